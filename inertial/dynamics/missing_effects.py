@@ -116,7 +116,8 @@ def _best_class(
     """The effects that reduce the residual of a fit most; None where none is significant.
 
     An effect is named only where it improves the model with a p-value below 10⁻³, times the number of candidates, and where
-    points that were left out gain by it: what only follows the fitted points, or their too small uncertainties, predicts no others.
+    points that were left out gain by it: what only follows the fitted points, or their too small uncertainties, predicts no
+    others.
     """
 
     def score(fit: Fitted) -> float:

@@ -7,11 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Literal
 
 from schemas.errors import WrongUse
 
 if TYPE_CHECKING:
+    from pipelines.certificates.documents import CalibrationDocument
     from pipelines.certificates.entries import LedgerEntry
 
 
@@ -56,7 +57,7 @@ class Calibration:
         return self.event.until
 
     @property
-    def state(self) -> str:
+    def state(self) -> Literal["valid", "superseded", "revoked"]:
         """``valid``, ``superseded`` or ``revoked``: its state, independent of the date."""
         if self.ended_by is None:
             return "valid"
@@ -66,7 +67,7 @@ class Calibration:
         """Whether it is valid on a day."""
         return self.start <= day < self.until
 
-    def document(self) -> dict[str, Any]:
+    def document(self) -> CalibrationDocument:
         """The calibration for JSON."""
         event = self.event
         ended = self.ended_by

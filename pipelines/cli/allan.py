@@ -7,24 +7,9 @@ from typing import Annotated, Any
 
 import typer
 
-from pipelines.cli.options import (
-    ArchiveOption,
-    JsonOption,
-    PageOption,
-    PlotOption,
-    RateOption,
-    SeriesArgument,
-    SeriesColumnsOption,
-    SeriesUnitOption,
-    StretchOption,
-    TimeColumnOption,
-    TimeUnitOption,
-    console,
-    error_console,
-    give,
-    print_table,
-    short,
-)
+from pipelines.archive import Archive
+from pipelines.cli import options
+from pipelines.cli.printing import error_console, give, print_table, say, short
 from schemas.errors import WrongUse, did_you_mean
 
 PART = "Results"
@@ -41,12 +26,12 @@ STATISTICS = ("allan", "modified", "hadamard", "total", "time", "tie", "mtie")
 
 
 def command(
-    source: SeriesArgument,
-    columns: SeriesColumnsOption = "",
-    time: TimeColumnOption = "",
-    time_unit: TimeUnitOption = "s",
-    rate: RateOption = None,
-    unit: SeriesUnitOption = "",
+    source: options.SeriesArgument,
+    columns: options.SeriesColumnsOption = "",
+    time: options.TimeColumnOption = "",
+    time_unit: options.TimeUnitOption = "s",
+    rate: options.RateOption = None,
+    unit: options.SeriesUnitOption = "",
     spacing: Annotated[
         str,
         typer.Option("--spacing", metavar="octave|decade", help="Averaging times: 1, 2, 4 … or 1, 2, 5, 10 … samples."),
@@ -60,12 +45,12 @@ def command(
             "interval error.",
         ),
     ] = STATISTICS[0],
-    stretch: StretchOption = None,
-    plot: PlotOption = None,
-    page: PageOption = None,
-    archive: ArchiveOption = None,
+    stretch: options.StretchOption = None,
+    plot: options.PlotOption = None,
+    page: options.PageOption = None,
+    archive: options.ArchiveOption = None,
     *,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Compute the overlapping Allan deviation of a record at rest, and the terms Q, N, B, K and R that explain it.
 
@@ -75,7 +60,6 @@ def command(
     Other statistics have an interval where its degrees of freedom are known. 'time', 'tie' and 'mtie' are of the integral
     of the output without its mean: the error of a velocity, in m/s for an output in g.
     """
-    from pipelines.archive import Archive
     from pipelines.chain.noise_documents import allan_document, allan_of_run, statistic_of_run
     from pipelines.cli.series_options import even_series, write_pictures
 
@@ -99,14 +83,11 @@ def command(
 
 
 def _print(document: dict[str, Any]) -> None:
-    out = console()
     span = document["samples"] / document["rate_hz"]
-    out.print(
-        f"{document['source']}: {document['samples']} samples at {short(document['rate_hz'], 5)} Hz, {short(span)} s",
-    )
+    say(f"{document['source']}: {document['samples']} samples at {short(document['rate_hz'], 5)} Hz, {short(span)} s")
     _print_terms(document) if document["statistic"] == STATISTICS[0] else _print_curves(document)
     for note in document["notes"]:
-        out.print(note, style="yellow")
+        say(note, style="yellow")
 
 
 def _print_terms(document: dict[str, Any]) -> None:

@@ -9,7 +9,10 @@ from typing import Annotated
 import typer
 
 from inertial.counts import number_of, size_text
-from pipelines.cli.options import ArchiveOption, JsonOption, console, print_json
+from pipelines.archive import Archive
+from pipelines.cli import options
+from pipelines.cli.printing import give_lines, refuse_standard_output
+from schemas.errors import DONE, PART_FAILED, WrongUse
 
 PART = "Certificates, trace, audit"
 ORDER = 460
@@ -49,34 +52,29 @@ app = typer.Typer(
 
 @app.command()
 def clean(
-    archive: ArchiveOption = None,
+    archive: options.ArchiveOption = None,
     *,
     only_look: Annotated[
         bool, typer.Option("--dry-run", help="Show what would be removed, and change nothing.")
     ] = False,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Remove temporary files of killed writers and add finished runs to the chain; files in use are not touched."""
-    from pipelines.archive import Archive
     from pipelines.archive.cleaning import clean as cleaned
 
     store = Archive(archive)
     store.refuse_none()
     done = cleaned(store, only_look=only_look)
-    if as_json:
-        print_json({"archive": str(store.root), "only_looked": only_look, **asdict(done)})
-        return
-    out = console()
-    for place in done.removed:
-        out.print(f"{'found' if only_look else 'removed'}  {place}")
-    for place in dict.fromkeys(done.busy):
-        out.print(f"in use   {place}")
-    for run in done.sealed:
-        out.print(f"sealed   {run}")
     word = "found" if only_look else "removed"
-    out.print(f"{number_of(len(done.removed), 'leftover')} of killed writers {word} ({size_text(done.bytes)})")
+    lines = [
+        *(f"{word}  {path}" for path in done.removed),
+        *(f"in use   {path}" for path in dict.fromkeys(done.busy)),
+        *(f"sealed   {run}" for run in done.sealed),
+        f"{number_of(len(done.removed), 'leftover')} of killed writers {word} ({size_text(done.bytes)})",
+    ]
     if done.anchored:
-        out.print(f"{number_of(done.anchored, 'calibration')} added to the chain")
+        lines.append(f"{number_of(done.anchored, 'calibration')} added to the chain")
+    give_lines({"archive": str(store.root), "only_looked": only_look, **asdict(done)}, lines, as_json=as_json)
 
 
 @app.command()
@@ -91,37 +89,29 @@ def key(
     public: Annotated[
         bool, typer.Option("--public", help="Show the public key of the existing key; make no key.")
     ] = False,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Make the key that signs manifests, outside the archive, and show its public key."""
     from pipelines.archive import signatures
-    from pipelines.cli.standard_output import refuse_standard_output
-    from schemas.errors import WrongUse
 
     refuse_standard_output(output, "archive key", "a private key is never printed")
-    place = output or signatures.default_key_place()
+    path = output or (signatures.key_place() if public else signatures.default_key_place())
+    if path is None:
+        raise WrongUse("archive key: no key exists, one is needed; make it with 'tumbleline archive key'")
     if public:
-        place = output or signatures.key_place()
-        if place is None:
-            raise WrongUse("archive key: no key exists, one is needed; make it with 'tumbleline archive key'")
-        made = signatures.private_key(place).public_key()
+        made = signatures.private_key(path).public_key()
     else:
-        within = next((one for one in place.resolve().parents if (one / "archive.json").is_file()), None)
+        within = next((folder for folder in path.resolve().parents if (folder / "archive.json").is_file()), None)
         if within is not None:
             raise WrongUse(
-                f"archive key: {place} lies in archive {within}, a place outside it is needed; give another with --output"
+                f"archive key: {path} lies in archive {within}, a place outside it is needed; give another with --output"
             )
-        made = signatures.make_key(place)
-    hexadecimal = made.public_bytes_raw().hex()
-    if as_json:
-        print_json({"name": signatures.name_of(made), "public": hexadecimal, "private_file": str(place)})
-        return
-    out = console()
-    out.print(f"key      {signatures.name_of(made)}")
-    out.print(f"public   {hexadecimal}")
-    out.print(f"private  {place}")
+        made = signatures.make_key(path)
+    name, hexadecimal = signatures.name_of(made), made.public_bytes_raw().hex()
+    lines = [f"key      {name}", f"public   {hexadecimal}", f"private  {path}"]
     if output is not None and not public:
-        out.print(f"to sign with this key, set TUMBLELINE_SIGNING_KEY={place}")
+        lines.append(f"to sign with this key, set TUMBLELINE_SIGNING_KEY={path}")
+    give_lines({"name": name, "public": hexadecimal, "private_file": str(path)}, lines, as_json=as_json)
 
 
 @app.command()
@@ -129,46 +119,40 @@ def backup(
     target: Annotated[
         str, typer.Argument(metavar="COPY", help="Folder or address of the copy: empty, or an earlier copy.")
     ],
-    archive: ArchiveOption = None,
+    archive: options.ArchiveOption = None,
     database: Annotated[
         Path | None,
         typer.Option("--database", metavar="DIR", help="Also copy the database of the orchestrator into this folder."),
     ] = None,
     keep: Annotated[int, typer.Option("--keep", min=1, help="Number of copies of the database to keep.")] = 14,
     *,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Copy the archive to another disk or store, also during runs; a repeated copy adds only what is new.
 
     The database of the orchestrator is that of PREFECT_SERVER_DATABASE_CONNECTION_URL (PostgreSQL), else prefect.db in
     PREFECT_HOME. It holds the history of runs only; the archive does not need it.
     """
-    from pipelines.archive import Archive
     from pipelines.archive.backup import copy_archive
     from pipelines.orchestrator.database import copy_into
 
     source, copy = Archive(archive), Archive(target)
     made = copy_into(database, keep) if database is not None else None
     done = copy_archive(source, copy)
-    if as_json:
-        file = None if made is None else str(made)
-        print_json({"archive": str(source.root), "copy": str(copy.root), "database": file, **asdict(done)})
-        return
-    out = console()
-    counted = f"{number_of(done.files, 'file')} copied ({size_text(done.bytes)}), {done.present} already there"
-    out.print(counted)
-    if made is not None:
-        out.print(f"database  {made}")
+    file = None if made is None else str(made)
+    document = {"archive": str(source.root), "copy": str(copy.root), "database": file, **asdict(done)}
+    lines = [f"{number_of(done.files, 'file')} copied ({size_text(done.bytes)}), {done.present} already there"]
+    give_lines(document, [*lines, *([f"database  {file}"] if file else [])], as_json=as_json)
 
 
 @app.command()
 def compact(
-    archive: ArchiveOption = None,
+    archive: options.ArchiveOption = None,
     before: Annotated[
         str, typer.Option("--before", metavar="DATE", help="Only runs that began before this day; default: all.")
     ] = "",
     *,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Put the files of finished runs, their captures and the calibrations into a few large files, one for each month.
 
@@ -177,10 +161,8 @@ def compact(
     """
     from datetime import date
 
-    from pipelines.archive import Archive
     from pipelines.archive.compaction import compact as compacted
     from pipelines.audit.index import up_to_date
-    from schemas.errors import WrongUse
 
     try:
         day = date.fromisoformat(before).isoformat() if before else ""
@@ -190,24 +172,20 @@ def compact(
     store.refuse_none()
     done = compacted(store, day)
     up_to_date(store)
-    if as_json:
-        print_json({"archive": str(store.root), **asdict(done)})
-        return
-    out = console()
-    for name in done.packs:
-        out.print(f"written  packed/{name}")
-    for name in done.kept:
-        out.print(f"kept     {name}: changed, or in use; the next compaction packs it")
-    for name in done.unfinished:
-        out.print(f"open     {name}: not finished, left as it is")
     packed = f"{number_of(done.packed, 'file')} packed ({size_text(done.bytes)})"
-    out.print(f"{packed}, {number_of(done.freed, 'single file')} removed")
+    lines = [
+        *(f"written  packed/{name}" for name in done.packs),
+        *(f"kept     {name}: changed, or in use; the next compaction packs it" for name in done.kept),
+        *(f"open     {name}: not finished, left as it is" for name in done.unfinished),
+        f"{packed}, {number_of(done.freed, 'single file')} removed",
+    ]
+    give_lines({"archive": str(store.root), **asdict(done)}, lines, as_json=as_json)
 
 
 @app.command()
 def restore(
     source: Annotated[str, typer.Argument(metavar="COPY", help="Folder or address of the copy.")],
-    archive: ArchiveOption = None,
+    archive: options.ArchiveOption = None,
     database: Annotated[
         Path | None,
         typer.Option(
@@ -215,31 +193,27 @@ def restore(
         ),
     ] = None,
     *,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Copy an archive back into an empty folder and verify it; exit 1 where the verification has findings.
 
     Stop the server and the workers first. The key that signs the archive is not part of a copy: keep it elsewhere.
     """
-    from pipelines.archive import Archive
     from pipelines.archive.backup import copy_archive
     from pipelines.archive.signatures import public_keys
     from pipelines.integrity.archive import verify
     from pipelines.orchestrator.database import default_database, restore_database
-    from schemas.errors import DONE, PART_FAILED
 
     copy, target = Archive(source), Archive(archive)
     done = copy_archive(copy, target)  # before the database: an archive that is refused leaves the database as it is
     if database is not None:
         restore_database(database, default_database())
     report = verify(target, keys=public_keys(()))
-    if as_json:
-        place = {"archive": str(target.root), "copy": str(copy.root), "whole": report.whole, "head": report.head}
-        print_json({**place, **asdict(done)})
-    else:
-        out = console()
-        counted = f"{number_of(done.files, 'file')} copied ({size_text(done.bytes)})"
-        out.print(f"{counted}, {done.present} already there")
-        state = "nothing is wrong" if report.whole else "run 'tumbleline verify' for the findings"
-        out.print(f"verified: {number_of(report.runs, 'run')}, {state}")
+    document = {"archive": str(target.root), "copy": str(copy.root), "whole": report.whole, "head": report.head}
+    state = "nothing is wrong" if report.whole else "run 'tumbleline verify' for the findings"
+    lines = [
+        f"{number_of(done.files, 'file')} copied ({size_text(done.bytes)}), {done.present} already there",
+        f"verified: {number_of(report.runs, 'run')}, {state}",
+    ]
+    give_lines({**document, **asdict(done)}, lines, as_json=as_json)
     raise typer.Exit(DONE if report.whole else PART_FAILED)

@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pipelines.cli.options import ArchiveOption, JsonOption, console, error_console, print_json, short
-from schemas.errors import DONE, PART_FAILED, WrongUse
+from pipelines.archive import Archive
+from pipelines.cli import options
+from pipelines.cli.printing import print_json, remark, say, short
+from schemas.errors import DONE, PART_FAILED, WrongUse, did_you_mean
 
 if TYPE_CHECKING:
     from pipelines.audit.audit import Audit
@@ -23,10 +25,11 @@ EXAMPLES = (
 )
 
 SHOWN = 12  # findings of one kind
+BEGINNING = -700000.0  # days before any calibration
 
 
 def command(
-    archive: ArchiveOption = None,
+    archive: options.ArchiveOption = None,
     since: Annotated[
         str,
         typer.Option("--since", metavar="DATE", help="Changes, signals and figures from this day on; all by default."),
@@ -52,10 +55,9 @@ def command(
         int | None, typer.Option("--workers", min=1, help="Processes that read runs; as many as cores by default.")
     ] = None,
     *,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Audit the archive: re-calibrations due, drift, stations, check standards, population. Exit status 1: there are findings."""
-    from pipelines.archive import Archive
     from pipelines.audit.audit import audit
     from pipelines.audit.document import document
     from pipelines.audit.findings import findings
@@ -70,19 +72,22 @@ def command(
     _refuse_nothing(audited, str(store.root))
     audit_findings = findings(audited)
     if page is not None:
-        _write_page(page, audited, audit_findings, str(store.root))
+        from pipelines.archive.files import ELSEWHERE, publish
+        from pipelines.audit.page import render
+
+        publish(page, render(audited, audit_findings, str(store.root)).encode(), "audit", ELSEWHERE)
     if as_json:
         print_json(document(audited, audit_findings, str(store.root)))
     else:
-        _show(audited, audit_findings, page)
+        _show(audited, audit_findings)
+        if page is not None:
+            remark(f"page    {page}")
     raise typer.Exit(PART_FAILED if audit_findings else DONE)
 
 
 def _refuse_nothing(audited: Audit, root: str) -> None:
     """Refuse an unknown name, and an archive without calibrations before the day."""
     import numpy as np
-
-    from schemas.errors import did_you_mean
 
     for option, name, there in (
         ("--device", audited.scope.device.upper(), audited.all.device),
@@ -97,40 +102,33 @@ def _refuse_nothing(audited: Audit, root: str) -> None:
         )
 
 
-def _write_page(page: Path, audited: Audit, audit_findings: list[AuditFinding], root: str) -> None:
-    from pipelines.archive.files import ELSEWHERE, publish
-    from pipelines.audit.page import render
-
-    publish(page, render(audited, audit_findings, root).encode(), "audit", ELSEWHERE)
-
-
-def _show(audited: Audit, audit_findings: list[AuditFinding], page: Path | None) -> None:
+def _show(audited: Audit, audit_findings: list[AuditFinding]) -> None:
     from inertial.counts import number_of
     from pipelines.audit.calibrations import date_of
     from pipelines.audit.document import counts
     from pipelines.audit.finding import WHO
 
-    out, number = console(), counts(audited)
-    period = f"{date_of(audited.scope.since)} to {date_of(audited.scope.until - 1)}" if audited.scope.since > _BEGINNING else (
-        f"all until {date_of(audited.scope.until - 1)}"
-    )  # fmt: skip
+    number, until = counts(audited), date_of(audited.scope.until - 1)
+    everything = audited.scope.since <= BEGINNING
+    period = f"all until {until}" if everything else f"{date_of(audited.scope.since)} to {until}"
     counted = ", ".join(number_of(number[f"{noun}s"], noun) for noun in ("calibration", "unit", "run", "station"))
-    out.print(f"{counted}; {period}")
-    _show_yield(audited)
-    out.print(_certificates(audited))
+    say(f"{counted}; {period}")
+    shares: list[Any] = [share for share in audited.yields if share.of in {"all", "station"} and share.total]
+    if shares:
+        say(f"yield   {', '.join(f'{share.name} {short(100.0 * share.interval.value)} %' for share in shares)}")
+    say(_certificates(audited))
     for who, words in WHO.items():
-        own = [finding for finding in audit_findings if finding.who == who]
-        if own:
-            out.print(f"\n{words}", style="bold")
-        for kind in dict.fromkeys(finding.kind for finding in own):
-            _show_kind([finding for finding in own if finding.kind == kind])
+        of_one = [finding for finding in audit_findings if finding.who == who]
+        if of_one:
+            say(f"\n{words}", style="bold")
+        for kind in dict.fromkeys(finding.kind for finding in of_one):
+            messages = [finding.message for finding in of_one if finding.kind == kind]
+            for message in messages[:SHOWN]:
+                say(f"  · {message}")
+            if len(messages) > SHOWN:
+                say(f"  · … {len(messages) - SHOWN} more of this kind; --json and --page list all", style="dim")
     if not audit_findings:
-        out.print("no action is needed")
-    if page is not None:
-        error_console().print(f"page    {page}")
-
-
-_BEGINNING = -700000.0  # days before any calibration
+        say("no action is needed")
 
 
 def _certificates(audited: Audit) -> str:
@@ -139,17 +137,3 @@ def _certificates(audited: Audit) -> str:
         return "ledger  nothing is certified: units are due an interval after their last pass"
     valid = f"{int(audited.due.valid.sum())} of {audited.due.row.size} units have one that is valid on {audited.certificates.day}"
     return f"ledger  {len(audited.certificates)} certificates; {valid}"
-
-
-def _show_kind(own: list[AuditFinding]) -> None:
-    for finding in own[:SHOWN]:
-        console().print(f"  · {finding.message}")
-    if len(own) > SHOWN:
-        console().print(f"  · … {len(own) - SHOWN} more of this kind; --json and --page list all", style="dim")
-
-
-def _show_yield(audited: Audit) -> None:
-    shares: list[Any] = [share for share in audited.yields if share.of in {"all", "station"}]
-    parts = [f"{share.name} {short(100.0 * share.interval.value)} %" for share in shares if share.total]
-    if parts:
-        console().print(f"yield   {', '.join(parts)}")

@@ -7,10 +7,11 @@ names of files itself where there are none.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pipelines.archive import RunInfo
+from pipelines.archive import Archive
 from schemas.errors import TumblelineError
 
 if TYPE_CHECKING:
@@ -19,8 +20,8 @@ if TYPE_CHECKING:
 
 def attach(command: Command) -> Command:
     """The command, each parameter with its candidates."""
-    for one in [command, *getattr(command, "commands", {}).values()]:
-        for parameter in one.params:
+    for subcommand in [command, *getattr(command, "commands", {}).values()]:
+        for parameter in subcommand.params:
             names = candidates_of(parameter)
             if names is not None:
                 completes: Any = parameter
@@ -51,29 +52,29 @@ def _completer(names: Callable[[Context], Iterable[str]]) -> Callable[[Context, 
     return complete
 
 
-def _infos(ctx: Context) -> list[RunInfo]:
-    from pipelines.archive import Archive
-
-    return Archive(ctx.params.get("archive")).runs()
+def _archive(ctx: Context) -> Archive:
+    return Archive(ctx.params.get("archive"))
 
 
 def _runs(ctx: Context) -> list[str]:
-    from pipelines.archive import Archive
-
-    return ["latest", *Archive(ctx.params.get("archive")).run_ids()]
+    return ["latest", *_archive(ctx).run_ids()]
 
 
 def _units(ctx: Context) -> list[str]:
-    return [unit for info in _infos(ctx) for unit in info.units]
+    return [unit for info in _archive(ctx).runs() for unit in info.units]
 
 
 def _runs_and_units(ctx: Context) -> list[str]:
-    infos = _infos(ctx)
+    infos = _archive(ctx).runs()
     return ["latest", *(info.id for info in infos), *(unit for info in infos for unit in info.units)]
 
 
 def _selections(ctx: Context) -> list[str]:
     return ["all", *_runs(ctx)]
+
+
+def _tables(ctx: Context) -> list[str]:
+    return _archive(ctx).run(str(ctx.params.get("run") or "latest")).tables()
 
 
 def _recipes(ctx: Context) -> list[str]:
@@ -97,12 +98,6 @@ def _stations(ctx: Context) -> list[str]:
     return [BUILT_IN, *own_names("stations"), *_files("*.toml")]
 
 
-def _effects(ctx: Context) -> list[str]:
-    from inertial.effects import catalogue
-
-    return list(catalogue())
-
-
 def _effects_with_value(ctx: Context) -> list[str]:
     """The beginning of EFFECT=µg; the value has no candidates."""
     return [f"{name}=" for name in _effects(ctx)]
@@ -114,42 +109,6 @@ def _hidden(ctx: Context) -> list[str]:
     return ["random", *(scene.kind for scene in SCENES)]
 
 
-def _presets(ctx: Context) -> list[str]:
-    from stations.plant.preset import preset_names
-
-    return preset_names()
-
-
-def _profiles(ctx: Context) -> list[str]:
-    from stations.profile_files import profile_names
-
-    return profile_names()
-
-
-def _faults(ctx: Context) -> list[str]:
-    from stations.plant.faults.catalogue import kinds
-
-    return list(kinds())
-
-
-def _formats(ctx: Context) -> list[str]:
-    from pipelines.export import FORMATS
-
-    return list(FORMATS)
-
-
-def _tables(ctx: Context) -> list[str]:
-    from pipelines.archive import Archive
-
-    return Archive(ctx.params.get("archive")).run(str(ctx.params.get("run") or "latest")).tables()
-
-
-def _subjects(ctx: Context) -> list[str]:
-    from pipelines.cli.keys import SUBJECTS
-
-    return list(SUBJECTS)
-
-
 def _files(pattern: str) -> list[str]:
     """Files of the working folder; those of other folders are typed, or completed by the shell."""
     return [path.name for path in Path().glob(pattern)]
@@ -158,6 +117,18 @@ def _files(pattern: str) -> list[str]:
 def _data(ctx: Context) -> list[str]:
     return [*_runs(ctx), *_files("*.parquet"), *_files("*.csv")]
 
+
+def _of(module: str, name: str) -> Callable[[Context], Iterable[str]]:
+    """The names in a registry, or those that a function returns; its module is imported when they are asked for."""
+
+    def names(_ctx: Context) -> Any:
+        registry: Any = getattr(import_module(module), name)
+        return registry() if callable(registry) else registry
+
+    return names
+
+
+_effects = _of("inertial.effects", "catalogue")
 
 SOURCES: dict[tuple[str, str], Callable[[Context], Iterable[str]]] = {
     ("recipe", "RECIPE"): _recipes,
@@ -185,11 +156,11 @@ SOURCES: dict[tuple[str, str], Callable[[Context], Iterable[str]]] = {
     ("required_errors", "EFFECT="): _effects_with_value,
     ("see", ""): _effects,
     ("part", ""): _effects,
-    ("name", "PROFILE"): _profiles,
-    ("device", "PRESET"): _presets,
-    ("fault", "KIND"): _faults,
-    ("form", ""): _formats,
+    ("name", "PROFILE"): _of("stations.profile_files", "profile_names"),
+    ("device", "PRESET"): _of("stations.plant.preset", "preset_names"),
+    ("fault", "KIND"): _of("stations.plant.faults.catalogue", "kinds"),
+    ("form", ""): _of("pipelines.export", "FORMATS"),
     ("table", "TABLE"): _tables,
-    ("subject", "SUBJECT"): _subjects,
+    ("subject", "SUBJECT"): _of("pipelines.cli.keys", "SUBJECTS"),
 }
 """The source of candidates by the name of a parameter and a part of its notation, the narrower notation first."""

@@ -7,7 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pipelines.cli.options import ArchiveOption, JsonOption, console, error_console, print_json
+from pipelines.archive import Archive
+from pipelines.cli import options
+from pipelines.cli.printing import give_lines, refuse_standard_output, remark
+from schemas.errors import DONE, PART_FAILED
 
 if TYPE_CHECKING:
     from pipelines.certificates.document.issue import Issued
@@ -44,33 +47,27 @@ def command(
     address: Annotated[
         str, typer.Option("--address", metavar="URL", help="Print a QR code of this address; {number} is filled in.")
     ] = "",
-    archive: ArchiveOption = None,
+    archive: options.ArchiveOption = None,
     *,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Write, for every certified unit, SERIAL_N.pdf and SERIAL_N.xml with the content of ISO/IEC 17025, 7.8.2 and 7.8.4.
 
     A unit has to be certified before ('tumbleline certify'): the number of its certificate is the one in the ledger. The same
     certificate gives the same bytes, unless it is signed. Exit status 1: some units of a run have no certificate.
     """
-    from pipelines.archive import Archive
     from pipelines.certificates.document.issue import issue
     from pipelines.certificates.document.laboratory import read_laboratory
     from pipelines.certificates.document.signing import read_key
-    from pipelines.cli.standard_output import refuse_standard_output
-    from schemas.errors import DONE, PART_FAILED
 
     refuse_standard_output(output, "certificate", "a folder for PDF and XML")
     who = read_laboratory(laboratory)
     key = None if sign_with is None else read_key(sign_with, password_file)
     done = issue(Archive(archive), names, who, output, key=key, address=address)
-    if as_json:
-        print_json(_document(done))
-    else:
-        for one in done.written:
-            console().print(f"certificate {one.number}: {one.pdf}, {one.xml}")
+    lines = [f"certificate {one.number}: {one.pdf}, {one.xml}" for one in done.written]
+    give_lines(_document(done), lines, as_json=as_json)
     for serial, why in done.left_out.items():
-        error_console().print(f"certificate: {serial}: {why}")
+        remark(f"certificate: {serial}: {why}")
     raise typer.Exit(PART_FAILED if done.left_out else DONE)
 
 

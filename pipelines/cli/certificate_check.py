@@ -8,14 +8,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pipelines.archive import Archive
-from pipelines.cli.options import console, print_json
+from pipelines.cli.printing import print_json, say
 from schemas.errors import WrongUse
 
 if TYPE_CHECKING:
     from pipelines.certificates.document.file_check import CheckedFile
 
 ENDINGS = (".pdf", ".xml", ".sig")
-STYLES = {"good": None, "bad": "bold red", "not checked": "yellow"}
+STYLES = {"good": "", "bad": "bold red", "not checked": "yellow"}
 
 
 def certificate_files(names: Sequence[str]) -> list[Path]:
@@ -85,21 +85,20 @@ def _document(one: CheckedFile) -> dict[str, Any]:
 
 
 def _print(one: CheckedFile) -> None:
-    out = console()
     head = f"{one.path}: certificate {one.facts.number}, unit {one.facts.serial}" if one.facts else str(one.path)
-    out.print(head, style="bold")
+    say(head, style="bold")
     for check in one.checks:
         mark = {"good": "ok", "bad": "WRONG", "not checked": "-"}[check.state]
-        out.print(f"  {mark:<6}{check.check:<11} {check.message}", style=STYLES[check.state])
+        say(f"  {mark:<6}{check.check:<11} {check.message}", style=STYLES[check.state])
     wrong = sum(check.state == "bad" for check in one.checks)
     if wrong:
-        out.print(f"  not accepted: {wrong} of {len(one.checks)} checks failed", style="bold red")
+        say(f"  not accepted: {wrong} of {len(one.checks)} checks failed", style="bold red")
     elif one.accepted:
         by = {"signature": "a trusted signature", "archive": "the archive"}
         proven = " and ".join(by[name] for name in one.proven_by)
-        out.print(f"  accepted: nothing is wrong, proven by {proven}", style="bold green")
+        say(f"  accepted: nothing is wrong, proven by {proven}", style="bold green")
     else:
-        out.print(
+        say(
             f"  not accepted: nothing is wrong, and nothing shows where the file comes from; {_needed(one)}",
             style="bold yellow",
         )

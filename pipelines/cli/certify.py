@@ -7,16 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from inertial.counts import number_of
-from pipelines.archive import Run
-from pipelines.cli.options import (
-    ArchiveOption,
-    JsonOption,
-    RunArgument,
-    console,
-    error_console,
-    give,
-    print_table,
-)
+from pipelines.archive import Archive, Run
+from pipelines.cli import options
+from pipelines.cli.printing import error_console, give, print_table, remark, say
+from schemas.errors import DONE, PART_FAILED, ArchiveUnusable
 
 if TYPE_CHECKING:
     from pipelines.chain.certify import Certified
@@ -31,7 +25,7 @@ EXAMPLES = (
 
 
 def command(
-    run: RunArgument = "latest",
+    run: options.RunArgument = "latest",
     units: Annotated[
         str, typer.Option("--units", metavar="SN,…", help="Certify only these units; default: all that passed.")
     ] = "",
@@ -54,12 +48,12 @@ def command(
             "--key", metavar="FILE|HEX", help="Another public key that is accepted for the signatures of the run."
         ),
     ] = None,
-    archive: ArchiveOption = None,
+    archive: options.ArchiveOption = None,
     *,
     supersede: Annotated[
         bool, typer.Option("--supersede", help="Also end calibrations that begin later and overlap.")
     ] = False,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Certify the units of a run that passed, with first and last day of validity.
 
@@ -67,12 +61,10 @@ def command(
     which the new one begins, so that a unit has one valid calibration on each day. The report of the run is made again and names
     the certificates. Exit status 1: some units of the run did not pass and have no certificate.
     """
-    from pipelines.archive import Archive
     from pipelines.archive.signatures import public_keys
     from pipelines.certificates import Ledger
     from pipelines.chain.certify import certify
     from pipelines.report import renew_report
-    from schemas.errors import DONE, PART_FAILED, ArchiveUnusable
 
     store = Archive(archive)
     serials = tuple(serial.strip() for serial in units.split(",")) if units else ()
@@ -82,15 +74,11 @@ def command(
         keys=public_keys() | (public_keys(key) if key else {}),
     )  # fmt: skip
     try:
-        if source.about.get("capture"):
+        with error_console().status("drawing the report"):
             renew_report(source)
-        elif source.report.is_file():
-            from pipelines.cli.imported_report import make_imported_report
-
-            make_imported_report(source)
     except ArchiveUnusable as problem:  # the certificates are written; the old report may show other coefficients
-        error_console().print(f"certify: the report was not made again: {problem}")
-    give(_document(source.id, done), lambda _: _print(source.id, done), as_json=as_json)
+        remark(f"certify: the report was not made again: {problem}")
+    give(_document(source.id, done), _print, as_json=as_json)
     raise typer.Exit(PART_FAILED if done.left_out else DONE)
 
 
@@ -106,7 +94,7 @@ def _print_run(run: Run) -> None:
         *library_remarks(run),
     ]
     for line in lines:
-        error_console().print(f"certify: {line}")
+        remark(f"certify: {line}")
 
 
 def _document(run: str, done: Certified) -> dict[str, Any]:
@@ -120,28 +108,17 @@ def _document(run: str, done: Certified) -> dict[str, Any]:
     }
 
 
-def _print(run: str, done: Certified) -> None:
-    there = {event.certificate for event in done.there}
+def _print(document: dict[str, Any]) -> None:
     lines = [
-        [
-            e.certificate,
-            e.grade,
-            e.start,
-            e.until,
-            "already certified" if e.certificate in there else e.action,
-            _ended(e.ends),
-        ]
-        for e in sorted(done.events, key=lambda event: event.serial)
-    ]
+        [e["certificate"], e["grade"], e["from"], e["until"], "already certified" if e["was_there"] else e["action"],
+         ", ".join(f"/{number}" for number in e["ends"])]
+        for e in sorted(document["certified"], key=lambda entry: entry["serial"])
+    ]  # fmt: skip
     if lines:
-        print_table(["certificate", "grade", "from", "until", "entry", "ends"], lines, title=f"run {run}")
-        console().print(
-            f"The documents: tumbleline certificate {run} --laboratory FILE (docs/how-to/issue-a-certificate.md)",
+        print_table(["certificate", "grade", "from", "until", "entry", "ends"], lines, title=f"run {document['run']}")
+        say(
+            f"The documents: tumbleline certificate {document['run']} --laboratory FILE (docs/how-to/issue-a-certificate.md)",
             style="dim",
         )
-    for serial, why in done.left_out.items():
-        console().print(f"  {serial} not certified: {why}")
-
-
-def _ended(sequences: tuple[int, ...]) -> str:
-    return ", ".join(f"/{number}" for number in sequences)
+    for serial, why in document["left_out"].items():
+        say(f"  {serial} not certified: {why}")

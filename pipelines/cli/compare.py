@@ -2,30 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from pipelines.cli.options import (
-    ArchiveOption,
-    DwellsArgument,
-    EffectFileOption,
-    EffectsOption,
-    FormulaOption,
-    FreshHistoryOption,
-    FreshOption,
-    HistoryOption,
-    JsonOption,
-    LeaveOutOption,
-    ModelOption,
-    console,
-    error_console,
-    give,
-    print_table,
-    short,
-    short_values,
-)
-
-if TYPE_CHECKING:
-    import pandas as pd
+from pipelines.cli import options
+from pipelines.cli.printing import error_console, give, print_table, say, short, short_values
 
 PART = "Is the model good enough, and what is missing?"
 ORDER = 240
@@ -39,52 +19,36 @@ POSES = 6
 
 
 def command(
-    dwells: DwellsArgument,
-    effects: EffectsOption = "",
-    model: ModelOption = None,
-    fresh: FreshOption = "",
-    history: HistoryOption = "",
-    fresh_history: FreshHistoryOption = "",
-    effect_file: EffectFileOption = None,
-    formula: FormulaOption = None,
-    leave_out: LeaveOutOption = "",
-    archive: ArchiveOption = None,
+    dwells: options.DwellsArgument,
+    effects: options.EffectsOption = "",
+    model: options.ModelOption = None,
+    fresh: options.FreshOption = "",
+    history: options.HistoryOption = "",
+    fresh_history: options.FreshHistoryOption = "",
+    effect_file: options.EffectFileOption = None,
+    formula: options.FormulaOption = None,
+    leave_out: options.LeaveOutOption = "",
+    archive: options.ArchiveOption = None,
     *,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Fit a model to dwells; state its error there, on dwells left out, and on a fresh run with the coefficients unchanged."""
-    from pipelines.cli.inputs import add_effect_files, add_formulas, both_runs, judged_effects, without_dwells
-    from pipelines.diagnosis.diagnose import default_model
+    from pipelines.cli.inputs import add_effects, both_runs, without_dwells
+    from pipelines.diagnosis.diagnose import compare, default_model
+    from pipelines.diagnosis.inputs import judged_effects
 
-    add_effect_files(effect_file)
-    add_formulas(formula, "compare")
+    add_effects(effect_file, formula, "compare")
     chosen = judged_effects(dwells, archive, effects, model, "compare")
     first, temperatures, again, again_temperatures = both_runs(dwells, history, fresh, fresh_history, archive)
     table, _ = without_dwells(first, leave_out)
-    document = compared(chosen or default_model(table), table, temperatures, again, again_temperatures)
+    with error_console().status("fitting"):
+        document = compare(table, chosen or default_model(table), temperatures, again, again_temperatures)
     give(document, print_comparison, as_json=as_json)
-
-
-def compared(
-    effects: list[str],
-    dwells: pd.DataFrame,
-    history: pd.DataFrame | None,
-    fresh: pd.DataFrame | None,
-    fresh_history: pd.DataFrame | None,
-) -> dict[str, Any]:
-    """The comparison, on one thread: the matrices are small."""
-    from threadpoolctl import threadpool_limits
-
-    with threadpool_limits(1), error_console().status("fitting"):
-        from pipelines.diagnosis.diagnose import compare  # loads the search for effects: after the first line
-
-        return compare(dwells, effects, history, fresh, fresh_history)
 
 
 def print_comparison(document: dict[str, Any], poses: int = POSES) -> None:
     """Print a comparison for people, with so many of the worst poses."""
-    out = console()
-    out.print(f"model  {', '.join(document['effects'])}")
+    say(f"model  {', '.join(document['effects'])}")
     lines = [
         ["fitted to these dwells", short(document["rms_ug"])],
         ["dwells left out: the worst of poses, soaks, stretches of time", short(document["heldout_rms_ug"])],
@@ -93,7 +57,7 @@ def print_comparison(document: dict[str, Any], poses: int = POSES) -> None:
         lines.append(["fresh run, coefficients unchanged", short(document["fresh_rms_ug"])])
     lines.append(["noise assumed by this fit", short(document["floor_ug"])])
     print_table(["error", "rms\nµg"], lines)
-    out.print(
+    say(
         "The noise assumed by the fit includes what is missing from the model; 'tumbleline diagnose' states the noise of the "
         "measurement.",
         style="dim",
@@ -111,7 +75,7 @@ def print_comparison(document: dict[str, Any], poses: int = POSES) -> None:
         print_table(["force x y z\ng", "dwells", "rms\nµg"], worst, title="Worst poses")
     _parameters(document)
     for text in document["warnings"]:
-        out.print(f"warning: {text}", style="yellow")
+        say(f"warning: {text}", style="yellow")
 
 
 def _parameters(document: dict[str, Any]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import secrets
 from collections.abc import Generator
 from contextlib import contextmanager
 from pathlib import Path
@@ -9,7 +10,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pipelines.cli.options import JsonOption, console, error_console, print_json, print_table, short
+from pipelines.cli import options
+from pipelines.cli.next_commands import command_line, extension, judged_data
+from pipelines.cli.printing import error_console, give_lines, print_json, publish, say
+from pipelines.cli.text.demo_text import print_ending
 from schemas.progress import Progress
 
 if TYPE_CHECKING:
@@ -41,7 +45,7 @@ def command(
     by_hand: Annotated[
         bool, typer.Option("--by-hand", help="Only measure and write the files; continue with the commands yourself.")
     ] = False,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Hide an effect in the simulated station and find it from the measurements: compare, diagnose, extend, compare.
 
@@ -51,7 +55,7 @@ def command(
     from pipelines.demo.measure import measure
     from pipelines.demo.scenes import scene
 
-    drawn = _seed() if seed is None else seed
+    drawn = secrets.randbelow(100000) if seed is None else seed
     hidden = scene(effect, drawn)
     with writing(folder, "demo", ELSEWHERE):
         folder.mkdir(parents=True, exist_ok=True)
@@ -66,12 +70,6 @@ def command(
     document = game.play()
     if as_json:
         print_json({"seed": drawn, **document})
-
-
-def _seed() -> int:
-    import secrets
-
-    return secrets.randbelow(100000)
 
 
 @contextmanager
@@ -89,22 +87,17 @@ def _bar() -> Generator[Progress]:
 
 
 def _hand_over(folder: Path, hidden: Scene, *, as_json: bool) -> None:
-    names = ("dwells", "history", "fresh", "fresh-history")
-    if as_json:
-        print_json({"folder": str(folder), "files": [f"{n}.parquet" for n in names], "effects": list(hidden.model)})
-        return
-    out = console()
-    out.print(
-        f"The lot was measured twice, with one hidden effect. Files in {folder}: {', '.join(f'{n}.parquet' for n in names)}.",
-    )
-    out.print("Begin with")
-    out.print(f"  {_command('diagnose', folder, hidden.model)}")
+    files = [f"{name}.parquet" for name in ("dwells", "history", "fresh", "fresh-history")]
+    lines = [
+        f"The lot was measured twice, with one hidden effect. Files in {folder}: {', '.join(files)}.",
+        "Begin with",
+        f"  {_command('diagnose', folder, hidden.model)}",
+    ]
+    give_lines({"folder": str(folder), "files": files, "effects": list(hidden.model)}, lines, as_json=as_json)
 
 
 def _command(name: str, folder: Path, model: tuple[str, ...] | None) -> str:
     """A command to type, on the files of the demonstration."""
-    from pipelines.cli.next_commands import command_line
-
     chosen = ["--effects", ",".join(model)] if model else ["--model", str(folder / "model.toml")]
     again = ["--fresh", str(folder / "fresh.parquet"), "--fresh-history", str(folder / "fresh-history.parquet")]
     start = [name, str(folder / "dwells.parquet"), *chosen, "--history", str(folder / "history.parquet")]
@@ -120,61 +113,63 @@ class _Game:
 
     def play(self) -> dict[str, Any]:
         """Play all steps of the demonstration; return the result."""
-        self._say(
-            f"Four units were measured on the simulated station, {self.lot.dwells['dwell'].nunique()} dwells each, and then once "
-            "more. The station or the devices have an effect that the model does not contain."
-        )
+        if not self.quiet:
+            say(
+                f"Four units were measured on the simulated station, {self.lot.dwells['dwell'].nunique()} dwells each, and then "
+                "once more. The station or the devices have an effect that the model does not contain."
+            )
         before = self._compare("1. How good is the model?", first=True)
         diagnosis = self._diagnose()
         added = self._extend(diagnosis["recommended"])
         after = self._compare("4. How good is the extended model?", first=False) if added else before
-        named = {name for group in diagnosis["classes"] for name in group["effects"]}
-        several = [group["effects"] for group in diagnosis["classes"] if len(group["effects"]) > 1]
+        classes = [group["effects"] for group in diagnosis["classes"]]
+        several = [effects for effects in classes if len(effects) > 1]
         document = {
             "hidden": {"kind": self.hidden.kind, "effect": self.hidden.effect, "physics": self.hidden.truth},
-            "classes": [group["effects"] for group in diagnosis["classes"]],
+            "classes": classes,
             "recommended": diagnosis["recommended"],
             "unseen": diagnosis["unseen"],
             "added": added,
-            "found": self.hidden.effect in named,
-            "told_apart": [self.hidden.effect] in [group["effects"] for group in diagnosis["classes"]],
+            "found": any(self.hidden.effect in effects for effects in classes),
+            "told_apart": [self.hidden.effect] in classes,
             "not_told_apart": several,
             "next_measurements": diagnosis["next_measurements"] if several else [],
             "before": _errors(before),
             "after": _errors(after),
             "folder": str(self.folder),
         }
-        self._reveal(document)
+        if not self.quiet:
+            self._step("5. What was hidden?", "")
+            print_ending(document)
         return document
 
     def _compare(self, title: str, *, first: bool) -> dict[str, Any]:
-        from pipelines.cli.compare import compared, print_comparison
+        from pipelines.cli.compare import print_comparison
+        from pipelines.diagnosis.diagnose import compare
 
         self._step(title, _command("compare", self.folder, self.hidden.model if first else None))
         lot = self.lot
-        document = compared(self.model, lot.dwells, lot.history, lot.fresh, lot.fresh_history)
+        with error_console().status("fitting"):
+            document = compare(lot.dwells, self.model, lot.history, lot.fresh, lot.fresh_history)
         if not self.quiet:
             print_comparison(document, poses=0)
         return document
 
     def _diagnose(self) -> dict[str, Any]:
-        from pipelines.cli.diagnose import diagnosed, write_report
+        from pipelines.cli.diagnose import diagnosed
         from pipelines.cli.text.diagnosis_text import print_diagnosis
 
         self._step("2. What is missing?", _command("diagnose", self.folder, self.hidden.model))
         source = str(self.folder / "dwells.parquet")
         document, report = diagnosed(self.lot.dwells, self.lot.history, self.model, source, with_report=True)
         document["history"] = str(self.folder / "history.parquet")
-        write_report(self.folder / "report.html", report)
-        if not self.quiet:
-            file = self.folder / "model.toml"
-            print_diagnosis(document, data=None, model=file)  # the next step of the game adds the effect
+        publish(self.folder / "report.html", report, "report")
+        if not self.quiet:  # without commands: the next step of the game adds the effect
+            print_diagnosis(document, data=None, model=self.folder / "model.toml")
         return document
 
     def _extend(self, recommended: list[str]) -> list[str]:
         """The effects added, written to the model file one version each."""
-        from pipelines.cli.next_commands import extension, judged_data
-
         chosen = self._asked_for(recommended)
         file = self.folder / "model.toml"
         data = judged_data(str(self.folder / "dwells.parquet"), str(self.folder / "history.parquet"), None)
@@ -194,69 +189,13 @@ class _Game:
         refuse_unknown_effects(names, "demo")
         return [name for name in names if name not in self.hidden.model]
 
-    def _reveal(self, document: dict[str, Any]) -> None:
-        if self.quiet:
-            return
-        self._step("5. What was hidden?", "")
-        out = console()
-        out.print(
-            f"{self.hidden.truth} ({self.hidden.kind}): {self.hidden.effect}",
-            style="bold",
-        )
-        named = ", ".join(" or ".join(group) for group in document["classes"]) or "nothing"
-        if document["told_apart"]:
-            out.print(f"The diagnosis named {named}. Found.", style="bold green")
-        elif document["found"]:
-            self._one_of_a_class(document, named)
-        elif self.hidden.effect in document["unseen"]:
-            text = f"The diagnosis named {named}, and listed {self.hidden.effect} as not visible under this plan."
-            out.print(text, style="bold yellow", soft_wrap=True)
-        else:
-            out.print(f"The diagnosis named {named}. Not found.", style="bold red")
-        lines = [
-            [when, *(short(document[key][f]) for f in ("rms_ug", "fresh_rms_ug"))]
-            for when, key in (("before", "before"), ("extended", "after"))
-        ]
-        print_table(["model", "residual, µg", "fresh run, µg"], lines)
-        out.print(f"Everything is in {self.folder}: dwells, model.toml and report.html.")
-
-    def _one_of_a_class(self, document: dict[str, Any], named: str) -> None:
-        """The result if the hidden effect is in a class with others, and the measurement that separates them."""
-        from pipelines.cli.text.diagnosis_text import print_next_measurement
-
-        out, hidden = console(), self.hidden.effect
-        group = next(g for g in document["not_told_apart"] if hidden in g)
-        added = [name for name in document["added"] if name in group]
-        others = ", ".join(name for name in group if name not in added)
-        what = (
-            f"the added effect,  {' and '.join(added)}, is one of a class"
-            if added
-            else "nothing of its class was added"
-        )
-        text = f"The diagnosis named {named}. Found in a class, not separated: {what}; these data fit equally well with {others}."
-        out.print(text, style="bold yellow", soft_wrap=True)
-        rows = [row for row in document["next_measurements"] if set(row["why"].split(":")[0].split(" | ")) & set(group)]
-        if not rows:
-            out.print(
-                "No measurement that the station can take is certain to separate them.",
-            )
-        elif "minutes" in rows[0]:
-            out.print("The measurement that separates them:")
-            print_next_measurement(rows, out)
-        else:
-            out.print(rows[0]["why"], soft_wrap=True)
-
     def _step(self, title: str, line: str) -> None:
         if self.asks:
             typer.prompt("\nPress Enter to continue", default="", show_default=False, prompt_suffix=" ")
         if not self.quiet:
-            console().print(f"\n{title}", style="bold cyan")
+            say(f"\n{title}", style="bold cyan")
             if line:
-                console().print(f"  {line}", style="dim")
-
-    def _say(self, text: str) -> None:
-        if not self.quiet:
-            console().print(text)
+                say(f"  {line}", style="dim")
 
 
 def _errors(document: dict[str, Any]) -> dict[str, Any]:

@@ -9,20 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pipelines.cli.options import (
-    ArchiveOption,
-    DwellsArgument,
-    EffectFileOption,
-    EffectsOption,
-    FormulaOption,
-    HistoryOption,
-    JsonOption,
-    LeaveOutOption,
-    ModelOption,
-    error_console,
-    print_json,
-)
-from schemas.errors import DONE, PART_FAILED
+from pipelines.archive import Archive
+from pipelines.cli import options
+from pipelines.cli.printing import error_console, print_json, publish
+from schemas.errors import DONE, PART_FAILED, WrongUse
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -39,13 +29,13 @@ EXAMPLES = (
 
 
 def command(
-    dwells: DwellsArgument,
-    effects: EffectsOption = "",
-    model: ModelOption = None,
-    history: HistoryOption = "",
-    effect_file: EffectFileOption = None,
-    formula: FormulaOption = None,
-    leave_out: LeaveOutOption = "",
+    dwells: options.DwellsArgument,
+    effects: options.EffectsOption = "",
+    model: options.ModelOption = None,
+    history: options.HistoryOption = "",
+    effect_file: options.EffectFileOption = None,
+    formula: options.FormulaOption = None,
+    leave_out: options.LeaveOutOption = "",
     report: Annotated[
         Path | None,
         typer.Option(
@@ -62,27 +52,20 @@ def command(
             "--recipe", metavar="RECIPE", help="Recipe of the dwells, for --next; a run of the archive has its own."
         ),
     ] = "",
-    archive: ArchiveOption = None,
+    archive: options.ArchiveOption = None,
     *,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Judge whether a model is adequate, where it fails, and which physical effect is missing.
 
     Exit status 0: the model is adequate. 1: it is not, it cannot be judged, or every unit has a data fault. 2: the input cannot
     be used.
     """
-    from pipelines.cli.inputs import (
-        add_effect_files,
-        add_formulas,
-        dwells_and_history,
-        judged_effects,
-        without_dwells,
-    )
-    from pipelines.diagnosis.inputs import history_beside
+    from pipelines.cli.inputs import add_effects, dwells_and_history, without_dwells
+    from pipelines.diagnosis.inputs import history_beside, judged_effects
     from pipelines.importers.files import is_file
 
-    add_effect_files(effect_file)
-    add_formulas(formula, "diagnose")
+    add_effects(effect_file, formula, "diagnose")
     base = measured_recipe(dwells, recipe, archive) if following is not None else None
     judged = judged_effects(dwells, archive, effects, model, "diagnose")
     table, temperatures = dwells_and_history(dwells, history, archive)
@@ -93,7 +76,7 @@ def command(
     )
     document["history"] = beside or None
     if report is not None:
-        write_report(report, report_text)
+        publish(report, report_text, "report")
     if following is not None and base is not None:
         from pipelines.jobs.recipes import folder_of
 
@@ -110,7 +93,6 @@ def command(
 
 def _kept_name(dwells: str, archive: str | None) -> str:
     """The name of the data for a page that is kept: what 'latest' means changes."""
-    from pipelines.archive import Archive
     from pipelines.importers.files import is_file
 
     return dwells if is_file(dwells) else Archive(archive).run(dwells).id
@@ -127,12 +109,7 @@ def diagnosed(
     left_out: Sequence[str] = (),
 ) -> tuple[dict[str, Any], str]:
     """The document of a diagnosis, and its report on request, with the coefficients of a fit if they are given."""
-    from threadpoolctl import threadpool_limits
-
-    from pipelines.parallel import keep_memory
-
-    keep_memory()
-    with threadpool_limits(1), error_console().status("looking for missing effects"):
+    with error_console().status("looking for missing effects"):
         from pipelines.diagnosis.examination import examination  # loads the search for effects: after the first line
 
         made = examination(table, history, judged, left_out)
@@ -152,11 +129,9 @@ def measured_recipe(dwells: str, recipe: str, archive: str | None) -> Recipe:
     WrongUse
         Neither a file of dwells nor an import states its recipe, and none is named.
     """
-    from pipelines.archive import Archive
     from pipelines.importers.files import is_file
     from pipelines.jobs.job import job_of_run
     from pipelines.jobs.recipes import load_recipe
-    from schemas.errors import WrongUse
 
     if recipe:
         return load_recipe(recipe)
@@ -193,11 +168,3 @@ def write_next(path: Path, document: dict[str, Any], base: Recipe, home: Path, s
     files.publish(path, recipe_text(recipe, remarks).encode(), "recipe", files.ELSEWHERE)
     out.print(f"next: {path}; to see what it determines:")
     out.print(f"  {command_line('plan', str(path))}")
-
-
-def write_report(path: Path, text: str) -> None:
-    """Write a report, complete or not at all, and print its path."""
-    from pipelines.archive import files
-
-    files.publish(path, text.encode(), "report", files.ELSEWHERE)
-    error_console().print(f"report: {path}")

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from inertial.counts import number_of
-from pipelines.cli.options import STYLES, ArchiveOption, JsonOption, console, print_json, print_table, short
+from pipelines.archive import Archive
+from pipelines.cli import options
+from pipelines.cli.printing import STYLES, print_json, print_table, say, short
 
 if TYPE_CHECKING:
     from rich.text import Text
@@ -27,13 +29,12 @@ SHOWN = 12
 def command(
     run_a: Annotated[str, typer.Argument(metavar="RUN_A", help="Name of a run, the beginning of it, or 'latest'.")],
     run_b: Annotated[str, typer.Argument(metavar="RUN_B", help="The run to compare with.")],
-    archive: ArchiveOption = None,
+    archive: options.ArchiveOption = None,
     *,
     everything: Annotated[bool, typer.Option("--all", help="Show all changes; default: only the largest.")] = False,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Show which grades, coefficients and figures differ between two runs, relative to their uncertainty, and the causes."""
-    from pipelines.archive import Archive
     from pipelines.rerun.diff import diff
 
     store = Archive(archive)
@@ -45,23 +46,22 @@ def command(
 
 
 def _print(document: dict[str, Any], most: int | None) -> None:
-    out = console()
-    out.print(f"a  {document['a']}\nb  {document['b']}")
+    say(f"a  {document['a']}\nb  {document['b']}")
     if document["same"]:
-        out.print("no coefficient, figure or grade differs", style="bold green")
+        say("no coefficient, figure or grade differs", style="bold green")
     _print_flips(document)
     _print_changes(document["coefficients"], ("effect", "name", "axis"), "coefficients", most)
     _print_changes(document["figures"], ("figure",), "figures", most)
     for side in ("only_a", "only_b"):
         if document[side]:
-            out.print(f"only in {side[-1]}: {', '.join(document[side])}")
+            say(f"only in {side[-1]}: {', '.join(document[side])}")
     _print_causes(document["because"])
 
 
 def _print_flips(document: dict[str, Any]) -> None:
     flips = [row for row in document["units"] if row["flipped"]]
     if not flips:
-        console().print(f"no grade differs ({number_of(len(document['units']), 'unit')})")
+        say(f"no grade differs ({number_of(len(document['units']), 'unit')})")
         return
     lines = [
         [row["unit"], *(_styled(o, g) for o, g in zip(row["outcome"], row["grade"], strict=True)), _reason(row)]
@@ -91,7 +91,6 @@ def _reason(row: dict[str, Any]) -> str:
 def _print_changes(rows: list[dict[str, Any]], key: tuple[str, ...], what: str, most: int | None) -> None:
     if not rows:
         return
-    out = console()
     both = [row for row in rows if not (math.isnan(row["a"]) or math.isnan(row["b"]))]
     lines = [_change_line(row, key) for row in both[:most]]
     if lines:
@@ -101,7 +100,7 @@ def _print_changes(rows: list[dict[str, Any]], key: tuple[str, ...], what: str, 
     new, gone = _apart(rows, "b"), _apart(rows, "a")
     for side, names in (("only in b", new), ("only in a", gone)):
         if names:
-            out.print(f"{what} {side}: {', '.join(names)}")
+            say(f"{what} {side}: {', '.join(names)}")
 
 
 def _change_line(row: dict[str, Any], key: tuple[str, ...]) -> list[str]:
@@ -118,15 +117,14 @@ def _apart(rows: list[dict[str, Any]], side: str) -> list[str]:
 
 
 def _print_causes(rows: list[dict[str, Any]]) -> None:
-    out = console()
     if not rows:
-        out.print("causes: none found; data, code, model, limits and libraries are the same")
+        say("causes: none found; data, code, model, limits and libraries are the same")
         return
-    out.print("because of")
+    say("because of")
     code = [row["stage"] for row in rows if row["what"] == "code"]
     for row in rows:
         name = f" {row['name']}" if row["name"] else ""
         if row["what"] != "code":
-            out.print(f"  {row['what']}{name}: {row['a']} → {row['b']}")
+            say(f"  {row['what']}{name}: {row['a']} → {row['b']}")
     if code:
-        out.print(f"  code of {', '.join(code)}")
+        say(f"  code of {', '.join(code)}")

@@ -6,7 +6,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pipelines.cli.options import ArchiveOption, JsonOption, StationOption, console, give, print_table
+from pipelines.cli import options
+from pipelines.cli.printing import give, print_table, say
+from schemas.errors import DONE, PART_FAILED
 
 if TYPE_CHECKING:
     from pipelines.doctor.documents import DoctorDocument
@@ -23,13 +25,13 @@ COLOURS = {"good": "green", "warning": "yellow", "fault": "bold red", "not confi
 
 
 def command(
-    archive: ArchiveOption = None,
-    station: StationOption = None,
+    archive: options.ArchiveOption = None,
+    station: options.StationOption = None,
     free_gb: Annotated[
         float, typer.Option("--free-gb", min=0.0, metavar="GB", help="Free space that the archive needs.")
     ] = 1.0,
     *,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Check the installation and its connections, with a remedy for each fault.
 
@@ -37,7 +39,6 @@ def command(
     removed. A station is checked only if --station names it. Exit 1: at least one fault; warnings leave it at 0.
     """
     from pipelines.doctor.examine import examine
-    from schemas.errors import DONE, PART_FAILED
 
     document = examine(archive, station, free_gb)
     give(document, _show, as_json=as_json)
@@ -59,13 +60,12 @@ def _show(document: DoctorDocument) -> None:
         for c in checks
     ]
     print_table(["part", "check", "state", "found"], lines, whole=3)
-    out = console()
     if document["samples"]:
-        out.print(f"sample recipes and stations: {document['samples']}")
+        say(f"sample recipes and stations: {document['samples']}")
     for state in ("not configured", "warning", "fault"):
         for c in (c for c in checks if c["state"] == state):
             needed = f", needed: {c['needed']}" if c["needed"] else ""
             remedy = f"; {c['remedy']}" if c["remedy"] else ""
             text = f"{state}: {c['part']}, {c['check']}: {c['found']}{needed}{remedy}"
-            out.print(text, style=COLOURS[state])
-    out.print(f"{document['faults']} faults, {document['warnings']} warnings")
+            say(text, style=COLOURS[state])
+    say(f"{document['faults']} faults, {document['warnings']} warnings")

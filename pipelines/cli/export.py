@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pipelines.archive import Run
-from pipelines.cli.options import ArchiveOption, JsonOption, RunArgument, error_console
+from pipelines.archive import Archive, Run
+from pipelines.cli import options
+from pipelines.cli.printing import STANDARD_OUTPUT, print_text, remark
+from schemas.errors import WrongUse, did_you_mean
 
 PART = "Results"
 ORDER = 340
@@ -35,7 +37,7 @@ if TYPE_CHECKING:
 
 
 def command(
-    run: RunArgument = "latest",
+    run: options.RunArgument = "latest",
     form: Annotated[str, typer.Option("--format", help=f"{', '.join(_FORMATS)}; described below.")] = "json",
     units: Annotated[
         str, typer.Option("--units", metavar="SN,…", help="Export only these units; default: all that passed.")
@@ -78,24 +80,22 @@ def command(
         ),
     ] = None,
     counts_per_g: Annotated[int, typer.Option("--counts-per-g", help="betaflight: counts of 1 g (acc_1G).")] = 2048,
-    archive: ArchiveOption = None,
+    archive: options.ArchiveOption = None,
     *,
     failed: Annotated[bool, typer.Option("--failed", help="Also export units that failed their limits.")] = False,
     revoked: Annotated[
         bool, typer.Option("--revoked", help="Also export units whose calibration was revoked.")
     ] = False,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Write coefficients: bias b and response K as polynomials in temperature, to apply as a = K⁻¹(ã − b).
 
     Files for autopilots hold one unit each, and state in µg what the format cannot hold. Only units that passed are exported;
     revoked calibrations are left out. An option that begins with names of formats is for these formats.
     """
-    from pipelines.archive import Archive
     from pipelines.certificates.coefficient_remarks import signature_remarks
     from pipelines.export import FORMATS, ExportSettings, device_ids, export_files, unit_calibrations
     from pipelines.jobs.model_files import use_formulas_of
-    from schemas.errors import WrongUse, did_you_mean
 
     form = "json" if as_json else form
     if form not in FORMATS:
@@ -113,11 +113,8 @@ def command(
 
 def _write(files: dict[str, bytes], output: Path | None) -> None:
     """Write the files: one to standard output, a file or a folder, several to a folder only."""
-    from pipelines.cli.standard_output import NAME, print_text
-    from schemas.errors import WrongUse
-
     (name, content), *others = files.items()
-    if output is None or output == NAME:
+    if output is None or output == STANDARD_OUTPUT:
         if others:
             raise WrongUse(
                 f"export: {len(files)} units, each needs a file of its own in this format; give a folder with --output, or "
@@ -138,7 +135,7 @@ def _write(files: dict[str, bytes], output: Path | None) -> None:
             f"export: {output} cannot be written ({problem.strerror}); give another file with --output"
         ) from None
     if folder:
-        error_console().print(f"export: {len(files)} files in {output}")
+        remark(f"export: {len(files)} files in {output}")
 
 
 def _print_certificates(run: Run, chosen: Sequence[UnitCalibration], signers: Sequence[str]) -> None:
@@ -162,4 +159,4 @@ def _print_certificates(run: Run, chosen: Sequence[UnitCalibration], signers: Se
         lines.append(f"not certified: {', '.join(bare)}; 'tumbleline certify {run.id}' gives them a period of validity")
     lines += [*library_remarks(run), *signers]
     for line in lines:
-        error_console().print(f"export: {line}")
+        remark(f"export: {line}")

@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pipelines.cli.options import ByOption, EffectFileOption, JsonOption, console, error_console, print_json
+from pipelines.cli import options
+from pipelines.cli.printing import give_lines, is_standard_output, print_text, remark, say
 from schemas.errors import WrongUse
 
 if TYPE_CHECKING:
+    from pipelines.cli.documents.models import ExtendDocument
     from pipelines.jobs.model_files import ModelStep
 
 PART = "Is the model good enough, and what is missing?"
@@ -40,7 +42,7 @@ def command(
     why: Annotated[
         str, typer.Option("--why", metavar="TEXT", help="Reason for the change; needed with --remove.")
     ] = "",
-    by: ByOption = "",
+    by: options.ByOption = "",
     run: Annotated[str, typer.Option("--run", metavar="RUN", help="Run or file with the evidence.")] = "",
     output: Annotated[
         Path | None,
@@ -57,22 +59,21 @@ def command(
             "--effects", metavar="a,b,c", help="The starting model of a new file; default: bias to scale_temperature."
         ),
     ] = "",
-    effect_file: EffectFileOption = None,
+    effect_file: options.EffectFileOption = None,
     *,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Write the next version of a model with one effect more or less, and who changed it, when and why.
 
     A MODEL that does not exist is created: version 1 has the starting model, version 2 the effect. A removed effect stays in the
     history of the file, with the reason.
     """
-    from pipelines.cli.inputs import add_effect_files
-    from pipelines.cli.standard_output import is_standard_output, print_text
+    from pipelines.cli.inputs import add_effects
     from pipelines.jobs.model_files import extended, model_step, publish_model, reduced
 
     printed = is_standard_output(output, "extend", as_json=as_json)
     _refuse_contradiction(model, effect, remove, why)
-    add_effect_files(effect_file)
+    add_effects(effect_file)
     step = model_step(remove or effect, why, by, run)
     text, begun = _start(model, effects, step)
     new, after = (reduced if remove else extended)(text, step, f"model {model.name}")
@@ -81,7 +82,7 @@ def command(
         print_text(new)
     else:
         publish_model(target, new)
-    document = {
+    document: ExtendDocument = {
         "file": str(target),
         "model": after.model.name,
         "version": after.model.version,
@@ -93,15 +94,12 @@ def command(
         "at": step.at.isoformat(),
         "why": step.why,
     }
-    if as_json:
-        print_json(document)
-        return
-    out = error_console() if printed else console()
+    change = f"removes {step.effect}" if remove else f"has {step.effect}"
+    lines = [f"{target}: version {after.model.version} {change} ({step.why})"]
     if begun:
         first = ", ".join(e for e in after.model.effects if e != effect)
-        out.print(f"{target}: created with version 1: {first}")
-    change = f"removes {step.effect}" if remove else f"has {step.effect}"
-    out.print(f"{target}: version {after.model.version} {change} ({step.why})")
+        lines.insert(0, f"{target}: created with version 1: {first}")
+    give_lines(document, lines, as_json=as_json, show=remark if printed else say)
 
 
 def _refuse_contradiction(model: Path, effect: str, remove: str, why: str) -> None:

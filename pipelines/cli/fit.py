@@ -7,17 +7,9 @@ from pathlib import Path
 
 import typer
 
-from pipelines.cli.options import (
-    ArchiveOption,
-    JsonOption,
-    LeaveOutOption,
-    ModelOption,
-    OtherEffectsOption,
-    OtherLimitsOption,
-    RunArgument,
-    error_console,
-    print_json,
-)
+from pipelines.archive import Archive
+from pipelines.cli import options
+from pipelines.cli.printing import give, remark
 from schemas.errors import WrongUse
 from schemas.foreign import shown
 
@@ -31,24 +23,23 @@ EXAMPLES = (
 
 
 def command(
-    run: RunArgument = "latest",
-    effects: OtherEffectsOption = "",
-    model: ModelOption = None,
-    limits: OtherLimitsOption = "",
-    leave_out: LeaveOutOption = "",
-    archive: ArchiveOption = None,
+    run: options.RunArgument = "latest",
+    effects: options.OtherEffectsOption = "",
+    model: options.ModelOption = None,
+    limits: options.OtherLimitsOption = "",
+    leave_out: options.LeaveOutOption = "",
+    archive: options.ArchiveOption = None,
     *,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Fit a model to archived data again; the result is a new run on the same capture; the old run is kept.
 
     An import is fitted with known poses or, without them, by the norm of gravity. Exit status 1: the model is not adequate, it
     cannot be judged, or a unit did not pass.
     """
-    from pipelines.archive import Archive
     from pipelines.chain.runner import Runner
-    from pipelines.cli.summary import exit_status, print_summary, summary
-    from pipelines.cli.text.verdict_text import judged, print_adequacy, print_references
+    from pipelines.cli.summary import exit_status, print_result, summary
+    from pipelines.cli.text.verdict_text import judged
     from pipelines.jobs.job import job_of_run
 
     if Path(run).is_file():
@@ -70,15 +61,10 @@ def command(
     runner = Runner(job, store)
     try:
         for done in runner.all():
-            error_console().print(f"{done.stage:<9} {'was there' if done.reused else f'{done.seconds:.1f} s'}")
+            remark(f"{done.stage:<9} {'was there' if done.reused else f'{done.seconds:.1f} s'}")
     except Exception:
         runner.abandon()  # the measurements are the old run's: nothing is lost, and no empty run becomes the latest
         raise
     document = judged(summary(runner.run), runner.run)
-    if as_json:
-        print_json(document)
-    else:
-        print_summary(document)
-        print_adequacy(document["adequacy"])
-        print_references(document["references"])
+    give(document, print_result, as_json=as_json)
     raise typer.Exit(exit_status(document))

@@ -7,20 +7,10 @@ from typing import Annotated, Any
 
 import typer
 
+from pipelines.cli import options
 from pipelines.cli.next_commands import command_line, print_next
-from pipelines.cli.options import (
-    ArchiveOption,
-    EffectFileOption,
-    FreshHistoryOption,
-    FreshOption,
-    HistoryOption,
-    JsonOption,
-    console,
-    error_console,
-    print_json,
-    print_table,
-    short,
-)
+from pipelines.cli.printing import error_console, give, print_table, publish, say, short
+from schemas.errors import WrongUse
 
 PART = "Is the model good enough, and what is missing?"
 ORDER = 250
@@ -36,27 +26,27 @@ def command(
     dwells: Annotated[
         str, typer.Option("--dwells", metavar="DWELLS", help="A file in the exchange format, or a run of the archive.")
     ] = "",
-    fresh: FreshOption = "",
-    history: HistoryOption = "",
-    fresh_history: FreshHistoryOption = "",
+    fresh: options.FreshOption = "",
+    history: options.HistoryOption = "",
+    fresh_history: options.FreshHistoryOption = "",
     picture: Annotated[
         Path | None, typer.Option("--picture", metavar="FILE.png", help="Draw it, as PNG, SVG or PDF.")
     ] = None,
-    effect_file: EffectFileOption = None,
-    archive: ArchiveOption = None,
+    effect_file: options.EffectFileOption = None,
+    archive: options.ArchiveOption = None,
     *,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Show what each version of a model added, who, when, why, and the error on the run, on dwells left out and on a fresh run.
 
     Without --dwells only the changes are shown.
     """
-    from pipelines.cli.inputs import add_effect_files, both_runs
+    from pipelines.cli.inputs import add_effects, both_runs
     from pipelines.diagnosis.model_history import FIGURES, JUDGED, change_row
     from pipelines.improvement.improvement import ImprovedTables, errors_by_version
     from pipelines.jobs.model_files import read_model, versions
 
-    add_effect_files(effect_file)
+    add_effects(effect_file)
     model_file = read_model(model)
     _refuse_picture(picture, dwells)
     if dwells:
@@ -68,22 +58,17 @@ def command(
             for version in versions(model_file)
         ]
     if picture is not None:
-        from pipelines.archive import files
         from pipelines.drawing.picture import picture as drawn
         from pipelines.report.evolution import evolution_chart
 
         chart = evolution_chart(rows, model_file.model.name)
-        files.publish(picture, drawn(chart, picture.suffix.lower()), "picture", files.ELSEWHERE)
-        error_console().print(f"picture: {picture}")
-    if as_json:
-        print_json({"model": model_file.model.name, "file": str(model), "versions": rows})
-    else:
-        _print(rows, model_file.model.name, model)
+        publish(picture, drawn(chart, picture.suffix.lower()), "picture")
+    document = {"model": model_file.model.name, "file": str(model), "versions": rows}
+    give(document, lambda _: _print(rows, model_file.model.name, model), as_json=as_json)
 
 
 def _refuse_picture(picture: Path | None, dwells: str) -> None:
     from pipelines.drawing.picture import refuse_ending
-    from schemas.errors import WrongUse
 
     if picture is None:
         return
@@ -93,7 +78,6 @@ def _refuse_picture(picture: Path | None, dwells: str) -> None:
 
 
 def _print(rows: list[dict[str, Any]], name: str, file: Path) -> None:
-    out = console()
     changes = [
         [str(row["version"]), _change(row), row["by"], row["at"][:16].replace("T", " "), row["why"]] for row in rows
     ]
@@ -112,21 +96,21 @@ def _print(rows: list[dict[str, Any]], name: str, file: Path) -> None:
     print_table(["version", *(heads[k] for k in keys)], errors, title="Error, rms")
     for row in rows:
         if row["text"]:
-            out.print(f"version {row['version']}: {row['text']}")
-    out.print(
+            say(f"version {row['version']}: {row['text']}")
+    say(
         "cross-validated: the worst of poses, soaks and stretches of time · fresh run: coefficients unchanged, the bias change "
         "of each unit included · assumed noise: of the fit of each version, missing effects included",
         style="dim",
     )
     for text in dict.fromkeys(text for row in rows for text in row["warnings"]):
-        out.print(f"warning: {text}", style="yellow")
+        say(f"warning: {text}", style="yellow")
     refuted = [name for row in rows if row["confirmed"] is False for name in row["added"]]
     if refuted:
-        out.print(
+        say(
             f"{', '.join(refuted)}: refuted. The fresh run does not show the predicted change; remove it from the model.",
             style="bold red",
         )
-        print_next(out, [removal(file, effect) for effect in refuted if effect in rows[-1]["effects"]])
+        print_next([removal(file, effect) for effect in refuted if effect in rows[-1]["effects"]])
 
 
 def removal(file: Path, effect: str) -> str:

@@ -7,17 +7,8 @@ from typing import Annotated, Any
 
 import typer
 
-from pipelines.cli.options import (
-    ArchiveOption,
-    GroupOption,
-    JoinOption,
-    JsonOption,
-    console,
-    error_console,
-    print_json,
-    print_table,
-    short,
-)
+from pipelines.cli import options
+from pipelines.cli.printing import error_console, print_json, print_table, say, short
 from pipelines.cli.text.import_text import print_import, print_transfers
 from schemas.errors import DONE, PART_FAILED, WrongUse, did_you_mean
 from schemas.foreign import shown
@@ -101,8 +92,8 @@ def command(
             "--faulty", metavar="refuse|leave-out|keep", help="Constant axes and torn words; refuse by default."
         ),
     ] = "",
-    join: JoinOption = "",
-    group: GroupOption = "",
+    join: options.JoinOption = "",
+    group: options.GroupOption = "",
     list_dwells: Annotated[
         bool, typer.Option("--list-dwells", help="List every dwell: start, end, mean, sd, residual, influence.")
     ] = False,
@@ -141,9 +132,9 @@ def command(
             "--effects", metavar="a,b,…", help="Model of the transfer function; second_order,delay by default."
         ),
     ] = "",
-    archive: ArchiveOption = None,
+    archive: options.ArchiveOption = None,
     *,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Import recordings of other systems into the archive: a raw record and its dwells in the exchange format.
 
@@ -260,13 +251,12 @@ def import_and_print(
     if as_json:
         print_json(dict(imported))
     else:
-        out = console()
-        out.print(f"{imported['unit']}: {imported['records']} recordings, kept as run {imported['run']}")
+        say(f"{imported['unit']}: {imported['records']} recordings, kept as run {imported['run']}")
         rows = [
             [one["figure"], one["axis"], short(one["value"]), short(one["uncertainty"]), one["unit"], one["note"]]
             for one in imported["figures"]
         ]
         print_table(["figure", "axis", "value", "standard uncertainty", "unit", "remark"], rows, whole=2)
         for line in imported["text"]:
-            out.print(f"  {line}")
+            say(f"  {line}")
     return DONE if all(one["identified"] for one in imported["figures"]) else PART_FAILED

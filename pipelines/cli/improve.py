@@ -10,19 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from pipelines.archive import Archive, Run
-from pipelines.cli.options import (
-    ArchiveOption,
-    ByOption,
-    EffectFileOption,
-    EffectsOption,
-    FreshHistoryOption,
-    FreshOption,
-    HistoryOption,
-    JsonOption,
-    LeaveOutOption,
-    error_console,
-    give,
-)
+from pipelines.cli import options
+from pipelines.cli.printing import error_console, give, refuse_standard_output, remark, say
 from pipelines.improvement.improvement import ImprovedTables, Improvement
 from schemas.errors import DONE, PART_FAILED, WrongUse
 
@@ -49,7 +38,7 @@ def command(
     data: Annotated[
         str, typer.Argument(metavar="DATA|RUN", help="A file in the exchange format, or a run of the archive.")
     ],
-    effects: EffectsOption = "",
+    effects: options.EffectsOption = "",
     model: Annotated[
         Path | None,
         typer.Option("--model", metavar="FILE", help="Model file to judge; its next versions are written to it."),
@@ -64,13 +53,13 @@ def command(
             "--effect", metavar="a,b", help="Effects to add, one per class of the diagnosis, without a question."
         ),
     ] = "",
-    history: HistoryOption = "",
-    fresh: FreshOption = "",
-    fresh_history: FreshHistoryOption = "",
-    leave_out: LeaveOutOption = "",
-    by: ByOption = "",
-    effect_file: EffectFileOption = None,
-    archive: ArchiveOption = None,
+    history: options.HistoryOption = "",
+    fresh: options.FreshOption = "",
+    fresh_history: options.FreshHistoryOption = "",
+    leave_out: options.LeaveOutOption = "",
+    by: options.ByOption = "",
+    effect_file: options.EffectFileOption = None,
+    archive: options.ArchiveOption = None,
     *,
     yes: Annotated[
         bool,
@@ -83,7 +72,7 @@ def command(
             help="Let the station of a run measure its units again as the fresh run; default: ask at a terminal.",
         ),
     ] = None,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Diagnose a model, ask which of the missing effects to add, write the model file, and judge the change by a fresh run.
 
@@ -91,19 +80,17 @@ def command(
     was added, the fresh run is one of its archive, or the station measures it: one more question, or --measure. Exit status 0:
     the resulting model is adequate and no fresh run refutes it; 1: otherwise; 2: the input cannot be used.
     """
-    from pipelines.cli.inputs import add_effect_files, both_runs, judged_effects
+    from pipelines.cli.inputs import add_effects, both_runs, without_dwells
     from pipelines.cli.next_commands import judged_data
     from pipelines.cli.text.improve_text import next_lines, print_improvement
-    from pipelines.diagnosis.inputs import history_beside
+    from pipelines.diagnosis.inputs import history_beside, judged_effects
     from pipelines.importers.files import is_file
-    from pipelines.tables.leave_out import leave_out as without_dwells
-    from pipelines.tables.leave_out import named_dwells
 
-    add_effect_files(effect_file)
+    add_effects(effect_file)
     judged = judged_effects(data, archive, effects, model, "improve")
     target = _target(model, output)
     dwells, temperatures, again, again_temperatures = both_runs(data, history, fresh, fresh_history, archive)
-    dwells = without_dwells(dwells, named_dwells(leave_out))
+    dwells, _ = without_dwells(dwells, leave_out)
     tables = ImprovedTables(dwells, temperatures, again, again_temperatures)
     beside = history or (history_beside(data) if is_file(data) else "")
     may_measure = True if yes and measure is None else measure
@@ -133,14 +120,13 @@ class _Terminal:
 
     def begins_again(self, added: list[str]) -> None:
         """Prints the heading of the second diagnosis."""
-        from pipelines.cli.text.improve_text import print_heading
-
-        print_heading(f"Diagnosis with {', '.join(added)}", quiet=self._quiet)
+        if not self._quiet:
+            say(f"\nDiagnosis with {', '.join(added)}", style="bold cyan")
 
     def diagnosed(self, document: dict[str, Any], *, first: bool) -> None:
         """Prints a diagnosis with all its tables the first time, as its verdict alone later."""
         from pipelines.cli.text.diagnosis_text import print_diagnosis
-        from pipelines.cli.text.improve_text import print_verdict
+        from pipelines.cli.text.verdict_text import print_verdict
 
         if self._quiet:
             return
@@ -170,7 +156,6 @@ class _Terminal:
 def _target(model: Path | None, output: Path | None) -> Path:
     """The model file to write; another existing file is refused."""
     from pipelines.cli.next_commands import free_name
-    from pipelines.cli.standard_output import refuse_standard_output
 
     refuse_standard_output(output, "improve", "the model is written, then extended and judged from it")
     target = output or model or Path(free_name())
@@ -204,7 +189,7 @@ def fresh_run(source: str, archive: str | None, *, measure: bool | None) -> str:
     fresh = fresh_run_of(store, run)
     if fresh is not None:
         text = f"fresh run: {fresh.id}, the same units measured again"
-        error_console().print(text)
+        remark(text)
         return fresh.id
     if measure is False or not repeatable(run):
         return ""

@@ -1,4 +1,4 @@
-"""Inputs of the commands that judge models: dwells with their history, a model, effects of the user."""
+"""Inputs of the commands that judge models: dwells with their history, effects of the user."""
 
 from __future__ import annotations
 
@@ -6,8 +6,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from pipelines.archive import Archive
+from pipelines.cli.printing import remark
+
 if TYPE_CHECKING:
     import pandas as pd
+
+    from pipelines.parallel import Distributor
 
 
 def dwells_and_history(source: str, history: str, archive: str | None) -> tuple[pd.DataFrame, pd.DataFrame | None]:
@@ -17,26 +22,12 @@ def dwells_and_history(source: str, history: str, archive: str | None) -> tuple[
     ----------
     history : a file; empty for the run's own, or for the one beside a file of dwells
     """
-    from pipelines.cli.options import error_console
     from pipelines.diagnosis import inputs
 
-    dwells, temperatures, place = inputs.dwells_and_history(source, history, archive)
-    if place and not history:
-        error_console().print(f"history: {place}, found beside the dwells")
+    dwells, temperatures, file = inputs.dwells_and_history(source, history, archive)
+    if file and not history:
+        remark(f"history: {file}, found beside the dwells")
     return dwells, temperatures
-
-
-def judged_effects(source: str, archive: str | None, listed: str, model: Path | None, where: str) -> list[str] | None:
-    """The model that a command judges: the one given, else a run's own; None where there is neither.
-
-    Parameters
-    ----------
-    listed : effects as they were named on the command line; empty where they were not
-    where : the command, for its messages
-    """
-    from pipelines.diagnosis import inputs
-
-    return inputs.judged_effects(source, archive, listed, model, where)
 
 
 def without_dwells(dwells: pd.DataFrame, listed: str) -> tuple[pd.DataFrame, list[str]]:
@@ -47,20 +38,36 @@ def without_dwells(dwells: pd.DataFrame, listed: str) -> tuple[pd.DataFrame, lis
     return leave_out(dwells, named), [f"{unit}:{dwell}" for unit, dwell in named]
 
 
-def add_formulas(written: Sequence[str] | None, where: str) -> None:
-    """Formulas of the command line, in the catalogue from now on."""
-    if written:
-        from pipelines.diagnosis import inputs
+def add_effects(files: Sequence[Path] | None, formulas: Sequence[str] | None = None, where: str = "") -> None:
+    """Effects from files outside the tree, and formulas of the command line, in the catalogue from now on.
 
-        inputs.use_written_formulas(written, where)
-
-
-def add_effect_files(paths: Sequence[Path] | None) -> None:
-    """Effects from files outside the tree, in the catalogue from now on."""
+    Parameters
+    ----------
+    where : the command, for messages about formulas
+    """
     from inertial import effects
 
-    for path in paths or ():
+    for path in files or ():
         effects.add_file(path)
+    if formulas:
+        from pipelines.diagnosis.inputs import use_written_formulas
+
+        use_written_formulas(formulas, where)
+
+
+def distribution(store: Archive, runs: Sequence[str], dask: str, workers: int | None) -> tuple[Distributor | None, int]:
+    """How the work on runs is distributed over Dask, None for processes of this machine; and the number of processes.
+
+    Parameters
+    ----------
+    dask, workers : as they were given
+    """
+    from pipelines.flows.dask_cluster import on_dask
+    from pipelines.parallel import processors
+
+    count = max(1, min(workers or processors(), len(runs)))
+    home = store.root.resolve() / "orchestrator" if isinstance(store.root, Path) else None
+    return on_dask(dask, count, home), count
 
 
 def both_runs(

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
 from inertial.counts import number_of
-from pipelines.cli.options import GroupOption, JoinOption, JsonOption, console, error_console, print_json, print_table
+from pipelines.cli import options
+from pipelines.cli.printing import error_console, print_json, print_table, say
 from schemas.errors import DONE, PART_FAILED, WrongUse
 
 if TYPE_CHECKING:
@@ -24,13 +25,15 @@ EXAMPLES = (
 )
 
 MOST_INTERVALS, MOST_FAULTS = 12, 6
+NUMBERS: tuple[tuple[Literal["low", "high", "resolution"], int], ...] = (("low", 6), ("high", 6), ("resolution", 4))
+"""Numbers of a column, with their digits."""
 PICTURES = (".svg", ".png", ".pdf")
 
 
 def command(
     files: Annotated[list[Path], typer.Argument(metavar="FILE…", help="Recordings in any format that import reads.")],
-    join: JoinOption = "",
-    group: GroupOption = "",
+    join: options.JoinOption = "",
+    group: options.GroupOption = "",
     picture: Annotated[
         Path | None, typer.Option("--picture", metavar="FILE", help="Draw the record: .svg, .png or .pdf.")
     ] = None,
@@ -38,7 +41,7 @@ def command(
         Path | None, typer.Option("--page", metavar="FILE.html", help="Write the result as an HTML page.")
     ] = None,
     *,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Show the content of a file and its probable meaning, with reasons: columns, units, rate, gaps, faults, static intervals.
 
@@ -62,13 +65,14 @@ def command(
     for paths in sets:
         with error_console().status(f"reading {paths[0].name}"):
             inspections.append(inspect(paths, join=join, group=group))
-    _write(inspections[0], picture, page)
+    if picture or page:
+        _write(inspections[0], picture, page)
     documents = [one.document for one in inspections]
     if as_json:
         print_json(documents[0] if len(documents) == 1 else {"inspections": documents})
     else:
         if len(documents) > 1:
-            console().print(
+            say(
                 f"{len(documents)} recordings; if they are parts of one, add --join rows (one after the other) or --join "
                 "columns (side by side)",
             )
@@ -78,8 +82,6 @@ def command(
 
 
 def _write(inspection: Inspection, picture: Path | None, page: Path | None) -> None:
-    if picture is None and page is None:
-        return
     from pipelines.report import recording
 
     if picture is not None:
@@ -99,38 +101,35 @@ def _write(inspection: Inspection, picture: Path | None, page: Path | None) -> N
 
 def _print(one: InspectDocument) -> None:
     """Print the content of a recording."""
-    out = console()
     names = " + ".join(Path(name).name for name in one["files"])
     rate = "" if one["rate_hz"] is None else f", {one['rate_hz']:.5g} Hz"
     long = "" if one["duration_s"] is None else f", {one['duration_s']:.5g} s"
-    out.print(f"{names}: {one['form']}, {one['rows']} rows{rate}{long}")
+    say(f"{names}: {one['form']}, {one['rows']} rows{rate}{long}")
     for remark in one["remarks"]:
-        out.print(f"  {remark}")
+        say(f"  {remark}")
     _print_columns(one)
     if one["output_unit"]:
-        out.print(f"  output in {one['output_unit']}: {one['output_reason']}")
+        say(f"  output in {one['output_unit']}: {one['output_reason']}")
     if one["time_unit"]:
-        out.print(f"  time in {one['time_unit']}: {one['time_reason']}")
+        say(f"  time in {one['time_unit']}: {one['time_reason']}")
     if one["gaps"]:
-        out.print(f"  {number_of(one['gaps'], 'gap')} in time longer than five samples")
+        say(f"  {number_of(one['gaps'], 'gap')} in time longer than five samples")
     for column in one["columns"]:
         if column["clipped"] and column["low"] is not None and column["high"] is not None:
-            out.print(
+            say(
                 f"  axis {column['meaning']} is clipped: {number_of(column['clipped'], 'sample')} in runs at the end of its "
                 f"range ({column['low']:g} to {column['high']:g}); the true output is beyond",
             )
     for fault in one["faults"][:MOST_FAULTS]:
         what = "is constant" if fault["fault"] == "stuck_output" else "has torn words"
-        out.print(
-            f"  axis {fault['axis']} {what}: {fault['samples']} samples from row {fault['first_row']} on",
-        )
+        say(f"  axis {fault['axis']} {what}: {fault['samples']} samples from row {fault['first_row']} on")
     more = len(one["faults"]) - MOST_FAULTS
     if more > 0:
-        out.print(f"  and {more} more such faults")
+        say(f"  and {more} more such faults")
     _print_intervals(one)
     for text in one["open"]:
-        out.print(f"  to be added by you: {text}")
-    out.print(one["command"])
+        say(f"  to be added by you: {text}")
+    say(one["command"])
 
 
 def _print_columns(one: InspectDocument) -> None:
@@ -141,9 +140,7 @@ def _print_columns(one: InspectDocument) -> None:
             column["meaning"],
             column["reason"],
             column["unit"],
-            "" if column["low"] is None else f"{column['low']:.6g}",
-            "" if column["high"] is None else f"{column['high']:.6g}",
-            "" if column["resolution"] is None else f"{column['resolution']:.4g}",
+            *("" if column[key] is None else f"{column[key]:.{digits}g}" for key, digits in NUMBERS),
             str(column["clipped"] or ""),
             str(column["missing"] or ""),
         ]
@@ -155,14 +152,13 @@ def _print_columns(one: InspectDocument) -> None:
 
 def _print_intervals(one: InspectDocument) -> None:
     intervals = one["intervals"]
-    out = console()
     if not intervals:
         return
     several = [k for k, interval in enumerate(intervals) if interval["positions"] > 1]
     total = sum(interval["end_s"] - interval["start_s"] for interval in intervals)
-    out.print(f"  {number_of(len(intervals), 'static interval')}, {total:.4g} s")
+    say(f"  {number_of(len(intervals), 'static interval')}, {total:.4g} s")
     for k in several[:MOST_FAULTS]:
-        out.print(f"  interval {k} holds about {intervals[k]['positions']} positions logged back to back")
+        say(f"  interval {k} holds about {intervals[k]['positions']} positions logged back to back")
     rows = [
         [
             str(k),
@@ -176,4 +172,4 @@ def _print_intervals(one: InspectDocument) -> None:
     ]
     print_table(["interval", "start, s", "end, s", "samples", "mean x / y / z", "sd x / y / z"], rows)
     if len(intervals) > MOST_INTERVALS:
-        out.print(f"  and {len(intervals) - MOST_INTERVALS} more")
+        say(f"  and {len(intervals) - MOST_INTERVALS} more")

@@ -3,34 +3,23 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
-from contextlib import AbstractContextManager
 from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pipelines.cli.options import (
-    ArchiveOption,
-    JsonOption,
-    RecipeArgument,
-    RepeatOption,
-    SeedOption,
-    StationOption,
-    console,
-    error_console,
-    give,
-    print_table,
-    short,
-)
+from pipelines.archive import Archive
+from pipelines.cli import options
+from pipelines.cli.next_commands import command_line, judged_data, print_extension, print_next
+from pipelines.cli.printing import error_console, give, print_table, remark, say, short
 from pipelines.cli.run import shown
-from pipelines.inquiry.joint_diagnosis import JointDiagnosis
+from pipelines.cli.text.verdict_text import print_verdict
 from schemas.errors import DONE, PART_FAILED
 
 if TYPE_CHECKING:
     from pipelines.inquiry.inquiry import FollowUp, Inquiry
-    from pipelines.inquiry.loop import Approval, Consent, InquirySettings
-    from pipelines.jobs.job import Request
+    from pipelines.inquiry.lineage import JointDiagnosis
+    from pipelines.inquiry.loop import Consent
 
 PART = "Measure"
 ORDER = 130
@@ -44,14 +33,14 @@ SETTLED = frozenset({"adequate", "told_apart"})
 
 
 def command(
-    recipe: RecipeArgument = "production",
-    station: StationOption = None,
+    recipe: options.RecipeArgument = "production",
+    station: options.StationOption = None,
     units: Annotated[
         str, typer.Option("--units", metavar="SN,…|FILE", help="Serial numbers slot by slot, or a slot map.")
     ] = "",
-    archive: ArchiveOption = None,
-    seed: SeedOption = None,
-    repeat: RepeatOption = 0,
+    archive: options.ArchiveOption = None,
+    seed: options.SeedOption = None,
+    repeat: options.RepeatOption = 0,
     effects: Annotated[
         str,
         typer.Option("--effects", metavar="a,b,c", help="Effects of the model to diagnose; the recipe's by default."),
@@ -78,7 +67,7 @@ def command(
         typer.Option("--unseen", help="Also measure follow-ups for effects that are not visible in the first run."),
     ] = False,
     direct: Annotated[bool, typer.Option("--direct", help="Run without the orchestrator.")] = False,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Measure a lot, diagnose it, and measure follow-ups that discriminate between the effects that may be missing.
 
@@ -86,85 +75,50 @@ def command(
     is spent. An interrupted inquiry continues when the same command is given again. Exit status 0: the model is adequate or the
     effects are identified; 1: neither.
     """
-    from pipelines.archive import Archive
     from pipelines.cli.terminal import attended
-    from pipelines.inquiry.loop import InquirySettings
+    from pipelines.inquiry.loop import InquirySettings, Participants, always, directly, run_inquiry
     from pipelines.jobs.job import Request
     from pipelines.jobs.model_files import chosen_effects
     from pipelines.jobs.seating import read_seating
 
-    seating = read_seating(units)
+    seating, store = read_seating(units), Archive(archive)
     request = Request(recipe, station, seating.units, seating.slots, seed, repeat)
     settings = InquirySettings(tuple(chosen_effects(effects, None, "investigate") or ()), budget, unseen)
     at_terminal = attended() and not as_json
-    paused = yes is False and not at_terminal and not direct
-    document = _run(
-        request, Archive(archive), settings, _approval(yes=yes, at_terminal=at_terminal), direct=direct, paused=paused
-    )
-    document["command"] = _continue_command() if document["ended"] in {"asked", "declined"} else None
-    give(document, lambda _: print_inquiry(document, archive), as_json=as_json)
-    raise typer.Exit(DONE if document["ended"] in SETTLED else PART_FAILED)
+    with shown() as (progress, stage_done, quiet):
 
-
-def _approval(
-    *, yes: bool | None, at_terminal: bool
-) -> Callable[[Callable[[], AbstractContextManager[None]]], Approval]:
-    """Approval of extra station time: automatic, ask at the terminal, or none (stop and report)."""
-    from pipelines.inquiry.loop import always
-
-    def at_the_terminal(quiet: Callable[[], AbstractContextManager[None]]) -> Approval:
         def ask(inquiry: Inquiry, joint: JointDiagnosis, follow_up: FollowUp) -> Consent:
             with quiet():
-                return _question(inquiry, follow_up)
-
-        return ask
-
-    def nobody(inquiry: Inquiry, joint: JointDiagnosis, follow_up: FollowUp) -> Consent:
-        return "nobody"
-
-    if yes:
-        return lambda _quiet: always
-    return at_the_terminal if at_terminal else lambda _quiet: nobody
-
-
-def _question(inquiry: Inquiry, follow_up: FollowUp) -> Consent:
-    """The answer at the terminal to a proposed follow-up."""
-    from pipelines.cli.terminal import agreed
-    from pipelines.cli.text.diagnosis_text import print_next_measurement
-
-    out = error_console()
-    for sentence in follow_up.why:
-        out.print(f"\n{sentence}.")
-    print_next_measurement(list(follow_up.rows), out)
-    left = inquiry.budget - inquiry.spent
-    text = f"Measure this follow-up ({follow_up.minutes:.1f} min; {left:.1f} of {inquiry.budget:.1f} min budget left)?"
-    return "go" if agreed(text) else "stop"
-
-
-def _run(
-    request: Request,
-    archive: Any,
-    settings: InquirySettings,
-    approval: Callable[[Callable[[], AbstractContextManager[None]]], Approval],
-    *,
-    direct: bool,
-    paused: bool,
-) -> dict[str, Any]:
-    """The document of the inquiry."""
-    from pipelines.inquiry.loop import Participants, directly, run_inquiry
-
-    with shown() as (progress, stage_done, quiet):
+                return _answer(inquiry, follow_up) if at_terminal else "nobody"
 
         def diagnosed(joint: JointDiagnosis) -> None:
             with quiet():
                 _print_diagnosis(joint)
 
-        participants = Participants(directly, approval(quiet), progress, stage_done, diagnosed)
+        participants = Participants(directly, always if yes else ask, progress, stage_done, diagnosed)
         if direct:
-            return run_inquiry(request.job(archive), archive, settings, participants)
-        from pipelines.flows.investigate import investigate_locally
+            document = run_inquiry(request.job(store), store, settings, participants)
+        else:
+            from pipelines.flows.investigate import investigate_locally
 
-        return investigate_locally(request, archive, settings, participants, ask=paused)
+            paused = yes is False and not at_terminal
+            document = investigate_locally(request, store, settings, participants, ask=paused)
+    document["command"] = _continue_command() if document["ended"] in {"asked", "declined"} else None
+    give(document, lambda _: print_inquiry(document, archive), as_json=as_json)
+    raise typer.Exit(DONE if document["ended"] in SETTLED else PART_FAILED)
+
+
+def _answer(inquiry: Inquiry, follow_up: FollowUp) -> Consent:
+    """The answer at the terminal to a proposed follow-up."""
+    from pipelines.cli.terminal import agreed
+    from pipelines.cli.text.diagnosis_text import print_next_measurement
+
+    for sentence in follow_up.why:
+        remark(f"\n{sentence}.")
+    print_next_measurement(list(follow_up.rows), error_console())
+    left = inquiry.budget - inquiry.spent
+    text = f"Measure this follow-up ({follow_up.minutes:.1f} min; {left:.1f} of {inquiry.budget:.1f} min budget left)?"
+    return "go" if agreed(text) else "stop"
 
 
 def _print_diagnosis(joint: JointDiagnosis) -> None:
@@ -172,45 +126,40 @@ def _print_diagnosis(joint: JointDiagnosis) -> None:
     from pipelines.diagnosis.sentences import verdict
 
     runs = len(joint.lineage.runs)
-    text = f"diagnosis of {runs} run{'s' if runs > 1 else ''}: {verdict(joint.document)}"
-    error_console().print(text)
+    remark(f"diagnosis of {runs} run{'s' if runs > 1 else ''}: {verdict(joint.document)}")
 
 
 def _continue_command() -> str:
     """The command that measures the proposed follow-up."""
-    from pipelines.cli.next_commands import command_line
-
     given = [a for a in sys.argv[1:] if a not in {"--ask", "--json"}]
     return command_line(*given, "--yes")
 
 
 def print_inquiry(document: dict[str, Any], archive: str | None = None) -> None:
     """Print an inquiry; ``archive`` as it was given, for the commands to give next."""
-    from pipelines.cli.next_commands import judged_data, print_extension, print_next
     from pipelines.cli.text.diagnosis_text import print_findings, print_next_measurement
-    from pipelines.diagnosis.sentences import verdict
 
-    out = console()
-    good = document["ended"] in {"adequate", "told_apart"}
-    out.print(verdict(document), style="bold green" if document["adequate"] else "bold red")
+    print_verdict(document)
     _rounds(document)
     print_findings(document)
-    out.print(f"{document['text'][:1].upper()}{document['text'][1:]}.", style="green" if good else "yellow")
+    say(
+        f"{document['text'][:1].upper()}{document['text'][1:]}.",
+        style="green" if document["ended"] in SETTLED else "yellow",
+    )
     if document["ended"] in {"asked", "declined"}:
         print_next_measurement(document["next_measurements"])
-        print_next(out, [document["command"]])
+        print_next([document["command"]])
     else:
-        print_extension(out, document, partial(judged_data, document["run"], "", archive), None)
+        print_extension(document, partial(judged_data, document["run"], "", archive), None)
 
 
 def _rounds(document: dict[str, Any]) -> None:
     minutes = document["minutes"]
     first, further = short(minutes["first_run"]), short(minutes["follow_ups"]) or "0"
-    text = (
+    say(
         f"Station time: {first} min first run ({document['run']}), {further} min follow-ups "
         f"({100.0 * minutes['share']:.0f} %), {short(minutes['budget'])} min budget."
     )
-    console().print(text)
     if document["rounds"]:
         lines = [[r["run"], short(r["minutes"]), "\n".join(r["why"])] for r in document["rounds"]]
         print_table(["run", "station time, min", "reason"], lines, title="Follow-ups")

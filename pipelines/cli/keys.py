@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
-from pipelines.cli.options import JsonOption, console, print_json, print_table
+from pipelines.cli import options
+from pipelines.cli.printing import give, print_table, say
+from schemas.errors import WrongUse, did_you_mean
 
 PART = "Measure"
 ORDER = 190
@@ -26,35 +28,28 @@ def command(
         ),
     ] = "",
     *,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """List what a recipe, limits or station file may contain, what --fault and demo accept, and the names of files.
 
     The same lists are on the page docs/reference/keys.md.
     """
-    from schemas.errors import WrongUse, did_you_mean
-
     if subject and subject not in SUBJECTS:
         raise WrongUse(f"keys: no list is called '{subject}'; {did_you_mean(subject, SUBJECTS)}")
-    if not subject:
-        rows = [{"subject": name, "meaning": text} for name, (text, _) in SUBJECTS.items()]
-        document: dict[str, Any] = {"subject": "", "rows": rows}
-    else:
-        document = {"subject": subject, "rows": SUBJECTS[subject][1]()}
-    if as_json:
-        print_json(document)
-        return
-    _print(document["rows"])
-    if not subject:
-        console().print("tumbleline keys SUBJECT shows a list")
+    subjects = [{"subject": name, "meaning": text} for name, (text, _) in SUBJECTS.items()]
+    rows = SUBJECTS[subject][1]() if subject else subjects
+    give({"subject": subject, "rows": rows}, lambda _: _print(rows), as_json=as_json)
 
 
 def _print(rows: list[dict[str, str]]) -> None:
     """Rows in two columns, name and meaning, with one table for each table of the file."""
     for table in dict.fromkeys(row.get("table", "") for row in rows):
-        own = [row for row in rows if row.get("table", "") == table]
-        head = next(name for name in own[0] if name != "table")
-        print_table([head, "meaning"], [[row[head], _text(row, head)] for row in own], f"[{table}]" if table else "")
+        of_table = [row for row in rows if row.get("table", "") == table]
+        head = next(name for name in of_table[0] if name != "table")
+        lines = [[row[head], _text(row, head)] for row in of_table]
+        print_table([head, "meaning"], lines, f"[{table}]" if table else "")
+    if rows and "subject" in rows[0]:
+        say("tumbleline keys SUBJECT shows a list")
 
 
 def _text(row: dict[str, str], head: str) -> str:

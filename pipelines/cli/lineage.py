@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from inertial.counts import number_of
-from pipelines.cli.options import ArchiveOption, JsonOption, console, print_json
+from pipelines.cli import options
+from pipelines.cli.printing import console, print_json, say
 
 if TYPE_CHECKING:
     from rich.tree import Tree
@@ -41,9 +42,9 @@ def command(
             "--crate", metavar="DIR", help="Write an RO-Crate with every file of the lineage into this folder."
         ),
     ] = None,
-    archive: ArchiveOption = None,
+    archive: options.ArchiveOption = None,
     *,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Show the origin of certificates, tables and samples, and the results made from them: by whom, when, with which code."""
     from pipelines.archive import Archive, files
@@ -66,10 +67,10 @@ def command(
         return
     if prov is None and crate is None:
         _print(tree_of(traced))
-    for what in ([f"PROV in {prov}"] if prov else []) + (
-        [f"RO-Crate with {number_of(copied, 'file')} in {crate}"] if crate else []
-    ):
-        console().print(what)
+    if prov is not None:
+        say(f"PROV in {prov}")
+    if crate is not None:
+        say(f"RO-Crate with {number_of(copied, 'file')} in {crate}")
 
 
 def _print(tree: Tree) -> None:

@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import asdict
 
 from inertial.counts import number_of
-from pipelines.archive import RunInfo
-from pipelines.cli.options import ArchiveOption, JsonOption, console, print_json, print_table
+from pipelines.archive import Archive, RunInfo
+from pipelines.cli import options
+from pipelines.cli.printing import give, print_table, say
 from schemas.tables import ADEQUATE
 
 PART = "Results"
@@ -18,35 +19,28 @@ EXAMPLES = (
 )
 
 
-def command(archive: ArchiveOption = None, *, as_json: JsonOption = False) -> None:
+def command(archive: options.ArchiveOption = None, *, as_json: options.JsonOption = False) -> None:
     """List the runs of the archive in the order of their start."""
-    from pipelines.archive import Archive
-
     store = Archive(archive)
     infos = store.runs()
-    if as_json:
-        print_json({"archive": str(store.root), "runs": [asdict(info) for info in infos]})
-        return
+    document = {"archive": str(store.root), "runs": [asdict(info) for info in infos]}
+    give(document, lambda _: _print(infos, store), as_json=as_json)
+
+
+def _print(infos: list[RunInfo], store: Archive) -> None:
     if not infos:
-        console().print(f"no run in {store.root}; make one with 'tumbleline run'")
+        say(f"no run in {store.root}; make one with 'tumbleline run'")
         return
-    out = console()
-    out.print(f"{number_of(len(infos), 'run')} in {store.root}")
+    say(f"{number_of(len(infos), 'run')} in {store.root}")
     print_table(["run", "started (UTC)", "station", "passed", "units"], [_line(info) for info in infos])
     for info in infos:
         if info.rerun_of:
-            out.print(f"{info.id} is a re-run of {info.rerun_of}")
+            say(f"{info.id} is a re-run of {info.rerun_of}")
 
 
 def _line(info: RunInfo) -> list[str]:
     started = info.started[:16].replace("T", " ")
-    return [
-        info.id,
-        started,
-        info.station or "import",
-        _result(info),
-        f"{_units(info.units)}, {info.device}",
-    ]
+    return [info.id, started, info.station or "import", _result(info), f"{_units(info.units)}, {info.device}"]
 
 
 def _result(info: RunInfo) -> str:

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import os
+import sys
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pipelines.cli.options import ArchiveOption, JsonOption, console, print_json
-from pipelines.monitoring.alerts import Poster
+from pipelines.archive import Archive
+from pipelines.cli import options
+from pipelines.cli.printing import give_lines, say
+from schemas.errors import DONE, PART_FAILED, WrongUse
 
 if TYPE_CHECKING:
+    from pipelines.monitoring.alerts import Poster
     from pipelines.monitoring.snapshot import Monitor
 
 PART = "Measure"
@@ -25,7 +31,7 @@ PORT = 9464
 
 
 def command(
-    archive: ArchiveOption = None,
+    archive: options.ArchiveOption = None,
     queue: Annotated[
         list[str] | None,
         typer.Option("--queue", metavar="NAME", help="A queue that must have a worker online; may be repeated."),
@@ -50,25 +56,22 @@ def command(
         bool, typer.Option("--metrics", help="Print the numbers in the format of Prometheus, and exit.")
     ] = False,
     serve: Annotated[bool, typer.Option("--serve", help="Serve /metrics, /healthz and /livez until stopped.")] = False,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Report whether the line is healthy; exit status 1 if it is not.
 
     The command reads the archive, the orchestrator of PREFECT_API_URL, and the leases of the stations of this computer. It
     changes nothing. Its numbers contain no serial number.
     """
-    import os
-
-    from pipelines.archive import Archive
     from pipelines.monitoring.exposition import text
     from pipelines.monitoring.snapshot import Monitor
-    from schemas.errors import DONE, PART_FAILED, WrongUse
 
     address = webhook or os.environ.get("TUMBLELINE_WEBHOOK", "")
     if webhook and not serve:
         raise WrongUse("monitor: --webhook posts while the service runs, --serve is needed; give it too")
     monitor = Monitor(Archive(archive), days, free_gb, tuple(queue or ()))
     if serve:
+        from pipelines.monitoring.alerts import Poster
         from stations.safety.folder import state_folder
 
         _serve(monitor, host, port, Poster(address, state_folder()) if address else None, audits)
@@ -78,32 +81,18 @@ def command(
         typer.echo(text(snapshot).decode(), nl=False)
         return
     document = snapshot.document()
-    if as_json:
-        print_json(document)
-    else:
-        for problem in document["problems"]:
-            console().print(problem)
-        console().print("healthy" if document["ok"] else f"{len(document['problems'])} problems")
+    verdict = "healthy" if document["ok"] else f"{len(document['problems'])} problems"
+    give_lines(document, [*document["problems"], verdict], as_json=as_json)
     raise typer.Exit(DONE if document["ok"] else PART_FAILED)
 
 
 def _serve(monitor: Monitor, host: str, port: int, poster: Poster | None, audits: Path | None) -> None:
-    import sys
-    from contextlib import nullcontext
-
-    import uvicorn
-
-    from pipelines.cli.serving_pages import run_until_stopped
+    from pipelines.cli.serving_pages import page_server, run_until_stopped
     from pipelines.monitoring.service import alerting, application
-    from pipelines.serving.connections import TimedRequests
     from pipelines.serving.listening import listening_socket
 
     place = listening_socket(host, port, "monitor")
-    console().print(f"http://{host}:{place.getsockname()[1]}/healthz")
+    say(f"http://{host}:{place.getsockname()[1]}/healthz")
     sys.stdout.flush()  # a program that started it waits for the address
-    config = uvicorn.Config(
-        TimedRequests(application(monitor), place.connections), log_level="warning", access_log=False, server_header=False,
-        ws="none", timeout_graceful_shutdown=2, proxy_headers=False,
-    )  # fmt: skip
     with place, alerting(monitor, poster, audits) if poster is not None else nullcontext():
-        run_until_stopped(uvicorn.Server(config), place, "monitor")
+        run_until_stopped(page_server(application(monitor), place), place, "monitor")

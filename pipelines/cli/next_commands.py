@@ -7,13 +7,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from pipelines.archive import Run
-
-if TYPE_CHECKING:
-    from rich.console import Console
-
+from pipelines.archive import Archive, Run
+from pipelines.cli.printing import say
 
 PROGRAM = "tumbleline"
 MEASURE_AGAIN = (
@@ -74,7 +71,6 @@ def judged_data(source: str, history: str, archive: str | None) -> JudgedData:
     if is_file(source):
         fresh = fresh_beside(source)
         return JudgedData(source, history, fresh, history_beside(fresh) if fresh and history else "", archive)
-    from pipelines.archive import Archive
     from pipelines.chain.runner import decisive
     from pipelines.jobs.fresh_run import fresh_repeat, fresh_run_of, repeatable
     from pipelines.jobs.job import OF_RUN, job_of_run, measured_again
@@ -125,15 +121,15 @@ def versions(file: Path | str, data: JudgedData) -> str:
     return command_line("history", str(file), "--dwells", data.source, *data.options, *fresh)
 
 
-def print_next(out: Console, lines: Sequence[str]) -> None:
+def print_next(lines: Sequence[str]) -> None:
     """Print commands under a heading."""
     if lines:
-        out.print("\nNext:", style="bold")
+        say("\nNext:", "bold")
         for line in lines:
-            out.print(f"  {line}")
+            say(f"  {line}")
 
 
-def print_extension(out: Console, document: dict[str, Any], find: FindData, model: Path | None) -> None:
+def print_extension(document: dict[str, Any], find: FindData, model: Path | None) -> None:
     """Print the commands that add the recommended effects of a diagnosis and judge them.
 
     Parameters
@@ -147,11 +143,11 @@ def print_extension(out: Console, document: dict[str, Any], find: FindData, mode
     file = model or free_name()
     new = not (model and model.exists())
     if data.refusal is not None and (why := data.refusal([*document["effects"], *document["recommended"]])):
-        out.print(why, style="yellow")
-    print_next(out, extension(file, document["recommended"], document["effects"], data, new=new))
+        say(why, "yellow")
+    print_next(extension(file, document["recommended"], document["effects"], data, new=new))
     if not data.fresh:
         its_own = " and its temperatures with --fresh-history" if data.history else ""
-        out.print(MEASURE_AGAIN.format(history=its_own), style="dim")
+        say(MEASURE_AGAIN.format(history=its_own), "dim")
 
 
 def free_name() -> str:

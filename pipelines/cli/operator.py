@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import os
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pipelines.cli.options import ArchiveOption, JsonOption, console, print_json, print_table
+from pipelines.archive import Archive
+from pipelines.cli import options
+from pipelines.cli.printing import give, print_table, say
+from schemas.errors import WrongUse
 
 if TYPE_CHECKING:
     from pipelines.chain.attendance import Answer
@@ -25,48 +29,44 @@ def command(
     run: Annotated[
         str, typer.Argument(metavar="[FLOW-RUN]", help="The run to answer: the beginning of its name or id.")
     ] = "",
-    archive: ArchiveOption = None,
+    archive: options.ArchiveOption = None,
     *,
     go: Annotated[bool, typer.Option("--go", help="Confirm: the run continues.")] = False,
     stop: Annotated[
         bool, typer.Option("--stop", help="Stop the run; the same 'tumbleline run' continues it later.")
     ] = False,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Show the runs that wait for the operator and their questions; answer with --go or --stop."""
-    from schemas.errors import WrongUse
-
     if go and stop:
         raise WrongUse("operator: --go and --stop are both given, one is needed; leave one out")
     _reach(archive)
     from pipelines.flows.operator import answer, waiting
 
     matches = [one for one in waiting() if one.name.startswith(run) or one.id.startswith(run)]
-    if go or stop:
-        chosen, reply = _one(matches, run), _answer(go=go)
-        answer(chosen.id, reply)
-        matches = [chosen]
-    if as_json:
-        print_json({"waiting": [vars(one) for one in matches], "answered": "go" if go else "stop" if stop else None})
-    elif go or stop:
-        console().print(f"{matches[0].name}: {'continues' if go else 'stops'}")
+    reply: Answer | None = "go" if go else "stop" if stop else None
+    if reply is not None:
+        _refuse_other_than_one(matches, run)
+        answer(matches[0].id, reply)
+    give(
+        {"waiting": [vars(one) for one in matches], "answered": reply},
+        lambda _: _print(matches, reply),
+        as_json=as_json,
+    )
+
+
+def _print(matches: list[Waiting], reply: Answer | None) -> None:
+    if reply is not None:
+        say(f"{matches[0].name}: {'continues' if reply == 'go' else 'stops'}")
     elif matches:
         print_table(["run", "asks"], [[one.name, one.question] for one in matches])
     else:
-        console().print("no run waits for the operator")
-
-
-def _answer(*, go: bool) -> Answer:
-    return "go" if go else "stop"
+        say("no run waits for the operator")
 
 
 def _reach(archive: str | None) -> None:
     """Connect the client to the server of the environment, or to the server of the archive."""
-    import os
-
-    from pipelines.archive import Archive
     from pipelines.flows.local import environment_of, reach_named
-    from schemas.errors import WrongUse
 
     if os.environ.get("PREFECT_API_URL"):
         reach_named()
@@ -79,12 +79,9 @@ def _reach(archive: str | None) -> None:
     os.environ.update(matches)
 
 
-def _one(matches: list[Waiting], run: str) -> Waiting:
-    from schemas.errors import WrongUse
-
+def _refuse_other_than_one(matches: list[Waiting], run: str) -> None:
     if len(matches) != 1:
         names = ", ".join(one.name for one in matches) or "none"
         raise WrongUse(
             f"operator: {len(matches)} waiting runs begin with '{run}' ({names}), one is needed; give more of its name"
         )
-    return matches[0]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from pipelines.cli.next_commands import command_line, print_next
 from pipelines.cli.optimise_options import OptimiseOptions, levels_of, requirement_of
-from pipelines.cli.options import console, error_console, print_table, short
+from pipelines.cli.printing import error_console, print_table, remark, say, short
 from schemas.errors import TumblelineError
 from schemas.recipe import Recipe
 from schemas.station import StationConfig
@@ -96,9 +96,8 @@ def _reached(best: Optimum) -> str:
 
 def print_optimum(document: dict[str, Any]) -> None:
     """Print the recipe found."""
-    out = console()
     temperatures = ", ".join(f"{t:g}" for t in document["temperatures_C"])
-    out.print(
+    say(
         f"{document['recipe']}: {document['dwells']} dwells of {document['dwell_s']:g} s "
         f"in {document['poses']} poses, soaks at {temperatures} °C"
     )
@@ -109,22 +108,22 @@ def print_optimum(document: dict[str, Any]) -> None:
     ]
     print_table(["station time, min", "new recipe", document["from"], "textbook plan"], parts)
     for line in _comparison(document):
-        out.print(line)
+        say(line)
     if document["rivals"]:
         lines = [[r["true"], r["wrong"], short(r["chi_square"]), short(r["textbook"])] for r in document["rivals"]]
         print_table(["true effect", "fitted effect", "χ², new recipe", "χ², textbook plan"], lines, whole=2)
     else:
         print_table(ERROR_HEADS, _error_lines(document["coefficients"]))
-        out.print(f"error: of the new recipe; given: of {document['from']}", style="dim")
+        say(f"error: of the new recipe; given: of {document['from']}", style="dim")
     if document["seen_besides"]:
-        out.print(f"Also visible, unlike with the textbook plan: {', '.join(document['seen_besides'])}")
-    out.print(f"Recipe file: {document['file']}")
+        say(f"Also visible, unlike with the textbook plan: {', '.join(document['seen_besides'])}")
+    say(f"Recipe file: {document['file']}")
     if document["limits_missing"]:
-        error_console().print(f"warning: {document['limits_missing']}", style="yellow")
+        remark(f"warning: {document['limits_missing']}", style="yellow")
     else:
-        print_next(out, [command_line("run", str(document["file"]))])
+        print_next([command_line("run", str(document["file"]))])
     if "page" in document:
-        out.print(f"Page: {document['page']}")
+        say(f"Page: {document['page']}")
 
 
 def _comparison(document: dict[str, Any]) -> list[str]:
@@ -133,17 +132,16 @@ def _comparison(document: dict[str, Any]) -> list[str]:
     difference = (
         f"{abs(more):.0f} min {'more' if more > 0.0 else 'less'} than {name}" if abs(more) >= 0.5 else f"as {name}"
     )
-    lines = [
-        (
-            f"The new recipe takes {difference}, and {100.0 * document['share']:.0f} % of the textbook plan's time without the "
-            f"static record; {document['verification_dwells']} dwells are for verification (textbook plan: none)."
-        ),
-    ]
+    first = (
+        f"The new recipe takes {difference}, and {100.0 * document['share']:.0f} % of the textbook plan's time without the "
+        f"static record; {document['verification_dwells']} dwells are for verification (textbook plan: none)."
+    )
+    lines = [first]
     worst = document["own_worst"]
     if worst is not None:
         meets = "meets the required errors" if worst <= 1.0 else f"has up to {worst:.2f} times the required errors"
         lines.append(
-            f"{name} {meets}." + (f" For errors as in {name}, give --factor {worst:.2f}." if worst > 1.0 else "")
+            f"{name} {meets}." + ("" if worst <= 1.0 else f" For errors as in {name}, give --factor {worst:.2f}.")
         )
         if worst <= 1.0 and more > 0.0:
             lines.append(f"{name} is quicker and meets the requirement: keep it.")

@@ -8,19 +8,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from pipelines.cli.options import (
-    ArchiveOption,
-    JsonOption,
-    ModelOption,
-    RecipeArgument,
-    StationOption,
-    error_console,
-    give,
-    print_json,
-)
+from pipelines.archive import Archive
+from pipelines.cli import options
 from pipelines.cli.plan_files import save, write_page, write_pictures
+from pipelines.cli.printing import give, is_standard_output, print_json, print_text, remark
 from pipelines.cli.text.plan_text import print_plan, print_procedures
-from schemas.errors import PART_FAILED
+from schemas.errors import PART_FAILED, RecipeInvalid
 from schemas.limits import Limits
 from schemas.recipe import Recipe
 
@@ -101,11 +94,11 @@ app = typer.Typer(
 
 @app.command(RECIPE)
 def command(
-    recipe: RecipeArgument = "production",
+    recipe: options.RecipeArgument = "production",
     device: DeviceOption = "",
-    station: StationOption = None,
+    station: options.StationOption = None,
     effects: EffectsOption = "",
-    model: ModelOption = None,
+    model: options.ModelOption = None,
     noise: NoiseOption = None,
     wander: WanderOption = None,
     pose: Annotated[
@@ -118,13 +111,13 @@ def command(
         ),
     ] = None,
     page: PageOption = None,
-    archive: ArchiveOption = None,
+    archive: options.ArchiveOption = None,
     pictures: Annotated[
         Path | None,
         typer.Option("--pictures", metavar="DIR", help="Also write the pictures to this folder, as RECIPE-NAME.svg."),
     ] = None,
     *,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Show station time, expected errors, and for every effect its visibility, detection floor and confounded effects.
 
@@ -145,7 +138,7 @@ def command(
         with_model(recipe, effects, model, archive, config.name), moves_of(pose or (), "plan"), "plan"
     )
     for message in refused_by_run(planned_recipe, config, folder_of(recipe)):
-        error_console().print(f"warning: 'tumbleline run' refuses this recipe: {message}", style="yellow")
+        remark(f"warning: 'tumbleline run' refuses this recipe: {message}", style="yellow")
     limits = _limits(planned_recipe, folder_of(recipe))
     if not planned_recipe.tumbles and page is None and pictures is None:
         document = plan_of_procedures(planned_recipe, config, limits)
@@ -186,9 +179,9 @@ def optimise(
         ),
     ] = None,
     device: DeviceOption = "",
-    station: StationOption = None,
+    station: options.StationOption = None,
     effects: EffectsOption = "",
-    model: ModelOption = None,
+    model: options.ModelOption = None,
     see: Annotated[
         str,
         typer.Option(
@@ -255,9 +248,9 @@ def optimise(
     noise: NoiseOption = None,
     wander: WanderOption = None,
     page: PageOption = None,
-    archive: ArchiveOption = None,
+    archive: options.ArchiveOption = None,
     *,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Write the recipe with the least station time that reaches the required errors.
 
@@ -267,7 +260,6 @@ def optimise(
     """
     from pipelines.cli.optimal import cheapest_recipe, missing_limits, print_optimum, written
     from pipelines.cli.optimise_options import OptimiseOptions
-    from pipelines.cli.standard_output import is_standard_output, print_text
     from pipelines.jobs.recipes import folder_of
     from pipelines.planning.preset_noise import noise_of
     from schemas.station import load_station
@@ -302,7 +294,6 @@ def optimise(
 def _limits(recipe: Recipe, home: Path) -> Limits | None:
     """The limits that a recipe names; None where they are not there, which a plan does not need."""
     from pipelines.jobs.recipes import load_limits
-    from schemas.errors import RecipeInvalid
 
     try:
         return load_limits(recipe, home)
@@ -318,7 +309,6 @@ def with_model(recipe: str, effects: str, model: Path | None, archive: str | Non
     chosen = chosen_effects(effects, model, "plan")
 
     def line(device: str) -> dict[str, Any]:
-        from pipelines.archive import Archive
         from pipelines.jobs.releases import line_model
 
         if chosen:

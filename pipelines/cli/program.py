@@ -7,16 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pipelines.cli.options import (
-    ArchiveOption,
-    JsonOption,
-    RunArgument,
-    StationOption,
-    console,
-    error_console,
-    give,
-    print_table,
-)
+from pipelines.archive import Archive
+from pipelines.cli import options
+from pipelines.cli.printing import give, print_table, remark, say
+from schemas.errors import DONE, PART_FAILED, WrongUse, did_you_mean
 
 if TYPE_CHECKING:
     from pipelines.export import UnitCalibration
@@ -32,8 +26,8 @@ UNATTENDED = "program: standard input ended before an answer, a line is needed; 
 
 
 def command(
-    run: RunArgument = "latest",
-    station: StationOption = None,
+    run: options.RunArgument = "latest",
+    station: options.StationOption = None,
     units: Annotated[
         str, typer.Option("--units", metavar="SN,…", help="Write only these units; default: all that passed.")
     ] = "",
@@ -41,13 +35,13 @@ def command(
     tolerance: Annotated[
         float, typer.Option("--tolerance", metavar="UG", min=1.0, help="Largest allowed error in the two poses, µg.")
     ] = 3000.0,
-    archive: ArchiveOption = None,
+    archive: options.ArchiveOption = None,
     *,
     offset_registers: Annotated[
         bool, typer.Option("--offset-registers", help="Also write the offset registers of an ADXL355.")
     ] = False,
     yes: Annotated[bool, typer.Option("--yes", "-y", help="Write without confirmation.")] = False,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Write the coefficients of a run into the memory of its devices, which are in the slots of the run.
 
@@ -55,10 +49,8 @@ def command(
     back, and verify in two poses. The unit's certificate ends before the first write and is renewed after the verification.
     If a step fails, the unit is not certified, and the previously valid copy is unchanged. Exit status 1: a unit failed.
     """
-    from pipelines.archive import Archive
     from pipelines.programming.job import chosen_units, document, program_run, station_of
     from pipelines.programming.outcome import Choice
-    from schemas.errors import DONE, PART_FAILED, WrongUse, did_you_mean
     from schemas.foreign import shown
     from schemas.station import load_station
 
@@ -68,15 +60,14 @@ def command(
     chosen = chosen_units(source, [serial.strip() for serial in units.split(",") if serial.strip()])
     config = load_station(station) if station is not None else station_of(source)
     if not yes and not _agreed(source.id, config.name, chosen):
-        console().print("nothing was written")
+        say("nothing was written")
         raise typer.Exit(DONE)
-    out = error_console()
     outcomes, given = program_run(
         source,
         chosen,
         config,
         Choice(form, offset_registers, tolerance),
-        lambda text: out.print(f"program: {text}"),
+        lambda text: remark(f"program: {text}"),
     )
     result = document(source, outcomes, given)
     give(result, _print, as_json=as_json)
@@ -86,9 +77,8 @@ def command(
 def _agreed(run: str, station: str, chosen: Sequence[tuple[int, UnitCalibration]]) -> bool:
     from pipelines.cli.terminal import agreed
 
-    out = error_console()
     for slot, unit in chosen:
-        out.print(f"  slot {slot:>2}  {unit.unit}  {unit.certified}")
+        remark(f"  slot {slot:>2}  {unit.unit}  {unit.certified}")
     question = f"Write the coefficients of run {run} into {len(chosen)} devices on station {station}?"
     return agreed(question, "y or Enter writes, n writes nothing", UNATTENDED)
 
@@ -112,4 +102,4 @@ def _print(result: dict[str, Any]) -> None:
     print_table(heads, rows, title=f"run {result['run']}")
     for one in result["units"]:
         if one["outcome"] == "failed":
-            console().print(f"  {one['unit']} failed at '{one['step']}': {one['reason']}")
+            say(f"  {one['unit']} failed at '{one['step']}': {one['reason']}")

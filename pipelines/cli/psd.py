@@ -6,24 +6,8 @@ from typing import Annotated, Any
 
 import typer
 
-from pipelines.cli.options import (
-    ArchiveOption,
-    JsonOption,
-    PageOption,
-    PlotOption,
-    RateOption,
-    SeriesArgument,
-    SeriesColumnsOption,
-    SeriesUnitOption,
-    StretchOption,
-    TimeColumnOption,
-    TimeUnitOption,
-    console,
-    error_console,
-    give,
-    print_table,
-    short,
-)
+from pipelines.cli import options
+from pipelines.cli.printing import error_console, give, print_table, say, short
 from schemas.errors import WrongUse
 
 PART = "Results"
@@ -36,22 +20,22 @@ EXAMPLES = (
 
 
 def command(
-    source: SeriesArgument,
-    columns: SeriesColumnsOption = "",
-    time: TimeColumnOption = "",
-    time_unit: TimeUnitOption = "s",
-    rate: RateOption = None,
-    unit: SeriesUnitOption = "",
+    source: options.SeriesArgument,
+    columns: options.SeriesColumnsOption = "",
+    time: options.TimeColumnOption = "",
+    time_unit: options.TimeUnitOption = "s",
+    rate: options.RateOption = None,
+    unit: options.SeriesUnitOption = "",
     segment: Annotated[
         int | None,
         typer.Option("--segment", metavar="N", help="Samples of a segment; an eighth of the record by default."),
     ] = None,
-    stretch: StretchOption = None,
-    plot: PlotOption = None,
-    page: PageOption = None,
-    archive: ArchiveOption = None,
+    stretch: options.StretchOption = None,
+    plot: options.PlotOption = None,
+    page: options.PageOption = None,
+    archive: options.ArchiveOption = None,
     *,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Compute the one-sided power spectral density by Welch's method, and σ(τ) from it beside that of the samples.
 
@@ -72,8 +56,7 @@ def command(
 
 
 def _print(document: dict[str, Any]) -> None:
-    out = console()
-    out.print(
+    say(
         f"{document['source']}: {document['samples']} samples at {short(document['rate_hz'], 5)} Hz, segments of "
         f"{document['segment']} samples, resolution {short(document['rate_hz'] / document['segment'])} Hz",
     )

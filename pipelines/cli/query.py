@@ -9,7 +9,9 @@ from typing import Annotated
 import typer
 
 from inertial.counts import number_of
-from pipelines.cli.options import ArchiveOption, JsonOption, console, print_json, print_table, short
+from pipelines.archive import Archive
+from pipelines.cli import options
+from pipelines.cli.printing import print_json, print_table, say, short
 from schemas.errors import WrongUse
 
 PART = "Results"
@@ -25,9 +27,9 @@ MANY = 100
 
 def command(
     sql: Annotated[str, typer.Argument(metavar="SQL", help="One SELECT, for instance 'SELECT count(*) FROM units'.")],
-    archive: ArchiveOption = None,
+    archive: options.ArchiveOption = None,
     *,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
     as_csv: Annotated[bool, typer.Option("--csv", help="Print comma-separated values and nothing else.")] = False,
     compact: Annotated[
         bool,
@@ -41,19 +43,14 @@ def command(
     Views: runs, units, parameters, station, coefficients, figures, calibrations, and every table of the runs (dwells, residuals,
     grades, verification, noise, …) with the run in the first column.
     """
-    from pipelines.archive import Archive
     from pipelines.audit.sql import ask
 
     if as_json and as_csv:
         raise WrongUse("query: --json and --csv are both given, one is needed; leave one out")
     answer = ask(Archive(archive), sql, compact=compact)
     if as_json:
-        print_json(
-            {
-                "columns": list(answer.columns),
-                "rows": [dict(zip(answer.columns, row, strict=True)) for row in answer.rows],
-            }
-        )
+        rows = [dict(zip(answer.columns, row, strict=True)) for row in answer.rows]
+        print_json({"columns": list(answer.columns), "rows": rows})
         return
     if as_csv:
         writer = csv.writer(sys.stdout, lineterminator="\n")
@@ -62,7 +59,7 @@ def command(
         return
     print_table(list(answer.columns), [[_cell(value) for value in row] for row in answer.rows[:MANY]])
     if len(answer.rows) > MANY:
-        console().print(f"{number_of(len(answer.rows) - MANY, 'more row')}; print all rows with --json or --csv")
+        say(f"{number_of(len(answer.rows) - MANY, 'more row')}; print all rows with --json or --csv")
 
 
 def _cell(value: object) -> str:

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from pipelines.archive import Archive
-from pipelines.cli.options import ArchiveOption, EffectFileOption, JsonOption, console, print_json, print_table
+from pipelines.cli import options
+from pipelines.cli.printing import give, give_lines, print_table, say
 from schemas.errors import WrongUse
 
 if TYPE_CHECKING:
@@ -29,14 +30,14 @@ def command(
     device: Annotated[str, typer.Option("--device", metavar="KIND", help="For this kind of device only.")] = "",
     station: Annotated[str, typer.Option("--station", metavar="NAME", help="For this station only.")] = "",
     reason: Annotated[str, typer.Option("--reason", metavar="TEXT", help="Reason for the release.")] = "",
-    effect_file: EffectFileOption = None,
-    archive: ArchiveOption = None,
+    effect_file: options.EffectFileOption = None,
+    archive: options.ArchiveOption = None,
     *,
     force: Annotated[
         bool, typer.Option("--force", help="Release the model without a what-if with the verdict 'better'.")
     ] = False,
     listed: Annotated[bool, typer.Option("--list", help="List the releases.")] = False,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Release a model to the line from a date, or list the releases.
 
@@ -45,21 +46,19 @@ def command(
     """
     store = Archive(archive)
     if listed:
-        _refuse_both(model)
+        if model is not None:
+            raise WrongUse(f"release: --list and the model {model.name} are both given, one is needed; leave one out")
         _list(store, as_json=as_json)
         return
     record = _released(
         store, model, since, effect_file, {"device": device, "station": station, "reason": reason, "force": force}
     )
-    if as_json:
-        print_json({"archive": str(store.root), **_document(record)})
-        return
-    out = console()
-    out.print(
+    lines = [
         f"release {record.number}: {_name(record)} for {_where(record)} from {record.since:%Y-%m-%d %H:%M} UTC",
-    )
-    out.print(f"  {', '.join(record.effects)}")
-    out.print(f"  evidence: {record.evidence or 'none'}{', forced' if record.forced else ''}")
+        f"  {', '.join(record.effects)}",
+        f"  evidence: {record.evidence or 'none'}{', forced' if record.forced else ''}",
+    ]
+    give_lines({"archive": str(store.root), **record.document()}, lines, as_json=as_json)
 
 
 def _released(
@@ -80,11 +79,6 @@ def _released(
     )
 
 
-def _refuse_both(model: Path | None) -> None:
-    if model is not None:
-        raise WrongUse(f"release: --list and the model {model.name} are both given, one is needed; leave one out")
-
-
 def _list(store: Archive, *, as_json: bool) -> None:
     from datetime import UTC, datetime
 
@@ -93,27 +87,21 @@ def _list(store: Archive, *, as_json: bool) -> None:
     records = releases(store)
     now = datetime.now(UTC)
     valid = {one.number for one in records if released(store, one.device, one.station, now) == one}
-    if as_json:
-        rows = [{**_document(one), "in_use": one.number in valid} for one in records]
-        print_json({"archive": str(store.root), "releases": rows})
-        return
+    rows = [{**record.document(), "in_use": record.number in valid} for record in records]
+    give({"archive": str(store.root), "releases": rows}, lambda _: _print(store, records, valid), as_json=as_json)
+
+
+def _print(store: Archive, records: list[Release], valid: set[int]) -> None:
     if not records:
-        console().print(f"no model is released in {store.root}; release one with 'tumbleline release'")
+        say(f"no model is released in {store.root}; release one with 'tumbleline release'")
         return
     lines = [
-        [
-            str(one.number),
-            _name(one),
-            _where(one),
-            f"{one.since:%Y-%m-%d}",
-            "yes" if one.number in valid else "",
-            one.who,
-        ]
-        for one in records
+        [str(r.number), _name(r), _where(r), f"{r.since:%Y-%m-%d}", "yes" if r.number in valid else "", r.who]
+        for r in records
     ]
     print_table(["no.", "model", "for", "from", "in use", "by"], lines, whole=4)
-    for one in records:
-        console().print(f"  {one.number}: {one.reason}{' (forced)' if one.forced else ''}")
+    for record in records:
+        say(f"  {record.number}: {record.reason}{' (forced)' if record.forced else ''}")
 
 
 def _name(record: Release) -> str:
@@ -122,20 +110,3 @@ def _name(record: Release) -> str:
 
 def _where(record: Release) -> str:
     return f"{record.device} on {record.station}".removeprefix(" on ").removesuffix(" on ") or "all"
-
-
-def _document(record: Release) -> dict[str, Any]:
-    return {
-        "release": record.number,
-        "model": record.model_name,
-        "version": record.model_version,
-        "effects": list(record.effects),
-        "from": record.since.isoformat(),
-        "device": record.device,
-        "station": record.station,
-        "reason": record.reason,
-        "evidence": record.evidence,
-        "forced": record.forced,
-        "by": record.who,
-        "at": record.when,
-    }

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import typer
 
-from pipelines.cli.options import ArchiveOption, JsonOption, RunArgument, print_json
+from pipelines.archive import Archive
+from pipelines.cli import options
+from pipelines.cli.printing import error_console, give
 
 PART = "Results"
 ORDER = 330
@@ -15,19 +17,13 @@ EXAMPLES = (
 )
 
 
-def command(run: RunArgument = "latest", archive: ArchiveOption = None, *, as_json: JsonOption = False) -> None:
+def command(
+    run: options.RunArgument = "latest", archive: options.ArchiveOption = None, *, as_json: options.JsonOption = False
+) -> None:
     """Print the path of a run's report; write the report if it is missing or older than the run's tables."""
-    from pipelines.archive import Archive
     from pipelines.report import make_report
 
     stored = Archive(archive).run(run)
-    if stored.about.get("capture") or stored.about.get("parents"):
+    with error_console().status("drawing the report"):
         make_report(stored)
-    else:
-        from pipelines.cli.imported_report import make_imported_report
-
-        make_imported_report(stored)
-    if as_json:
-        print_json({"run": stored.id, "report": str(stored.report)})
-    else:
-        typer.echo(stored.report)
+    give({"run": stored.id, "report": str(stored.report)}, lambda _: typer.echo(stored.report), as_json=as_json)

@@ -6,7 +6,9 @@ from typing import Annotated
 
 import typer
 
-from pipelines.cli.options import ArchiveOption, JsonOption, console, print_json
+from pipelines.archive import Archive, Run
+from pipelines.cli import options
+from pipelines.cli.printing import give_lines
 
 PART = "Certificates, trace, audit"
 ORDER = 420
@@ -32,12 +34,11 @@ def command(
             "--certificate", min=0, help="Number after the serial; default: all that are valid today or later."
         ),
     ] = 0,
-    archive: ArchiveOption = None,
+    archive: options.ArchiveOption = None,
     *,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Revoke a unit's calibration, with the reason. Nothing is deleted: the revocation is added to the ledger of the unit."""
-    from pipelines.archive import Archive, Run
     from pipelines.certificates import Ledger
     from pipelines.certificates.days import day_of
     from pipelines.report import renew_report
@@ -48,7 +49,5 @@ def command(
     ended = [f"{serial}/{number}" for number in event.ends]
     for run in dict.fromkeys(one.run for one in ledger.calibrations(serial) if one.certificate in ended):
         renew_report(Run(store, run))
-    if as_json:
-        print_json({"unit": serial, "revoked": ended, **event.document()})
-    else:
-        console().print(f"revoked {', '.join(ended)} from {event.start} on: {event.reason}")
+    lines = [f"revoked {', '.join(ended)} from {event.start} on: {event.reason}"]
+    give_lines({"unit": serial, "revoked": ended, **event.document()}, lines, as_json=as_json)

@@ -9,17 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from pipelines.archive import Archive, Run
-from pipelines.cli.options import (
-    ArchiveOption,
-    JsonOption,
-    RecipeArgument,
-    RepeatOption,
-    SeedOption,
-    StationOption,
-    console,
-    error_console,
-    print_json,
-)
+from pipelines.cli import options
+from pipelines.cli.printing import error_console, print_json, remark
 from schemas.progress import Progress
 
 if TYPE_CHECKING:
@@ -36,8 +27,8 @@ EXAMPLES = (
 
 
 def command(
-    recipe: RecipeArgument = "production",
-    station: StationOption = None,
+    recipe: options.RecipeArgument = "production",
+    station: options.StationOption = None,
     units: Annotated[
         str,
         typer.Option(
@@ -46,9 +37,9 @@ def command(
             help="Serial numbers in the order of the slots, a slot map (CSV or TOML), or 'scan' to scan them.",
         ),
     ] = "",
-    archive: ArchiveOption = None,
-    seed: SeedOption = None,
-    repeat: RepeatOption = 0,
+    archive: options.ArchiveOption = None,
+    seed: options.SeedOption = None,
+    repeat: options.RepeatOption = 0,
     fault: Annotated[
         list[str] | None,
         typer.Option("--fault", metavar="KIND[:KEY=VALUE…]", help="Fault of the simulated station; may be repeated."),
@@ -61,7 +52,7 @@ def command(
         ),
     ] = None,
     direct: Annotated[bool, typer.Option("--direct", help="Run the same chain without the orchestrator.")] = False,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Measure and calibrate a lot, from recipe to report: the main job.
 
@@ -72,24 +63,16 @@ def command(
     """
     from pipelines.certificates.coefficient_remarks import library_remarks
     from pipelines.cli.next_commands import print_next
-    from pipelines.cli.summary import exit_status, print_summary, summary
+    from pipelines.cli.summary import exit_status, print_result, summary
     from pipelines.cli.terminal import attended, scanned
-    from pipelines.cli.text.verdict_text import judged, print_adequacy, print_references
+    from pipelines.cli.text.verdict_text import judged
     from pipelines.jobs.job import OF_RUN, Request
     from pipelines.jobs.seating import SCAN, read_seating
     from schemas.station import load_station
 
     slots = 0 if recipe.startswith(OF_RUN) else load_station(station).devices.slots.count
     seating = scanned(slots) if units == SCAN else read_seating(units)
-    request_of_lot = Request(
-        recipe=recipe,
-        station=station,
-        units=seating.units,
-        slots=seating.slots,
-        seed=seed,
-        repeat=repeat,
-        faults=tuple(fault or ()),
-    )
+    request_of_lot = Request(recipe, station, seating.units, seating.slots, seed, repeat, tuple(fault or ()))
     asks = prompts if prompts is not None else attended() and not as_json
     requests = request_of_lot.fillings(slots) if asks else [request_of_lot]
     jobs = [request.job(Archive(archive)) for request in requests]
@@ -99,17 +82,14 @@ def command(
         for request, job in zip(requests, jobs, strict=True)
     ]
     for line in (line for run in runs for line in library_remarks(run)):
-        error_console().print(f"run: {line}")
+        remark(f"run: {line}")
     documents = [judged(summary(run), run) for run in runs]
     if as_json:
         print_json(documents[0] if len(documents) == 1 else {"fillings": documents})
     else:
         for document in documents:
-            print_summary(document)
-            print_adequacy(document["adequacy"])
-            print_references(document["references"])
+            print_result(document)
         print_next(
-            console(),
             [line for run, document in zip(runs, documents, strict=True) for line in _next(run, document, archive)],
         )
     raise typer.Exit(max(exit_status(document) for document in documents))

@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pipelines.cli.options import error_console
+from pipelines.archive import Archive
+from pipelines.cli.printing import error_console, publish
 from schemas.errors import WrongUse
 
 if TYPE_CHECKING:
@@ -31,7 +32,6 @@ def even_series(
     WrongUse
         An option of files was given for a run.
     """
-    from pipelines.archive import Archive
     from pipelines.importers.series import is_series_file, series_of_file, series_of_run
 
     time, time_unit, rate = clock
@@ -51,14 +51,11 @@ def write_pictures(document: dict[str, Any], plot: Path | None, page: Path | Non
     """Draw a document of ``allan`` or ``psd`` as a picture, and as a page with its tables."""
     if plot is None and page is None:
         return
-    from pipelines.archive import files
     from pipelines.drawing.picture import picture, refuse_ending
     from pipelines.report.noise_page import noise_chart, noise_page
 
     if plot is not None:
         refuse_ending(plot, "--plot")
-        files.publish(plot, picture(noise_chart(document), plot.suffix.lower()), "plot", files.ELSEWHERE)
-        error_console().print(f"plot: {plot}")
+        publish(plot, picture(noise_chart(document), plot.suffix.lower()), "plot")
     if page is not None:
-        files.publish(page, noise_page(document).encode(), "page", files.ELSEWHERE)
-        error_console().print(f"page: {page}")
+        publish(page, noise_page(document), "page")

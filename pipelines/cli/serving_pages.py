@@ -4,23 +4,44 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import socket
 from contextlib import suppress
+from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pipelines.cli.options import error_console
+from pipelines.cli.printing import remark
 
 if TYPE_CHECKING:
     import uvicorn
+    from starlette.types import ASGIApp
+
+    from pipelines.serving.listening import LimitedSocket
 
 
-def run_until_stopped(server: uvicorn.Server, place: socket.socket, command: str) -> None:
+PATIENCE_S = 2  # open streams would hold up the end of a server
+
+
+def page_server(
+    app: ASGIApp, place: LimitedSocket, certificate: Path | None = None, key: Path | None = None
+) -> uvicorn.Server:
+    """The server of an application on a socket that is open already; with HTTPS where a certificate and its key are given."""
+    import uvicorn
+
+    from pipelines.serving.connections import TimedRequests
+
+    config = uvicorn.Config(
+        TimedRequests(app, place.connections), log_level="warning", access_log=False, server_header=False, ws="none",
+        timeout_graceful_shutdown=PATIENCE_S, ssl_certfile=certificate, ssl_keyfile=key, proxy_headers=False,
+    )  # fmt: skip
+    return uvicorn.Server(config)
+
+
+def run_until_stopped(server: uvicorn.Server, place: LimitedSocket, command: str) -> None:
     """Serve until Ctrl-C, which is how these commands end, then say so in one line."""
     logging.getLogger("uvicorn.error").addFilter(_not_cancelled)
     try:
         with suppress(KeyboardInterrupt):  # the server has ended by it, and mostly raises it again
             server.run(sockets=[place])
-        error_console().print(f"{command}: ended")
+        remark(f"{command}: ended")
     finally:
         logging.getLogger("uvicorn.error").removeFilter(_not_cancelled)
 

@@ -8,16 +8,9 @@ import typer
 
 from inertial.counts import number_of
 from pipelines.archive import Archive, Run
-from pipelines.cli.options import (
-    ArchiveOption,
-    JsonOption,
-    console,
-    print_json,
-    print_remarks,
-    print_table,
-    rows,
-    short,
-)
+from pipelines.cli import options
+from pipelines.cli.printing import print_json, print_table, say, short
+from pipelines.cli.validity import print_remarks, show_validity
 from schemas.errors import DONE, PART_FAILED
 
 PART = "Results"
@@ -45,9 +38,9 @@ def command(
     known: Annotated[
         str, typer.Option("--known", metavar="DATE", help="With --at: as the archive was on this day.")
     ] = "",
-    archive: ArchiveOption = None,
+    archive: options.ArchiveOption = None,
     *,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Show the result of a run, one of its tables, or the calibration of a unit that is valid on a date (default: today).
 
@@ -55,8 +48,6 @@ def command(
     """
     store = Archive(archive)
     if at or known or _is_unit(store, run):
-        from pipelines.cli.validity import show_validity
-
         raise typer.Exit(DONE if show_validity(store, run, at, known, as_json=as_json) else PART_FAILED)
     shown_run = store.run(run)
     if table:
@@ -90,8 +81,8 @@ def _show_run(run: Run, *, as_json: bool) -> None:
     if document["units"]:
         print_summary(document)
     else:
-        console().print(_unfinished(run))
-    console().print(f"tables  {', '.join(tables)}")
+        say(_unfinished(run))
+    say(f"tables  {', '.join(tables)}")
 
 
 def _unfinished(run: Run) -> str:
@@ -103,15 +94,17 @@ def _unfinished(run: Run) -> str:
 
 
 def _show_table(run: Run, name: str, *, as_json: bool) -> None:
+    from pipelines.tables.frames import rows_of
+
     frame = run.table(name)
     if as_json:
-        print_json({"run": run.id, "table": name, "rows": rows(frame)})
+        print_json({"run": run.id, "table": name, "rows": rows_of(frame)})
         return
     shown = frame.head(MANY)
     lines = [[_cell(value) for value in row] for row in shown.itertuples(index=False)]
     print_table([str(column) for column in frame.columns], lines, title=f"{run.id}: {name}")
     if len(frame) > MANY:
-        console().print(f"{number_of(len(frame) - MANY, 'more row')}; print all rows with --json")
+        say(f"{number_of(len(frame) - MANY, 'more row')}; print all rows with --json")
 
 
 def _cell(value: object) -> str:

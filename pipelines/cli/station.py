@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pipelines.cli.options import JsonOption, StationOption, console, print_json, print_table
+from pipelines.cli import options
+from pipelines.cli.printing import give, print_json, print_table, say
 from pipelines.cli.station_check import check
 from pipelines.cli.station_log import log
 from pipelines.cli.station_lot import DeviceOption, UnitsOption, made_up
@@ -16,7 +17,6 @@ from pipelines.cli.station_watch import watch
 
 if TYPE_CHECKING:
     from schemas.profile import Profile
-    from stations.serving import Served
 
 PART = "Measure"
 ORDER = 150
@@ -70,7 +70,7 @@ app.command()(watch)
 
 @app.command()
 def serve(
-    station: StationOption = None,
+    station: options.StationOption = None,
     host: Annotated[str, typer.Option("--host", help="Interface to listen on.")] = "127.0.0.1",
     port: Annotated[int, typer.Option("--port", min=0, max=65535, help="TCP port; 0: any free port.")] = 5020,
     speed: Annotated[
@@ -86,7 +86,7 @@ def serve(
         ),
     ] = 30.0,
     *,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Serve the simulated station over Modbus TCP until interrupted, for any Modbus client."""
     import signal
@@ -102,66 +102,39 @@ def serve(
 
     def ready(at: str, port_found: int) -> None:
         devices = served(config, list(range(units)))
+        rows = [{"name": d.name, "device_id": d.device_id, "profile": d.profile} for d in devices]
         if as_json:
-            print_json({"host": at, "port": port_found, "devices": [_where(d) for d in devices]})
-        else:
-            lines = [[d.name, str(d.device_id), d.profile] for d in devices]
-            print_table(
-                ["device", "id", "profile"], lines, title=f"{config.name} on {at}:{port_found}, speed {speed:g}"
-            )
-            console().print("stop with Ctrl-C")
+            print_json({"host": at, "port": port_found, "devices": rows})
+            return
+        title = f"{config.name} on {at}:{port_found}, speed {speed:g}"
+        print_table(["device", "id", "profile"], [[d.name, str(d.device_id), d.profile] for d in devices], title)
+        say("stop with Ctrl-C")
 
-    run(
-        config,
-        made_up(device, units, seed),
-        host=host,
-        port=port,
-        speed=speed,
-        stop=stop,
-        ready=ready,
-        silence_s=silence,
-    )
+    lot = made_up(device, units, seed)
+    run(config, lot, host=host, port=port, speed=speed, stop=stop, ready=ready, silence_s=silence)
 
 
 @app.command()
 def profiles(
     name: Annotated[str, typer.Argument(metavar="[PROFILE]", help="Show the registers of this profile.")] = "",
     *,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """List the register-map profiles, or the registers of one profile."""
     from stations.profile_files import load_profile, profile_names
 
     if name:
         profile = load_profile(name)
-        if as_json:
-            print_json(profile.model_dump(mode="json"))
-            return
-        if profile.commands:
-            lines = [[c.name, c.ask, c.tell, c.unit, c.disputed] for c in profile.commands]
-            print_table(["value", "read command", "write command", "unit", "disputed"], lines, title=profile.model)
-            return
-        lines = [
-            [r.name, r.space, str(r.address), r.type, SHORT[r.access], r.unit, r.manual] for r in profile.registers
-        ]
-        print_table(["register", "space", "address", "type", "access", "unit", "manual"], lines, title=profile.model)
-        _print_disputed(profile)
+        give(profile.model_dump(mode="json"), lambda _: _print_profile(profile), as_json=as_json)
         return
     loaded = [load_profile(one) for one in profile_names()]
-    if as_json:
-        print_json(
-            {
-                "profiles": [
-                    p.model_dump(mode="json", exclude={"registers", "commands", "groups", "fifo"}) for p in loaded
-                ]
-            }
-        )
-        return
+    heads = ["profile", "kind", "device", "links", "verified"]
     lines = [
         [p.name, p.kind, f"{p.maker} {_first_words(p.model)}", " ".join(p.links), "yes" if p.verified else "no"]
         for p in loaded
     ]
-    print_table(["profile", "kind", "device", "links", "verified"], lines)
+    rows = [p.model_dump(mode="json", exclude={"registers", "commands", "groups", "fifo"}) for p in loaded]
+    give({"profiles": rows}, lambda _: print_table(heads, lines), as_json=as_json)
 
 
 def _first_words(model: str) -> str:
@@ -169,13 +142,14 @@ def _first_words(model: str) -> str:
     return re.split(r"[,:;(]| with | behind ", model)[0].strip()
 
 
-def _print_disputed(profile: Profile) -> None:
-    """Registers on which sources disagree, one line each."""
+def _print_profile(profile: Profile) -> None:
+    """The registers or commands of a profile; registers on which sources disagree, one line each."""
+    if profile.commands:
+        lines = [[c.name, c.ask, c.tell, c.unit, c.disputed] for c in profile.commands]
+        print_table(["value", "read command", "write command", "unit", "disputed"], lines, title=profile.model)
+        return
+    lines = [[r.name, r.space, str(r.address), r.type, SHORT[r.access], r.unit, r.manual] for r in profile.registers]
+    print_table(["register", "space", "address", "type", "access", "unit", "manual"], lines, title=profile.model)
     for register in profile.registers:
         if register.disputed:
-            console().print(f"disputed  {register.name}: {register.disputed}")
-
-
-def _where(device: Served) -> dict[str, object]:
-    """A device for JSON."""
-    return {"name": device.name, "device_id": device.device_id, "profile": device.profile}
+            say(f"disputed  {register.name}: {register.disputed}")

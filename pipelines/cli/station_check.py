@@ -2,29 +2,30 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from inertial.counts import number_of
-from pipelines.cli.options import JsonOption, StationOption, error_console, print_json, print_table
+from pipelines.cli import options
+from pipelines.cli.printing import print_json, print_table, remark
 from pipelines.cli.station_lot import DeviceOption, UnitsOption, made_up
+from schemas.errors import STATION
 
 if TYPE_CHECKING:
     from schemas.lot import Lot
     from schemas.station import StationConfig
-    from stations.self_test import CheckResult, SelfTestBench
+    from stations.self_test import CheckResult
     from stations.serving import RegisterReading
 
 
 def check(
-    station: StationOption = None,
+    station: options.StationOption = None,
     device: DeviceOption = "ADXL355",
     units: UnitsOption = 8,
     *,
     registers: Annotated[bool, typer.Option("--registers", help="Only read every register once; no motion.")] = False,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Test a station before a shift: registers, instruments, moves, noise of every slot, a check standard.
 
@@ -32,7 +33,6 @@ def check(
     """
     from dataclasses import asdict
 
-    from schemas.errors import STATION
     from schemas.station import load_station
     from stations.serving import look
 
@@ -47,7 +47,7 @@ def check(
     else:
         _print(readings, findings, registers=registers)
         for message in failed:
-            error_console().print(message)
+            remark(message)
     raise typer.Exit(STATION if failed else 0)
 
 
@@ -61,25 +61,15 @@ def _tested(config: StationConfig, device: str, units: int) -> list[CheckResult]
     history = read_history(path)
     lot = made_up(device, units, 1, repeat=len(history)) if config.kind == "simulated" else _seated(config)
     if lot is None:
-        return [
-            CheckResult(
-                "slots",
-                "reader",
-                ok=False,
-                message="reader: no slot is occupied, at least one unit is needed; seat a unit",
-            )
-        ]
+        message = "reader: no slot is occupied, at least one unit is needed; seat a unit"
+        return [CheckResult("slots", "reader", ok=False, message=message)]
     with open_station(config, lot, run="station check") as opened:
         bench = SelfTestBench(opened, config.self_test, history)
         findings = bench.run()
-    _keep(path, bench, keep)
-    return findings
-
-
-def _keep(path: Path, bench: SelfTestBench, keep: Any) -> None:
     controlled = [finding.ok for finding in bench.findings if finding.check in {"offset", "scale"}]
     if bench.standard is not None and controlled and all(controlled):
         keep(path, bench.standard)
+    return findings
 
 
 def _seated(config: StationConfig) -> Lot | None:

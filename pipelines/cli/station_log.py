@@ -7,7 +7,8 @@ from typing import Annotated, Any
 import typer
 
 from pipelines.archive import Archive
-from pipelines.cli.options import ArchiveOption, JsonOption, console, print_json
+from pipelines.cli import options
+from pipelines.cli.printing import print_json, say
 
 STYLES = {
     "spoilt": "yellow",
@@ -28,11 +29,11 @@ QUIET = {"reference", "soak"}  # shown only with --all, because they occur in ev
 
 def log(
     run: Annotated[str, typer.Argument(metavar="[RUN]", help="Show only this run of the archive.")] = "",
-    archive: ArchiveOption = None,
+    archive: options.ArchiveOption = None,
     limit: Annotated[int, typer.Option("--limit", min=1, help="Number of events, newest last.")] = 50,
     *,
     everything: Annotated[bool, typer.Option("--all", help="Also show soaks and reference readings.")] = False,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Show events that paused or ended runs (from the archive) and events of stations (from the log of this computer)."""
     recorded = [*_of_runs(Archive(archive), run), *([] if run else _of_machine())]
@@ -42,7 +43,7 @@ def log(
         print_json({"events": events})
         return
     if not events:
-        console().print("no events")
+        say("no events")
         return
     for event in events:
         _print(event)
@@ -59,10 +60,10 @@ def _print(event: dict[str, Any]) -> None:
         f"  {event['where']}{record}  ",
         (event["kind"].replace("_", " "), STYLES.get(event["kind"], "")),
     )
-    console().print(head)
+    say(head)
     cause_and_action = " → ".join(part for part in (event["reason"], event["action"]) if part)
     if cause_and_action:
-        console().print(Padding(Text(cause_and_action), (0, 0, 0, 4)))
+        say(Padding(Text(cause_and_action), (0, 0, 0, 4)))
 
 
 def _of_runs(store: Archive, run: str) -> list[dict[str, Any]]:

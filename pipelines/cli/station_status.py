@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pipelines.cli.options import JsonOption, StationOption, console, error_console, print_json
+from pipelines.cli import options
+from pipelines.cli.printing import console, print_json, remark, say
 from pipelines.cli.station_lot import DeviceOption, UnitsOption, made_up
+from schemas.errors import STATION
 
 if TYPE_CHECKING:
     from rich.console import Group
@@ -19,13 +22,13 @@ GOOD, BAD = "green", "bold red"
 
 
 def status(
-    station: StationOption = None,
+    station: options.StationOption = None,
     device: DeviceOption = "ADXL355",
     units: UnitsOption = 8,
     every: Annotated[float, typer.Option("--every", min=0.1, help="Seconds between two readings with --watch.")] = 1.0,
     *,
     watch: Annotated[bool, typer.Option("--watch", help="Repeat until Ctrl-C.")] = False,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Show angles, temperatures, states, slots and the run that drives the station.
 
@@ -33,7 +36,6 @@ def status(
 
     Nothing is moved and no lease is needed: a run in progress is not disturbed.
     """
-    from schemas.errors import STATION
     from schemas.station import load_station
     from stations.overview import looked_at
 
@@ -45,25 +47,25 @@ def status(
         elif watch:
             now = _live(look, every)
         else:
-            console().print(picture(now))
+            say(picture(now))
     if not as_json:
         for fault in now.faults.values():
-            error_console().print(fault)
+            remark(fault)
     raise typer.Exit(STATION if now.faults else 0)
 
 
-def _live(look: object, every: float) -> Overview:
+def _live(look: Callable[[], Overview], every: float) -> Overview:
     """Show new readings until Ctrl-C; return the last one."""
     import time
 
     from rich.live import Live
 
-    now: Overview = look()  # pyright: ignore[reportCallIssue]
+    now = look()
     with Live(picture(now), console=console(), refresh_per_second=4, screen=False) as live:
         try:
             while True:
                 time.sleep(every)
-                now = look()  # pyright: ignore[reportCallIssue]
+                now = look()
                 live.update(picture(now))
         except KeyboardInterrupt:
             return now

@@ -12,10 +12,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pipelines.archive import Records
+from pipelines.archive import Archive, Records
+from pipelines.cli import options
 from pipelines.cli.chart import Line, chart, clock
-from pipelines.cli.options import ArchiveOption, JsonOption, StationOption, console, print_json
+from pipelines.cli.printing import console, print_json, say
 from pipelines.cli.station_lot import made_up
+from schemas.errors import WrongUse
 
 if TYPE_CHECKING:
     from rich.console import Group
@@ -27,47 +29,46 @@ Points = list[tuple[float, float]]
 Look = Callable[[], "ChartData"]
 
 
+def _series() -> dict[str, Points]:
+    return {name: [] for name in ("chamber", "coldest", "warmest", "outer", "inner")}
+
+
 @dataclass
 class ChartData:
-    """Data of the charts: temperatures in °C and angles in degrees against the time of the station, s."""
+    """Data of the charts: temperatures in °C and angles in degrees against the time of the station, s, by name."""
 
     title: str
-    chamber: Points = field(default_factory=list[tuple[float, float]])
-    coldest: Points = field(default_factory=list[tuple[float, float]])
-    warmest: Points = field(default_factory=list[tuple[float, float]])
-    outer: Points = field(default_factory=list[tuple[float, float]])
-    inner: Points = field(default_factory=list[tuple[float, float]])
     over: bool = False
+    points: dict[str, Points] = field(default_factory=_series)
 
     @property
     def last(self) -> float:
         """The newest time of the data."""
-        return max((points[-1][0] for points in (self.chamber, self.outer) if points), default=0.0)
+        return max((points[-1][0] for points in self.points.values() if points), default=0.0)
 
     def document(self) -> dict[str, Any]:
         """The same for JSON."""
-        series = ("chamber", "coldest", "warmest", "outer", "inner")
-        return {"title": self.title, "over": self.over, **{name: getattr(self, name) for name in series}}
+        return {"title": self.title, "over": self.over, **self.points}
 
 
 def watch(
     run: Annotated[str, typer.Argument(metavar="[RUN]", help="A run of the archive; default: the newest.")] = "latest",
-    station: StationOption = None,
-    archive: ArchiveOption = None,
+    station: options.StationOption = None,
+    archive: options.ArchiveOption = None,
     minutes: Annotated[
         float, typer.Option("--minutes", min=0.1, help="Time span, minutes before now; default: the whole run.")
     ] = math.inf,
     every: Annotated[float, typer.Option("--every", min=0.1, help="Seconds between two readings.")] = 1.0,
     *,
     once: Annotated[bool, typer.Option("--once", help="Draw once and exit.")] = False,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Draw temperatures and angles over time, live: of a run in the archive, or with --station of a station."""
     with _source(run, station, archive) as look:
         if as_json:
             print_json(look().document())
         elif once or not sys.stdout.isatty():
-            console().print(picture(look(), minutes))
+            say(picture(look(), minutes))
         else:
             _live(look, minutes, every)
 
@@ -75,9 +76,6 @@ def watch(
 @contextmanager
 def _source(run: str, station: Path | None, archive: str | None) -> Generator[Look]:
     if station is None:
-        from pipelines.archive import Archive
-        from schemas.errors import WrongUse
-
         source = Archive(archive).run(run)
         records = source.records
         if records is None:
@@ -110,29 +108,22 @@ def of_records(title: str, records: Records) -> ChartData:
         ends = [start - MOVE_S for start in starts[1:]] + [starts[-1] + float(by_record["duration_s"].iloc[-1])]
         return [(t, v) for start, end, v in zip(starts, ends, values, strict=True) for t in (start, max(start, end))]
 
-    return ChartData(
-        title,
-        series("air"),
-        series("low"),
-        series("high"),
-        stairs("outer_deg"),
-        stairs("inner_deg"),
-        records.is_complete(),
-    )
+    temperatures = {"chamber": series("air"), "coldest": series("low"), "warmest": series("high")}
+    angles = {"outer": stairs("outer_deg"), "inner": stairs("inner_deg")}
+    return ChartData(title, records.is_complete(), temperatures | angles)
 
 
 def _added(seen: ChartData, now: Overview) -> ChartData:
     """The data with one more reading of the station."""
     time = now.time_s
     if now.chamber_C is not None:
-        seen.chamber.append((time, now.chamber_C))
+        seen.points["chamber"].append((time, now.chamber_C))
     known = [slot.unit_C for slot in now.slots if slot.unit_C is not None and math.isfinite(slot.unit_C)]
     if known:
-        seen.coldest.append((time, min(known)))
-        seen.warmest.append((time, max(known)))
-    for name, points in (("outer", seen.outer), ("inner", seen.inner)):
-        if name in now.angles_deg:
-            points.append((time, now.angles_deg[name]))
+        seen.points["coldest"].append((time, min(known)))
+        seen.points["warmest"].append((time, max(known)))
+    for name, angle in now.angles_deg.items():
+        seen.points[name].append((time, angle))
     return seen
 
 
@@ -143,14 +134,14 @@ def picture(seen: ChartData, minutes: float) -> Group:
     out = console()
     width, height = out.width, max(6, min(16, (out.height - 8) // 2))
     last = seen.last
-    first = min((points[0][0] for points in (seen.chamber, seen.outer) if points), default=0.0)
+    first = min((points[0][0] for points in seen.points.values() if points), default=0.0)
     span = (max(first, last - 60.0 * minutes), max(last, first + 1.0))
     temperatures = [
-        Line("chamber", "cyan", seen.chamber),
-        Line("coldest unit", "blue", seen.coldest),
-        Line("warmest unit", "red", seen.warmest),
+        Line("chamber", "cyan", seen.points["chamber"]),
+        Line("coldest unit", "blue", seen.points["coldest"]),
+        Line("warmest unit", "red", seen.points["warmest"]),
     ]
-    angles = [Line("outer", "green", seen.outer), Line("inner", "magenta", seen.inner)]
+    angles = [Line("outer", "green", seen.points["outer"]), Line("inner", "magenta", seen.points["inner"])]
     state = "finished" if seen.over else f"at {clock(last)}"
     return Group(
         f"{seen.title}, {state}",

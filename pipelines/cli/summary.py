@@ -9,7 +9,7 @@ import pandas as pd
 from inertial.counts import number_of
 from pipelines.archive import Run
 from pipelines.capture.interruptions import Interruptions, interruptions
-from pipelines.cli.options import STYLES, console, print_table, short
+from pipelines.cli.printing import STYLES, print_table, say, short
 from pipelines.tables.frames import rows_of
 from pipelines.tables.json_values import json_value
 from schemas.errors import DONE, PART_FAILED
@@ -64,13 +64,8 @@ def summary(run: Run) -> dict[str, Any]:
 
 
 def _unit(row: dict[str, Any], figures: pd.DataFrame) -> dict[str, Any]:
-    own = figures[figures["unit"] == row["unit"]]
-    return json_value(
-        {
-            **row,
-            "figures": {f["figure"]: {k: f[k] for k in (*FIXED, *RISKS) if k in f} for f in rows_of(own)},
-        }
-    )
+    of_unit = rows_of(figures[figures["unit"] == row["unit"]])
+    return json_value({**row, "figures": {f["figure"]: {k: f[k] for k in (*FIXED, *RISKS) if k in f} for f in of_unit}})
 
 
 def exit_status(document: dict[str, Any]) -> int:
@@ -83,38 +78,44 @@ def print_summary(document: dict[str, Any]) -> None:
     from rich.text import Text
 
     lines: list[list[str | Text]] = []
-    calibrated = any(name in unit["figures"] for unit in document["units"] for name, _ in SHOWN) or not _listed(
-        document
-    )
-    measured = {
-        name for unit in document["units"] for name in unit["figures"]
-    }  # a recipe without a static record has no N
-    shown = [one for one in (*(SHOWN if calibrated else ()), *_listed(document)) if one[0] in measured or not measured]
+    measured = {name for unit in document["units"] for name in unit["figures"]}  # without a static record there is no N
+    limited = _limited(document)
+    calibrated = bool(measured & dict(SHOWN).keys()) or not limited
+    columns = (*(SHOWN if calibrated else ()), *limited)
+    shown = [(name, head) for name, head in columns if name in measured or not measured]
     for unit in document["units"]:
         values = [short(unit["figures"].get(name, {}).get("value")) for name, _ in shown]
         outcome = Text(unit["outcome"], style=STYLES[unit["outcome"]])
         lines.append([str(unit["slot"]), unit["unit"], outcome, unit["grade"], *values])
     print_table(["slot", "unit", "result", "grade", *(title for _, title in shown)], lines)
-    out = console()
     if calibrated:
-        out.print(" · ".join(LEGEND[name] for name, _ in shown if name in LEGEND), style="dim")
+        say(" · ".join(LEGEND[name] for name, _ in shown if name in LEGEND), style="dim")
         if any(name == "velocity_random_walk_ug_rtHz" for name, _ in shown):
-            out.print(NOISE_LEGEND, style="dim")
+            say(NOISE_LEGEND, style="dim")
     for unit in document["units"]:
         if unit["reasons"]:
-            out.print(f"  {unit['unit']}: {unit['reasons']}")
-    out.print(f"  decided by {document['rule']}", style="dim")
+            say(f"  {unit['unit']}: {unit['reasons']}")
+    say(f"  decided by {document['rule']}", style="dim")
     if any(unit.get("basis") != "budget" for unit in document["units"]):
-        out.print(f"  {NOISE_ONLY}", style="dim")
+        say(f"  {NOISE_ONLY}", style="dim")
     for line in _interrupted(document["interruptions"]):
-        out.print(line)
+        say(line)
     total = len(document["units"])
-    out.print(f"{document['passed']} of {total} passed, {document['failed']} failed, {document['refused']} refused")
-    out.print(f"run     {document['run']}")
-    out.print(f"report  {document['report']}")
+    say(f"{document['passed']} of {total} passed, {document['failed']} failed, {document['refused']} refused")
+    say(f"run     {document['run']}")
+    say(f"report  {document['report']}")
 
 
-def _listed(document: dict[str, Any]) -> list[tuple[str, str]]:
+def print_result(document: dict[str, Any]) -> None:
+    """The result of a run for people, with the verdicts on its model and on its references."""
+    from pipelines.cli.text.verdict_text import print_adequacy, print_references
+
+    print_summary(document)
+    print_adequacy(document["adequacy"])
+    print_references(document["references"])
+
+
+def _limited(document: dict[str, Any]) -> list[tuple[str, str]]:
     """Figures of procedures that have a limit, with their heads."""
     from pipelines.procedures import FIGURES
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING
 
-from pipelines.cli.options import error_console
+from pipelines.cli.printing import remark
 from pipelines.jobs.seating import Seating, scan
 from schemas.errors import WrongUse
 
@@ -28,19 +28,17 @@ class Terminal:
     def ask(self, prompt: Prompt) -> Answer:
         """Enter continues the run, ``stop`` stops it."""
         with self._quiet():
-            out = error_console()
-            out.print(f"\n{TITLES[prompt.kind]}  ", style="bold", end="")
-            out.print(f"{prompt.text}.")
+            remark(f"\n{TITLES[prompt.kind]}  ", style="bold", end="")
+            remark(f"{prompt.text}.")
             for slot, serial in prompt.slots:
-                out.print(f"  slot {slot:>2}  {serial}")
+                remark(f"  slot {slot:>2}  {serial}")
             return "stop" if _line("Enter when done, 'stop' to stop the run: ").lower() in STOP else "go"
 
 
 def scanned(slots: int) -> Seating:
     """The seating, scanned at the terminal slot by slot."""
-    out = error_console()
-    out.print(f"Scan the units, slot by slot (0 to {slots - 1}); Enter alone leaves a slot empty.")
-    seating = scan(slots, lambda slot: _line(f"slot {slot:>2}: "), lambda message: out.print(message, style="yellow"))
+    remark(f"Scan the units, slot by slot (0 to {slots - 1}); Enter alone leaves a slot empty.")
+    seating = scan(slots, lambda slot: _line(f"slot {slot:>2}: "), lambda message: remark(message, style="yellow"))
     if not seating.units:
         raise WrongUse("scan: no unit was scanned, at least one is needed; give the command again")
     return seating
@@ -67,7 +65,7 @@ def agreed(question: str, choices: str = MEASURES, unattended: str = UNATTENDED)
         if answer in STOP:
             return False
         message = f"'{answer}' is neither yes nor no: {choices}"
-        error_console().print(message, style="yellow")
+        remark(message, style="yellow")
 
 
 def attended() -> bool:
@@ -77,7 +75,7 @@ def attended() -> bool:
 
 def _line(question: str, unattended: str = UNATTENDED) -> str:
     """A line of standard input; its end is an error."""
-    error_console().print(question, end="")
+    remark(question, end="")
     line = sys.stdin.readline()
     if not line:
         raise WrongUse(unattended)

@@ -11,6 +11,7 @@ import traceback
 from datetime import UTC, datetime
 from pathlib import Path
 
+from schemas.errors import TumblelineError
 from schemas.foreign import reason
 
 VARIABLE = "TUMBLELINE_DEBUG"
@@ -61,7 +62,6 @@ def _report(problem: Exception) -> str:
 
 def _written(text: str) -> Path | None:
     """File of the report: in the state folder, else in the folder of temporary files; None where neither can be written."""
-    from schemas.errors import TumblelineError
     from stations.safety.folder import state_folder
 
     now = datetime.now(UTC).strftime("%Y%m%dT%H%M%S")

@@ -3,21 +3,30 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from importlib import import_module
 from typing import Any
 
-from pipelines.archive import Archive
+from pipelines.archive import Archive, Run
 from pipelines.certificates import Calibration
-from pipelines.cli.options import console, print_json, print_table
+from pipelines.cli.printing import print_json, print_table, remark, say
+from schemas.errors import WrongUse
 
 MADE = ("stage", "code", "key", "libraries", "schema", "inputs", "parameters", "who", "where", "when")
+
+
+def print_remarks(run: Run, serials: Sequence[str]) -> None:
+    """Print missing or foreign signatures and differing library versions on standard error."""
+    from pipelines.certificates.coefficient_remarks import library_remarks, signature_remarks
+
+    for line in (*signature_remarks(run, serials), *library_remarks(run)):
+        remark(f"show: {line}")
 
 
 def show_validity(archive: Archive, serial: str, at: str, known: str, *, as_json: bool) -> bool:
     """Print the calibration that is valid on a day; return whether there is one."""
     from pipelines.certificates import Ledger
     from pipelines.certificates.days import day_of, today
-    from schemas.errors import WrongUse
 
     day = day_of(at, "--at") if at else today()
     history = Ledger(archive).calibrations(serial, day_of(known, "--known") if known else "")
@@ -39,9 +48,7 @@ def show_validity(archive: Archive, serial: str, at: str, known: str, *, as_json
 
 def _made(archive: Archive, valid: Calibration) -> dict[str, Any]:
     """The coefficients of a calibration, with the code, libraries and data that made them."""
-    from pipelines.archive import Run
     from pipelines.certificates.certified_coefficients import coefficients_of
-    from pipelines.cli.options import print_remarks
 
     run = Run(archive, valid.run)
     if not (run.path / "run.json").is_file():
@@ -56,19 +63,18 @@ def _made(archive: Archive, valid: Calibration) -> dict[str, Any]:
 
 
 def _print(serial: str, day: str, valid: Calibration | None, history: list[Calibration], made: dict[str, Any]) -> None:
-    out = console()
     if valid is None:
-        out.print(f"{serial}: no calibration is valid on {day}", style="bold red")
+        say(f"{serial}: no calibration is valid on {day}", style="bold red")
     else:
         event = valid.event
-        out.print(f"{serial}: certificate {valid.certificate} is valid on {day}", style="bold green")
-        out.print(f"  valid    {valid.start} until {valid.until}, grade {event.grade}")
-        out.print(f"  from     run {valid.run}, recipe {event.recipe}, station {event.station}")
-        out.print(f"  by       {event.who} on {event.where}, {event.when}")
-        out.print(f"  tables   coefficients {event.coefficients[:16]}…")
+        say(f"{serial}: certificate {valid.certificate} is valid on {day}", style="bold green")
+        say(f"  valid    {valid.start} until {valid.until}, grade {event.grade}")
+        say(f"  from     run {valid.run}, recipe {event.recipe}, station {event.station}")
+        say(f"  by       {event.who} on {event.where}, {event.when}")
+        say(f"  tables   coefficients {event.coefficients[:16]}…")
         if made.get("made"):
             libraries = ", ".join(f"{name} {number}" for name, number in made["made"]["libraries"].items())
-            out.print(f"  code     {made['made']['code'][:16]}… with {libraries}")
+            say(f"  code     {made['made']['code'][:16]}… with {libraries}")
     lines = [[one.certificate, one.start, one.until, one.state, one.run, _why(one)] for one in history]
     print_table(["certificate", "from", "until", "state", "run", "reason"], lines)
     rows = made.get("coefficients") or []

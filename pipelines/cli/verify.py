@@ -8,9 +8,11 @@ from typing import Annotated
 import typer
 
 from inertial.counts import number_of
-from pipelines.cli.options import ArchiveOption, JsonOption, console, error_console, give
+from pipelines.archive import Archive
+from pipelines.cli import options
+from pipelines.cli.printing import console, error_console, give
 from pipelines.integrity import Report
-from schemas.errors import DONE, PART_FAILED
+from schemas.errors import DONE, PART_FAILED, WrongUse
 
 SHOWN = 8  # consequences of one finding
 
@@ -60,9 +62,9 @@ def command(
         str,
         typer.Option("--head", metavar="HASH", help="Hash of an entry of the chain from an earlier verification."),
     ] = "",
-    archive: ArchiveOption = None,
+    archive: options.ArchiveOption = None,
     *,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Compute every hash again: find changed bytes, missing files, edited manifests, foreign tables, false signatures.
 
@@ -70,12 +72,10 @@ def command(
     the XML is made again from the archive and compared whole, and revoked and replaced certificates are found. Exit status 1:
     there are findings, or nothing proves where a certificate comes from.
     """
-    from pipelines.archive import Archive
     from pipelines.archive.signatures import public_keys
     from pipelines.audit.index_check import check_index
     from pipelines.cli.certificate_check import certificate_files, check_certificates
     from pipelines.integrity import verify
-    from schemas.errors import WrongUse
 
     if files := certificate_files(runs or ()):
         accepted = check_certificates(files, trust or (), archive, laboratory, as_json=as_json)

@@ -3,28 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
 from inertial.counts import number_of
 from pipelines.archive import Archive
-from pipelines.cli.options import (
-    ArchiveOption,
-    DaskOption,
-    EffectFileOption,
-    JsonOption,
-    OtherLimitsOption,
-    WorkersOption,
-    console,
-    error_console,
-    give,
-    print_table,
-    short,
-)
-
-if TYPE_CHECKING:
-    from pipelines.jobs.model_change import ModelChange
+from pipelines.cli import options
+from pipelines.cli.inputs import distribution
+from pipelines.cli.printing import error_console, give, print_table, say, short
 
 PART = "Old data, new models"
 ORDER = 540
@@ -43,13 +30,13 @@ def command(
         list[str] | None,
         typer.Argument(metavar="[SELECTION…]", help="Runs as for 'tumbleline rerun'; default: all."),
     ] = None,
-    limits: OtherLimitsOption = "",
-    effect_file: EffectFileOption = None,
-    archive: ArchiveOption = None,
-    dask: DaskOption = "",
-    workers: WorkersOption = None,
+    limits: options.OtherLimitsOption = "",
+    effect_file: options.EffectFileOption = None,
+    archive: options.ArchiveOption = None,
+    dask: options.DaskOption = "",
+    workers: options.WorkersOption = None,
     *,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Show the effect of a model on the lots of the archive: yield, errors, and errors on later runs, with old and new model.
 
@@ -58,33 +45,19 @@ def command(
     """
     from pipelines.jobs.model_change import change_from_options
     from pipelines.rerun.selection import selected
-    from pipelines.rerun.whatif import BETTER
+    from pipelines.rerun.whatif import BETTER, evaluated
 
     change = change_from_options("", model, limits, effect_file, where="whatif")
     store = Archive(archive)
     runs = [entry.id for entry in selected(store, selection or ["all"])]
-    document = _evaluated(store, runs, change, dask, workers)
+    distribute, count = distribution(store, runs, dask, workers)
+    with error_console().status(f"evaluating {number_of(len(runs), 'lot')}, {count} at a time"):
+        document = evaluated(store, runs, change, distribute, count)
     give({"archive": str(store.root), **document}, lambda _: _print(document), as_json=as_json)
     raise typer.Exit(0 if document["verdict"] == BETTER else 1)
 
 
-def _evaluated(store: Archive, runs: list[str], change: ModelChange, dask: str, workers: int | None) -> dict[str, Any]:
-    """Every lot with both models, and the errors on later runs of units that were measured before."""
-    from pathlib import Path as LocalPath
-
-    from pipelines.flows.dask_cluster import on_dask
-    from pipelines.parallel import processors
-    from pipelines.rerun.whatif import evaluated
-
-    count = max(1, min(workers or processors(), len(runs)))
-    home = store.root.resolve() / "orchestrator" if isinstance(store.root, LocalPath) else None
-    distribute = on_dask(dask, count, home)
-    with error_console().status(f"evaluating {number_of(len(runs), 'lot')}, {count} at a time"):
-        return evaluated(store, runs, change, distribute, count)
-
-
 def _print(document: dict[str, Any]) -> None:
-    out = console()
     title = f"{document['name']} version {document['version']} on {number_of(document['lots'], 'lot')}"
     rows = [(f"{row['device']} on {row['station']}", row) for row in document["groups"]]
     lines = [line for name, row in [*rows, ("all", document["total"])] for line in _lines(name, row)]
@@ -93,14 +66,14 @@ def _print(document: dict[str, Any]) -> None:
     for key, outcome in (("to_fail", "fail with the new model only"), ("to_pass", "pass with the new model only")):
         rows = document["flips"][key]
         if rows:
-            out.print(f"{number_of(len(rows), 'unit')}: {outcome}")
+            say(f"{number_of(len(rows), 'unit')}: {outcome}")
             for row in rows[:SHOWN]:
-                out.print(f"  {row['unit']} in {row['run']}: {row['reasons']}", style="dim")
+                say(f"  {row['unit']} in {row['run']}: {row['reasons']}", style="dim")
     for row in document["failed"]:
-        out.print(f"  {row['run']}: {row['error']}", style="bold red")
+        say(f"  {row['run']}: {row['error']}", style="bold red")
     style = {"better": "bold green", "worse": "bold red"}.get(document["verdict"], "bold")
-    out.print(f"{document['verdict']}: {document['words']}", style=style)
-    out.print(f"evidence  {document['evidence']}")
+    say(f"{document['verdict']}: {document['words']}", style=style)
+    say(f"evidence  {document['evidence']}")
 
 
 def _lines(name: str, row: dict[str, Any]) -> list[list[str]]:

@@ -8,7 +8,8 @@ from typing import Annotated
 
 import typer
 
-from pipelines.cli.options import console, error_console
+from pipelines.archive import Archive
+from pipelines.cli.printing import remark, say
 from schemas.errors import WrongUse
 
 PART = "Is the model good enough, and what is missing?"
@@ -18,8 +19,6 @@ EXAMPLES = (
     "tumbleline workbench",
     "tumbleline workbench archive --port 8765",
 )
-
-PATIENCE_S = 2  # open streams would hold up the end of the server
 
 
 def command(
@@ -73,9 +72,8 @@ def command(
 
     import uvicorn
 
-    from pipelines.archive import Archive
-    from pipelines.cli.serving_pages import run_until_stopped
-    from pipelines.serving.connections import MOST, ConnectionLimits, TimedRequests
+    from pipelines.cli.serving_pages import page_server, run_until_stopped
+    from pipelines.serving.connections import MOST, ConnectionLimits
     from pipelines.serving.listening import listening_socket
     from pipelines.workbench.application import create_app
     from pipelines.workbench.settings import WorkbenchSettings
@@ -98,13 +96,8 @@ def command(
         )  # fmt: skip
         servers: list[uvicorn.Server] = []
         app = create_app(settings, ending=lambda: any(server.should_exit for server in servers))
-        console().print(f"{settings.address}/?token={settings.token}")
+        say(f"{settings.address}/?token={settings.token}")
         sys.stdout.flush()  # a program that started it waits for the address
-        error_console().print("Open the address above; Ctrl-C ends the workbench.")
-        config = uvicorn.Config(
-            TimedRequests(app, place.connections), host=host, port=listening, log_level="warning", access_log=False,
-            server_header=False, ws="none", timeout_graceful_shutdown=PATIENCE_S,
-            ssl_certfile=certificate, ssl_keyfile=key, proxy_headers=False,
-        )  # fmt: skip
-        servers.append(uvicorn.Server(config))
+        remark("Open the address above; Ctrl-C ends the workbench.")
+        servers.append(page_server(app, place, certificate, key))
         run_until_stopped(servers[0], place, "workbench")

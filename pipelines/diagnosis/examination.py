@@ -7,12 +7,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import pandas as pd
+from threadpoolctl import threadpool_limits
 
 from inertial import effects as catalogue
 from inertial.criticism.diagnosis import Diagnosis
 from inertial.planning.reasons import reason
 from pipelines.diagnosis.diagnose import default_model, document, examined
 from pipelines.diagnosis.suggested_formula import as_toml, offer
+from pipelines.parallel import keep_memory
 from pipelines.tables.dwells import Measured
 
 
@@ -35,7 +37,7 @@ def examination(
     judged: Sequence[str] | None,
     left_out: Collection[str] = (),
 ) -> Examination:
-    """The diagnosis of dwells against a model.
+    """The diagnosis of dwells against a model, on one thread: the matrices are small.
 
     Parameters
     ----------
@@ -43,15 +45,17 @@ def examination(
     left_out : ``UNIT:DWELL``, which were removed from ``table`` on purpose
     """
     effects = list(judged) if judged else default_model(table)
-    measurement, faults, diagnosis = examined(table, history, effects, left_out)
-    whole = {
-        **document(measurement, faults, diagnosis, left_out=left_out),
-        **_extras(measurement.units, effects, diagnosis),
-    }
-    return Examination(whole, measurement, diagnosis)
+    keep_memory()
+    with threadpool_limits(1):
+        measurement, faults, diagnosis = examined(table, history, effects, left_out)
+        content = {
+            **document(measurement, faults, diagnosis, left_out=left_out),
+            **report_fields(measurement.units, effects, diagnosis),
+        }
+    return Examination(content, measurement, diagnosis)
 
 
-def _extras(units: tuple[str, ...], effects: list[str], diagnosis: Diagnosis | None) -> dict[str, Any]:
+def report_fields(units: tuple[str, ...], effects: list[str], diagnosis: Diagnosis | None) -> dict[str, Any]:
     """Keys of the document beyond the fixed ones: the judged model, breakers of unseen effects, the suggested formula."""
     extras: dict[str, Any] = {"effects": effects, "units": list(units), "breakers": {}, "offer": None}
     if diagnosis is None:

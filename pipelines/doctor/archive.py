@@ -13,7 +13,7 @@ from pipelines.archive.archive import FORMAT
 from pipelines.archive.signatures import VARIABLE as KEY_VARIABLE
 from pipelines.archive.signatures import key_place, name_of, private_key
 from pipelines.archive.store import first_line
-from pipelines.doctor.check import LARGEST_OFFSET_S, Check, clock_check, of_error, unwritable, write_probe
+from pipelines.doctor.check import LARGEST_OFFSET_S, Check, clock_check, judged, of_error, unwritable, write_probe
 from schemas.errors import TumblelineError
 
 PART, KEY = "archive", "signing key"
@@ -47,12 +47,12 @@ def _checks(archive: Archive, *, named: bool, free_gb: float) -> list[Check]:
     if not mark.is_file():
         return [_missing(archive, named=named)]
     form = files.read_json(mark).get("format")
-    out = [Check(PART, "reachable", "good", str(root))]
-    if form == FORMAT:
-        out.append(Check(PART, "format", "good", f"{form}"))
-    else:
-        remedy = "use the version that wrote it, or name another archive"
-        out.append(Check(PART, "format", "fault", f"{form}", f"{FORMAT}, which this version writes", remedy))
+    remedy = "use the version that wrote it, or name another archive"
+    needed = f"{FORMAT}, which this version writes"
+    out = [
+        Check(PART, "reachable", "good", str(root)),
+        judged(PART, "format", f"{form}", needed, remedy, good=form == FORMAT),
+    ]
     try:
         ahead_s = write_probe(root)
     except OSError as problem:
@@ -78,10 +78,8 @@ def _missing(archive: Archive, *, named: bool) -> Check:
 
 def _room(root: Path, free_gb: float) -> Check:
     free = shutil.disk_usage(root).free / GIGA
-    if free >= free_gb:
-        return Check(PART, "free space", "good", f"{free:.1f} GB")
     remedy = "make room on its disk, or give it a larger one"
-    return Check(PART, "free space", "fault", f"{free:.1f} GB", f"at least {free_gb:g} GB", remedy)
+    return judged(PART, "free space", f"{free:.1f} GB", f"at least {free_gb:g} GB", remedy, good=free >= free_gb)
 
 
 def _later_than_now(root: Path) -> list[Check]:
@@ -110,9 +108,8 @@ def key_checks(address: str | None) -> list[Check]:
 
 def _mode(place: Path) -> Check:
     mode = stat.S_IMODE(place.stat().st_mode)
-    if mode & OTHERS:
-        return Check(KEY, "private", "fault", f"mode {mode:04o}", "0600 or less", f"run: chmod 600 {place}")
-    return Check(KEY, "private", "good", f"mode {mode:04o}")
+    remedy = f"run: chmod 600 {place}"
+    return judged(KEY, "private", f"mode {mode:04o}", "0600 or less", remedy, good=not mode & OTHERS)
 
 
 def _outside(place: Path, address: str | None) -> Check:

@@ -28,11 +28,16 @@ class Check(NamedTuple):
     remedy: str = ""
 
 
-def of_error(part: str, check: str, problem: Exception) -> Check:
-    """A fault from a message of the form ``where: what was found, what is needed; what to do``."""
+def judged(part: str, check: str, found: str, needed: str, remedy: str, *, good: bool) -> Check:
+    """A good check, or a fault with what is needed and the remedy."""
+    return Check(part, check, "good", found) if good else Check(part, check, "fault", found, needed, remedy)
+
+
+def of_error(part: str, check: str, problem: Exception | str, otherwise: str = "see the message") -> Check:
+    """A fault from a message of the form ``where: what was found, what is needed; what to do``, or ``otherwise`` to do."""
     text = str(problem)
     found, _, remedy = text.rpartition("; ")
-    return Check(part, check, "fault", found or text, "", remedy if found else "see the message")
+    return Check(part, check, "fault", found or text, "", remedy if found else otherwise)
 
 
 def write_probe(folder: Place) -> float:
@@ -77,16 +82,9 @@ def offset(stamp: float, begun: float, ended: float, resolution_s: float) -> flo
 def clock_check(part: str, ahead_s: float, whose: str) -> Check:
     """Whether another clock agrees with that of the host."""
     found = f"{ahead_s:+.1f} s against the host" if ahead_s else "agrees with the host"
-    if abs(ahead_s) <= LARGEST_OFFSET_S:
-        return Check(part, "clock", "good", found)
-    return Check(
-        part,
-        "clock",
-        "fault",
-        found,
-        f"at most {LARGEST_OFFSET_S:g} s",
-        f"synchronise the clocks of the host and of {whose} with one time server (NTP)",
-    )
+    remedy = f"synchronise the clocks of the host and of {whose} with one time server (NTP)"
+    needed = f"at most {LARGEST_OFFSET_S:g} s"
+    return judged(part, "clock", found, needed, remedy, good=abs(ahead_s) <= LARGEST_OFFSET_S)
 
 
 def unwritable(part: str, place: object, problem: OSError, remedy: str) -> Check:

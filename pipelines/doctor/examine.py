@@ -8,6 +8,7 @@ import sys
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
+from typing import cast
 from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 
 from pipelines.doctor.archive import archive_checks, key_checks
@@ -41,10 +42,6 @@ def examine(archive: str | None = None, station: Path | None = None, free_gb: fl
         *station_checks(station),
         *host_checks(),
     ]
-    rows: list[CheckDocument] = [
-        {"part": c.part, "check": c.check, "state": c.state, "found": c.found, "needed": c.needed, "remedy": c.remedy}
-        for c in checks
-    ]
     samples = shipped("deploy")
     faults = sum(c.state == "fault" for c in checks)
     return {
@@ -56,7 +53,7 @@ def examine(archive: str | None = None, station: Path | None = None, free_gb: fl
         "version": metadata.version(PRODUCT),
         "python": platform.python_version(),
         "samples": None if samples is None else str(samples),
-        "checks": rows,
+        "checks": [cast("CheckDocument", check._asdict()) for check in checks],
     }
 
 
@@ -144,7 +141,7 @@ def station_checks(path: Path | None) -> list[Check]:
 
 
 def _seen(now: Overview) -> list[Check]:
-    out = [_fault(part, text) for part, text in now.faults.items()]
+    out = [of_error(PART, part, text, "check its power, cable and address") for part, text in now.faults.items()]
     if not out:
         angles = ", ".join(f"{name} {angle:.3f}°" for name, angle in now.angles_deg.items())
         slots = f"{len(now.slots)} slots with a unit"
@@ -154,11 +151,6 @@ def _seen(now: Overview) -> list[Check]:
         if found and found != good:
             out.append(Check(PART, name, "warning", found, good, "put it right at the station before the next run"))
     return out
-
-
-def _fault(part: str, text: str) -> Check:
-    found, _, remedy = text.rpartition("; ")
-    return Check(PART, part, "fault", found or text, "", remedy if found else "check its power, cable and address")
 
 
 def _lease(now: Overview) -> Check:

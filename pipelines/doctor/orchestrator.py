@@ -15,7 +15,7 @@ from importlib import metadata
 from typing import NamedTuple
 from urllib.parse import urlsplit
 
-from pipelines.doctor.check import Check, clock_check, of_error, offset
+from pipelines.doctor.check import Check, clock_check, judged, of_error, offset
 from pipelines.orchestrator.credentials import without_credentials
 from pipelines.orchestrator.settings import CLIENT_KEY, KEY_FILE, LOOPBACK, use_key
 from schemas.errors import TumblelineError
@@ -39,9 +39,8 @@ def orchestrator_checks() -> list[Check]:
     address = os.environ.get(VARIABLE, "").rstrip("/")
     if not address:
         found = f"{VARIABLE} is not set: each run starts an orchestrator of its own"
-        return [
-            Check(PART, "address", "not configured", found, "", f"for scheduled runs name the server in {VARIABLE}")
-        ]
+        remedy = f"for scheduled runs name the server in {VARIABLE}"
+        return [Check(PART, "address", "not configured", found, "", remedy)]
     shown = without_credentials(address)
     if not address.startswith(("http://", "https://")):
         remedy = f"correct {VARIABLE}"
@@ -91,17 +90,16 @@ def _ahead(stated: str | None, begun: float, ended: float) -> float | None:
 
 
 def _reachable(shown: str, answer: ServerAnswer) -> Check:
-    if answer.status == HTTPStatus.OK:
-        return Check(PART, "reachable", "good", shown)
-    remedy = f"correct {VARIABLE}: it ends in /api"
-    return Check(PART, "reachable", "fault", f"{shown} answers {answer.status}", "200 of a Prefect server", remedy)
+    good, remedy = answer.status == HTTPStatus.OK, f"correct {VARIABLE}: it ends in /api"
+    found = shown if good else f"{shown} answers {answer.status}"
+    return judged(PART, "reachable", found, "200 of a Prefect server", remedy, good=good)
 
 
 def _database(answer: ServerAnswer) -> Check:
-    if answer.status == HTTPStatus.OK:
-        return Check(PART, "database", "good", "ready")
+    good = answer.status == HTTPStatus.OK
     remedy = "look into the server's log: its database does not answer, or its disk is full"
-    return Check(PART, "database", "fault", f"not ready ({answer.status})", "200 at /ready", remedy)
+    found = "ready" if good else f"not ready ({answer.status})"
+    return judged(PART, "database", found, "200 at /ready", remedy, good=good)
 
 
 def _authenticated(address: str) -> list[Check]:
@@ -115,9 +113,8 @@ def _authenticated(address: str) -> list[Check]:
         return [Check(PART, "authenticated", "fault", f"no answer ({problem})", "a server that runs", "start it again")]
     if answer.status in (HTTPStatus.UNAUTHORIZED, HTTPStatus.FORBIDDEN):
         remedy = f"give the server's key in {CLIENT_KEY}, or its file in {KEY_FILE}"
-        return [
-            Check(PART, "authenticated", "fault", f"the key is refused ({answer.status})", "its server's key", remedy)
-        ]
+        found = f"the key is refused ({answer.status})"
+        return [Check(PART, "authenticated", "fault", found, "its server's key", remedy)]
     if answer.status != HTTPStatus.OK:
         remedy = "look into the server's log"
         return [Check(PART, "authenticated", "fault", f"answers {answer.status}", "200", remedy)]

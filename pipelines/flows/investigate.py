@@ -21,7 +21,7 @@ from pipelines.flows.calibrate import requested, stage
 from pipelines.flows.local import reached
 from pipelines.flows.operator import Paused
 from pipelines.inquiry.inquiry import FollowUp, Inquiry
-from pipelines.inquiry.joint_diagnosis import JointDiagnosis
+from pipelines.inquiry.lineage import JointDiagnosis
 from pipelines.inquiry.loop import Consent, InquirySettings, Participants, always, run_inquiry
 from pipelines.jobs.job import Request
 from pipelines.orchestrator.archive_address import archive_of

@@ -66,18 +66,16 @@ def with_effects(text: str, steps: Sequence[ModelStep], file: Path) -> tuple[str
 def errors_by_version(
     versions: Sequence[Version], tables: ImprovedTables, working: Callable[[], AbstractContextManager[Any]]
 ) -> list[dict[str, Any]]:
-    """The errors of each version and the verdict on its change, on one thread: the matrices are small.
+    """The errors of each version and the verdict on its change.
 
     Parameters
     ----------
     working : is entered while a version is fitted
     """
-    from threadpoolctl import threadpool_limits
-
     from pipelines.diagnosis.model_history import evolution
 
     def compared(effects: list[str], before: list[str] | None) -> dict[str, Any]:
-        with threadpool_limits(1), working():
+        with working():
             from pipelines.diagnosis.diagnose import compare  # loads the search for effects: after the first line
 
             return compare(tables.dwells, effects, tables.history, tables.fresh, tables.fresh_history, before)
@@ -119,7 +117,7 @@ class Improvement:
         rows = self._rows(versions, after["error"]["floor_ug"], tables)
         if text:
             publish_model(self.target, text)
-        document: dict[str, Any] = {
+        return {
             "data": self.data,
             "file": str(self.target) if added or self.model else None,
             "diagnosis": before,
@@ -131,9 +129,8 @@ class Improvement:
             "ladder": rows,
             "refuted": [name for row in rows if row["confirmed"] is False for name in row["added"]],
             "warnings": list(dict.fromkeys(text for row in rows for text in row["warnings"])),
+            "fresh": fresh or None,
         }
-        document["fresh"] = fresh or None
-        return document
 
     def _with_fresh(self, *, changed: bool) -> tuple[ImprovedTables, str]:
         """The tables with those of a fresh run, and its name; a changed model is judged by one where there may be one."""
@@ -147,12 +144,7 @@ class Improvement:
 
     def _diagnosis(self, effects: list[str] | None, *, first: bool) -> dict[str, Any]:
         """The diagnosis of a model, as the attendant sees it."""
-        from threadpoolctl import threadpool_limits
-
-        from pipelines.parallel import keep_memory
-
-        keep_memory()
-        with threadpool_limits(1), self.attendant.working("looking for missing effects"):
+        with self.attendant.working("looking for missing effects"):
             from pipelines.diagnosis.examination import (
                 examination,  # loads the search for effects: after the first line
             )
@@ -206,21 +198,22 @@ class Improvement:
         self, effects: list[str], added: list[str], choices: list[dict[str, Any]]
     ) -> tuple[list[Version], str]:
         """The model that was judged and one version per added effect; the text of the model file, empty without a change."""
-        from pipelines.jobs.model_files import Version, model_step, model_text, new_model, versions
+        from pipelines.jobs.model_files import Version, model_step, model_text, versions
 
         judged = Version(1, tuple(effects), (), (), None)
         if not added:
             return [judged], ""
         others = {choice["effect"]: choice["not_separated_from"] for choice in choices}
         steps = [model_step(name, self._reason(others[name]), self.by, self.data) for name in added]
-        text = model_text(self.model) if self.model else self._begun(new_model, effects, steps[0])
+        text = model_text(self.model) if self.model else self._begun(effects, steps[0])
         text, model = with_effects(text, steps, self.target)
         return (versions(model)[-len(added) - 1 :] if model else [judged]), text
 
-    def _begun(self, new_model: Any, effects: list[str], step: Any) -> str:
+    def _begun(self, effects: list[str], step: ModelStep) -> str:
         """The first version of a new model file."""
         from inertial import effects as catalogue
         from inertial.effects.formula import Formula
+        from pipelines.jobs.model_files import new_model
 
         formulas = [name for name in effects if isinstance(catalogue.get(name), Formula)]
         if formulas:

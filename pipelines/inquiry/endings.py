@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from pipelines.inquiry.joint_diagnosis import JointDiagnosis
+from pipelines.inquiry.lineage import JointDiagnosis
 
 End = Literal[
     "adequate", "told_apart", "nothing_parts", "budget", "declined", "asked", "blocked", "not_judged", "unexplained"
@@ -56,8 +56,7 @@ def no_follow_up(joint: JointDiagnosis) -> str:
         return f"no measurement on this station discriminates between {ambiguous_classes(joint)}"
     return (
         f"no follow-up was found that is expected to discriminate between {ambiguous_classes(joint)}: they differ too little "
-        "beside the "
-        "noise; measure the plan again with longer dwells, or more units"
+        "beside the noise; measure the plan again with longer dwells, or more units"
     )
 
 

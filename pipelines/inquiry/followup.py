@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import cast
 
 import numpy as np
 
@@ -128,19 +127,8 @@ def follow_up(sequence: Sequence[SequenceStep], base: Job, last: Job, parents: S
         "static_record_s": 0.0,
         "static_temperature_C": soaks[-1].temperature_C,
     }
-    recipe = Recipe.model_validate({**base.recipe.model_dump(), **_dumped(changes)})
+    recipe = Recipe.model_validate(base.recipe.model_copy(update=changes).model_dump())
     return Job(recipe, base.limits, base.lot, base.station, parents=tuple(parents))
-
-
-def _dumped(changes: Mapping[str, object]) -> dict[str, object]:
-    """Changes with models as plain values, so that validation sees what a recipe file contains."""
-    return {key: _dumped_value(value) for key, value in changes.items()}
-
-
-def _dumped_value(value: object) -> object:
-    if isinstance(value, list):
-        return [_dumped_value(item) for item in cast("list[object]", value)]
-    return value.model_dump() if isinstance(value, Pose | SoakPart) else value
 
 
 def _parts(sequence: Sequence[SequenceStep]) -> list[list[SequenceStep]]:

@@ -3,25 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from threadpoolctl import threadpool_limits
 
-from inertial.criticism.diagnosis import Diagnosis
 from inertial.next_measurement.proposals import Proposal
 from inertial.planning.sequences import SequenceStep
 from pipelines.archive import Archive, Records, Run, code_hash, files, stage_key
 from pipelines.chain.runner import Runner
 from pipelines.diagnosis.diagnose import document, examined
+from pipelines.diagnosis.examination import report_fields
 from pipelines.diagnosis.next_measurement import Proposed, proposed, rows_of
 from pipelines.inquiry.endings import NO_FOLLOW_UP, Ending, ambiguous_classes, ending_of, no_follow_up
 from pipelines.inquiry.explanation import shows, why
 from pipelines.inquiry.followup import circumstances, follow_up
-from pipelines.inquiry.joint_diagnosis import JointDiagnosis
-from pipelines.inquiry.lineage import RunSequence
+from pipelines.inquiry.lineage import JointDiagnosis, RunSequence
 from pipelines.jobs.job import Job
-from pipelines.tables.dwells import Measured
 from schemas.progress import Progress
 from schemas.recipe import Recipe
 
@@ -87,8 +85,9 @@ class Inquiry:
             measured, faults, diagnosis = examined(dwells, history, self.effects)
             following = Proposed() if diagnosis is None else proposed(diagnosis, around)
             content = document(measured, faults, diagnosis, following)
-        content.update(_report_fields(measured, self.effects, diagnosis))
-        return JointDiagnosis(self.lineage, self.effects, content, measured, diagnosis, following)
+        fields = report_fields(measured.units, list(self.effects), diagnosis)
+        content |= {"reasons": {}, **fields, "offer": None}
+        return JointDiagnosis(self.lineage, content, measured, diagnosis, following)
 
     def next_step(self, joint: JointDiagnosis) -> FollowUp | Ending:
         """The next follow-up, or why the inquiry ends."""
@@ -97,16 +96,12 @@ class Inquiry:
             return begun
         ended = ending_of(joint)
         showing = joint.following.showing
+        last_round = len(self.lineage.runs) > MOST_ROUNDS
         if ended is not None:
-            if (
-                self.unseen
-                and showing is not None
-                and ended.end not in NO_FOLLOW_UP
-                and len(self.lineage.runs) <= MOST_ROUNDS
-            ):
+            if self.unseen and showing is not None and ended.end not in NO_FOLLOW_UP and not last_round:
                 return self._follow_up((showing,), (shows(joint.state, self.effects, showing),))
             return ended
-        if len(self.lineage.runs) > MOST_ROUNDS:
+        if last_round:
             return Ending(
                 "nothing_parts", f"{MOST_ROUNDS} follow-ups have not discriminated between {ambiguous_classes(joint)}"
             )
@@ -125,8 +120,7 @@ class Inquiry:
             needed = sum(p.minutes for p in proposals)
             text = (
                 f"discriminating between {ambiguous_classes(joint)} needs {needed:.0f} min more station time, "
-                f"{max(left, 0.0):.0f} of "
-                f"{self.budget:.0f} min are left; give --budget {self.spent + needed:.0f}"
+                f"{max(left, 0.0):.0f} of {self.budget:.0f} min are left; give --budget {self.spent + needed:.0f}"
             )
             return Ending("budget", text)
         return self._follow_up(affordable, tuple(why(joint.state, self.effects, p) for p in affordable))
@@ -135,8 +129,7 @@ class Inquiry:
         """The follow-up that measures the proposals."""
         steps: list[SequenceStep] = [s for p in proposals for s in p.steps]
         job = follow_up(steps, self.base, self.jobs[-1], self.lineage.ids, "; ".join(reasons))
-        recipe = job.recipe.model_copy(update={"effects": list(self.effects)})
-        job = Job(recipe, job.limits, job.lot, job.station, parents=job.parents)
+        job = replace(job, recipe=job.recipe.model_copy(update={"effects": list(self.effects)}))
         rows = tuple(row for p in proposals for row in rows_of(p))
         return FollowUp(job, rows, reasons, sum(p.minutes for p in proposals))
 
@@ -149,16 +142,10 @@ class Inquiry:
             if same_lineage and about["recipe"]["effects"] == list(self.effects):
                 saved = files.read_json(run.path / FILE)["round"] if (run.path / FILE).is_file() else {}
                 rows, reasons = saved.get("next_measurements", ()), saved.get("why", [about["recipe"]["description"]])
-                return FollowUp(
-                    self._job_of(about), tuple(rows), tuple(reasons), saved.get("planned_minutes", 0.0), begun=True
-                )
+                recipe = Recipe.model_validate(about["recipe"])
+                job = replace(self.base, recipe=recipe, captured=about["capture"], parents=tuple(about["parents"]))
+                return FollowUp(job, tuple(rows), tuple(reasons), saved.get("planned_minutes", 0.0), begun=True)
         return None
-
-    def _job_of(self, about: dict[str, Any]) -> Job:
-        """The job of a follow-up that was started before, with the station and lot of the first run."""
-        recipe = Recipe.model_validate(about["recipe"])
-        base = self.base
-        return Job(recipe, base.limits, base.lot, base.station, about["capture"], tuple(about["parents"]))
 
     def runner(self, follow_up: FollowUp, progress: Progress) -> Runner:
         """The runner of a follow-up: the station continues from the state at the end of the newest run."""
@@ -196,11 +183,8 @@ class Inquiry:
             return
         from pipelines.report.diagnosis import render_diagnosis
 
-        content = {
-            "runs": list(self.lineage.ids),
-            "effects": list(self.effects),
-            "diagnosis": without_report_fields(joint.document),
-        }
+        diagnosis = {key: value for key, value in joint.document.items() if key not in {"breakers", "offer"}}
+        content = {"runs": list(self.lineage.ids), "effects": list(self.effects), "diagnosis": diagnosis}
         files.publish(run.path / FILE, files.json_bytes({**content, "round": self.rounds[-1]}))
         html = render_diagnosis(joint.document, joint.measured, joint.diagnosis, " + ".join(self.lineage.ids))
         run.save_report(key, html, {"inputs": inputs, "parameters": parameters, "code": code})
@@ -246,25 +230,3 @@ def _continued(before: Records) -> Any:
             capture(station, job.recipe, job.lot, records, progress=progress, events=records.events)
 
     return measure
-
-
-def _report_fields(measured: Measured, effects: Sequence[str], diagnosis: Diagnosis | None) -> dict[str, Any]:
-    """Fields of the document for reports, beside the fixed keys."""
-    from inertial import effects as catalogue
-    from inertial.planning.reasons import reason
-
-    unseen = diagnosis.unseen if diagnosis is not None else ()
-    breakers = {name: catalogue.get(name).breaker for name in unseen}
-    reasons = {} if diagnosis is None else {n: reason(diagnosis.problem.lot.state, n, effects) for n in unseen}
-    return {
-        "effects": list(effects),
-        "units": list(measured.units),
-        "breakers": breakers,
-        "reasons": reasons,
-        "offer": None,
-    }
-
-
-def without_report_fields(document: dict[str, Any]) -> dict[str, Any]:
-    """A document without the fields that only reports use."""
-    return {key: value for key, value in document.items() if key not in {"breakers", "offer"}}

@@ -1,13 +1,18 @@
-"""A run and its follow-ups as one set of dwells: one station, one lot, one clock."""
+"""A run and its follow-ups as one set of dwells, and their diagnosis together: one station, one lot, one clock."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import pandas as pd
 
+from inertial.criticism.diagnosis import Diagnosis
+from inertial.state import State
 from pipelines.archive import Run
+from pipelines.diagnosis.next_measurement import Proposed
+from pipelines.tables.dwells import Measured
 from schemas.errors import DataRejected
 
 NUMBERED = ("dwell", "record")
@@ -54,6 +59,29 @@ class RunSequence:
     def with_run(self, run: Run) -> RunSequence:
         """The sequence with one more run."""
         return RunSequence((*self.runs, run))
+
+
+@dataclass(frozen=True)
+class JointDiagnosis:
+    """The diagnosis of all runs of a lineage together."""
+
+    lineage: RunSequence
+    document: dict[str, Any]
+    measured: Measured
+    diagnosis: Diagnosis | None
+    following: Proposed
+
+    @property
+    def state(self) -> State:
+        """The dwells of the diagnosis."""
+        if self.diagnosis is None:
+            raise LookupError("an inquiry in which every unit has a data fault has no state")
+        return self.diagnosis.problem.lot.state
+
+    @property
+    def ambiguous(self) -> list[list[str]]:
+        """Classes of more than one effect."""
+        return [group["effects"] for group in self.document["classes"] if len(group["effects"]) > 1]
 
 
 def _numbered_through(tables: Sequence[pd.DataFrame]) -> pd.DataFrame:

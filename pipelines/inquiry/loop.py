@@ -7,34 +7,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, Protocol
+from typing import Any, Literal
 
 from pipelines.archive import Archive
 from pipelines.chain.chain import ORDER
 from pipelines.chain.runner import Done, Runner
 from pipelines.inquiry.endings import Ending
 from pipelines.inquiry.inquiry import FOLLOW_UP, FollowUp, Inquiry, begin
-from pipelines.inquiry.joint_diagnosis import JointDiagnosis
+from pipelines.inquiry.lineage import JointDiagnosis
 from pipelines.jobs.job import Job
 from schemas.progress import Progress, silent
 
 Consent = Literal["go", "stop", "nobody"]
 
 
-class Stages(Protocol):
-    """Runs a stage."""
-
-    def __call__(self, name: str, runner: Runner) -> Done:
-        """Run one stage of a runner."""
-        ...
-
-
-class Approval(Protocol):
-    """Approval of extra station time."""
-
-    def __call__(self, inquiry: Inquiry, joint: JointDiagnosis, follow_up: FollowUp) -> Consent:
-        """``go`` measures the follow-up, ``stop`` declines it, ``nobody`` reports that no person is available to approve it."""
-        ...
+Approval = Callable[[Inquiry, JointDiagnosis, FollowUp], Consent]
+"""Approval of extra station time: ``go`` measures the follow-up, ``stop`` declines it, ``nobody``: no person can approve it."""
 
 
 def always(inquiry: Inquiry, joint: JointDiagnosis, follow_up: FollowUp) -> Consent:
@@ -72,7 +60,7 @@ class Participants:
     diagnosed : called after every joint diagnosis
     """
 
-    stage: Stages = directly
+    stage: Callable[[str, Runner], Done] = directly
     approve: Approval = always
     progress: Progress = silent
     stage_done: Callable[[Done], None] = lambda _done: None

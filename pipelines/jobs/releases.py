@@ -16,6 +16,7 @@ from pipelines.archive import Archive, files, hash_chain
 from pipelines.archive.keys import digest
 from pipelines.archive.locks import alone
 from pipelines.archive.provenance import provenance
+from pipelines.jobs.documents import ReleaseRecord
 from schemas.errors import RecipeInvalid, WrongUse
 from schemas.recipe import FormulaSpec
 
@@ -52,6 +53,23 @@ class Release:
     def rank(self) -> tuple[bool, bool, datetime, int]:
         """The order of priority of the records."""
         return bool(self.station), bool(self.device), self.since, self.number
+
+    def document(self) -> ReleaseRecord:
+        """The record for JSON."""
+        return {
+            "release": self.number,
+            "model": self.model_name,
+            "version": self.model_version,
+            "effects": list(self.effects),
+            "from": self.since.isoformat(),
+            "device": self.device,
+            "station": self.station,
+            "reason": self.reason,
+            "evidence": self.evidence,
+            "forced": self.forced,
+            "by": self.who,
+            "at": self.when,
+        }
 
     def of_model(self) -> dict[str, Any]:
         """The keys of a recipe for the model."""

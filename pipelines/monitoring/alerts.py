@@ -15,14 +15,12 @@ from datetime import UTC, datetime, timedelta
 from hashlib import sha256
 from http.client import HTTPException
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 from pipelines.archive.files import json_bytes, publish
 from pipelines.monitoring.documents import Alert
+from pipelines.monitoring.snapshot import Snapshot
 from schemas.errors import WrongUse
-
-if TYPE_CHECKING:
-    from pipelines.monitoring.snapshot import Snapshot
 
 TIMEOUT_S = 10.0
 ACCEPTED_FILE = "alerts.json"

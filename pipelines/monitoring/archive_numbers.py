@@ -77,6 +77,7 @@ class ArchiveReader:
 
     def read(self, now: datetime | None = None) -> ArchiveNumbers:
         """The numbers of the runs that started within the window, and of all certificates."""
+        self.archive.refuse_none()
         at = now or datetime.now(UTC)
         since = (at - timedelta(days=self.window_d)).isoformat()
         numbers = ArchiveNumbers()
@@ -103,12 +104,8 @@ class ArchiveReader:
         line.last = started if line.last is None else max(line.last, started)
         if info.id not in self._times:
             self._times[info.id] = self._time_of(info.id)
-        times = self._times[info.id]
-        line.station_s += times.station_s
-        line.pauses += times.pauses
-        line.paused_s += times.paused_s
-        line.repeated += times.repeated
-        line.door += times.door
+        for name, value in self._times[info.id]._asdict().items():
+            setattr(line, name, getattr(line, name) + value)
 
     def _time_of(self, run_id: str) -> RunTime:
         run = self.archive.run(run_id)
@@ -133,15 +130,11 @@ class ArchiveReader:
             numbers.lag_s = max(numbers.lag_s, (at - _finished(path, info)).total_seconds())
 
     def _due(self, numbers: ArchiveNumbers) -> None:
-        days = {within: _day_after(within) for within in DUE_DAYS}
-        numbers.due = dict.fromkeys(DUE_DAYS, 0)
         last: dict[str, str] = {}
         for calibration in Ledger(self.archive).all():
             last[calibration.serial] = max(last.get(calibration.serial, ""), calibration.until)
         numbers.certified = len(last)
-        for until in last.values():
-            for within, day in days.items():
-                numbers.due[within] += until <= day
+        numbers.due = {days: sum(until <= _day_after(days) for until in last.values()) for days in DUE_DAYS}
 
 
 def _finished(path: Place, info: RunInfo) -> datetime:

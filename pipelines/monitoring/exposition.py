@@ -5,17 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from datetime import datetime
 from importlib.metadata import version
-from typing import TYPE_CHECKING
 
 from prometheus_client import CollectorRegistry, generate_latest
 from prometheus_client.core import GaugeMetricFamily
 
+from pipelines.monitoring.archive_numbers import ArchiveNumbers
 from pipelines.monitoring.queue_numbers import QueueNumbers
+from pipelines.monitoring.snapshot import Snapshot
 from pipelines.monitoring.station_numbers import StationNumbers
-
-if TYPE_CHECKING:
-    from pipelines.monitoring.archive_numbers import ArchiveNumbers
-    from pipelines.monitoring.snapshot import Snapshot
 
 LINE = ("station", "recipe")
 
@@ -57,11 +54,11 @@ def _archive(numbers: ArchiveNumbers, window_d: int) -> Iterator[GaugeMetricFami
     share = _family("yield_ratio", "Share of the graded units that passed", LINE)
     last = _family("last_run_timestamp_seconds", "Start of the newest finished run", LINE)
     sums = {
-        "station_seconds": _family("station_seconds", "Time on the clock of the station", LINE),
+        "station_s": _family("station_seconds", "Time on the clock of the station", LINE),
         "pauses": _family("pauses", "Pauses for a condition of the station", LINE),
-        "paused_seconds": _family("paused_seconds", "Duration of the pauses", LINE),
-        "repeated_dwells": _family("repeated_dwells", "Dwells that were discarded and measured again", LINE),
-        "door_openings": _family("door_openings", "Openings of the chamber door during runs", LINE),
+        "paused_s": _family("paused_seconds", "Duration of the pauses", LINE),
+        "repeated": _family("repeated_dwells", "Dwells that were discarded and measured again", LINE),
+        "door": _family("door_openings", "Openings of the chamber door during runs", LINE),
     }
     for key, line in sorted(numbers.lines.items()):
         runs.add_metric([*key, "finished"], line.finished)
@@ -72,9 +69,8 @@ def _archive(numbers: ArchiveNumbers, window_d: int) -> Iterator[GaugeMetricFami
             share.add_metric(key, line.passed / (line.passed + line.failed))
         if line.last is not None:
             last.add_metric(key, line.last.timestamp())
-        values = (line.station_s, line.pauses, line.paused_s, line.repeated, line.door)
-        for family, value in zip(sums.values(), values, strict=True):
-            family.add_metric(key, float(value))
+        for name, family in sums.items():
+            family.add_metric(key, float(getattr(line, name)))
     yield from (runs, units, share, last, *sums.values())
     yield _one("archive_unsealed_runs", "Finished runs that are not in the hash chain", float(numbers.unsealed))
     yield _one("archive_lag_seconds", "Age of the oldest finished run that is not in the hash chain", numbers.lag_s)
@@ -112,11 +108,10 @@ def _queues(numbers: QueueNumbers, now: datetime) -> Iterator[GaugeMetricFamily]
 
 
 def _stations(numbers: StationNumbers) -> Iterator[GaugeMetricFamily]:
-    names = sorted({*numbers.driven, *numbers.unsafe, *(station for station, _ in numbers.events)})
     driven = _family("station_driven", "1 while a run drives the station", ("station",))
     unsafe = _family("station_unsafe", "1 where the station was not reported safe after its last run", ("station",))
     events = _family("station_events", "Events in the log of the state folder", ("station", "event"))
-    for name in names:
+    for name in sorted({*numbers.driven, *numbers.unsafe, *(station for station, _ in numbers.events)}):
         driven.add_metric([name], float(name in numbers.driven))
         unsafe.add_metric([name], float(name in numbers.unsafe))
     for (station, event), count in sorted(numbers.events.items()):

@@ -6,20 +6,16 @@ import threading
 from collections.abc import Generator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from starlette.applications import Starlette
+from starlette.requests import Request
 from starlette.responses import JSONResponse, PlainTextResponse, Response
 from starlette.routing import Route
 
 from pipelines.monitoring.alerts import Poster, alerts_of
 from pipelines.monitoring.exposition import text
+from pipelines.monitoring.snapshot import Monitor
 from schemas.log_lines import tell
-
-if TYPE_CHECKING:
-    from starlette.requests import Request
-
-    from pipelines.monitoring.snapshot import Monitor
 
 CONTENT_TYPE = "text/plain; version=0.0.4; charset=utf-8"
 EVERY_S = 15.0

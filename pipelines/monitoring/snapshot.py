@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
+from typing import Any
 
 from pipelines.archive import Archive
 from pipelines.monitoring.archive_numbers import ArchiveNumbers, ArchiveReader
@@ -58,8 +59,9 @@ class Snapshot:
 
     def document(self) -> HealthDocument:
         """The verdict for JSON."""
-        return {"ok": self.ok, "when": self.when.isoformat(timespec="seconds"), "problems": self.problems,
-                "sources": {source: not fault for source, fault in self.faults.items()}}  # fmt: skip
+        sources = {source: not fault for source, fault in self.faults.items()}
+        when = self.when.isoformat(timespec="seconds")
+        return {"ok": self.ok, "when": when, "problems": self.problems, "sources": sources}
 
     def _of_archive(self, numbers: ArchiveNumbers) -> list[str]:
         out: list[str] = []
@@ -72,19 +74,15 @@ class Snapshot:
         return out
 
     def _of_queues(self, numbers: QueueNumbers) -> list[str]:
-        late = numbers.late(self.when)
-        out = [
+        online = {name.partition(" on ")[0] for name, is_online in numbers.workers.items() if is_online}
+        late = [
             f"queue {run.queue}: run {run.name} was due at {run.since:%H:%M} UTC and has not started; start its worker, or "
             "resume its queue"
-            for run in late
+            for run in numbers.late(self.when)
         ]
-        online = {name.partition(" on ")[0] for name, is_online in numbers.workers.items() if is_online}
-        out += [
-            f"queue {queue}: no worker is online, one is needed; start tumbleline-worker@{queue}"
-            for queue in self.expected
-            if queue not in online
-        ]
-        return out
+        without_worker = [queue for queue in self.expected if queue not in online]
+        needed = "no worker is online, one is needed; start tumbleline-worker@"
+        return [*late, *(f"queue {queue}: {needed}{queue}" for queue in without_worker)]
 
 
 def _reason(problem: Exception, prefix: str) -> str:
@@ -122,33 +120,23 @@ class Monitor:
             return snapshot
 
     def _take(self) -> Snapshot:
-        faults: dict[str, str] = {}
-        archive: ArchiveNumbers | None = None
-        queues: QueueNumbers | None = None
-        stations: StationNumbers | None = None
-        faults["archive"] = ""
-        try:
-            self._reader.archive.refuse_none()
-            archive = self._reader.read()
-        except Exception as problem:  # noqa: BLE001 - a damaged file of one source must not hide the others
-            faults["archive"] = _reason(problem, "archive: ")
-        if configured():
-            faults["orchestrator"] = ""
+        sources: dict[str, Callable[[], Any]] = {
+            "archive": self._reader.read,
+            **({"orchestrator": read_queues} if configured() else {}),
+            "stations": lambda: read_stations(state_folder()),
+        }
+        numbers, faults = dict[str, Any](), dict.fromkeys(sources, "")
+        for source, read in sources.items():
             try:
-                queues = read_queues()
-            except Exception as problem:  # noqa: BLE001 - the same
-                faults["orchestrator"] = _reason(problem, "orchestrator: ")
-        faults["stations"] = ""
-        try:
-            stations = read_stations(state_folder())
-        except Exception as problem:  # noqa: BLE001 - the same
-            faults["stations"] = _reason(problem, "stations: ")
+                numbers[source] = read()
+            except Exception as problem:  # noqa: BLE001 - a damaged file of one source must not hide the others
+                faults[source] = _reason(problem, f"{source}: ")
         return Snapshot(
             datetime.now(UTC),
             self._reader.window_d,
-            archive,
-            queues,
-            stations,
+            numbers.get("archive"),
+            numbers.get("orchestrator"),
+            numbers.get("stations"),
             faults,
             self._free_bytes,
             self._expected,

@@ -25,6 +25,10 @@ OPTIONAL = (
 
 def make_report(run: Run) -> bool:
     """Write the run's report if it is missing or older than its tables; return whether it was up to date."""
+    if not _captured(run):
+        from pipelines.report.imported import make_imported_report  # loads the search for effects
+
+        return make_imported_report(run)
     if run.about.get("parents") and run.report.is_file():
         return True  # a follow-up has no decisions: its report is the diagnosis of all runs together
     _refuse_unfinished(run)
@@ -45,15 +49,19 @@ def make_report(run: Run) -> bool:
 
 def renew_report(run: Run) -> None:
     """Write an existing report again after a change of the ledger."""
-    if (run.path / "report.json").is_file() and all(name in run.tables() for name in INPUTS):
+    if (run.path / "report.json").is_file() and (not _captured(run) or set(INPUTS) <= set(run.tables())):
         make_report(run)
+
+
+def _captured(run: Run) -> bool:
+    """Whether a run was measured on a station, or is one of a lot that was, not imported."""
+    return bool(run.about.get("capture") or run.about.get("parents"))
 
 
 def _refuse_unfinished(run: Run) -> None:
     """Refuse a report on a run without decisions."""
     missing = [name for name in INPUTS if name not in run.tables()]
     if missing:
-        message = f"report: run {run.id} has no {', '.join(missing)}; "
-        if run.records is None:
-            raise WrongUse(message + "it was imported, and a report needs a captured run")
-        raise WrongUse(message + "it is not finished: give its 'tumbleline run' again to continue")
+        raise WrongUse(
+            f"report: run {run.id} has no {', '.join(missing)}; it is not finished: give its 'tumbleline run' again to continue"
+        )

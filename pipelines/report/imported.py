@@ -1,18 +1,26 @@
-"""Parts of the report of an import besides its diagnosis: figures against their limits, certificates, and the budget."""
+"""The report of an import that was fitted: verdict with pictures, coefficients, figures against limits, certificates, budget."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 from inertial.quantities import ANGLE_COLUMNS, FORCE_COLUMNS
-from pipelines.archive import Run
+from pipelines.archive import Run, code_hash, stage_key
 from pipelines.certificates.statement import Stated, stated
+from pipelines.diagnosis.examination import examination
+from pipelines.jobs.model_files import use_formulas_of
 from pipelines.report.context import OPTIONAL, TABLES, ReportContext
+from pipelines.report.diagnosis import render_diagnosis
 from pipelines.report.panels import budget, certificates
 from pipelines.report.templates import fill
 from pipelines.report.unit_panels import figures
 from pipelines.stages.unknown_poses.budget import OF_POSES
+from pipelines.stages.unknown_poses.fit import fitted_dwells
+from pipelines.tables.frames import rows_of
+from schemas.errors import WrongUse
 
+GRADED = ("grades", "figures", "budget", "uncertainties", "verification", "lot_risks")
 FEWEST_OF_A_LOT = 3
 """Units from which on the risk of a lot is known."""
 OF_ENCODERS = ("orthogonality", "outer_offset", "inner_offset", "harmonics")
@@ -70,3 +78,42 @@ def decisions(run: Run) -> str:
         budget_title=budget.TITLE,
         budget=budget.render(report),
     )
+
+
+def make_imported_report(run: Run) -> bool:
+    """Write the report of an import if it is missing or older than its tables; return whether it was up to date.
+
+    Raises
+    ------
+    WrongUse
+        The run has no coefficients, or none of a model of the catalogue.
+    """
+    effects = list((run.about.get("recipe") or {}).get("effects", ()))
+    names = ("dwells", "coefficients")
+    if axis := run.about.get("plane_across"):
+        raise WrongUse(
+            f"report: run {run.id} was turned about {axis} alone and has coefficients of the axes in the plane only; "
+            f"'tumbleline fit {run.id}' prints them"
+        )
+    if not effects or not set(names) <= set(run.tables()):
+        raise WrongUse(
+            f"report: run {run.id} was imported and not fitted, coefficients are needed; fit it with 'tumbleline fit {run.id} "
+            "--effects bias,scale,misalignment' then give this command for the new run"
+        )
+    use_formulas_of(run)
+    past = run.table("history") if "history" in run.tables() else None
+    judged = [name for name in GRADED if name in run.tables()]
+    inputs, code = {name: run.manifest(name)["sha256"] for name in (*names, *judged)}, code_hash("report of an import")
+    parameters: dict[str, Any] = {"effects": effects}
+    if given := certificates_of(run):
+        parameters["certificates"] = {unit: list(one) for unit, one in sorted(given.items())}
+    key = stage_key("report", inputs, parameters, code)
+    if run.has_report(key):
+        run.seal()
+        return True
+    rows = rows_of(run.table("coefficients"))
+    made = examination(fitted_dwells(run.table("dwells")), past, effects)
+    page = render_diagnosis(made.document, made.measured, made.diagnosis, f"run {run.id}", rows)
+    page = page.replace("</body>", f"{decisions(run)}</body>")
+    run.save_report(key, page, {"inputs": inputs, "parameters": parameters, "code": code})
+    return False

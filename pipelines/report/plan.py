@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from pipelines.drawing import svg_text
+from pipelines.planning.plan_rows import by_coefficient, worst_axes
 from pipelines.report.budget_plots import shares_plot
 from pipelines.report.numbers import scientific, significant
 from pipelines.report.plan_pictures import alias_chart, sight_chart, sphere_chart, temperature_chart
@@ -51,10 +52,7 @@ def _budget(reach: dict[str, Any] | None) -> str:
     """Shares of the contributions to the reachable uncertainty, of the worst axis of each quantity; empty if none is stated."""
     if reach is None:
         return ""
-    worst: dict[str, dict[str, Any]] = {}
-    for row in reach["quantities"]:
-        if row["quantity"] not in worst or row["u"] > worst[row["quantity"]]["u"]:
-            worst[row["quantity"]] = row
+    worst = worst_axes(reach)
     titles = {"bias_error": "error by the references", "bias_error_period": "error over the period"}
     worst.pop(LARGEST_ERROR, None)  # made of the same contributions
     return shares_plot(
@@ -64,17 +62,12 @@ def _budget(reach: dict[str, Any] | None) -> str:
 
 def _coefficients(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """One line per coefficient, its axes side by side."""
-    lines: dict[tuple[str, int, bool], dict[str, Any]] = {}
-    count: dict[tuple[str, str], int] = {}
-    for row in rows:
-        place = count.get((row["effect"], row["axis"]), 0)
-        count[row["effect"], row["axis"]] = place + 1
-        shared = row["axis"] == "*"
-        line = lines.setdefault(
-            (row["effect"], place, shared), {"effect": row["effect"], "unit": row["unit"], "cells": {}, "names": []}
-        )
-        line["names"].append(row["name"])
-        line["cells"]["x" if shared else row["axis"]] = significant(row["uncertainty_ug"])
-    for line in lines.values():
-        line["names"] = ", ".join(dict.fromkeys(line["names"]))
-    return list(lines.values())
+    return [
+        {
+            "effect": next(iter(axes.values()))["effect"],
+            "unit": next(iter(axes.values()))["unit"],
+            "cells": {axis.replace("*", "x"): significant(row["uncertainty_ug"]) for axis, row in axes.items()},
+            "names": ", ".join(dict.fromkeys(row["name"] for row in axes.values())),
+        }
+        for axes in by_coefficient(rows)
+    ]

@@ -1,10 +1,12 @@
-"""The JSON documents of rerun, diff and whatif: keys that other programs read. A NotRequired key may be missing."""
+"""The JSON documents of rerun, diff, whatif and the fit of an import. A NotRequired key may be missing."""
 
 from __future__ import annotations
 
-from typing import Annotated, NotRequired
+from typing import Annotated, Any, Literal, NotRequired
 
 from typing_extensions import TypedDict
+
+from pipelines.diagnosis.documents.diagnosis import LeaveOut, VerdictEvidence
 
 
 class UnitDifference(TypedDict):
@@ -176,3 +178,30 @@ class RerunCheckDocument(TypedDict):
     same: int
     runs: list[ReproducedRun]
     archive: NotRequired[str]
+
+
+class FittedUnit(TypedDict):
+    """The decision on a unit of an import that was fitted against limits."""
+
+    unit: str
+    outcome: Literal["pass", "fail", "refused"]
+    grade: str
+    reasons: str
+
+
+class ImportedFitDocument(TypedDict):
+    """``fit --json (an import)``: a model fitted to an import, its verdict and the basis of the verdict."""
+
+    run: Annotated[str, "the run that holds the fit"]
+    fit_of: Annotated[str, "the import"]
+    effects: list[str]
+    left_out: Annotated[list[str], "dwells left out, UNIT:DWELL"]
+    units: Annotated[list[FittedUnit], "empty without limits"]
+    adequate: Annotated[bool | None, "null: cannot be judged"]
+    reason: Annotated[str | None, "why it cannot be judged"]
+    error: Annotated[dict[str, Any], "as in `diagnose --json`; `fit_rms_ug`: residual of all dwells of the fit, µg"]
+    evidence: VerdictEvidence | None
+    leave_out: LeaveOut | None
+    missing: Annotated[list[list[str]], "classes of effects that are missing"]
+    lines: Annotated[list[str], "the same in words"]
+    open: NotRequired[Annotated[list[str], "of a unit that was turned about one axis: what that does not show"]]

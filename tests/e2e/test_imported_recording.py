@@ -231,6 +231,12 @@ def test_from_a_recording_with_stated_references_to_its_certificate() -> None:
     text_of("certificate", "H1", status=0)
     assert "local gravity" in Path("H1_1.xml").read_text(encoding="utf-8")
     text_of("verify", status=0)
+    text_of("revoke", "H1", "--reason", "fell to the floor", status=0)
+    page = (
+        Archive(None).run(fitted["run"]).report.read_text(encoding="utf-8")
+    )  # made again, as that of a captured run is
+    assert '<span class="tag fail">revoked</span>' in page
+    assert "fell to the floor" in page
 
 
 def test_without_a_statement_an_import_stays_noise_only() -> None:

@@ -16,7 +16,7 @@ from root_process import ROOT
 
 from pipelines.archive import Archive
 from pipelines.inquiry.inquiry import FollowUp, Inquiry
-from pipelines.inquiry.joint_diagnosis import JointDiagnosis
+from pipelines.inquiry.lineage import JointDiagnosis
 from pipelines.inquiry.loop import Consent, InquirySettings, Participants, run_inquiry
 from pipelines.jobs.job import job_of_run
 from pipelines.rerun.selection import selected

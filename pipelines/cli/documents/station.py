@@ -1,4 +1,4 @@
-"""The JSON documents of stations: state, self-test, log, charts, server."""
+"""The JSON documents of stations: state, self-test, log, charts, server; and the keys of the files that describe them."""
 
 from __future__ import annotations
 
@@ -149,3 +149,10 @@ class StationProfilesDocument(TypedDict):
     """``station profiles --json``: the register-map profiles, without registers; with a name the whole profile."""
 
     profiles: Annotated[list[dict[str, Any]], "keys of a [profile](../how-to/add-a-device.md)"]
+
+
+class KeysDocument(TypedDict):
+    """``keys [SUBJECT] --json``: the keys of a file, or the names that an option takes."""
+
+    subject: Annotated[str, "empty: the list of subjects"]
+    rows: Annotated[list[dict[str, str]], "one for each key or name, by the heads of the printed table"]

@@ -6,23 +6,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pipelines.cli.next_commands import FindData, JudgedData, command_line, print_extension, print_next
-from pipelines.cli.options import console, print_table
-from pipelines.cli.text.verdict_text import STYLE_OF
-from pipelines.diagnosis import sections
+from pipelines.cli.printing import console, print_table, say
+from pipelines.cli.text.verdict_text import print_verdict
+from pipelines.diagnosis import sections, sentences
 from pipelines.diagnosis.sections import Section
-from pipelines.diagnosis.sentences import (
-    UNEXPLAINED,
-    evidence_text,
-    few_dwells,
-    influences,
-    not_separated,
-    tails_left_out,
-    undetected,
-    unexplained_text,
-    verdict,
-    why_recommended,
-    without_single_dwells,
-)
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -36,18 +23,17 @@ def print_diagnosis(document: dict[str, Any], *, data: FindData | None, model: P
     data : gives the data as they were named on the command line, where commands to give next are printed; None: none are printed
     model : the model file as it was given there
     """
-    out = console()
-    out.print(verdict(document), style=STYLE_OF[document["adequate"]], soft_wrap=True)
-    _dim(evidence_text(document))
-    if few_dwells(document):
-        _dim(undetected(document))
+    print_verdict(document)
+    _dim(sentences.evidence_text(document))
+    if sentences.few_dwells(document):
+        _dim(sentences.undetected(document))
     print_findings(document)
-    _unexplained(out, document, data, model)
+    _unexplained(document, data, model)
     if data is not None and document["recommended"]:
-        print_extension(out, document, data, model)
-        _dim(not_separated(document))
+        print_extension(document, data, model)
+        _dim(sentences.not_separated(document))
     if document["unseen"]:
-        out.print()
+        say()
     for section in (sections.unseen, sections.unseen_in_part, sections.hidden_by_noise):
         print_section(section(document))
     print_next_measurement(document["next_measurements"])
@@ -57,15 +43,15 @@ def print_findings(document: dict[str, Any]) -> None:
     """Print data faults, the drivers that the residual follows, the classes of missing effects, and the dwells that decide."""
     for section in (sections.faults, sections.drivers, sections.missing):
         print_section(section(document))
-    for text in why_recommended(document):
-        console().print(text, soft_wrap=True)
-    if text := without_single_dwells(document):
-        console().print(text, soft_wrap=True)
-    _dim(tails_left_out(document))
-    for text in influences(document):
+    for text in sentences.why_recommended(document):
+        say(text)
+    if text := sentences.without_single_dwells(document):
+        say(text)
+    _dim(sentences.tails_left_out(document))
+    for text in sentences.influences(document):
         _dim(text)
     for text in document.get("warnings", ()):
-        console().print(f"warning: {text}", style="yellow")
+        say(f"warning: {text}", style="yellow")
 
 
 def print_next_measurement(proposed: list[dict[str, Any]], out: Console | None = None) -> None:
@@ -78,13 +64,13 @@ def print_section(section: Section, out: Console | None = None) -> None:
     if section.rows:
         print_table(section.heads("\n"), section.rows, title=section.title, out=out)
     for text in section.notes:
-        (out or console()).print(text, style="dim", soft_wrap=True)
+        (out or console()).print(text, style="dim")
 
 
 def _dim(text: str) -> None:
     """Print a sentence of second rank; nothing where it is empty."""
     if text:
-        console().print(text, style="dim", soft_wrap=True)
+        say(text, style="dim")
 
 
 def _with_formula(document: dict[str, Any], data: JudgedData) -> str:
@@ -95,12 +81,12 @@ def _with_formula(document: dict[str, Any], data: JudgedData) -> str:
     return command_line("diagnose", data.source, "--effects", effects, "--formula", formula, *data.options)
 
 
-def _unexplained(out: Console, document: dict[str, Any], data: FindData | None, model: Path | None) -> None:
+def _unexplained(document: dict[str, Any], data: FindData | None, model: Path | None) -> None:
     if not document["unexplained"]:
         return
-    out.print(f"\n{UNEXPLAINED}: {unexplained_text(document)}")
+    say(f"\n{sentences.UNEXPLAINED}: {sentences.unexplained_text(document)}")
     if document["offer"]:
-        out.print(f"Formula for {model or 'a model file'}, to be refined:\n")
-        out.print(document["offer"]["toml"], soft_wrap=True)
+        say(f"Formula for {model or 'a model file'}, to be refined:\n")
+        say(document["offer"]["toml"])
         if data is not None:
-            print_next(out, [_with_formula(document, data())])
+            print_next([_with_formula(document, data())])

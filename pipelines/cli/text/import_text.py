@@ -7,42 +7,32 @@ from typing import Any
 
 from inertial.counts import number_of
 from pipelines.cli.next_commands import archive_words, command_line, print_next
-from pipelines.cli.options import console, print_table, short, short_values
-
-VERDICTS = {
-    True: ("adequate", "bold green"),
-    False: ("NOT ADEQUATE: this fit does not describe these data", "bold red"),
-    None: ("CANNOT BE JUDGED: see above", "bold yellow"),
-}
-VERDICTS_OF_TRANSFER = {**VERDICTS, False: ("NOT ADEQUATE: the model does not describe these points", "bold red")}
+from pipelines.cli.printing import print_table, say, short, short_values
+from pipelines.cli.text.verdict_text import print_verdict_of_fit
 
 
 def print_transfers(imports: Sequence[Mapping[str, Any]]) -> None:
     """Imported transfer functions for people."""
-    out = console()
     for one in imports:
-        out.print(f"{one['unit']}: {one['points']} points, kept as run {one['run']}")
+        say(f"{one['unit']}: {one['points']} points, kept as run {one['run']}")
         for line in one["text"]:
-            out.print(f"  {line}")
-        verdict, style = VERDICTS_OF_TRANSFER[one["adequate"]]
-        out.print(f"  {verdict}", style=style)
+            say(f"  {line}")
+        print_verdict_of_fit(one["adequate"], "the model does not describe these points")
 
 
 def print_import(one: dict[str, Any], archive: str | None, *, list_dwells: bool) -> None:
     """An import for people."""
-    out = console()
     dwells = number_of(one["dwells"], "dwell")
     rows = f"{number_of(one['samples'], 'sample')}, {dwells}" if one["samples"] else dwells
-    out.print(f"{', '.join(one['units'])}: {rows} in {one['out_unit']}, kept as run {one['run']}")
+    say(f"{', '.join(one['units'])}: {rows} in {one['out_unit']}, kept as run {one['run']}")
     for remark in [*one["remarks"], *one["lines"]]:
-        out.print(f"  {remark}")
+        say(f"  {remark}")
     if list_dwells:
         _print_dwells(one["dwell_list"], one["out_unit"])
     if one["fit"]:
-        verdict, style = VERDICTS[one["adequate"]]
-        out.print(f"  {verdict}", style=style)
+        print_verdict_of_fit(one["adequate"], "this fit does not describe these data")
         if one["fit"] == "norm" and one["adequate"] is False:
-            print_next(out, [command_line("diagnose", one["run"], *archive_words(archive))])
+            print_next([command_line("diagnose", one["run"], *archive_words(archive))])
 
 
 def _print_dwells(dwells: list[dict[str, Any]], unit: str) -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from pipelines.cli.next_commands import FindData, command_line, fresh_measurement, print_next
-from pipelines.cli.options import console, print_table, short
+from pipelines.cli.printing import print_table, say, short
 
 ERRORS = {
     "fitted_ug": "fitted to these dwells",
@@ -16,32 +16,16 @@ ERRORS = {
 }
 
 
-def print_heading(text: str, *, quiet: bool) -> None:
-    """Print a heading, unless the output is a document."""
-    if not quiet:
-        console().print(f"\n{text}", style="bold cyan")
-
-
-def print_verdict(document: dict[str, Any]) -> None:
-    """Print the verdict of a diagnosis."""
-    from pipelines.cli.text.verdict_text import STYLE_OF
-    from pipelines.diagnosis.sentences import verdict
-
-    console().print(verdict(document), style=STYLE_OF[document["adequate"]], soft_wrap=True)
-
-
 def print_improvement(document: dict[str, Any]) -> None:
     """Print what was added, the ladder of errors, and the next command; the diagnoses are printed as they are made."""
     _choices(document)
     _ladder(document["ladder"])
-    out = console()
     for text in document["warnings"]:
-        out.print(f"warning: {text}", style="yellow")
-    print_next(out, document["next"])
+        say(f"warning: {text}", style="yellow")
+    print_next(document["next"])
 
 
 def _choices(document: dict[str, Any]) -> None:
-    out = console()
     for choice in document["choices"]:
         effect, others = choice["effect"], ", ".join(choice["not_separated_from"])
         text = f"{document['file']}: added {effect}" if choice["added"] else f"{effect} is not added"
@@ -49,7 +33,7 @@ def _choices(document: dict[str, Any]) -> None:
             text += f"; these data do not separate it from {others}"
         if choice["decided_by"] == "undecided":
             text += "; --yes does not decide between them: name one with --effect"
-        out.print(text, style="" if choice["added"] else "yellow", soft_wrap=True)
+        say(text, style="" if choice["added"] else "yellow")
 
 
 def _ladder(rows: list[dict[str, Any]]) -> None:
@@ -64,7 +48,7 @@ def _ladder(rows: list[dict[str, Any]]) -> None:
     print_table(["error, µg rms", *heads], lines, title="Error by version of the model", whole=0)
     for row in rows[1:]:
         style = {True: "bold green", False: "bold red", None: "yellow"}[row["confirmed"]]
-        console().print(f"{', '.join(row['added'])}: {row['text']}", style=style)
+        say(f"{', '.join(row['added'])}: {row['text']}", style=style)
 
 
 def next_lines(document: dict[str, Any], target: Path, find: FindData, *, after: dict[str, Any]) -> list[str]:

@@ -5,8 +5,11 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from pipelines.cli.options import console, print_table, short
+from inertial.counts import number_of
+from pipelines.cli.printing import print_table, say, short
+from pipelines.planning.plan_rows import by_coefficient, worst_axes
 from schemas.decisions import LARGEST_ERROR
+from schemas.units import AXES
 
 RAISED = 3.0
 """Factor by which 1/f and random walk must raise a floor to be listed."""
@@ -15,13 +18,12 @@ RAISED = 3.0
 def print_plan(document: dict[str, Any]) -> None:
     """Print a plan."""
     minutes, error = document["minutes"], document["dwell_error_ug"]
-    out = console()
-    out.print(
+    say(
         f"{document['recipe']} with {document['device']} on station {document['station']}: "
-        f"{document['dwells']} dwells in {document['poses']} poses at {_soaks(len(document['temperatures_C']))}"
+        f"{document['dwells']} dwells in {document['poses']} poses at {number_of(len(document['temperatures_C']), 'soak')}"
     )
-    out.print(_time(minutes))
-    out.print(
+    say(_time(minutes))
+    say(
         f"error of a dwell (1σ): {short(error['together'])} µg; white {short(error['white'])}, wander {short(error['wander'])}"
         f"{_longer(document['dwell_s'])}"
     )
@@ -32,7 +34,7 @@ def print_plan(document: dict[str, Any]) -> None:
         again = (
             "no repeatability is stated" if bias["switch_on_u_ug"] is None else f"{short(bias['switch_on_u_ug'])} µg"
         )
-        out.print(
+        say(
             f"bias, 1σ of the worst axis: as the mean of the record {short(bias['record_u_ug'])} µg, of the day after it "
             f"{short(bias['long_u_ug'])} µg; after the next switch-on: {again}"
         )
@@ -46,9 +48,8 @@ def print_plan(document: dict[str, Any]) -> None:
         print_table(["visible effect", "confounded with"], alike)
     faint = [row["effect"] for row in seen if row["faint"]]
     if faint:
-        names = ", ".join(faint)
-        out.print(f"* floor above the typical size: {names}")
-    out.print(
+        say(f"* floor above the typical size: {', '.join(faint)}")
+    say(
         "v: fraction of the effect's column that remains after the model; 1/v²: variance inflation; floor: smallest detectable "
         "contribution to a dwell (3σ, RMS), and its coefficient; =: identical under this plan",
         style="dim",
@@ -69,14 +70,13 @@ def print_plan(document: dict[str, Any]) -> None:
         ["effect not visible", "reason; what to add"], [[r["effect"], r["why"] or r["breaker"]] for r in invisible]
     )
     if "page" in document:
-        out.print(f"Page: {document['page']}")
+        say(f"Page: {document['page']}")
 
 
 def print_procedures(document: dict[str, Any]) -> None:
     """Print the plan of a recipe without the multi-position test."""
-    out = console()
-    out.print(f"{document['recipe']} with {document['device']} on station {document['station']}")
-    out.print(_time(document["minutes"]))
+    say(f"{document['recipe']} with {document['device']} on station {document['station']}")
+    say(_time(document["minutes"]))
     _print_procedure_rows(document)
 
 
@@ -99,11 +99,8 @@ def _print_procedure_rows(document: dict[str, Any]) -> None:
             for row in rows
         ],
     )
-    figures = [figure for row in rows for figure in row["figures"]]
-    print_table(
-        ["figure", "unit", "limit", "meaning"],
-        [[one["figure"], one["unit"], one["limit"] or "", one["meaning"]] for one in figures],
-    )
+    figures = [[f["figure"], f["unit"], f["limit"] or "", f["meaning"]] for row in rows for f in row["figures"]]
+    print_table(["figure", "unit", "limit", "meaning"], figures)
 
 
 def _time(minutes: dict[str, float]) -> str:
@@ -112,10 +109,6 @@ def _time(minutes: dict[str, float]) -> str:
         f"{name.replace('_', ' ')} {minutes[name]:.0f}" for name in minutes if name != "total" and minutes[name] > 0.0
     )
     return f"{minutes['total']:.0f} min of station time: {parts}"
-
-
-def _soaks(count: int) -> str:
-    return f"{count} soak{'' if count == 1 else 's'}"
 
 
 def _longer(dwell: dict[str, float]) -> str:
@@ -130,15 +123,12 @@ def _longer(dwell: dict[str, float]) -> str:
 
 def _coefficient_lines(rows: list[dict[str, Any]]) -> list[list[str]]:
     """One line per coefficient with its three axes; one value for parameters of the station."""
-    lines: dict[tuple[str, int], list[str]] = {}
-    count: dict[tuple[str, str], int] = {}
-    for row in rows:
-        place = count.get((row["effect"], row["axis"]), 0)
-        count[row["effect"], row["axis"]] = place + 1
-        key = (row["effect"], place if row["axis"] != "*" else 100 + place)
-        line = lines.setdefault(key, [f"{row['effect']}, {row['unit']}", "", "", ""])
-        line[1 + max(0, "xyz".find(row["axis"]))] = short(row["uncertainty_ug"])
-    return list(lines.values())
+    lines: list[list[str]] = []
+    for axes in by_coefficient(rows):
+        first = next(iter(axes.values()))
+        values = {axis.replace("*", "x"): short(row["uncertainty_ug"]) for axis, row in axes.items()}
+        lines.append([f"{first['effect']}, {first['unit']}", *(values.get(axis, "") for axis in AXES)])
+    return lines
 
 
 def _visible_line(row: dict[str, Any]) -> list[str]:
@@ -171,28 +161,22 @@ LEAST = 0.01
 
 def print_reach(reach: dict[str, Any] | None) -> None:
     """A table of the quantities with their largest contributions, limits that cannot be met, and remarks."""
-    out = console()
     if reach is None:
-        out.print(
-            "uncertainty: noise only, the station states no [uncertainty]; no grade above consumer, no certificate"
-        )
+        say("uncertainty: noise only, the station states no [uncertainty]; no grade above consumer, no certificate")
         return
-    worst: dict[str, dict[str, Any]] = {}
-    for row in reach["quantities"]:
-        if row["quantity"] not in worst or row["u"] > worst[row["quantity"]]["u"]:
-            worst[row["quantity"]] = row
+    worst = worst_axes(reach)
     print_table(["quantity, worst axis", "axis", "u", "U, k = 2", "unit"], [_line(row) for row in worst.values()])
     for row in worst.values():
         rulers = ", ".join(f"{name} {100.0 * share:.0f} %" for name, share in row["shares"].items() if share >= LEAST)
-        out.print(f"{TITLES[row['quantity']]}: {rulers or 'no contribution'}")
+        say(f"{TITLES[row['quantity']]}: {rulers or 'no contribution'}")
     period = f"period of validity {reach['validity_months']} months, frame {reach['frame']}"
-    out.print(f"{period}; references by {reach['grade_source'].replace('_', ' ')}", style="dim")
+    say(f"{period}; references by {reach['grade_source'].replace('_', ' ')}", style="dim")
     if reach["grade_source"] == "assumed":
-        out.print("references: assumed values, which allow no certificate")
+        say("references: assumed values, which allow no certificate")
     for name, rules in reach["not_stated"].items():
-        out.print(f"not stated: {name} (dominates {rules})")
+        say(f"not stated: {name} (dominates {rules})")
     for line in (*reach["remarks"], *(f"cannot be met: {one}" for one in reach["unreachable"])):
-        out.print(line)
+        say(line)
 
 
 def _line(row: dict[str, Any]) -> list[str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from pipelines.archive import Run
-from pipelines.cli.options import console, error_console
+from pipelines.cli.printing import error_console, say
 
 if TYPE_CHECKING:
     from pipelines.jobs.references import ReferencesDocument
@@ -14,6 +14,19 @@ if TYPE_CHECKING:
 
 STYLE_OF = {True: "bold green", False: "bold red", None: "bold yellow"}
 """Style of a verdict; None: it cannot be judged."""
+
+
+def print_verdict(document: dict[str, Any]) -> None:
+    """Print the verdict of a diagnosis."""
+    from pipelines.diagnosis.sentences import verdict
+
+    say(verdict(document), STYLE_OF[document["adequate"]])
+
+
+def print_verdict_of_fit(adequate: bool | None, not_adequate: str) -> None:
+    """Print whether a fit is adequate; ``not_adequate``: what is wrong where it is not."""
+    texts = {True: "adequate", False: f"NOT ADEQUATE: {not_adequate}", None: "CANNOT BE JUDGED: see above"}
+    say(f"  {texts[adequate]}", STYLE_OF[adequate])
 
 
 def judged(document: dict[str, Any], run: Run) -> dict[str, Any]:
@@ -33,7 +46,7 @@ def print_adequacy(verdict: AdequacyDocument | None) -> None:
 
     faulty = f"; left out because of a data fault: {', '.join(verdict['faulty'])}" if verdict["faulty"] else ""
     text = f"model   {plain_verdict(verdict)}{faulty}"
-    console().print(text, style=STYLE_OF[verdict["adequate"]], soft_wrap=True)
+    say(text, style=STYLE_OF[verdict["adequate"]])
 
 
 def print_references(judged: ReferencesDocument | None) -> None:
@@ -47,4 +60,4 @@ def print_references(judged: ReferencesDocument | None) -> None:
     else:
         told = f"CONTRADICTED: {contradiction(judged)}" if judged["worse"] else "not contradicted by the residuals"
         text = f"{told}; {unseen(judged)}"
-    console().print(f"stated references   {text}", style="bold red" if judged["worse"] else "")
+    say(f"stated references   {text}", style="bold red" if judged["worse"] else "")

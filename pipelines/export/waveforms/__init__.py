@@ -15,7 +15,7 @@ from typing import Protocol, cast
 from pipelines.export.waveforms.channel import Channel
 from schemas.errors import WrongUse, did_you_mean
 
-__all__ = ["WRITERS", "Channel", "write_waveforms"]
+__all__ = ["WRITERS", "Channel", "write_waveforms", "writer_of"]
 
 
 class Writer(Protocol):
@@ -42,6 +42,13 @@ def _writers_by_name() -> dict[str, Writer]:
 WRITERS: dict[str, Writer] = _writers_by_name()
 
 
+def writer_of(form: str) -> Writer:
+    """The writer of a format; an unknown format is refused with similar names."""
+    if form not in WRITERS:
+        raise WrongUse(f"waveforms: no format is called '{form}'; {did_you_mean(form, WRITERS)}")
+    return WRITERS[form]
+
+
 def write_waveforms(form: str, channels: Sequence[Channel], path: Path) -> list[Path]:
     """Write the channels and return the paths: one file, or one for each clock where the format holds only one.
 
@@ -50,11 +57,9 @@ def write_waveforms(form: str, channels: Sequence[Channel], path: Path) -> list[
     WrongUse
         The format is not known, there is no channel, or a library is missing.
     """
-    if form not in WRITERS:
-        raise WrongUse(f"waveforms: no format is called '{form}'; {did_you_mean(form, WRITERS)}")
+    writer = writer_of(form)
     if not channels:
         raise WrongUse("waveforms: no channel, at least one is needed; name another record")
-    writer = WRITERS[form]
     clocks = list(dict.fromkeys((one.interval_s, len(one.values), one.group) for one in channels))
     shared = len({(interval, count) for interval, count, _ in clocks}) == 1
     if shared or not writer.ONE_CLOCK:

@@ -17,8 +17,8 @@ from typer.testing import CliRunner
 from pipelines.certificates.ledger import Ledger
 from pipelines.chain.certify import certify
 from pipelines.cli import take_texts_as_given
-from pipelines.cli.demo import _Game
 from pipelines.cli.terminal import agreed
+from pipelines.cli.text.demo_text import print_ending
 from pipelines.demo.scenes import scene
 from schemas.errors import WrongUse
 
@@ -144,11 +144,11 @@ CLASS = ["aging_log", "warm_up", "thermal_lag"]
 def ending(capsys: pytest.CaptureFixture[str], **changes: Any) -> str:
     hidden = scene("warm_up", 0)
     document = {
+        "hidden": {"kind": hidden.kind, "effect": hidden.effect, "physics": hidden.truth}, "folder": "game",
         "classes": [CLASS], "unseen": [], "added": ["thermal_lag"], "found": True, "told_apart": False,
         "not_told_apart": [CLASS], "next_measurements": [], "before": NONE, "after": NONE, **changes,
     }  # fmt: skip
-    game = _Game(Path("game"), hidden, None, asks=False, quiet=False)  # pyright: ignore[reportArgumentType]  # no lot is read
-    game._reveal(document)
+    print_ending(document)
     return " ".join(capsys.readouterr().out.split())
 
 

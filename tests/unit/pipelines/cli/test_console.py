@@ -8,7 +8,7 @@ from rich.text import Text
 
 from inertial.effects import built_in
 from pipelines.cli.console import WordConsole
-from pipelines.cli.options import console, print_table
+from pipelines.cli.printing import console, print_table
 
 HEADS = ["run", "started (UTC)", "station", "passed", "largest deviation, µg", "meaning of the number", "unit"]
 LINE = ["production-30db20d7e5", "2026-11-22 09:24", "simulated", "8 of 8", "472.25", "deviation of the norm", "µg"]

@@ -28,9 +28,9 @@ from pipelines.certificates.document.laboratory import LaboratoryFile, read_labo
 from pipelines.certificates.document.numbers import si_unit, with_uncertainty
 from pipelines.certificates.document.pages import page_content
 from pipelines.certificates.document.schema_files import validate
+from pipelines.certificates.documents import CertificateDocument
 from pipelines.chain.certify import certify
 from pipelines.cli import app
-from pipelines.cli.documents.certificates import CertificateDocument
 from pipelines.report.numbers import with_uncertainty as report_rounding
 from schemas.errors import RecipeInvalid, WrongUse
 

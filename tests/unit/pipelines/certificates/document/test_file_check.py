@@ -33,9 +33,9 @@ from pipelines.certificates.document.issue import issue
 from pipelines.certificates.document.laboratory import LaboratoryFile, read_laboratory
 from pipelines.certificates.document.signature_check import canonical, parsed, xml_signature
 from pipelines.certificates.document.signing import SigningKey, sign_pdf, sign_xml
+from pipelines.certificates.documents import CertifyDocument
 from pipelines.chain.certify import certify
 from pipelines.cli import app
-from pipelines.cli.documents.certificates import CertifyDocument
 from schemas.errors import WrongUse
 
 etree = pytest.importorskip("lxml.etree")

@@ -1,4 +1,4 @@
-"""The JSON documents of calibrations: certified, valid, revoked, written as certificates, traced."""
+"""The JSON documents of calibrations: certified, valid, revoked, written as certificates."""
 
 from __future__ import annotations
 
@@ -138,36 +138,3 @@ class RevokeDocument(LedgerEntryDocument):
     action: Literal["certify", "supersede", "revoke"]
     unit: str
     revoked: Annotated[list[str], "certificates that it ends"]
-
-
-class LineageNode(TypedDict):
-    """A file, run or reference of a lineage."""
-
-    id: str
-    kind: str
-    label: str
-    file: Annotated[str, "below the archive's folder; empty: none"]
-    sha256: str
-    about: dict[str, Any]
-
-
-class LineageStep(TypedDict):
-    """A step that made things from other things."""
-
-    id: str
-    name: str
-    used: Annotated[list[str], "ids"]
-    made: Annotated[list[str], "ids"]
-    about: dict[str, Any]
-
-
-class LineageDocument(TypedDict):
-    """``lineage UNIT|RUN|FILE --json``: origin and results of a unit, a run or a file."""
-
-    target: str
-    kind: str
-    focus: Annotated[list[str], "ids of what was asked for"]
-    things: list[LineageNode]
-    steps: list[LineageStep]
-    prov: Annotated[str | None, "the file of `--prov`; null: none"]
-    crate: Annotated[str | None, "the folder of `--crate`; null: none"]

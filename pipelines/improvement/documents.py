@@ -1,0 +1,55 @@
+"""The JSON document of improve: keys that other programs read. A NotRequired key may be missing."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, NotRequired
+
+from typing_extensions import TypedDict
+
+from pipelines.diagnosis.documents.diagnosis import DiagnosisDocument
+
+
+class ImprovementChoice(TypedDict):
+    """The decision on one class of the diagnosis."""
+
+    effect: str
+    not_separated_from: Annotated[list[str], "effects of the class that these data do not separate from it"]
+    decided_by: Annotated[
+        Literal["question", "--effect", "--yes", "undecided"], "`undecided`: a class of several, without an answer"
+    ]
+    added: bool
+
+
+class LadderRow(TypedDict):
+    """The errors of one version of the model."""
+
+    version: int
+    added: list[str]
+    fitted_ug: Annotated[float, "residual of the fit, µg"]
+    heldout_ug: Annotated[float | None, "worst cross-validated error of poses, soaks and blocks of time, µg"]
+    fresh_ug: Annotated[float | None, "error on the fresh run, µg; null without `--fresh`"]
+    noise_ug: Annotated[float, "noise of the measurement by the last diagnosis, µg"]
+    fall_ug: Annotated[float | None, "decrease of the error by what was added, µg"]
+    fall_u_ug: Annotated[float | None, "standard uncertainty of the decrease, µg"]
+    confirmed: Annotated[bool | None, "whether data that were not fitted confirm the change; null: cannot be decided"]
+    reason: NotRequired[Annotated[str | None, "why it is not decided; null: it is, or nothing is judged"]]
+    text: Annotated[str, "`confirmed` as a sentence"]
+    warnings: list[str]
+
+
+class ImproveDocument(TypedDict):
+    """``improve --json``: diagnosis of a model, effects added to it, and the error of each version."""
+
+    data: str
+    file: Annotated[str | None, "the model file; null: none was given and none written"]
+    diagnosis: Annotated[DiagnosisDocument, "of the model to begin with"]
+    choices: Annotated[list[ImprovementChoice], "one per class with a recommended effect"]
+    added: list[str]
+    effects: Annotated[list[str], "the resulting model"]
+    after: Annotated[DiagnosisDocument | None, "of the resulting model; null: nothing was added"]
+    adequate: Annotated[bool | None, "whether the resulting model is adequate; null: cannot be judged"]
+    ladder: Annotated[list[LadderRow], "oldest version first; empty if no unit can be judged"]
+    refuted: Annotated[list[str], "added effects that the fresh run is evidence against"]
+    warnings: list[str]
+    fresh: Annotated[str | None, "the fresh run that judged the last version; null: there was none"]
+    next: Annotated[list[str], "commands to give next"]
