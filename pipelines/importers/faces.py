@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -13,11 +13,9 @@ from inertial.probability import passes
 from inertial.uncertainty.rounding import equal
 from pipelines.importers.judged import FitAnswer, coefficient, gravity_of, imported_dwells
 from pipelines.importers.mapping import FACES, Mapping
+from pipelines.importers.record import Imported
 from schemas.errors import DataRejected
 from schemas.units import AXES, MICRO, STANDARD_GRAVITY_M_S2
-
-if TYPE_CHECKING:
-    from pipelines.importers.record import Imported
 
 MODEL = ("bias", "scale", "misalignment")
 GROSS = 0.05
@@ -63,8 +61,6 @@ def six_faces(data: Imported, mapping: Mapping) -> FitAnswer:
 
 def _covariance(rows: list[dict[str, Any]]) -> pd.DataFrame:
     """The covariance of the coefficients as the archive's long table: six opposite faces make them independent of each other."""
-    import pandas as pd
-
     entries: list[dict[str, Any]] = []
     for axis in AXES:
         own = [row for row in rows if row["axis"] == axis]

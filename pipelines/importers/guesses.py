@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from inertial.quantities import LARGEST
+from inertial.quantities import ANGLE_COLUMNS, FORCE_COLUMNS, KNOWN_COLUMNS, LARGEST, SPREAD_COLUMNS
 from pipelines.importers import clocks, unit_check, values
 from pipelines.importers.clocks import typical_step
 from pipelines.importers.content import Content
@@ -29,6 +29,18 @@ _MOST_COLUMNS = 24
 _SOME = 20_000
 _MOST_POSITIONS = 500
 _LIKELY_HZ = 100.0
+EXCHANGE = "the exchange format"
+_OF_EXCHANGE = {
+    "unit": "unit",
+    "dwell": "dwell",
+    "time_s": "time",
+    "out_x": "x",
+    "out_y": "y",
+    "out_z": "z",
+    **dict.fromkeys(FORCE_COLUMNS, "reference force"),
+    **dict.fromkeys(ANGLE_COLUMNS, "reference angle"),
+    **{name: f"sd_{name[-1]}" for name in SPREAD_COLUMNS},
+}
 
 
 @dataclass(frozen=True)
@@ -238,3 +250,18 @@ def _output(  # noqa: PLR0911 - one answer per reason
     if unit_check.VOLTS_PER_G[0] <= size <= unit_check.VOLTS_PER_G[1]:
         return Guess("V", f"its norm is {size:.5g}, no size of gravity, but one of volts: check")
     return Guess("LSB", f"its norm is {size:.5g}, neither gravity nor volts: check")
+
+
+def guesses_of_dwells(table: pd.DataFrame) -> Guesses:
+    """The meanings of the columns of the exchange format, by their names; further columns of numbers are covariates."""
+    columns: dict[str, Guess] = {}
+    for name in map(str, table.columns):
+        if name in _OF_EXCHANGE or name in KNOWN_COLUMNS:
+            columns[name] = Guess(_OF_EXCHANGE.get(name, "recorded quantity"), "its name")
+        elif table[name].dtype.kind in "fiu":
+            columns[name] = Guess("covariate", "further numbers")
+        else:
+            columns[name] = Guess("", "")
+    stated = sorted({str(unit) for unit in table["out_unit"].dropna()}) if "out_unit" in table else []
+    output = Guess(stated[0], "column out_unit") if len(stated) == 1 else Guess("", "")
+    return Guesses(columns, Guess("s", EXCHANGE), output)

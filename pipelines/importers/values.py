@@ -9,8 +9,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from inertial.quantities import BY_COLUMN, FORCE_COLUMNS, LARGEST, LARGEST_TIME_S, RECORDED, SPREAD_COLUMNS
-from pipelines.importers.content import Content, row_of
-from schemas.errors import DataRejected
+from pipelines.importers.content import Content
+from schemas.errors import DataRejected, did_you_mean
 from schemas.foreign import foreign, shown
 
 _FORCE_G = 1e4
@@ -74,12 +74,7 @@ def as_numbers(values: pd.Series, where: str, *, flags: bool = False) -> NDArray
 
 
 def finite(
-    values: pd.Series,
-    where: str,
-    content: Content | None = None,
-    *,
-    flags: bool = False,
-    needed: str = "a finite number",
+    values: pd.Series, where: str, content: Content, *, flags: bool = False, needed: str = "a finite number"
 ) -> NDArray[np.float64]:
     """The numbers of a column; others are refused with row, and line if ``content`` knows it."""
     numbers = as_numbers(values, where, flags=flags)
@@ -87,11 +82,30 @@ def finite(
     if bad.size:
         row = int(bad[0])
         raise DataRejected(
-            f"{where}: {row_of(row, content)}, column '{shown(str(values.name))}': found {shown(str(values.iloc[row]))}, "
+            f"{where}: {content.row(row)}, column '{shown(str(values.name))}': found {shown(str(values.iloc[row]))}, "
             f"{needed} is needed ({bad.size} such {'row' if bad.size == 1 else 'rows'}); repair the file, or add --gaps split to "
             "use what lies between"
         )
     refuse_outside(numbers, "", where, label=str(values.name))
+    return numbers
+
+
+def finite_column(
+    table: pd.DataFrame,
+    name: str,
+    where: str,
+    remedy: str = "remove the gap, or cut the recording there",
+) -> NDArray[np.float64]:
+    """The numbers of a column of samples or points; a missing column and a value that is no finite number are refused."""
+    if name not in table.columns:
+        raise DataRejected(f"{where}: column '{shown(name)}' is not there; {did_you_mean(name, list(table.columns))}")
+    numbers = pd.to_numeric(table[name], errors="coerce").to_numpy(dtype=np.float64)
+    bad = np.flatnonzero(~(np.abs(numbers) < LARGEST))
+    if bad.size:
+        found = shown(str(table[name].iloc[bad[0]]))
+        raise DataRejected(
+            f"{where}: row {bad[0] + 1}, column '{shown(name)}': found {found}, a finite number is needed; {remedy}"
+        )
     return numbers
 
 
