@@ -60,10 +60,16 @@ class UnitCalibration:
 
     def correct(self, output: NDArray[np.float64], temperature: float) -> NDArray[np.float64]:
         """Specific force (n, 3) in g for outputs (n, 3), as firmware computes it."""
-        powers = (temperature - 25.0) ** np.arange(ORDER)
-        bias = np.einsum("k,ki->i", powers, self.bias)
-        matrix = np.einsum("k,kij->ij", powers, self.response)
-        return np.linalg.solve(matrix, (output - bias).T).T
+        return corrected_output(self.bias, self.response, output, temperature)
+
+
+def corrected_output(
+    bias: NDArray[np.float64], response: NDArray[np.float64], output: NDArray[np.float64], temperature: float
+) -> NDArray[np.float64]:
+    """Specific force (n, 3) in g for outputs (n, 3), by coefficients (4, 3) and (4, 3, 3) of θ⁰ … θ³."""
+    powers = (temperature - T_REFERENCE) ** np.arange(ORDER)
+    matrix = np.einsum("k,kij->ij", powers, response)
+    return np.linalg.solve(matrix, (output - np.einsum("k,ki->i", powers, bias)).T).T
 
 
 def unit_calibrations(

@@ -47,13 +47,7 @@ def digest_of(sources: Sequence[SourceFile]) -> str:
 
 def is_file(source: str | Path) -> bool:
     """Whether a source is a file, not a run of the archive."""
-    path = Path(source)
-    looks_like_one = isinstance(source, Path) or "/" in str(source) or path.suffix != ""
-    return is_there(path) or (looks_like_one and not _is_run_like(source))
-
-
-def _is_run_like(source: str | Path) -> bool:
-    return isinstance(source, str) and "/" not in source and not Path(source).suffix
+    return is_there(source) or isinstance(source, Path) or "/" in source or Path(source).suffix != ""
 
 
 def read(path: Path) -> tuple[pd.DataFrame, SourceFile]:

@@ -59,8 +59,12 @@ def plane(data: Imported, mapping: Mapping) -> FitAnswer:
             "import: the poses lie in no plane across an axis of the sensor, one axis of rotation along x, y or z is needed for "
             "--fit plane; use --fit norm, or mount the sensor with an axis along that of the table"
         )
-    gravity = gravity_of(mapping) if known_force(dwells) is None else 1.0
-    return plane_answer(dwells, across, gravity, data.out_unit)
+    return plane_answer(dwells, across, _gravity(dwells, mapping), data.out_unit)
+
+
+def _gravity(dwells: pd.DataFrame, mapping: Mapping) -> float:
+    """Local gravity, g, which is needed only where the poses are not known."""
+    return gravity_of(mapping) if known_force(dwells) is None else 1.0
 
 
 def shown_turn(data: Imported, mapping: Mapping) -> FitAnswer | None:
@@ -72,9 +76,8 @@ def shown_turn(data: Imported, mapping: Mapping) -> FitAnswer | None:
     across = axis_of_plane(dwells)
     if across is None:
         return None
-    gravity = gravity_of(mapping) if known_force(dwells) is None else 1.0
     try:
-        fit = _fitted(dwells, across, gravity)
+        fit = _fitted(dwells, across, _gravity(dwells, mapping))
     except DataRejected:
         return None
     enough = known_force(dwells) is not None or fit.dof >= SHOWN_DOF

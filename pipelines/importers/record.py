@@ -9,9 +9,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from pipelines.importers import clocks, exchange, held_out, pose_check, sample_faults, unit_check, values
+from pipelines.importers import clocks, exchange, pose_check, sample_faults, unit_check, values
 from pipelines.importers.content import Content
 from pipelines.importers.documents import SampleFaultDocument
+from pipelines.importers.held_out import with_held_out
 from pipelines.importers.mapping import FACES, MEANINGS, OUTPUT_UNITS, Mapping
 from pipelines.importers.record_time import backwards, gaps_of, seconds, time_doubts
 from pipelines.importers.stated_units import column_name
@@ -102,7 +103,7 @@ def imported(
     dwells = _means(samples, intervals, tuple(extras), mapping) if len(intervals) else None
     if dwells is not None:
         remarks = (*remarks, *pose_check.refuse_or_remark(dwells, mapping, where))
-        dwells, held = _held_out(dwells, mapping, where)
+        dwells, held = with_held_out(dwells, mapping.verify, where)
         remarks = (*remarks, *held)
     remarks = (
         *remarks,
@@ -255,21 +256,11 @@ def _as_dwells(
     frame[["out_x", "out_y", "out_z"]] = output
     labels = columns["dwell"].astype(str).tolist() if "dwell" in columns else [f"dwell {k}" for k in count]
     sound, still = sample_faults.sound_dwells(extras, labels, mapping, where)
-    remarks = (*remarks, *still)
     frame = _finished(frame.assign(record=count, pose=labels, **extras), mapping)
     dwells = exchange.checked(frame[sound].reset_index(drop=True), where=where, foreign=True)
-    remarks = (*remarks, *pose_check.refuse_or_remark(dwells, mapping, where))
-    dwells, held = _held_out(dwells, mapping, where)
-    remarks = (*remarks, *held)
-    return Imported(None, dwells, OUTPUT_UNITS[mapping.units.output][0], remarks)
-
-
-def _held_out(dwells: pd.DataFrame, mapping: Mapping, where: str) -> tuple[pd.DataFrame, tuple[str, ...]]:
-    """The dwells with those for verification marked, and a remark that names these."""
-    if not mapping.verify:
-        return dwells, ()
-    marked, remark = held_out.with_held_out(dwells, mapping.verify, where)
-    return marked, (remark,)
+    remarks = (*remarks, *still, *pose_check.refuse_or_remark(dwells, mapping, where))
+    dwells, held = with_held_out(dwells, mapping.verify, where)
+    return Imported(None, dwells, OUTPUT_UNITS[mapping.units.output][0], (*remarks, *held))
 
 
 def _finished(frame: pd.DataFrame, mapping: Mapping) -> pd.DataFrame:

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from pipelines.archive import Run
 from pipelines.importers import files
-from pipelines.importers.files import is_file
 from pipelines.importers.mapping import TIME_UNITS
 from pipelines.importers.values import finite_column
 from schemas.errors import DataRejected, WrongUse
@@ -107,11 +106,6 @@ def series_of_run(run: Run, record: int | None = None) -> EvenSeries:
     unit = str(run.table("dwells")["out_unit"].iloc[0]) if "dwells" in run.tables() else ""
     values = np.stack([own[axis].to_numpy(dtype=np.float64) for axis in AXES])
     return EvenSeries(AXES, values, rate, unit, where)
-
-
-def is_series_file(source: str) -> bool:
-    """Whether a source names a file, and no run of the archive."""
-    return is_file(source) or Path(source).is_file()
 
 
 def _refuse_clock(names: Sequence[str], values: Array, where: str, *, named: bool, timed: bool) -> None:

@@ -13,7 +13,6 @@ from inertial.dynamics.transfer_diagnosis import diagnose_transfer
 from inertial.dynamics.transfer_effects import EFFECTS, Conditions
 from inertial.dynamics.transfer_model import Points
 from inertial.errors import InertialError
-from pipelines.archive import Run
 from pipelines.importers import files
 from pipelines.importers.documents import TransferImport, TransferParameter
 from pipelines.importers.keep import keep_tables, lot_of_import
@@ -95,7 +94,10 @@ def import_transfer(
             value=value, uncertainty=error, low=low, high=high, unit=p.unit, identified=known
         )
     text = diagnosis_text(diagnosis)
-    run = _keep(points, source, unit, list(effects), text, archive)
+    stated = {"procedure": "sweep", "effects": list(effects), "unit": unit}
+    about = {"name": f"transfer function of {unit}", "source": source.as_dict(), "lot": lot_of_import([unit])}
+    tables = _tables(points, unit, text)
+    run = keep_tables("import of a transfer function", source.sha256, stated, about, tables, archive)
     return {
         "run": run.id,
         "unit": unit,
@@ -122,17 +124,8 @@ def import_transfer(
     }
 
 
-def _keep(
-    points: Points,
-    source: files.SourceFile,
-    unit: str,
-    effects: list[str],
-    text: Sequence[tuple[str, str]],
-    archive: str | None,
-) -> Run:
-    """The run that holds points and findings."""
-    parameters = {"procedure": "sweep", "effects": effects, "unit": unit}
-    about = {"name": f"transfer function of {unit}", "source": source.as_dict(), "lot": lot_of_import([unit])}
+def _tables(points: Points, unit: str, text: Sequence[tuple[str, str]]) -> dict[str, pd.DataFrame]:
+    """Points and findings for the archive."""
     size, c = np.abs(points.value), points.conditions
     rows = pd.DataFrame(
         {
@@ -143,5 +136,4 @@ def _keep(
         }
     )  # fmt: skip
     findings = [{"unit": unit, "procedure": "sweep", "number": 0, "subject": a, "text": b} for a, b in text]
-    tables = {"procedure_points": gathered_points([(0, "sweep", rows)]), "procedure_findings": finding_table(findings)}
-    return keep_tables("import of a transfer function", source.sha256, parameters, about, tables, archive)
+    return {"procedure_points": gathered_points([(0, "sweep", rows)]), "procedure_findings": finding_table(findings)}

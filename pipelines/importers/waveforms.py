@@ -12,7 +12,6 @@ import pandas as pd
 from pydantic import ValidationError
 
 from inertial.errors import InertialError
-from pipelines.archive import Run
 from pipelines.importers import files
 from pipelines.importers.content import Content, unit_in
 from pipelines.importers.documents import WaveformFigure, WaveformImport
@@ -105,7 +104,15 @@ def import_waveforms(
         texts.append(("not judged", "clipping: full_scale is not given; add it to the file of --part"))
     stated = {"part": content, "columns": dict(layout.columns), "units": dict(layout.units), "rate_hz": layout.rate_hz}
     stated |= {"group": layout.group}
-    run = _keep(procedure, stated, points, values, texts, sources, unit, archive)
+    about = {
+        "name": f"{one.title} of {unit}, recorded elsewhere",
+        "source": sources[0].as_dict(),
+        "sources": [source.as_dict() for source in sources],
+        "lot": lot_of_import([unit]),
+    }
+    parameters = {"procedure": procedure, "unit": unit, **stated}
+    tables = _tables(procedure, unit, points, values, texts)
+    run = keep_tables("import of waveforms", digest_of(sources), parameters, about, tables, archive)
     units = {spec.name: spec.unit for spec in one.figures}
     figures: list[WaveformFigure] = [
         {
@@ -234,28 +241,10 @@ def _clock(content: Content, layout: RecordingLayout, where: str) -> np.ndarray:
     return np.arange(n) * interval
 
 
-def _keep(
-    procedure: str,
-    stated: Mapping[str, Any],
-    points: pd.DataFrame,
-    values: Sequence[Any],
-    texts: Sequence[tuple[str, str]],
-    sources: Sequence[files.SourceFile],
-    unit: str,
-    archive: str | None,
-) -> Run:
-    """The run that holds points, figures and findings.
-
-    Parameters
-    ----------
-    stated : everything that the command states
-    """
-    about = {
-        "name": f"{PROCEDURES[procedure].title} of {unit}, recorded elsewhere",
-        "source": sources[0].as_dict(),
-        "sources": [one.as_dict() for one in sources],
-        "lot": lot_of_import([unit]),
-    }
+def _tables(
+    procedure: str, unit: str, points: pd.DataFrame, values: Sequence[Any], texts: Sequence[tuple[str, str]]
+) -> dict[str, pd.DataFrame]:
+    """Points, figures and findings for the archive."""
     units = {spec.name: spec.unit for spec in PROCEDURES[procedure].figures}
     rows = [
         {
@@ -266,10 +255,8 @@ def _keep(
         for f in values
     ]  # fmt: skip
     findings = [{"unit": unit, "procedure": procedure, "number": 0, "subject": a, "text": b} for a, b in texts]
-    tables = {
+    return {
         "procedure_points": gathered_points([(0, procedure, points)]),
         "procedure_figures": figure_table(rows),
         "procedure_findings": finding_table(findings),
     }
-    parameters = {"procedure": procedure, "unit": unit, **stated}
-    return keep_tables("import of waveforms", digest_of(sources), parameters, about, tables, archive)
