@@ -71,7 +71,11 @@ class Guesses:
 
     def column(self, meaning: str) -> str:
         """The column with a meaning; empty if there is none."""
-        return next((name for name, guess in self.columns.items() if guess.meaning == meaning), "")
+        return _column(self.columns, meaning)
+
+
+def _column(guessed: dict[str, Guess], meaning: str) -> str:
+    return next((name for name, guess in guessed.items() if guess.meaning == meaning), "")
 
 
 def guesses(content: Content) -> Guesses:
@@ -88,8 +92,7 @@ def guesses(content: Content) -> Guesses:
 
 def _sheet(table: pd.DataFrame, numeric: dict[str, NDArray[np.float64]], guessed: dict[str, Guess]) -> bool:
     """Whether the rows are positions, each with a label of its own; the labels are then those of the dwells."""
-    meanings = {one.meaning for one in guessed.values()}
-    if "time" in meanings or not {"x", "y", "z"} <= meanings or len(table) > _MOST_POSITIONS:
+    if _column(guessed, "time") or not all(_column(guessed, axis) for axis in "xyz") or len(table) > _MOST_POSITIONS:
         return False
     for name in table.columns:
         if str(name) not in numeric and table[name].notna().all() and table[name].nunique() == len(table) > 1:
@@ -195,16 +198,16 @@ def _others(
             guessed[name] = Guess(f"sd_{spread[1].lower()}", "its name")
         elif name in numeric and (_HEAT.search(name) or TEMPERATURE.get(content.units.get(name, "").lower())):
             middle = float(np.nanmedian(numeric[name]))
-            if -100.0 < middle < 500.0 and "temperature" not in {one.meaning for one in guessed.values()}:
+            if -100.0 < middle < 500.0 and not _column(guessed, "temperature"):
                 guessed[name] = Guess("temperature", "its name or unit")
-        elif name not in numeric and "dwell" not in {one.meaning for one in guessed.values()}:
+        elif name not in numeric and not _column(guessed, "dwell"):
             distinct = int(table[name].nunique())
             if 1 < distinct <= max(2, len(table) // 10):
                 guessed[name] = Guess("dwell", f"{distinct} labels")
 
 
 def _time_unit(content: Content, numeric: dict[str, NDArray[np.float64]], guessed: dict[str, Guess]) -> Guess:
-    name = next((one for one, guess in guessed.items() if guess.meaning == "time"), "")
+    name = _column(guessed, "time")
     if not name or name not in numeric:
         return Guess("", "")
     numbers = numeric[name][np.isfinite(numeric[name])]
@@ -212,7 +215,7 @@ def _time_unit(content: Content, numeric: dict[str, NDArray[np.float64]], guesse
     if seen.unit or not seen.possible:
         return Guess(seen.unit, seen.reason)
     step, possible = typical_step(numbers), seen.possible
-    heat = next((one for one, guess in guessed.items() if guess.meaning == "temperature"), "")
+    heat = _column(guessed, "temperature")
     if heat:
         change, span = float(np.nanmax(numeric[heat]) - np.nanmin(numeric[heat])), float(numbers[-1] - numbers[0])
         slow = tuple(unit for unit in possible if change <= _FASTEST_K_S * span * clocks.TIME_UNITS[unit])

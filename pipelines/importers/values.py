@@ -115,36 +115,27 @@ def _has_flags(values: pd.Series) -> bool:
     return values.dtype == object and any(isinstance(value, bool | np.bool_) for value in values)
 
 
-def outside(values: NDArray[np.float64], column: str) -> tuple[int, str]:
-    """The first row with an impossible value, and the possible range; −1 if there is none. Gaps count as inside."""
-    low, high = BOUNDS.get(column, (-LARGEST, LARGEST))
-    bad = np.flatnonzero((values < low) | (values > high))
-    if not bad.size:
-        return -1, ""
-    unit = _UNITS.get(column.rsplit("_", 1)[-1], "") if column in BOUNDS else ""
-    return int(bad[0]), _range(low, high, f" {unit}" if unit else "")
-
-
-def _range(low: float, high: float, unit: str) -> str:
-    if low == 0.0 and high >= LARGEST_TIME_S:
-        return f"0{unit} or more is"
-    return f"{low:g} to {high:g}{unit} is"
-
-
 def refuse_outside(
     values: NDArray[np.float64], column: str, where: str, *, label: str = "", first_row: int = 1
 ) -> None:
-    """Refuse impossible values, with row, value and bounds.
+    """Refuse impossible values, with row, value and bounds; gaps count as possible.
 
     Parameters
     ----------
     column : whose bounds hold; those of any number for one without a meaning.
     label : its name in the message; the same by default.
     """
-    row, needed = outside(values, column)
-    if row >= 0:
-        place = f"row {row + first_row}, column {shown(label or column)}"
-        raise DataRejected(f"{where}: {place}: found {values[row]:g}, {needed} needed; correct it, or its unit")
+    low, high = BOUNDS.get(column, (-LARGEST, LARGEST))
+    bad = np.flatnonzero((values < low) | (values > high))
+    if not bad.size:
+        return
+    row = int(bad[0])
+    unit = f" {_UNITS[kind]}" if column in BOUNDS and (kind := column.rsplit("_", 1)[-1]) in _UNITS else ""
+    needed = f"0{unit} or more" if low == 0.0 and high >= LARGEST_TIME_S else f"{low:g} to {high:g}{unit}"
+    raise DataRejected(
+        f"{where}: row {row + first_row}, column {shown(label or column)}: found {values[row]:g}, {needed} is needed; "
+        "correct it, or its unit"
+    )
 
 
 def text(value: Any) -> str:
