@@ -90,14 +90,13 @@ def unit_calibrations(
     dwells = run.table("dwells")
     out_unit = str(dwells["out_unit"].iloc[0])
     noise, full_scale, nominal = noise_of_units(run), _full_scales(run), _nominal(run, out_unit) if graded else None
-    known = {*BIAS, *SCALE, *ACROSS}
-    left_out = tuple(effect for effect in calibration.effects if effect not in known)
+    left_out = effects_left_out(calibration)
     calibrations: list[UnitCalibration] = []
     for unit in chosen:
         outcome, grade = grades.get(unit, (UNGRADED, "none"))
         calibrations.append(
             UnitCalibration(
-                unit, outcome, grade, out_unit, *_polynomials(calibration, unit), _temperatures(dwells, unit), left_out,
+                unit, outcome, grade, out_unit, *polynomials(calibration, unit), _temperatures(dwells, unit), left_out,
                 certificates.get(unit), noise.get(unit), full_scale.get(unit), nominal,
             )
         )  # fmt: skip
@@ -216,7 +215,12 @@ def _refuse(grades: pd.DataFrame, serials: tuple[str, ...], *, failed: bool) -> 
             raise WrongUse(f"export: unit {unit} failed ({reasons}); --failed exports its coefficients")
 
 
-def _polynomials(calibration: Calibration, unit: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def effects_left_out(calibration: Calibration) -> tuple[str, ...]:
+    """Effects of a model that have no place in polynomials of temperature."""
+    return tuple(effect for effect in calibration.effects if effect not in {*BIAS, *SCALE, *ACROSS})
+
+
+def polynomials(calibration: Calibration, unit: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Bias (4, 3) and response (4, 3, 3) of a unit as coefficients of θ⁰ … θ³."""
     u = calibration.units.index(unit)
     bias, response = np.zeros((ORDER, 3)), np.zeros((ORDER, 3, 3))
