@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from pipelines.export.corrected import Corrected
+    from pipelines.export.documents import CorrectDocument
     from pipelines.export.recording import CorrectableRecording
 
 PART = "Results"
@@ -142,7 +143,7 @@ def _write(recording: CorrectableRecording, done: Corrected, output: Path) -> No
         files.publish(output, data, "correct", files.ELSEWHERE)
 
 
-def _print(document: dict[str, Any], out: Console) -> None:
+def _print(document: CorrectDocument, out: Console) -> None:
     def line(text: str, style: str = "") -> None:
         out.print(text, style=style or None)
 
