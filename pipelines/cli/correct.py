@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -25,6 +25,7 @@ from schemas.errors import DONE, PART_FAILED, WrongUse
 
 if TYPE_CHECKING:
     from pipelines.export.corrected import Corrected
+    from pipelines.export.documents import CorrectDocument
     from pipelines.export.recording import CorrectableRecording
 
 PART = "Results"
@@ -145,7 +146,7 @@ VERDICTS = {
 }
 
 
-def _print(document: dict[str, Any], show: Callable[..., None]) -> None:
+def _print(document: CorrectDocument, show: Callable[..., None]) -> None:
     certificate = document["certificate"]
     show(
         f"{document['file']}: {document['samples']} samples corrected with unit {document['unit']} of run {document['run']}"

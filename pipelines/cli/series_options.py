@@ -32,10 +32,11 @@ def even_series(
     WrongUse
         An option of files was given for a run.
     """
-    from pipelines.importers.series import is_series_file, series_of_file, series_of_run
+    from pipelines.importers.files import is_file
+    from pipelines.importers.series import series_of_file, series_of_run
 
     time, time_unit, rate = clock
-    if is_series_file(source):
+    if is_file(source):
         named = [name.strip() for name in columns.split(",") if name.strip()]
         with error_console().status(f"reading {Path(source).name}"):
             return series_of_file(Path(source), named, time=time, time_unit=time_unit, rate_hz=rate, unit=unit)

@@ -158,7 +158,7 @@ def document(
         "blocked_by": blocked,
         "evidence": evidence_of(diagnosis, names),
         "error": {
-            **error_of(diagnosis),
+            **error_of(diagnosis.rms, diagnosis.floor, diagnosis.log_p),
             "white_noise_ug": white_noise_of(diagnosis.base),
             **noise_of(diagnosis.final),
         },

@@ -84,11 +84,11 @@ class Corrected:
 
     force: Array
     covariance: Array
-    track: Track | None
-    bias: Array | None
-    bias_covariance: Array | None
-    updated: NDArray[np.bool_] | None
     outside: int
+    track: Track | None = None
+    bias: Array | None = None
+    bias_covariance: Array | None = None
+    updated: NDArray[np.bool_] | None = None
     flicker: FlickerTerms | None = None
     at_limits: Track | None = None
 
@@ -169,9 +169,8 @@ def corrected(recording: CorrectableRecording, fit: FitOfUnit, tracking: Trackin
     temperature = recording.state.temperature
     low, high = fit.exported.temperatures
     outside = 0 if temperature is None else int(np.sum((temperature < low - 0.5) | (temperature > high + 0.5)))
-    if tracking is None:
-        return Corrected(force, covariance, None, None, None, None, outside)
-    return _tracked(recording, fit, tracking, Corrected(force, covariance, None, None, None, None, outside))
+    plain = Corrected(force, covariance, outside)
+    return plain if tracking is None else _tracked(recording, fit, tracking, plain)
 
 
 def _tracked(recording: CorrectableRecording, fit: FitOfUnit, tracking: Tracking, plain: Corrected) -> Corrected:

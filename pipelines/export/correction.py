@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from pipelines.archive import Run
 from pipelines.export.corrected import Corrected, FitOfUnit, Tracking
+from pipelines.export.documents import CorrectDocument
 from pipelines.export.recording import CorrectableRecording
 from schemas.errors import WrongUse
 from schemas.foreign import shown
@@ -60,11 +60,11 @@ def tracking_of(
 
 def correction_document(
     recording: CorrectableRecording, fit: FitOfUnit, done: Corrected, output: Path | None
-) -> dict[str, Any]:
+) -> CorrectDocument:
     """What was corrected, with which calibration, how well, and the bias where it was tracked."""
     sd = MICRO * np.sqrt(np.diagonal(done.covariance, axis1=1, axis2=2))
     certificate = fit.exported.certificate
-    document: dict[str, Any] = {
+    document: CorrectDocument = {
         "file": recording.name,
         "run": fit.run,
         "unit": fit.exported.unit,

@@ -30,7 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.export.fixed_point import FixedPoint, fixed_point, thousandths
-from pipelines.export.polynomials import ORDER, UnitCalibration
+from pipelines.export.polynomials import ORDER, UnitCalibration, corrected_output
 from schemas.errors import WrongUse
 
 Array = NDArray[np.float64]
@@ -66,12 +66,9 @@ class CoefficientBlock:
     def correct(self, output: Array, temperature: float) -> Array:
         """Specific force (n, 3) in g of outputs (n, 3), as firmware computes it from the block."""
         if self.form == "q24":
-            parts = self.bias.astype(np.int64), self.matrix.astype(np.int64)
-            whole = FixedPoint(self.scale, *parts, thousandths(self.temperatures))
-            return whole.correct(output, temperature)
-        powers = (temperature - 25.0) ** np.arange(ORDER)
-        bias = np.einsum("k,ki->i", powers, self.bias)
-        return np.linalg.solve(np.einsum("k,kij->ij", powers, self.matrix), (output - bias).T).T
+            integers = self.bias.astype(np.int64), self.matrix.astype(np.int64)
+            return FixedPoint(self.scale, *integers, thousandths(self.temperatures)).correct(output, temperature)
+        return corrected_output(self.bias, self.matrix, output, temperature)
 
 
 def block_of(

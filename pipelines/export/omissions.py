@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.export.polynomials import UnitCalibration
+from pipelines.export.unit_noise import UnitNoise
 from schemas.units import MICRO
 
 Array = NDArray[np.float64]
@@ -69,6 +70,25 @@ def _without(unit: UnitCalibration, part: str, nominal: float) -> UnitCalibratio
     else:
         turned = np.zeros_like(turned)
     return replace(unit, bias=bias, response=np.concatenate([response[None], gains[..., None] * response + turned]))
+
+
+def comment(text: str) -> str:
+    """Text that cannot end a C comment or a line."""
+    return " ".join(text.replace("*/", "* /").split())
+
+
+def noise_heading(
+    unit: UnitCalibration, run: str, noise: UnitNoise, before: Sequence[str], after: Sequence[str]
+) -> list[str]:
+    """Comment lines of a file that holds the noise of a unit alone: what it is, its certificate, and what it does not hold.
+
+    Parameters
+    ----------
+    before, after : further lines, before and after that of the effects that the file does not hold
+    """
+    left_out = [f"not in this file: effects {', '.join(unit.left_out)}"] if unit.left_out else []
+    head = f"noise of accelerometer {unit.unit}, run {run}, static record at {noise.rate_hz:g} Hz"
+    return [f"# {comment(line)}" for line in (head, unit.certified, *before, *left_out, *after)]
 
 
 def comment_lines(parts: Sequence[tuple[str, float]], total_ug: float) -> list[str]:

@@ -8,13 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.export.comments import comment
 from pipelines.export.omissions import (
     ACROSS,
     ACROSS_T,
     BIAS_T,
     SCALE_T,
     Applied,
+    comment,
     comment_lines,
     largest_error_ug,
     omitted,

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 import pandas as pd
@@ -14,14 +14,11 @@ from inertial.fits.linear import axis_rows
 from inertial.state import T_REFERENCE
 from pipelines.archive import Run
 from pipelines.certificates.statement import Stated, stated
-from pipelines.export.unit_noise import noise_of_units
+from pipelines.export.unit_noise import UnitNoise, noise_of_units
 from pipelines.importers.exchange import refuse_other_procedures
 from pipelines.tables.calibration import Calibration, read_calibration
 from schemas.errors import RecipeInvalid, WrongUse
 from stations.plant.preset import load_preset
-
-if TYPE_CHECKING:
-    from pipelines.export.unit_noise import UnitNoise
 
 BIAS = ("bias", "bias_temperature", "bias_temperature_quadratic", "bias_temperature_cubic")
 SCALE = ("scale", "scale_temperature", "scale_temperature_quadratic")
@@ -63,10 +60,16 @@ class UnitCalibration:
 
     def correct(self, output: NDArray[np.float64], temperature: float) -> NDArray[np.float64]:
         """Specific force (n, 3) in g for outputs (n, 3), as firmware computes it."""
-        powers = (temperature - 25.0) ** np.arange(ORDER)
-        bias = np.einsum("k,ki->i", powers, self.bias)
-        matrix = np.einsum("k,kij->ij", powers, self.response)
-        return np.linalg.solve(matrix, (output - bias).T).T
+        return corrected_output(self.bias, self.response, output, temperature)
+
+
+def corrected_output(
+    bias: NDArray[np.float64], response: NDArray[np.float64], output: NDArray[np.float64], temperature: float
+) -> NDArray[np.float64]:
+    """Specific force (n, 3) in g for outputs (n, 3), by coefficients (4, 3) and (4, 3, 3) of θ⁰ … θ³."""
+    powers = (temperature - T_REFERENCE) ** np.arange(ORDER)
+    matrix = np.einsum("k,kij->ij", powers, response)
+    return np.linalg.solve(matrix, (output - np.einsum("k,ki->i", powers, bias)).T).T
 
 
 def unit_calibrations(
@@ -79,13 +82,41 @@ def unit_calibrations(
     failed : include units that failed their limits; units whose data were refused have no calibration
     revoked : include units whose calibration was revoked
     """
-    if "grades" not in run.tables():
-        return _ungraded(run, serials)
+    graded = "grades" in run.tables()
+    chosen, grades, certificates = (
+        _exportable(run, serials, failed=failed, revoked=revoked) if graded else _imported(run, serials)
+    )
+    calibration = read_calibration(run.table("coefficients"), run.table("covariance"))
+    dwells = run.table("dwells")
+    out_unit = str(dwells["out_unit"].iloc[0])
+    noise, full_scale, nominal = noise_of_units(run), _full_scales(run), _nominal(run, out_unit) if graded else None
+    left_out = effects_left_out(calibration)
+    calibrations: list[UnitCalibration] = []
+    for unit in chosen:
+        outcome, grade = grades.get(unit, (UNGRADED, "none"))
+        calibrations.append(
+            UnitCalibration(
+                unit, outcome, grade, out_unit, *polynomials(calibration, unit), _temperatures(dwells, unit), left_out,
+                certificates.get(unit), noise.get(unit), full_scale.get(unit), nominal,
+            )
+        )  # fmt: skip
+    return calibrations
+
+
+UNGRADED = "no limits"
+"""The outcome of a unit that was fitted and compared with no limits: that of an import."""
+
+Chosen: TypeAlias = "tuple[Sequence[str], dict[str, tuple[str, str]], Mapping[str, Stated]]"
+"""Units to export; outcome and grade, and certificate by unit."""
+
+
+def _exportable(run: Run, serials: tuple[str, ...], *, failed: bool, revoked: bool) -> Chosen:
+    """The units that were compared with limits, by their outcome."""
     refuse_other_procedures(run, "coefficients")
-    grades = run.table("grades").set_index("unit")
-    _refuse(grades, serials, failed=failed)
+    table = run.table("grades").set_index("unit")
+    _refuse(table, serials, failed=failed)
     allowed = ("pass", "fail") if failed else EXPORTABLE
-    chosen = [u for u in (serials or tuple(grades.index)) if grades.loc[u, "outcome"] in allowed]
+    chosen = [unit for unit in (serials or tuple(table.index)) if table.loc[unit, "outcome"] in allowed]
     if not chosen:
         raise WrongUse(
             f"export: no unit of run {run.id} passed, at least one is needed; --failed exports failed ones too"
@@ -93,28 +124,11 @@ def unit_calibrations(
     certificates = stated(run, chosen)
     if not revoked:
         chosen = _not_revoked(run, chosen, certificates, named=bool(serials))
-    calibration = read_calibration(run.table("coefficients"), run.table("covariance"))
-    dwells = run.table("dwells")
-    out_unit = str(dwells["out_unit"].iloc[0])
-    noise, full_scale, nominal = noise_of_units(run), _full_scales(run), _nominal(run, out_unit)
-    return [
-        replace(
-            _one(calibration, unit, grades.loc[unit].to_dict(), out_unit, _temperatures(dwells, unit)),
-            certificate=certificates.get(unit),
-            noise=noise.get(unit),
-            full_scale=full_scale.get(unit),
-            nominal=nominal,
-        )
-        for unit in chosen
-    ]
+    return chosen, {u: (str(table.loc[u, "outcome"]), str(table.loc[u, "grade"])) for u in chosen}, certificates
 
 
-UNGRADED = "no limits"
-"""The outcome of a unit that was fitted and compared with no limits: that of an import."""
-
-
-def _ungraded(run: Run, serials: tuple[str, ...]) -> list[UnitCalibration]:
-    """Calibrations of an import that was fitted without limits; a captured run without grades is not finished."""
+def _imported(run: Run, serials: tuple[str, ...]) -> Chosen:
+    """The units of an import that was fitted without limits; a captured run without grades is not finished."""
     if run.about.get("capture"):
         raise WrongUse(
             f"export: run {run.id} has no grades, they are needed; it is not finished: repeat its 'tumbleline run'"
@@ -130,17 +144,9 @@ def _ungraded(run: Run, serials: tuple[str, ...]) -> list[UnitCalibration]:
             f"export: run {run.id} was imported and has no {', '.join(missing)}; fit it with 'tumbleline fit {run.id} --effects "
             "bias,scale,misalignment' and export the run that this makes"
         )
-    calibration = read_calibration(run.table("coefficients"), run.table("covariance"))
-    for unit in serials:
-        if unit not in calibration.units:
-            raise WrongUse(f"export: no unit {unit} in this run; there are {', '.join(calibration.units)}")
-    dwells = run.table("dwells")
-    out_unit = str(dwells["out_unit"].iloc[0])
-    decided = {"outcome": UNGRADED, "grade": "none"}
-    return [
-        _one(calibration, unit, decided, out_unit, _temperatures(dwells, unit))
-        for unit in (serials or calibration.units)
-    ]
+    units = tuple(dict.fromkeys(run.table("coefficients")["unit"].tolist()))
+    _refuse_unknown(serials, units)
+    return serials or units, {}, {}
 
 
 def _full_scales(run: Run) -> dict[str, float]:
@@ -191,10 +197,15 @@ def _not_revoked(run: Run, chosen: list[str], certificates: Mapping[str, Stated]
     return [unit for unit in chosen if unit not in gone]
 
 
-def _refuse(grades: pd.DataFrame, serials: tuple[str, ...], *, failed: bool) -> None:
+def _refuse_unknown(serials: tuple[str, ...], units: Collection[str]) -> None:
     for unit in serials:
-        if unit not in grades.index:
-            raise WrongUse(f"export: no unit {unit} in this run; there are {', '.join(grades.index)}")
+        if unit not in units:
+            raise WrongUse(f"export: no unit {unit} in this run; there are {', '.join(units)}")
+
+
+def _refuse(grades: pd.DataFrame, serials: tuple[str, ...], *, failed: bool) -> None:
+    _refuse_unknown(serials, grades.index.tolist())
+    for unit in serials:
         outcome, reasons = grades.loc[unit, "outcome"], grades.loc[unit, "reasons"]
         if outcome == "refused":
             raise WrongUse(
@@ -204,9 +215,13 @@ def _refuse(grades: pd.DataFrame, serials: tuple[str, ...], *, failed: bool) -> 
             raise WrongUse(f"export: unit {unit} failed ({reasons}); --failed exports its coefficients")
 
 
-def _one(
-    calibration: Calibration, unit: str, grade: dict, out_unit: str, temperatures: tuple[float, float]
-) -> UnitCalibration:
+def effects_left_out(calibration: Calibration) -> tuple[str, ...]:
+    """Effects of a model that have no place in polynomials of temperature."""
+    return tuple(effect for effect in calibration.effects if effect not in {*BIAS, *SCALE, *ACROSS})
+
+
+def polynomials(calibration: Calibration, unit: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Bias (4, 3) and response (4, 3, 3) of a unit as coefficients of θ⁰ … θ³."""
     u = calibration.units.index(unit)
     bias, response = np.zeros((ORDER, 3)), np.zeros((ORDER, 3, 3))
     for power, effect in enumerate(BIAS):
@@ -223,14 +238,4 @@ def _one(
         if values.size:
             # the temperature acts on the whole row: S(θ)·M
             response[power] += values * (axis_rows(response[0]) if power else np.eye(3))
-    known = {*BIAS, *SCALE, *ACROSS}
-    return UnitCalibration(
-        unit=unit,
-        outcome=str(grade["outcome"]),
-        grade=str(grade["grade"]),
-        out_unit=out_unit,
-        bias=bias,
-        response=response,
-        temperatures=(float(temperatures[0]), float(temperatures[1])),
-        left_out=tuple(effect for effect in calibration.effects if effect not in known),
-    )
+    return bias, response

@@ -11,11 +11,12 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from inertial.quantities import BY_COLUMN, FORCE_COLUMNS, LARGEST
+from inertial.quantities import BY_COLUMN, FORCE_COLUMNS
 from inertial.state import State
 from pipelines.importers import files
+from pipelines.importers.values import as_numbers, finite_column
 from pipelines.stages.reduce import FollowedSupply
-from schemas.errors import DataRejected, WrongUse, did_you_mean
+from schemas.errors import DataRejected, WrongUse
 from schemas.foreign import shown
 
 Array = NDArray[np.float64]
@@ -57,7 +58,6 @@ def read_recording(
         A column is missing, a value is not finite, or the time does not always increase.
     """
     table, _ = files.read(path)
-    table = table.set_axis([str(name) for name in table.columns], axis=1)
     there, where = list(table.columns), path.name
     chosen = list(columns) or next((list(names) for names in USUAL if set(names) <= set(there)), [])
     if len(chosen) != 3:
@@ -65,11 +65,11 @@ def read_recording(
             f"{where}: columns {', '.join(shown(name) for name in there[:8])}, three columns of output are needed; name "
             "them with --columns x,y,z"
         )
-    output = np.stack([_finite(table, name, where) for name in chosen], axis=1)
+    output = np.stack([finite_column(table, name, where) for name in chosen], axis=1)
     n = len(output)
     if rate_hz is not None and time:
         raise WrongUse(f"{where}: --time and --rate are both given, one is needed; leave one out")
-    moments = np.arange(n) / rate_hz if rate_hz is not None else _finite(table, time or TIME, where)
+    moments = np.arange(n) / rate_hz if rate_hz is not None else finite_column(table, time or TIME, where)
     if n < 2 or not np.all(np.diff(moments) > 0.0):
         raise DataRejected(
             f"{where}: {n} samples whose time does not always increase, two or more in order are needed; sort the "
@@ -77,7 +77,7 @@ def read_recording(
         )
     known = np.full((n, 3), np.nan)
     if set(FORCE_COLUMNS) <= set(there):
-        known = np.stack([_numbers(table[name]) for name in FORCE_COLUMNS], axis=1)
+        known = np.stack([as_numbers(table[name], where) for name in FORCE_COLUMNS], axis=1)
     return CorrectableRecording(moments, output, _state(table, moments, {*chosen, time or TIME}, where), known, where)
 
 
@@ -96,31 +96,13 @@ def _state(table: pd.DataFrame, time: Array, used: set[str], where: str) -> Stat
     """Conditions by the names of recorded quantities; any other column of numbers is a covariate."""
     known: dict[str, Any] = {}
     covariates: dict[str, Array] = {}
-    for name in table.columns:
-        column = str(name)
-        if column in used or column in FORCE_COLUMNS or not pd.api.types.is_numeric_dtype(table[name]):
+    for column in table.columns:
+        if column in used or column in FORCE_COLUMNS or not pd.api.types.is_numeric_dtype(table[column]):
             continue
         row = BY_COLUMN.get(column)
         if row is not None and row.attribute and not row.once:
-            known[row.attribute] = row.factor * _finite(table, column, where)
+            known[row.attribute] = row.factor * finite_column(table, column, where)
         elif row is None or not row.attribute:
-            covariates[column] = _numbers(table[name])
+            covariates[column] = as_numbers(table[column], where, flags=True)
     known["time"] = time
     return State(force=np.zeros((len(time), 3)), **known, covariates=covariates)
-
-
-def _numbers(column: pd.Series) -> Array:
-    return pd.to_numeric(column, errors="coerce").to_numpy(dtype=np.float64)
-
-
-def _finite(table: pd.DataFrame, name: str, where: str) -> Array:
-    if name not in table.columns:
-        raise DataRejected(f"{where}: column '{shown(name)}' is not there; {did_you_mean(name, list(table.columns))}")
-    values = _numbers(table[name])
-    bad = np.flatnonzero(~(np.abs(values) < LARGEST))
-    if bad.size:
-        raise DataRejected(
-            f"{where}: row {bad[0] + 1}, column '{shown(name)}': found {shown(str(table[name].iloc[bad[0]]))}, a finite number "
-            "is needed; remove the gap, or cut the recording there"
-        )
-    return values

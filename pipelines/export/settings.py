@@ -4,13 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
+from pipelines.export.polynomials import UnitCalibration
 from schemas.errors import WrongUse, did_you_mean
 from schemas.foreign import shown
-
-if TYPE_CHECKING:
-    from pipelines.export.polynomials import UnitCalibration
 
 ARITHMETICS = ("double", "float", "q24")
 HIGHEST_ID = 2**31 - 1

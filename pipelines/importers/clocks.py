@@ -34,8 +34,7 @@ _FORMATS = (
 )
 _DAY_FIRST = ("%d/%m/%Y %H:%M:%S.%f", "%d/%m/%Y %H:%M:%S")
 _MONTH_FIRST = ("%m/%d/%Y %H:%M:%S.%f", "%m/%d/%Y %H:%M:%S", "%m/%d/%Y %I:%M:%S %p", "%m/%d/%Y %I:%M:%S.%f %p")
-_HALF_DAY_S = 43_200.0
-_HOUR_S = 3600.0
+_DAY_S, _HOUR_S = 86_400.0, 3600.0
 
 
 @dataclass(frozen=True)
@@ -136,14 +135,10 @@ def stamps(column: pd.Series, where: str) -> NDArray[np.float64]:
             spans = pd.to_timedelta(
                 text.str.replace(r":(\d+)$", r".\1", regex=True) if text.iloc[0].count(":") == 3 else text
             )
-        seconds = np.asarray(spans.dt.total_seconds(), dtype=np.float64)
-        midnights = np.cumsum(np.concatenate([[0.0], np.diff(seconds) < -_HALF_DAY_S]))
-        return seconds + 86_400.0 * midnights - seconds[0]
+        return _unwrapped(np.asarray(spans.dt.total_seconds(), dtype=np.float64), _DAY_S)
     if column.notna().all() and bool(text.str.match(_MINUTES).all()):
         parts = text.str.replace(",", ".", regex=False).str.split(":", expand=True).astype(float).to_numpy()
-        seconds = 60.0 * parts[:, 0] + parts[:, 1]
-        hours = np.cumsum(np.concatenate([[0.0], np.diff(seconds) < -0.5 * _HOUR_S]))
-        return seconds + _HOUR_S * hours - seconds[0]
+        return _unwrapped(60.0 * parts[:, 0] + parts[:, 1], _HOUR_S)
     for form in _FORMATS:
         parsed = _parsed(text, form)
         if parsed is not None:
@@ -162,6 +157,12 @@ def stamps(column: pd.Series, where: str) -> NDArray[np.float64]:
         f"{where}: row {row + 1}, column '{name}': found {shown(column.iloc[row])!r}, a time is needed: a number, ISO 8601 "
         "(2026-12-31T23:59:59.5), DD.MM.YYYY hh:mm:ss or hh:mm:ss; repair the row, map another column, or give --rate HZ"
     )
+
+
+def _unwrapped(seconds: NDArray[np.float64], period_s: float) -> NDArray[np.float64]:
+    """Seconds since the first of a clock that begins again after each period."""
+    periods = np.cumsum(np.concatenate([[0.0], np.diff(seconds) < -0.5 * period_s]))
+    return seconds + period_s * periods - seconds[0]
 
 
 def _first(text: pd.Series, forms: tuple[str, ...]) -> pd.Series | None:

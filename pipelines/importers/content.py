@@ -32,19 +32,15 @@ class Content:
     interval_s: float | None = None
     lines: tuple[tuple[str, Sequence[int]], ...] = ()
 
-    def line_of(self, row: int) -> str:
-        """The line of the text that a row (from 0) is in, as an editor counts it; empty if unknown."""
+    def row(self, index: int) -> str:
+        """A row (from 0) for messages: its number among the rows of data from 1, and its line in an editor where it is known."""
+        before = 0
         for name, lines in self.lines:
-            if row < len(lines):
-                return f"line {lines[row] + 1}" + (f" of {name}" if len(self.lines) > 1 else "")
-            row -= len(lines)
-        return ""
-
-
-def row_of(row: int, content: Content | None) -> str:
-    """A row (from 0) as a place: its number among the rows of data from 1, and the line of the file where it is known."""
-    line = "" if content is None else content.line_of(row)
-    return f"row {row + 1} ({line})" if line else f"row {row + 1}"
+            if index < before + len(lines):
+                file = f" of {name}" if len(self.lines) > 1 else ""
+                return f"row {index + 1} (line {lines[index - before] + 1}{file})"
+            before += len(lines)
+        return f"row {index + 1}"
 
 
 def unit_in(name: str) -> str:

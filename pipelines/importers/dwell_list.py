@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping as Mapping_
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -11,10 +11,8 @@ from numpy.typing import NDArray
 
 from pipelines.importers.judged import FitAnswer
 from pipelines.importers.mapping import Mapping
+from pipelines.importers.record import Imported
 from schemas.units import AXES, MICRO
-
-if TYPE_CHECKING:
-    from pipelines.importers.record import Imported
 
 
 def dwell_rows(data: Imported, judged: FitAnswer | None, mapping: Mapping) -> list[dict[str, Any]]:

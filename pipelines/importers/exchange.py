@@ -9,19 +9,25 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from inertial.quantities import ANGLE_COLUMNS, FORCE_COLUMNS, KNOWN_COLUMNS, SPREAD_COLUMNS
 from pipelines.archive import Archive, Run
 from pipelines.importers import files, values
-from pipelines.tables.dwell_columns import ANGLES, DEVIATIONS, FORCE, KNOWN, REQUIRED
 from schemas import table_check, tables
 from schemas.errors import DataRejected, WrongUse, close_matches, did_you_mean
 from schemas.foreign import shown
 from schemas.serials import refuse_unusable_serials
 
+REQUIRED = ("unit", "dwell", "time_s", "out_x", "out_y", "out_z")
 _TEXTS = ("kind", "pose", "out_unit", "status")
 _CORRECT = "correct it in the file"
 _LARGEST_FORCE = 1e3
 _METRES = (9.7, 9.9)
 """A reference of this size is gravity in m/s², not 9.8 g in a centrifuge."""
+
+
+def is_exchange(names: Iterable[object]) -> bool:
+    """Whether columns are those of a table of dwells in the exchange format."""
+    return set(REQUIRED) <= {str(name) for name in names}
 
 
 def read_dwells(source: str | Path, *, archive: str | Path | None = None) -> pd.DataFrame:
@@ -101,12 +107,12 @@ def checked(frame: pd.DataFrame, *, where: str, foreign: bool = False) -> pd.Dat
     for column in frame.columns:
         if column == "unit" or column in _TEXTS:
             continue
-        if column in KNOWN or pd.api.types.is_numeric_dtype(frame[column]):
+        if column in KNOWN_COLUMNS or pd.api.types.is_numeric_dtype(frame[column]):
             frame[column] = _numbers(frame, column, where)
     frame["dwell"] = _whole(frame, "dwell", where)
-    _all_or_none(frame, FORCE, where)
-    _all_or_none(frame, ANGLES, where)
-    _all_or_none(frame, DEVIATIONS, where)
+    _all_or_none(frame, FORCE_COLUMNS, where)
+    _all_or_none(frame, ANGLE_COLUMNS, where)
+    _all_or_none(frame, SPREAD_COLUMNS, where)
     _plausible(frame, where)
     frame = table_check.check("dwells", frame, where=where)
     return frame.sort_values(["unit", "dwell"], kind="stable").reset_index(drop=True)
@@ -147,9 +153,9 @@ def _units(frame: pd.DataFrame, where: str, *, foreign: bool) -> list[str]:
 def _numbers(frame: pd.DataFrame, column: str, where: str) -> NDArray[np.float64]:
     if column == "time_s" and values.is_moment(frame[column]):
         return values.seconds(frame[column], where)
-    numbers = values.as_numbers(frame[column], where, flags=column not in KNOWN)
+    numbers = values.as_numbers(frame[column], where, flags=column not in KNOWN_COLUMNS)
     bad = np.flatnonzero(~np.isfinite(numbers))
-    needed = (*REQUIRED, *FORCE, *ANGLES)
+    needed = (*REQUIRED, *FORCE_COLUMNS, *ANGLE_COLUMNS)
     if bad.size and not (column not in needed and bool(np.all(pd.isna(frame[column])))):
         row = int(bad[0])
         place = f"row {row} (unit {frame['unit'].iloc[row]}), column {shown(column)}"
@@ -184,8 +190,8 @@ def _plausible(frame: pd.DataFrame, where: str) -> None:
     if frame.empty:
         return  # a run whose units were all refused: who judges it says that nothing is left
     _inside(frame.drop(columns="n", errors="ignore"), where)  # which has its own check
-    if FORCE[0] in frame.columns:
-        size = float(np.median(np.linalg.norm(frame[list(FORCE)].to_numpy(dtype=np.float64), axis=1)))
+    if FORCE_COLUMNS[0] in frame.columns:
+        size = float(np.median(np.linalg.norm(frame[list(FORCE_COLUMNS)].to_numpy(dtype=np.float64), axis=1)))
         if not 0.0 < size < _LARGEST_FORCE or _METRES[0] < size < _METRES[1]:
             raise DataRejected(
                 f"{where}: the reference force has a norm of {size:.4g}, about 1 is needed; give force_x, "

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -10,14 +10,13 @@ from numpy.typing import NDArray
 
 from inertial.fits.ferraris import Faces, faces, ferraris
 from inertial.probability import passes
+from inertial.quantities import OUTPUT_COLUMNS, SPREAD_COLUMNS
 from inertial.uncertainty.rounding import equal
 from pipelines.importers.judged import FitAnswer, coefficient, gravity_of, imported_dwells
 from pipelines.importers.mapping import FACES, Mapping
+from pipelines.importers.record import Imported
 from schemas.errors import DataRejected
 from schemas.units import AXES, MICRO, STANDARD_GRAVITY_M_S2
-
-if TYPE_CHECKING:
-    from pipelines.importers.record import Imported
 
 MODEL = ("bias", "scale", "misalignment")
 GROSS = 0.05
@@ -63,8 +62,6 @@ def six_faces(data: Imported, mapping: Mapping) -> FitAnswer:
 
 def _covariance(rows: list[dict[str, Any]]) -> pd.DataFrame:
     """The covariance of the coefficients as the archive's long table: six opposite faces make them independent of each other."""
-    import pandas as pd
-
     entries: list[dict[str, Any]] = []
     for axis in AXES:
         own = [row for row in rows if row["axis"] == axis]
@@ -85,10 +82,8 @@ def _verdict(fit: Faces, size: NDArray[np.float64]) -> tuple[bool | None, str]:
     share = fit.rms / size
     if not bool(np.all(share <= GROSS)):
         worst = float(np.max(share)) if np.isfinite(share).all() else float("nan")
-        return (
-            False,
-            f"the faces disagree by {100.0 * worst:.3g} % of gravity, far beyond noise; check the labels of the faces",
-        )
+        percent = f"{100.0 * worst:.3g} %"
+        return False, f"the faces disagree by {percent} of gravity, far beyond noise; check the labels of the faces"
     passed = passes(fit.p_value, UNLIKELY)
     if passed is not None:
         return passed, ""
@@ -109,11 +104,11 @@ def _by_face(
             f"import: {len(dwells)} dwells, faces {', '.join(missing) or 'none'} missing; each of {', '.join(FACES)} is needed "
             "once; name them with --poses LABEL=+x,…"
         )
-    means = dwells[["out_x", "out_y", "out_z"]].to_numpy(dtype=np.float64)
+    means = dwells[list(OUTPUT_COLUMNS)].to_numpy(dtype=np.float64)
     up, down = (means[[faces_there[f"{sign}{axis}"] for axis in AXES]] for sign in "+-")
-    if not {"sd_x", "sd_y", "sd_z", "n"} <= set(dwells.columns):
+    if not {*SPREAD_COLUMNS, "n"} <= set(dwells.columns):
         return up, down, np.full(3, np.nan)
-    variance = dwells[["sd_x", "sd_y", "sd_z"]].to_numpy(dtype=np.float64) ** 2
+    variance = dwells[list(SPREAD_COLUMNS)].to_numpy(dtype=np.float64) ** 2
     return up, down, np.sqrt(np.mean(variance / dwells["n"].to_numpy(dtype=np.float64)[:, None], axis=0))
 
 

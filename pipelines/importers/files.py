@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import hashlib
 import stat
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import pandas as pd
 
 from pipelines.importers.content import Content
+from pipelines.importers.documents import SourceDocument
 from pipelines.importers.limited import in_reader, limits_for
 from pipelines.importers.unpacking import MOST_BYTES, gunzipped, refuse_cells
 from schemas.errors import DataRejected, WrongUse
@@ -25,27 +26,28 @@ MOST_COLUMNS = 10_000
 
 @dataclass(frozen=True)
 class SourceFile:
-    """The source of a table, for the archive."""
+    """The source of a table, for the archive; the files of a recording in several."""
 
     path: str
     sha256: str
     size: int
     form: str
+    parts: tuple[SourceFile, ...] = ()
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> SourceDocument:
         """JSON-able."""
-        return {"path": self.path, "sha256": self.sha256, "bytes": self.size, "form": self.form}
+        about: SourceDocument = {"path": self.path, "sha256": self.sha256, "bytes": self.size, "form": self.form}
+        return {**about, "files": [part.as_dict() for part in self.parts]} if self.parts else about
+
+
+def digest_of(sources: Sequence[SourceFile]) -> str:
+    """The hash of several files as one source."""
+    return hashlib.sha256("".join(source.sha256 for source in sources).encode()).hexdigest()
 
 
 def is_file(source: str | Path) -> bool:
     """Whether a source is a file, not a run of the archive."""
-    path = Path(source)
-    looks_like_one = isinstance(source, Path) or "/" in str(source) or path.suffix != ""
-    return is_there(path) or (looks_like_one and not _is_run_like(source))
-
-
-def _is_run_like(source: str | Path) -> bool:
-    return isinstance(source, str) and "/" not in source and not Path(source).suffix
+    return is_there(source) or isinstance(source, Path) or "/" in source or Path(source).suffix != ""
 
 
 def read(path: Path) -> tuple[pd.DataFrame, SourceFile]:

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from inertial.quantities import LARGEST
+from inertial.quantities import ANGLE_COLUMNS, FORCE_COLUMNS, KNOWN_COLUMNS, LARGEST, SPREAD_COLUMNS
 from pipelines.importers import clocks, unit_check, values
 from pipelines.importers.clocks import typical_step
 from pipelines.importers.content import Content
@@ -29,6 +29,18 @@ _MOST_COLUMNS = 24
 _SOME = 20_000
 _MOST_POSITIONS = 500
 _LIKELY_HZ = 100.0
+EXCHANGE = "the exchange format"
+_OF_EXCHANGE = {
+    "unit": "unit",
+    "dwell": "dwell",
+    "time_s": "time",
+    "out_x": "x",
+    "out_y": "y",
+    "out_z": "z",
+    **dict.fromkeys(FORCE_COLUMNS, "reference force"),
+    **dict.fromkeys(ANGLE_COLUMNS, "reference angle"),
+    **{name: f"sd_{name[-1]}" for name in SPREAD_COLUMNS},
+}
 
 
 @dataclass(frozen=True)
@@ -59,7 +71,11 @@ class Guesses:
 
     def column(self, meaning: str) -> str:
         """The column with a meaning; empty if there is none."""
-        return next((name for name, guess in self.columns.items() if guess.meaning == meaning), "")
+        return _column(self.columns, meaning)
+
+
+def _column(guessed: dict[str, Guess], meaning: str) -> str:
+    return next((name for name, guess in guessed.items() if guess.meaning == meaning), "")
 
 
 def guesses(content: Content) -> Guesses:
@@ -76,8 +92,7 @@ def guesses(content: Content) -> Guesses:
 
 def _sheet(table: pd.DataFrame, numeric: dict[str, NDArray[np.float64]], guessed: dict[str, Guess]) -> bool:
     """Whether the rows are positions, each with a label of its own; the labels are then those of the dwells."""
-    meanings = {one.meaning for one in guessed.values()}
-    if "time" in meanings or not {"x", "y", "z"} <= meanings or len(table) > _MOST_POSITIONS:
+    if _column(guessed, "time") or not all(_column(guessed, axis) for axis in "xyz") or len(table) > _MOST_POSITIONS:
         return False
     for name in table.columns:
         if str(name) not in numeric and table[name].notna().all() and table[name].nunique() == len(table) > 1:
@@ -183,16 +198,16 @@ def _others(
             guessed[name] = Guess(f"sd_{spread[1].lower()}", "its name")
         elif name in numeric and (_HEAT.search(name) or TEMPERATURE.get(content.units.get(name, "").lower())):
             middle = float(np.nanmedian(numeric[name]))
-            if -100.0 < middle < 500.0 and "temperature" not in {one.meaning for one in guessed.values()}:
+            if -100.0 < middle < 500.0 and not _column(guessed, "temperature"):
                 guessed[name] = Guess("temperature", "its name or unit")
-        elif name not in numeric and "dwell" not in {one.meaning for one in guessed.values()}:
+        elif name not in numeric and not _column(guessed, "dwell"):
             distinct = int(table[name].nunique())
             if 1 < distinct <= max(2, len(table) // 10):
                 guessed[name] = Guess("dwell", f"{distinct} labels")
 
 
 def _time_unit(content: Content, numeric: dict[str, NDArray[np.float64]], guessed: dict[str, Guess]) -> Guess:
-    name = next((one for one, guess in guessed.items() if guess.meaning == "time"), "")
+    name = _column(guessed, "time")
     if not name or name not in numeric:
         return Guess("", "")
     numbers = numeric[name][np.isfinite(numeric[name])]
@@ -200,7 +215,7 @@ def _time_unit(content: Content, numeric: dict[str, NDArray[np.float64]], guesse
     if seen.unit or not seen.possible:
         return Guess(seen.unit, seen.reason)
     step, possible = typical_step(numbers), seen.possible
-    heat = next((one for one, guess in guessed.items() if guess.meaning == "temperature"), "")
+    heat = _column(guessed, "temperature")
     if heat:
         change, span = float(np.nanmax(numeric[heat]) - np.nanmin(numeric[heat])), float(numbers[-1] - numbers[0])
         slow = tuple(unit for unit in possible if change <= _FASTEST_K_S * span * clocks.TIME_UNITS[unit])
@@ -238,3 +253,18 @@ def _output(  # noqa: PLR0911 - one answer per reason
     if unit_check.VOLTS_PER_G[0] <= size <= unit_check.VOLTS_PER_G[1]:
         return Guess("V", f"its norm is {size:.5g}, no size of gravity, but one of volts: check")
     return Guess("LSB", f"its norm is {size:.5g}, neither gravity nor volts: check")
+
+
+def guesses_of_dwells(table: pd.DataFrame) -> Guesses:
+    """The meanings of the columns of the exchange format, by their names; further columns of numbers are covariates."""
+    columns: dict[str, Guess] = {}
+    for name in map(str, table.columns):
+        if name in _OF_EXCHANGE or name in KNOWN_COLUMNS:
+            columns[name] = Guess(_OF_EXCHANGE.get(name, "recorded quantity"), "its name")
+        elif table[name].dtype.kind in "fiu":
+            columns[name] = Guess("covariate", "further numbers")
+        else:
+            columns[name] = Guess("", "")
+    stated = sorted({str(unit) for unit in table["out_unit"].dropna()}) if "out_unit" in table else []
+    output = Guess(stated[0], "column out_unit") if len(stated) == 1 else Guess("", "")
+    return Guesses(columns, Guess("s", EXCHANGE), output)

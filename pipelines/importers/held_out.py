@@ -33,8 +33,8 @@ def held_out_count(text: str, dwells: int) -> int:
     return max(1, round(0.01 * number * dwells)) if share else int(number)
 
 
-def with_held_out(dwells: pd.DataFrame, text: str, where: str) -> tuple[pd.DataFrame, str]:
-    """The dwells with kind ``verification`` for those that are held out, and a remark that names them.
+def with_held_out(dwells: pd.DataFrame, text: str, where: str) -> tuple[pd.DataFrame, tuple[str, ...]]:
+    """The dwells with kind ``verification`` for those that are held out, and a remark that names them; none for an empty text.
 
     Of each unit one dwell is drawn from each of so many stretches of equal length; the first and the last dwell stay in the fit,
     so that it does not extrapolate in time. The draw depends on the number of dwells only.
@@ -44,6 +44,8 @@ def with_held_out(dwells: pd.DataFrame, text: str, where: str) -> tuple[pd.DataF
     DataRejected
         Too few dwells are left for the fit.
     """
+    if not text:
+        return dwells, ()
     kinds = dwells["kind"].astype(object).to_numpy().copy()
     named: list[str] = []
     for unit, places in dwells.groupby("unit", sort=False).indices.items():
@@ -56,7 +58,7 @@ def with_held_out(dwells: pd.DataFrame, text: str, where: str) -> tuple[pd.DataF
         chosen = places[_drawn(len(places), count)]
         kinds[chosen] = "verification"
         named.append(f"{unit}: {', '.join(str(number) for number in dwells['dwell'].to_numpy()[chosen])}")
-    return dwells.assign(kind=kinds), f"held out for verification: {'; '.join(named)}"
+    return dwells.assign(kind=kinds), (f"held out for verification: {'; '.join(named)}",)
 
 
 def _drawn(dwells: int, count: int) -> np.ndarray:

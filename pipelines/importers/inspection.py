@@ -9,23 +9,21 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from inertial import change_of_level, record_faults, static_intervals
+from inertial.counts import number_of
+from inertial.quantities import ANGLE_COLUMNS, FORCE_COLUMNS
 from pipelines.importers import clocks, files, sample_faults, sources, unit_check, values
 from pipelines.importers.content import Content
 from pipelines.importers.documents import ColumnDocument, InspectDocument, IntervalDocument
-from pipelines.importers.exchange_inspection import (
-    command_of_dwells,
-    content_of_dwells,
-    guesses_of_dwells,
-    problems_of_dwells,
-)
-from pipelines.importers.guesses import Guesses, guesses, measurable
+from pipelines.importers.exchange import is_exchange, read_dwells
+from pipelines.importers.guesses import EXCHANGE, Guesses, guesses, guesses_of_dwells, measurable
 from pipelines.importers.mapping import TIME_UNITS
 from pipelines.importers.record_time import GAP
 from pipelines.importers.stated_units import TEMPERATURE
-from pipelines.tables.dwell_columns import is_exchange
+from schemas.errors import TumblelineError
 from schemas.units import AXES
 
 _NAMED = ("time", "x", "y", "z", "sd_x", "sd_y", "sd_z", "temperature", "dwell")
@@ -88,15 +86,7 @@ def inspect(paths: Sequence[Path], *, join: str = "", group: str = "") -> Inspec
     )
     split = bool(gaps) or not bool(whole.all())
     document: InspectDocument = {
-        "files": [str(path) for path in paths],
-        "form": source.form,
-        "rows": len(content.table),
-        "columns": _columns(content, guessed),
-        "remarks": list(content.remarks),
-        "time_unit": guessed.time_unit.meaning,
-        "time_reason": guessed.time_unit.reason,
-        "output_unit": guessed.output.meaning,
-        "output_reason": guessed.output.reason,
+        **_document(paths, content, source.form, guessed),
         "rate_hz": rate,
         "duration_s": float(own[-1] - own[0]) if own is not None and len(own) > 1 else None,
         "gaps": gaps,
@@ -110,15 +100,14 @@ def inspect(paths: Sequence[Path], *, join: str = "", group: str = "") -> Inspec
     return Inspection(document, own, kept)
 
 
-def _of_dwells(path: Path, content: Content, form: str) -> InspectDocument:
-    """The document about a table of dwells in the exchange format."""
-    guessed = guesses_of_dwells(content.table)
+def _document(paths: Sequence[Path], content: Content, form: str, guessed: Guesses) -> InspectDocument:
+    """The document with what is known of the columns, and nothing of a record in them."""
     return {
-        "files": [str(path)],
+        "files": [str(path) for path in paths],
         "form": form,
         "rows": len(content.table),
-        "columns": [{**one, "resolution": None, "clipped": 0} for one in _columns(content, guessed)],
-        "remarks": [*content.remarks, content_of_dwells(content.table)],
+        "columns": _columns(content, guessed),
+        "remarks": list(content.remarks),
         "time_unit": guessed.time_unit.meaning,
         "time_reason": guessed.time_unit.reason,
         "output_unit": guessed.output.meaning,
@@ -128,9 +117,36 @@ def _of_dwells(path: Path, content: Content, form: str) -> InspectDocument:
         "gaps": 0,
         "faults": [],
         "intervals": [],
-        "open": problems_of_dwells(path),
-        "command": command_of_dwells(path),
+        "open": [],
+        "command": "",
     }
+
+
+def _of_dwells(path: Path, content: Content, form: str) -> InspectDocument:
+    """The document about a table of dwells in the exchange format, which ``diagnose`` reads as it is, without an import."""
+    document = _document([path], content, form, guesses_of_dwells(content.table))
+    for column in document["columns"]:
+        column |= {"resolution": None, "clipped": 0}
+    document["remarks"].append(_content_of_dwells(content.table))
+    document["command"] = shlex.join(["tumbleline", "diagnose", str(path)])
+    try:
+        read_dwells(path)
+    except TumblelineError as problem:
+        document["open"] = [str(problem)]
+    return document
+
+
+def _content_of_dwells(table: pd.DataFrame) -> str:
+    """What the table holds, as a sentence."""
+    names = set(table.columns)
+    if set(FORCE_COLUMNS) <= names:
+        reference = "the force on each axis"
+    elif set(ANGLE_COLUMNS) <= names:
+        reference = "the angles of the table"
+    else:
+        reference = "none: only the magnitude of gravity is known"
+    units = number_of(int(table["unit"].nunique()), "unit")
+    return f"a table of dwells in {EXCHANGE}: {units}, {number_of(len(table), 'dwell')}; reference: {reference}"
 
 
 def _time(content: Content, guessed: Guesses) -> tuple[NDArray[np.float64] | None, int, list[str]]:

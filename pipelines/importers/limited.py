@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import atexit
 import os
-import select
 import signal
+import socket
 import subprocess
 import sys
 import threading
-import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar, cast
@@ -64,23 +64,21 @@ class _Reader:
     def __init__(self) -> None:
         # -P and the path of this process: a module in the folder of the recordings is never imported
         environment = os.environ | ENVIRONMENT | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
-        self._process = subprocess.Popen(  # noqa: S603 - this interpreter and a module of the product
-            [sys.executable, "-P", "-c", PROGRAM],
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=environment,
-        )  # fmt: skip
+        self._socket, theirs = socket.socketpair()
+        self._stream = self._socket.makefile("rwb")
+        with theirs:
+            self._process = subprocess.Popen(  # noqa: S603 - this interpreter and a module of the product
+                [sys.executable, "-P", "-c", PROGRAM, str(theirs.fileno())], pass_fds=[theirs.fileno()], env=environment,
+                stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+            )  # fmt: skip
 
     def ask(self, request: tuple[Any, ...], clock_s: float, where: str) -> tuple[str, Any, bool]:
         """The answer: its kind, its content, and whether the process ends with it."""
-        sink, source = self._process.stdin, self._process.stdout
-        if sink is None or source is None:
-            raise RuntimeError("the process of the reader has no pipes")
-        deadline = time.monotonic() + clock_s
+        self._socket.settimeout(clock_s)
         try:
-            limited_process.send(sink, request)
-            return cast(
-                "tuple[str, Any, bool]", limited_process.received(lambda n: _filled(source.fileno(), n, deadline))
-            )
-        except (BrokenPipeError, EOFError):
+            limited_process.send(self._stream, request)
+            return cast("tuple[str, Any, bool]", limited_process.value_of(limited_process.received(self._stream)))
+        except (ConnectionError, EOFError):
             status = self._process.wait()
         except TimeoutError:
             raise ReadingEnded(
@@ -94,12 +92,9 @@ class _Reader:
         """End the process, whatever it does."""
         self._process.kill()
         self._process.wait()
-        for stream in (self._process.stdin, self._process.stdout):
-            if stream is not None:
-                try:
-                    stream.close()
-                except BrokenPipeError:  # a request that the process did not take
-                    continue
+        with suppress(OSError):  # a request that the process did not take
+            self._stream.close()
+        self._socket.close()
 
 
 _lock = threading.Lock()
@@ -157,20 +152,3 @@ def end() -> None:
     """End the idle process."""
     while _idle:
         _idle.pop().end()
-
-
-def _filled(handle: int, count: int, deadline: float) -> bytearray:
-    """So many bytes of a pipe."""
-    content = bytearray(count)
-    view, filled = memoryview(content), 0
-    waiting = select.poll()
-    waiting.register(handle, select.POLLIN)
-    while filled < count:
-        left = deadline - time.monotonic()
-        if left <= 0.0 or not waiting.poll(1000.0 * left):
-            raise TimeoutError
-        taken = os.readv(handle, [view[filled:]])
-        if not taken:
-            raise EOFError
-        filled += taken
-    return content

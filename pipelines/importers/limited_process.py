@@ -12,6 +12,7 @@ import pickle
 import queue
 import resource
 import signal
+import socket
 import struct
 import sys
 import threading
@@ -20,7 +21,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 from schemas.errors import TumblelineError
 
@@ -45,18 +46,22 @@ def send(sink: Any, value: Any) -> None:
     sink.flush()
 
 
-def received(read: Callable[[int], bytes | bytearray]) -> Any:
-    """A value from the other process, by a function that gives so many bytes."""
-    return _value(_pieces(read))
+def received(source: Any) -> list[bytearray]:
+    """The pieces of a value from the other process; arrays lie where they are received."""
+    (count,) = struct.unpack(">Q", _exactly(source, 8))
+    sizes = struct.unpack(f">{count}Q", _exactly(source, 8 * count))
+    return [_exactly(source, size) for size in sizes]
 
 
-def _pieces(read: Callable[[int], bytes | bytearray]) -> list[bytes | bytearray]:
-    (count,) = struct.unpack(">Q", read(8))
-    sizes = struct.unpack(f">{count}Q", read(8 * count))
-    return [read(size) for size in sizes]
+def _exactly(source: Any, count: int) -> bytearray:
+    piece = bytearray(count)
+    if source.readinto(piece) < count:
+        raise EOFError
+    return piece
 
 
-def _value(pieces: list[bytes | bytearray]) -> Any:
+def value_of(pieces: list[bytearray]) -> Any:
+    """The value in received pieces."""
     head, *arrays = pieces
     return pickle.loads(head, buffers=arrays)  # noqa: S301 - from a process of this program
 
@@ -65,38 +70,32 @@ def main() -> None:
     """Read until the other process ends; its end also ends a reading."""
     _here.append(True)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the other process decides
-    source, sink = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # what a library prints is no answer
+    stream = socket.socket(fileno=int(sys.argv[1])).makefile("rwb")
     requests: queue.SimpleQueue[Any] = queue.SimpleQueue()
-    threading.Thread(target=_listen, args=(source, requests), daemon=True).start()
+    threading.Thread(target=_listen, args=(stream, requests), daemon=True).start()
     import_module("pipelines.importers.readers")  # while the other process prepares its first request
 
     while True:
         # a request imports the module of its function: only here, where no other import is under way
-        request = _value(requests.get())
+        request = value_of(requests.get())
         kind, content = _done(*request)
         gc.collect()
         last = kind == "memory" or _pages(1) > KEPT_BYTES
         try:
-            send(sink, (kind, content, last))
+            send(stream, (kind, content, last))
         except MemoryError:
-            send(sink, ("memory", None, True))
+            send(stream, ("memory", None, True))
         del request, content
         if last:
             return
 
 
-def _listen(source: BinaryIO, requests: queue.SimpleQueue[Any]) -> None:
+def _listen(source: Any, requests: queue.SimpleQueue[Any]) -> None:
     """Pass requests on; the process ends where there is nobody who asks."""
-
-    def exactly(count: int) -> bytes:
-        piece = source.read(count)
-        if len(piece) < count:
-            os._exit(0)
-        return piece
-
-    while True:
-        requests.put(_pieces(exactly))
+    with suppress(EOFError, OSError):
+        while True:
+            requests.put(received(source))
+    os._exit(0)
 
 
 def _done(

@@ -6,7 +6,7 @@ from datetime import date
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, field_validator, model_validator
 
 from inertial.quantities import FORCE_COLUMNS, LARGEST, OUTPUT_COLUMNS, RECORDED, SPREAD_COLUMNS
 from schemas.bounds import FASTEST_HZ, LONGEST_WAIT_S
@@ -44,6 +44,11 @@ OUTPUT_UNITS: dict[str, tuple[str, float]] = {
 }
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 TEMPERATURE_UNITS = ("degC", "K", "degF")
+_KNOWN_UNITS = {
+    "output": ("the output", tuple(OUTPUT_UNITS)),
+    "time": ("time", ("", *TIME_UNITS, "samples")),
+    "temperature": ("temperature", TEMPERATURE_UNITS),
+}
 FACES = {
     f"{sign}{axis}": tuple(float(sign + "1") * (axis == other) for other in "xyz") for sign in "+-" for axis in "xyz"
 }
@@ -59,20 +64,15 @@ class Units(BaseModel):
     """Empty: as stated by the file, or recognised from its steps."""
     temperature: str = "degC"
 
-    @field_validator("output")
+    @field_validator("output", "time", "temperature")
     @classmethod
-    def _known_output(cls, value: str) -> str:
-        return _one_of(value, OUTPUT_UNITS, "unit of the output")
-
-    @field_validator("time")
-    @classmethod
-    def _known_time(cls, value: str) -> str:
-        return value and _one_of(value, (*TIME_UNITS, "samples"), "unit of time")
-
-    @field_validator("temperature")
-    @classmethod
-    def _known_temperature(cls, value: str) -> str:
-        return _one_of(value, TEMPERATURE_UNITS, "unit of temperature")
+    def _known(cls, value: str, info: ValidationInfo) -> str:
+        quantity, known = _KNOWN_UNITS[str(info.field_name)]
+        if value not in known:
+            raise ValueError(
+                f"found '{shown(value)}', a known unit of {quantity} is needed: {', '.join(filter(None, known))}"
+            )
+        return value
 
 
 class Mapping(BaseModel):
@@ -216,9 +216,3 @@ def pairs(text: str, option: str) -> dict[str, str]:
             raise WrongUse(f"{option}: '{name}' is there twice, once is needed; remove one")
         by_name[name] = value
     return by_name
-
-
-def _one_of(value: str, known: Any, what: str) -> str:
-    if value not in known:
-        raise ValueError(f"found '{shown(value)}', a known {what} is needed: {', '.join(known)}")
-    return value

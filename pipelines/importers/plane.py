@@ -12,6 +12,7 @@ from inertial.counts import number_of
 from inertial.errors import NotIdentified
 from inertial.fits.plane import FEWEST_DOF, PlaneFit, fit_plane, fit_plane_norm, inside_of, plane_across, quiet_axis
 from inertial.probability import passes
+from inertial.quantities import OUTPUT_COLUMNS, SPREAD_COLUMNS
 from inertial.uncertainty.rounding import equal
 from pipelines.importers.judged import FitAnswer, coefficient, gravity_of, imported_dwells
 from pipelines.importers.mapping import Mapping
@@ -24,7 +25,7 @@ Array = NDArray[np.float64]
 if TYPE_CHECKING:
     from pipelines.importers.record import Imported
 
-OUT, SPREAD = ([f"{kind}_{axis}" for axis in AXES] for kind in ("out", "sd"))
+OUT, SPREAD = list(OUTPUT_COLUMNS), list(SPREAD_COLUMNS)
 FEWEST = 4
 UNLIKELY = 0.05
 SHOWN_DOF = 4
@@ -59,8 +60,12 @@ def plane(data: Imported, mapping: Mapping) -> FitAnswer:
             "import: the poses lie in no plane across an axis of the sensor, one axis of rotation along x, y or z is needed for "
             "--fit plane; use --fit norm, or mount the sensor with an axis along that of the table"
         )
-    gravity = gravity_of(mapping) if known_force(dwells) is None else 1.0
-    return plane_answer(dwells, across, gravity, data.out_unit)
+    return plane_answer(dwells, across, _gravity(dwells, mapping), data.out_unit)
+
+
+def _gravity(dwells: pd.DataFrame, mapping: Mapping) -> float:
+    """Local gravity, g, which is needed only where the poses are not known."""
+    return gravity_of(mapping) if known_force(dwells) is None else 1.0
 
 
 def shown_turn(data: Imported, mapping: Mapping) -> FitAnswer | None:
@@ -72,9 +77,8 @@ def shown_turn(data: Imported, mapping: Mapping) -> FitAnswer | None:
     across = axis_of_plane(dwells)
     if across is None:
         return None
-    gravity = gravity_of(mapping) if known_force(dwells) is None else 1.0
     try:
-        fit = _fitted(dwells, across, gravity)
+        fit = _fitted(dwells, across, _gravity(dwells, mapping))
     except DataRejected:
         return None
     enough = known_force(dwells) is not None or fit.dof >= SHOWN_DOF
@@ -150,10 +154,8 @@ def _errors(dwells: pd.DataFrame, output: Array) -> Array:
 def _verdict(fit: PlaneFit) -> tuple[bool | None, str]:
     """Whether the model describes the dwells, by harmonics of the angle beside it; None where this cannot be judged."""
     if fit.misfit > GROSS:
-        return (
-            False,
-            f"the residual is {100.0 * fit.misfit:.3g} % of gravity: the poses lie in no plane, or an axis is dead",
-        )
+        percent = f"{100.0 * fit.misfit:.3g} %"
+        return False, f"the residual is {percent} of gravity: the poses lie in no plane, or an axis is dead"
     if fit.dof < FEWEST_DOF:
         return None, (
             f"cannot be judged: {number_of(fit.dof, 'degree')} of freedom, {FEWEST_DOF} are needed; measure "
@@ -162,10 +164,8 @@ def _verdict(fit: PlaneFit) -> tuple[bool | None, str]:
     passed = passes(fit.p_value, UNLIKELY)
     if passed is None:
         return None, "cannot be judged: the probability of the residuals is no number; add poses"
-    return (
-        passed,
-        "" if passed else "the residual follows harmonics of the angle, as a second- or third-order term does",
-    )
+    reason = "" if passed else "the residual follows harmonics of the angle, as a second- or third-order term does"
+    return passed, reason
 
 
 def _opened(fit: PlaneFit, *, known: bool) -> list[str]:

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from inertial.fits.polynomial import fit_temperature_curve
 from pipelines.importers.judged import FitAnswer
 from pipelines.importers.mapping import Mapping
+from pipelines.importers.record import Imported
 from schemas.errors import WrongUse
 from schemas.units import AXES, MICRO, STANDARD_GRAVITY_M_S2
-
-if TYPE_CHECKING:
-    from pipelines.importers.record import Imported
 
 
 def ramp(data: Imported, mapping: Mapping) -> FitAnswer:

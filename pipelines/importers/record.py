@@ -9,9 +9,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from pipelines.importers import clocks, exchange, held_out, pose_check, sample_faults, unit_check, values
-from pipelines.importers.content import Content, row_of
+from pipelines.importers import clocks, exchange, pose_check, sample_faults, unit_check, values
+from pipelines.importers.content import Content
 from pipelines.importers.documents import SampleFaultDocument
+from pipelines.importers.held_out import with_held_out
 from pipelines.importers.mapping import FACES, MEANINGS, OUTPUT_UNITS, Mapping
 from pipelines.importers.record_time import backwards, gaps_of, seconds, time_doubts
 from pipelines.importers.stated_units import column_name
@@ -58,20 +59,20 @@ def imported(
         A column is not there, a value is not a finite number, time runs back, the norm contradicts the unit, samples are missing,
         an axis is constant, words are torn, or a dwell holds several positions.
     """
+    content = content or Content(table)
     columns = _columns(table, mapping, where)
-    remarks = () if content is None else content.remarks
-    stated = {} if content is None else content.units
     kept, columns, dropped = _with_numbers(columns, mapping, where, content)
-    breaks = sorted({int(np.searchsorted(kept, k)) for k in breaks} | _behind(kept))
+    left_out_before = {int(k) + 1 for k in np.flatnonzero(np.diff(kept) > 1)}
+    breaks = sorted({int(np.searchsorted(kept, k)) for k in breaks} | left_out_before)
     raw = np.column_stack([values.finite(columns[axis], where, content) for axis in mapping.axes])
     raw = raw * [1.0 if sign == "+" else -1.0 for sign in mapping.signs]
-    remarks = (*remarks, *dropped, *unit_check.refuse_other_unit(raw, mapping.units.output, where))
+    remarks = (*content.remarks, *dropped, *unit_check.refuse_other_unit(raw, mapping.units.output, where))
     out_unit, factor = OUTPUT_UNITS[mapping.units.output]
     serials = _serials(columns, mapping, where)
     extras = _extras(columns, mapping, where, content)
     if mapping.rows == "dwells":
-        return _as_dwells(columns, raw * factor, serials, extras, mapping, where, remarks)
-    clock = seconds(columns, mapping, stated, where, breaks, content=content)
+        return _as_dwells(columns, raw * factor, serials, extras, mapping, content, where, remarks)
+    clock = seconds(columns, mapping, content, where)
     breaks, wide = gaps_of(clock.seconds, columns.get("dwell"), breaks, mapping, where)
     if len(set(serials)) > 1:
         raise DataRejected(
@@ -102,7 +103,7 @@ def imported(
     dwells = _means(samples, intervals, tuple(extras), mapping) if len(intervals) else None
     if dwells is not None:
         remarks = (*remarks, *pose_check.refuse_or_remark(dwells, mapping, where))
-        dwells, held = _held_out(dwells, mapping, where)
+        dwells, held = with_held_out(dwells, mapping.verify, where)
         remarks = (*remarks, *held)
     remarks = (
         *remarks,
@@ -114,8 +115,7 @@ def imported(
 
 
 def _columns(table: pd.DataFrame, mapping: Mapping, where: str) -> dict[str, pd.Series]:
-    names = [str(name) for name in table.columns]
-    named = table.set_axis(names, axis=1)
+    names = list(table.columns)
     columns: dict[str, pd.Series] = {}
     for meaning, source_column in mapping.columns.items():
         column = column_name(names, source_column)
@@ -123,19 +123,19 @@ def _columns(table: pd.DataFrame, mapping: Mapping, where: str) -> dict[str, pd.
             raise DataRejected(
                 f"{where}: column '{shown(source_column)}' (for {meaning}) is not there; {did_you_mean(source_column, names)}"
             )
-        columns[meaning] = pd.Series(named[column], name=column)
+        columns[meaning] = table[column]
     meanings = [meaning for meaning in ("time", *AXES) if meaning in columns]
-    names_ = [str(columns[meaning].name) for meaning in meanings]
-    if len(set(names_)) < len(names_):
+    mapped = [str(columns[meaning].name) for meaning in meanings]
+    if len(set(mapped)) < len(mapped):
         raise DataRejected(
-            f"{where}: {', '.join(meanings)} are columns {', '.join(map(shown, names_))}, different ones are needed; "
+            f"{where}: {', '.join(meanings)} are columns {', '.join(map(shown, mapped))}, different ones are needed; "
             "correct --map"
         )
     return columns
 
 
 def _with_numbers(
-    columns: dict[str, pd.Series], mapping: Mapping, where: str, content: Content | None
+    columns: dict[str, pd.Series], mapping: Mapping, where: str, content: Content
 ) -> tuple[NDArray[np.int64], dict[str, pd.Series], tuple[str, ...]]:
     """Rows that are kept (k,), the columns with these rows, and a remark on the others, which lack a number."""
     count = len(columns["x"])
@@ -156,7 +156,7 @@ def _with_numbers(
         raise DataRejected(f"{where}: no row has a number in every mapped column, one is needed at least; check --map")
     if kept.size == count:
         return kept, columns, ()
-    first = row_of(int(np.flatnonzero(~whole)[0]), content)
+    first = content.row(int(np.flatnonzero(~whole)[0]))
     remark = f"{count - kept.size} of {count} rows without a number left out, the first is {first}; dwells end there"
     return kept, {name: one.iloc[kept].reset_index(drop=True) for name, one in columns.items()}, (remark,)
 
@@ -170,11 +170,6 @@ def _twice(time: NDArray[np.float64], raw: NDArray[np.float64]) -> tuple[str, ..
     return (
         f"CHECK THE ROWS: {int(same.sum())} rows repeat the row before them with its time and values, the first is row {first}",
     )
-
-
-def _behind(kept: NDArray[np.int64]) -> set[int]:
-    """Places among the kept rows before which a row was left out."""
-    return {int(k) + 1 for k in np.flatnonzero(np.diff(kept) > 1)}
 
 
 def _serials(columns: dict[str, pd.Series], mapping: Mapping, where: str) -> list[str]:
@@ -191,7 +186,7 @@ def _serials(columns: dict[str, pd.Series], mapping: Mapping, where: str) -> lis
 
 
 def _extras(
-    columns: dict[str, pd.Series], mapping: Mapping, where: str, content: Content | None
+    columns: dict[str, pd.Series], mapping: Mapping, where: str, content: Content
 ) -> dict[str, NDArray[np.float64]]:
     """Temperature, other known columns and covariates by the names of the tables."""
     extras: dict[str, NDArray[np.float64]] = {}
@@ -246,6 +241,7 @@ def _as_dwells(
     serials: list[str],
     extras: dict[str, NDArray[np.float64]],
     mapping: Mapping,
+    content: Content,
     where: str,
     remarks: tuple[str, ...],
 ) -> Imported:
@@ -253,28 +249,18 @@ def _as_dwells(
     count = pd.Series(serials).groupby(serials).cumcount().to_numpy()
     time = count.astype(np.float64)
     if "time" in columns:
-        time = seconds(columns, mapping, {}, where, (), dwells=True).seconds
+        time = seconds(columns, mapping, content, where, dwells=True).seconds
         backwards(time, serials, where, together=True)  # units may follow one another, or alternate
         time = time - float(time.min())
     frame = pd.DataFrame({"unit": serials, "dwell": count, "time_s": time})
     frame[["out_x", "out_y", "out_z"]] = output
     labels = columns["dwell"].astype(str).tolist() if "dwell" in columns else [f"dwell {k}" for k in count]
     sound, still = sample_faults.sound_dwells(extras, labels, mapping, where)
-    remarks = (*remarks, *still)
     frame = _finished(frame.assign(record=count, pose=labels, **extras), mapping)
     dwells = exchange.checked(frame[sound].reset_index(drop=True), where=where, foreign=True)
-    remarks = (*remarks, *pose_check.refuse_or_remark(dwells, mapping, where))
-    dwells, held = _held_out(dwells, mapping, where)
-    remarks = (*remarks, *held)
-    return Imported(None, dwells, OUTPUT_UNITS[mapping.units.output][0], remarks)
-
-
-def _held_out(dwells: pd.DataFrame, mapping: Mapping, where: str) -> tuple[pd.DataFrame, tuple[str, ...]]:
-    """The dwells with those for verification marked, and a remark that names these."""
-    if not mapping.verify:
-        return dwells, ()
-    marked, remark = held_out.with_held_out(dwells, mapping.verify, where)
-    return marked, (remark,)
+    remarks = (*remarks, *still, *pose_check.refuse_or_remark(dwells, mapping, where))
+    dwells, held = with_held_out(dwells, mapping.verify, where)
+    return Imported(None, dwells, OUTPUT_UNITS[mapping.units.output][0], (*remarks, *held))
 
 
 def _finished(frame: pd.DataFrame, mapping: Mapping) -> pd.DataFrame:

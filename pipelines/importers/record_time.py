@@ -31,21 +31,17 @@ GAP = 5.0
 def seconds(
     columns: Columns[str, pd.Series],
     mapping: Mapping,
-    stated: Columns[str, str],
+    content: Content,
     where: str,
-    breaks: Sequence[int],
     *,
     dwells: bool = False,
-    content: Content | None = None,
 ) -> RecordingClock:
     """Seconds of every row from any beginning.
 
     Parameters
     ----------
-    stated : column → unit, as the file states it.
-    breaks : rows before which another file begins, or rows are missing.
+    content : of the file, which knows the units of its columns and the lines of its rows.
     dwells : whether rows are dwells, whose steps say nothing about their unit.
-    content : of the file, which knows the lines of its rows.
 
     Raises
     ------
@@ -54,7 +50,7 @@ def seconds(
     WrongUse
         There is no time and no rate, or the unit of time cannot be recognised.
     """
-    clock = _clock(columns, mapping, stated, where, dwells=dwells, content=content)
+    clock = _clock(columns, mapping, content, where, dwells=dwells)
     values.refuse_outside(clock.seconds, "time_s", where)
     if dwells:
         return clock
@@ -86,13 +82,7 @@ def _continued(clock: RecordingClock) -> RecordingClock:
 
 
 def _clock(
-    columns: Columns[str, pd.Series],
-    mapping: Mapping,
-    stated: Columns[str, str],
-    where: str,
-    *,
-    dwells: bool,
-    content: Content | None,
+    columns: Columns[str, pd.Series], mapping: Mapping, content: Content, where: str, *, dwells: bool
 ) -> RecordingClock:
     time = columns.get("time")
     if time is not None and values.is_moment(time):
@@ -112,14 +102,15 @@ def _clock(
         return RecordingClock(count / mapping.rate_hz, "samples", ())
     numbers = values.finite(time, where, content, needed="a time")
     name = str(time.name)
+    stated = content.units.get(name, "")
     if dwells:
-        recognition = clocks.recognised(numbers, name, stated.get(name, ""))
-        own = recognition.unit if not recognition.reason.startswith("steps") else ""
-        unit = mapping.units.time or own or "s"
+        recognition = clocks.recognised(numbers, name, stated)
+        known = recognition.unit if not recognition.reason.startswith("steps") else ""
+        unit = mapping.units.time or known or "s"
         return RecordingClock(numbers * TIME_UNITS[unit], unit, ())
     if np.all(numbers == numbers[0]):
         return RecordingClock(np.zeros(len(numbers)), "s", ())
-    return clocks.clock(numbers, name, mapping.units.time, stated.get(name, ""), where)
+    return clocks.clock(numbers, name, mapping.units.time, stated, where)
 
 
 def backwards(time: NDArray[np.float64], group: Sequence[Any], where: str, *, together: bool) -> None:

@@ -93,17 +93,8 @@ def without_short(
     numbers = np.zeros(len(intervals) + 1, dtype=np.int64)
     numbers[np.array(kept, dtype=np.int64) + 1] = np.arange(len(kept)) + 1
     gone = [intervals.labels[k] for k in range(len(intervals)) if k not in set(kept)]
-    fewer = Stretches(
-        tuple(intervals.first[k] for k in kept),
-        tuple(intervals.last[k] for k in kept),
-        tuple(intervals.labels[k] for k in kept),
-        intervals.remarks,
-    )
-    return (
-        fewer,
-        numbers[record],
-        (f"dwells left out because most of their samples have faults: {', '.join(gone[:_MOST_LISTED])}",),
-    )
+    remark = f"dwells left out because most of their samples have faults: {', '.join(gone[:_MOST_LISTED])}"
+    return intervals.only(kept), numbers[record], (remark,)
 
 
 def sound_dwells(

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from pipelines.archive import Run
 from pipelines.importers import files
-from pipelines.importers.files import is_file
-from schemas.errors import DataRejected, WrongUse, did_you_mean
+from pipelines.importers.mapping import TIME_UNITS
+from pipelines.importers.values import finite_column
+from schemas.errors import DataRejected, WrongUse
 from schemas.foreign import shown
 from schemas.units import AXES
 
@@ -27,8 +28,6 @@ EVEN = 1e-3
 
 FEWEST_STEPS = 16
 """Steps from which on a column that always rises is a time: noise does so in one of 10¹⁴ records."""
-
-TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 
 
 @dataclass(frozen=True)
@@ -74,19 +73,12 @@ def series_of_file(
     if time_unit not in TIME_UNITS:
         raise WrongUse(f"--time-unit: found '{shown(time_unit)}', one of {', '.join(TIME_UNITS)} is needed; correct it")
     table, _ = files.read(path)
-    table = table.set_axis([str(name) for name in table.columns], axis=1)
-    there = list(table.columns)
-    for name in (*columns, *([time] if time else [])):
-        if name not in there:
-            raise DataRejected(f"{path.name}: column '{shown(name)}' is not there; {did_you_mean(name, there)}")
-    chosen = list(columns) or [name for name in there if name != time and pd.api.types.is_numeric_dtype(table[name])]
+    chosen = list(columns) or [n for n in table.columns if n != time and pd.api.types.is_numeric_dtype(table[n])]
     if not chosen:
         raise DataRejected(f"{path.name}: no column of numbers, one at least is needed; name one with --columns")
-    values = np.stack([_numbers(table[name], path.name) for name in chosen])
+    values = np.stack([finite_column(table, name, path.name) for name in chosen])
     _refuse_clock(chosen, values, path.name, named=bool(columns), timed=bool(time))
-    rate = (
-        rate_hz if rate_hz is not None else _rate(TIME_UNITS[time_unit] * _numbers(table[time], path.name), path.name)
-    )
+    rate = rate_hz or _rate(TIME_UNITS[time_unit] * finite_column(table, time, path.name), path.name)
     return EvenSeries(tuple(chosen), values, float(rate), unit, path.name)
 
 
@@ -114,22 +106,6 @@ def series_of_run(run: Run, record: int | None = None) -> EvenSeries:
     unit = str(run.table("dwells")["out_unit"].iloc[0]) if "dwells" in run.tables() else ""
     values = np.stack([own[axis].to_numpy(dtype=np.float64) for axis in AXES])
     return EvenSeries(AXES, values, rate, unit, where)
-
-
-def is_series_file(source: str) -> bool:
-    """Whether a source names a file, and no run of the archive."""
-    return is_file(source) or Path(source).is_file()
-
-
-def _numbers(column: pd.Series, where: str) -> Array:
-    values = pd.to_numeric(column, errors="coerce").to_numpy(dtype=np.float64)
-    bad = np.flatnonzero(~np.isfinite(values))
-    if bad.size:
-        raise DataRejected(
-            f"{where}: row {bad[0] + 1}, column '{shown(str(column.name))}': found {shown(str(column.iloc[bad[0]]))}, a finite "
-            "number is needed; remove the gap, or cut the record there"
-        )
-    return values
 
 
 def _refuse_clock(names: Sequence[str], values: Array, where: str, *, named: bool, timed: bool) -> None:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,17 +16,6 @@ from pipelines.importers.content import Content
 from pipelines.importers.stated_units import column_name
 from schemas.errors import DataRejected, WrongUse
 from schemas.foreign import shown
-
-
-@dataclass(frozen=True)
-class JoinedSource(files.SourceFile):
-    """The source of a recording; the files if it has several."""
-
-    parts: tuple[files.SourceFile, ...] = ()
-
-    def as_dict(self) -> dict[str, Any]:
-        """JSON-able."""
-        return {**super().as_dict(), **({"files": [one.as_dict() for one in self.parts]} if self.parts else {})}
 
 
 def read(
@@ -46,23 +34,20 @@ def read(
     DataRejected
         The files do not fit together.
     """
-    read_ones = [files.read_content(path, group) for path in paths]
-    if len(read_ones) == 1:
-        return (*read_ones[0], ())
-    contents, sources = [one[0] for one in read_ones], tuple(one[1] for one in read_ones)
+    if len(paths) == 1:
+        return (*files.read_content(paths[0], group), ())
+    contents, sources = zip(*(files.read_content(path, group) for path in paths), strict=True)
     names = [path.name for path in paths]
     if join == "columns":
         joined, breaks = _beside(contents, names, time), ()
     else:
         joined, breaks = _after(contents, names, time)
-    digest = hashlib.sha256("".join(one.sha256 for one in sources).encode()).hexdigest()
-    about = JoinedSource(
-        " + ".join(one.path for one in sources), digest, sum(one.size for one in sources), sources[0].form, sources
-    )
+    paths_joined, size = " + ".join(source.path for source in sources), sum(source.size for source in sources)
+    about = files.SourceFile(paths_joined, files.digest_of(sources), size, sources[0].form, sources)
     return joined, about, breaks
 
 
-def _after(contents: list[Content], names: list[str], time: str) -> tuple[Content, tuple[int, ...]]:
+def _after(contents: Sequence[Content], names: list[str], time: str) -> tuple[Content, tuple[int, ...]]:
     """Files one after another; a clock that restarts is continued after the file before."""
     first = contents[0]
     columns = list(first.table.columns)
@@ -96,7 +81,7 @@ def _behind(before: pd.DataFrame, table: pd.DataFrame, time: str) -> tuple[pd.Da
     return table.assign(**{time: table[time] + (last - begin + step)}), True
 
 
-def _beside(contents: list[Content], names: list[str], time: str) -> Content:
+def _beside(contents: Sequence[Content], names: list[str], time: str) -> Content:
     """Files side by side: by their clocks if both have the column of time, else row by row."""
     first = contents[0]
     columns: dict[str, Any] = {str(name): column for name, column in first.table.items()}

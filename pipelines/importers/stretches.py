@@ -29,6 +29,11 @@ class Stretches:
         """Their number."""
         return len(self.first)
 
+    def only(self, numbers: Sequence[int]) -> Stretches:
+        """Some of them, by their numbers from 0."""
+        first, last = (tuple(rows[k] for k in numbers) for rows in (self.first, self.last))
+        return Stretches(first, last, tuple(self.labels[k] for k in numbers), self.remarks)
+
 
 def stretches(
     labels: Sequence[str] | None,
@@ -139,10 +144,4 @@ def _named(intervals: Stretches, mapping: Mapping, where: str) -> Stretches:
         raise DataRejected(
             f"{where}: no dwell is labelled '{missing[0]}' (in --poses); {did_you_mean(missing[0], intervals.labels)}"
         )
-    kept = [k for k, label in enumerate(intervals.labels) if label in mapping.poses]
-    return Stretches(
-        tuple(intervals.first[k] for k in kept),
-        tuple(intervals.last[k] for k in kept),
-        tuple(intervals.labels[k] for k in kept),
-        intervals.remarks,
-    )
+    return intervals.only([k for k, label in enumerate(intervals.labels) if label in mapping.poses])

@@ -13,9 +13,10 @@ from inertial.dynamics.transfer_diagnosis import diagnose_transfer
 from inertial.dynamics.transfer_effects import EFFECTS, Conditions
 from inertial.dynamics.transfer_model import Points
 from inertial.errors import InertialError
-from pipelines.archive import Archive, Run, code_hash, stage_key
 from pipelines.importers import files
 from pipelines.importers.documents import TransferImport, TransferParameter
+from pipelines.importers.keep import keep_tables, lot_of_import
+from pipelines.importers.values import finite_column
 from pipelines.procedures.columns import finding_table, gathered_points
 from pipelines.procedures.transfer_figures import bandwidth_of, diagnosis_text
 from schemas.errors import DataRejected, WrongUse, did_you_mean
@@ -47,13 +48,9 @@ def transfer_points(table: pd.DataFrame, name: str) -> Points:
     columns: dict[str, Any] = {}
     for one in (*NEEDED, *OPTIONAL):
         there = one in table.columns
-        values = pd.to_numeric(table[one], errors="coerce") if there else pd.Series(OPTIONAL[one], index=table.index)
-        columns[one] = values.to_numpy(dtype=float)
-        bad = np.flatnonzero(~np.isfinite(columns[one])) if there else np.zeros(0)
-        if bad.size:
-            raise DataRejected(
-                f"{name}: row {int(bad[0]) + 1}, column {one}: a finite number is needed; correct the row"
-            )
+        columns[one] = (
+            finite_column(table, one, name, "correct the row") if there else np.full(len(table), OPTIONAL[one])
+        )
     for one in ("frequency_hz", "magnitude", "magnitude_uncertainty_percent", "phase_uncertainty_deg"):
         if not np.all(columns[one] > 0.0):
             row = int(np.flatnonzero(columns[one] <= 0.0)[0]) + 1
@@ -101,7 +98,10 @@ def import_transfer(
             identified=one.identified,
         )
     text = diagnosis_text(diagnosis)
-    run = _keep(points, source, unit, list(effects), text, archive)
+    stated = {"procedure": "sweep", "effects": list(effects), "unit": unit}
+    about = {"name": f"transfer function of {unit}", "source": source.as_dict(), "lot": lot_of_import([unit])}
+    tables = _tables(points, unit, text)
+    run = keep_tables("import of a transfer function", source.sha256, stated, about, tables, archive)
     return {
         "run": run.id,
         "unit": unit,
@@ -128,24 +128,8 @@ def import_transfer(
     }
 
 
-def _keep(
-    points: Points,
-    source: files.SourceFile,
-    unit: str,
-    effects: list[str],
-    text: Sequence[tuple[str, str]],
-    archive: str | None,
-) -> Run:
-    """The run that holds the import, with a manifest that names the source."""
-    inputs, parameters = {"source": source.sha256}, {"procedure": "sweep", "effects": effects, "unit": unit}
-    code = code_hash("import of a transfer function")
-    key = stage_key("import", inputs, parameters, code)
-    about = {
-        "name": f"transfer function of {unit}",
-        "source": source.as_dict(),
-        "lot": {"device": "imported", "units": [{"serial": unit, "slot": 0}]},
-    }
-    run = Archive(archive).open_run("import", about, {"key": key})
+def _tables(points: Points, unit: str, text: Sequence[tuple[str, str]]) -> dict[str, pd.DataFrame]:
+    """Points and findings for the archive."""
     size, c = np.abs(points.value), points.conditions
     rows = pd.DataFrame(
         {
@@ -156,8 +140,4 @@ def _keep(
         }
     )  # fmt: skip
     findings = [{"unit": unit, "procedure": "sweep", "number": 0, "subject": a, "text": b} for a, b in text]
-    tables = {"procedure_points": gathered_points([(0, "sweep", rows)]), "procedure_findings": finding_table(findings)}
-    if not run.has(tuple(tables), key):
-        run.save("import", key, tables, {"inputs": inputs, "parameters": parameters, "code": code})
-    run.seal()
-    return run
+    return {"procedure_points": gathered_points([(0, "sweep", rows)]), "procedure_findings": finding_table(findings)}

@@ -9,7 +9,6 @@ from __future__ import annotations
 import gzip
 import io
 import zlib
-from collections.abc import Callable
 
 from schemas.errors import DataRejected
 from schemas.foreign import foreign
@@ -62,11 +61,12 @@ def gunzipped(data: bytes, where: str) -> bytes:
     """
     pieces: list[bytes] = []
     size = 0
-    stream = gzip.GzipFile(fileobj=io.BytesIO(data))
-    while piece := _next(lambda: stream.read(PIECE), f"{where}: a gzip file of {len(data)} bytes that does not unpack"):
-        size += len(piece)
-        refuse_larger(size, len(data), where)
-        pieces.append(piece)
+    found = f"{where}: a gzip file of {len(data)} bytes that does not unpack"
+    with foreign(found, "copy it again"), gzip.GzipFile(fileobj=io.BytesIO(data)) as stream:
+        while piece := stream.read(PIECE):
+            size += len(piece)
+            refuse_larger(size, len(data), where)
+            pieces.append(piece)
     return b"".join(pieces)
 
 
@@ -78,19 +78,12 @@ def inflated(data: bytes, room: int, packed: int, where: str) -> bytes:
     room : bytes of the same file that were unpacked before.
     packed : bytes of the file.
     """
-    found = f"{where}: a compressed variable that does not unpack"
     stream, pieces, size = zlib.decompressobj(), list[bytes](), 0
-    while data and not stream.eof:
-        piece = _next(lambda rest=data: stream.decompress(rest, PIECE), found)
-        data = stream.unconsumed_tail
-        size += len(piece)
-        refuse_larger(room + size, packed, where)
-        pieces.append(piece)
-        if not piece and not data:
-            break
+    with foreign(f"{where}: a compressed variable that does not unpack", "copy it again"):
+        while data and not stream.eof:
+            piece = stream.decompress(data, PIECE)
+            data = stream.unconsumed_tail
+            size += len(piece)
+            refuse_larger(room + size, packed, where)
+            pieces.append(piece)
     return b"".join(pieces)
-
-
-def _next(read: Callable[[], bytes], found: str) -> bytes:
-    with foreign(found, "copy it again"):
-        return read()

@@ -9,8 +9,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from inertial.quantities import BY_COLUMN, FORCE_COLUMNS, LARGEST, LARGEST_TIME_S, RECORDED, SPREAD_COLUMNS
-from pipelines.importers.content import Content, row_of
-from schemas.errors import DataRejected
+from pipelines.importers.content import Content
+from schemas.errors import DataRejected, did_you_mean
 from schemas.foreign import foreign, shown
 
 _FORCE_G = 1e4
@@ -74,12 +74,7 @@ def as_numbers(values: pd.Series, where: str, *, flags: bool = False) -> NDArray
 
 
 def finite(
-    values: pd.Series,
-    where: str,
-    content: Content | None = None,
-    *,
-    flags: bool = False,
-    needed: str = "a finite number",
+    values: pd.Series, where: str, content: Content, *, flags: bool = False, needed: str = "a finite number"
 ) -> NDArray[np.float64]:
     """The numbers of a column; others are refused with row, and line if ``content`` knows it."""
     numbers = as_numbers(values, where, flags=flags)
@@ -87,11 +82,30 @@ def finite(
     if bad.size:
         row = int(bad[0])
         raise DataRejected(
-            f"{where}: {row_of(row, content)}, column '{shown(str(values.name))}': found {shown(str(values.iloc[row]))}, "
+            f"{where}: {content.row(row)}, column '{shown(str(values.name))}': found {shown(str(values.iloc[row]))}, "
             f"{needed} is needed ({bad.size} such {'row' if bad.size == 1 else 'rows'}); repair the file, or add --gaps split to "
             "use what lies between"
         )
     refuse_outside(numbers, "", where, label=str(values.name))
+    return numbers
+
+
+def finite_column(
+    table: pd.DataFrame,
+    name: str,
+    where: str,
+    remedy: str = "remove the gap, or cut the recording there",
+) -> NDArray[np.float64]:
+    """The numbers of a column of samples or points; a missing column and a value that is no finite number are refused."""
+    if name not in table.columns:
+        raise DataRejected(f"{where}: column '{shown(name)}' is not there; {did_you_mean(name, list(table.columns))}")
+    numbers = pd.to_numeric(table[name], errors="coerce").to_numpy(dtype=np.float64)
+    bad = np.flatnonzero(~(np.abs(numbers) < LARGEST))
+    if bad.size:
+        found = shown(str(table[name].iloc[bad[0]]))
+        raise DataRejected(
+            f"{where}: row {bad[0] + 1}, column '{shown(name)}': found {found}, a finite number is needed; {remedy}"
+        )
     return numbers
 
 
@@ -101,36 +115,27 @@ def _has_flags(values: pd.Series) -> bool:
     return values.dtype == object and any(isinstance(value, bool | np.bool_) for value in values)
 
 
-def outside(values: NDArray[np.float64], column: str) -> tuple[int, str]:
-    """The first row with an impossible value, and the possible range; −1 if there is none. Gaps count as inside."""
-    low, high = BOUNDS.get(column, (-LARGEST, LARGEST))
-    bad = np.flatnonzero((values < low) | (values > high))
-    if not bad.size:
-        return -1, ""
-    unit = _UNITS.get(column.rsplit("_", 1)[-1], "") if column in BOUNDS else ""
-    return int(bad[0]), _range(low, high, f" {unit}" if unit else "")
-
-
-def _range(low: float, high: float, unit: str) -> str:
-    if low == 0.0 and high >= LARGEST_TIME_S:
-        return f"0{unit} or more is"
-    return f"{low:g} to {high:g}{unit} is"
-
-
 def refuse_outside(
     values: NDArray[np.float64], column: str, where: str, *, label: str = "", first_row: int = 1
 ) -> None:
-    """Refuse impossible values, with row, value and bounds.
+    """Refuse impossible values, with row, value and bounds; gaps count as possible.
 
     Parameters
     ----------
     column : whose bounds hold; those of any number for one without a meaning.
     label : its name in the message; the same by default.
     """
-    row, needed = outside(values, column)
-    if row >= 0:
-        place = f"row {row + first_row}, column {shown(label or column)}"
-        raise DataRejected(f"{where}: {place}: found {values[row]:g}, {needed} needed; correct it, or its unit")
+    low, high = BOUNDS.get(column, (-LARGEST, LARGEST))
+    bad = np.flatnonzero((values < low) | (values > high))
+    if not bad.size:
+        return
+    row = int(bad[0])
+    unit = f" {_UNITS[kind]}" if column in BOUNDS and (kind := column.rsplit("_", 1)[-1]) in _UNITS else ""
+    needed = f"0{unit} or more" if low == 0.0 and high >= LARGEST_TIME_S else f"{low:g} to {high:g}{unit}"
+    raise DataRejected(
+        f"{where}: row {row + first_row}, column {shown(label or column)}: found {values[row]:g}, {needed} is needed; "
+        "correct it, or its unit"
+    )
 
 
 def text(value: Any) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,10 +12,13 @@ import pandas as pd
 from pydantic import ValidationError
 
 from inertial.errors import InertialError
-from pipelines.archive import Archive, Run, code_hash, stage_key
 from pipelines.importers import files
 from pipelines.importers.content import Content, unit_in
 from pipelines.importers.documents import WaveformFigure, WaveformImport
+from pipelines.importers.files import digest_of
+from pipelines.importers.keep import keep_tables, lot_of_import
+from pipelines.importers.mapping import TIME_UNITS
+from pipelines.importers.values import finite_column
 from pipelines.procedures import PROCEDURES
 from pipelines.procedures.base import FromWaveforms, NominalScale
 from pipelines.procedures.columns import figure_table, finding_table, gathered_points
@@ -29,7 +31,7 @@ from schemas.units import AXES
 
 ACCELERATION = {"g": 1.0, "m/s^2": 1.0 / 9.80665, "m/s²": 1.0 / 9.80665, "m/s2": 1.0 / 9.80665, "mg": 1e-3}
 VOLT = {"V": 1.0, "mV": 1e-3}
-TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6}
+TIMES = {**TIME_UNITS, "µs": 1e-6}
 UNEVEN = 0.01
 """Part of a sample interval by which a time may depart from an even grid."""
 
@@ -102,7 +104,15 @@ def import_waveforms(
         texts.append(("not judged", "clipping: full_scale is not given; add it to the file of --part"))
     stated = {"part": content, "columns": dict(layout.columns), "units": dict(layout.units), "rate_hz": layout.rate_hz}
     stated |= {"group": layout.group}
-    run = _keep(procedure, stated, points, values, texts, sources, unit, archive)
+    about = {
+        "name": f"{one.title} of {unit}, recorded elsewhere",
+        "source": sources[0].as_dict(),
+        "sources": [source.as_dict() for source in sources],
+        "lot": lot_of_import([unit]),
+    }
+    parameters = {"procedure": procedure, "unit": unit, **stated}
+    tables = _tables(procedure, unit, points, values, texts)
+    run = keep_tables("import of waveforms", digest_of(sources), parameters, about, tables, archive)
     units = {spec.name: spec.unit for spec in one.figures}
     figures: list[WaveformFigure] = [
         {
@@ -173,14 +183,15 @@ def _recording(
     time = _clock(content, layout, path.name)
     wide = np.zeros((len(time), 3))
     for axis, column in outputs.items():
-        wide[:, AXES.index(axis)] = _values(content, column, path.name)
+        wide[:, AXES.index(axis)] = finite_column(content.table, column, path.name)
     drive_time = _clock(other, layout, path.name)
     drive = np.zeros((len(drive_time), 3))
     place = AXES.index(part.axis) if hasattr(part, "axis") else 0
-    drive[:, place] = known[reference_unit] * _values(other, layout.columns["reference"], path.name)
+    drive[:, place] = known[reference_unit] * finite_column(other.table, layout.columns["reference"], path.name)
     for k, axis in enumerate(AXES):
         if f"reference_{axis}" in layout.columns:
-            drive[:, k] = known[reference_unit] * _values(other, layout.columns[f"reference_{axis}"], path.name)
+            column = layout.columns[f"reference_{axis}"]
+            drive[:, k] = known[reference_unit] * finite_column(other.table, column, path.name)
     return UnitRecord(time, wide), UnitRecord(drive_time, drive), text, source
 
 
@@ -214,7 +225,7 @@ def _clock(content: Content, layout: RecordingLayout, where: str) -> np.ndarray:
             raise DataRejected(
                 f"{where}: column '{shown(column)}' has no unit of time, one of {', '.join(TIMES)} is needed; add --units time=…"
             )
-        time = TIMES[unit] * _values(content, column, where)
+        time = TIMES[unit] * finite_column(content.table, column, where)
         steps = np.diff(time)
         interval = float((time[-1] - time[0]) / max(n - 1, 1))
         if interval <= 0.0 or np.max(np.abs(steps - interval)) > max(UNEVEN, 2e-16 * n) * interval:
@@ -230,47 +241,10 @@ def _clock(content: Content, layout: RecordingLayout, where: str) -> np.ndarray:
     return np.arange(n) * interval
 
 
-def _values(content: Content, column: str, where: str) -> np.ndarray:
-    """The numbers of a column."""
-    if column not in content.table.columns:
-        names = [str(name) for name in content.table.columns]
-        raise DataRejected(f"{where}: column '{shown(column)}' is not there; {did_you_mean(column, names)}")
-    values = pd.to_numeric(content.table[column], errors="coerce").to_numpy(dtype=float)
-    bad = np.flatnonzero(~np.isfinite(values))
-    if bad.size:
-        raise DataRejected(
-            f"{where}: column '{shown(column)}', row {int(bad[0]) + 1}: a finite number is needed; repair or cut the recording"
-        )
-    return values
-
-
-def _keep(
-    procedure: str,
-    stated: Mapping[str, Any],
-    points: pd.DataFrame,
-    values: Sequence[Any],
-    texts: Sequence[tuple[str, str]],
-    sources: Sequence[files.SourceFile],
-    unit: str,
-    archive: str | None,
-) -> Run:
-    """The run that holds the import, with a manifest that names the sources.
-
-    Parameters
-    ----------
-    stated : everything that the command states, as each of it decides the figures: another statement is another run
-    """
-    whole = hashlib.sha256("".join(one.sha256 for one in sources).encode()).hexdigest()
-    inputs, parameters = {"source": whole}, {"procedure": procedure, "unit": unit, **stated}
-    code = code_hash("import of waveforms")
-    key = stage_key("import", inputs, parameters, code)
-    about = {
-        "name": f"{PROCEDURES[procedure].title} of {unit}, recorded elsewhere",
-        "source": sources[0].as_dict(),
-        "sources": [one.as_dict() for one in sources],
-        "lot": {"device": "imported", "units": [{"serial": unit, "slot": 0}]},
-    }
-    run = Archive(archive).open_run("import", about, {"key": key})
+def _tables(
+    procedure: str, unit: str, points: pd.DataFrame, values: Sequence[Any], texts: Sequence[tuple[str, str]]
+) -> dict[str, pd.DataFrame]:
+    """Points, figures and findings for the archive."""
     units = {spec.name: spec.unit for spec in PROCEDURES[procedure].figures}
     rows = [
         {
@@ -281,12 +255,8 @@ def _keep(
         for f in values
     ]  # fmt: skip
     findings = [{"unit": unit, "procedure": procedure, "number": 0, "subject": a, "text": b} for a, b in texts]
-    tables = {
+    return {
         "procedure_points": gathered_points([(0, procedure, points)]),
         "procedure_figures": figure_table(rows),
         "procedure_findings": finding_table(findings),
     }
-    if not run.has(tuple(tables), key):
-        run.save("import", key, tables, {"inputs": inputs, "parameters": parameters, "code": code})
-    run.seal()
-    return run

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from datetime import UTC, datetime
 from typing import Any
 
@@ -78,7 +79,7 @@ def program_run(
             ledger.revoke(serial, REASON, day=day)
         return len(ledger.events(serial)) + 1 if held[serial] is not None else 0
 
-    choice = Choice(choice.form, choice.with_offsets, choice.tolerance_ug, int(datetime.now(UTC).strftime("%Y%m%d")))
+    choice = replace(choice, date=int(datetime.now(UTC).strftime("%Y%m%d")))
     with _station(run, config) as (station, saved), alone(root / TOP, wait=True):
         for _, unit in units:
             _refuse_older(ledger, run, unit.unit, day)

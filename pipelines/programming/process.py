@@ -18,8 +18,14 @@ from pipelines.archive.store import Place
 from pipelines.certificates.programmed import add
 from pipelines.export.device_block import block_of, pack, unpack
 from pipelines.export.polynomials import UnitCalibration
-from pipelines.programming.checks import InPose, require_in_pose, require_moved, write_offsets_again
-from pipelines.programming.outcome import Choice, ProgrammingOutcome
+from pipelines.programming.outcome import (
+    Choice,
+    InPose,
+    ProgrammingOutcome,
+    require_in_pose,
+    require_moved,
+    write_offsets_again,
+)
 from schemas.errors import OperatorNeeded, StationError, StationRefused, TumblelineError, WrongUse
 from schemas.recipe import Recipe
 from schemas.units import STANDARD_GRAVITY_M_S2

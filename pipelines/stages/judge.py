@@ -68,7 +68,7 @@ def adequacy(dwells: pd.DataFrame, history: pd.DataFrame | None, effects: Sequen
         return _not_judged(every_unit_faulty(faults), faulty)
     with threadpool_limits(1):
         verdict = judged(lot, effects, generator())
-    error = error_of(verdict)
+    error = error_of(verdict.rms, verdict.floor, verdict.log_p)
     return {
         "adequate": verdict.adequate,
         "reason": verdict.unjudged or None,

@@ -7,9 +7,8 @@ needs every dwell of every unit and a reference force, as a fit in the output's 
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -46,12 +45,10 @@ class Measured:
     def pick(self, units: list[int]) -> Measured:
         """The same for some units."""
         index = np.asarray(units, dtype=np.intp)
-        picked: dict[str, Any] = {}
-        for name in Readings.__dataclass_fields__:
-            value = getattr(self.readings, name)
-            picked[name] = value[index] if isinstance(value, np.ndarray) else value
+        values = {field.name: getattr(self.readings, field.name) for field in fields(self.readings)}
+        arrays = {name: value[index] for name, value in values.items() if isinstance(value, np.ndarray)}
         names = tuple(self.units[i] for i in units)
-        return Measured(names, self.dwells, Readings(**picked), self.state.pick(index), self.reference)
+        return replace(self, units=names, readings=replace(self.readings, **arrays), state=self.state.pick(index))
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -23,25 +23,6 @@ SMALL_MISFIT = "the misfit is smaller than the noise, but significant"
 _SMALL = 1.1
 _SHOWN = 6  # units, and dwells of each, that a notice of missing dwells lists
 _SEED = 1293
-
-
-class HasFigures(Protocol):
-    """A verdict, or a diagnosis: rms and floor in g, and the natural logarithm of the probability."""
-
-    @property
-    def rms(self) -> float:
-        """Residual of the judged model, g."""
-        ...
-
-    @property
-    def floor(self) -> float:
-        """Noise of the measurement, g."""
-        ...
-
-    @property
-    def log_p(self) -> float:
-        """Natural logarithm of the probability of such a residual if the model is adequate."""
-        ...
 
 
 def generator() -> np.random.Generator:
@@ -123,13 +104,9 @@ def probability(log_p: float) -> float:
     return float(max(np.exp(min(log_p, 0.0)), 1e-300))
 
 
-def error_of(verdict: HasFigures) -> dict[str, Any]:
-    """Residual and noise, µg, and the probability of a verdict."""
-    return {
-        "rms_ug": MICRO * verdict.rms,
-        "floor_ug": MICRO * verdict.floor,
-        "p_value": probability(verdict.log_p),
-    }
+def error_of(rms: float, floor: float, log_p: float) -> dict[str, Any]:
+    """Residual and noise, µg, from g, and the probability of such a residual, from its natural logarithm."""
+    return {"rms_ug": MICRO * rms, "floor_ug": MICRO * floor, "p_value": probability(log_p)}
 
 
 def is_small(error: Mapping[str, Any]) -> bool:

@@ -14,7 +14,7 @@ from inertial.planning.remedies import REMEDIES
 from inertial.planning.sequences import SequenceStep, extended
 from inertial.quantities import BOOKKEEPING, BY_COLUMN, DERIVED, KNOWN_COLUMNS, LEFT_ALONE, RECORDED, column_of
 from inertial.state import State
-from pipelines.importers import exchange, mapping
+from pipelines.importers import mapping
 from pipelines.report.residuals import LABELS
 from pipelines.schedule.planned_state import planned_state
 from pipelines.stages.reduce import KEPT, WHERE_THERE
@@ -47,7 +47,6 @@ def test_a_row_is_whole(row, tmp_path):
     assert (row.column in KNOWN_COLUMNS) == bool(row.attribute)
     assert not row.attribute or row.attribute in {item.name for item in fields(State)}
     assert row.axis_label == LABELS[row.column]
-    assert (row.column in exchange.KNOWN) == bool(row.attribute)
     assert not row.mapped or mapping.MEANINGS[row.mapped] == row.column
     assert not row.formula or (QUANTITIES[row.formula][0] == QUANTITIES[row.column][0] == row.attribute)
     assert not row.attribute or column_of(row.attribute) == row.column

@@ -37,9 +37,9 @@ def of_its_process() -> int:
 
 
 def copies_to(folder: str) -> None:
-    from pipelines.importers.temporary_file import as_file
+    from pipelines.importers.readers.uff58 import as_file
 
-    with as_file(b"x" * 1000, ".uff") as path:
+    with as_file(b"x" * 1000) as path:
         Path(folder, "began").write_text(f"{path} {len(path.read_bytes())}", encoding="utf-8")
         time.sleep(60)
 

@@ -6,13 +6,11 @@ import re
 from collections.abc import Sequence
 from importlib import import_module
 from pkgutil import iter_modules
-from typing import TYPE_CHECKING, Protocol, cast
+from typing import Protocol, cast
 
+from pipelines.export.polynomials import UnitCalibration
 from pipelines.export.settings import ExportSettings
 from schemas.errors import WrongUse
-
-if TYPE_CHECKING:
-    from pipelines.export.polynomials import UnitCalibration
 
 
 class Format(Protocol):

@@ -7,13 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.export.comments import comment
 from pipelines.export.omissions import (
     ACROSS,
     ACROSS_T,
     BIAS_T,
     SCALE,
     SCALE_T,
+    comment,
     comment_lines,
     largest_error_ug,
     omitted,

@@ -11,9 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from pipelines.export.comments import comment
 from pipelines.export.fixed_point import ONE, fixed_point
-from pipelines.export.omissions import largest_error_ug
+from pipelines.export.omissions import comment, largest_error_ug
 from pipelines.export.polynomials import ORDER, UnitCalibration
 from pipelines.export.settings import ExportSettings
 

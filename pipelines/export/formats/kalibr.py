@@ -7,8 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.export.comments import comment
-from pipelines.export.omissions import largest_error_ug
+from pipelines.export.omissions import largest_error_ug, noise_heading
 from pipelines.export.polynomials import UnitCalibration
 from pipelines.export.settings import ExportSettings
 from pipelines.export.unit_noise import required_noise
@@ -36,17 +35,11 @@ def write(units: Sequence[UnitCalibration], run: str, settings: ExportSettings) 
     noise = required_noise(unit.noise, unit.unit, run, NAME)
     factor = STANDARD_GRAVITY_M_S2 / MICRO
     rate = settings.rate_hz or noise.rate_hz
-    lines = [
-        f"# {comment(line)}"
-        for line in (
-            f"noise of accelerometer {unit.unit}, run {run}, static record at {noise.rate_hz:g} Hz",
-            unit.certified,
-            _without_calibration(unit),
-            *([f"not in this file: effects {', '.join(unit.left_out)}"] if unit.left_out else []),
-            "as measured at rest; Kalibr's users multiply by 5 to 20 for motion and temperature",
-            "add gyroscope_noise_density, gyroscope_random_walk and rostopic: this calibration does not contain them",
-        )
-    ]
+    remarks = (
+        "as measured at rest; Kalibr's users multiply by 5 to 20 for motion and temperature",
+        "add gyroscope_noise_density, gyroscope_random_walk and rostopic: this calibration does not contain them",
+    )
+    lines = noise_heading(unit, run, noise, [_without_calibration(unit)], remarks)
     for symbol, key, text in _KEYS:
         values = factor * noise.value[symbol]
         own = ", ".join(f"{axis} {value:.4g}" for axis, value in zip(AXES, values, strict=True))

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from inertial.noise.gauss_markov import flicker_terms
-from pipelines.export.comments import comment
+from pipelines.export.omissions import noise_heading
 from pipelines.export.polynomials import UnitCalibration
 from pipelines.export.settings import ExportSettings
 from pipelines.export.unit_noise import required_noise
@@ -40,20 +40,14 @@ def write(units: Sequence[UnitCalibration], run: str, settings: ExportSettings) 
     terms = flicker_terms(_SHORTEST_S, _LONGEST_S)
     covariance = np.diag(density**2 * rate).ravel()
     remarks = [f"{symbol}: {remark}" for symbol in ("N", "B", "K") if (remark := noise.remark(symbol))]
+    meanings = (
+        "noise_density is N of IEEE Std 952 (two-sided), m/s²/√Hz; imu_utils' acc_n is another quantity",
+        "random_walk: m/s³/√Hz; sigmas: m/s²; times: s; covariance: white noise at update_rate, (m/s²)², row by row",
+        f"bias processes: flat to {100.0 * terms.flatness:.2g} % from {_SHORTEST_S:g} to {_LONGEST_S:g} s",
+        "not in this file: the calibration itself, and the change of the bias from one switch-on to the next",
+    )
     lines = [
-        f"# {comment(line)}"
-        for line in (
-            f"noise of accelerometer {unit.unit}, run {run}, static record at {noise.rate_hz:g} Hz",
-            unit.certified,
-            "noise_density is N of IEEE Std 952 (two-sided), m/s²/√Hz; imu_utils' acc_n is another quantity",
-            "random_walk: m/s³/√Hz; sigmas: m/s²; times: s; covariance: white noise at update_rate, (m/s²)², row by row",
-            f"bias processes: flat to {100.0 * terms.flatness:.2g} % from {_SHORTEST_S:g} to {_LONGEST_S:g} s",
-            "not in this file: the calibration itself, and the change of the bias from one switch-on to the next",
-            *([f"not in this file: effects {', '.join(unit.left_out)}"] if unit.left_out else []),
-            *remarks,
-        )
-    ]
-    lines += [
+        *noise_heading(unit, run, noise, meanings, remarks),
         "/**:",
         "  ros__parameters:",
         f"    update_rate: {rate!r}",

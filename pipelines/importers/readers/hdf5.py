@@ -38,15 +38,11 @@ def read(name: str, data: bytes, group: str) -> Content:
     """
     h5py = library("h5py", EXTRA, f"{name}: an HDF5 file (MATLAB 7.3 among them)")
     broken = f"{name}: an HDF5 file (MATLAB 7.3 among them) that cannot be read"
-    with foreign(broken, REMEDY):
-        file = h5py.File(io.BytesIO(data), "r")
-    with file:
-        with foreign(broken, REMEDY):
-            sets = list(_datasets(h5py, file, "", 0))
-            claimed = sum(int(np.prod(one.shape)) * 8 for _, one in sets)
-        refuse_larger(claimed, len(data), name)
-        columns: dict[str, np.ndarray] = {}
-        for label, dataset in sets:
+    columns: dict[str, np.ndarray] = {}
+    with foreign(broken, REMEDY), h5py.File(io.BytesIO(data), "r") as file:
+        datasets = list(_datasets(h5py, file, "", 0))
+        refuse_larger(8 * sum(int(np.prod(dataset.shape)) for _, dataset in datasets), len(data), name)
+        for label, dataset in datasets:
             with foreign(f"{broken}: dataset {label}", REMEDY):
                 columns |= _columns(label, np.asarray(dataset[()]))
     return Content(_table(columns, group, name))

@@ -33,25 +33,21 @@ def recognised(data: bytes) -> bool:
 def read(name: str, data: bytes, group: str) -> Content:
     """The subchannels of one channel beside `time` in s, calibrated by the file's own coefficients."""
     idelib = library("idelib", EXTRA, f"{name}: an IDE recording")
-    broken = f"{name}: an IDE recording that cannot be read"
     # the library's importFile opens the file itself, and leaves it open where the file is broken
-    with io.BytesIO(data) as stream:
-        with foreign(broken, REMEDY):
-            # the library evaluates these strings as Python: 9**99**99 never returns
-            idelib.parsers.valEval = partial(_number, where=name)
-            dataset = idelib.importer.openFile(stream, quiet=True, name=name)
-            idelib.importer.readData(dataset)
-            channels = {f"{key}": channel for key, channel in dataset.channels.items()}
-            lengths = {key: len(channel.getSession()) for key, channel in channels.items()}
-        filled = {key: n for key, n in lengths.items() if n > 0}
-        if not filled:
+    with io.BytesIO(data) as stream, foreign(f"{name}: an IDE recording that cannot be read", REMEDY):
+        # the library evaluates these strings as Python: 9**99**99 never returns
+        idelib.parsers.valEval = partial(_number, where=name)
+        dataset = idelib.importer.openFile(stream, quiet=True, name=name)
+        idelib.importer.readData(dataset)
+        channels = {f"{key}": channel for key, channel in dataset.channels.items()}
+        lengths = {key: len(channel.getSession()) for key, channel in channels.items()}
+        titles = {f"{key} {channels[key].name}".strip(): key for key, count in lengths.items() if count > 0}
+        if not titles:
             raise DataRejected(f"{name}: no channel with samples in this IDE recording, one is needed; check the file")
-        with foreign(broken, REMEDY):
-            titles = {f"{key} {channels[key].name}".strip(): key for key in filled}
-        titles = {**titles, **({group: group} if group in filled else {})}
-        title = chosen([(t, filled[k]) for t, k in titles.items()], group, name)
-        with foreign(broken, REMEDY):
-            return _content(channels[titles[title]])
+        if group in titles.values():
+            titles[group] = group
+        title = chosen([(title, lengths[key]) for title, key in titles.items()], group, name)
+        return _content(channels[titles[title]])
 
 
 def _number(text: str | bytes, where: str) -> float:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 
 import pandas as pd
 import pyarrow as pa
@@ -44,21 +43,19 @@ def table_of(name: str, data: bytes) -> pd.DataFrame:
     broken = f"{name}: {len(data)} bytes that begin as Parquet but are not a whole file"
     with foreign(broken, REMEDY):
         file = pq.ParquetFile(pa.BufferReader(data))
-        schema, claimed = file.schema_arrow, _claimed(file)
-    _refuse_odd_columns(schema, name)
-    refuse_larger(claimed, len(data), name)
-    labels = [label for label in schema.names if not _INDEX.fullmatch(label)]
-    texts = [field.name for field in schema if _is_text(field.type)]
-    with foreign(broken, REMEDY):
+        schema = file.schema_arrow
+        _refuse_odd_columns(schema, name)
+        refuse_larger(_claimed(file), len(data), name)
+        labels = [label for label in schema.names if not _INDEX.fullmatch(label)]
         # texts stay in their dictionaries until it is known how long they are
+        texts = [field.name for field in schema if _is_text(field.type)]
         reader = pq.ParquetFile(pa.BufferReader(data), read_dictionary=texts)
-    pieces: list[pa.RecordBatch] = []
-    size = 0
-    for piece in _pieces(reader, labels, broken):
-        size += _unpacked(piece)
-        refuse_larger(size, len(data), name)
-        pieces.append(piece)
-    with foreign(broken, REMEDY):
+        pieces: list[pa.RecordBatch] = []
+        size = 0
+        for piece in reader.iter_batches(BATCH_ROWS, columns=labels):
+            size += _unpacked(piece)
+            refuse_larger(size, len(data), name)
+            pieces.append(piece)
         table = pa.Table.from_batches(pieces, reader.schema_arrow.empty_table().select(labels).schema)
         return pd.DataFrame({label: _plain(table.column(label)) for label in labels})
 
@@ -73,19 +70,8 @@ def _claimed(file: pq.ParquetFile) -> int:
     return max(about.num_rows * about.num_columns * VALUE_BYTES, groups)
 
 
-def _pieces(reader: pq.ParquetFile, labels: list[str], broken: str) -> Iterator[pa.RecordBatch]:
-    with foreign(broken, REMEDY):
-        batches = reader.iter_batches(BATCH_ROWS, columns=labels)
-    while True:
-        with foreign(broken, REMEDY):
-            piece = next(batches, None)
-        if piece is None:
-            return
-        yield piece
-
-
 def _unpacked(piece: pa.RecordBatch) -> int:
-    """Bytes of the values of a batch, texts as often as they stand there."""
+    """Bytes of the values of a batch, texts as often as they occur."""
     return sum(VALUE_BYTES * len(column) + _text_bytes(column) for column in piece.columns)
 
 
@@ -103,13 +89,8 @@ def _plain(column: pa.ChunkedArray) -> pd.Series:
 
 
 def _is_text(kind: pa.DataType) -> bool:
-    own = kind.value_type if pa.types.is_dictionary(kind) else kind
-    return (
-        pa.types.is_string(own)
-        or pa.types.is_large_string(own)
-        or pa.types.is_binary(own)
-        or pa.types.is_large_binary(own)
-    )
+    values = kind.value_type if pa.types.is_dictionary(kind) else kind
+    return values in (pa.string(), pa.large_string(), pa.binary(), pa.large_binary())
 
 
 def _refuse_odd_columns(schema: pa.Schema, name: str) -> None:

@@ -24,23 +24,26 @@ REMEDY = "save the data frame again with save(…), or export it with write.csv"
 
 def recognised(data: bytes) -> bool:
     """Whether the file begins as R's saved objects do, also packed by bzip2 or xz (gzip is unpacked before)."""
-    return data.startswith((*_SAVED, *_SINGLE)) or (data.startswith((_BZIP2, _XZ)) and _unpacked_head(data) != b"")
-
-
-def _unpacked_head(data: bytes) -> bytes:
-    """First bytes of what bzip2 or xz packed; empty where that is no R data."""
-    unpack = bz2.BZ2Decompressor() if data.startswith(_BZIP2) else lzma.LZMADecompressor(memlimit=2**27)
     try:
-        head = unpack.decompress(data[: 2**20], 64)
+        return _unpacked(data[: 2**20], 64).startswith((*_SAVED, *_SINGLE))
     except (OSError, lzma.LZMAError, EOFError):
-        return b""
-    return head if head.startswith((*_SAVED, *_SINGLE)) else b""
+        return False
+
+
+def _unpacked(data: bytes, most: int) -> bytes:
+    """At most so many bytes of what bzip2 or xz packed; bytes of another format as they are."""
+    if not data.startswith((_BZIP2, _XZ)):
+        return data
+    unpack = bz2.BZ2Decompressor() if data.startswith(_BZIP2) else lzma.LZMADecompressor(memlimit=2**28)
+    return unpack.decompress(data, most)
 
 
 def read(name: str, data: bytes, group: str) -> Content:
     """The data frame of a file; several are groups to choose from."""
     rdata = library("rdata", EXTRA, f"{name}: a file of R")
-    plain = _plain(name, data)
+    with foreign(f"{name}: a packed file of R that does not unpack", "copy it again"):
+        plain = _unpacked(data, MOST_BYTES + 1)
+    refuse_larger(len(plain), len(data), name)
     suffix = ".rds" if plain.startswith(_SINGLE) else ".rda"
     classes = {**rdata.conversion.DEFAULT_CLASS_MAP, "POSIXct": _times, "integer64": _long_integers}
     with foreign(f"{name}: a file of R that cannot be read", REMEDY):
@@ -78,13 +81,3 @@ def _plain_column(values: pd.Series) -> pd.Series:
     if values.isna().any():
         return values.astype("float64")
     return values.astype("bool" if str(values.dtype) == "boolean" else "int32")
-
-
-def _plain(name: str, data: bytes) -> bytes:
-    if not data.startswith((_BZIP2, _XZ)):
-        return data
-    unpack = bz2.BZ2Decompressor() if data.startswith(_BZIP2) else lzma.LZMADecompressor(memlimit=2**28)
-    with foreign(f"{name}: a packed file of R that does not unpack", "copy it again"):
-        plain = unpack.decompress(data, MOST_BYTES + 1)
-    refuse_larger(len(plain), len(data), name)
-    return plain

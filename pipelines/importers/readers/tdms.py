@@ -32,20 +32,17 @@ def recognised(data: bytes) -> bool:
 def read(name: str, data: bytes, group: str) -> Content:
     """The channels of one group; `time` in s where the file states an interval (``wf_increment``)."""
     nptdms = library("nptdms", EXTRA, f"{name}: a TDMS file")
-    broken = f"{name}: a TDMS file that cannot be read"
     messages = _LibraryLog()
-    with foreign(broken, REMEDY), messages.collected():
+    with foreign(f"{name}: a TDMS file that cannot be read", REMEDY), messages.collected():
         about = nptdms.TdmsFile.read_metadata(io.BytesIO(data))
         claimed = sum(8 * len(channel) for one in about.groups() for channel in one.channels())
-    refuse_larger(claimed, len(data), name)
-    with foreign(broken, REMEDY), messages.collected():
+        refuse_larger(claimed, len(data), name)
         file = nptdms.TdmsFile.read(io.BytesIO(data))
         groups = {one.name: [c for c in one.channels() if len(c) and _numeric(c)] for one in file.groups()}
-    groups = {label: channels for label, channels in groups.items() if channels}
-    if not groups:
-        raise DataRejected(f"{name}: no channel with numbers in this TDMS file, one is needed; check the file")
-    label = chosen([(one, len(channels[0])) for one, channels in groups.items()], group, name)
-    with foreign(broken, REMEDY):
+        groups = {label: channels for label, channels in groups.items() if channels}
+        if not groups:
+            raise DataRejected(f"{name}: no channel with numbers in this TDMS file, one is needed; check the file")
+        label = chosen([(label, len(channels[0])) for label, channels in groups.items()], group, name)
         content = _content(groups[label], name)
     return replace(content, remarks=(*content.remarks, *(f"message of the reader: {text}" for text in messages.texts)))
 

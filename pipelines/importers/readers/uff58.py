@@ -6,13 +6,16 @@ frequency; ordinate type 12 is acceleration.
 
 from __future__ import annotations
 
+import tempfile
+from collections.abc import Generator
+from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from pipelines.importers.content import Content, chosen
-from pipelines.importers.temporary_file import as_file
 from schemas.errors import DataRejected
 from schemas.foreign import foreign, shown
 from schemas.library import library
@@ -34,6 +37,7 @@ ORDINATES = {
     18: "frequency",
     19: "revolutions per minute",
 }
+HANDLES = Path("/proc/self/fd")
 _DIRECTIONS = {1: "+X", -1: "-X", 2: "+Y", -2: "-Y", 3: "+Z", -3: "-Z"}
 
 
@@ -47,12 +51,10 @@ def recognised(data: bytes) -> bool:
 def read(name: str, data: bytes, group: str) -> Content:
     """Time records of one interval and length as columns, beside `time` in s."""
     pyuff = library("pyuff", EXTRA, f"{name}: a universal file (UFF)")
-    broken = f"{name}: a universal file that cannot be read"
-    with as_file(data, ".uff") as path, foreign(broken, REMEDY):
+    with as_file(data) as path, foreign(f"{name}: a universal file that cannot be read", REMEDY):
         file = pyuff.UFF(str(path))
         numbers = [k for k, kind in enumerate(file.get_set_types()) if int(kind) == 58]
         sets: list[dict[str, Any]] = [dict(file.read_sets(k)) for k in numbers]
-    with foreign(broken, REMEDY):
         records = [_record(one) for one in sets if int(one.get("func_type", 0)) == TIME_RECORD]
     if not records:
         raise DataRejected(
@@ -82,6 +84,24 @@ def read(name: str, data: bytes, group: str) -> Content:
     count = len(next(iter(columns.values())))
     table = pd.DataFrame({"time": clock[0] + clock[1] * np.arange(count), **columns})
     return Content(table, tuple(remarks), {"time": "s", **units}, clock[1])
+
+
+@contextmanager
+def as_file(data: bytes) -> Generator[Path]:
+    """The path of a temporary file with the bytes: the library reads from a path only.
+
+    Where the system gives open files a path, it has no other: nothing is left of it, also when the process is killed.
+    """
+    if HANDLES.is_dir():
+        with tempfile.TemporaryFile(prefix="tumbleline-") as file:
+            file.write(data)
+            file.flush()
+            yield HANDLES / str(file.fileno())
+        return
+    with tempfile.TemporaryDirectory(prefix="tumbleline-") as folder:
+        path = Path(folder) / "recording.uff"
+        path.write_bytes(data)
+        yield path
 
 
 def _record(one: dict[str, Any]) -> tuple[str, tuple[float, float, int, int], np.ndarray, str, int]:

@@ -15,8 +15,8 @@ from typing import Any
 
 import pandas as pd
 
+from pipelines.importers.exchange import is_exchange
 from pipelines.importers.limited import ReadingEnded, ReadingLimits, in_reader
-from pipelines.tables.dwell_columns import is_exchange
 from pipelines.tables.frames import rows_of
 from pipelines.workbench.settings import WorkbenchSettings
 from pipelines.workbench.state import UploadPage

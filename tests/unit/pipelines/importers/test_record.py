@@ -41,6 +41,16 @@ def test_dwells_of_a_file_in_which_an_axis_stands_still_are_refused_or_left_out(
     assert len(imported(frame, build({**content, "faulty": "keep"}, "t"), "f.csv").dwells) == 12
 
 
+def test_the_unit_that_a_file_states_for_the_time_of_its_dwells_counts(rng: np.random.Generator) -> None:
+    out = rng.normal(size=(12, 3))
+    frame = pd.DataFrame(out / np.linalg.norm(out, axis=1, keepdims=True), columns=["ax", "ay", "az"])
+    frame = frame.assign(when=60_000.0 * np.arange(12))
+    content = {**CONTENT, "columns": {"time": "when", "x": "ax", "y": "ay", "z": "az"}, "rows": "dwells"}
+    dwells = imported(frame, build(content, "t"), "f.csv", Content(frame, units={"when": "ms"})).dwells
+    assert dwells is not None
+    np.testing.assert_allclose(dwells["time_s"], 60.0 * np.arange(12))
+
+
 def test_one_pose_is_judged_by_bias_and_its_temperature(rng: np.random.Generator) -> None:
     table = lots.lot(rng, units=1)
     assert default_model(table)[:3] == ["bias", "scale", "misalignment"]
