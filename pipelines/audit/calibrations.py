@@ -5,20 +5,19 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from pipelines.audit.index import AuditIndex
 from pipelines.audit.parameters import FAMILY_OF, NAMES
 
 Array = NDArray[np.float64]
 Texts = NDArray[np.object_]
 Flags = NDArray[np.bool_]
 
-if TYPE_CHECKING:
-    from pipelines.audit.index import AuditIndex
 
 DAY_S = 86400.0
 CLOCK_SET_D = 366.0  # a clock that was never set shows 1970

@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inertial.counts import number_of
+from pipelines.audit.audit import Audit
 from pipelines.audit.calibrations import date_of
 from pipelines.audit.due import uncertified
 from pipelines.audit.finding import AuditFinding, some
 
 Numbers = NDArray[np.int64]
 
-if TYPE_CHECKING:
-    from pipelines.audit.audit import Audit
 
 REASONS = {  # reasons in a sentence about overdue units
     "certificate": "their certificate has ended",

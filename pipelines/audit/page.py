@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from inertial.uncertainty.rounding import chance
 from pipelines.audit import pictures as drawn
+from pipelines.audit.audit import Audit
 from pipelines.audit.calibrations import date_of
 from pipelines.audit.document import counts, furthest
 from pipelines.audit.finding import WHO, AuditFinding
@@ -17,9 +18,6 @@ from pipelines.audit.unit_drifts import UnitDrift
 from pipelines.drawing import svg_text
 from pipelines.report.numbers import THIN, significant
 from pipelines.report.templates import template
-
-if TYPE_CHECKING:
-    from pipelines.audit.audit import Audit
 
 MOST_SERIES, MOST_CHARTS, MOST_HISTORIES, MOST_ROWS, MOST_OF_KIND = 8, 4, 4, 25, 40
 

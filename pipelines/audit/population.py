@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -16,14 +15,13 @@ from inertial.population.memory import TO_SIGMA
 from inertial.population.two_way import group_medians
 from pipelines.audit.calibrations import Calibrations, codes, date_of
 from pipelines.audit.drifts import OWN
+from pipelines.audit.index import AuditIndex
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Texts = NDArray[np.object_]
 Numbers = NDArray[np.int64]
 
-if TYPE_CHECKING:
-    from pipelines.audit.index import AuditIndex
 
 FEWEST = 20
 FEWEST_OF_LOT = 3

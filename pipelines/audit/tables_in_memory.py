@@ -7,18 +7,16 @@ import threading
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from weakref import finalize
 
 import pyarrow as pa
 import pyarrow.dataset as ds
 
 from pipelines.audit import datasets
+from pipelines.audit.index import AuditIndex
 from pipelines.audit.run_rows import SCHEMAS
 from schemas.errors import WrongUse
-
-if TYPE_CHECKING:
-    from pipelines.audit.index import AuditIndex
 
 
 @dataclass(frozen=True)

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from inertial.population.comparison import outlier_limit
+from pipelines.audit.audit import Audit
 from pipelines.audit.calibrations import Calibrations, date_of
 from pipelines.audit.finding import AuditFinding, date_or_never
 from pipelines.audit.parameters import unit_text
-
-if TYPE_CHECKING:
-    from pipelines.audit.audit import Audit
-    from pipelines.audit.unit_drifts import UnitDrift
+from pipelines.audit.unit_drifts import UnitDrift
 
 
 def of_units(audit: Audit) -> Iterator[AuditFinding]:

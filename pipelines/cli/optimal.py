@@ -34,9 +34,10 @@ def cheapest_recipe(
     ----------
     base : the recipe to start from; ``name`` : its name on the command line
     """
+    from pipelines.planning.context import plan_context
     from pipelines.planning.optimise import optimise
     from pipelines.planning.optimum_document import optimum_document, own_recipe
-    from pipelines.planning.plan import plan, plan_context
+    from pipelines.planning.plan import plan
     from pipelines.planning.textbook import textbook
     from pipelines.planning.verification_poses import verified_in
 

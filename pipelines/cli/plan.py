@@ -135,7 +135,8 @@ def command(
     from pipelines.jobs.range_of_station import refused_by_run
     from pipelines.jobs.recipes import folder_of
     from pipelines.jobs.terms import planned_terms
-    from pipelines.planning.plan import plan, plan_context
+    from pipelines.planning.context import plan_context
+    from pipelines.planning.plan import plan
     from pipelines.planning.preset_noise import noise_of
     from pipelines.planning.procedure_plan import plan_of_procedures, procedure_rows
     from schemas.station import load_station

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 from pipelines.diagnosis.imported_norms import norm
 from pipelines.importers.faces import six_faces
@@ -12,10 +11,8 @@ from pipelines.importers.mapping import Mapping
 from pipelines.importers.plane import plane, shown_turn
 from pipelines.importers.pose_check import silent_axis
 from pipelines.importers.ramp import ramp
+from pipelines.importers.record import Imported
 from schemas.errors import DataRejected
-
-if TYPE_CHECKING:
-    from pipelines.importers.record import Imported
 
 METHODS: dict[str, Callable[[Imported, Mapping], FitAnswer]] = {
     "norm": norm,

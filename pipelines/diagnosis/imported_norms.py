@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -17,6 +17,7 @@ from inertial.uncertainty.rounding import equal
 from pipelines.diagnosis.diagnose import default_model, diagnose
 from pipelines.importers.judged import FitAnswer, gravity_of, imported_dwells
 from pipelines.importers.mapping import Mapping
+from pipelines.importers.record import Imported
 from pipelines.stages.judge import AdequacyDocument, told_by, verdict_table
 from pipelines.stages.unknown_poses.fit import FittedNorms, bias_uncertainty, fitted_dwells, norm_tables, norms_fitted
 from pipelines.tables.condense import MOST
@@ -25,8 +26,6 @@ from schemas.units import AXES, MICRO, STANDARD_GRAVITY_M_S2
 
 Array = NDArray[np.float64]
 
-if TYPE_CHECKING:
-    from pipelines.importers.record import Imported
 
 COVERAGE = 2.0
 TEMPERATURE = "bias_temperature"

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 from inertial.decisions import CONFIRMED, LEFT_OUT
 from pipelines.diagnosis.confirmation import fall_of
-
-if TYPE_CHECKING:
-    from pipelines.jobs.model_files import Version
+from pipelines.jobs.model_files import Version
 
 FIGURES = {
     "fitted_ug": "rms_ug",

@@ -14,9 +14,10 @@ from inertial.errors import NotIdentified
 from inertial.planning.expected import Expected
 from inertial.planning.pose_exchange import exchanged
 from inertial.planning.visibility import visibilities
+from pipelines.planning.context import PlanContext, plan_context
 from pipelines.planning.dwell_counts import FEWEST, MOST, fewest_dwells
 from pipelines.planning.lower_bound import lower_bound
-from pipelines.planning.plan import PlanContext, identified, plan_context
+from pipelines.planning.plan import identified
 from pipelines.planning.requirement import Requirement
 from pipelines.planning.soak_orders import mirrored, orders
 from pipelines.planning.textbook import PART_SEEN

@@ -8,9 +8,10 @@ from typing import Any
 from inertial.errors import NotIdentified
 from inertial.planning.expected import Expected
 from inertial.planning.visibility import visibilities
+from pipelines.planning.context import PlanContext, plan_context
 from pipelines.planning.discrimination import rival_separations
 from pipelines.planning.optimise import Optimum
-from pipelines.planning.plan import PlanContext, identified, plan_context
+from pipelines.planning.plan import identified
 from pipelines.schedule.timing import spent
 from schemas.recipe import Recipe
 from schemas.units import MICRO

@@ -12,7 +12,8 @@ from inertial.errors import NotIdentified
 from inertial.planning.expected import expected_errors
 from inertial.planning.visibility import visibilities
 from inertial.state import State
-from pipelines.planning.plan import PlanContext, identified, plan_context
+from pipelines.planning.context import PlanContext, plan_context
+from pipelines.planning.plan import identified
 from pipelines.planning.verification_poses import numbered
 from pipelines.schedule.planned_state import planned_state
 from schemas.recipe import Recipe

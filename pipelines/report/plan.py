@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pipelines.drawing import svg_text
+from pipelines.planning.context import PlanContext
 from pipelines.report.budget_plots import shares_plot
 from pipelines.report.numbers import scientific, significant
 from pipelines.report.plan_pictures import alias_chart, sight_chart, sphere_chart, temperature_chart
 from pipelines.report.templates import template
 from schemas.decisions import LARGEST_ERROR
-
-if TYPE_CHECKING:
-    from pipelines.planning.plan import PlanContext
 
 
 def render_plan(document: dict[str, Any], context: PlanContext) -> str:

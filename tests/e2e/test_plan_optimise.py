@@ -15,8 +15,8 @@ from pipelines.cli import app
 from pipelines.cli.optimal import missing_limits
 from pipelines.jobs.recipe_text import limits_from, recipe_text
 from pipelines.jobs.recipes import load_recipe, sample_names
+from pipelines.planning.context import plan_context
 from pipelines.planning.lower_bound import lower_bound
-from pipelines.planning.plan import plan_context
 from pipelines.planning.requirement import Requirement, candidates
 from pipelines.planning.soak_orders import orders, soak_seconds
 from pipelines.planning.textbook import reference_errors, textbook

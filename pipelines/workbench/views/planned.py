@@ -43,7 +43,8 @@ def recipe_of(request: Mapping[str, Any]) -> tuple[Recipe, Recipe, StationConfig
 
 def planned(request: Mapping[str, Any]) -> dict[str, Any]:
     """``document``, ``charts`` and ``poses`` of a plan; ``before``: the effects of the recipe by name, where poses are moved."""
-    from pipelines.planning.plan import plan, plan_context
+    from pipelines.planning.context import plan_context
+    from pipelines.planning.plan import plan
     from pipelines.planning.preset_noise import noise_of
     from pipelines.report.plan_pictures import sphere_chart, temperature_chart
 

@@ -10,8 +10,9 @@ from inertial.frames import force_from_angles
 from inertial.noise.dwells import DwellNoise, dwell_covariance
 from pipelines.jobs.model_files import STARTING_MODEL
 from pipelines.jobs.recipes import load_recipe
+from pipelines.planning.context import plan_context
 from pipelines.planning.dwell_counts import FEWEST, fewest_dwells, smallest_passing
-from pipelines.planning.plan import identified, plan_context
+from pipelines.planning.plan import identified
 from pipelines.planning.requirement import Requirement, candidates, temperature_choices
 from pipelines.planning.soak_orders import mirrored, orders
 from pipelines.planning.textbook import reference_errors, textbook
