@@ -27,9 +27,8 @@ from pipelines.workbench.pages import (
     table_csv,
     workbench_of,
 )
-from pipelines.workbench.questions import history_question
 from pipelines.workbench.services.samples import samples_of
-from pipelines.workbench.state import UnitPage
+from pipelines.workbench.state import UnitPage, quoted
 from schemas.errors import WrongUse
 
 router = APIRouter()
@@ -135,6 +134,15 @@ def _history(bench: Workbench, serial: str) -> list[dict[str, Any]]:
     answer = bench.index.of_unit(serial, history_question(serial))
     rows = [dict(zip(answer.columns, row, strict=True)) for row in answer.rows]
     return [{**row, "day": day_of(str(row["measured"]))} for row in rows if row["measured"]]
+
+
+def history_question(unit: str) -> str:
+    """The coefficients of a unit in all its runs, in SQL."""
+    return (
+        "SELECT measured, run, effect, name, axis, value, standard_error, unit_text "  # noqa: S608 - the serial is quoted
+        "FROM coefficients JOIN runs USING (run) "
+        f"WHERE unit = {quoted(unit)} AND rerun_of = '' ORDER BY measured, run"
+    )
 
 
 def _parameter(row: dict[str, Any]) -> str:

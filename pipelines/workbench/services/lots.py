@@ -12,13 +12,14 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pipelines.archive import files
+from pipelines.archive import Archive, files
 from pipelines.archive.keys import digest
+from pipelines.jobs.job import Request
 from pipelines.workbench.settings import WorkbenchSettings
 from schemas.errors import TumblelineError, WrongUse
 
@@ -71,10 +72,7 @@ class LotState:
         return self.ended or self.phase == PAUSED
 
 
-def start(
-    settings: WorkbenchSettings, recipe: str, units: Sequence[str], slots: Sequence[int], faults: Sequence[str], repeat: int,
-    station: Path | None = None,
-) -> LotState:  # fmt: skip
+def start(settings: WorkbenchSettings, lot_request: Request) -> LotState:
     """A new lot on a station, or the continuation of the same stopped lot.
 
     Raises
@@ -82,20 +80,9 @@ def start(
     TumblelineError
         The recipe, the seats or the faults are invalid; nothing was moved.
     """
-    from pipelines.archive import Archive
-    from pipelines.jobs.job import Request
-
-    if len(set(units)) < len(units):
-        twice = next(unit for unit in units if list(units).count(unit) > 1)
+    twice = next((unit for unit in lot_request.units if lot_request.units.count(unit) > 1), None)
+    if twice is not None:
         raise WrongUse(f"lot: serial '{twice}' is in two slots, each unit has one; scan the slots again")
-    lot_request = Request(
-        recipe=recipe,
-        station=station,
-        units=tuple(units),
-        slots=tuple(slots),
-        repeat=repeat,
-        faults=tuple(faults),
-    )
     job = lot_request.job(Archive(settings.archive))
     content = {
         **lot_request.parameters(),
@@ -104,7 +91,7 @@ def start(
     }
     name = digest(content)[:12]
     for other in lots(settings):
-        if not other.ended and other.id != name and other.station == str(station or ""):
+        if not other.ended and other.id != name and other.station == str(lot_request.station or ""):
             raise WrongUse(
                 f"lot: the station has lot {other.id} ({other.phase}), one lot at a time is possible; finish or stop that one "
                 "first"
@@ -129,17 +116,14 @@ def start(
 
 def again(settings: WorkbenchSettings, name: str) -> LotState:
     """The continuation of a stopped lot."""
-    request = files.read_json(place_of(settings, name) / "request.json")
-    station = Path(request["station"]) if request["station"] else None
-    return start(
-        settings,
-        request["recipe"],
-        request["units"],
-        request["slots"],
-        request["faults"],
-        int(request["repeat"]),
-        station,
-    )
+    return start(settings, request_of(files.read_json(place_of(settings, name) / "request.json")))
+
+
+def request_of(content: Mapping[str, Any]) -> Request:
+    """The request of a lot, from its file."""
+    station = Path(content["station"]) if content["station"] else None
+    lists = {name: tuple(content[name]) for name in ("units", "slots", "faults")}
+    return Request(content["recipe"], station, seed=content["seed"], repeat=int(content["repeat"]), **lists)
 
 
 def answer(settings: WorkbenchSettings, name: str, number: int, reply: str) -> LotState:
