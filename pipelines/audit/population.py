@@ -238,17 +238,22 @@ def odd_ones(calibrations: Calibrations, chosen: Flags) -> list[Odd]:
 
 def _odd_units(calibrations: Calibrations, device: str, rows: Numbers, values: Array, odd_lots: set[str]) -> list[Odd]:
     z = np.nan_to_num(robust_z(values))
-    worst = np.argmax(np.abs(z), axis=1)
-    size = np.abs(z[np.arange(rows.size), worst])
     outliers: list[Odd] = []
-    for k in np.flatnonzero(size > outlier_limit(z.size, rows.size)):
-        row, column = rows[k], worst[k]
+    for k, column in _outliers(z):
+        row = rows[k]
         if str(calibrations.run[row]) not in odd_lots:
             outliers.append(
                 Odd("unit", str(calibrations.unit[row]), device, str(calibrations.station[row]), str(calibrations.run[row]),
                     float(calibrations.day[row]), OWN[column], float(values[k, column]), float(z[k, column]), 1)
             )  # fmt: skip
     return outliers
+
+
+def _outliers(z: Array) -> list[tuple[int, int]]:
+    """Rows of distances in σ (n, p) whose largest one is an outlier, with its column."""
+    worst = np.argmax(np.abs(z), axis=1)
+    size = np.abs(z[np.arange(len(z)), worst])
+    return [(int(k), int(worst[k])) for k in np.flatnonzero(size > outlier_limit(z.size, len(z)))]
 
 
 def _error_of_lots(values: Array, lot: Numbers) -> Array:
@@ -269,11 +274,9 @@ def _odd_lots(calibrations: Calibrations, device: str, rows: Numbers, values: Ar
     # medians, so that a single outlier is reported as a unit and not as its lot
     means = np.stack([group_medians(values[:, c], lot) for c in range(values.shape[1])], axis=1)[large]
     z = np.nan_to_num(unlike(means, _error_of_lots(values, lot)[large]))
-    worst = np.argmax(np.abs(z), axis=1)
-    size = np.abs(z[np.arange(large.size), worst])
     out: list[Odd] = []
-    for k in np.flatnonzero(size > outlier_limit(z.size, large.size)):
-        run, column = str(runs[large[k]]), worst[k]
+    for k, column in _outliers(z):
+        run = str(runs[large[k]])
         row = rows[np.flatnonzero(lot == large[k])[0]]
         out.append(
             Odd("lot", run, device, str(calibrations.station[row]), run, float(calibrations.day[row]), OWN[column],

@@ -76,7 +76,7 @@ def compared(
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(1), error_console().status("fitting"):
-        from pipelines.diagnosis.diagnose import compare  # loads the search for effects: after the first line
+        from pipelines.diagnosis.compare import compare  # loads the search for effects: after the first line
 
         return compare(dwells, effects, history, fresh, fresh_history)
 

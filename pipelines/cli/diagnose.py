@@ -133,7 +133,7 @@ def diagnosed(
 
     keep_memory()
     with threadpool_limits(1), error_console().status("looking for missing effects"):
-        from pipelines.diagnosis.examination import examination  # loads the search for effects: after the first line
+        from pipelines.diagnosis.diagnose import examination  # loads the search for effects: after the first line
 
         made = examination(table, history, judged, left_out)
     if not with_report:

@@ -72,7 +72,7 @@ def command(
     """
     from pipelines.archive import Archive
     from pipelines.archive.signatures import public_keys
-    from pipelines.audit.index_check import check_index
+    from pipelines.audit.index import check_index
     from pipelines.cli.certificate_check import certificate_files, check_certificates
     from pipelines.integrity import verify
     from schemas.errors import WrongUse

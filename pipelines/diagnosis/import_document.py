@@ -49,7 +49,7 @@ def import_document(
         data = record.imported(content.table, how, name, content, breaks)
     judged = None
     if fit:
-        from pipelines.diagnosis.imported import judge
+        from pipelines.diagnosis.imported_norms import judge
 
         with working("fitting and judging"):
             judged = judge(fit, data, how)

@@ -46,7 +46,6 @@ NEEDED = (
     "pipelines.capture.capture",
     "pipelines.jobs.adequacy",
     "pipelines.jobs.references",
-    "pipelines.report.run_page",
     "stations.opening",
 )
 SIMULATED = ("stations.plant.plant", "stations.plant.server", "stations.plant.line_server")

@@ -78,7 +78,7 @@ def errors_by_version(
 
     def compared(effects: list[str], before: list[str] | None) -> dict[str, Any]:
         with threadpool_limits(1), working():
-            from pipelines.diagnosis.diagnose import compare  # loads the search for effects: after the first line
+            from pipelines.diagnosis.compare import compare  # loads the search for effects: after the first line
 
             return compare(tables.dwells, effects, tables.history, tables.fresh, tables.fresh_history, before)
 
@@ -153,7 +153,7 @@ class Improvement:
 
         keep_memory()
         with threadpool_limits(1), self.attendant.working("looking for missing effects"):
-            from pipelines.diagnosis.examination import (
+            from pipelines.diagnosis.diagnose import (
                 examination,  # loads the search for effects: after the first line
             )
 

@@ -6,6 +6,7 @@ from typing import Any
 
 from pipelines.drawing import svg_text
 from pipelines.planning.context import PlanContext
+from pipelines.report.axes import side_by_side
 from pipelines.report.budget_plots import shares_plot
 from pipelines.report.numbers import scientific, significant
 from pipelines.report.plan_pictures import alias_chart, sight_chart, sphere_chart, temperature_chart
@@ -26,7 +27,7 @@ def render_plan(document: dict[str, Any], context: PlanContext) -> str:
         recipe=context.recipe,
         number=significant,
         scientific=scientific,
-        coefficients=_coefficients(document["coefficients"]),
+        coefficients=side_by_side(document["coefficients"], lambda row: significant(row["uncertainty_ug"]), "unit"),
         seen=[row for row in document["effects"] if row["seen"]],
         unseen=[row for row in document["effects"] if not row["seen"]],
         **pictures(document, context),
@@ -58,21 +59,3 @@ def _budget(reach: dict[str, Any] | None) -> str:
     return shares_plot(
         {f"{titles.get(q, q)}, {row['axis']}": row["shares"] for q, row in worst.items() if row["shares"]}
     )
-
-
-def _coefficients(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """One line per coefficient, its axes side by side."""
-    lines: dict[tuple[str, int, bool], dict[str, Any]] = {}
-    count: dict[tuple[str, str], int] = {}
-    for row in rows:
-        place = count.get((row["effect"], row["axis"]), 0)
-        count[row["effect"], row["axis"]] = place + 1
-        shared = row["axis"] == "*"
-        line = lines.setdefault(
-            (row["effect"], place, shared), {"effect": row["effect"], "unit": row["unit"], "cells": {}, "names": []}
-        )
-        line["names"].append(row["name"])
-        line["cells"]["x" if shared else row["axis"]] = significant(row["uncertainty_ug"])
-    for line in lines.values():
-        line["names"] = ", ".join(dict.fromkeys(line["names"]))
-    return list(lines.values())

@@ -8,11 +8,10 @@ from each import each
 
 from deploy.release import unpack
 from pipelines.archive import Archive
-from pipelines.report import panel, render
+from pipelines.report import PANELS, panel, render
 from pipelines.report.context import ReportContext
 from pipelines.report.panel import IncompletePanel, panels, rendered
 from pipelines.report.panels.unit_by_unit import UNIT_PANELS
-from pipelines.report.run_page import PANELS
 
 ROOT = Path(__file__).resolve().parents[2]
 KEPT = ROOT / "tests" / "archives" / "v1.tar.xz"

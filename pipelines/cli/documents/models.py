@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal, NotRequired
 
 from typing_extensions import TypedDict
 
-from pipelines.diagnosis.documents.diagnosis import DiagnosisDocument, LeaveOut, VerdictEvidence
+from pipelines.diagnosis.documents import DiagnosisDocument, LeaveOut, VerdictEvidence
 
 
 class ImprovementChoice(TypedDict):

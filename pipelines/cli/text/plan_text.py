@@ -130,15 +130,14 @@ def _longer(dwell: dict[str, float]) -> str:
 
 def _coefficient_lines(rows: list[dict[str, Any]]) -> list[list[str]]:
     """One line per coefficient with its three axes; one value for parameters of the station."""
-    lines: dict[tuple[str, int], list[str]] = {}
-    count: dict[tuple[str, str], int] = {}
-    for row in rows:
-        place = count.get((row["effect"], row["axis"]), 0)
-        count[row["effect"], row["axis"]] = place + 1
-        key = (row["effect"], place if row["axis"] != "*" else 100 + place)
-        line = lines.setdefault(key, [f"{row['effect']}, {row['unit']}", "", "", ""])
-        line[1 + max(0, "xyz".find(row["axis"]))] = short(row["uncertainty_ug"])
-    return list(lines.values())
+    from pipelines.report.axes import side_by_side
+
+    lines = side_by_side(rows, lambda row: short(row["uncertainty_ug"]), "unit")
+    axes = [["*" if "*" in line["cells"] else "x", "y", "z"] for line in lines]
+    return [
+        [f"{line['effect']}, {line['unit']}", *(line["cells"].get(axis, "") for axis in own)]
+        for line, own in zip(lines, axes, strict=True)
+    ]
 
 
 def _visible_line(row: dict[str, Any]) -> list[str]:

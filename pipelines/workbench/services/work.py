@@ -73,8 +73,7 @@ def diagnose(request: Mapping[str, Any], report_progress: ReportProgress) -> Dia
     steps = 4
     report_progress(0, steps, "reading the dwells")
     from inertial.quantities import formula_names
-    from pipelines.diagnosis.diagnose import default_model
-    from pipelines.diagnosis.examination import examination
+    from pipelines.diagnosis.diagnose import default_model, examination
     from pipelines.report.residual_table import ladder_of, residual_table, residuals_with
     from pipelines.tables.condense import condense
     from pipelines.tables.dwell_table import covariates
@@ -219,10 +218,9 @@ def audited(request: Mapping[str, Any], report_progress: ReportProgress) -> dict
     report_progress(0, 2, "reading the runs")
     from pipelines.archive import Archive
     from pipelines.audit import pictures
-    from pipelines.audit.audit import audit
+    from pipelines.audit.audit import audit, scope_of
     from pipelines.audit.document import document, furthest
     from pipelines.audit.findings import findings
-    from pipelines.audit.period import scope_of
     from pipelines.audit.rules import load_rules
 
     scope = scope_of(*(str(request[name]) for name in ("since", "until", "device", "station")))
