@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Flags
 from pipelines.archive import Archive
 from pipelines.audit.calibrations import Calibrations, captures_of, dated_runs, day_of, first_runs, left_out, load
 from pipelines.audit.certificates import Certificates, certificates_of
@@ -33,8 +33,6 @@ from pipelines.certificates.days import FIRST, today
 from pipelines.certificates.days import day_of as checked
 from pipelines.parallel import Distributor
 from schemas.errors import WrongUse
-
-Flags = NDArray[np.bool_]
 
 LIMITED = {  # families with a limit of the value: figure, and units of the parameter per unit of the figure
     "bias": ("zero_g_offset_mg", 1e3),

@@ -10,13 +10,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from inertial.arrays import Array, Flags, Index, Texts
 from pipelines.audit.index import AuditIndex
 from pipelines.audit.parameters import FAMILY_OF, NAMES
-
-Array = NDArray[np.float64]
-Texts = NDArray[np.object_]
-Flags = NDArray[np.bool_]
-
 
 DAY_S = 86400.0
 CLOCK_SET_D = 366.0  # a clock that was never set shows 1970
@@ -34,7 +30,7 @@ class Calibrations:
     unit: Texts
     device: Texts
     station: Texts
-    slot: NDArray[np.int64]
+    slot: Index
     outcome: Texts
     day: Array
     values: Array
@@ -43,7 +39,7 @@ class Calibrations:
     def __len__(self) -> int:
         return self.day.size
 
-    def chosen(self, which: Flags | NDArray[np.int64]) -> Calibrations:
+    def chosen(self, which: Flags | Index) -> Calibrations:
         """The chosen calibrations, in their order."""
         return Calibrations(*(getattr(self, name)[which] for name in self.__dataclass_fields__))
 
@@ -56,13 +52,13 @@ class Calibrations:
         return self.errors[:, NAMES.index(name)]
 
     @property
-    def histories(self) -> NDArray[np.int64]:
+    def histories(self) -> Index:
         """Number of the unit of every calibration, from 0; the same serial on two kinds of device is two units."""
         pair = (self.unit[1:] != self.unit[:-1]) | (self.device[1:] != self.device[:-1])
         return np.concatenate([[0], np.cumsum(pair)]) if len(self) else np.zeros(0, dtype=np.int64)
 
 
-def codes(texts: NDArray[Any]) -> NDArray[np.int64]:
+def codes(texts: NDArray[Any]) -> Index:
     """Texts as numbers from 0, in their alphabetical order."""
     return np.unique(texts.astype(str), return_inverse=True)[1].astype(np.int64)
 

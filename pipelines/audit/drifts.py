@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Flags
 from inertial.population.drift import (
     DeviceDrift,
     LatestState,
@@ -22,10 +22,6 @@ from pipelines.audit.calibrations import Calibrations
 from pipelines.audit.pairs import YEAR_D, Pairs, changes_of, e_n_of, pairs_of, spans_of
 from pipelines.audit.parameters import FAMILIES, FAMILY_OF, NAMES
 from pipelines.audit.rules import Rules
-
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-Index = NDArray[np.int64]
 
 MONTH_D = YEAR_D / 12.0
 OWN = tuple(name for name in NAMES if FAMILIES[FAMILY_OF[name]].own)

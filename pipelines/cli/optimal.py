@@ -36,8 +36,7 @@ def cheapest_recipe(
     """
     from pipelines.planning.context import plan_context
     from pipelines.planning.optimise import optimise
-    from pipelines.planning.optimum_document import optimum_document, own_recipe
-    from pipelines.planning.plan import plan
+    from pipelines.planning.optimum_document import optimum_document
     from pipelines.planning.textbook import textbook
     from pipelines.planning.verification_poses import verified_in
 
@@ -50,7 +49,7 @@ def cheapest_recipe(
         best = optimise(
             base, against, requirement, lambda note: status.update(f"searching: {note}"), tolerance=tolerance
         )
-    return best, optimum_document(best, plan(best.planned), own_recipe(base, name, best))
+    return best, optimum_document(best, base, name)
 
 
 def written(best: Optimum, target: Path, home: Path, own: dict[str, Any]) -> str:

@@ -135,9 +135,8 @@ def command(
     from pipelines.jobs.range_of_station import refused_by_run
     from pipelines.jobs.recipes import folder_of
     from pipelines.jobs.terms import planned_terms
-    from pipelines.planning.context import plan_context
+    from pipelines.planning.context import noise_of, plan_context
     from pipelines.planning.plan import plan
-    from pipelines.planning.preset_noise import noise_of
     from pipelines.planning.procedure_plan import plan_of_procedures, procedure_rows
     from schemas.station import load_station
 
@@ -270,7 +269,7 @@ def optimise(
     from pipelines.cli.optimise_options import OptimiseOptions
     from pipelines.cli.standard_output import is_standard_output, print_text
     from pipelines.jobs.recipes import folder_of
-    from pipelines.planning.preset_noise import noise_of
+    from pipelines.planning.context import noise_of
     from schemas.station import load_station
 
     printed = is_standard_output(output, "plan optimise", as_json=as_json)

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
+from inertial.arrays import Array
 from inertial.counts import degrees_of_freedom
 from inertial.state import T_REFERENCE
 from inertial.uncertainty.rounding import equal
@@ -27,9 +27,6 @@ from pipelines.stages.unknown_poses.fit import FittedNorms, bias_uncertainty, fi
 from pipelines.tables.condense import MOST
 from schemas.errors import DataRejected
 from schemas.units import AXES, MICRO, STANDARD_GRAVITY_M_S2
-
-Array = NDArray[np.float64]
-
 
 COVERAGE = 2.0
 TEMPERATURE = "bias_temperature"

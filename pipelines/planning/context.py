@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial.noise.dwells import DwellNoise, dwell_covariance
+from inertial.noise.flicker import FLICKER_FLOOR
 from inertial.planning.visibility import SEEN, visibilities
 from inertial.state import State
 from pipelines.schedule.planned_state import state_of
@@ -17,9 +18,12 @@ from pipelines.schedule.timing import Activity, schedule
 from schemas.errors import RecipeInvalid
 from schemas.recipe import Recipe
 from schemas.station import StationConfig
+from stations.plant.preset import load_preset
 
 OF_VERIFICATION = "only the verification poses show it, which a diagnosis uses and a fit leaves out"
 REMEDY = "move poses from 'verification' to 'poses', and verify in others"
+
+UG = 1e-6  # of g
 
 
 @dataclass(frozen=True)
@@ -84,3 +88,20 @@ def with_verification_hint(text: str, activities: Sequence[Activity], station: S
     named = [effect for effect in recipe.effects if f"{effect} cannot be identified" in text]
     checked = sorted(shown_by_verification(activities, station, recipe, named))
     return f"{text}; {', '.join(checked)}: {OF_VERIFICATION}; {REMEDY}" if checked else text
+
+
+def noise_of(recipe: Recipe, device: str, density: float | None, wander: float | None) -> DwellNoise:
+    """Noise of a preset, with given values in place of the preset's.
+
+    Parameters
+    ----------
+    device : preset; the recipe's device where it is empty
+    density : white noise, µg/√Hz · wander : flicker floor of the Allan deviation, µg
+    """
+    if density is not None and wander is not None:
+        return DwellNoise(density * UG, wander * UG / FLICKER_FLOOR)
+    preset = load_preset(device or recipe.device)
+    white = preset.sampled_density_ug(recipe.rate_hz) if density is None else density
+    if wander is not None:
+        return DwellNoise(white * UG, wander * UG / FLICKER_FLOOR)
+    return DwellNoise(white * UG, preset.bias_instability_ug * UG, preset.rate_random_walk_ug * UG)

@@ -7,17 +7,14 @@ from itertools import permutations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inertial import design
+from inertial.arrays import Array
 from inertial.planning.discrimination import Discrimination
 from pipelines.planning.context import PlanContext
 from pipelines.planning.requirement import Requirement, candidates, temperature_choices
 from schemas.errors import WrongUse
 from schemas.units import MICRO
-
-Array = NDArray[np.float64]
-
 
 ENOUGH = 50.0
 """χ² of the wrong effect over a lot from which two effects count as discriminated."""

@@ -7,11 +7,9 @@ from dataclasses import replace
 from itertools import permutations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from pipelines.planning.timed_design import PlanDesign, TimedDesign
-
-Array = NDArray[np.float64]
 
 FEWEST = 4
 """Minimum number of dwells of a soak: the reference pose at both ends, and two other poses between."""

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from itertools import permutations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inertial import design
+from inertial.arrays import Array
 from inertial.noise.dwells import dwell_covariance
 from pipelines.planning.context import PlanContext
 from pipelines.planning.requirement import Requirement
@@ -23,9 +23,6 @@ from pipelines.planning.timed_design import soak_waits
 from pipelines.schedule.planned_state import settled_state
 from pipelines.schedule.timing import spent
 from schemas.recipe import Recipe
-
-Array = NDArray[np.float64]
-
 
 RESTED_S = 1e4  # s at rest before a dwell: nothing of the last move is left
 PIECE_S = 120.0

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial import design
+from inertial.arrays import Array
 from inertial.errors import NotIdentified
 from inertial.planning.expected import Expected
 from inertial.planning.pose_exchange import exchanged
@@ -28,7 +29,6 @@ from schemas.errors import RecipeInvalid
 from schemas.poses import SoakPart
 from schemas.recipe import Recipe
 
-Array = NDArray[np.float64]
 Progress = Callable[[str], None]
 
 TRIED = 3

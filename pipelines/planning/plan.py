@@ -7,9 +7,9 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inertial import effects as catalogue
+from inertial.arrays import Array
 from inertial.effects import SensorEffect
 from inertial.errors import NotIdentified
 from inertial.noise.dwells import dwell_covariance
@@ -26,8 +26,6 @@ from pipelines.stages.uncertainty.budget_terms import BudgetTerms
 from pipelines.tables.calibration import unit_texts
 from schemas.limits import Limits
 from schemas.units import AXES, MICRO
-
-Array = NDArray[np.float64]
 
 NO_SWITCH_ON = "no repeatability of switching on is stated for this device"
 

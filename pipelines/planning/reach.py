@@ -6,8 +6,8 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.uncertainty.period import Windows, flicker_within
 from pipelines.planning.context import PlanContext
 from pipelines.schedule.planned_dwells import planned_dwells
@@ -16,8 +16,6 @@ from pipelines.stages.uncertainty.reachable import PlannedDwells, reachable, unr
 from pipelines.stages.uncertainty.tables import LABELS
 from schemas.limits import Limits
 from schemas.units import MICRO
-
-Array = NDArray[np.float64]
 
 
 def reach(context: PlanContext, covariance: Array, terms: BudgetTerms, limits: Limits | None) -> dict[str, Any] | None:

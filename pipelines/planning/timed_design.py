@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial import design
+from inertial.arrays import Array, Flags
 from inertial.frames import force_from_angles
 from inertial.noise.dwells import DwellNoise, dwell_covariance
 from inertial.noise.flicker import flicker_of_means
@@ -23,7 +24,6 @@ from schemas.recipe import FEWEST_SAMPLES, Recipe
 from schemas.station import StationConfig
 from schemas.units import STANDARD_GRAVITY_M_S2
 
-Array = NDArray[np.float64]
 Choice = NDArray[np.intp]
 
 SHORTEST_DWELL_S = 1.0
@@ -48,7 +48,7 @@ class PlanDesign:
         return np.repeat(np.arange(len(self.order)), self.counts)
 
     @property
-    def fixed(self) -> NDArray[np.bool_]:
+    def fixed(self) -> Flags:
         """Dwells that begin or end a soak, (n,): they use the reference pose."""
         change = np.diff(self.group) != 0
         return np.concatenate([[True], change]) | np.concatenate([change, [True]])
@@ -114,7 +114,7 @@ class TimedDesign:
         left, right = (np.moveaxis(x.reshape(n, 3, width), 1, 0) for x in (flat, solved))
         return self.requirement.ratio_to_required(np.swapaxes(left, -1, -2) @ right), seconds
 
-    def pose_independent(self) -> NDArray[np.bool_]:
+    def pose_independent(self) -> Flags:
         """Columns (3, p) that do not depend on the pose: bias and its dependence on temperature and time."""
         every = np.arange(len(self.force))
         rows = self._columns(
@@ -200,7 +200,7 @@ def spread(force: Array) -> Choice:
     return np.array(chosen, dtype=np.intp)
 
 
-def spanned(force: Array, choice: Choice, fixed: NDArray[np.bool_], needed_g: float) -> Choice:
+def spanned(force: Array, choice: Choice, fixed: Flags, needed_g: float) -> Choice:
     """A plan (n,) of candidates with the required span of specific force on every axis, as few poses as possible replaced.
 
     Parameters

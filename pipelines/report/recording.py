@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from pipelines.drawing import Chart, Plot, PlotAxis, Trace, svg_text
 from pipelines.drawing.chart import Role, between
 from pipelines.importers.inspection import Inspection
 from pipelines.report.templates import template
 from schemas.units import AXES
-
-Array = NDArray[np.float64]
-
 
 _PIXELS = 1500
 ROOM = 0.05  # of the range, above and below

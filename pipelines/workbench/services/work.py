@@ -132,9 +132,8 @@ def ladder(request: Mapping[str, Any], report_progress: ReportProgress) -> list[
 def planned(request: Mapping[str, Any], report_progress: ReportProgress) -> dict[str, Any]:
     """``document``, ``charts`` and ``poses`` of a plan; ``before``: the effects of the recipe by name, where poses are moved."""
     report_progress(0, 2, "reading the recipe")
-    from pipelines.planning.context import plan_context
+    from pipelines.planning.context import noise_of, plan_context
     from pipelines.planning.plan import plan
-    from pipelines.planning.preset_noise import noise_of
     from pipelines.report.plan_pictures import sphere_chart, temperature_chart
 
     report_progress(1, 2, "visibility of effects")
