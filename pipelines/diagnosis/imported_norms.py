@@ -41,7 +41,7 @@ def norm(data: Imported, mapping: Mapping) -> FitAnswer:
     rows = [{str(name): value for name, value in row.items()} for row in tables["coefficients"].to_dict("records")]
     others = {name: tables[name] for name in ("covariance", "residuals", "predictions", "wander")}
     others["verdict"] = verdict_table(answer.verdict, effects)
-    return FitAnswer("norm", answer.adequate, answer.document, answer.lines, rows, tuple(effects), others)
+    return FitAnswer("norm", answer.document["adequate"], answer.document, answer.lines, rows, tuple(effects), others)
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,6 @@ class NormAnswer:
     """A fit under the norm condition: its verdict, its document for JSON, and lines for people."""
 
     fit: FittedNorms
-    adequate: bool | None
     document: dict[str, Any]
     lines: tuple[str, ...]
     verdict: AdequacyDocument
@@ -73,14 +72,9 @@ def fitted(
         done = norms_fitted(dwells, history, effects, gravity)
         smaller = _smaller(dwells, history, effects, gravity)
     verdict = diagnose(fitted_dwells(dwells), history, list(effects))
-    document = _document(done, smaller, verdict)
-    return NormAnswer(
-        done,
-        verdict["adequate"],
-        document,
-        tuple(_lines(done, smaller, verdict, out_unit)),
-        told_by(verdict, dwells["unit"].nunique()),
-    )
+    lines = tuple(_lines(done, smaller, verdict, out_unit))
+    told = told_by(verdict, dwells["unit"].nunique())
+    return NormAnswer(done, _document(done, smaller, verdict), lines, told)
 
 
 def _smaller(

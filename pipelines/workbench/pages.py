@@ -201,9 +201,13 @@ def _environment() -> Environment:
     )
     environment.filters["short"] = short
     environment.filters["plain_reason"] = plain_reason
-    environment.filters["tuple_of"] = tuple
+    environment.filters["tuple_of"] = _tuple_of
     environment.filters["without_nothing"] = without_nothing
     return environment
+
+
+def _tuple_of(values: Any) -> tuple[Any, ...]:
+    return tuple(values)
 
 
 def short(text: object, most: int = 28) -> str:

@@ -22,6 +22,7 @@ from pipelines.archive.keys import digest
 from pipelines.jobs.job import Request
 from pipelines.workbench.settings import WorkbenchSettings
 from schemas.errors import TumblelineError, WrongUse
+from stations.safety.lease_files import is_process
 
 FOLDER = "lots"
 ENDED = frozenset({"done", "stopped", "failed", "interrupted"})
@@ -169,15 +170,15 @@ def pause_all(settings: WorkbenchSettings) -> list[str]:
     for one in working:
         pause(settings, one.id)
     end = time.monotonic() + SAFE_S
-    while time.monotonic() < end and any(_alive(one.pid) for one in working if one.pid):
+    while time.monotonic() < end and any(is_process(one.pid) for one in working if one.pid):
         time.sleep(POLL_S)
-    return [one.id for one in working if one.pid and _alive(one.pid)]
+    return [one.id for one in working if one.pid and is_process(one.pid)]
 
 
 def _ended(place: Path) -> LotState:
     """Ask the process of a lot to end; the page shows the phase that it writes at its end."""
     now = state_of(place)
-    if not now.idle and now.pid and _alive(now.pid):
+    if not now.idle and now.pid and is_process(now.pid):
         os.kill(now.pid, signal.SIGTERM)
     else:
         write_state(place, files.read_json(place / "state.json"))  # open pages look again
@@ -206,7 +207,7 @@ def state_of(place: Path) -> LotState:
     request, now = files.read_json(place / "request.json"), files.read_json(place / "state.json")
     phase = str(now["phase"])
     pid = int(now.get("pid", 0))
-    lost = (pid and not _alive(pid)) or (not pid and time.time() - float(now.get("since", 0.0)) > 60.0)
+    lost = (pid and not is_process(pid)) or (not pid and time.time() - float(now.get("since", 0.0)) > 60.0)
     if phase not in ENDED and lost:
         phase = "interrupted"
     if phase == "stopped" and (place / PAUSED).is_file():
@@ -234,14 +235,3 @@ def stamp(settings: WorkbenchSettings) -> str:
         return ""
     newest = [place.stat().st_mtime_ns for place in top.glob("*/state.json")]
     return f"{len(newest)}.{max(newest, default=0)}"
-
-
-def _alive(pid: int) -> bool:
-    try:
-        os.kill(pid, 0)
-    except ProcessLookupError:
-        return False
-    except PermissionError:
-        return True
-    status = Path(f"/proc/{pid}/stat")
-    return not (status.is_file() and status.read_text().rpartition(")")[2].split()[:1] == ["Z"])
