@@ -16,13 +16,12 @@ from inertial.planning.expected import Expected
 from inertial.planning.pose_exchange import exchanged
 from inertial.planning.visibility import visibilities
 from pipelines.planning.context import PlanContext, plan_context
-from pipelines.planning.dwell_counts import FEWEST, MOST, fewest_dwells
 from pipelines.planning.lower_bound import lower_bound
 from pipelines.planning.plan import identified
 from pipelines.planning.requirement import Requirement
 from pipelines.planning.soak_orders import mirrored, orders
 from pipelines.planning.textbook import PART_SEEN
-from pipelines.planning.timed_design import PlanDesign, TimedDesign, spanned
+from pipelines.planning.timed_design import FEWEST, MOST, PlanDesign, TimedDesign, fewest_dwells, spanned
 from pipelines.planning.verification_poses import apart, numbered, turns
 from pipelines.schedule.timing import spent
 from schemas.errors import RecipeInvalid
