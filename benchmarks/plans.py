@@ -27,9 +27,10 @@ from inertial.noise.dwells import DwellNoise  # noqa: E402
 from inertial.state import State  # noqa: E402
 from pipelines.jobs.model_files import STARTING_MODEL  # noqa: E402
 from pipelines.jobs.recipes import load_recipe  # noqa: E402
+from pipelines.planning.context import PlanContext, plan_context  # noqa: E402
 from pipelines.planning.lower_bound import lower_bound  # noqa: E402
 from pipelines.planning.optimise import optimise  # noqa: E402
-from pipelines.planning.plan import PlanContext, identified, plan_context  # noqa: E402
+from pipelines.planning.plan import identified  # noqa: E402
 from pipelines.planning.requirement import Requirement, candidates, temperature_choices  # noqa: E402
 from pipelines.planning.textbook import seen_by, textbook  # noqa: E402
 from pipelines.schedule.timing import spent  # noqa: E402

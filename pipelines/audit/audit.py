@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Flags
 from pipelines.archive import Archive
-from pipelines.audit.calibrations import Calibrations, captures_of, later, load, runs_of, undated
+from pipelines.audit.calibrations import Calibrations, captures_of, dated_runs, day_of, first_runs, left_out, load
 from pipelines.audit.certificates import Certificates, certificates_of
 from pipelines.audit.drifts import KindDrift, kind_drifts
 from pipelines.audit.due import Due, due, last_measured
@@ -29,9 +29,10 @@ from pipelines.audit.population import (
 from pipelines.audit.rules import Rules
 from pipelines.audit.stations_over_time import ControlChart, StationSeries, charts, slot_series, station_series
 from pipelines.audit.unit_drifts import UnitDrift, unit_drifts
+from pipelines.certificates.days import FIRST, today
+from pipelines.certificates.days import day_of as checked
 from pipelines.parallel import Distributor
-
-Flags = NDArray[np.bool_]
+from schemas.errors import WrongUse
 
 LIMITED = {  # families with a limit of the value: figure, and units of the parameter per unit of the figure
     "bias": ("zero_g_offset_mg", 1e3),
@@ -52,6 +53,17 @@ class Scope:
     device: str = ""
     station: str = ""
     tomorrow: float = float("inf")
+
+
+def scope_of(since: str, until: str, device: str, station: str) -> Scope:
+    """What is looked at, from dates as texts; ``until`` holds its whole day."""
+    first = day_of(checked(since or FIRST, "--since"))
+    last = day_of(checked(until or today(), "--until")) + 1.0
+    if first >= last:
+        raise WrongUse(
+            f"audit: --since {since} is after --until {until or today()}, a period is needed; exchange the two"
+        )
+    return Scope(first, last, device, station, day_of(today()) + 1.0)
 
 
 @dataclass(frozen=True)
@@ -96,19 +108,21 @@ def audit(
 
     Parameters
     ----------
-    spread, workers : where runs are read, see :func:`pipelines.parallel.map_partitions`
+    distribute, workers : where runs are read, see :func:`pipelines.parallel.map_partitions`
     """
     index = up_to_date(archive, distribute, workers)
-    runs = runs_of(index, scope.until)
+    every_run = dated_runs(index)
+    runs = first_runs(every_run, scope.until)
     calibrations = load(index, runs)
+    later = every_run[every_run["day"] >= scope.tomorrow].sort_values(["day", "run"])
     foreign = tuple(strangers(calibrations, rules))
     good = np.ones(len(calibrations), dtype=bool)
     good[[one.row for one in foreign]] = False
     product = ~np.array([rules.is_standard(str(unit)) for unit in calibrations.unit], dtype=bool)
-    inside = product & _named(calibrations, scope)
+    inside = product & _of_device(calibrations, scope) & _at(calibrations, scope)
     period = inside & (calibrations.day >= scope.since)
     figures = figures_of(index, calibrations, period)
-    ledger = certificates_of(archive.root, scope.until, captures_of(index))
+    ledger = certificates_of(archive.root, scope.until, captures_of(every_run))
     kinds = kind_drifts(calibrations, good & inside, rules, scope.since)
     units = unit_drifts(calibrations, good & inside, kinds, rules, _limits(calibrations, figures))
     station = index.table("station").to_pandas()
@@ -124,8 +138,8 @@ def audit(
         good=good,
         product=product,
         period=period,
-        problems=(*_problems(index.table("runs", ["run", "problem"]).to_pydict()), *undated(index)),
-        later=tuple(later(index, scope.tomorrow)),
+        problems=tuple(left_out(every_run)),
+        later=tuple(zip(later["run"], later["day"], strict=True)),
         strangers=tuple(one for one in foreign if calibrations.day[one.row] >= scope.since),
         kinds=tuple(kinds),
         units=units,
@@ -147,24 +161,12 @@ def audit(
     )
 
 
-def _named(calibrations: Calibrations, scope: Scope) -> Flags:
-    return _of_device(calibrations, scope) & _at(calibrations, scope)
-
-
 def _of_device(calibrations: Calibrations, scope: Scope) -> Flags:
     return np.array([not scope.device or str(d) == scope.device.upper() for d in calibrations.device], dtype=bool)
 
 
 def _at(calibrations: Calibrations, scope: Scope) -> Flags:
-    return (
-        np.full(len(calibrations), fill_value=True)
-        if not scope.station
-        else np.asarray(calibrations.station == scope.station)
-    )
-
-
-def _problems(columns: dict[str, list[str]]) -> tuple[tuple[str, str], ...]:
-    return tuple((run, text) for run, text in zip(columns["run"], columns["problem"], strict=True) if text)
+    return np.array([not scope.station or station == scope.station for station in calibrations.station], dtype=bool)
 
 
 def _limits(calibrations: Calibrations, figures: Figures) -> dict[tuple[str, str], float]:

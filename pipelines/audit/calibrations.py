@@ -2,26 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from inertial.arrays import Array, Flags, Index, Texts
+from pipelines.audit.index import AuditIndex
 from pipelines.audit.parameters import FAMILY_OF, NAMES
-
-Array = NDArray[np.float64]
-Texts = NDArray[np.object_]
-Flags = NDArray[np.bool_]
-
-if TYPE_CHECKING:
-    from pipelines.audit.index import AuditIndex
 
 DAY_S = 86400.0
 CLOCK_SET_D = 366.0  # a clock that was never set shows 1970
+DATE = "a date such as 2026-05-01T09:30:00Z is needed"
 
 
 @dataclass(frozen=True)
@@ -35,7 +30,7 @@ class Calibrations:
     unit: Texts
     device: Texts
     station: Texts
-    slot: NDArray[np.int64]
+    slot: Index
     outcome: Texts
     day: Array
     values: Array
@@ -44,7 +39,7 @@ class Calibrations:
     def __len__(self) -> int:
         return self.day.size
 
-    def chosen(self, which: Flags | NDArray[np.int64]) -> Calibrations:
+    def chosen(self, which: Flags | Index) -> Calibrations:
         """The chosen calibrations, in their order."""
         return Calibrations(*(getattr(self, name)[which] for name in self.__dataclass_fields__))
 
@@ -56,18 +51,14 @@ class Calibrations:
         """Standard errors of one parameter, (n,)."""
         return self.errors[:, NAMES.index(name)]
 
-    def numbers(self, of: Callable[[Calibrations], Texts]) -> NDArray[np.int64]:
-        """A column of texts as numbers from 0."""
-        return codes(of(self))
-
     @property
-    def histories(self) -> NDArray[np.int64]:
+    def histories(self) -> Index:
         """Number of the unit of every calibration, from 0; the same serial on two kinds of device is two units."""
         pair = (self.unit[1:] != self.unit[:-1]) | (self.device[1:] != self.device[:-1])
         return np.concatenate([[0], np.cumsum(pair)]) if len(self) else np.zeros(0, dtype=np.int64)
 
 
-def codes(texts: NDArray[Any]) -> NDArray[np.int64]:
+def codes(texts: NDArray[Any]) -> Index:
     """Texts as numbers from 0, in their alphabetical order."""
     return np.unique(texts.astype(str), return_inverse=True)[1].astype(np.int64)
 
@@ -83,38 +74,26 @@ def date_of(day: float) -> str:
     return (datetime(1970, 1, 1, tzinfo=UTC) + timedelta(days=float(day))).date().isoformat()
 
 
-def runs_of(index: AuditIndex, until: float) -> pd.DataFrame:
-    """Runs that were measured before ``until``, with their day, device and station; each capture once.
-
-    Of each capture only the first run counts, not its re-runs.
-    """
-    runs = index.table("runs").to_pandas()
-    runs = runs[(runs["rerun_of"].astype(str) == "") & (runs["measured"].astype(str) != "")].astype({"run": str})
-    runs = runs.assign(day=[_day_or_nan(str(moment)) for moment in runs["measured"]])
-    runs = runs[runs["day"].notna()].sort_values(["day", "run"], kind="stable")
-    own = runs["capture"].astype(str).where(runs["capture"].astype(str) != "", runs["run"])
-    chosen = runs[~own.duplicated() & (runs["day"] < until)]
-    return chosen[["run", "day", "device", "station"]].astype({"device": str, "station": str})
+def dated_runs(index: AuditIndex) -> pd.DataFrame:
+    """All runs, their columns as texts, with the day of measurement; NaN for one without a date that can be believed."""
+    runs = index.table("runs").to_pandas().astype(str)
+    return runs.assign(day=[_day_or_nan(moment) for moment in runs["measured"]])
 
 
-def undated(index: AuditIndex) -> list[tuple[str, str]]:
-    """Runs whose date cannot be read, with the fault of each."""
-    runs = index.table("runs", ["run", "measured"]).to_pydict()
-    return [
-        (
-            run,
-            f"its date {moment!r} is invalid, or from a clock that was never set; a date such as 2026-05-01T09:30:00Z is needed",
-        )
-        for run, moment in zip(runs["run"], runs["measured"], strict=True)
-        if moment and np.isnan(_day_or_nan(moment))
+def first_runs(runs: pd.DataFrame, until: float) -> pd.DataFrame:
+    """Runs that were measured before ``until``, with their day, device and station; each capture once, by its first run."""
+    runs = runs[(runs["rerun_of"] == "") & runs["day"].notna()].sort_values(["day", "run"], kind="stable")
+    capture = runs["capture"].where(runs["capture"] != "", runs["run"])
+    return runs.loc[~capture.duplicated() & (runs["day"] < until), ["run", "day", "device", "station"]]
+
+
+def left_out(runs: pd.DataFrame) -> list[tuple[str, str]]:
+    """Runs that cannot be used, with the reason: first those with a fault of their files, then those whose date is none."""
+    faulty, undated = runs[runs["problem"] != ""], runs[(runs["measured"] != "") & runs["day"].isna()]
+    reasons = [
+        f"its date {moment!r} is invalid, or from a clock that was never set; {DATE}" for moment in undated["measured"]
     ]
-
-
-def later(index: AuditIndex, day: float) -> list[tuple[str, float]]:
-    """Runs with a date of measurement on a day or after it, with their days."""
-    runs = index.table("runs", ["run", "measured"]).to_pydict()
-    dated = ((run, _day_or_nan(moment)) for run, moment in zip(runs["run"], runs["measured"], strict=True) if moment)
-    return sorted((one for one in dated if one[1] >= day), key=lambda one: (one[1], one[0]))
+    return [*zip(faulty["run"], faulty["problem"], strict=True), *zip(undated["run"], reasons, strict=True)]
 
 
 def _day_or_nan(moment: str) -> float:
@@ -126,10 +105,10 @@ def _day_or_nan(moment: str) -> float:
     return day if day >= CLOCK_SET_D else float("nan")
 
 
-def captures_of(index: AuditIndex) -> dict[str, str]:
+def captures_of(runs: pd.DataFrame) -> dict[str, str]:
     """The capture of every run that has one, by the run's name."""
-    runs = index.table("runs", ["run", "capture"]).to_pydict()
-    return {run: capture for run, capture in zip(runs["run"], runs["capture"], strict=True) if capture}
+    captured = runs[runs["capture"] != ""]
+    return dict(zip(captured["run"], captured["capture"], strict=True))
 
 
 def load(index: AuditIndex, runs: pd.DataFrame) -> Calibrations:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from inertial.population.control_charts import RULES
+from pipelines.audit.audit import Audit
 from pipelines.audit.calibrations import date_of
 from pipelines.audit.documents import AuditDocument, AuditFindingDocument, DueDocument, DueUnit
 from pipelines.audit.due import uncertified
@@ -15,9 +16,6 @@ from pipelines.audit.finding import WHO, AuditFinding
 from pipelines.audit.parameters import unit_text
 from pipelines.audit.stations_over_time import ControlChart, StationSeries
 from pipelines.audit.unit_drifts import UnitDrift
-
-if TYPE_CHECKING:
-    from pipelines.audit.audit import Audit
 
 MOST_UNITS = 200  # histories in the document; ``tumbleline query`` gives the others by their serial
 SCHEMA = 1

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Flags
 from inertial.population.drift import (
     DeviceDrift,
     LatestState,
@@ -22,10 +22,6 @@ from pipelines.audit.calibrations import Calibrations
 from pipelines.audit.pairs import YEAR_D, Pairs, changes_of, e_n_of, pairs_of, spans_of
 from pipelines.audit.parameters import FAMILIES, FAMILY_OF, NAMES
 from pipelines.audit.rules import Rules
-
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-Index = NDArray[np.int64]
 
 MONTH_D = YEAR_D / 12.0
 OWN = tuple(name for name in NAMES if FAMILIES[FAMILY_OF[name]].own)
@@ -62,34 +58,11 @@ def kind_drifts(calibrations: Calibrations, good: Flags, rules: Rules, since: fl
     pairs, out = pairs_of(calibrations, good), list[KindDrift]()
     spans = spans_of(calibrations, pairs)
     for device in np.unique(calibrations.device.astype(str)):
-        of_kind = calibrations.device[pairs.later] == device
-        if of_kind.sum() < FEWEST_PAIRS:
-            continue
-        own: list[KindDrift] = []
-        for name in OWN:
-            change, known = changes_of(calibrations, pairs, name)
-            longer, longer_known = changes_of(calibrations, spans, name)
-            kept = of_kind & np.isfinite(change + known)
-            whole = (calibrations.device[spans.later] == device) & np.isfinite(longer + longer_known)
-            if kept.sum() < FEWEST_PAIRS:
-                continue
-            both = (
-                (change[kept], longer[whole]),
-                (pairs.years[kept], spans.years[whole]),
-                (known[kept], longer_known[whole]),
-            )
-            together = tuple(np.concatenate(parts) for parts in both)
-            kind = kind_of(*together)
-            recent = kept & (calibrations.day[pairs.later] >= since)
-            seating = seating_of(kind, *together, pairs=int(kept.sum()))
-            drift_of_kind = _kind_drift(
-                calibrations, pairs, recent, device, name, (kind, prudent(kind, *together)), seating, rules
-            )
-            own.append(replace(drift_of_kind, known=drifts_known(together[1])))
-        forecast_known = all(one.known for one in own)
-        months = (
-            float("nan") if not forecast_known else _reliable_months(calibrations, pairs, own, rules.reliability_target)
-        )
+        drifts = (_kind_drift(calibrations, pairs, spans, device, name, rules, since) for name in OWN)
+        own = [drift for drift in drifts if drift is not None]
+        months = float("nan")
+        if all(one.known for one in own):
+            months = _reliable_months(calibrations, pairs, own, rules.reliability_target)
         out += [replace(one, reliable_months=months if np.isfinite(one.tolerance) else float("nan")) for one in own]
     return out
 
@@ -109,29 +82,35 @@ def _reliable_months(calibrations: Calibrations, pairs: Pairs, kinds: list[KindD
 
 
 def _kind_drift(
-    calibrations: Calibrations,
-    pairs: Pairs,
-    recent: Flags,
-    device: str,
-    name: str,
-    kinds: tuple[DeviceDrift, DeviceDrift],
-    seating: tuple[float, float],
-    rules: Rules,
-) -> KindDrift:
-    tolerance = rules.tolerance_of(device, FAMILY_OF[name])
-    kind, ahead = kinds
-    change, _ = changes_of(calibrations, pairs, name)
+    calibrations: Calibrations, pairs: Pairs, spans: Pairs, device: str, name: str, rules: Rules, since: float
+) -> KindDrift | None:
+    """Drift of one parameter of a kind; None with too few pairs."""
+    change, known = changes_of(calibrations, pairs, name)
+    longer, longer_known = changes_of(calibrations, spans, name)
+    chosen = (calibrations.device[pairs.later] == device) & np.isfinite(change + known)
+    long = (calibrations.device[spans.later] == device) & np.isfinite(longer + longer_known)
+    if chosen.sum() < FEWEST_PAIRS:
+        return None
+    together = (
+        np.concatenate([change[chosen], longer[long]]),
+        np.concatenate([pairs.years[chosen], spans.years[long]]),
+        np.concatenate([known[chosen], longer_known[long]]),
+    )
+    kind, tolerance = kind_of(*together), rules.tolerance_of(device, FAMILY_OF[name])
+    seating = seating_of(kind, *together, pairs=int(chosen.sum()))
+    recent = chosen & (calibrations.day[pairs.later] >= since)
     numbers, moved = e_n_of(calibrations, pairs, name, seating)[recent], np.abs(change[recent])
-    numbers, moved = numbers[np.isfinite(numbers)], moved[np.isfinite(moved)]
+    numbers = numbers[np.isfinite(numbers)]
     return KindDrift(
         device=device,
         parameter=name,
         kind=kind,
-        ahead=ahead,
+        ahead=prudent(kind, *together),
         beyond=float(np.mean(np.abs(numbers) > 1.0)) if numbers.size else 0.0,
         out=float(np.mean(moved > tolerance)) if moved.size else 0.0,
         median=float(np.median(moved)) if moved.size else 0.0,
         tolerance=tolerance,
         reliable_months=float("nan"),
+        known=drifts_known(together[1]),
         seating=seating,
     )

@@ -6,16 +6,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array, Flags, Index, Texts
 from pipelines.audit.calibrations import Calibrations
 from pipelines.audit.certificates import Certificates
 from pipelines.audit.drifts import MONTH_D, KindDrift
+from pipelines.audit.pairs import last_of_each
 from pipelines.audit.rules import Rules
 from pipelines.audit.unit_drifts import UnitDrift
-
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -29,11 +27,11 @@ class Due:
     valid : whether a certificate is valid; entered : whether the last measurement is certified, in any state
     """
 
-    row: NDArray[np.int64]
+    row: Index
     day: Array
     months: Array
-    because: NDArray[np.object_]
-    certificate: NDArray[np.object_]
+    because: Texts
+    certificate: Texts
     valid: Flags
     entered: Flags
 
@@ -53,11 +51,7 @@ def due(
     else of its kind, inside the bounds of the rules), unless its certificate ends before.
     """
     rows = np.flatnonzero(good)
-    last = (
-        rows[np.concatenate([calibrations.histories[rows[1:]] != calibrations.histories[rows[:-1]], [True]])]
-        if rows.size
-        else rows
-    )
+    last = rows[last_of_each(calibrations.histories[rows])]
     fixed = {device: float(rules.months(device)) for device in np.unique(calibrations.device.astype(str))}
     months = np.array([fixed[str(device)] for device in calibrations.device[last]])
     because = np.full(last.size, "fixed", dtype=object)
@@ -88,7 +82,7 @@ def last_measured(calibrations: Calibrations, due_units: Due, station: str) -> D
     return Due(*(getattr(due_units, name)[own] for name in Due.__dataclass_fields__))
 
 
-def uncertified(calibrations: Calibrations, due_units: Due, certificates: Certificates) -> NDArray[np.int64]:
+def uncertified(calibrations: Calibrations, due_units: Due, certificates: Certificates) -> Index:
     """Units that passed last without a certificate for it, as indices into ``due``; none without a ledger."""
     if not len(certificates):
         return np.zeros(0, dtype=np.int64)
@@ -98,19 +92,14 @@ def uncertified(calibrations: Calibrations, due_units: Due, certificates: Certif
 def _by_certificate(calibrations: Calibrations, due_units: Due, certificates: Certificates) -> None:
     """Replace the interval of every unit by the state of its certificate."""
     for k, row in enumerate(due_units.row):
-        one = certificates.standing(
-            str(calibrations.device[row]), str(calibrations.unit[row]), str(calibrations.run[row])
-        )
+        names = (str(column[row]) for column in (calibrations.device, calibrations.unit, calibrations.run))
+        one = certificates.standing(*names)
         if one is None:
             continue
-        due_units.certificate[k], due_units.valid[k], due_units.entered[k] = (
-            one.certificate,
-            one.state == "valid",
-            one.entered,
-        )
-        if (
-            one.state != "valid" and not one.entered
-        ):  # measured again after its end: the interval counts from the measurement
+        due_units.certificate[k], due_units.entered[k] = one.certificate, one.entered
+        due_units.valid[k] = one.state == "valid"
+        # measured again after its end: the interval counts from the measurement
+        if not due_units.valid[k] and not one.entered:
             continue
         if due_units.because[k] == "drift" and one.state != "revoked" and due_units.day[k] < one.until:
             continue
@@ -119,12 +108,12 @@ def _by_certificate(calibrations: Calibrations, due_units: Due, certificates: Ce
 
 def _by_drift(
     calibrations: Calibrations,
-    last: NDArray[np.int64],
+    last: Index,
     fixed: Array,
     rules: Rules,
     kinds: list[KindDrift],
     units: Mapping[str, list[UnitDrift]],
-) -> tuple[Array, NDArray[np.object_]]:
+) -> tuple[Array, Texts]:
     of_kind: dict[str, float] = {}
     for kind in kinds:
         if np.isfinite(kind.reliable_months):

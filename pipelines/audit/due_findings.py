@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Index
 from inertial.counts import number_of
+from pipelines.audit.audit import Audit
 from pipelines.audit.calibrations import date_of
 from pipelines.audit.due import uncertified
 from pipelines.audit.finding import AuditFinding, some
-
-Numbers = NDArray[np.int64]
-
-if TYPE_CHECKING:
-    from pipelines.audit.audit import Audit
 
 REASONS = {  # reasons in a sentence about overdue units
     "certificate": "their certificate has ended",
@@ -93,12 +88,12 @@ def _coming_due(audit: Audit) -> Iterator[AuditFinding]:
         yield AuditFinding("line", "due", device, message, units)
 
 
-def _by_device(audit: Audit, chosen: Numbers) -> Iterator[tuple[str, Numbers]]:
+def _by_device(audit: Audit, chosen: Index) -> Iterator[tuple[str, Index]]:
     """Indices into the due units, by kind of device."""
     devices = audit.all.device[audit.due.row[chosen]].astype(str)
     for device in np.unique(devices):
         yield str(device), chosen[devices == device]
 
 
-def _units(audit: Audit, own: Numbers) -> tuple[str, ...]:
+def _units(audit: Audit, own: Index) -> tuple[str, ...]:
     return tuple(str(unit) for unit in audit.all.unit[audit.due.row[own]])

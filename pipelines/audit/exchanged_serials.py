@@ -5,22 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array, Flags, Index
 from inertial.population.fingerprints import ChangeScale, alike_below, change_scale, distance, foreign_above, nearest
 from pipelines.audit.calibrations import Calibrations
+from pipelines.audit.pairs import YEAR_D
 from pipelines.audit.parameters import FAMILY_OF, NAMES
-from pipelines.audit.parameters import NAMES as PARAMETERS
 from pipelines.audit.rules import Rules
 
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-Index = NDArray[np.int64]
-
-
-YEAR_D = 365.25
 FEWEST_PAIRS = 20  # with fewer calibrations of a kind its usual change is unknown
-TURNS = [k for k, name in enumerate(PARAMETERS) if FAMILY_OF[name] == "rotation"]
+TURNS = [k for k, name in enumerate(NAMES) if FAMILY_OF[name] == "rotation"]
 ROUNDS = 4
 
 

@@ -35,9 +35,9 @@ class AuditFinding:
     evidence: dict[str, Any] = field(default_factory=dict[str, Any])
 
 
-def date_or_never(day: float) -> str:
+def date_or_never(day: float, never: str = "never") -> str:
     """A date; ``never`` for infinity."""
-    return date_of(day) if np.isfinite(day) else "never"
+    return date_of(day) if np.isfinite(day) else never
 
 
 def some(units: tuple[str, ...]) -> str:

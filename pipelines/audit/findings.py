@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+from pipelines.audit.audit import Audit
 from pipelines.audit.calibrations import date_of
 from pipelines.audit.due_findings import of_certificates, of_what_is_due
 from pipelines.audit.finding import WHO, AuditFinding
 from pipelines.audit.population_findings import of_population
 from pipelines.audit.station_findings import of_stations
 from pipelines.audit.unit_findings import of_units
-
-if TYPE_CHECKING:
-    from pipelines.audit.audit import Audit
 
 
 def findings(audit: Audit) -> list[AuditFinding]:

@@ -5,17 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Flags, Index
 from inertial.population.gauge import Gauge, gauge_study
 from pipelines.audit.calibrations import Calibrations
 from pipelines.audit.drifts import OWN
+from pipelines.audit.pairs import first_of_each
 from pipelines.audit.parameters import FAMILY_OF
 from pipelines.audit.rules import Rules
-
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-Index = NDArray[np.int64]
 
 SIX_SIGMA = 6.0
 FEWEST_PARTS = 3
@@ -59,10 +56,9 @@ def _groups(calibrations: Calibrations, good: Flags, within_days: float) -> list
     """Sets of runs on exactly the same units within some days; by run, the rows of its units in order of serial."""
     rows = np.flatnonzero(good)
     order = rows[np.lexsort((calibrations.unit[rows].astype(str), calibrations.run[rows].astype(str)))]
-    runs = calibrations.run[order].astype(str)
-    starts = np.flatnonzero(np.concatenate([[True], runs[1:] != runs[:-1]])) if order.size else np.zeros(0, dtype=int)
+    starts = first_of_each(calibrations.run[order].astype(str))
     by_units: dict[tuple[str, ...], list[Index]] = {}
-    for own in np.split(order, starts[1:]) if order.size else []:
+    for own in np.split(order, starts[1:]):
         if own.size >= FEWEST_PARTS:
             by_units.setdefault(tuple(calibrations.unit[own]), []).append(own)
     out: list[dict[str, Index]] = []

@@ -2,24 +2,23 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from functools import partial
+from typing import Any
 
 import numpy as np
 
 from inertial.uncertainty.rounding import chance
 from pipelines.audit import pictures as drawn
+from pipelines.audit.audit import Audit
 from pipelines.audit.calibrations import date_of
 from pipelines.audit.document import counts, furthest
-from pipelines.audit.finding import WHO, AuditFinding
+from pipelines.audit.finding import WHO, AuditFinding, date_or_never
 from pipelines.audit.parameters import unit_text
 from pipelines.audit.stations_over_time import ControlChart, StationSeries
 from pipelines.audit.unit_drifts import UnitDrift
 from pipelines.drawing import svg_text
 from pipelines.report.numbers import THIN, significant
 from pipelines.report.templates import template
-
-if TYPE_CHECKING:
-    from pipelines.audit.audit import Audit
 
 MOST_SERIES, MOST_CHARTS, MOST_HISTORIES, MOST_ROWS, MOST_OF_KIND = 8, 4, 4, 25, 40
 
@@ -59,7 +58,7 @@ def render(audit: Audit, listed: list[AuditFinding], archive: str) -> str:
         number=significant,
         signed=_signed,
         chance=chance,
-        date=_date,
+        date=partial(date_or_never, never="–"),
         percent=_percent,
         whole=_whole,
     )
@@ -111,10 +110,6 @@ def _telling_drifts(audit: Audit) -> list[UnitDrift]:
     worst = [max(drifts, key=lambda d: abs(d.odd)) for drifts in audit.units.values()]
     several = [drift for drift in worst if drift.calibrations > 2]
     return sorted(several, key=lambda d: (-abs(d.odd), d.unit))[:MOST_HISTORIES]
-
-
-def _date(day: float) -> str:
-    return date_of(day) if np.isfinite(day) else "–"
 
 
 def _whole(count: int) -> str:

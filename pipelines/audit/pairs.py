@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from inertial.arrays import Array, Flags, Index
 from inertial.population.agreement import e_n
 from pipelines.audit.calibrations import Calibrations
-
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-Index = NDArray[np.int64]
-
 
 YEAR_D = 365.25
 
@@ -31,7 +28,10 @@ def pairs_of(calibrations: Calibrations, good: Flags) -> Pairs:
     """Every good calibration with the previous good one of the same unit."""
     rows = np.flatnonzero(good)
     same = calibrations.histories[rows[1:]] == calibrations.histories[rows[:-1]]
-    later, earlier = rows[1:][same], rows[:-1][same]
+    return _pairs(calibrations, rows[1:][same], rows[:-1][same])
+
+
+def _pairs(calibrations: Calibrations, later: Index, earlier: Index) -> Pairs:
     return Pairs(later, earlier, (calibrations.day[later] - calibrations.day[earlier]) / YEAR_D)
 
 
@@ -59,15 +59,16 @@ def e_n_of(calibrations: Calibrations, pairs: Pairs, name: str, seating: tuple[f
 def spans_of(calibrations: Calibrations, pairs: Pairs) -> Pairs:
     """The last calibration of every unit with its first, where others lie between: long times separate slope from random walk."""
     unit = calibrations.histories[pairs.later]
-    last = last_of_each(unit)
-    first = np.concatenate([[0], last[:-1] + 1]) if last.size else last
+    first, last = first_of_each(unit), last_of_each(unit)
     longer = last > first
-    later, earlier = pairs.later[last[longer]], pairs.earlier[first[longer]]
-    return Pairs(later, earlier, (calibrations.day[later] - calibrations.day[earlier]) / YEAR_D)
+    return _pairs(calibrations, pairs.later[last[longer]], pairs.earlier[first[longer]])
 
 
-def last_of_each(numbers: Index) -> Index:
-    """Places where a run of equal numbers ends."""
-    if not numbers.size:
-        return np.zeros(0, dtype=np.int64)
-    return np.flatnonzero(np.concatenate([numbers[1:] != numbers[:-1], [True]]))
+def first_of_each(values: NDArray[Any]) -> Index:
+    """Places where a series of equal values begins."""
+    return np.flatnonzero(np.append(True, values[1:] != values[:-1])[: values.size])
+
+
+def last_of_each(values: NDArray[Any]) -> Index:
+    """Places where a series of equal values ends."""
+    return np.flatnonzero(np.append(values[1:] != values[:-1], True)[: values.size])

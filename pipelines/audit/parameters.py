@@ -11,12 +11,9 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array, Index
 from schemas.units import AXES
-
-Array = NDArray[np.float64]
-Numbers = NDArray[np.int64]
 
 
 class Family(NamedTuple):
@@ -52,7 +49,7 @@ _CYCLE = ((1, 2), (2, 0), (0, 1))  # the two axes that a rotation about x, y, z 
 
 
 def parameters_of(
-    row: Numbers, texts: Mapping[str, tuple[Sequence[str], Numbers]], value: Array, error: Array, zero: Array
+    row: Index, texts: Mapping[str, tuple[Sequence[str], Index]], value: Array, error: Array, zero: Array
 ) -> dict[str, Array]:
     """Value and standard error of every parameter, each (n,): ``bias_x``, ``bias_x_error``, …; NaN where the model has none.
 

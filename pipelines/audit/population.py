@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from inertial.arrays import Array, Flags, Index, Texts
 from inertial.population.capability import Index as Capability
 from inertial.population.capability import cpk, fraction_interval, independent, shape_of, sigma_within
 from inertial.population.comparison import Comparison, compare, holm, outlier_limit, robust_z, unlike
@@ -16,14 +15,8 @@ from inertial.population.memory import TO_SIGMA
 from inertial.population.two_way import group_medians
 from pipelines.audit.calibrations import Calibrations, codes, date_of
 from pipelines.audit.drifts import OWN
-
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-Texts = NDArray[np.object_]
-Numbers = NDArray[np.int64]
-
-if TYPE_CHECKING:
-    from pipelines.audit.index import AuditIndex
+from pipelines.audit.index import AuditIndex
+from pipelines.audit.pairs import first_of_each
 
 FEWEST = 20
 FEWEST_OF_LOT = 3
@@ -93,7 +86,7 @@ class Difference:
 class Figures:
     """The figures of chosen calibrations: row among the calibrations, figure, value, limit."""
 
-    row: Numbers
+    row: Index
     figure: Texts
     value: Array
     limit: Array
@@ -103,40 +96,19 @@ class Figures:
 def figures_of(index: AuditIndex, calibrations: Calibrations, chosen: Flags) -> Figures:
     """Figures of the chosen calibrations."""
     frame = index.table("figures", ["run", "unit", "figure", "value", "limit", "unit_text"]).to_pandas()
-    runs, run = np.unique(calibrations.run.astype(str), return_inverse=True)
-    units, unit = np.unique(calibrations.unit.astype(str), return_inverse=True)
-    own = run.astype(np.int64) * max(units.size, 1) + unit
-    order = np.argsort(own)
-    run_index, unit_index = (_numbers_in(frame[n], known) for n, known in (("run", runs), ("unit", units)))
-    key = run_index * max(units.size, 1) + unit_index
-    place = np.minimum(np.searchsorted(own[order], key), max(own.size - 1, 0))
-    kept = (run_index >= 0) & (unit_index >= 0)
-    if own.size:
-        kept &= own[order][place] == key
-        row = order[place]
-        kept &= chosen[row]
-    else:
-        row = place
-    chosen_rows = np.flatnonzero(kept)
+    keys = pd.DataFrame({"row": np.flatnonzero(chosen)})
+    for name, texts in (("run", calibrations.run), ("unit", calibrations.unit)):
+        frame[name] = frame[name].astype("category")
+        keys[name] = pd.Categorical(texts[chosen], categories=frame[name].cat.categories)
     # an index grown run by run and one made again hold the same rows in another order; sums must not depend on it
-    chosen_rows = chosen_rows[np.argsort(row[chosen_rows], kind="stable")]
+    frame = frame.merge(keys, on=["run", "unit"]).sort_values("row", kind="stable")
     return Figures(
-        row[chosen_rows],
-        frame["figure"].astype(str).to_numpy(object)[chosen_rows],
-        frame["value"].to_numpy(float)[chosen_rows],
-        frame["limit"].to_numpy(float)[chosen_rows],
-        frame["unit_text"].astype(str).to_numpy(object)[chosen_rows],
+        frame["row"].to_numpy(np.int64),
+        frame["figure"].astype(str).to_numpy(object),
+        frame["value"].to_numpy(float),
+        frame["limit"].to_numpy(float),
+        frame["unit_text"].astype(str).to_numpy(object),
     )
-
-
-def _numbers_in(column: pd.Series, known: NDArray[np.str_]) -> Numbers:
-    """Index of every text of a categorical column in the sorted known texts; −1 for an unknown text."""
-    column = column.astype("category")
-    categories = np.asarray(column.cat.categories, dtype=str)
-    place = np.searchsorted(known, categories)
-    there = place < known.size
-    there[there] = known[place[there]] == categories[there]
-    return np.where(there, place, -1)[np.asarray(column.cat.codes)]
 
 
 def abilities(calibrations: Calibrations, figures: Figures) -> tuple[list[Ability], list[Difference]]:
@@ -165,7 +137,7 @@ def abilities(calibrations: Calibrations, figures: Figures) -> tuple[list[Abilit
     return able, [replace(d, p=float(p)) for d, p in zip(differences, adjusted, strict=True)]
 
 
-def _compared(values: Array, groups: Numbers, lot: Numbers, by: str) -> Comparison | None:
+def _compared(values: Array, groups: Index, lot: Index, by: str) -> Comparison | None:
     """Groups of values compared; stations by the means of their lots: lots differ, and each is on one station."""
     comparison = compare(values, groups)
     if comparison is None or by != "station":
@@ -178,13 +150,11 @@ def _compared(values: Array, groups: Numbers, lot: Numbers, by: str) -> Comparis
 def _first_of_each(calibrations: Calibrations, figures: Figures) -> Figures:
     """The figures of every unit's first calibration among those given."""
     rows = np.unique(figures.row)
-    unit = calibrations.histories[rows]
-    first = rows[np.concatenate([[True], unit[1:] != unit[:-1]])] if rows.size else rows
-    kept = np.isin(figures.row, first)
-    return Figures(*(getattr(figures, name)[kept] for name in Figures.__dataclass_fields__))
+    first = np.isin(figures.row, rows[first_of_each(calibrations.histories[rows])])
+    return Figures(*(getattr(figures, name)[first] for name in Figures.__dataclass_fields__))
 
 
-def _ability(device: str, figure: str, figures: Figures, own: Numbers, lot: Numbers) -> Ability:
+def _ability(device: str, figure: str, figures: Figures, own: Index, lot: Index) -> Ability:
     values, limit = figures.value[own], float(np.median(figures.limit[own]))
     two_sided = bool((values < 0.0).any())
     low = -limit if two_sided else -np.inf
@@ -221,14 +191,11 @@ def odd_ones(calibrations: Calibrations, chosen: Flags) -> list[Odd]:
 
     Only the first calibration of a unit counts, so that frequent calibrations have no larger weight.
     """
-    first = (
-        np.concatenate([[True], calibrations.histories[1:] != calibrations.histories[:-1]])
-        if len(calibrations)
-        else np.zeros(0, dtype=bool)
-    )
+    first = first_of_each(calibrations.histories)
+    first = first[chosen[first]]
     out: list[Odd] = []
     for device in np.unique(calibrations.device.astype(str)):
-        rows = np.flatnonzero(chosen & first & (calibrations.device == device))
+        rows = first[calibrations.device[first] == device]
         values = np.stack([calibrations.column(name)[rows] for name in OWN], axis=1)
         usable = np.isfinite(values).any(axis=0)
         if rows.size < FEWEST or not usable.any():
@@ -238,13 +205,11 @@ def odd_ones(calibrations: Calibrations, chosen: Flags) -> list[Odd]:
     return sorted(out, key=lambda odd: (odd.kind, -abs(odd.z), odd.name))
 
 
-def _odd_units(calibrations: Calibrations, device: str, rows: Numbers, values: Array, odd_lots: set[str]) -> list[Odd]:
+def _odd_units(calibrations: Calibrations, device: str, rows: Index, values: Array, odd_lots: set[str]) -> list[Odd]:
     z = np.nan_to_num(robust_z(values))
-    worst = np.argmax(np.abs(z), axis=1)
-    size = np.abs(z[np.arange(rows.size), worst])
     outliers: list[Odd] = []
-    for k in np.flatnonzero(size > outlier_limit(z.size, rows.size)):
-        row, column = rows[k], worst[k]
+    for k, column in _outliers(z):
+        row = rows[k]
         if str(calibrations.run[row]) not in odd_lots:
             outliers.append(
                 Odd("unit", str(calibrations.unit[row]), device, str(calibrations.station[row]), str(calibrations.run[row]),
@@ -253,7 +218,14 @@ def _odd_units(calibrations: Calibrations, device: str, rows: Numbers, values: A
     return outliers
 
 
-def _error_of_lots(values: Array, lot: Numbers) -> Array:
+def _outliers(z: Array) -> list[tuple[int, int]]:
+    """Rows of distances in σ (n, p) whose largest one is an outlier, with its column."""
+    worst = np.argmax(np.abs(z), axis=1)
+    size = np.abs(z[np.arange(len(z)), worst])
+    return [(int(k), int(worst[k])) for k in np.flatnonzero(size > outlier_limit(z.size, len(z)))]
+
+
+def _error_of_lots(values: Array, lot: Index) -> Array:
     """Standard error of the median of every lot, (lots, p), from the spread inside the lots."""
     counts = np.bincount(lot)
     middles = np.stack([group_medians(column, lot) for column in values.T], axis=1)
@@ -262,7 +234,7 @@ def _error_of_lots(values: Array, lot: Numbers) -> Array:
     return MEDIAN_OVER_MEAN * inside / np.sqrt(counts)[:, None]
 
 
-def _odd_lots(calibrations: Calibrations, device: str, rows: Numbers, values: Array) -> list[Odd]:
+def _odd_lots(calibrations: Calibrations, device: str, rows: Index, values: Array) -> list[Odd]:
     runs, lot = np.unique(calibrations.run[rows].astype(str), return_inverse=True)
     counts = np.bincount(lot)
     large = np.flatnonzero(counts >= FEWEST_OF_LOT)
@@ -271,11 +243,9 @@ def _odd_lots(calibrations: Calibrations, device: str, rows: Numbers, values: Ar
     # medians, so that a single outlier is reported as a unit and not as its lot
     means = np.stack([group_medians(values[:, c], lot) for c in range(values.shape[1])], axis=1)[large]
     z = np.nan_to_num(unlike(means, _error_of_lots(values, lot)[large]))
-    worst = np.argmax(np.abs(z), axis=1)
-    size = np.abs(z[np.arange(large.size), worst])
     out: list[Odd] = []
-    for k in np.flatnonzero(size > outlier_limit(z.size, large.size)):
-        run, column = str(runs[large[k]]), worst[k]
+    for k, column in _outliers(z):
+        run = str(runs[large[k]])
         row = rows[np.flatnonzero(lot == large[k])[0]]
         out.append(
             Odd("lot", run, device, str(calibrations.station[row]), run, float(calibrations.day[row]), OWN[column],

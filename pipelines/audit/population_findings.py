@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 from inertial.counts import number_of
 from inertial.uncertainty.rounding import equal
+from pipelines.audit.audit import Audit
 from pipelines.audit.calibrations import date_of
 from pipelines.audit.finding import AuditFinding
 from pipelines.audit.parameters import unit_text
+from pipelines.audit.population import Ability
 from pipelines.report.numbers import significant
-
-if TYPE_CHECKING:
-    from pipelines.audit.audit import Audit
-    from pipelines.audit.population import Ability
 
 TELLING_EFFECT = 0.02  # smaller shares of the variance between groups are not relevant
 DIFFERENT_P = 1e-3

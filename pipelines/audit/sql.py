@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
+import mmap
 import re
-from collections.abc import Callable, Mapping
-from functools import partial
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import pyarrow as pa
+import pyarrow.dataset as ds
+import pyarrow.parquet as pq
 
 from pipelines.archive import Archive
-from pipelines.audit import datasets
+from pipelines.archive.packed_path import member_of
+from pipelines.archive.store import Place, first_line
 from pipelines.audit.index import AuditIndex, up_to_date
 from pipelines.audit.run_rows import SCHEMAS
 from pipelines.audit.tables_in_memory import QueryResult, rows_of_index
 from pipelines.certificates.validity import Calibration
-from schemas.errors import WrongUse, did_you_mean
+from schemas.errors import ArchiveUnusable, WrongUse, did_you_mean
 from schemas.library import library
 
 if TYPE_CHECKING:
@@ -38,6 +43,7 @@ FILES: tuple[str, ...] = (  # tables of the runs that are read in place
     "dwells", "residuals", "readings", "history", "verdicts", "covariance", "predictions", "wander", "verification",
     "verification_poses", "allan", "noise", "grades",
 )  # fmt: skip
+READERS = 8  # of files
 VIEWS = (*SCHEMAS, *FILES, "calibrations")
 WORD = re.compile(r"[A-Za-z_]\w*")
 
@@ -144,11 +150,11 @@ def _views(archive: Archive, index: AuditIndex | None, *, compact: bool) -> Mapp
 def _of_runs(archive: Archive, name: str) -> Any:
     runs = archive.root / "runs"
     if not isinstance(runs, Path):
-        return datasets.gathered(runs.glob(f"*/{name}.parquet"))
+        return gathered(runs.glob(f"*/{name}.parquet"))
     places = sorted(runs.glob(f"*/{name}.parquet"))
     if not places:
         raise WrongUse(f"query: no run in {archive.root} has a table '{name}', one is needed; query another view")
-    return datasets.of_runs(places)
+    return datasets_of_runs(places)
 
 
 LEDGER: Mapping[str, Callable[[Calibration], str]] = {  # columns of the view, with the keys of a calibration's document
@@ -171,3 +177,72 @@ def _of_ledger(archive: Archive) -> pa.Table:
 
     known = list(Ledger(archive).all())
     return pa.table({name: pa.array([of(one) for one in known], pa.string()) for name, of in LEDGER.items()})
+
+
+def datasets_of_runs(places: Sequence[Path]) -> ds.Dataset:
+    """Files ``…/<run>/<table>.parquet`` of a local archive, packed or not, as one table with the column ``run`` in front.
+
+    A column that some runs do not have is null there.
+
+    Raises
+    ------
+    ArchiveUnusable
+        A file is no Parquet file, or a column has different types.
+    """
+    from pyarrow.fs import LocalFileSystem
+
+    with ThreadPoolExecutor(READERS) as pool:
+        file_schemas = list(pool.map(_schema, places))
+    try:
+        columns = pa.unify_schemas(file_schemas, promote_options="permissive").remove_metadata()
+    except (pa.ArrowInvalid, pa.ArrowTypeError) as problem:
+        raise ArchiveUnusable(
+            f"query: tables {places[0].name} of the runs do not fit together ({first_line(problem)}); see 'tumbleline "
+            "verify'"
+        ) from None
+    form, system = ds.ParquetFileFormat(), LocalFileSystem()
+    parts: list[Any] = []
+    for place in places:
+        run, source = ds.field("run") == place.parent.name, _source(place)
+        own = None if isinstance(source, pa.BufferReader) else system
+        parts.append(form.make_fragment(source, own, partition_expression=run))
+    schema = pa.schema([("run", pa.string()), *(field for field in columns if field.name != "run")])
+    return ds.FileSystemDataset(parts, schema=schema, format=form, filesystem=system)
+
+
+def gathered(places: Iterable[Place]) -> pa.Table:
+    """Tables of an object store, read into memory, with the column ``run`` in front."""
+    parts: list[pa.Table] = []
+    for place in places:
+        table = pq.ParquetFile(pa.BufferReader(place.read_bytes())).read()
+        parts.append(table.add_column(0, "run", pa.repeat(pa.scalar(place.parent.name), len(table))))
+    return pa.concat_tables(parts, promote_options="default") if parts else pa.table({"run": pa.array([], pa.string())})
+
+
+def _source(place: Path) -> pa.BufferReader | str:
+    """Where the bytes of a file are: its own path, or its part of a pack, which is read when it is needed."""
+    member = member_of(place)
+    if member is None:
+        return str(place)
+    try:
+        whole = _mapped(str(member.pack))
+    except FileNotFoundError:  # its pack was merged with others
+        return pa.BufferReader(place.read_bytes())
+    return pa.BufferReader(pa.py_buffer(memoryview(whole)[member.offset : member.offset + member.size]))
+
+
+@lru_cache(maxsize=512)
+def _mapped(pack: str) -> mmap.mmap:
+    """A pack in the address space, which is never changed; the file may be closed."""
+    with Path(pack).open("rb") as file:
+        return mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
+
+
+def _schema(place: Path) -> pa.Schema:
+    try:
+        return pq.read_schema(_source(place)).remove_metadata()
+    except (OSError, pa.ArrowInvalid) as problem:
+        raise ArchiveUnusable(
+            f"query: {place} is not a complete Parquet file ({first_line(problem)}); restore it from a copy, see 'tumbleline "
+            "verify'"
+        ) from None

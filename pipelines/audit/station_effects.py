@@ -15,11 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial import design, effects
+from inertial.arrays import Array
 from inertial.effects import SensorEffect, StationEffect
 from inertial.errors import InertialError, MissingInput
 from inertial.state import State
-
-Array = NDArray[np.float64]
 
 FEWEST_UNITS = 3  # with fewer units a single outlier could be attributed to the station
 SEEN = 0.02  # share of an effect's columns outside the units' model; a smaller share cannot be separated from the units

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from inertial.counts import number_of
+from inertial.population.change_points import ChangePoint
 from inertial.uncertainty.rounding import equal
+from pipelines.audit.audit import Audit
 from pipelines.audit.calibrations import date_of
 from pipelines.audit.finding import AuditFinding
-
-if TYPE_CHECKING:
-    from inertial.population.change_points import ChangePoint
-    from pipelines.audit.audit import Audit
-    from pipelines.audit.stations_over_time import StationSeries
+from pipelines.audit.stations_over_time import StationSeries
 
 
 def of_stations(audit: Audit) -> Iterator[AuditFinding]:

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from inertial.arrays import Array, Flags, Index, Texts
 from inertial.population.change_points import ChangePoint, change_points, noise_of
 from inertial.population.control_charts import Baseline, alarms, baseline, chance_of_alarms, signals
 from inertial.population.two_way import unit_and_place
@@ -15,10 +15,6 @@ from pipelines.audit.calibrations import Calibrations, codes
 from pipelines.audit.drifts import OWN
 from pipelines.audit.parameters import unit_text
 from pipelines.audit.rules import Rules
-
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-Texts = NDArray[np.object_]
 
 LEVEL = 1e-3  # p-value of a change, shared by all series
 FEWEST = 8
@@ -154,7 +150,7 @@ def charts(calibrations: Calibrations, rules: Rules, since: float) -> list[Contr
 
 def _chart(
     calibrations: Calibrations,
-    own: NDArray[np.int64],
+    own: Index,
     key: tuple[str, str, str],
     values: Array,
     rules: Rules,

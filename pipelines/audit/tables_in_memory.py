@@ -7,18 +7,15 @@ import threading
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from weakref import finalize
 
 import pyarrow as pa
 import pyarrow.dataset as ds
 
-from pipelines.audit import datasets
+from pipelines.audit.index import AuditIndex
 from pipelines.audit.run_rows import SCHEMAS
 from schemas.errors import WrongUse
-
-if TYPE_CHECKING:
-    from pipelines.audit.index import AuditIndex
 
 
 @dataclass(frozen=True)
@@ -63,7 +60,11 @@ def rows_of_index(index: AuditIndex | None, name: str) -> Any:
     kept = [column for column in SCHEMAS[name].names if column != "stamp"]
     if index is None or not index.parts or not isinstance(index.parts[0], Path):
         return index.table(name, kept) if index is not None else SCHEMAS[name].empty_table().select(kept)
-    return datasets.of_index(index.files(name), pa.schema([SCHEMAS[name].field(column) for column in kept]))
+    from pyarrow.fs import LocalFileSystem
+
+    schema, form, system = pa.schema([SCHEMAS[name].field(c) for c in kept]), ds.ParquetFileFormat(), LocalFileSystem()
+    parts = [form.make_fragment(file, system) for file in index.files(name)]
+    return ds.FileSystemDataset(parts, schema=schema, format=form, filesystem=system)
 
 
 def in_memory(index: AuditIndex, names: Collection[str]) -> TablesInMemory:

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from inertial.arrays import Array, Flags, Index
 from inertial.population.drift import (
     LatestState,
     forecast,
@@ -19,13 +20,9 @@ from inertial.population.drift import (
 )
 from pipelines.audit.calibrations import Calibrations
 from pipelines.audit.drifts import AHEAD, KindDrift
-from pipelines.audit.pairs import YEAR_D, Pairs, changes_of, e_n_of, last_of_each, pairs_of
+from pipelines.audit.pairs import YEAR_D, Pairs, changes_of, e_n_of, first_of_each, last_of_each, pairs_of
 from pipelines.audit.parameters import FAMILY_OF
 from pipelines.audit.rules import Rules
-
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-Index = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -185,9 +182,7 @@ def _padded(calibrations: Calibrations, good: Flags, rows: Pairs, name: str) -> 
     value, error = calibrations.column(name), calibrations.error(name)
     use = np.flatnonzero(good & (place[calibrations.histories] >= 0) & np.isfinite(value + error))
     unit = place[calibrations.histories[use]]
-    starts = (
-        np.flatnonzero(np.concatenate([[True], unit[1:] != unit[:-1]])) if use.size else np.zeros(0, dtype=np.int64)
-    )
+    starts = first_of_each(unit)
     order = np.arange(use.size) - np.repeat(starts, np.diff(np.append(starts, use.size)))
     shape = (units.size, int(order.max()) + 1 if use.size else 1)
     filled: list[Array] = []

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from inertial.population.comparison import outlier_limit
+from pipelines.audit.audit import Audit
 from pipelines.audit.calibrations import Calibrations, date_of
 from pipelines.audit.finding import AuditFinding, date_or_never
+from pipelines.audit.pairs import YEAR_D
 from pipelines.audit.parameters import unit_text
-
-if TYPE_CHECKING:
-    from pipelines.audit.audit import Audit
-    from pipelines.audit.unit_drifts import UnitDrift
+from pipelines.audit.unit_drifts import UnitDrift
 
 
 def of_units(audit: Audit) -> Iterator[AuditFinding]:
@@ -27,16 +26,16 @@ def of_units(audit: Audit) -> Iterator[AuditFinding]:
 
 
 def _two_units(audit: Audit) -> Iterator[AuditFinding]:
-    for one in twice(audit.all):
-        if audit.all.day[one.second] < audit.scope.since:
+    for serial, rows in twice(audit.all).items():
+        if audit.all.day[rows[1]] < audit.scope.since:
             continue
-        first, second = (_where(audit.all, row) for row in (one.first, one.second))
+        first, second = (_where(audit.all, row) for row in rows)
         message = (
-            f"{one.serial}: measured as {first} and as {second}, which is impossible for one unit: two units have one serial; "
+            f"{serial}: measured as {first} and as {second}, which is impossible for one unit: two units have one serial; "
             "identify both, give one a new serial, and revoke the certificates of the wrong one"
         )
-        evidence = {"runs": [str(audit.all.run[row]) for row in (one.first, one.second)]}
-        yield AuditFinding("quality", "two_units", one.serial, message, (one.serial,), evidence)
+        evidence = {"runs": [str(audit.all.run[row]) for row in rows]}
+        yield AuditFinding("quality", "two_units", serial, message, (serial,), evidence)
 
 
 def _where(calibrations: Calibrations, row: int) -> str:
@@ -163,14 +162,14 @@ def _numbers(drift: UnitDrift) -> dict[str, Any]:
 
 def _after(drift: UnitDrift) -> str:
     """Time between two calibrations, in a unit in which it is not zero."""
-    months, days = 12.0 * drift.years, 365.25 * drift.years
+    months, days = 12.0 * drift.years, YEAR_D * drift.years
     if months >= 1.5:
         return f"{months:.0f} months"
     return f"{days:.0f} days" if days >= 1.5 else f"{24.0 * days:.2g} hours"
 
 
 def _before(drift: UnitDrift) -> str:
-    return date_of(drift.day - 365.25 * drift.years)
+    return date_of(drift.day - YEAR_D * drift.years)
 
 
 def _signed(value: float) -> str:
@@ -182,22 +181,13 @@ def _signed(value: float) -> str:
 AT_ONCE_D = 1.0 / 96.0  # a quarter of an hour: moving and soaking a unit takes longer
 
 
-class Twice(NamedTuple):
-    """A serial of two units: rows of two calibrations that cannot be of one unit."""
-
-    serial: str
-    first: int
-    second: int
-
-
-def twice(calibrations: Calibrations) -> list[Twice]:
-    """Serials of two units, in order, each once."""
+def twice(calibrations: Calibrations) -> dict[str, tuple[int, int]]:
+    """Serials of two units, in order, with the rows of two calibrations that cannot be of one unit."""
     order = np.lexsort((calibrations.day, calibrations.unit.astype(str)))
     unit, device, station = (column[order] for column in (calibrations.unit, calibrations.device, calibrations.station))
     same = unit[1:] == unit[:-1]
     close = (np.diff(calibrations.day[order]) < AT_ONCE_D) & (station[1:] != station[:-1])
-    by_serial: dict[str, Twice] = {}
+    by_serial: dict[str, tuple[int, int]] = {}
     for k in np.flatnonzero(same & ((device[1:] != device[:-1]) | close)):
-        serial = str(unit[k])
-        by_serial.setdefault(serial, Twice(serial, int(order[k]), int(order[k + 1])))
-    return list(by_serial.values())
+        by_serial.setdefault(str(unit[k]), (int(order[k]), int(order[k + 1])))
+    return by_serial

@@ -58,10 +58,9 @@ def command(
     as_json: options.JsonOption = False,
 ) -> None:
     """Audit the archive: re-calibrations due, drift, stations, check standards, population. Exit status 1: there are findings."""
-    from pipelines.audit.audit import audit
+    from pipelines.audit.audit import audit, scope_of
     from pipelines.audit.document import document
     from pipelines.audit.findings import findings
-    from pipelines.audit.period import scope_of
     from pipelines.audit.rules import load_rules
     from pipelines.flows.dask_cluster import on_dask
     from pipelines.parallel import processors

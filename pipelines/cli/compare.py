@@ -34,7 +34,8 @@ def command(
 ) -> None:
     """Fit a model to dwells; state its error there, on dwells left out, and on a fresh run with the coefficients unchanged."""
     from pipelines.cli.inputs import add_effects, both_runs, without_dwells
-    from pipelines.diagnosis.diagnose import compare, default_model
+    from pipelines.diagnosis.compare import compare
+    from pipelines.diagnosis.diagnose import default_model
     from pipelines.diagnosis.inputs import judged_effects
 
     add_effects(effect_file, formula, "compare")

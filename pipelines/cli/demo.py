@@ -145,7 +145,7 @@ class _Game:
 
     def _compare(self, title: str, *, first: bool) -> dict[str, Any]:
         from pipelines.cli.compare import print_comparison
-        from pipelines.diagnosis.diagnose import compare
+        from pipelines.diagnosis.compare import compare
 
         self._step(title, _command("compare", self.folder, self.hidden.model if first else None))
         lot = self.lot

@@ -110,7 +110,7 @@ def diagnosed(
 ) -> tuple[dict[str, Any], str]:
     """The document of a diagnosis, and its report on request, with the coefficients of a fit if they are given."""
     with error_console().status("looking for missing effects"):
-        from pipelines.diagnosis.examination import examination  # loads the search for effects: after the first line
+        from pipelines.diagnosis.diagnose import examination  # loads the search for effects: after the first line
 
         made = examination(table, history, judged, left_out)
     if not with_report:

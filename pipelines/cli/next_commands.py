@@ -159,8 +159,8 @@ def free_name() -> str:
 def fit_refusal(run: Run, effects: Sequence[str]) -> str:
     """What a run's recipe lacks to fit a model, and why its dwells show the model none the less; empty where it lacks nothing."""
     from pipelines.jobs.job import job_of_run
+    from pipelines.planning.context import with_verification_hint
     from pipelines.planning.plan import missing
-    from pipelines.planning.shown_by_verification import OF_VERIFICATION, REMEDY, shown_by_verification
     from pipelines.schedule.planned_state import state_of
     from pipelines.schedule.steps import steps
     from pipelines.schedule.timing import schedule
@@ -171,7 +171,6 @@ def fit_refusal(run: Run, effects: Sequence[str]) -> str:
     text = missing(state_of(activities, job.station, recipe, history=True), effects)
     if not text:
         return ""
-    named = [effect for effect in effects if f"{effect} cannot be identified" in text]
-    checked = sorted(shown_by_verification(activities, job.station, recipe, named))
-    also = f"; {', '.join(checked)}: {OF_VERIFICATION}; {REMEDY}" if checked else ""
-    return f"Recipe {recipe.name} cannot fit this model: {text}{also}."
+    return (
+        f"Recipe {recipe.name} cannot fit this model: {with_verification_hint(text, activities, job.station, recipe)}."
+    )

@@ -34,9 +34,9 @@ def cheapest_recipe(
     ----------
     base : the recipe to start from; ``name`` : its name on the command line
     """
+    from pipelines.planning.context import plan_context
     from pipelines.planning.optimise import optimise
-    from pipelines.planning.optimum_document import optimum_document, own_recipe
-    from pipelines.planning.plan import plan, plan_context
+    from pipelines.planning.optimum_document import optimum_document
     from pipelines.planning.textbook import textbook
     from pipelines.planning.verification_poses import verified_in
 
@@ -49,7 +49,7 @@ def cheapest_recipe(
         best = optimise(
             base, against, requirement, lambda note: status.update(f"searching: {note}"), tolerance=tolerance
         )
-    return best, optimum_document(best, plan(best.planned), own_recipe(base, name, best))
+    return best, optimum_document(best, base, name)
 
 
 def written(best: Optimum, target: Path, home: Path, own: dict[str, Any]) -> str:

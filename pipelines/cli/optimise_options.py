@@ -12,7 +12,7 @@ from schemas.recipe import Recipe
 from schemas.units import MICRO
 
 if TYPE_CHECKING:
-    from pipelines.planning.plan import PlanContext
+    from pipelines.planning.context import PlanContext
     from pipelines.planning.requirement import Requirement
 
 

@@ -128,8 +128,8 @@ def command(
     from pipelines.jobs.range_of_station import refused_by_run
     from pipelines.jobs.recipes import folder_of
     from pipelines.jobs.terms import planned_terms
-    from pipelines.planning.plan import plan, plan_context
-    from pipelines.planning.preset_noise import noise_of
+    from pipelines.planning.context import noise_of, plan_context
+    from pipelines.planning.plan import plan
     from pipelines.planning.procedure_plan import plan_of_procedures, procedure_rows
     from schemas.station import load_station
 
@@ -261,7 +261,7 @@ def optimise(
     from pipelines.cli.optimal import cheapest_recipe, missing_limits, print_optimum, written
     from pipelines.cli.optimise_options import OptimiseOptions
     from pipelines.jobs.recipes import folder_of
-    from pipelines.planning.preset_noise import noise_of
+    from pipelines.planning.context import noise_of
     from schemas.station import load_station
 
     printed = is_standard_output(output, "plan optimise", as_json=as_json)

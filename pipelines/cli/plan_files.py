@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from pipelines.planning.plan import PlanContext
+    from pipelines.planning.context import PlanContext
 
 
 def save(path: Path, text: str) -> None:

@@ -73,7 +73,7 @@ def command(
     there are findings, or nothing proves where a certificate comes from.
     """
     from pipelines.archive.signatures import public_keys
-    from pipelines.audit.index_check import check_index
+    from pipelines.audit.index import check_index
     from pipelines.cli.certificate_check import certificate_files, check_certificates
     from pipelines.integrity import verify
 

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from inertial import effects as catalogue
+from inertial.arrays import Array
 from inertial.criticism.diagnosis import diagnose
 from inertial.criticism.left_out import left_out
 from inertial.criticism.verdict import judged
@@ -32,8 +32,6 @@ from pipelines.tables.dwells import Measured, lot_of, measured
 from pipelines.tables.sound_lot import generator
 from schemas.errors import DataRejected
 from schemas.units import MICRO
-
-Array = NDArray[np.float64]
 
 
 def compare(

@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.criticism.left_out import Kind, LeftOut, left_out
 from inertial.criticism.reproduced_change import ReproducedChange, reproduced_change, without_own_bias
 from inertial.decisions import BLOCKS, CONFIRMED, LEFT_OUT, RISES
@@ -16,9 +16,6 @@ from inertial.estimation.model import Model
 from inertial.estimation.problem import Lot, Problem
 from pipelines.diagnosis.result_rows import known
 from schemas.units import MICRO
-
-Array = NDArray[np.float64]
-
 
 _TOLD = {"blocks of time": "stretches of time"}
 """Kinds of dwells left out in the words of the texts, where these differ."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,8 @@ from inertial.criticism.diagnosis import Diagnosis
 from inertial.criticism.diagnosis import diagnose as diagnose_lot
 from inertial.data_errors.faults import Fault
 from inertial.errors import InertialError
-from pipelines.diagnosis.compare import compare, without_history
+from inertial.planning.reasons import reason
+from pipelines.diagnosis.compare import without_history
 from pipelines.diagnosis.next_measurement import Proposed, proposed
 from pipelines.diagnosis.result_rows import (
     Names,
@@ -29,12 +31,11 @@ from pipelines.diagnosis.result_rows import (
     white_noise_of,
     without_influence,
 )
-from pipelines.diagnosis.suggested_formula import what_follows
+from pipelines.diagnosis.suggested_formula import as_toml, offer, what_follows
+from pipelines.parallel import keep_memory
 from pipelines.tables.dwells import Measured
 from pipelines.tables.sound_lot import error_of, every_unit_faulty, gaps, generator, probability, sound_lot
 from schemas.errors import DataRejected
-
-__all__ = ["compare", "default_model", "diagnose", "document", "examined"]
 
 DEFAULT = ("bias", "scale", "misalignment")
 THERMAL = ("bias_temperature", "scale_temperature")
@@ -168,7 +169,7 @@ def document(
         ],
         "classes": classes_of(diagnosis, names),
         "influence": influence_of(diagnosis, names),
-        "without_influence": without_influence(diagnosis),
+        "without_influence": without_influence(diagnosis.carried),
         "removed": removed_of(diagnosis, names),
         "recommended": [n.effects.simplest.effect.id for n in diagnosis.named if not n.effects.of_data and n.predicts],
         "leave_out": leave_out_of(diagnosis, names),
@@ -196,3 +197,54 @@ def _fault(measurement: Measured, fault: Fault) -> dict[str, Any]:
         "dwells": [int(measurement.dwells[k]) for k in fault.dwells],
         "evidence": fault.evidence,
     }
+
+
+@dataclass(frozen=True)
+class Examination:
+    """A diagnosis of dwells.
+
+    document : for programs, with keys beyond the fixed ones
+    measured, diagnosis : the readings, and their diagnosis; None if every unit has a data fault
+    """
+
+    document: dict[str, Any]
+    measured: Measured
+    diagnosis: Diagnosis | None
+
+
+def examination(
+    table: pd.DataFrame,
+    history: pd.DataFrame | None,
+    judged: Sequence[str] | None,
+    left_out: Collection[str] = (),
+) -> Examination:
+    """The diagnosis of dwells against a model, on one thread: the matrices are small.
+
+    Parameters
+    ----------
+    judged : the model; the default one if None
+    left_out : ``UNIT:DWELL``, which were removed from ``table`` on purpose
+    """
+    effects = list(judged) if judged else default_model(table)
+    keep_memory()
+    with threadpool_limits(1):
+        measurement, faults, diagnosis = examined(table, history, effects, left_out)
+        content = {
+            **document(measurement, faults, diagnosis, left_out=left_out),
+            **report_fields(measurement.units, effects, diagnosis),
+        }
+    return Examination(content, measurement, diagnosis)
+
+
+def report_fields(units: tuple[str, ...], effects: list[str], diagnosis: Diagnosis | None) -> dict[str, Any]:
+    """Keys of the document beyond the fixed ones: the judged model, breakers of unseen effects, the suggested formula."""
+    extras: dict[str, Any] = {"effects": effects, "units": list(units), "breakers": {}, "offer": None}
+    if diagnosis is None:
+        return extras
+    extras["breakers"] = {name: catalogue.get(name).breaker for name in diagnosis.unseen}
+    state = diagnosis.problem.lot.state
+    extras["reasons"] = {name: reason(state, name, effects) for name in diagnosis.unseen}
+    if diagnosis.unexplained is not None:
+        formula = offer(diagnosis.unexplained, diagnosis.problem.lot.state)
+        extras["offer"] = None if formula is None else {**formula, "toml": as_toml(formula)}
+    return extras

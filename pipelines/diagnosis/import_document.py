@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pipelines.importers.content import Content
+from pipelines.importers.mapping import Mapping
 from schemas.errors import WrongUse
 from schemas.foreign import shown
-
-if TYPE_CHECKING:
-    from pipelines.importers.mapping import Mapping
-    from schemas.import_references import ImportReferences
+from schemas.import_references import ImportReferences
 
 
 def import_document(
@@ -51,7 +49,7 @@ def import_document(
         data = record.imported(content.table, how, name, content, breaks)
     judged = None
     if fit:
-        from pipelines.diagnosis.imported import judge
+        from pipelines.diagnosis.imported_norms import judge
 
         with working("fitting and judging"):
             judged = judge(fit, data, how)

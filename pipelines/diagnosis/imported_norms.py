@@ -1,32 +1,32 @@
-"""A fit to dwells of unknown orientation with its verdict, by the methods of ``fit`` and ``diagnose``."""
+"""The fits of an import by name, with verdicts: labelled faces, a plane, a temperature ramp, dwells of unknown orientation."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
+from inertial.arrays import Array
 from inertial.counts import degrees_of_freedom
 from inertial.state import T_REFERENCE
 from inertial.uncertainty.rounding import equal
 from pipelines.diagnosis.diagnose import default_model, diagnose
+from pipelines.importers.faces import six_faces
 from pipelines.importers.judged import FitAnswer, gravity_of, imported_dwells
 from pipelines.importers.mapping import Mapping
+from pipelines.importers.plane import plane, shown_turn
+from pipelines.importers.pose_check import silent_axis
+from pipelines.importers.ramp import ramp
+from pipelines.importers.record import Imported
 from pipelines.stages.judge import AdequacyDocument, told_by, verdict_table
 from pipelines.stages.unknown_poses.fit import FittedNorms, bias_uncertainty, fitted_dwells, norm_tables, norms_fitted
 from pipelines.tables.condense import MOST
 from schemas.errors import DataRejected
 from schemas.units import AXES, MICRO, STANDARD_GRAVITY_M_S2
-
-Array = NDArray[np.float64]
-
-if TYPE_CHECKING:
-    from pipelines.importers.record import Imported
 
 COVERAGE = 2.0
 TEMPERATURE = "bias_temperature"
@@ -41,7 +41,7 @@ def norm(data: Imported, mapping: Mapping) -> FitAnswer:
     rows = [{str(name): value for name, value in row.items()} for row in tables["coefficients"].to_dict("records")]
     others = {name: tables[name] for name in ("covariance", "residuals", "predictions", "wander")}
     others["verdict"] = verdict_table(answer.verdict, effects)
-    return FitAnswer("norm", answer.adequate, answer.document, answer.lines, rows, tuple(effects), others)
+    return FitAnswer("norm", answer.document["adequate"], answer.document, answer.lines, rows, tuple(effects), others)
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,6 @@ class NormAnswer:
     """A fit under the norm condition: its verdict, its document for JSON, and lines for people."""
 
     fit: FittedNorms
-    adequate: bool | None
     document: dict[str, Any]
     lines: tuple[str, ...]
     verdict: AdequacyDocument
@@ -73,14 +72,9 @@ def fitted(
         done = norms_fitted(dwells, history, effects, gravity)
         smaller = _smaller(dwells, history, effects, gravity)
     verdict = diagnose(fitted_dwells(dwells), history, list(effects))
-    document = _document(done, smaller, verdict)
-    return NormAnswer(
-        done,
-        verdict["adequate"],
-        document,
-        tuple(_lines(done, smaller, verdict, out_unit)),
-        told_by(verdict, dwells["unit"].nunique()),
-    )
+    lines = tuple(_lines(done, smaller, verdict, out_unit))
+    told = told_by(verdict, dwells["unit"].nunique())
+    return NormAnswer(done, _document(done, smaller, verdict), lines, told)
 
 
 def _smaller(
@@ -201,3 +195,31 @@ def _axis_line(done: FittedNorms, spread: dict[str, Array], place: tuple[int, in
         f"{whose}{AXES[k]}: bias {_bias(done)[u, k]:.7g} ± {record:.2g} {unit} over the record ({later}; k = {COVERAGE:g}), "
         f"scale {float(done.scale[u, k]) / STANDARD_GRAVITY_M_S2:.6g} {unit} per m/s²"
     )
+
+
+METHODS: dict[str, Callable[[Imported, Mapping], FitAnswer]] = {
+    "norm": norm,
+    "faces": six_faces,
+    "plane": plane,
+    "temperature": ramp,
+}
+
+_NORM_NEEDS = 9
+"""Bias, scale and the angles between the axes."""
+
+
+def judge(method: str, data: Imported, mapping: Mapping) -> FitAnswer:
+    """The fit called ``method``, one of :data:`METHODS`, of one unit's import, with a verdict on its own adequacy."""
+    silent = silent_axis(data.dwells) if method == "norm" and data.dwells is not None else ""
+    if silent and (turned := shown_turn(data, mapping)) is not None:
+        return turned
+    if silent:  # more poses, which the fit requests, do not help
+        raise DataRejected(
+            f"import: axis {silent}; three axes that respond to gravity are needed for --fit norm; correct --map {silent[0]}=…"
+        )
+    if method == "norm" and data.dwells is not None and not mapping.poses and len(data.dwells) <= _NORM_NEEDS:
+        raise DataRejected(
+            f"import: {len(data.dwells)} dwells of unknown orientation, more than {_NORM_NEEDS} are needed for --fit norm; add "
+            "positions; or, if faces were up, name them with --poses LABEL=+x,LABEL=-x,… and give --fit faces"
+        )
+    return METHODS[method](data, mapping)

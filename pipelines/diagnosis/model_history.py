@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Protocol
+from collections.abc import Callable, Sequence
+from typing import Any
 
 from inertial.decisions import CONFIRMED, LEFT_OUT
 from pipelines.diagnosis.confirmation import fall_of
-
-if TYPE_CHECKING:
-    from pipelines.jobs.model_files import Version
+from pipelines.jobs.model_files import Version
 
 FIGURES = {
     "fitted_ug": "rms_ug",
@@ -22,12 +20,8 @@ FIGURES = {
 JUDGED = ("fall_ug", "fall_u_ug", "confirmed", "reason")
 
 
-class Compare(Protocol):
-    """Errors of a model as :func:`pipelines.diagnosis.compare.compare` states them."""
-
-    def __call__(self, effects: list[str], before: list[str] | None) -> dict[str, Any]:
-        """The comparison of a model; the effects added to ``before`` are judged, if given."""
-        ...
+Compare = Callable[[list[str], list[str] | None], dict[str, Any]]
+"""Errors of a model as :func:`pipelines.diagnosis.compare.compare` states them; the effects added to the second are judged."""
 
 
 def evolution(versions: Sequence[Version], compare: Compare) -> list[dict[str, Any]]:

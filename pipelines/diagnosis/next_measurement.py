@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -60,45 +61,36 @@ def proposed(diagnosis: Diagnosis, around: Circumstances | None = None) -> Propo
     for named in (*diagnosis.handled, *diagnosis.named):
         if len(named.effects.members) > 1:
             # more poses do not separate handling errors from effects; the text of the handling error says what does
-            handled = named.effects.of_data
-            measurement = None if handled else _proposal_for(diagnosis, named.effects, around, already)
+            measurement, alike = None, ()
+            if not named.effects.of_data:
+                with suppress(MissingInput):  # a quantity that the run did not record
+                    measurement = proposal(diagnosis.final, named.effects, around, already)
+                with suppress(MissingInput):
+                    alike = twins(diagnosis.final, named.effects, around)
             already += measurement.steps if measurement is not None else ()
             parting.append((named.effects, measurement))
-            twin.append(() if handled else _twins(diagnosis, named.effects, around))
+            twin.append(alike)
     return Proposed(tuple(parting), sighting(diagnosis.final, diagnosis.unseen, around, already), tuple(twin))
-
-
-def _twins(diagnosis: Diagnosis, group: EffectClass, around: Circumstances | None) -> tuple[str, ...]:
-    try:
-        return twins(diagnosis.final, group, around)
-    except MissingInput:
-        return ()
-
-
-def _proposal_for(
-    diagnosis: Diagnosis, group: EffectClass, around: Circumstances | None, already: list[SequenceStep]
-) -> Proposal | None:
-    try:
-        return proposal(diagnosis.final, group, around, already)
-    except MissingInput:
-        return None
 
 
 def _breaker(group: EffectClass) -> dict[str, Any]:
     """What separates a class, as text, if no steps of the station do."""
     ordered = sorted(group.members[:2], key=lambda m: m.term.effect.scope == "data")
     first, second = (m.term.effect for m in ordered)
-    outer, inner, temperature = BREAKER_POSE
     steps = "" if group.of_data else "no steps of the station are certain to separate them; needed:  "
     why = f"{first.id} | {second.id}: {steps}{second.breaker}"
-    return {"outer_deg": outer, "inner_deg": inner, "chamber_C": temperature, "why": why, "measurable": False}
+    return _without_steps(why)
 
 
 def _no_measurement(alike: Sequence[str]) -> dict[str, Any]:
     """What separates effects that are identical under every step of the station, as text."""
-    outer, inner, temperature = BREAKER_POSE
     cures = dict.fromkeys(catalogue.get(name).breaker for name in alike)
     why = f"{' | '.join(alike)}: no measurement of this station separates them; needed: {'; '.join(cures)}"
+    return _without_steps(why)
+
+
+def _without_steps(why: str) -> dict[str, Any]:
+    outer, inner, temperature = BREAKER_POSE
     return {"outer_deg": outer, "inner_deg": inner, "chamber_C": temperature, "why": why, "measurable": False}
 
 

@@ -27,6 +27,10 @@ class Names:
     units: tuple[str, ...]
     dwells: tuple[int, ...]
 
+    def at(self, unit: int, dwell: int) -> dict[str, Any]:
+        """A dwell of a unit by its names."""
+        return {"unit": self.units[unit], "dwell": self.dwells[dwell]}
+
 
 def known(value: float) -> float | None:
     """A number; None if it is not finite."""
@@ -78,7 +82,7 @@ def _class(named: Named, names: Names) -> dict[str, Any]:
         "nonlinear_of": None if scope == "data" or not simplest.values else simplest.effect.id,
         "plausible": _plausible(group.size, simplest.effect.typical_ug),
     }
-    row |= _carried(named.carried, names)
+    row |= {"influence": _dwells(named.carried, names), "without_influence": without_influence(named.carried)}
     if named.evidence:
         units = [names.units[u] for u in named.units]
         row |= {
@@ -102,7 +106,7 @@ def _bad_dwell(diagnosis: Diagnosis, bad: BadDwell, names: Names) -> dict[str, A
         "plausible": True,
         "units": [names.units[bad.unit]],
         "dwells": [names.dwells[bad.dwell]],
-        "influence": [{"unit": names.units[bad.unit], "dwell": names.dwells[bad.dwell], "share": 1.0}],
+        "influence": [{**names.at(bad.unit, bad.dwell), "share": 1.0}],
         "without_influence": {"dwells": 1, "p_value": 1.0},
         "evidence": f"{MICRO * size:.0f} µg off, {bad.deviations:.1f} standard deviations; the dwell is left out",
     }
@@ -138,25 +142,23 @@ def evidence_of(diagnosis: Diagnosis, names: Names) -> dict[str, Any] | None:
     evidence = diagnosis.evidence
     if evidence is None:
         return None
-    row: dict[str, Any] = {
-        "degrees_of_freedom": evidence.dof,
-        "condition": known(evidence.condition),
-        "bias_jackknife_ug": None if evidence.bias_spread is None else known(MICRO * evidence.bias_spread),
-        "bias_change_ug": None if evidence.bias_change is None else known(MICRO * evidence.bias_change),
-        "bias_change_by": None,
-        "largest_residual": None,
-        "smallest_cubic_ug": None if evidence.cubic is None else known(MICRO * evidence.cubic),
-    }
-    if evidence.carrier is not None:
-        row["bias_change_by"] = {"unit": names.units[evidence.carrier[0]], "dwell": names.dwells[evidence.carrier[1]]}
+    largest = None
     if evidence.largest is not None:
         size, unit, dwell = evidence.largest
-        row["largest_residual"] = {
-            "unit": names.units[unit],
-            "dwell": names.dwells[dwell],
-            "studentised": known(round(size, 2)),
-        }
-    return row
+        largest = {**names.at(unit, dwell), "studentised": known(round(size, 2))}
+    return {
+        "degrees_of_freedom": evidence.dof,
+        "condition": known(evidence.condition),
+        "bias_jackknife_ug": _micro(evidence.bias_spread),
+        "bias_change_ug": _micro(evidence.bias_change),
+        "bias_change_by": None if evidence.carrier is None else names.at(*evidence.carrier),
+        "largest_residual": largest,
+        "smallest_cubic_ug": _micro(evidence.cubic),
+    }
+
+
+def _micro(value: float | None) -> float | None:
+    return None if value is None else known(MICRO * value)
 
 
 def white_noise_of(model: Model) -> float | None:
@@ -175,7 +177,7 @@ def leave_out_of(diagnosis: Diagnosis, names: Names) -> dict[str, Any] | None:
     if not dwells:
         return None
     return {
-        "dwells": [{"unit": names.units[d.unit], "dwell": names.dwells[d.dwell]} for d in dwells],
+        "dwells": [names.at(d.unit, d.dwell) for d in dwells],
         "adequate_without": diagnosis.without_removed,
     }
 
@@ -183,33 +185,21 @@ def leave_out_of(diagnosis: Diagnosis, names: Names) -> dict[str, Any] | None:
 def influence_of(diagnosis: Diagnosis, names: Names) -> list[dict[str, Any]]:
     """Dwells by influence on the verdict, largest first; dwells left out have all of it."""
     single = [d for d in diagnosis.removed if not d.tail]
-    rows = [{"unit": names.units[d.unit], "dwell": names.dwells[d.dwell], "share": 1.0} for d in single]
+    rows = [{**names.at(d.unit, d.dwell), "share": 1.0} for d in single]
     if rows and not (diagnosis.named or diagnosis.handled):
         return rows
     return _dwells(diagnosis.carried, names)
 
 
 def _dwells(carried: CarriedEvidence, names: Names) -> list[dict[str, Any]]:
-    return [
-        {"unit": names.units[d.unit], "dwell": names.dwells[d.dwell], "share": round(d.share, 4)}
-        for d in carried.dwells
-    ]
+    return [{**names.at(d.unit, d.dwell), "share": round(d.share, 4)} for d in carried.dwells]
 
 
-def _carried(carried: CarriedEvidence, names: Names) -> dict[str, Any]:
-    """The dwells of largest influence on a class, and the verdict without them."""
-    return {"influence": _dwells(carried, names), "without_influence": _without(carried)}
-
-
-def _without(carried: CarriedEvidence) -> dict[str, Any] | None:
+def without_influence(carried: CarriedEvidence) -> dict[str, Any] | None:
+    """The verdict without the dwells of largest influence; None if nothing is named."""
     if carried.log_p_without is None:
         return None
     return {"dwells": len(carried.dwells), "p_value": probability(carried.log_p_without)}
-
-
-def without_influence(diagnosis: Diagnosis) -> dict[str, Any] | None:
-    """The verdict without the dwells of largest influence; None if nothing is named."""
-    return _without(diagnosis.carried)
 
 
 def removed_of(diagnosis: Diagnosis, names: Names) -> dict[str, Any] | None:
@@ -220,8 +210,7 @@ def removed_of(diagnosis: Diagnosis, names: Names) -> dict[str, Any] | None:
         "heavy_tails": any(d.tail for d in diagnosis.removed),
         "dwells": [
             {
-                "unit": names.units[d.unit],
-                "dwell": names.dwells[d.dwell],
+                **names.at(d.unit, d.dwell),
                 "off_ug": MICRO * float(np.linalg.norm(d.off)),
                 "deviations": round(d.deviations, 2),
                 "tail": d.tail,

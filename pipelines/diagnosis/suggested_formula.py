@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from inertial.criticism.diagnosis import Unexplained
 from inertial.expressions import NAMES, QUANTITIES
 from inertial.quantities import formula_name
 from inertial.state import State
-
-if TYPE_CHECKING:
-    from inertial.criticism.diagnosis import Unexplained
-
 
 _PARTS = {
     "bias": "the error",

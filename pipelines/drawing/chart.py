@@ -9,9 +9,8 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from inertial.arrays import Array
 
 Role = Literal["x", "y", "z", "fourth", "norm", "accent", "before", "after", "muted", "limit", "good", "ink"]
 Style = Literal["points", "line", "band", "bars", "density", "labels"]

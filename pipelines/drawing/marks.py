@@ -7,12 +7,9 @@ from dataclasses import dataclass
 from html import escape
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array, Flags
 from pipelines.drawing.chart import DIVERGING, ROLES, SEQUENTIAL, Anchor, ColourScale, Trace
-
-Array = NDArray[np.float64]
-
 
 OUTLINE = "#555555"
 INSIDE = 1e-6
@@ -38,7 +35,7 @@ class Place:
         """Vertical places of values, not outside of the rectangle."""
         return self.top + self.height * (1.0 - np.clip(self.along(values), 0.0, 1.0))
 
-    def holds(self, x: Array, y: Array) -> NDArray[np.bool_]:
+    def holds(self, x: Array, y: Array) -> Flags:
         """Which points lie inside."""
         across, along = self.across(x), self.along(y)
         return (
@@ -107,7 +104,7 @@ def _line(trace: Trace, place: Place, scale: ColourScale | None) -> str:
     return f'<path d="{path}" stroke="{ROLES[trace.role]}" stroke-width="{width:g}" fill="none"{dash}/>' if path else ""
 
 
-def _far_outside(place: Place, y: Array) -> NDArray[np.bool_]:
+def _far_outside(place: Place, y: Array) -> Flags:
     """Which points of a line are above or below the rectangle with their neighbours: the line does not follow its edge."""
     outside = np.abs(place.along(y) - 0.5) > 0.5 + INSIDE
     return outside & np.append(outside[1:], True) & np.append(True, outside[:-1])

@@ -6,11 +6,9 @@ Mollweide's projection (Snyder, Map Projections: A Working Manual, USGS 1395, 19
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from pipelines.drawing.chart import Anchor, Plot, PlotAxis, Trace
-
-Array = NDArray[np.float64]
 
 _STEPS = 30
 LETTERS: dict[str, tuple[tuple[float, float, float], Anchor]] = {

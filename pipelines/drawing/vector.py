@@ -9,14 +9,11 @@ from dataclasses import dataclass, replace
 from html import escape
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from pipelines.drawing.chart import ROLES, Chart, ColourScale, Plot, PlotAxis, Trace
 from pipelines.drawing.marks import DRAW, Place, marks, shade
 from pipelines.drawing.ticks import Ticks, date_ticks, linear_ticks, log_ticks
-
-Array = NDArray[np.float64]
-
 
 WIDTH = 1150.0
 """Of the picture, in its own pixels; a page shows it as wide as it is itself."""

@@ -46,7 +46,7 @@ NEEDED = (
     "pipelines.capture.capture",
     "pipelines.jobs.adequacy",
     "pipelines.jobs.references",
-    "pipelines.report.run_page",
+    "pipelines.report",
     "stations.opening",
 )
 SIMULATED = ("stations.plant.plant", "stations.plant.server", "stations.plant.line_server")

@@ -6,7 +6,7 @@ from typing import Annotated, Literal, NotRequired
 
 from typing_extensions import TypedDict
 
-from pipelines.diagnosis.documents.diagnosis import DiagnosisDocument
+from pipelines.diagnosis.documents import DiagnosisDocument
 
 
 class ImprovementChoice(TypedDict):

@@ -76,7 +76,7 @@ def errors_by_version(
 
     def compared(effects: list[str], before: list[str] | None) -> dict[str, Any]:
         with working():
-            from pipelines.diagnosis.diagnose import compare  # loads the search for effects: after the first line
+            from pipelines.diagnosis.compare import compare  # loads the search for effects: after the first line
 
             return compare(tables.dwells, effects, tables.history, tables.fresh, tables.fresh_history, before)
 
@@ -145,7 +145,7 @@ class Improvement:
     def _diagnosis(self, effects: list[str] | None, *, first: bool) -> dict[str, Any]:
         """The diagnosis of a model, as the attendant sees it."""
         with self.attendant.working("looking for missing effects"):
-            from pipelines.diagnosis.examination import (
+            from pipelines.diagnosis.diagnose import (
                 examination,  # loads the search for effects: after the first line
             )
 

@@ -6,7 +6,7 @@ from typing import Annotated, NotRequired
 
 from typing_extensions import TypedDict
 
-from pipelines.diagnosis.documents.diagnosis import DiagnosisDocument, NextMeasurement
+from pipelines.diagnosis.documents import DiagnosisDocument, NextMeasurement
 
 
 class InquiryMinutes(TypedDict):

@@ -12,8 +12,7 @@ from inertial.next_measurement.proposals import Proposal
 from inertial.planning.sequences import SequenceStep
 from pipelines.archive import Archive, Records, Run, code_hash, files, stage_key
 from pipelines.chain.runner import Runner
-from pipelines.diagnosis.diagnose import document, examined
-from pipelines.diagnosis.examination import report_fields
+from pipelines.diagnosis.diagnose import document, examined, report_fields
 from pipelines.diagnosis.next_measurement import Proposed, proposed, rows_of
 from pipelines.inquiry.endings import NO_FOLLOW_UP, Ending, ambiguous_classes, ending_of, no_follow_up
 from pipelines.inquiry.explanation import shows, why

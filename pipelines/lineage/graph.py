@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 
@@ -48,6 +48,11 @@ class ProvActivity:
     made: tuple[str, ...]
     about: dict[str, Any] = field(default_factory=dict[str, Any])
 
+    @property
+    def person(self) -> str:
+        """Who took the step, and where."""
+        return f"{self.about['who']}@{self.about.get('where', '')}"
+
 
 @dataclass
 class Graph:
@@ -67,19 +72,11 @@ class Graph:
 
     def made_by(self) -> dict[str, list[ProvActivity]]:
         """The steps that made a node, by its id; a calibration that another step ended has several."""
-        steps_of: dict[str, list[ProvActivity]] = {}
-        for step in self.steps.values():
-            for node in step.made:
-                steps_of.setdefault(node, []).append(step)
-        return steps_of
+        return _by_node((node, step) for step in self.steps.values() for node in step.made)
 
     def used_by(self) -> dict[str, list[ProvActivity]]:
         """The steps that used a node, by its id."""
-        steps_of: dict[str, list[ProvActivity]] = {}
-        for step in self.steps.values():
-            for node in step.used:
-                steps_of.setdefault(node, []).append(step)
-        return steps_of
+        return _by_node((node, step) for step in self.steps.values() for node in step.used)
 
     def around(self, start: Iterable[str]) -> Graph:
         """The part of the graph with the origin of these nodes and the results made from them."""
@@ -114,7 +111,13 @@ class Graph:
         return nodes, steps
 
 
+def _by_node(pairs: Iterable[tuple[str, ProvActivity]]) -> dict[str, list[ProvActivity]]:
+    steps_of: dict[str, list[ProvActivity]] = {}
+    for node, step in pairs:
+        steps_of.setdefault(node, []).append(step)
+    return steps_of
+
+
 def _within(step: ProvActivity, kept: set[str]) -> ProvActivity:
-    used = tuple(node for node in step.used if node in kept)
-    made = tuple(node for node in step.made if node in kept)
-    return ProvActivity(step.id, step.name, used, made, step.about)
+    used, made = (tuple(node for node in nodes if node in kept) for nodes in (step.used, step.made))
+    return replace(step, used=used, made=made)

@@ -32,7 +32,10 @@ def prov_of(traced: Lineage) -> dict[str, Any]:
     graph = traced.graph
     agents: dict[str, dict[str, Any]] = {}
     activities = [_activity(step, graph, agents) for step in graph.steps.values()]
-    entities = [_entity(node, graph) for node in graph.nodes.values()]
+    made_by, used_by = graph.made_by(), graph.used_by()
+    entities = [
+        _entity(node, graph, made_by.get(node.id, []), used_by.get(node.id, [])) for node in graph.nodes.values()
+    ]
     return {"@context": CONTEXT, "@graph": [*entities, *activities, *agents.values()]}
 
 
@@ -41,8 +44,8 @@ def iri(kind: str, name: str) -> str:
     return f"{BASE}{kind}/{quote(name, safe='/:@._-~')}"
 
 
-def _entity(node: Node, graph: Graph) -> dict[str, Any]:
-    made = graph.made_by().get(node.id, [])
+def _entity(node: Node, graph: Graph, made: list[ProvActivity], used: list[ProvActivity]) -> dict[str, Any]:
+    """A node with the steps that made it and those that used it."""
     kinds = {"recipe": ["prov:Plan"], "limits": ["prov:Plan"]}.get(node.kind, [])
     entity: dict[str, Any] = {
         "@id": iri("thing", node.id),
@@ -62,8 +65,8 @@ def _entity(node: Node, graph: Graph) -> dict[str, Any]:
         if made[0].about.get("when"):
             entity["generatedAtTime"] = made[0].about["when"]
         if made[0].about.get("who"):
-            entity["wasAttributedTo"] = iri("agent", _person(made[0]))
-    for step in graph.used_by().get(node.id, []):
+            entity["wasAttributedTo"] = iri("agent", made[0].person)
+    for step in used:
         if step.name == "revoke":
             entity["wasInvalidatedBy"], entity["invalidatedAtTime"] = iri("step", step.id), step.about["when"]
     return {key: value for key, value in entity.items() if value != []}
@@ -109,8 +112,8 @@ def _agents(step: ProvActivity, agents: dict[str, dict[str, Any]]) -> list[str]:
     """The person and the program of a step."""
     names: list[str] = []
     if step.about.get("who"):
-        name = iri("agent", _person(step))
-        agents[name] = {"@id": name, "@type": ["prov:Agent", "prov:Person"], "label": _person(step)}
+        name = iri("agent", step.person)
+        agents[name] = {"@id": name, "@type": ["prov:Agent", "prov:Person"], "label": step.person}
         names.append(name)
     software = step.about.get("software", {})
     if software:
@@ -119,7 +122,3 @@ def _agents(step: ProvActivity, agents: dict[str, dict[str, Any]]) -> list[str]:
         agents[name] = {"@id": name, "@type": ["prov:Agent", "prov:SoftwareAgent"], "label": label}
         names.append(name)
     return names
-
-
-def _person(step: ProvActivity) -> str:
-    return f"{step.about['who']}@{step.about.get('where', '')}"

@@ -147,7 +147,7 @@ def _action(step: ProvActivity, graph: Graph) -> dict[str, Any]:
     if about.get("when"):
         action["endTime"] = about["when"]
     if about.get("who"):
-        action["agent"] = {"@id": f"#{quote(_person(step))}"}
+        action["agent"] = {"@id": f"#{quote(step.person)}"}
     if about.get("software"):
         action["instrument"] = {"@id": _program(about["software"])}
     return action
@@ -163,8 +163,8 @@ def _agents(graph: Graph) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
     programs: dict[str, dict[str, Any]] = {}
     for step in graph.steps.values():
         if step.about.get("who"):
-            name = f"#{quote(_person(step))}"
-            people[name] = {"@id": name, "@type": "Person", "name": _person(step), "affiliation": {"@id": "#owner"}}
+            name = f"#{quote(step.person)}"
+            people[name] = {"@id": name, "@type": "Person", "name": step.person, "affiliation": {"@id": "#owner"}}
         software = step.about.get("software")
         if software:
             name = _program(software)
@@ -174,10 +174,6 @@ def _agents(graph: Graph) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
                 "@id": name, "@type": "SoftwareApplication", "name": "Tumbleline", "softwareVersion": number, "description": text,
             }  # fmt: skip
     return list(people.values()), list(programs.values())
-
-
-def _person(step: ProvActivity) -> str:
-    return f"{step.about['who']}@{step.about.get('where', '')}"
 
 
 def _program(software: dict[str, Any]) -> str:

@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pipelines.archive import Archive, Run, files
 from pipelines.certificates.ledger import Ledger
 from pipelines.lineage.gather import Gatherer
+from pipelines.lineage.graph import Graph
 from schemas.errors import ArchiveUnusable, WrongUse, did_you_mean
-
-if TYPE_CHECKING:
-    from pipelines.lineage.graph import Graph
 
 
 @dataclass(frozen=True)

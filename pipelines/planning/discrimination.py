@@ -4,21 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import permutations
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inertial import design
+from inertial.arrays import Array
 from inertial.planning.discrimination import Discrimination
+from pipelines.planning.context import PlanContext
 from pipelines.planning.requirement import Requirement, candidates, temperature_choices
 from schemas.errors import WrongUse
 from schemas.units import MICRO
-
-Array = NDArray[np.float64]
-
-if TYPE_CHECKING:
-    from pipelines.planning.plan import PlanContext
 
 ENOUGH = 50.0
 """χ² of the wrong effect over a lot from which two effects count as discriminated."""

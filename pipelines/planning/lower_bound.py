@@ -10,24 +10,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import permutations
-from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inertial import design
+from inertial.arrays import Array
 from inertial.noise.dwells import dwell_covariance
+from pipelines.planning.context import PlanContext
 from pipelines.planning.requirement import Requirement
 from pipelines.planning.soak_orders import orders
 from pipelines.planning.timed_design import soak_waits
 from pipelines.schedule.planned_state import settled_state
 from pipelines.schedule.timing import spent
 from schemas.recipe import Recipe
-
-Array = NDArray[np.float64]
-
-if TYPE_CHECKING:
-    from pipelines.planning.plan import PlanContext
 
 RESTED_S = 1e4  # s at rest before a dwell: nothing of the last move is left
 PIECE_S = 120.0

@@ -10,24 +10,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial import design
+from inertial.arrays import Array
 from inertial.errors import NotIdentified
 from inertial.planning.expected import Expected
 from inertial.planning.pose_exchange import exchanged
 from inertial.planning.visibility import visibilities
-from pipelines.planning.dwell_counts import FEWEST, MOST, fewest_dwells
+from pipelines.planning.context import PlanContext, plan_context
 from pipelines.planning.lower_bound import lower_bound
-from pipelines.planning.plan import PlanContext, identified, plan_context
+from pipelines.planning.plan import identified
 from pipelines.planning.requirement import Requirement
 from pipelines.planning.soak_orders import mirrored, orders
 from pipelines.planning.textbook import PART_SEEN
-from pipelines.planning.timed_design import PlanDesign, TimedDesign, spanned
+from pipelines.planning.timed_design import FEWEST, MOST, PlanDesign, TimedDesign, fewest_dwells, spanned
 from pipelines.planning.verification_poses import apart, numbered, turns
 from pipelines.schedule.timing import spent
 from schemas.errors import RecipeInvalid
 from schemas.poses import SoakPart
 from schemas.recipe import Recipe
 
-Array = NDArray[np.float64]
 Progress = Callable[[str], None]
 
 TRIED = 3

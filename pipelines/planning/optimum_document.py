@@ -2,47 +2,35 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections import Counter
 from typing import Any
 
+from inertial.arrays import Array
 from inertial.errors import NotIdentified
-from inertial.planning.expected import Expected
 from inertial.planning.visibility import visibilities
+from pipelines.planning.context import plan_context
 from pipelines.planning.discrimination import rival_separations
 from pipelines.planning.optimise import Optimum
-from pipelines.planning.plan import PlanContext, identified, plan_context
+from pipelines.planning.plan import identified, plan
 from pipelines.schedule.timing import spent
 from schemas.recipe import Recipe
-from schemas.units import MICRO
+from schemas.units import AXES, MICRO
 
 
-@dataclass(frozen=True)
-class OwnRecipe:
-    """The recipe that the search starts from, for comparison.
+def optimum_document(best: Optimum, base: Recipe, name: str) -> dict[str, Any]:
+    """The result of a search as a document for programs.
 
-    name : as given on the command line
-    context : the recipe on the station
-    expected : expected standard errors of its model; None where it cannot identify the model
+    Parameters
+    ----------
+    base : the recipe that the search started from; ``name`` : as given on the command line
     """
-
-    name: str
-    context: PlanContext
-    expected: Expected | None
-
-
-def own_recipe(base: Recipe, name: str, best: Optimum) -> OwnRecipe:
-    """The recipe of the command line on the same station, with the same flicker model as the new recipe."""
-    slowest = float(best.against.state.time[-1])
-    context = plan_context(base, best.against.station, best.against.noise, slowest=slowest)
+    document = plan(best.planned)
+    slowest = float(best.against.state.time[-1])  # the flicker model of the new recipe
+    own = plan_context(base, best.against.station, best.against.noise, slowest=slowest)
     try:
-        expected = identified(context)
+        own_errors = identified(own).errors
     except NotIdentified:
-        expected = None
-    return OwnRecipe(name, context, expected)
-
-
-def optimum_document(best: Optimum, plan: dict[str, Any], own: OwnRecipe) -> dict[str, Any]:
-    """The result of a search as a document for programs."""
+        own_errors = None
     textbook = best.against
     seen = {s.effect for s in visibilities(textbook.state, textbook.recipe.effects, 1.0) if s.seen}
     reference = {
@@ -51,49 +39,47 @@ def optimum_document(best: Optimum, plan: dict[str, Any], own: OwnRecipe) -> dic
     rivals = [
         {**r, "textbook": reference[r["true"], r["wrong"]]} for r in rival_separations(best.requirement, best.planned)
     ]
-    own_minutes = spent(own.context.activities).document()
     return {
-        "recipe": plan["recipe"],
-        "from": own.name,
-        "dwell_s": plan["dwell_s"]["planned"],
-        "temperatures_C": plan["temperatures_C"],
-        "poses": plan["poses"],
-        "dwells": plan["dwells"],
-        "minutes": plan["minutes"],
-        "own_minutes": own_minutes,
-        "own_worst": _own_worst(best, own),
+        "recipe": document["recipe"],
+        "from": name,
+        "dwell_s": document["dwell_s"]["planned"],
+        "temperatures_C": document["temperatures_C"],
+        "poses": document["poses"],
+        "dwells": document["dwells"],
+        "minutes": document["minutes"],
+        "own_minutes": spent(own.activities).document(),
+        "own_worst": _own_worst(best, own_errors),
         "textbook_minutes": spent(textbook.activities).document(),
         "share": best.share,
         "verification_dwells": _verification(best.planned.recipe),
         "worst": best.worst,
-        "coefficients": _coefficient_rows(best, plan, own),
+        "coefficients": _coefficient_rows(best, document["coefficients"], own_errors),
         "rivals": rivals,
-        "seen_besides": sorted({row["effect"] for row in plan["effects"] if row["seen"]} - seen),
-        "plan": plan,
+        "seen_besides": sorted({row["effect"] for row in document["effects"] if row["seen"]} - seen),
+        "plan": document,
     }
 
 
-def _own_worst(best: Optimum, own: OwnRecipe) -> float | None:
-    """Largest ratio of the own recipe's errors to the required ones; None for rivals, or where it has no errors."""
-    if own.expected is None or best.requirement.discrimination is not None:
+def _own_worst(best: Optimum, own_errors: Array | None) -> float | None:
+    """Largest ratio of the own recipe's errors to the required ones; None for rivals, or where it cannot identify its model."""
+    if own_errors is None or best.requirement.discrimination is not None:
         return None
-    return float((own.expected.errors / best.requirement.errors).max())
+    return float((own_errors / best.requirement.errors).max())
 
 
-def _coefficient_rows(best: Optimum, plan: dict[str, Any], own: OwnRecipe) -> list[dict[str, Any]]:
+def _coefficient_rows(
+    best: Optimum, coefficients: list[dict[str, Any]], own_errors: Array | None
+) -> list[dict[str, Any]]:
     """Coefficients with the required error (None where rivals are discriminated) and the own recipe's error."""
-    axis_number = {"x": 0, "y": 1, "z": 2}
-    columns: dict[str, int] = {}
+    required = None if best.requirement.discrimination else best.requirement.errors
+    column = Counter[str]()
     rows: list[dict[str, Any]] = []
-    for row in plan["coefficients"]:
-        if row["axis"] in axis_number:
-            axis, column = axis_number[row["axis"]], columns.setdefault(row["axis"], 0)
-            columns[row["axis"]] += 1
-            required = (
-                MICRO * float(best.requirement.errors[axis, column]) if not best.requirement.discrimination else None
-            )
-            own_error = None if own.expected is None else MICRO * float(own.expected.errors[axis, column])
-            rows.append({**row, "wanted_ug": required, "own_ug": own_error})
+    for row in coefficients:
+        if row["axis"] in AXES:
+            at = AXES.index(row["axis"]), column[row["axis"]]
+            column[row["axis"]] += 1
+            errors = {"wanted_ug": required, "own_ug": own_errors}
+            rows.append({**row, **{key: None if e is None else MICRO * float(e[at]) for key, e in errors.items()}})
     return rows
 
 

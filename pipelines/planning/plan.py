@@ -3,75 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inertial import effects as catalogue
+from inertial.arrays import Array
 from inertial.effects import SensorEffect
 from inertial.errors import NotIdentified
-from inertial.noise.dwells import DwellNoise, dwell_covariance
+from inertial.noise.dwells import dwell_covariance
 from inertial.noise.flicker import RATIO, constants_of_means
 from inertial.noise.measurands import DAY_S, against_mean, between_means, flicker_mean, walk_mean
 from inertial.planning.expected import Expected, expected_errors, expected_gain
 from inertial.planning.reasons import reason
 from inertial.planning.visibility import SEEN, Visibility, visibilities
 from inertial.state import State
+from pipelines.planning.context import OF_VERIFICATION, PlanContext, shown_by_verification, with_verification_hint
 from pipelines.planning.reach import reach
-from pipelines.planning.shown_by_verification import OF_VERIFICATION, REMEDY, shown_by_verification
-from pipelines.schedule.planned_state import state_of
-from pipelines.schedule.steps import steps
-from pipelines.schedule.timing import Activity, schedule, spent
+from pipelines.schedule.timing import spent
 from pipelines.stages.uncertainty.budget_terms import BudgetTerms
 from pipelines.tables.calibration import unit_texts
-from schemas.errors import RecipeInvalid
 from schemas.limits import Limits
-from schemas.recipe import Recipe
-from schemas.station import StationConfig
 from schemas.units import AXES, MICRO
 
-Array = NDArray[np.float64]
-
 NO_SWITCH_ON = "no repeatability of switching on is stated for this device"
-
-
-@dataclass(frozen=True)
-class PlanContext:
-    """A recipe on a station.
-
-    activities : what the station does and when
-    state : the planned dwells of the fit, (n,)
-    covariance : (n, n), of the dwell means, g²
-    """
-
-    recipe: Recipe
-    station: StationConfig
-    noise: DwellNoise
-    activities: list[Activity]
-    state: State
-    covariance: NDArray[np.float64]
-
-
-def plan_context(recipe: Recipe, station: StationConfig, noise: DwellNoise, *, slowest: float = 0.0) -> PlanContext:
-    """A recipe on a station with devices of this noise; ``slowest`` as in :func:`inertial.noise.dwells.dwell_covariance`.
-
-    Raises
-    ------
-    RecipeInvalid
-        The recipe has no multi-position test, of whose dwells a plan is made.
-    """
-    if not recipe.tumbles:
-        raise RecipeInvalid(
-            f"recipe {recipe.name}: its procedures have no multi_position, of whose dwells visibility, pictures and a quicker "
-            "recipe are made; list it, or see station time and figures of the procedures with 'tumbleline plan'",
-            key="procedures",
-        )
-    whole = schedule(steps(recipe), station, recipe)
-    state = state_of(whole, station, recipe, history=True)
-    covariance = dwell_covariance(state.time, recipe.dwell_s, noise, slowest=slowest)
-    return PlanContext(recipe, station, noise, whole, state, covariance)
 
 
 def plan(context: PlanContext, terms: BudgetTerms | None = None, limits: Limits | None = None) -> dict[str, Any]:
@@ -95,7 +51,8 @@ def plan(context: PlanContext, terms: BudgetTerms | None = None, limits: Limits 
         context.state, recipe.effects, noise.white(recipe.dwell_s), [s.effect for s in visibility if s.seen]
     )
     alone = {s.effect: MICRO * s.size for s in fast if np.isfinite(s.size)}
-    checked = _shown_by_verification(context, [s.effect for s in visibility if not s.seen])
+    hidden = [s.effect for s in visibility if not s.seen]
+    checked = shown_by_verification(context.activities, context.station, recipe, hidden)
     white, wander, together = (MICRO * f(recipe.dwell_s) for f in (noise.white, noise.wander, noise.error))
     return {
         "recipe": recipe.name,
@@ -187,20 +144,13 @@ def identified(context: PlanContext) -> Expected:
     NotIdentified
         The recipe cannot identify it; the message names the feature of the plan and what to add.
     """
-    units = max(1, len(context.recipe.units))
+    recipe = context.recipe
     try:
-        return expected_errors(context.recipe.effects, context.state, context.covariance, units=units)
+        return expected_errors(recipe.effects, context.state, context.covariance, units=max(1, len(recipe.units)))
     except NotIdentified as problem:
-        effects = context.recipe.effects
-        text = missing(context.state, effects) or str(problem)
-        named = [effect for effect in effects if f"{effect} cannot be identified" in text]
-        checked = sorted(_shown_by_verification(context, named))
-        also = f"; {', '.join(checked)}: {OF_VERIFICATION}; {REMEDY}" if checked else ""
-        raise NotIdentified(f"plan {context.recipe.name}: {text}{also}") from None
-
-
-def _shown_by_verification(context: PlanContext, effects: Sequence[str]) -> set[str]:
-    return shown_by_verification(context.activities, context.station, context.recipe, effects)
+        text = missing(context.state, recipe.effects) or str(problem)
+        text = with_verification_hint(text, context.activities, context.station, recipe)
+        raise NotIdentified(f"plan {recipe.name}: {text}") from None
 
 
 def missing(state: State, effects: Sequence[str]) -> str:

@@ -3,51 +3,22 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from inertial.noise.dwells import DwellNoise
+from inertial.arrays import Array
 from inertial.uncertainty.period import Windows, flicker_within
+from pipelines.planning.context import PlanContext
 from pipelines.schedule.planned_dwells import planned_dwells
-from pipelines.schedule.timing import Activity
 from pipelines.stages.uncertainty.budget_terms import BudgetTerms
 from pipelines.stages.uncertainty.reachable import PlannedDwells, reachable, unreachable
 from pipelines.stages.uncertainty.tables import LABELS
 from schemas.limits import Limits
-from schemas.recipe import Recipe
-from schemas.station import StationConfig
 from schemas.units import MICRO
 
-Array = NDArray[np.float64]
 
-
-class Planning(Protocol):
-    """A recipe on a station with devices of a noise."""
-
-    @property
-    def recipe(self) -> Recipe:
-        """What is measured."""
-        ...
-
-    @property
-    def station(self) -> StationConfig:
-        """Where."""
-        ...
-
-    @property
-    def noise(self) -> DwellNoise:
-        """Of the devices."""
-        ...
-
-    @property
-    def activities(self) -> list[Activity]:
-        """What the station does and when."""
-        ...
-
-
-def reach(context: Planning, covariance: Array, terms: BudgetTerms, limits: Limits | None) -> dict[str, Any] | None:
+def reach(context: PlanContext, covariance: Array, terms: BudgetTerms, limits: Limits | None) -> dict[str, Any] | None:
     """What a recipe can reach on its station; None where no uncertainty is stated.
 
     Parameters
@@ -87,7 +58,7 @@ def reach(context: Planning, covariance: Array, terms: BudgetTerms, limits: Limi
     }
 
 
-def remarks(context: Planning, terms: BudgetTerms) -> list[str]:
+def remarks(context: PlanContext, terms: BudgetTerms) -> list[str]:
     """What a reader should know of the statement: soaks that are too short, temperatures of the chamber, gravity by formula."""
     stated, out = terms.stated, list[str]()
     if stated is None:

@@ -6,16 +6,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inertial import poses
+from inertial.arrays import Array
 from inertial.planning.discrimination import Discrimination
 from inertial.planning.pose_exchange import CRITERIA, Criterion, ratios
 from inertial.state import T_REFERENCE
 from pipelines.planning.verification_poses import WHOLE_DEG
 from schemas.station import StationConfig
-
-Array = NDArray[np.float64]
 
 CANDIDATES = 26
 QUARTERS = 4

@@ -5,19 +5,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inertial import poses
+from inertial.arrays import Array
 from inertial.errors import NotIdentified
 from inertial.planning.expected import expected_errors
 from inertial.planning.visibility import visibilities
 from inertial.state import State
-from pipelines.planning.plan import PlanContext, identified, plan_context
+from pipelines.planning.context import PlanContext, plan_context
+from pipelines.planning.plan import identified
 from pipelines.planning.verification_poses import numbered
 from pipelines.schedule.planned_state import planned_state
 from schemas.recipe import Recipe
-
-Array = NDArray[np.float64]
 
 LEVELS = 5
 PART_SEEN = 0.05

@@ -1,16 +1,18 @@
-"""Plan designs with times: the time and columns of every dwell, the covariance of the dwell means, and the station time."""
+"""Plan designs with times: time and columns of every dwell, covariance of the means, station time, and the fewest dwells."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import permutations
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inertial import design
+from inertial.arrays import Array, Flags
 from inertial.frames import force_from_angles
 from inertial.noise.dwells import DwellNoise, dwell_covariance
 from inertial.noise.flicker import flicker_of_means
@@ -23,7 +25,6 @@ from schemas.recipe import FEWEST_SAMPLES, Recipe
 from schemas.station import StationConfig
 from schemas.units import STANDARD_GRAVITY_M_S2
 
-Array = NDArray[np.float64]
 Choice = NDArray[np.intp]
 
 SHORTEST_DWELL_S = 1.0
@@ -32,6 +33,15 @@ LONGEST_DWELLS = 3.0
 
 _GRAIN_S, _LONG_S = 2.0, 600.0
 """Step of the table of flicker covariance, and the increment of its length, s."""
+
+FEWEST = 4
+"""Minimum number of dwells of a soak: the reference pose at both ends, and two other poses between."""
+
+MOST = 420
+"""Maximum number of dwells of a recipe: above it the search time grows faster than the gain."""
+
+_FIRST = 3
+"""The first reduction removes one part in this many of a soak's dwells."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +58,7 @@ class PlanDesign:
         return np.repeat(np.arange(len(self.order)), self.counts)
 
     @property
-    def fixed(self) -> NDArray[np.bool_]:
+    def fixed(self) -> Flags:
         """Dwells that begin or end a soak, (n,): they use the reference pose."""
         change = np.diff(self.group) != 0
         return np.concatenate([[True], change]) | np.concatenate([change, [True]])
@@ -114,7 +124,7 @@ class TimedDesign:
         left, right = (np.moveaxis(x.reshape(n, 3, width), 1, 0) for x in (flat, solved))
         return self.requirement.ratio_to_required(np.swapaxes(left, -1, -2) @ right), seconds
 
-    def pose_independent(self) -> NDArray[np.bool_]:
+    def pose_independent(self) -> Flags:
         """Columns (3, p) that do not depend on the pose: bias and its dependence on temperature and time."""
         every = np.arange(len(self.force))
         rows = self._columns(
@@ -200,7 +210,7 @@ def spread(force: Array) -> Choice:
     return np.array(chosen, dtype=np.intp)
 
 
-def spanned(force: Array, choice: Choice, fixed: NDArray[np.bool_], needed_g: float) -> Choice:
+def spanned(force: Array, choice: Choice, fixed: Flags, needed_g: float) -> Choice:
     """A plan (n,) of candidates with the required span of specific force on every axis, as few poses as possible replaced.
 
     Parameters
@@ -225,3 +235,68 @@ def _flicker(dwell_s: float, longest: float) -> tuple[Array, Array, float]:
         [np.arange(0.5 * dwell_s + 1e-6, 200.0, 0.25), np.arange(200.0, longest + _GRAIN_S, _GRAIN_S)]
     )
     return grid, flicker_of_means(grid, dwell_s, longest), float(flicker_of_means(np.zeros(1), dwell_s, longest)[0])
+
+
+def fewest_dwells(timed: TimedDesign, design: PlanDesign, allowed: Array) -> PlanDesign | None:
+    """The design with the fewest dwells whose starting arrangement stays within the allowed ratios; None where there is none.
+
+    Parameters
+    ----------
+    design : soaks and dwell length; its counts are replaced
+    allowed : (3, p) or (pairs,), largest ratio to the required errors, as returned by :meth:`TimedDesign.ratio_and_seconds`;
+        above 1 where an exchange of poses is expected to improve it
+    """
+
+    def worst_ratio(counts: tuple[int, ...]) -> float:
+        return float(np.max(timed.ratio_and_seconds(replace(design, counts=counts))[0] / allowed))
+
+    soaks = len(design.order)
+    uniform = smallest_passing(lambda n: worst_ratio((n,) * soaks) <= 1.0, FEWEST, MOST // soaks)
+    if uniform is None:
+        return None
+    counts, step = (uniform,) * soaks, max(1, uniform // _FIRST)
+    while step >= 1:
+        fewer = _fewer(counts, step, worst_ratio)
+        counts, step = (counts, step // 2) if fewer is None else (fewer, step)
+    return replace(design, counts=counts)
+
+
+def _fewer(
+    counts: tuple[int, ...], step: int, worst_ratio: Callable[[tuple[int, ...]], float]
+) -> tuple[int, ...] | None:
+    """Counts with a smaller sum that still meet the ratios; None where neither a reduction nor a shift does."""
+    for variants in (_reduced(counts, step), _shifted(counts, step)):
+        passing = [(ratio, variant) for variant in variants if (ratio := worst_ratio(variant)) <= 1.0]
+        if passing:
+            return min(passing)[1]
+    return None
+
+
+def _reduced(counts: tuple[int, ...], step: int) -> Iterator[tuple[int, ...]]:
+    """Counts with ``step`` dwells removed from one soak."""
+    for k, n in enumerate(counts):
+        if n - step >= FEWEST:
+            yield (*counts[:k], n - step, *counts[k + 1 :])
+
+
+def _shifted(counts: tuple[int, ...], step: int) -> Iterator[tuple[int, ...]]:
+    """Counts with ``2·step`` dwells removed from one soak and ``step`` added to another."""
+    for source, target in permutations(range(len(counts)), 2):
+        if counts[source] - 2 * step >= FEWEST:
+            variant = list(counts)
+            variant[source] -= 2 * step
+            variant[target] += step
+            yield tuple(variant)
+
+
+def smallest_passing(passes: Callable[[int], bool], low: int, high: int) -> int | None:
+    """The smallest number from low to high that passes, by bisection; None where ``high`` fails.
+
+    Every number above one that passes must pass, too.
+    """
+    if not passes(high):
+        return None
+    while low < high:
+        middle = (low + high) // 2
+        low, high = (low, middle) if passes(middle) else (middle + 1, high)
+    return high

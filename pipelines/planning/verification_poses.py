@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inertial import poses
+from inertial.arrays import Array
 from inertial.frames import force_from_angles
 from schemas.poses import Pose
 from schemas.recipe import Recipe
-
-Array = NDArray[np.float64]
 
 WHOLE_DEG = 5.0
 

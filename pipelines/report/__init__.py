@@ -2,25 +2,31 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from pipelines.archive import Run, code_hash, stage_key
-from pipelines.certificates.statement import stated
-from pipelines.report.run_page import render
-from pipelines.report.templates import page_hash
+from pipelines.certificates.statement import Stated, stated
+from pipelines.report.context import OPTIONAL, TABLES, ReportContext
+from pipelines.report.interactive import interactive as with_scripts
+from pipelines.report.panel import rendered
+from pipelines.report.templates import page_hash, template
 from schemas.errors import WrongUse
 
-__all__ = ["INPUTS", "make_report", "render", "renew_report"]
+__all__ = ["make_report", "render", "renew_report"]
 
-INPUTS = (
-    *("verdicts", "dwells", "coefficients", "residuals", "verification", "verification_poses"),
-    *("allan", "noise", "figures", "grades"),
-)
-OPTIONAL = (
-    "history",
-    *("wander", "budget", "uncertainties", "lot_risks"),
-    *("procedure_points", "procedure_figures", "procedure_findings"),
-)
+PANELS = "pipelines.report.panels"
+
+
+def render(run: Run, certificates: Mapping[str, Stated] | None = None) -> str:
+    """The report of a run as one HTML text that needs no other file, of the panels that are found.
+
+    Parameters
+    ----------
+    certificates : of the run's units, in their present state in the ledger.
+    """
+    panels = rendered(PANELS, ReportContext(run, certificates or {}))
+    return with_scripts(template("page.html").render(run=run.id, panels=panels))
 
 
 def make_report(run: Run) -> bool:
@@ -32,13 +38,12 @@ def make_report(run: Run) -> bool:
     if run.about.get("parents") and run.report.is_file():
         return True  # a follow-up has no decisions: its report is the diagnosis of all runs together
     _refuse_unfinished(run)
-    names = [*INPUTS, *(name for name in OPTIONAL if name in run.tables())]
+    names = [*TABLES, *(name for name in ("history", *OPTIONAL) if name in run.tables())]
     inputs, code = {name: run.manifest(name)["sha256"] for name in names}, code_hash("report")
     certificates = stated(run, run.table("grades")["unit"])
-    parameters: dict[str, Any] = (
-        {"certificates": {unit: list(one) for unit, one in sorted(certificates.items())}} if certificates else {}
-    )
-    parameters["page"] = page_hash()  # the code's hash has no templates
+    parameters: dict[str, Any] = {"page": page_hash()}  # the code's hash has no templates
+    if certificates:
+        parameters["certificates"] = {unit: list(one) for unit, one in sorted(certificates.items())}
     key = stage_key("report", inputs, parameters, code)
     if run.has_report(key):
         run.seal()  # a killed writer may not have written it
@@ -49,7 +54,7 @@ def make_report(run: Run) -> bool:
 
 def renew_report(run: Run) -> None:
     """Write an existing report again after a change of the ledger."""
-    if (run.path / "report.json").is_file() and (not _captured(run) or set(INPUTS) <= set(run.tables())):
+    if (run.path / "report.json").is_file() and (not _captured(run) or set(TABLES) <= set(run.tables())):
         make_report(run)
 
 
@@ -60,7 +65,7 @@ def _captured(run: Run) -> bool:
 
 def _refuse_unfinished(run: Run) -> None:
     """Refuse a report on a run without decisions."""
-    missing = [name for name in INPUTS if name not in run.tables()]
+    missing = [name for name in TABLES if name not in run.tables()]
     if missing:
         raise WrongUse(
             f"report: run {run.id} has no {', '.join(missing)}; it is not finished: give its 'tumbleline run' again to continue"

@@ -40,8 +40,10 @@ class ReportContext:
         self.certificates = certificates
         self.about: dict[str, Any] = run.about
         self.recipe: dict[str, Any] = run.about["recipe"]
-        self.tables: dict[str, pd.DataFrame] = {name: run.table(name) for name in TABLES}
-        self.tables |= {name: run.table(name) for name in OPTIONAL if name in run.tables()}
+        stored = set(run.tables())
+        self.tables: dict[str, pd.DataFrame] = {
+            name: run.table(name) for name in (*TABLES, *OPTIONAL) if name in stored
+        }
 
     @property
     def coverage(self) -> float:

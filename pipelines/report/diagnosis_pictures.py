@@ -6,17 +6,15 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Literal, cast
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import stats
 
+from inertial.arrays import Array, Flags, Index
 from inertial.state import State
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Role, Symbol, Trace, density, level, shortened, symmetric
 from pipelines.drawing.mollweide import project, sphere
 from pipelines.report.residual_table import ResidualTable
 from pipelines.report.residuals import DriverValues, LotResiduals, direction
 from pipelines.report.smooth_curve import smooth
-
-Array = NDArray[np.float64]
 
 TURNS: tuple[tuple[int, Symbol, str], ...] = (
     (1, "triangle-up", "heating"),
@@ -156,10 +154,10 @@ def driver_chart(left: LotResiduals, drivers: list[DriverValues], temperature: A
     return Chart("Residuals against recorded quantities", tuple(plots), len(left.axes), height=235)
 
 
-def _against(x: Array, y: Array, label: str, turned: NDArray[np.int64] | None, *, several: bool) -> Iterator[Trace]:
+def _against(x: Array, y: Array, label: str, turned: Index | None, *, several: bool) -> Iterator[Trace]:
     """Points of one model, by the way the temperature was reached where that is known, and a smooth curve."""
     role = cast("Role", label)
-    groups: list[tuple[NDArray[np.bool_], Symbol, str]] = [(np.isfinite(y), "circle", "")]
+    groups: list[tuple[Flags, Symbol, str]] = [(np.isfinite(y), "circle", "")]
     if turned is not None:
         groups = [((turned == sign) & np.isfinite(y), mark, name) for sign, mark, name in TURNS]
     for rows, symbol, name in groups:
@@ -219,7 +217,7 @@ def _standing_out(table: ResidualTable, residual: Array, along: Array, unit: int
     turning = table.turning[unit]
     for axis, name in enumerate(table.axes):
         x, y, role = along[:, axis], residual[axis], cast("Role", name)
-        groups: list[tuple[str, Role, Symbol, NDArray[np.bool_]]]
+        groups: list[tuple[str, Role, Symbol, Flags]]
         if colour == "direction":
             groups = [(turn, TURN_ROLES[sign], symbol, turning == sign) for sign, symbol, turn in TURNS]
         else:

@@ -8,9 +8,9 @@ from typing import Any
 from inertial.quantities import ANGLE_COLUMNS, FORCE_COLUMNS
 from pipelines.archive import Run, code_hash, stage_key
 from pipelines.certificates.statement import Stated, stated
-from pipelines.diagnosis.examination import examination
+from pipelines.diagnosis.diagnose import examination
 from pipelines.jobs.model_files import use_formulas_of
-from pipelines.report.context import OPTIONAL, TABLES, ReportContext
+from pipelines.report.context import ReportContext
 from pipelines.report.diagnosis import render_diagnosis
 from pipelines.report.panels import budget, certificates
 from pipelines.report.templates import fill
@@ -43,12 +43,8 @@ magnitude, weighted by how far the force points along the axis.{% endif %}</p>{%
 class ImportContext(ReportContext):
     """An import that was graded, as the panels of a report read it."""
 
-    def __init__(self, run: Run, given: Mapping[str, Stated]) -> None:
-        self.run, self.certificates = run, given
-        self.about = run.about
-        self.recipe = run.about["recipe"]
-        there = set(run.tables())
-        self.tables = {name: run.table(name) for name in (*TABLES, *OPTIONAL) if name in there}
+    def __init__(self, run: Run, certificates: Mapping[str, Stated]) -> None:
+        super().__init__(run, certificates)
         if self.tables["grades"]["unit"].nunique() < FEWEST_OF_A_LOT:
             self.tables.pop("lot_risks", None)
         columns = set(run.table("dwells").columns)

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pipelines.drawing import svg_text
-from pipelines.planning.plan_rows import by_coefficient, worst_axes
+from pipelines.planning.context import PlanContext
+from pipelines.report.axes import side_by_side
 from pipelines.report.budget_plots import shares_plot
 from pipelines.report.numbers import scientific, significant
 from pipelines.report.plan_pictures import alias_chart, sight_chart, sphere_chart, temperature_chart
 from pipelines.report.templates import template
 from schemas.decisions import LARGEST_ERROR
-
-if TYPE_CHECKING:
-    from pipelines.planning.plan import PlanContext
 
 
 def render_plan(document: dict[str, Any], context: PlanContext) -> str:
@@ -29,7 +27,7 @@ def render_plan(document: dict[str, Any], context: PlanContext) -> str:
         recipe=context.recipe,
         number=significant,
         scientific=scientific,
-        coefficients=_coefficients(document["coefficients"]),
+        coefficients=side_by_side(document["coefficients"], lambda row: significant(row["uncertainty_ug"]), "unit"),
         seen=[row for row in document["effects"] if row["seen"]],
         unseen=[row for row in document["effects"] if not row["seen"]],
         **pictures(document, context),
@@ -58,16 +56,3 @@ def _budget(reach: dict[str, Any] | None) -> str:
     return shares_plot(
         {f"{titles.get(q, q)}, {row['axis']}": row["shares"] for q, row in worst.items() if row["shares"]}
     )
-
-
-def _coefficients(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """One line per coefficient, its axes side by side."""
-    return [
-        {
-            "effect": next(iter(axes.values()))["effect"],
-            "unit": next(iter(axes.values()))["unit"],
-            "cells": {axis.replace("*", "x"): significant(row["uncertainty_ug"]) for axis, row in axes.items()},
-            "names": ", ".join(dict.fromkeys(row["name"] for row in axes.values())),
-        }
-        for axes in by_coefficient(rows)
-    ]

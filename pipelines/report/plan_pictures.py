@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.frames import force_from_angles
 from inertial.planning.visibility import confounding
 from pipelines.drawing.chart import Chart, ColourScale, Plot, PlotAxis, Role, Symbol, Trace
 from pipelines.drawing.mollweide import project, sphere
+from pipelines.planning.context import PlanContext
 from pipelines.schedule.timing import temperatures
 from schemas.units import AXES
-
-Array = NDArray[np.float64]
-
-if TYPE_CHECKING:
-    from pipelines.planning.plan import PlanContext
 
 KINDS: tuple[tuple[str, str, Role, Symbol], ...] = (
     ("dwell", "fit", "accent", "circle"),

@@ -2,20 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from pipelines.drawing import Chart, Plot, PlotAxis, Trace, svg_text
 from pipelines.drawing.chart import Role, between
+from pipelines.importers.inspection import Inspection
 from pipelines.report.templates import template
 from schemas.units import AXES
-
-Array = NDArray[np.float64]
-
-if TYPE_CHECKING:
-    from pipelines.importers.inspection import Inspection
 
 _PIXELS = 1500
 ROOM = 0.05  # of the range, above and below

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from inertial import effects as catalogue
+from inertial.arrays import Array, Index
 from inertial.criticism.diagnosis import Diagnosis
 from inertial.errors import InertialError
 from inertial.estimation.model import Model
@@ -20,8 +20,6 @@ from inertial.quantities import shown_factor
 from pipelines.report.residuals import LABELS, axes_of, direction, recorded_quantities, residuals_of_model
 from pipelines.tables.dwells import Measured, lot_of, measured
 from schemas.errors import DataRejected
-
-Array = NDArray[np.float64]
 
 LEAST_LOG10_P = -1e6 / np.log(10.0)
 
@@ -35,11 +33,11 @@ class ResidualTable:
     """
 
     units: tuple[str, ...]
-    dwells: NDArray[np.int64]
+    dwells: Index
     axes: tuple[str, ...]
     residual: Array
     force: Array
-    turning: NDArray[np.int64]
+    turning: Index
     drivers: dict[str, tuple[str, Array]] = field(default_factory=dict[str, tuple[str, Array]])
 
     def pick(self, unit: int, dwell: int) -> str:

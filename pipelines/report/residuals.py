@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array, Index
 from inertial.criticism.diagnosis import Diagnosis
 from inertial.criticism.drivers import drivers_of
 from inertial.estimation.comparison import estimate, residuals_of
@@ -15,8 +15,6 @@ from inertial.estimation.problem import Problem
 from inertial.quantities import axis_labels, shown_factor
 from pipelines.report.smooth_curve import band
 from schemas.units import MICRO
-
-Array = NDArray[np.float64]
 
 ALWAYS = ("unit_C", "time_s", "temperature_rate", "since_move_s")
 STILL = {"unit_C": 1.0, "temperature_rate": 0.1, "since_move_s": 0.5}
@@ -142,7 +140,7 @@ def bands_without_zero(left: LotResiduals, drivers: list[DriverValues]) -> list[
     return labels
 
 
-def direction(temperature: Array) -> NDArray[np.int64]:
+def direction(temperature: Array) -> Index:
     """Whether each dwell was reached heating (1), cooling (−1) or neither (0), (n,), from temperatures (n,) in °C."""
     out = np.zeros(temperature.size, dtype=np.int64)
     held = temperature[0]

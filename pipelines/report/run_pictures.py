@@ -6,13 +6,10 @@ from typing import Any, Literal, cast
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from pipelines.drawing.chart import Chart, ColourScale, Plot, PlotAxis, Role, Trace, level, measured_curve
 from pipelines.report.smooth_curve import smooth
 from schemas.units import AXES
-
-Array = NDArray[np.float64]
 
 Against = Literal["force", "unit_C", "time", "pose"]
 

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.criticism.drivers import curve
 from pipelines.drawing.chart import Role, Trace
-
-Array = NDArray[np.float64]
 
 _KNOTS = 5
 

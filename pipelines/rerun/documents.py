@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal, NotRequired
 
 from typing_extensions import TypedDict
 
-from pipelines.diagnosis.documents.diagnosis import LeaveOut, VerdictEvidence
+from pipelines.diagnosis.documents import LeaveOut, VerdictEvidence
 
 
 class UnitDifference(TypedDict):

@@ -151,13 +151,13 @@ def saved_as(name: str) -> dict[str, str]:
 
 
 def table_csv(rows: Sequence[Mapping[str, Any]], name: str) -> Response:
-    """Rows as comma-separated values."""
+    """Rows as comma-separated values; a row may lack some of the columns."""
     import csv
     import io
 
     sink = io.StringIO()
     if rows:
-        writer = csv.DictWriter(sink, list(rows[0]), lineterminator="\n")
+        writer = csv.DictWriter(sink, list(dict.fromkeys(key for row in rows for key in row)), lineterminator="\n")
         writer.writeheader()
         writer.writerows({key: safe_cell(value) for key, value in row.items()} for row in rows)
     return Response(sink.getvalue(), media_type=PARAMETER["csv"], headers=saved_as(f"{name}.csv"))

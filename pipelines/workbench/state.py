@@ -19,6 +19,26 @@ Text = Annotated[str, Field(max_length=200)]
 Texts = Annotated[tuple[Annotated[str, Field(min_length=1, max_length=400)], ...], Field(max_length=60)]
 Outcome = Literal["", "pass", "fail", "refused"]
 
+ROWS = 50
+ORDERS = {
+    "measured": "measured DESC, unit",
+    "unit": "unit, measured DESC",
+    "outcome": "outcome, unit",
+    "station": "station, unit",
+}
+"""Units on a page of the search, and their orders in SQL."""
+
+
+def quoted(text: str) -> str:
+    """A text as a literal of SQL."""
+    return "'" + text.replace("'", "''").replace("\0", "") + "'"
+
+
+def like(text: str) -> str:
+    """A pattern that finds a text anywhere, with its special characters escaped."""
+    plain = text.replace("!", "!!").replace("%", "!%").replace("_", "!_")
+    return f"{quoted(f'%{plain}%')} ESCAPE '!'"
+
 
 class PageState(BaseModel):
     """Base of the states."""
@@ -95,9 +115,29 @@ class UnitsPage(PageState):
 
     def arguments(self) -> list[str]:
         """A question in SQL."""
-        from pipelines.workbench.questions import units_question
+        return ["query", self.question()]
 
-        return ["query", units_question(self)]
+    def question(self, most: int = ROWS) -> str:
+        """The question in SQL for a page of units with their runs."""
+        return (
+            "SELECT unit, outcome, grade, slot, run, measured, station, device "  # noqa: S608 - texts are quoted
+            "FROM units JOIN runs USING (run) "
+            f"WHERE {self.conditions()} ORDER BY {ORDERS[self.order]} LIMIT {most} OFFSET {(self.page - 1) * ROWS}"
+        )
+
+    def conditions(self) -> str:
+        """The conditions of the search in SQL."""
+        parts: list[str] = []
+        if self.search:
+            pattern = like(self.search.lower())
+            parts.append(f"(lower(unit) LIKE {pattern} OR lower(run) LIKE {pattern})")
+        chosen = {"outcome": self.outcome, "station": self.station, "device": self.device}
+        parts += [f"{column} = {quoted(value)}" for column, value in chosen.items() if value]
+        if self.since:
+            parts.append(f"measured >= {quoted(self.since)}")
+        if self.until:
+            parts.append(f"measured < {quoted(self.until + 'T99')}")
+        return " AND ".join(parts) or "true"
 
 
 class RunPage(PageState):
@@ -279,8 +319,3 @@ class OperatorPage(PageState):
     PATH: ClassVar[str] = "/operator"
     lot: Text = ""
     station: Text = ""
-
-
-PAGES: tuple[type[PageState], ...] = (
-    UnitsPage, RunPage, UnitPage, MissingPage, ModelsPage, UploadPage, PlanPage, StationPage, AuditPage, OperatorPage,
-)  # fmt: skip

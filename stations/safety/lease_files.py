@@ -38,7 +38,7 @@ class Holder:
         """Whether the holder in ``path`` is alive: a recent heartbeat and, on this machine, a process."""
         if seconds_since_beat(path) > SAFE_WITHIN_S:
             return False
-        return self.host != platform.node() or _is_process(self.pid)
+        return self.host != platform.node() or is_process(self.pid)
 
 
 def new_holder(station: str, run: str, role: Role = "run", token: str = "") -> Holder:
@@ -89,7 +89,8 @@ def seconds_since_beat(path: Path) -> float:
         return float("inf")
 
 
-def _is_process(pid: int) -> bool:
+def is_process(pid: int) -> bool:
+    """Whether a process of this host runs."""
     try:
         os.kill(pid, 0)
     except ProcessLookupError:

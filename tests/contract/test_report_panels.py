@@ -10,11 +10,10 @@ from root_process import ROOT
 
 from deploy.release import unpack
 from pipelines.archive import Archive
-from pipelines.report import panel, render
+from pipelines.report import PANELS, panel, render
 from pipelines.report.context import ReportContext
 from pipelines.report.panel import IncompletePanel, panels, rendered
 from pipelines.report.panels.unit_by_unit import UNIT_PANELS
-from pipelines.report.run_page import PANELS
 
 KEPT = ROOT / "tests" / "archives" / "v1.tar.xz"
 GUIDE = (ROOT / "docs" / "how-to" / "read-a-report.md").read_text(encoding="utf-8")

@@ -27,8 +27,8 @@ from pipelines.jobs.model_change import change_from_options
 from pipelines.jobs.recipe_text import limits_from
 from pipelines.jobs.recipes import load_recipe
 from pipelines.jobs.releases import release
+from pipelines.planning.context import plan_context
 from pipelines.planning.lower_bound import lower_bound
-from pipelines.planning.plan import plan_context
 from pipelines.planning.requirement import Requirement, candidates
 from pipelines.planning.soak_orders import orders, soak_seconds
 from pipelines.planning.textbook import reference_errors, textbook

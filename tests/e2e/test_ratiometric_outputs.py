@@ -16,7 +16,7 @@ from pipelines.archive import Archive
 from pipelines.chain.runner import Runner
 from pipelines.jobs.job import Request
 from pipelines.jobs.terms import planned_terms, without_noise
-from pipelines.planning.preset_noise import noise_of
+from pipelines.planning.context import noise_of
 from pipelines.stages.reduce import FollowedSupply, at_nominal_supply
 from pipelines.stages.uncertainty.reachable import reachable
 from schemas.decisions import decide

@@ -17,8 +17,7 @@ from typer.testing import CliRunner, Result
 
 from pipelines.archive import Archive, Run, files, parquet, stage_key
 from pipelines.archive.signatures import VARIABLE, make_key, public_keys
-from pipelines.audit.index import up_to_date
-from pipelines.audit.index_check import check_index
+from pipelines.audit.index import check_index, up_to_date
 from pipelines.audit.sql import ask
 from pipelines.certificates import Ledger
 from pipelines.certificates.ledger_index import INDEX_FOLDER, histories_of

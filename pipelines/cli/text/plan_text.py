@@ -7,9 +7,8 @@ from typing import Any
 
 from inertial.counts import number_of
 from pipelines.cli.printing import print_table, say, short
-from pipelines.planning.plan_rows import by_coefficient, worst_axes
+from pipelines.planning.plan_rows import worst_axes
 from schemas.decisions import LARGEST_ERROR
-from schemas.units import AXES
 
 RAISED = 3.0
 """Factor by which 1/f and random walk must raise a floor to be listed."""
@@ -123,12 +122,14 @@ def _longer(dwell: dict[str, float]) -> str:
 
 def _coefficient_lines(rows: list[dict[str, Any]]) -> list[list[str]]:
     """One line per coefficient with its three axes; one value for parameters of the station."""
-    lines: list[list[str]] = []
-    for axes in by_coefficient(rows):
-        first = next(iter(axes.values()))
-        values = {axis.replace("*", "x"): short(row["uncertainty_ug"]) for axis, row in axes.items()}
-        lines.append([f"{first['effect']}, {first['unit']}", *(values.get(axis, "") for axis in AXES)])
-    return lines
+    from pipelines.report.axes import side_by_side
+
+    lines = side_by_side(rows, lambda row: short(row["uncertainty_ug"]), "unit")
+    axes = [["*" if "*" in line["cells"] else "x", "y", "z"] for line in lines]
+    return [
+        [f"{line['effect']}, {line['unit']}", *(line["cells"].get(axis, "") for axis in own)]
+        for line, own in zip(lines, axes, strict=True)
+    ]
 
 
 def _visible_line(row: dict[str, Any]) -> list[str]:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
+from pipelines.report.axes import side_by_side
 from pipelines.report.context import UnitContext
 from pipelines.report.numbers import with_uncertainty
 from pipelines.report.templates import fill
@@ -29,14 +31,11 @@ def render(unit: UnitContext) -> str | None:
     """One line per coefficient with its three axes side by side; None without a fitted model."""
     if unit.tables["coefficients"].empty:
         return None
-    lines: dict[tuple[str, int], dict[str, Any]] = {}
-    counts: dict[tuple[str, str], int] = {}
-    for row in rows_of(unit.tables["coefficients"]):
-        place = counts.get((row["effect"], row["axis"]), 0)
-        counts[row["effect"], row["axis"]] = place + 1
-        line = lines.setdefault(
-            (row["effect"], place), {"effect": row["effect"], "unit": row["unit_text"], "cells": {}}
-        )
-        value, expanded = with_uncertainty(row["value"], unit.report.coverage * row["standard_error"])
-        line["cells"][row["axis"]] = {"name": row["name"], "value": value, "uncertainty": expanded}
-    return fill(TEMPLATE, lines=list(lines.values()), coverage=f"{unit.report.coverage:g}")
+    coverage = unit.report.coverage
+
+    def cell(row: Mapping[str, Any]) -> dict[str, str]:
+        value, expanded = with_uncertainty(row["value"], coverage * row["standard_error"])
+        return {"name": row["name"], "value": value, "uncertainty": expanded}
+
+    lines = side_by_side(rows_of(unit.tables["coefficients"]), cell)
+    return fill(TEMPLATE, lines=lines, coverage=f"{coverage:g}")

@@ -33,34 +33,20 @@ def render(unit: UnitContext) -> str:
 
 
 def _line(row: dict[str, Any]) -> dict[str, Any]:
-    value, expanded = significant(row["value"]), significant(row["uncertainty"], 2) if row["uncertainty"] > 0.0 else ""
-    limited = bool(np.isfinite(row["limit"]))
-    least = float(row.get("least", np.nan))
+    least, most = float(row.get("least", np.nan)), float(row["limit"])
     if np.isfinite(least):
-        return _at_least(row, value, expanded, least)
+        limit, margin = f"≥ {significant(least)}", significant(row["value"] - least)
+    else:  # both are empty without a limit
+        limit, margin = significant(most), significant(most - abs(row["value"]))
     return {
         "title": FIGURES[row["figure"]].label if row["figure"] in FIGURES else row["figure"],
-        "value": value,
-        "uncertainty": expanded,
-        "limit": significant(row["limit"]) if limited else "",
-        "margin": significant(row["limit"] - abs(row["value"])) if limited else "",
+        "value": significant(row["value"]),
+        "uncertainty": significant(row["uncertainty"], 2) if row["uncertainty"] > 0.0 else "",
+        "limit": limit,
+        "margin": margin,
         "unit": "" if row["unit_text"] == "1" else row["unit_text"],
-        "outcome": row["outcome"] if limited else "",
-        "risk": _risk(row) if limited else "",
-    }
-
-
-def _at_least(row: dict[str, Any], value: str, expanded: str, least: float) -> dict[str, Any]:
-    """The line of a figure with a least value."""
-    return {
-        "title": FIGURES[row["figure"]].label if row["figure"] in FIGURES else row["figure"],
-        "value": value,
-        "uncertainty": expanded,
-        "limit": f"≥ {significant(least)}",
-        "margin": significant(row["value"] - least),
-        "unit": "" if row["unit_text"] == "1" else row["unit_text"],
-        "outcome": row["outcome"],
-        "risk": _risk(row),
+        "outcome": row["outcome"] if limit else "",
+        "risk": _risk(row) if limit else "",
     }
 
 

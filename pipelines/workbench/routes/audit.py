@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from fastapi import APIRouter, Request
+from starlette.exceptions import HTTPException
 from starlette.responses import Response
 
 from inertial.uncertainty.rounding import chance
+from pipelines.audit.documents import AuditDocument
 from pipelines.audit.finding import WHO
 from pipelines.stages.figures import FIGURES
 from pipelines.workbench.pages import Workbench, figure, page, state_of, table_csv, workbench_of
@@ -19,6 +22,18 @@ router = APIRouter()
 HEADING, ORDER, ADDRESS = "Audit", 70, "/audit"
 DUE, FINDINGS = 60, 40
 COMPARED = ("station", "slot")
+TABLES: dict[str, Callable[[AuditDocument], Sequence[Mapping[str, Any]]]] = {
+    "due": lambda audited: [*audited["due"]["overdue"], *audited["due"]["soon"]],
+    "capability": lambda audited: audited["population"]["capability"],
+    "yield": lambda audited: audited["population"]["yield"],
+    "differences": lambda audited: sorted(
+        (row for row in audited["population"]["differences"] if row["by"] in COMPARED), key=lambda row: row["p"]
+    ),
+    "findings": lambda audited: [
+        {key: row[key] for key in ("who", "kind", "subject", "message")} for row in audited["findings"]
+    ],
+}
+"""Tables of the page that are saved as comma-separated values."""
 
 
 @router.get("/audit")
@@ -53,48 +68,21 @@ def drawn(request: Request, name: str, ending: str) -> Response:
     return figure(chart, ending, f"audit-{name}")
 
 
-@router.get("/audit/due.csv")
-def due(request: Request) -> Response:
-    """The units that are overdue or due soon."""
-    listed = _finished_audit(workbench_of(request), request)["document"]["due"]
-    return table_csv([*listed["overdue"], *listed["soon"]], "due")
+@router.get("/audit/{name}.csv")
+def table(request: Request, name: str) -> Response:
+    """A table of the page."""
+    if name not in TABLES:
+        raise HTTPException(404)
+    document = _finished_audit(workbench_of(request), request)["document"]
+    return table_csv([_flat(row) for row in TABLES[name](document)], name)
 
 
-@router.get("/audit/capability.csv")
-def capability(request: Request) -> Response:
-    """Capability of every figure with a limit, by kind of device."""
-    rows = _finished_audit(workbench_of(request), request)["document"]["population"]["capability"]
-    return table_csv([_flat(row) for row in rows], "capability")
-
-
-@router.get("/audit/yield.csv")
-def yields(request: Request) -> Response:
-    """The yield of all calibrations, and by station, device, lot and month."""
-    rows = _finished_audit(workbench_of(request), request)["document"]["population"]["yield"]
-    return table_csv([_flat(row) for row in rows], "yield")
-
-
-@router.get("/audit/differences.csv")
-def differences(request: Request) -> Response:
-    """Every figure compared between stations and between slots, by kind of device."""
-    rows = _finished_audit(workbench_of(request), request)["document"]["population"]["differences"]
-    told = sorted((row for row in rows if row["by"] in COMPARED), key=lambda row: row["p"])
-    return table_csv([_flat(row) for row in told], "differences")
-
-
-@router.get("/audit/findings.csv")
-def findings(request: Request) -> Response:
-    """The findings."""
-    audited = _finished_audit(workbench_of(request), request)
-    keys = ("who", "kind", "subject", "message")
-    return table_csv([{key: row[key] for key in keys} for row in audited["document"]["findings"]], "findings")
-
-
-def _flat(row: dict[str, Any]) -> dict[str, Any]:
-    """Value and ends of an interval in columns of their own."""
+def _flat(row: Mapping[str, Any]) -> dict[str, Any]:
+    """Value and ends of an interval in columns of their own; none for an interval that is not known."""
     out: dict[str, Any] = {}
     for key, value in row.items():
-        out |= {f"{key}_{side}": value[side] for side in value} if isinstance(value, dict) else {key: value}
+        if value is not None:
+            out |= {f"{key}_{side}": value[side] for side in value} if isinstance(value, dict) else {key: value}
     return out
 
 

@@ -26,9 +26,9 @@ from pipelines.workbench.pages import (
     table_csv,
     workbench_of,
 )
-from pipelines.workbench.results import Diagnosed
 from pipelines.workbench.services import models, requests, sources
 from pipelines.workbench.services.samples import samples_of
+from pipelines.workbench.services.work import Diagnosed
 from pipelines.workbench.state import MissingPage
 from schemas.errors import TumblelineError, WrongUse
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from fastapi import APIRouter, Request
 from starlette.responses import JSONResponse, Response
 
+from pipelines.jobs.job import Request as LotRequest
 from pipelines.workbench.pages import RequestBody, page, state_of, workbench_of
 from pipelines.workbench.services import lots, requests, stations
 from pipelines.workbench.state import OperatorPage
@@ -54,12 +55,13 @@ def start(request: Request, body: RequestBody) -> JSONResponse:
     }
     if not filled:
         raise WrongUse("lot: no serial number was scanned, one at least is needed; scan a unit into its slot")
-    faults = [part.strip() for part in str(body.get("fault", "")).split() if part.strip()]
+    faults = str(body.get("fault", "")).split()
     repeat = str(body.get("repeat", "0") or "0")
     if not repeat.isdecimal() or not repeat.isascii() or len(repeat) > 6:
         raise WrongUse(f"lot: repeat '{repeat[:20]}', a whole number from 0 on is needed; correct it")
-    filled = dict(sorted(filled.items()))
-    lot = lots.start(bench.settings, recipe, list(filled.values()), list(filled), faults, int(repeat), station.file)
+    slots, units = zip(*sorted(filled.items()), strict=True)
+    lot_request = LotRequest(recipe, station.file, units, slots, repeat=int(repeat), faults=tuple(faults))
+    lot = lots.start(bench.settings, lot_request)
     return JSONResponse({"address": OperatorPage(lot=lot.id).address()})
 
 

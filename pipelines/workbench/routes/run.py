@@ -8,8 +8,8 @@ from starlette.responses import Response
 from pipelines.certificates.statement import stated
 from pipelines.tables.frames import rows_of
 from pipelines.workbench.pages import Workbench, page, run_table, saved_as, state_of, table_csv, workbench_of
-from pipelines.workbench.results import Diagnosed
 from pipelines.workbench.services import requests
+from pipelines.workbench.services.work import Diagnosed
 from pipelines.workbench.state import MissingPage, RunPage
 from schemas.errors import TumblelineError, WrongUse
 

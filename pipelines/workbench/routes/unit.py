@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
@@ -13,6 +14,7 @@ from pipelines.audit.calibrations import day_of
 from pipelines.certificates import Ledger
 from pipelines.drawing import Chart
 from pipelines.report import run_pictures
+from pipelines.report.axes import side_by_side
 from pipelines.report.numbers import with_uncertainty
 from pipelines.stages.figures import FIGURES
 from pipelines.tables.frames import rows_of
@@ -27,9 +29,8 @@ from pipelines.workbench.pages import (
     table_csv,
     workbench_of,
 )
-from pipelines.workbench.questions import history_question
 from pipelines.workbench.services.samples import samples_of
-from pipelines.workbench.state import UnitPage
+from pipelines.workbench.state import UnitPage, quoted
 from schemas.errors import WrongUse
 
 router = APIRouter()
@@ -65,7 +66,7 @@ def unit(request: Request) -> Response:
     return page(
         request, "unit.html", state, problems, run=run, grade=grade, own=own, tables=tables, units=units,
         before=units[place - 1] if place else "", after=units[place + 1] if place + 1 < len(units) else "",
-        coefficients=_by_axis(own.get("coefficients", [])), parameters=parameters,
+        coefficients=side_by_side(own.get("coefficients", []), _expanded), parameters=parameters,
         coverage=float((run.about.get("limits") or {}).get("coverage_factor", COVERAGE)),
         labels={name: kind.label for name, kind in FIGURES.items()},
         certificates=Ledger(bench.archive).calibrations(state.unit)[-CERTIFICATES:][::-1],
@@ -137,21 +138,20 @@ def _history(bench: Workbench, serial: str) -> list[dict[str, Any]]:
     return [{**row, "day": day_of(str(row["measured"]))} for row in rows if row["measured"]]
 
 
+def history_question(unit: str) -> str:
+    """The coefficients of a unit in all its runs, in SQL."""
+    return (
+        "SELECT measured, run, effect, name, axis, value, standard_error, unit_text "  # noqa: S608 - the serial is quoted
+        "FROM coefficients JOIN runs USING (run) "
+        f"WHERE unit = {quoted(unit)} AND rerun_of = '' ORDER BY measured, run"
+    )
+
+
 def _parameter(row: dict[str, Any]) -> str:
     """The name of a coefficient: effect, name and axis."""
     return f"{row['effect']} {row['name']} {row['axis']}"
 
 
-def _by_axis(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """One line per effect, its axes side by side: value and expanded uncertainty as texts."""
-    lines: dict[tuple[str, int], dict[str, Any]] = {}
-    count: dict[tuple[str, str], int] = {}
-    for row in rows:
-        effect, axis = str(row["effect"]), str(row["axis"])
-        place = count.get((effect, axis), 0)
-        count[effect, axis] = place + 1
-        line = lines.setdefault((effect, place), {"effect": effect, "unit": row["unit_text"], "cells": {}})
-        line["cells"]["x" if axis == "*" else axis] = with_uncertainty(
-            float(row["value"]), COVERAGE * float(row["standard_error"])
-        )
-    return list(lines.values())
+def _expanded(row: Mapping[str, Any]) -> tuple[str, str]:
+    """Value and expanded uncertainty of a coefficient as texts."""
+    return with_uncertainty(float(row["value"]), COVERAGE * float(row["standard_error"]))

@@ -7,8 +7,7 @@ from starlette.responses import Response
 
 from pipelines.archive.listing import info_of
 from pipelines.workbench.pages import page, state_of, table_csv, workbench_of
-from pipelines.workbench.questions import ROWS, newest_question, units_question, yield_question
-from pipelines.workbench.state import UnitsPage
+from pipelines.workbench.state import ROWS, UnitsPage
 
 router = APIRouter()
 HEADING, ORDER, ADDRESS = "Units", 10, "/units"
@@ -21,7 +20,7 @@ def units(request: Request) -> Response:
     """A page of units, newest first."""
     bench = workbench_of(request)
     state, problems = state_of(request, UnitsPage)
-    answer = bench.index.ask(units_question(state))
+    answer = bench.index.ask(state.question())
     rows = [dict(zip(answer.columns, row, strict=True)) for row in answer.rows]
     counts = {str(name): int(count) for name, count in bench.index.ask(yield_question(state)).rows}
     newest = bench.index.ask(newest_question(NEWEST)).rows
@@ -36,6 +35,17 @@ def units(request: Request) -> Response:
 def table(request: Request) -> Response:
     """All units of the search."""
     state, _ = state_of(request, UnitsPage)
-    question = units_question(state.model_copy(update={"page": 1})).replace(f"LIMIT {ROWS}", f"LIMIT {EVERYTHING}")
-    answer = workbench_of(request).index.ask(question)
+    answer = workbench_of(request).index.ask(state.model_copy(update={"page": 1}).question(EVERYTHING))
     return table_csv([dict(zip(answer.columns, row, strict=True)) for row in answer.rows], "units")
+
+
+def yield_question(page: UnitsPage) -> str:
+    """Number of units by outcome, in SQL."""
+    return (
+        f"SELECT outcome, count(*) AS units FROM units JOIN runs USING (run) WHERE {page.conditions()} GROUP BY outcome"  # noqa: S608 - texts are quoted
+    )
+
+
+def newest_question(count: int) -> str:
+    """The newest runs, and how many there are, in SQL."""
+    return f"SELECT run, count(*) OVER () AS runs FROM runs ORDER BY started DESC, run DESC LIMIT {count}"  # noqa: S608 - a number

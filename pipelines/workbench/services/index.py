@@ -33,7 +33,7 @@ class RecentIndex:
 
     def __init__(self, address: str) -> None:
         self._archive = Archive(address)
-        self._lock = threading.Lock()
+        self._lock = threading.RLock()
         self._known: AuditIndex | None = None
         self._when, self._folder = 0.0, 0
         self._renewing = threading.Event()
@@ -70,18 +70,17 @@ class RecentIndex:
             return self._known
 
     def _renew(self) -> AuditIndex:
+        """The index made new; kept unless a newer one was made in the meantime. The lock may be held by the caller."""
         folder, start = self._stamp(), time.monotonic()
         index = up_to_date(self._archive)
-        self._known, self._when, self._folder = index, start, folder
+        with self._lock:
+            if self._known is None or start > self._when:
+                self._known, self._when, self._folder = index, start, folder
         return index
 
     def _renew_behind(self) -> None:
         try:
-            folder, start = self._stamp(), time.monotonic()
-            index = up_to_date(self._archive)
-            with self._lock:
-                if start > self._when:
-                    self._known, self._when, self._folder = index, start, folder
+            self._renew()
         finally:
             self._renewing.clear()
 

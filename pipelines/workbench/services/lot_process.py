@@ -12,10 +12,9 @@ from typing import Any, NoReturn
 from pipelines.archive import Archive, files
 from pipelines.chain.attendance import JUDGED, Answer, Attendance, Prompt
 from pipelines.chain.runner import Runner
-from pipelines.jobs.job import Request
 from pipelines.report.reasons import plain_reason
 from pipelines.tables.frames import rows_of
-from pipelines.workbench.services.lots import write_state
+from pipelines.workbench.services.lots import request_of, write_state
 from schemas.errors import OperatorNeeded, TumblelineError
 from schemas.installed import not_installed
 
@@ -85,13 +84,8 @@ def measure(place: Path) -> str:
 
 
 def _measured(request: dict[str, Any], pages: Pages) -> None:
-    keys = ("units", "slots", "faults")
-    lot_request = Request(
-        recipe=request["recipe"], station=Path(request["station"]) if request["station"] else None, seed=request["seed"],
-        repeat=int(request["repeat"]), **{key: tuple(request[key]) for key in keys},
-    )  # fmt: skip
     archive = Archive(request["archive"])
-    job = lot_request.job(archive)
+    job = request_of(request).job(archive)
     runner = Runner(job, archive, pages.progress)
     pages.put(run=runner.run.id)
     beside = Attendance(pages, job, runner.run.id)

@@ -12,15 +12,17 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pipelines.archive import files
+from pipelines.archive import Archive, files
 from pipelines.archive.keys import digest
+from pipelines.jobs.job import Request
 from pipelines.workbench.settings import WorkbenchSettings
 from schemas.errors import TumblelineError, WrongUse
+from stations.safety.lease_files import is_process
 
 FOLDER = "lots"
 ENDED = frozenset({"done", "stopped", "failed", "interrupted"})
@@ -71,10 +73,7 @@ class LotState:
         return self.ended or self.phase == PAUSED
 
 
-def start(
-    settings: WorkbenchSettings, recipe: str, units: Sequence[str], slots: Sequence[int], faults: Sequence[str], repeat: int,
-    station: Path | None = None,
-) -> LotState:  # fmt: skip
+def start(settings: WorkbenchSettings, lot_request: Request) -> LotState:
     """A new lot on a station, or the continuation of the same stopped lot.
 
     Raises
@@ -82,20 +81,9 @@ def start(
     TumblelineError
         The recipe, the seats or the faults are invalid; nothing was moved.
     """
-    from pipelines.archive import Archive
-    from pipelines.jobs.job import Request
-
-    if len(set(units)) < len(units):
-        twice = next(unit for unit in units if list(units).count(unit) > 1)
+    twice = next((unit for unit in lot_request.units if lot_request.units.count(unit) > 1), None)
+    if twice is not None:
         raise WrongUse(f"lot: serial '{twice}' is in two slots, each unit has one; scan the slots again")
-    lot_request = Request(
-        recipe=recipe,
-        station=station,
-        units=tuple(units),
-        slots=tuple(slots),
-        repeat=repeat,
-        faults=tuple(faults),
-    )
     job = lot_request.job(Archive(settings.archive))
     content = {
         **lot_request.parameters(),
@@ -104,7 +92,7 @@ def start(
     }
     name = digest(content)[:12]
     for other in lots(settings):
-        if not other.ended and other.id != name and other.station == str(station or ""):
+        if not other.ended and other.id != name and other.station == str(lot_request.station or ""):
             raise WrongUse(
                 f"lot: the station has lot {other.id} ({other.phase}), one lot at a time is possible; finish or stop that one "
                 "first"
@@ -129,17 +117,14 @@ def start(
 
 def again(settings: WorkbenchSettings, name: str) -> LotState:
     """The continuation of a stopped lot."""
-    request = files.read_json(place_of(settings, name) / "request.json")
-    station = Path(request["station"]) if request["station"] else None
-    return start(
-        settings,
-        request["recipe"],
-        request["units"],
-        request["slots"],
-        request["faults"],
-        int(request["repeat"]),
-        station,
-    )
+    return start(settings, request_of(files.read_json(place_of(settings, name) / "request.json")))
+
+
+def request_of(content: Mapping[str, Any]) -> Request:
+    """The request of a lot, from its file."""
+    station = Path(content["station"]) if content["station"] else None
+    lists = {name: tuple(content[name]) for name in ("units", "slots", "faults")}
+    return Request(content["recipe"], station, seed=content["seed"], repeat=int(content["repeat"]), **lists)
 
 
 def answer(settings: WorkbenchSettings, name: str, number: int, reply: str) -> LotState:
@@ -185,15 +170,15 @@ def pause_all(settings: WorkbenchSettings) -> list[str]:
     for one in working:
         pause(settings, one.id)
     end = time.monotonic() + SAFE_S
-    while time.monotonic() < end and any(_alive(one.pid) for one in working if one.pid):
+    while time.monotonic() < end and any(is_process(one.pid) for one in working if one.pid):
         time.sleep(POLL_S)
-    return [one.id for one in working if one.pid and _alive(one.pid)]
+    return [one.id for one in working if one.pid and is_process(one.pid)]
 
 
 def _ended(place: Path) -> LotState:
     """Ask the process of a lot to end; the page shows the phase that it writes at its end."""
     now = state_of(place)
-    if not now.idle and now.pid and _alive(now.pid):
+    if not now.idle and now.pid and is_process(now.pid):
         os.kill(now.pid, signal.SIGTERM)
     else:
         write_state(place, files.read_json(place / "state.json"))  # open pages look again
@@ -222,7 +207,7 @@ def state_of(place: Path) -> LotState:
     request, now = files.read_json(place / "request.json"), files.read_json(place / "state.json")
     phase = str(now["phase"])
     pid = int(now.get("pid", 0))
-    lost = (pid and not _alive(pid)) or (not pid and time.time() - float(now.get("since", 0.0)) > 60.0)
+    lost = (pid and not is_process(pid)) or (not pid and time.time() - float(now.get("since", 0.0)) > 60.0)
     if phase not in ENDED and lost:
         phase = "interrupted"
     if phase == "stopped" and (place / PAUSED).is_file():
@@ -250,14 +235,3 @@ def stamp(settings: WorkbenchSettings) -> str:
         return ""
     newest = [place.stat().st_mtime_ns for place in top.glob("*/state.json")]
     return f"{len(newest)}.{max(newest, default=0)}"
-
-
-def _alive(pid: int) -> bool:
-    try:
-        os.kill(pid, 0)
-    except ProcessLookupError:
-        return False
-    except PermissionError:
-        return True
-    status = Path(f"/proc/{pid}/stat")
-    return not (status.is_file() and status.read_text().rpartition(")")[2].split()[:1] == ["Z"])

@@ -15,9 +15,9 @@ from pipelines.jobs.moved_poses import moves_of
 from pipelines.jobs.recipe_text import limits_from, recipe_text
 from pipelines.jobs.recipes import folder_of, sample_names
 from pipelines.workbench.services import requests
+from pipelines.workbench.services.work import recipe_of
 from pipelines.workbench.settings import WorkbenchSettings
 from pipelines.workbench.state import PlanPage
-from pipelines.workbench.views.planned import recipe_of
 from schemas.errors import WrongUse
 from schemas.foreign import shown
 from schemas.recipe import Recipe

@@ -43,8 +43,6 @@ def samples_of(
     kept = [one for one in own if len(one)]
     if not kept:
         raise WrongUse(f"run {stored.id}: no samples of dwell {number} of unit {unit} are stored")
-    import pandas as pd
-
     out_unit = str(row["out_unit"]) if "out_unit" in rows.columns else ""
     pose = str(row["pose"]) if "pose" in rows.columns else ""
     return (

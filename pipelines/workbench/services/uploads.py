@@ -209,7 +209,7 @@ def mapping_of(request: Mapped[str, Any]) -> Any:
 
 def imported(request: Mapped[str, Any]) -> dict[str, Any]:
     """A file imported into the archive, with the requested fit."""
-    from pipelines.diagnosis.imported import judge
+    from pipelines.diagnosis.imported_norms import judge
     from pipelines.importers import files, keep, record
 
     place = Path(request["file"])

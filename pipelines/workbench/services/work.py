@@ -4,13 +4,38 @@ from __future__ import annotations
 
 import traceback
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
-from pipelines.workbench.results import Diagnosed
-from schemas.errors import TumblelineError
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.audit.finding import AuditFinding
+from pipelines.drawing import Chart
+from pipelines.report.residual_table import ResidualTable
+from schemas.errors import TumblelineError, WrongUse
 from schemas.installed import not_installed
+from schemas.recipe import Recipe
+from schemas.station import StationConfig
 
 ReportProgress = Callable[[int, int, str], None]
+MOST_CHARTS = 6
+MOST_EVIDENCE = 80  # findings with a chart of their own
+
+
+@dataclass(frozen=True)
+class Diagnosed:
+    """A diagnosis for its page.
+
+    before : residuals of the model before the last step, µg, as in ``table``; None if there is none
+    names : quantities for formulas, with their meaning
+    """
+
+    document: dict[str, Any]
+    table: ResidualTable | None
+    ladder: list[dict[str, Any]]
+    before: NDArray[np.float64] | None
+    names: dict[str, str]
 
 
 def done_in_process(kind: str, request: Mapping[str, Any], report_progress: ReportProgress) -> tuple[str, Any]:
@@ -48,8 +73,7 @@ def diagnose(request: Mapping[str, Any], report_progress: ReportProgress) -> Dia
     steps = 4
     report_progress(0, steps, "reading the dwells")
     from inertial.quantities import formula_names
-    from pipelines.diagnosis.diagnose import default_model
-    from pipelines.diagnosis.examination import examination
+    from pipelines.diagnosis.diagnose import default_model, examination
     from pipelines.report.residual_table import ladder_of, residual_table, residuals_with
     from pipelines.tables.condense import condense
     from pipelines.tables.dwell_table import covariates
@@ -105,13 +129,72 @@ def ladder(request: Mapping[str, Any], report_progress: ReportProgress) -> list[
     return errors_by_version(versions, ImprovedTables(dwells, history, fresh, fresh_history), working)
 
 
-def plan(request: Mapping[str, Any], report_progress: ReportProgress) -> dict[str, Any]:
-    """The plan of a recipe, and the data of its charts."""
+def planned(request: Mapping[str, Any], report_progress: ReportProgress) -> dict[str, Any]:
+    """``document``, ``charts`` and ``poses`` of a plan; ``before``: the effects of the recipe by name, where poses are moved."""
     report_progress(0, 2, "reading the recipe")
-    from pipelines.workbench.views.planned import planned
+    from pipelines.planning.context import noise_of, plan_context
+    from pipelines.planning.plan import plan
+    from pipelines.report.plan_pictures import sphere_chart, temperature_chart
 
     report_progress(1, 2, "visibility of effects")
-    return planned(request)
+    as_it_stands, recipe, config = recipe_of(request)
+    noise = noise_of(recipe, recipe.device, None, None)
+    context = plan_context(recipe, config, noise)
+    before = plan(plan_context(as_it_stands, config, noise)) if request["pose"] else None
+    return {
+        "document": plan(context),
+        "before": None if before is None else {row["effect"]: row for row in before["effects"]},
+        "minutes_before": None if before is None else before["minutes"]["total"],
+        "charts": {"sphere": sphere_chart(context), "temperature": temperature_chart(context)},
+        "poses": pose_rows(as_it_stands, recipe),
+    }
+
+
+def recipe_of(request: Mapping[str, Any]) -> tuple[Recipe, Recipe, StationConfig]:
+    """The recipe of a request as it stands, the same with its moved poses, and the station.
+
+    Raises
+    ------
+    TumblelineError
+        The recipe, its model or a pose is invalid.
+    """
+    from pathlib import Path
+
+    from pipelines.archive import Archive
+    from pipelines.jobs.model_files import chosen_effects, use_formulas
+    from pipelines.jobs.moved_poses import moves_of, with_moved_poses
+    from pipelines.jobs.recipes import load_recipe
+    from pipelines.jobs.releases import line_model
+    from schemas.station import load_station
+
+    config = load_station(Path(request["station"]) if request["station"] else None)
+    chosen = chosen_effects(",".join(request["effects"]), None, "plan")
+
+    def line(device: str) -> dict[str, Any]:
+        if chosen:
+            return {"effects": chosen}
+        keys = line_model(Archive(request["archive"]), device, config.name)
+        use_formulas(keys["formulas"], "the line's model")
+        return keys
+
+    recipe = load_recipe(request["recipe"], line)
+    recipe = recipe.model_copy(update={"effects": list(chosen)}) if chosen else recipe
+    return recipe, with_moved_poses(recipe, moves_of(request["pose"], "plan"), "plan"), config
+
+
+def pose_rows(as_it_stands: Recipe, recipe: Recipe) -> list[dict[str, Any]]:
+    """Every pose once: name, use, angles in degrees, and whether it was moved."""
+    rows: dict[str, dict[str, Any]] = {}
+    for use in ("poses", "verification"):
+        for old, new in zip(getattr(as_it_stands, use), getattr(recipe, use), strict=True):
+            rows[new.name] = {
+                "name": new.name,
+                "use": "fit" if use == "poses" else "verification",
+                "outer_deg": new.outer_deg,
+                "inner_deg": new.inner_deg,
+                "moved": (old.outer_deg, old.inner_deg) != (new.outer_deg, new.inner_deg),
+            }
+    return list(rows.values())
 
 
 def what_if(request: Mapping[str, Any], report_progress: ReportProgress) -> dict[str, Any]:
@@ -129,12 +212,50 @@ def what_if(request: Mapping[str, Any], report_progress: ReportProgress) -> dict
     return evaluated(archive, runs, change, report_progress=lambda text: report_progress(next(steps), 3, text))
 
 
-def audit(request: Mapping[str, Any], report_progress: ReportProgress) -> dict[str, Any]:
-    """The audit of the archive, and the data of its charts."""
+def audited(request: Mapping[str, Any], report_progress: ReportProgress) -> dict[str, Any]:
+    """The document of an audit of the archive, its charts, and the address of every finding with the chart of its evidence."""
     report_progress(0, 2, "reading the runs")
-    from pipelines.workbench.views.audited import audited
+    from pipelines.archive import Archive
+    from pipelines.audit import pictures
+    from pipelines.audit.audit import audit, scope_of
+    from pipelines.audit.document import document, furthest
+    from pipelines.audit.findings import findings
+    from pipelines.audit.rules import load_rules
 
-    return audited(request, report_progress)
+    scope = scope_of(*(str(request[name]) for name in ("since", "until", "device", "station")))
+    archive_audit = audit(Archive(request["archive"]), load_rules(None), scope)
+    report_progress(1, 2, "the evidence of its findings")
+    if not len(archive_audit.all) and not archive_audit.problems:
+        raise WrongUse(
+            f"audit: {request['archive']} has no calibration in this time, one at least is needed; make a run"
+        )
+    charts: dict[str, Chart] = {}
+    months = [share for share in archive_audit.yields if share.of == "month"]
+    if months:
+        charts["yield"] = pictures.yield_chart(months)
+    if archive_audit.due.row.size:
+        charts["due"] = pictures.due_chart(archive_audit)
+    for number, one in enumerate(sorted(archive_audit.charts, key=lambda one: one.p_value)[:MOST_CHARTS]):
+        charts[f"control-{number}"] = pictures.control_chart(one)
+    moved = sorted((*archive_audit.stations, *archive_audit.slots), key=lambda one: -len(one.changes))
+    for number, one in enumerate(moved[:MOST_CHARTS]):
+        charts[f"station-{number}"] = pictures.series_chart(one)
+    for number, one in enumerate(furthest(archive_audit, MOST_CHARTS)):
+        charts[f"drift-{number}"] = pictures.drift_chart(archive_audit, one)
+    listed = findings(archive_audit)
+    evidence = {address_of(one): pictures.evidence_chart(archive_audit, one) for one in listed[:MOST_EVIDENCE]}
+    return {
+        "document": document(archive_audit, listed, request["archive"]),
+        "charts": charts,
+        "evidence": {name: chart for name, chart in evidence.items() if chart is not None},
+        "addresses": [address_of(one) for one in listed],
+    }
+
+
+def address_of(finding: AuditFinding) -> str:
+    """A name of a finding that stays the same as long as the finding does."""
+    words = (finding.kind, finding.subject, str(finding.evidence.get("parameter", finding.evidence.get("figure", ""))))
+    return ".".join(word for word in words if word)[:180]
 
 
 def bring_in(request: Mapping[str, Any], report_progress: ReportProgress) -> dict[str, Any]:
@@ -149,8 +270,8 @@ def bring_in(request: Mapping[str, Any], report_progress: ReportProgress) -> dic
 WORK: dict[str, Any] = {
     "diagnose": diagnose,
     "ladder": ladder,
-    "plan": plan,
-    "audit": audit,
+    "plan": planned,
+    "audit": audited,
     "whatif": what_if,
     "import": bring_in,
 }

@@ -6,8 +6,7 @@ import pytest
 from each import each
 
 from inertial.data_errors.faults.quantised import lattice_step
-from pipelines.diagnosis.diagnose import diagnose
-from pipelines.diagnosis.examination import examination
+from pipelines.diagnosis.diagnose import diagnose, examination
 
 pytestmark = pytest.mark.usefixtures("no_next_measurement")
 

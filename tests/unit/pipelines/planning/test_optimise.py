@@ -10,12 +10,12 @@ from inertial.frames import force_from_angles
 from inertial.noise.dwells import DwellNoise, dwell_covariance
 from pipelines.jobs.model_files import STARTING_MODEL
 from pipelines.jobs.recipes import load_recipe
-from pipelines.planning.dwell_counts import FEWEST, fewest_dwells, smallest_passing
-from pipelines.planning.plan import identified, plan_context
+from pipelines.planning.context import plan_context
+from pipelines.planning.plan import identified
 from pipelines.planning.requirement import Requirement, candidates, temperature_choices
 from pipelines.planning.soak_orders import mirrored, orders
 from pipelines.planning.textbook import reference_errors, textbook
-from pipelines.planning.timed_design import PlanDesign, TimedDesign, spanned
+from pipelines.planning.timed_design import FEWEST, PlanDesign, TimedDesign, fewest_dwells, smallest_passing, spanned
 from pipelines.schedule.timing import spent
 from schemas.station import load_station
 from stations.plant.preset import load_preset

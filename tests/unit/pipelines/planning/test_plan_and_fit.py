@@ -12,7 +12,8 @@ from lots import dwell_rows
 from inertial.noise.dwells import DwellNoise
 from inertial.noise.measurands import walk_mean
 from pipelines.jobs.recipes import load_recipe
-from pipelines.planning.plan import plan, plan_context
+from pipelines.planning.context import plan_context
+from pipelines.planning.plan import plan
 from pipelines.stages.fit import fit
 from schemas.station import load_station
 

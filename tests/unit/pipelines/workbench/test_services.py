@@ -14,6 +14,7 @@ import pytest
 from capture_double import recipe_file
 
 from pipelines.archive import Archive
+from pipelines.jobs.job import Request
 from pipelines.jobs.model_files import read_model
 from pipelines.workbench.services import jobs as job_table
 from pipelines.workbench.services import lots, models, sources, stations, uploads
@@ -114,10 +115,10 @@ def test_a_lot_whose_process_is_gone_is_interrupted(settings: WorkbenchSettings)
     assert lot.slots == ((0, "A1", ""), (3, "A2", ""))
 
 
-@pytest.mark.parametrize("units", [["A1", "A1"], ["<script>"], ["A" * 65]])
-def test_a_lot_with_a_serial_that_cannot_be_moves_nothing(settings: WorkbenchSettings, units: list[str]) -> None:
+@pytest.mark.parametrize("units", [("A1", "A1"), ("<script>",), ("A" * 65,)])
+def test_a_lot_with_a_serial_that_cannot_be_moves_nothing(settings: WorkbenchSettings, units: tuple[str, ...]) -> None:
     with pytest.raises(TumblelineError):
-        lots.start(settings, "production", units, list(range(len(units))), [], 0)
+        lots.start(settings, Request("production", None, units, tuple(range(len(units)))))
     assert not (settings.folder / "lots").exists()
 
 
@@ -137,13 +138,13 @@ def test_each_station_measures_one_lot_at_a_time(two: WorkbenchSettings) -> None
     left, right = stations.stations(two)
     assert (left.name, right.name, left.simulated) == ("left", "right", True)
     recipe = recipe_file(two.folder)
-    first = lots.start(two, recipe, ["A1"], [0], [], 0, left.file)
-    second = lots.start(two, recipe, ["B1"], [2], [], 0, right.file)
+    first = lots.start(two, Request(recipe, left.file, ("A1",), (0,)))
+    second = lots.start(two, Request(recipe, right.file, ("B1",), (2,)))
     assert (first.station, second.station) == (left.address, right.address)
     assert first.id != second.id
     with pytest.raises(WrongUse, match=f"has lot {first.id}"):
-        lots.start(two, recipe, ["A2"], [0], [], 0, left.file)
-    assert lots.start(two, recipe, ["A1"], [0], [], 0, left.file).id == first.id  # the same lot, pressed twice
+        lots.start(two, Request(recipe, left.file, ("A2",), (0,)))
+    assert lots.start(two, Request(recipe, left.file, ("A1",), (0,))).id == first.id  # the same lot, pressed twice
     assert stations.named(stations.stations(two), "") == left
     with pytest.raises(WrongUse, match="middle"):
         stations.named(stations.stations(two), "middle")
@@ -152,19 +153,19 @@ def test_each_station_measures_one_lot_at_a_time(two: WorkbenchSettings) -> None
 def test_a_paused_lot_keeps_its_station_and_a_stopped_one_makes_room(two: WorkbenchSettings) -> None:
     left = stations.stations(two)[0]
     recipe = recipe_file(two.folder)
-    lot = lots.start(two, recipe, ["A1"], [0], [], 0, left.file)
+    lot = lots.start(two, Request(recipe, left.file, ("A1",), (0,)))
     lots.pause(two, lot.id)
     place = two.folder / "lots" / lot.id
     lots.write_state(place, {"phase": "stopped", "since": time.time()})  # what its process writes after the safe state
     paused = lots.state_of(place)
     assert (paused.phase, paused.ended, paused.idle) == ("paused", False, True)
     with pytest.raises(WrongUse, match="paused"):
-        lots.start(two, recipe, ["A2"], [0], [], 0, left.file)
+        lots.start(two, Request(recipe, left.file, ("A2",), (0,)))
     assert lots.again(two, lot.id).phase == "starting"
     lots.pause(two, lot.id)
     lots.write_state(place, {"phase": "stopped", "since": time.time()})
     assert lots.stop(two, lot.id).phase == "stopped"
-    assert lots.start(two, recipe, ["A2"], [0], [], 0, left.file).phase == "starting"
+    assert lots.start(two, Request(recipe, left.file, ("A2",), (0,))).phase == "starting"
     with pytest.raises(lots.Stale):
         lots.pause(two, lot.id)
 
@@ -272,7 +273,8 @@ def test_a_run_that_was_added_is_in_the_next_answer_and_an_unchanged_archive_is_
 def test_a_search_in_memory_gives_what_the_files_of_the_archive_give(tmp_path: Path) -> None:
     from benchmarks.generated_archive import write_archive
     from pipelines.audit.sql import ask
-    from pipelines.workbench.questions import history_question, newest_question, units_question, yield_question
+    from pipelines.workbench.routes.unit import history_question
+    from pipelines.workbench.routes.units import newest_question, yield_question
     from pipelines.workbench.services.index import RecentIndex
     from pipelines.workbench.state import UnitsPage
 
@@ -284,8 +286,8 @@ def test_a_search_in_memory_gives_what_the_files_of_the_archive_give(tmp_path: P
         UnitsPage(station="line-1", since="2022-01-01", order="outcome"),
         UnitsPage(search="no'such"), UnitsPage(search="RUN"), UnitsPage(search="100%_µ!"),
     ]  # fmt: skip
-    questions = [question(page) for page in pages for question in (units_question, yield_question)]
-    unit = str(recent.ask(units_question(UnitsPage())).rows[0][0])
+    questions = [question(page) for page in pages for question in (UnitsPage.question, yield_question)]
+    unit = str(recent.ask(UnitsPage().question()).rows[0][0])
     for question in (*questions, newest_question(12), history_question(unit)):
         answer = recent.of_unit(unit, question) if "coefficients" in question else recent.ask(question)
         wanted = ask(Archive(str(archive)), question)

@@ -1,1 +1,0 @@
-"""The JSON documents of diagnose, compare and history: keys that other programs read."""

@@ -1,0 +1,107 @@
+"""A recipe on a station before it is measured: its activities and dwells, and what the poses of verification show besides."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial.noise.dwells import DwellNoise, dwell_covariance
+from inertial.noise.flicker import FLICKER_FLOOR
+from inertial.planning.visibility import SEEN, visibilities
+from inertial.state import State
+from pipelines.schedule.planned_state import state_of
+from pipelines.schedule.steps import steps
+from pipelines.schedule.timing import Activity, schedule
+from schemas.errors import RecipeInvalid
+from schemas.recipe import Recipe
+from schemas.station import StationConfig
+from stations.plant.preset import load_preset
+
+OF_VERIFICATION = "only the verification poses show it, which a diagnosis uses and a fit leaves out"
+REMEDY = "move poses from 'verification' to 'poses', and verify in others"
+
+UG = 1e-6  # of g
+
+
+@dataclass(frozen=True)
+class PlanContext:
+    """A recipe on a station.
+
+    activities : what the station does and when
+    state : the planned dwells of the fit, (n,)
+    covariance : (n, n), of the dwell means, g²
+    """
+
+    recipe: Recipe
+    station: StationConfig
+    noise: DwellNoise
+    activities: list[Activity]
+    state: State
+    covariance: NDArray[np.float64]
+
+
+def plan_context(recipe: Recipe, station: StationConfig, noise: DwellNoise, *, slowest: float = 0.0) -> PlanContext:
+    """A recipe on a station with devices of this noise; ``slowest`` as in :func:`inertial.noise.dwells.dwell_covariance`.
+
+    Raises
+    ------
+    RecipeInvalid
+        The recipe has no multi-position test, of whose dwells a plan is made.
+    """
+    if not recipe.tumbles:
+        raise RecipeInvalid(
+            f"recipe {recipe.name}: its procedures have no multi_position, of whose dwells visibility, pictures and a quicker "
+            "recipe are made; list it, or see station time and figures of the procedures with 'tumbleline plan'",
+            key="procedures",
+        )
+    whole = schedule(steps(recipe), station, recipe)
+    state = state_of(whole, station, recipe, history=True)
+    covariance = dwell_covariance(state.time, recipe.dwell_s, noise, slowest=slowest)
+    return PlanContext(recipe, station, noise, whole, state, covariance)
+
+
+def shown_by_verification(
+    activities: Sequence[Activity], station: StationConfig, recipe: Recipe, effects: Sequence[str]
+) -> set[str]:
+    """The effects that are visible with the poses of verification, of those that are not visible without them.
+
+    Parameters
+    ----------
+    activities : what the station does in the recipe
+    effects : those that are not visible in the dwells of the fit; the recipe's others are the model
+    """
+    if not effects or not recipe.verification:
+        return set()
+    every = state_of(activities, station, recipe, history=True, kinds=("dwell", "verification"))
+    shown: set[str] = set()
+    for effect in effects:
+        rest = [other for other in recipe.effects if other != effect]
+        shown |= {s.effect for s in visibilities(every, rest, 1.0, [effect]) if s.remaining_fraction > SEEN}
+    return shown
+
+
+def with_verification_hint(text: str, activities: Sequence[Activity], station: StationConfig, recipe: Recipe) -> str:
+    """A sentence on effects that "cannot be identified", completed where the poses of verification show them."""
+    named = [effect for effect in recipe.effects if f"{effect} cannot be identified" in text]
+    checked = sorted(shown_by_verification(activities, station, recipe, named))
+    return f"{text}; {', '.join(checked)}: {OF_VERIFICATION}; {REMEDY}" if checked else text
+
+
+def noise_of(recipe: Recipe, device: str, density: float | None, wander: float | None) -> DwellNoise:
+    """Noise of a preset, with given values in place of the preset's.
+
+    Parameters
+    ----------
+    device : preset; the recipe's device where it is empty
+    density : white noise, µg/√Hz · wander : flicker floor of the Allan deviation, µg
+    """
+    if density is not None and wander is not None:
+        return DwellNoise(density * UG, wander * UG / FLICKER_FLOOR)
+    preset = load_preset(device or recipe.device)
+    white = preset.sampled_density_ug(recipe.rate_hz) if density is None else density
+    if wander is not None:
+        return DwellNoise(white * UG, wander * UG / FLICKER_FLOOR)
+    return DwellNoise(white * UG, preset.bias_instability_ug * UG, preset.rate_random_walk_ug * UG)
