@@ -7,12 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 from pipelines.archive import files
 from pipelines.archive.hash_chain import is_number
+from pipelines.archive.store import Place
 from schemas.event import Event
 
 if TYPE_CHECKING:
     import pandas as pd
-
-    from pipelines.archive.store import Place
 
 FOLDER = "events"
 SOAK_FIGURES = ("target_C", "seconds", "air_overshoot_K", "device_overshoot_K")

@@ -20,7 +20,7 @@ _ENGINE = (
 )
 _NOISE = (
     *(*_TABLES, *_MODEL, "inertial.distributions", "inertial.dynamics", "inertial.noise"),
-    *("pipelines.stages.bias_stability", "pipelines.stages.coarse_digits"),
+    *("pipelines.stages.noise", "pipelines.stages.coarse_digits"),
     *("pipelines.stages.noise", "pipelines.stages.static_record"),
 )
 _BUDGET = (
@@ -36,7 +36,7 @@ _DRAWN = (
 
 CODE = {
     "validate": (
-        *(*_SAMPLES, "inertial.pointing", "pipelines.stages.frozen"),
+        *(*_SAMPLES, "inertial.pointing", "pipelines.stages.validate"),
         "pipelines.stages.validate",
     ),
     "reduce": (*_TABLES, "pipelines.stages.reduce"),

@@ -22,8 +22,7 @@ from pipelines.archive.locks import LOCK, alone
 from pipelines.archive.pack_merging import merge_packs, remove_replaced
 from pipelines.archive.pack_writing import LARGEST, FolderToPack, write_pack
 from pipelines.archive.records import COMPLETE
-from pipelines.archive.run import START
-from pipelines.archive.run_files import SEALED
+from pipelines.archive.run import SEALED, START
 from schemas.errors import OperatorNeeded, WrongUse
 
 LEAST_AGE_S = 3600.0  # of an event of the ledger: a process that decides on the next one has read it long ago

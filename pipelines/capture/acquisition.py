@@ -1,9 +1,10 @@
-"""Measuring one record: the move, the samples, the observations meanwhile, and units that stop answering."""
+"""Measuring and storing one record: the move, the samples, the observations meanwhile, and units that stop answering."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 import pandas as pd
@@ -11,7 +12,6 @@ import pandas as pd
 from pipelines.capture.plausibility import Plausibility
 from pipelines.capture.power_cycling import Power
 from pipelines.capture.record import Record, TemperatureLog, readings_row
-from pipelines.capture.sink import CaptureSink
 from pipelines.capture.supervision import Supervisor, short_of_samples
 from pipelines.procedures import procedure_of
 from pipelines.procedures.base import OnEquipment, SetsEquipment
@@ -25,6 +25,35 @@ from stations.devices.recording import RecordingSpoilt
 from stations.devices.slot import Identity, Samples, SamplesLost
 from stations.safety.suspenders import Reason, Suspended
 from stations.station import Station
+
+
+class CaptureSink(Protocol):
+    """Storage of records: each is stored completely, or not at all."""
+
+    def finished(self) -> set[int]:
+        """Numbers of the records that are stored."""
+        ...
+
+    def part(self, record: int, number: int, samples: pd.DataFrame) -> None:
+        """Stores a part of the samples of a long record before the record is complete; part 0 discards earlier parts."""
+        ...
+
+    def put(
+        self,
+        record: int,
+        samples: pd.DataFrame,
+        readings: pd.DataFrame,
+        history: pd.DataFrame,
+        station_state: bytes,
+        parts: int = 0,
+    ) -> None:
+        """Stores a record durably, with the station's state after it; ``parts`` parts of its samples are stored already."""
+        ...
+
+    def last_state(self) -> bytes | None:
+        """The station's state after the last stored record."""
+        ...
+
 
 OBSERVATIONS = 5  # observations of encoders and instruments within a dwell
 HISTORY_S = 10.0

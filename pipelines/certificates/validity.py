@@ -7,12 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from pipelines.certificates.entries import LedgerEntry
 from schemas.errors import WrongUse
-
-if TYPE_CHECKING:
-    from pipelines.certificates.entries import LedgerEntry
 
 
 @dataclass(frozen=True)

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pandas as pd
 
 from pipelines.archive import Records, Run
+from pipelines.jobs.job import Job
 from pipelines.jobs.terms import budget_terms
 from pipelines.stages.fit import fit_tables
 from pipelines.stages.grade import GradeEvidence, grade
@@ -23,9 +24,6 @@ from pipelines.stages.verify import verify_tables
 from pipelines.tables.dwells import LotTables
 from pipelines.tables.samples import PROCEDURE
 from pipelines.tables.summaries import summarised
-
-if TYPE_CHECKING:
-    from pipelines.jobs.job import Job
 
 Tables = dict[str, "pd.DataFrame"]
 RECORDS = "records"

@@ -17,15 +17,15 @@ from contextlib import contextmanager
 from hashlib import sha256
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pipelines.archive import Archive, Run, code_hash
 from pipelines.chain.attendance import Operator
 from pipelines.chain.chain import BY_NAME, ORDER
 from pipelines.chain.runner import Done
+from pipelines.jobs.job import Job, Request
 from pipelines.orchestrator.credentials import without_credentials
-from pipelines.orchestrator.quick_imports import quick_imports
-from pipelines.orchestrator.server import ADDRESS, CLIENTS, START_LOCK, private_folder
+from pipelines.orchestrator.server import ADDRESS, CLIENTS, START_LOCK, private_folder, quick_imports
 from pipelines.orchestrator.server_check import check_server
 from pipelines.orchestrator.settings import CLIENT_KEY, KEY_FILE, STARTUP_S, cache_folder, new_key, settings, use_key
 from pipelines.parallel import with_environment
@@ -33,9 +33,6 @@ from pipelines.schedule.steps import steps
 from schemas.errors import ArchiveUnusable, StationTimeout, TumblelineError
 from schemas.installed import missing_in
 from schemas.progress import Progress
-
-if TYPE_CHECKING:
-    from pipelines.jobs.job import Job, Request
 
 POLL_S = 0.1
 PRIVATE = 0o600

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from datetime import UTC, datetime, timedelta
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pipelines.archive import Run, files, hash_chain
 from pipelines.archive.hash_chain import is_number
@@ -17,11 +17,9 @@ from pipelines.archive.listing import stages_of
 from pipelines.archive.provenance import provenance
 from pipelines.archive.signatures import ENTRY
 from pipelines.archive.store import Place
+from pipelines.integrity.chain import Chain
 from pipelines.integrity.findings import EDITED, MISSING, UNCHAINED, UNREADABLE, VerifiedPart
 from schemas.errors import ArchiveUnusable
-
-if TYPE_CHECKING:
-    from pipelines.integrity.chain import Chain
 
 JUST_NOW = timedelta(minutes=5)  # clocks of hosts may differ by as much: see the ledger
 MARK, REPORT = "sealed.json", "report.json"

@@ -10,17 +10,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pipelines.archive import Archive, files, hash_chain
 from pipelines.archive.keys import digest
 from pipelines.archive.locks import alone
 from pipelines.archive.provenance import provenance
+from pipelines.jobs.model_change import ModelChange
 from schemas.errors import RecipeInvalid, WrongUse
 from schemas.recipe import FormulaSpec
-
-if TYPE_CHECKING:
-    from pipelines.jobs.model_change import ModelChange
 
 FOLDER, EVIDENCE = "releases", "whatif"
 SCHEMA = 1

@@ -7,7 +7,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from pipelines.schedule.planned_dwells import planned_dwells
+from pipelines.schedule.planned_state import planned_dwells
 from pipelines.stages.uncertainty.budget_terms import BudgetTerms, terms_of
 from pipelines.stages.uncertainty.contributions import merged
 from pipelines.stages.uncertainty.reachable import PlannedDwells, reachable, unreachable

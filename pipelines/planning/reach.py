@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from inertial.noise.dwells import DwellNoise
 from inertial.uncertainty.period import Windows, flicker_within
-from pipelines.schedule.planned_dwells import planned_dwells
+from pipelines.schedule.planned_state import planned_dwells
 from pipelines.schedule.timing import Activity
 from pipelines.stages.uncertainty.budget_terms import BudgetTerms
 from pipelines.stages.uncertainty.reachable import PlannedDwells, reachable, unreachable

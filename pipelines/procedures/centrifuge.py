@@ -17,8 +17,15 @@ from inertial.dynamics.centrifuge_effects import EFFECTS, Spins
 from inertial.errors import NotIdentified
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace
 from pipelines.procedures.base import Evaluated, InG, NominalScale, OnEquipment, refuse_unknown_effects, scale_of
-from pipelines.procedures.centrifuge_radii import figures_of_radii, fitted_radii, of_radii, texts_of_radii
-from pipelines.procedures.centrifuge_radius import diagnosis_text, figures_of_radius, texts_of_radius
+from pipelines.procedures.centrifuge_radii import (
+    diagnosis_text,
+    figures_of_radii,
+    figures_of_radius,
+    fitted_radii,
+    of_radii,
+    texts_of_radii,
+    texts_of_radius,
+)
 from pipelines.procedures.columns import numbers, point_table
 from pipelines.procedures.figures import FigureSpec, FigureValue, UnitOutcome
 from pipelines.procedures.recorded import REFERENCE, Device, ProcedureStep, Records, at_rest, taken

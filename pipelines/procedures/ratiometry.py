@@ -13,9 +13,8 @@ from inertial.dynamics.stability import difference_error, short_noise
 from inertial.errors import NotIdentified
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Role, Trace, level
 from pipelines.procedures.base import Evaluated, Part, SetsEquipment
-from pipelines.procedures.columns import point_table
+from pipelines.procedures.columns import noise_columns, point_table, pooled_noise
 from pipelines.procedures.figures import FigureSpec, FigureValue, UnitOutcome, worst
-from pipelines.procedures.noise_columns import noise_columns, pooled_noise
 from pipelines.procedures.recorded import Device, ProcedureStep, Records, taken
 from pipelines.procedures.wording import with_uncertainty
 from schemas.bounds import NotNegative, Positive, Wait

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from inertial.dynamics.wandering_means import IdentifiedNoise
 from schemas.poses import Pose
 from schemas.units import AXES
-
-if TYPE_CHECKING:
-    from inertial.dynamics.wandering_means import IdentifiedNoise
 
 Array = NDArray[np.float64]
 REFERENCE = "@reference"

@@ -16,8 +16,14 @@ from pipelines.procedures.base import FromWaveforms, OnEquipment
 from pipelines.procedures.columns import point_table
 from pipelines.procedures.figures import FigureSpec, UnitOutcome
 from pipelines.procedures.recorded import REFERENCE, Device, ProcedureStep, Records, UnitRecord, at_rest, taken
-from pipelines.procedures.sweep_plan import FEWEST_POINTS, SweepPart
-from pipelines.procedures.sweep_points import clocks_of, condition_texts, response_point, transfer_points
+from pipelines.procedures.sweep_points import (
+    FEWEST_POINTS,
+    SweepPart,
+    clocks_of,
+    condition_texts,
+    response_point,
+    transfer_points,
+)
 from pipelines.procedures.transfer_chart import bode_chart
 from pipelines.procedures.transfer_figures import diagnosis_text, figures_of_transfer, sampling_text
 from schemas.errors import RecipeInvalid

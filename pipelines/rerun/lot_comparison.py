@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -16,6 +15,7 @@ from pipelines.jobs.model_change import ModelChange
 from pipelines.jobs.terms import budget_terms
 from pipelines.rerun.archived_job import archived_job
 from pipelines.rerun.buffered_run import BufferedRun
+from pipelines.rerun.partition import Batch
 from pipelines.rerun.selection import SelectedRun, entry_of
 from pipelines.stages.fit import fit_in_memory
 from pipelines.stages.grade import GradeEvidence, grade
@@ -27,9 +27,6 @@ from pipelines.tables.dwells import KINDS, LotTables, lot_arrays
 from pipelines.tables.frames import ByUnit
 from schemas.errors import DataRejected, TumblelineError
 from schemas.units import MICRO
-
-if TYPE_CHECKING:
-    from pipelines.rerun.partition import Batch
 
 Sums = dict[str, tuple[float, int]]
 """Sum of squared errors, µg², and their number, by unit."""

@@ -10,7 +10,9 @@ from pathlib import Path
 import pytest
 from root_process import ROOT
 
-ATTEND = "import sys; from pipelines.orchestrator.child_reaper import run_until_orphans_end as run; sys.exit(run(sys.argv[1:]))"
+ATTEND = (
+    "import sys; from pipelines.orchestrator.worker import run_until_orphans_end as run; sys.exit(run(sys.argv[1:]))"
+)
 WATCHDOG = """
 import os, signal, sys, time
 signal.signal(signal.SIGTERM, signal.SIG_IGN)

@@ -57,7 +57,7 @@ time.sleep(600.0)
 """
 ATTEND = """
 import itertools, os, sys
-from pipelines.orchestrator.child_reaper import run_until_orphans_end
+from pipelines.orchestrator.worker import run_until_orphans_end
 from pipelines.orchestrator.worker_health import watched
 beats, child = itertools.count(), []
 def ask():

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -19,10 +18,8 @@ from inertial.uncertainty.period import (
     logarithmic,
     walk_later,
 )
+from pipelines.stages.uncertainty.budget_terms import BudgetTables, BudgetTerms
 from schemas.validity import Ageing
-
-if TYPE_CHECKING:
-    from pipelines.stages.uncertainty.budget_terms import BudgetTables, BudgetTerms
 
 RECTANGULAR = float(np.sqrt(3.0))
 

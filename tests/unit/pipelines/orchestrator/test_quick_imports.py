@@ -4,7 +4,7 @@ import gc
 
 import pytest
 
-from pipelines.orchestrator.quick_imports import quick_imports
+from pipelines.orchestrator.server import quick_imports
 
 
 @pytest.fixture(autouse=True)

@@ -5,8 +5,7 @@ import pandas as pd
 import pytest
 from small_station import lot_of
 
-from pipelines.stages.frozen import frozen
-from pipelines.stages.validate import validate
+from pipelines.stages.validate import frozen, validate
 
 SOAKS, DWELLS = 3, 11
 
