@@ -48,7 +48,7 @@ def fit_import(run: Run, change: tuple[str, Path | None, str], leave_out: str, *
 def fit_document(done: Run, source: str) -> dict[str, Any]:
     """The result of the fit of an import: verdict, evidence, and decisions if there are limits."""
     from pipelines.diagnosis.imported_norms import fitted
-    from pipelines.rerun.steps import gravity_of_import, has_poses
+    from pipelines.rerun.import_steps import gravity_of_import, has_poses
     from pipelines.tables.frames import rows_of
 
     dwells = done.table("dwells")
@@ -76,7 +76,7 @@ def fit_document(done: Run, source: str) -> dict[str, Any]:
 def _of_a_plane(done: Run, source: str) -> dict[str, Any]:
     """The document of a fit of the two axes in a plane."""
     from pipelines.importers.plane import plane_answer
-    from pipelines.rerun.steps import gravity_of_import
+    from pipelines.rerun.import_steps import gravity_of_import
 
     dwells = done.table("dwells")
     across = AXES.index(done.about["plane_across"])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
@@ -12,8 +12,9 @@ from pydantic import Field
 
 from inertial.errors import NotIdentified
 from pipelines.drawing.chart import Chart
+from pipelines.procedures.columns import point_table
 from pipelines.procedures.figures import FigureSpec, FigureValue, Finding, Outcome, Texts, UnitOutcome
-from pipelines.procedures.recorded import Array, Device, ProcedureStep, Records, UnitRecord
+from pipelines.procedures.recorded import Array, Device, ProcedureStep, Records, Taken, UnitRecord, taken
 from schemas.errors import RecipeInvalid, did_you_mean
 from schemas.recipe import Recipe, Strict
 from schemas.station import StationConfig
@@ -111,6 +112,18 @@ class Evaluated(Procedure):
         """Every figure without a value, with the reason; for no axis in particular the part's, or the procedure's."""
         axis = axis or getattr(part, "axis", self.axis)
         return [FigureValue.not_determined(spec.name, axis, note) for spec in self.figures]
+
+
+class RecordByRecord(Evaluated):
+    """A procedure whose records are reduced one by one, each for itself."""
+
+    def reduce(self, part: Any, records: Records, device: Device) -> pd.DataFrame:
+        """The points of every unit in every record."""
+        return point_table(row for one in taken(records) for row in self.points(part, one, device))
+
+    @abstractmethod
+    def points(self, part: Any, one: Taken, device: Device) -> Iterable[Mapping[str, Any]]:
+        """The points of one unit in one record."""
 
 
 class InG(Procedure):

@@ -12,11 +12,10 @@ from inertial.dynamics.centrifuge import STANDARD_GRAVITY, Polynomial, columns, 
 from inertial.dynamics.centrifuge_diagnosis import SpinDiagnosis
 from inertial.dynamics.centrifuge_effects import EFFECTS
 from inertial.dynamics.centrifuge_radii import RadiiFit, fit_radii
-from inertial.dynamics.goodness import p_value
 from pipelines.drawing.chart import SEVERAL, Trace
 from pipelines.procedures.columns import numbers
 from pipelines.procedures.figures import FigureValue
-from pipelines.procedures.wording import improvement, not_separated, probability, verdict_of, with_uncertainty
+from pipelines.procedures.wording import diagnosis_texts, verdict_of, with_uncertainty
 from schemas.units import MICRO
 
 OF_RADII = ("centrifuge_mass_offset_um", "centrifuge_radius_consistency_ppm")
@@ -152,24 +151,11 @@ def texts_of_radius(fit: Polynomial, radius_m: float, *, both: bool) -> list[tup
 
 def diagnosis_text(diagnosis: SpinDiagnosis) -> list[tuple[str, str]]:
     """The diagnosis in sentences: subject and text."""
-    model = " + ".join(("bias", "scale", *diagnosis.fit.effects))
-    if diagnosis.adequate is None:
-        return [("diagnosis", f"{model} cannot be judged: {diagnosis.reason}")]
-    verdict = "adequate" if diagnosis.adequate else "not adequate"
-    text = (
-        f"{model} is {verdict} ({probability(p_value(diagnosis.fit))}), rms residual {MICRO * diagnosis.error_g:.3g} µg"
-    )
-    out = [("diagnosis", text)]
-    for one in diagnosis.classes:
-        name = one.effects[0]
+
+    def size(name: str) -> str:
         value, error = diagnosis.extended.of(name)
-        rivals = not_separated(one.effects, "the points")
-        size = f"{with_uncertainty(value, 2.0 * error)} {EFFECTS[name].unit} (k = 2)"
-        out.append(("missing effect", f"{name}: {size}, {probability(one.p_value)}{rivals}"))
-    if diagnosis.classes:
-        errors = (f"{MICRO * diagnosis.error_g:.3g}", f"{MICRO * diagnosis.extended_g:.3g} µg")
-        text = improvement(*errors, "points", diagnosis.left_out)
-        out.append(("with the missing effects", text))
-    if diagnosis.unexplained:
-        out.append(("unexplained", "no known effect explains the residual; look at it over the acceleration"))
-    return [*out, *(("next measurement", step) for step in diagnosis.next_steps)]
+        return f"{with_uncertainty(value, 2.0 * error)} {EFFECTS[name].unit} (k = 2)"
+
+    rms = (f"{MICRO * diagnosis.error_g:.3g}", f"{MICRO * diagnosis.extended_g:.3g}", "µg")
+    unexplained = "the residual; look at it over the acceleration"
+    return diagnosis_texts(diagnosis, "diagnosis", ("bias", "scale"), size, rms, ("points", "the points"), unexplained)

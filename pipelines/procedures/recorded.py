@@ -56,6 +56,14 @@ def at_rest(name: str) -> Pose:
     return Pose(name=name, outer_deg=0.0, inner_deg=0.0)
 
 
+def on_equipment(
+    role: str, name: str, part: Any, lasting_s: float, setting: Mapping[str, float], *, pose: str = ""
+) -> ProcedureStep:
+    """A record that equipment performs while the table turns nothing; its pose is named for the role where no name is given."""
+    rest = at_rest(pose or role)
+    return ProcedureStep(name, rest, part.temperature_C, lasting_s=lasting_s, role=role, setting=setting)
+
+
 @dataclass(frozen=True)
 class UnitRecord:
     """The samples of one unit, or of the reference, in one record.

@@ -21,7 +21,17 @@ from pipelines.procedures import shock_waves
 from pipelines.procedures.base import FromWaveforms, InG, NominalScale, OnEquipment, refuse_unknown_effects, scale_of
 from pipelines.procedures.columns import noise_columns, numbers, point_rows, point_table, pooled_noise
 from pipelines.procedures.figures import FigureSpec, FigureValue, UnitOutcome, worst
-from pipelines.procedures.recorded import REFERENCE, Device, ProcedureStep, Records, Taken, UnitRecord, at_rest, taken
+from pipelines.procedures.recorded import (
+    REFERENCE,
+    Device,
+    ProcedureStep,
+    Records,
+    Taken,
+    UnitRecord,
+    at_rest,
+    on_equipment,
+    taken,
+)
 from schemas.bounds import NotNegative, Positive, Wait
 from schemas.recipe import Recipe
 from schemas.units import AXES, MICRO
@@ -85,31 +95,23 @@ class ShockTest(InG, OnEquipment, FromWaveforms):
 
     def steps(self, part: ShockPart, recipe: Recipe) -> list[ProcedureStep]:
         """The bias, the shocks, the bias again."""
-        still = at_rest("bias")
-        machine = at_rest("shock")
-        signs = (1.0, -1.0) if part.both_directions else (1.0,)
-
-        def bias(name: str) -> ProcedureStep:
-            return ProcedureStep(name, still, part.temperature_C, lasting_s=part.window_s, wait_s=part.settle_s)
-
+        before, after = (
+            ProcedureStep(name, at_rest("bias"), part.temperature_C, lasting_s=part.window_s, wait_s=part.settle_s)
+            for name in ("before", "after")
+        )
         shocks = [
-            ProcedureStep(
+            on_equipment(
+                "shock_machine",
                 f"shock {k + 1}, {'+' if sign > 0 else '−'}{part.axis}",
-                machine,
-                part.temperature_C,
-                lasting_s=5.0,
-                role="shock_machine",
-                setting={
-                    "peak_g": part.peak_g,
-                    "duration_s": 1e-3 * part.duration_ms,
-                    "direction": sign,
-                    "axis": float(AXES.index(part.axis)),
-                },
+                part,
+                5.0,
+                _setting(part, part.peak_g, sign),
+                pose="shock",
             )
-            for sign in signs
+            for sign in ((1.0, -1.0) if part.both_directions else (1.0,))
             for k in range(part.shocks)
         ]
-        return [bias("before"), *shocks, bias("after")]
+        return [before, *shocks, after]
 
     def measure(self, equipment: Any, step: ProcedureStep, slots: Sequence[int]) -> Any:
         """One shock."""
@@ -122,8 +124,7 @@ class ShockTest(InG, OnEquipment, FromWaveforms):
         wave = reference.output[:, axis]
         wave = wave - wave[: max(8, int(BEFORE_S * reference.rate_hz))].mean()
         peak = float(wave[int(np.argmax(np.abs(wave)))])
-        duration = 1e-3 * part.duration_ms
-        return {"peak_g": abs(peak), "duration_s": duration, "direction": float(np.sign(peak)), "axis": float(axis)}
+        return _setting(part, abs(peak), float(np.sign(peak)))
 
     def reduce(self, part: ShockPart, records: Records, device: Device) -> pd.DataFrame:
         """Peaks of reference and unit, waveforms and spectra of the first shock, and the bias before and after."""
@@ -177,6 +178,11 @@ class ShockTest(InG, OnEquipment, FromWaveforms):
         left = Plot("", PlotAxis("time / ms"), PlotAxis(f"acceleration on {part.axis} / g"), tuple(shown["wave"]))
         axes = PlotAxis("natural frequency / Hz", log=True), PlotAxis("maximax response, Q = 10 / g")
         return Chart(self.title, (left, Plot("", *axes, tuple(shown["spectrum"]))), 2)
+
+
+def _setting(part: ShockPart, peak_g: float, direction: float) -> dict[str, float]:
+    axis = float(AXES.index(part.axis))
+    return {"peak_g": peak_g, "duration_s": 1e-3 * part.duration_ms, "direction": direction, "axis": axis}
 
 
 def settings_of(part: ShockPart) -> shock_waves.WaveSettings:

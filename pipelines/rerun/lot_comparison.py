@@ -12,7 +12,6 @@ from inertial.correction import correct
 from inertial.errors import InertialError
 from pipelines.archive import Archive, Run
 from pipelines.jobs.model_change import ModelChange
-from pipelines.jobs.terms import budget_terms
 from pipelines.rerun.archived_job import archived_job
 from pipelines.rerun.buffered_run import BufferedRun
 from pipelines.rerun.partition import Batch
@@ -114,7 +113,7 @@ def _both(run: Run, change: ModelChange) -> tuple[Side, Side]:
         BudgetTables(
             lot.dwells, lot.history, *(new[name] for name in names), noise=old["noise"], lot=lot, calibration=own
         ),
-        budget_terms(job),
+        job.terms,
     )
     evidence = GradeEvidence(
         old["verdicts"],

@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 def verify(
     dwells: pd.DataFrame,
-    history: pd.DataFrame,
+    history: pd.DataFrame | None,
     coefficients: pd.DataFrame,
     covariance: pd.DataFrame,
     predictions: pd.DataFrame,
