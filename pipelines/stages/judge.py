@@ -115,7 +115,7 @@ def _not_judged(reason: str, faulty: Sequence[str] = ()) -> AdequacyDocument:
 
 
 def _document(
-    adequate: bool | None,
+    adequate: bool | None,  # noqa: FBT001 - a value of the document
     reason: str | None,
     error: Mapping[str, float | None],
     named: bool,  # noqa: FBT001 - a value of the document

@@ -320,8 +320,8 @@ def _period(
         whole = [one for unit in lot.units if (one := period_of(tables, terms, unit, letter, span)) is not None]
         if len(whole) != len(lot.units) or own.axis_errors is None:
             return
-        names = dict.fromkeys(name for one in whole for name in one.parts)
-        later = {name: np.array([one.parts.get(name, 0.0) for one in whole]) for name in names}
+        names = dict.fromkeys(name for one in whole for name in one)
+        later = {name: np.array([one.get(name, 0.0) for one in whole]) for name in names}
         axes.append(replace(own.axis_errors, later=later))
     for letter, axis in zip(AXES, axes, strict=True):
         parts = {"run": axis.run, "budget": axis.fixed, **axis.later}

@@ -147,6 +147,10 @@ def test_the_order_of_verification_is_the_recipes() -> None:
     assert last == list("ddddvddddv")
     assert [one.kind[0] for one in spread] == list("ddvddddvdd")
     assert [one.record for one in spread] == list(range(10))
+    listed = recipe.model_copy(update={"verification_order": "interleaved", "procedures": [{"kind": "multi_position"}]})
+    assert [(one.kind, one.pose, one.soak) for one in steps(listed)] == [
+        (one.kind, one.pose, one.soak) for one in spread
+    ]
     assert "verification_order" not in recipe.model_dump()  # captures of earlier versions keep their names
 
 
