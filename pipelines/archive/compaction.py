@@ -10,8 +10,8 @@ from __future__ import annotations
 import os
 import re
 import time
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import nullcontext, suppress
+from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -89,22 +89,17 @@ def compact(archive: Archive, before: str = "") -> Compacted:
     return done
 
 
-class _compacting:  # noqa: N801 - used as a block
+@contextmanager
+def _compacting(root: Path) -> Generator[None]:
     """A block in which no other process compacts."""
-
-    def __init__(self, root: Path) -> None:
-        self._lock = alone(root / packs.FOLDER)
-
-    def __enter__(self) -> None:
+    with ExitStack() as held:
         try:
-            self._lock.__enter__()
+            held.enter_context(alone(root / packs.FOLDER))
         except OperatorNeeded:
             raise OperatorNeeded(
                 "archive compact: another process is compacting this archive; wait for its end"
             ) from None
-
-    def __exit__(self, *problem: object) -> None:
-        self._lock.__exit__(None, None, None)
+        yield
 
 
 def _refuse_open(root: Path) -> None:

@@ -240,7 +240,7 @@ class Acquisition:
         duration = station.clock.now() - start
         record = Record(step.record, step.kind, step.pose, step.soak, start, duration, recording.rate_hz)
         record.since_power = powered + duration / 2.0
-        self.observe_instruments(record)
+        record.observe(*self.look())
         for unit in self.answering:
             output = recording.outputs.get(unit.slot)
             if output is None:
@@ -249,13 +249,6 @@ class Acquisition:
                 record.keep(unit.serial, Samples(0, output, overflow=False))
         samples, readings = self.tables(record)
         return record, pd.concat([samples, recording.reference_frame(record.number, record.start)]), readings
-
-    def observe_instruments(self, record: Record) -> None:
-        """Adds an observation of angles, air and instruments to a record that is not taken on the table."""
-        station = self.station
-        angles, air, instruments = station.table.angles(), station.chamber.temperature(), station.reader.instruments()
-        self.log_temperatures(instruments)
-        record.observe(angles, air, instruments)
 
     def rest(self, seconds: float) -> None:
         """Waits ``seconds`` for the devices to come to rest after a move; logs temperatures during a long wait."""
@@ -278,12 +271,17 @@ class Acquisition:
 
     def observe(self, step: Step, record: Record) -> None:
         """Adds an observation to the record; a failed condition spoils the record."""
-        station = self.station
-        angles, air, instruments = station.table.angles(), station.chamber.temperature(), station.reader.instruments()
-        self.log_temperatures(instruments)
+        angles, air, instruments = self.look()
         target = step.temperature if step.settled else None
         self.supervisor.check_during(step.pose, target, angles, air, instruments, self.slots)
         record.observe(angles, air, instruments)
+
+    def look(self) -> tuple[tuple[float, float], float, Instruments]:
+        """Angles of the table, air and instruments now; logs the temperatures."""
+        station = self.station
+        angles, air, instruments = station.table.angles(), station.chamber.temperature(), station.reader.instruments()
+        self.log_temperatures(instruments)
+        return angles, air, instruments
 
     def read_samples(self, record: Record) -> None:
         """Moves the samples from the slots' memories to the record; the unit of a slot that does not answer is given up."""

@@ -72,19 +72,7 @@ def start(
         if _marker(station).exists():
             _pause(pool, station, paused=False)
             _marker(station).unlink(missing_ok=True)
-        command = [
-            sys.executable,
-            "-m",
-            "prefect",
-            "worker",
-            "start",
-            "--pool",
-            pool,
-            "--limit",
-            "1",
-            "--name",
-            name,
-        ]
+        command = [sys.executable, "-m", "prefect", "worker", "start", "--pool", pool, "--limit", "1", "--name", name]
         for queue in (station, *queues):
             command += ["--work-queue", queue]
         command += ["--run-once"] if once else []
