@@ -63,8 +63,28 @@ def run_locally(
     """The run that the flow ``calibrate_lot`` made, on the server named by PREFECT_API_URL or on one of our own."""
     archive.prepare()
     progress(0, len(steps(job.recipe)), "starting the orchestrator")
-    with reached(archive, lambda: _prepare(job)):
-        return _run(request, job, archive, progress, report, operator)
+    name = f"{job.recipe.name} {job.capture_id}"
+    with flow_run(archive, name, lambda: _prepare(job)) as address:
+        from pipelines.flows.calibrate import calibrate_lot, listening
+
+        with listening(progress, report, operator):
+            flow = calibrate_lot.with_options(flow_run_name=name)
+            run_id = str(flow(**request.parameters(), archive=address))
+    return archive.run(run_id)
+
+
+@contextmanager
+def flow_run(archive: Archive, name: str, meanwhile: Callable[[], None] = lambda: None) -> Generator[str]:
+    """A block for one flow run of a name, with the address by which it finds an archive; its history is complete at the end."""
+    with reached(archive, meanwhile):
+        from pipelines.flows.calibrate import settle_history
+        from pipelines.orchestrator.archive_address import named
+        from pipelines.orchestrator.dead_runs import close_dead_runs
+
+        close_dead_runs(name)
+        with named(archive) as address:
+            yield address
+        settle_history(name, len(ORDER))
 
 
 def _prepare(job: Job) -> None:
@@ -115,27 +135,6 @@ def _home(archive: Archive) -> Path:
     if isinstance(archive.root, Path):
         return archive.root.resolve() / "orchestrator"
     return cache_folder() / f"orchestrator-{sha256(without_credentials(archive.address).encode()).hexdigest()[:16]}"
-
-
-def _run(
-    request: Request,
-    job: Job,
-    archive: Archive,
-    progress: Progress,
-    report: Callable[[Done], None],
-    operator: Operator | None,
-) -> Run:
-    from pipelines.flows.calibrate import calibrate_lot, listening, settle_history
-    from pipelines.orchestrator.archive_address import named
-    from pipelines.orchestrator.dead_runs import close_dead_runs
-
-    name = f"{job.recipe.name} {job.capture_id}"
-    close_dead_runs(name)
-    with listening(progress, report, operator), named(archive) as address:
-        flow = calibrate_lot.with_options(flow_run_name=name)
-        run_id = str(flow(**request.parameters(), archive=address))
-    settle_history(name, len(ORDER))
-    return archive.run(run_id)
 
 
 @contextmanager

@@ -43,11 +43,10 @@ OLD_TABLES = {
 class Side:
     """A lot under one model.
 
-    outcome, grade, reasons : by unit; fitted, verified : errors of the fit's dwells and of those not fitted
+    outcome, reasons : by unit; fitted, verified : errors of the fit's dwells and of those not fitted
     """
 
     outcome: dict[str, str]
-    grade: dict[str, str]
     reasons: dict[str, str]
     fitted: Sums
     verified: Sums
@@ -132,12 +131,9 @@ def _calibration(tables: Mapping[str, pd.DataFrame]) -> Calibration | None:
 
 
 def _side(tables: Mapping[str, pd.DataFrame], calibration: Calibration | None) -> Side:
-    units, outcome, grades, reasons = (
-        tables["grades"][name].tolist() for name in ("unit", "outcome", "grade", "reasons")
-    )
+    units, outcome, reasons = (tables["grades"][name].tolist() for name in ("unit", "outcome", "reasons"))
     return Side(
         outcome=dict(zip(units, outcome, strict=True)),
-        grade=dict(zip(units, grades, strict=True)),
         reasons=dict(zip(units, reasons, strict=True)),
         fitted=_sums(tables["residuals"], "residual_ug"),
         verified=_sums(tables["verification"], "error_ug"),
