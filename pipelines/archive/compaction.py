@@ -19,8 +19,7 @@ from pipelines.archive import files, packs
 from pipelines.archive.archive import Archive
 from pipelines.archive.capture_journal import is_number
 from pipelines.archive.locks import LOCK, alone
-from pipelines.archive.pack_merging import merge_packs, remove_replaced
-from pipelines.archive.pack_writing import LARGEST, FolderToPack, write_pack
+from pipelines.archive.pack_writing import LARGEST, FolderToPack, merge_packs, remove_replaced, write_pack
 from pipelines.archive.records import COMPLETE
 from pipelines.archive.run import SEALED, START
 from schemas.errors import OperatorNeeded, WrongUse

@@ -10,9 +10,8 @@ import numpy as np
 import pandas as pd
 
 from pipelines.capture.plausibility import Plausibility
-from pipelines.capture.power_cycling import Power
 from pipelines.capture.record import Record, TemperatureLog, readings_row
-from pipelines.capture.supervision import Supervisor, short_of_samples
+from pipelines.capture.supervision import Power, Supervisor, short_of_samples
 from pipelines.procedures import procedure_of
 from pipelines.procedures.base import OnEquipment, SetsEquipment
 from pipelines.schedule.steps import Step

@@ -34,15 +34,6 @@ class NominalScale(Part):
 
     scale: Annotated[float, Field(gt=0.0, allow_inf_nan=False)] | None = None
 
-    def require_scale(self, recipe: Recipe) -> None:
-        """Refuse a recipe that gives no scale; :class:`schemas.errors.RecipeInvalid`."""
-        if self.scale is None and not recipe.tumbles:
-            raise RecipeInvalid(
-                f"recipe: procedure {self.kind} has no scale, output per g is needed for figures in g; set scale, or list "
-                "multi_position",
-                key="scale",
-            )
-
 
 class Procedure(ABC):
     """A test procedure. Each module of this package defines one as PROCEDURE.
@@ -131,7 +122,12 @@ class InG(Procedure):
 
     def check(self, part: NominalScale, recipe: Recipe, station: StationConfig) -> None:
         """Refuse a list without a scale."""
-        part.require_scale(recipe)
+        if part.scale is None and not recipe.tumbles:
+            raise RecipeInvalid(
+                f"recipe: procedure {part.kind} has no scale, output per g is needed for figures in g; set scale, or list "
+                "multi_position",
+                key="scale",
+            )
 
 
 class OnEquipment(Procedure):

@@ -12,10 +12,10 @@ from inertial.correction import correct
 from inertial.errors import InertialError
 from pipelines.archive import Archive, Run
 from pipelines.jobs.model_change import ModelChange
-from pipelines.rerun.archived_job import archived_job
 from pipelines.rerun.buffered_run import BufferedRun
 from pipelines.rerun.partition import Batch
 from pipelines.rerun.selection import SelectedRun, entry_of
+from pipelines.rerun.steps import archived_job
 from pipelines.stages.fit import fit_in_memory
 from pipelines.stages.grade import GradeEvidence, grade
 from pipelines.stages.uncertainty.budget_terms import BudgetTables

@@ -7,8 +7,7 @@ import pytest
 from small_station import QUIET, MemorySink, lot_of, plant_of, quiet_progress, short_recipe, station_of, write
 
 from pipelines.capture.capture import capture
-from pipelines.capture.power_cycling import Power
-from pipelines.capture.supervision import Supervisor
+from pipelines.capture.supervision import Power, Supervisor
 from pipelines.schedule.steps import steps
 from pipelines.schedule.timing import minutes
 from schemas.errors import OperatorNeeded, StationRefused

@@ -14,7 +14,7 @@ from capture_double import small_run
 
 from pipelines.archive import Archive, Run
 from pipelines.jobs.model_change import ModelChange
-from pipelines.rerun.archived_job import ArchivedJob, archived_job
+from pipelines.rerun.steps import ArchivedJob, archived_job
 from pipelines.stages.figures.base import BudgetRow
 from pipelines.stages.fit import fit_in_memory, fit_tables
 from pipelines.stages.grade import GradeEvidence, grade
