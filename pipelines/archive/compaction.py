@@ -17,7 +17,7 @@ from pathlib import Path
 
 from pipelines.archive import files, packs
 from pipelines.archive.archive import Archive
-from pipelines.archive.capture_journal import is_number
+from pipelines.archive.hash_chain import is_number
 from pipelines.archive.locks import LOCK, alone
 from pipelines.archive.pack_writing import LARGEST, FolderToPack, merge_packs, remove_replaced, write_pack
 from pipelines.archive.records import COMPLETE

@@ -162,8 +162,8 @@ def _refuse_without(evidence: dict[str, Any] | None, change: ModelChange, device
 
 def releases(archive: Archive) -> list[Release]:
     """Every record, in the order of writing."""
-    numbers = sorted(int(place.stem) for place in (archive.root / FOLDER).glob("*.json") if place.stem.isdigit())
-    return [_read(archive, number) for number in numbers]
+    stems = (place.stem for place in (archive.root / FOLDER).glob("*.json"))
+    return [_read(archive, number) for number in sorted(int(stem) for stem in stems if hash_chain.is_number(stem))]
 
 
 def released(archive: Archive, device: str, station: str, when: datetime) -> Release | None:
