@@ -189,10 +189,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
         sys.exit(problem.exit_status)
 
 
-if __name__ == "__main__":
-    main()
-
-
 @contextmanager
 def quick_imports() -> Generator[None]:
     """A block that imports much. What it makes stays, so it is not searched for garbage, neither in the block nor later.
@@ -207,3 +203,7 @@ def quick_imports() -> Generator[None]:
         gc.freeze()
         if enabled:
             gc.enable()
+
+
+if __name__ == "__main__":
+    main()

@@ -185,10 +185,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 1 if going else 0
 
 
-if __name__ == "__main__":
-    sys.exit(main())
-
-
 PR_SET_CHILD_SUBREAPER = 36  # linux/prctl.h
 STOPS = (signal.SIGTERM, signal.SIGINT)
 
@@ -241,3 +237,7 @@ def _adopt_orphans() -> None:
     library = ctypes.CDLL(None, use_errno=True)
     if library.prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0):
         raise OSError(ctypes.get_errno(), "prctl(PR_SET_CHILD_SUBREAPER)")
+
+
+if __name__ == "__main__":
+    sys.exit(main())
