@@ -15,19 +15,17 @@ from typing import TYPE_CHECKING, Any
 
 from pipelines.archive import files
 from pipelines.archive.keys import digest
+from pipelines.archive.listing import RunInfo
 from pipelines.archive.packed_path import with_packs
 from pipelines.archive.provenance import provenance
 from pipelines.archive.records import Records
 from pipelines.archive.run import START, Run
 from pipelines.archive.signatures import key_place
-from pipelines.archive.store import address_of, place_of
+from pipelines.archive.store import Place, address_of, place_of
 from schemas.errors import ArchiveUnusable, WrongUse, did_you_mean
 
 if TYPE_CHECKING:
     import pandas as pd
-
-    from pipelines.archive.listing import RunInfo
-    from pipelines.archive.store import Place
 
 FORMAT = 1
 PLAIN = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")  # a name that cannot lead elsewhere

@@ -179,15 +179,11 @@ def _is_readable(place: Place) -> bool:
 
 def _names(folder: Place, prefix: str, links: list[str] | None = None) -> set[str]:
     """Names, below the root, of the files of a folder that are copied; symbolic links are added to ``links``."""
-    names: set[str] = set()
-    for path, name in _walk(folder, prefix, [] if links is None else links):
-        if PurePosixPath(name).parts[0] not in {INDEX, packs.FOLDER}:
-            names.add(name)
-        del path
-    return names
+    names = _walk(folder, prefix, [] if links is None else links)
+    return {name for name in names if PurePosixPath(name).parts[0] not in {INDEX, packs.FOLDER}}
 
 
-def _walk(folder: Place, prefix: str, links: list[str]) -> Iterator[tuple[Place, str]]:
+def _walk(folder: Place, prefix: str, links: list[str]) -> Iterator[str]:
     if not folder.is_dir():
         return
     try:
@@ -201,7 +197,7 @@ def _walk(folder: Place, prefix: str, links: list[str]) -> Iterator[tuple[Place,
         elif path.is_dir():
             yield from _walk(path, name, links)
         else:
-            yield path, name
+            yield name
 
 
 def _copy(source: Place, target: Place, name: str, chain: _ChainAtStart, copied: Copied) -> bool:

@@ -7,12 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 from pipelines.archive import files
 from pipelines.archive.hash_chain import is_number
+from pipelines.archive.store import Place
 from schemas.event import Event
 
 if TYPE_CHECKING:
     import pandas as pd
-
-    from pipelines.archive.store import Place
 
 FOLDER = "events"
 SOAK_FIGURES = ("target_C", "seconds", "air_overshoot_K", "device_overshoot_K")
@@ -43,26 +42,14 @@ class Events:
 
     def table(self) -> pd.DataFrame:
         """Causes of pauses and of the end of the capture, with the action taken: the table ``events`` of the archive."""
-        import pandas as pd
-
-        rows = [
-            {"time_s": e.time_s, "kind": e.kind, "record": e.record, "reason": e.reason, "action": e.action}
-            for e in self.recorded()
-        ]
         columns = {"time_s": float, "kind": "str", "record": "int64", "reason": "str", "action": "str"}
-        return pd.DataFrame(rows, columns=list(columns)).astype(columns)
+        return _table([{name: getattr(event, name) for name in columns} for event in self.recorded()], columns)
 
     def soaks(self) -> pd.DataFrame:
         """How long each soak took, and overshoot of air and devices: the table ``soaks`` of the archive."""
-        import pandas as pd
-
-        rows = [
-            {"time_s": e.time_s, "record": e.record, **{name: e.figures[name] for name in SOAK_FIGURES}}
-            for e in self.recorded()
-            if e.kind == "soak" and e.figures
-        ]
-        columns = {"time_s": float, "record": "int64", **dict.fromkeys(SOAK_FIGURES, float)}
-        return pd.DataFrame(rows, columns=list(columns)).astype(columns)
+        soaks = [event for event in self.recorded() if event.kind == "soak" and event.figures]
+        rows = [{"time_s": soak.time_s, "record": soak.record, **soak.figures} for soak in soaks]
+        return _table(rows, {"time_s": float, "record": "int64", **dict.fromkeys(SOAK_FIGURES, float)})
 
     def hashes(self) -> dict[str, str]:
         """The hash of every event's file by its name."""
@@ -72,6 +59,12 @@ class Events:
         if not self.path.is_dir():
             return []
         return sorted((path for path in self.path.glob("*.json") if is_number(path.stem)), key=lambda path: path.name)
+
+
+def _table(rows: list[dict[str, Any]], columns: dict[str, Any]) -> pd.DataFrame:
+    import pandas as pd
+
+    return pd.DataFrame(rows, columns=list(columns)).astype(columns)
 
 
 def _event(content: dict[str, Any]) -> Event:

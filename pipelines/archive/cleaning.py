@@ -139,5 +139,5 @@ def _calibrations(root: Place) -> Iterator[str]:
     top, length = root / "calibrations", len(str(root))
     places = top.walk() if isinstance(top, ObjectPath) else sorted(top.glob("*/*/*.json"))
     for place in places:
-        if place.stem.isdigit():
+        if hash_chain.is_number(place.stem):
             yield str(place)[length:].lstrip(os.sep).replace(os.sep, "/")

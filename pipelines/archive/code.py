@@ -20,8 +20,7 @@ _ENGINE = (
 )
 _NOISE = (
     *(*_TABLES, *_MODEL, "inertial.distributions", "inertial.dynamics", "inertial.noise"),
-    *("pipelines.stages.bias_stability", "pipelines.stages.coarse_digits"),
-    *("pipelines.stages.noise", "pipelines.stages.static_record"),
+    *("pipelines.stages.coarse_digits", "pipelines.stages.noise", "pipelines.stages.static_record"),
 )
 _BUDGET = (
     *(*_TABLES, *_MODEL, "schemas", "inertial.correction", "inertial.distributions", "inertial.noise"),
@@ -35,10 +34,7 @@ _DRAWN = (
 )
 
 CODE = {
-    "validate": (
-        *(*_SAMPLES, "inertial.pointing", "pipelines.stages.frozen"),
-        "pipelines.stages.validate",
-    ),
+    "validate": (*_SAMPLES, "inertial.pointing", "pipelines.stages.validate"),
     "reduce": (*_TABLES, "pipelines.stages.reduce"),
     "fit": (
         *(*_ENGINE, "pipelines.stages.fit", "pipelines.stages.noisy_fit"),

@@ -10,20 +10,18 @@ from __future__ import annotations
 import os
 import re
 import time
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import nullcontext, suppress
+from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from pipelines.archive import files, packs
 from pipelines.archive.archive import Archive
-from pipelines.archive.capture_journal import is_number
+from pipelines.archive.hash_chain import is_number
 from pipelines.archive.locks import LOCK, alone
-from pipelines.archive.pack_merging import merge_packs, remove_replaced
-from pipelines.archive.pack_writing import LARGEST, FolderToPack, write_pack
+from pipelines.archive.pack_writing import LARGEST, FolderToPack, merge_packs, remove_replaced, write_pack
 from pipelines.archive.records import COMPLETE
-from pipelines.archive.run import START
-from pipelines.archive.run_files import SEALED
+from pipelines.archive.run import SEALED, START
 from schemas.errors import OperatorNeeded, WrongUse
 
 LEAST_AGE_S = 3600.0  # of an event of the ledger: a process that decides on the next one has read it long ago
@@ -90,22 +88,17 @@ def compact(archive: Archive, before: str = "") -> Compacted:
     return done
 
 
-class _compacting:  # noqa: N801 - used as a block
+@contextmanager
+def _compacting(root: Path) -> Generator[None]:
     """A block in which no other process compacts."""
-
-    def __init__(self, root: Path) -> None:
-        self._lock = alone(root / packs.FOLDER)
-
-    def __enter__(self) -> None:
+    with ExitStack() as held:
         try:
-            self._lock.__enter__()
+            held.enter_context(alone(root / packs.FOLDER))
         except OperatorNeeded:
             raise OperatorNeeded(
                 "archive compact: another process is compacting this archive; wait for its end"
             ) from None
-
-    def __exit__(self, *problem: object) -> None:
-        self._lock.__exit__(None, None, None)
+        yield
 
 
 def _refuse_open(root: Path) -> None:

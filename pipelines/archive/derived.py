@@ -10,13 +10,11 @@ from __future__ import annotations
 import json
 import logging
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pipelines.archive import files
 from pipelines.archive.signatures import BAD, GOOD, check, public_keys, signed
-
-if TYPE_CHECKING:
-    from pipelines.archive.store import Place
+from pipelines.archive.store import Place
 
 SOUND, OTHERS, EDITED = "sound", "made by others", "edited"
 LOGGER = logging.getLogger("tumbleline.archive")

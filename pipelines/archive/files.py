@@ -15,15 +15,12 @@ import uuid
 from collections.abc import Generator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pipelines.archive.names import LinkInArchive, refuse_leading_out
 from pipelines.archive.signatures import signed
-from pipelines.archive.store import ObjectPath, first_line
+from pipelines.archive.store import ObjectPath, Place, first_line
 from schemas.errors import ArchiveUnusable
-
-if TYPE_CHECKING:
-    from pipelines.archive.store import Place
 
 TEMPORARY = ".tmp-"
 WAITING = 8  # files written at the same time

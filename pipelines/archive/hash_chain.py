@@ -8,14 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import nullcontext
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pipelines.archive import files
 from pipelines.archive.locks import alone
-from pipelines.archive.store import ObjectPath
-
-if TYPE_CHECKING:
-    from pipelines.archive.store import Place
+from pipelines.archive.store import ObjectPath, Place
 
 FOLDER = "chain"
 SHARD = 1000

@@ -7,17 +7,13 @@ from collections import Counter
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import astuple, dataclass, fields
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pipelines.archive import derived, files
 from pipelines.archive.keys import digest
-from pipelines.archive.run_files import SEALED, names_in, stages_of
-from pipelines.archive.store import ObjectPath
+from pipelines.archive.run import SEALED, Run, names_in, stages_of
+from pipelines.archive.store import ObjectPath, Place
 from schemas.errors import ArchiveUnusable
-
-if TYPE_CHECKING:
-    from pipelines.archive.run import Run
-    from pipelines.archive.store import Place
 
 
 @dataclass(frozen=True)

@@ -17,14 +17,11 @@ import time
 import uuid
 from collections.abc import Generator
 from contextlib import contextmanager, suppress
-from typing import TYPE_CHECKING, TextIO
+from typing import TextIO
 
 from pipelines.archive import files
-from pipelines.archive.store import ObjectPath
+from pipelines.archive.store import ObjectPath, Place
 from schemas.errors import OperatorNeeded
-
-if TYPE_CHECKING:
-    from pipelines.archive.store import Place
 
 LEASE_S = 120.0
 RENEWAL_S = 30.0

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from pipelines.archive.store import Place
 from schemas.errors import ArchiveUnusable
-
-if TYPE_CHECKING:
-    from pipelines.archive.store import Place
 
 ONE = ("capture", "run", "rerun_of", "taken_from")  # entries that name one folder of the archive
 SEVERAL = ("parents",)

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import io
 import os
+from collections.abc import Generator
 from errno import EBADF, ELOOP, ENOENT, ENOTDIR
 from fnmatch import fnmatchcase
 from functools import cache
@@ -21,12 +22,9 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from pipelines.archive import packs
 from pipelines.archive.names import LinkInArchive
+from pipelines.archive.store import Place
 
 if TYPE_CHECKING:
-    from collections.abc import Generator
-
-    from pipelines.archive.store import Place
-
     Base = Path
 else:
     Base = type(Path())  # before Python 3.12 only the class of the system can be derived from

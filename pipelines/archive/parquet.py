@@ -6,15 +6,13 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from pipelines.archive.files import hash_of
-from pipelines.archive.store import first_line
+from pipelines.archive.store import Place, first_line
 from schemas.errors import ArchiveUnusable
 from schemas.version import VERSION
 
 if TYPE_CHECKING:
     import pandas as pd
     import pyarrow as pa
-
-    from pipelines.archive.store import Place
 
 TABLE_MARK = b"tumbleline.table"
 SCHEMA_MARK = b"tumbleline.schema"

@@ -9,13 +9,11 @@ from pipelines.archive import files, parquet
 from pipelines.archive.capture_journal import Events
 from pipelines.archive.hash_chain import is_number
 from pipelines.archive.keys import digest
-from pipelines.archive.store import ObjectPath
+from pipelines.archive.store import ObjectPath, Place
 from schemas.errors import ArchiveUnusable
 
 if TYPE_CHECKING:
     import pandas as pd
-
-    from pipelines.archive.store import Place
 
 PARTS = ("samples", "readings", "history")
 COMPLETE = "complete.json"

@@ -9,8 +9,8 @@ from pipelines.archive import files, hash_chain
 from pipelines.archive.parquet import columns_of, encoded, read_table
 from pipelines.archive.provenance import provenance
 from pipelines.archive.records import COMPLETE, PARTS, Records
-from pipelines.archive.run_files import SEALED, stages_of
 from pipelines.archive.signatures import ENTRY
+from pipelines.archive.store import Place
 from schemas.errors import ArchiveUnusable, WrongUse, did_you_mean
 from schemas.version import refuse_newer
 
@@ -18,7 +18,23 @@ if TYPE_CHECKING:
     import pandas as pd
     import pyarrow as pa
 
-    from pipelines.archive.store import Place
+SEALED = "sealed.json"
+
+
+def stages_of(folder: Place, names: set[str] | None = None) -> list[str]:
+    """The stages that made the run's tables."""
+    names = names_in(folder) if names is None else names
+    tables = sorted(name.removesuffix(".parquet") for name in names if name.endswith(".parquet"))
+    made = (
+        str(files.read_json(folder / f"{name}.json").get("stage", "")) for name in tables if f"{name}.json" in names
+    )
+    return list(dict.fromkeys(made))
+
+
+def names_in(folder: Place) -> set[str]:
+    """Names of the files in a folder; an empty set where the folder does not exist."""
+    return {place.name for place in folder.iterdir()} if folder.is_dir() else set()
+
 
 START = "run.json"
 

@@ -1,18 +1,17 @@
-"""Measuring one record: the move, the samples, the observations meanwhile, and units that stop answering."""
+"""Measuring and storing one record: the move, the samples, the observations meanwhile, and units that stop answering."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 import pandas as pd
 
 from pipelines.capture.plausibility import Plausibility
-from pipelines.capture.power_cycling import Power
 from pipelines.capture.record import Record, TemperatureLog, readings_row
-from pipelines.capture.sink import CaptureSink
-from pipelines.capture.supervision import Supervisor, short_of_samples
+from pipelines.capture.supervision import Power, Supervisor, short_of_samples
 from pipelines.procedures import procedure_of
 from pipelines.procedures.base import OnEquipment, SetsEquipment
 from pipelines.schedule.steps import Step
@@ -25,6 +24,35 @@ from stations.devices.recording import RecordingSpoilt
 from stations.devices.slot import Identity, Samples, SamplesLost
 from stations.safety.suspenders import Reason, Suspended
 from stations.station import Station
+
+
+class CaptureSink(Protocol):
+    """Storage of records: each is stored completely, or not at all."""
+
+    def finished(self) -> set[int]:
+        """Numbers of the records that are stored."""
+        ...
+
+    def part(self, record: int, number: int, samples: pd.DataFrame) -> None:
+        """Stores a part of the samples of a long record before the record is complete; part 0 discards earlier parts."""
+        ...
+
+    def put(
+        self,
+        record: int,
+        samples: pd.DataFrame,
+        readings: pd.DataFrame,
+        history: pd.DataFrame,
+        station_state: bytes,
+        parts: int = 0,
+    ) -> None:
+        """Stores a record durably, with the station's state after it; ``parts`` parts of its samples are stored already."""
+        ...
+
+    def last_state(self) -> bytes | None:
+        """The station's state after the last stored record."""
+        ...
+
 
 OBSERVATIONS = 5  # observations of encoders and instruments within a dwell
 HISTORY_S = 10.0
@@ -211,7 +239,7 @@ class Acquisition:
         duration = station.clock.now() - start
         record = Record(step.record, step.kind, step.pose, step.soak, start, duration, recording.rate_hz)
         record.since_power = powered + duration / 2.0
-        self.observe_instruments(record)
+        record.observe(*self.look())
         for unit in self.answering:
             output = recording.outputs.get(unit.slot)
             if output is None:
@@ -220,13 +248,6 @@ class Acquisition:
                 record.keep(unit.serial, Samples(0, output, overflow=False))
         samples, readings = self.tables(record)
         return record, pd.concat([samples, recording.reference_frame(record.number, record.start)]), readings
-
-    def observe_instruments(self, record: Record) -> None:
-        """Adds an observation of angles, air and instruments to a record that is not taken on the table."""
-        station = self.station
-        angles, air, instruments = station.table.angles(), station.chamber.temperature(), station.reader.instruments()
-        self.log_temperatures(instruments)
-        record.observe(angles, air, instruments)
 
     def rest(self, seconds: float) -> None:
         """Waits ``seconds`` for the devices to come to rest after a move; logs temperatures during a long wait."""
@@ -249,12 +270,17 @@ class Acquisition:
 
     def observe(self, step: Step, record: Record) -> None:
         """Adds an observation to the record; a failed condition spoils the record."""
-        station = self.station
-        angles, air, instruments = station.table.angles(), station.chamber.temperature(), station.reader.instruments()
-        self.log_temperatures(instruments)
+        angles, air, instruments = self.look()
         target = step.temperature if step.settled else None
         self.supervisor.check_during(step.pose, target, angles, air, instruments, self.slots)
         record.observe(angles, air, instruments)
+
+    def look(self) -> tuple[tuple[float, float], float, Instruments]:
+        """Angles of the table, air and instruments now; logs the temperatures."""
+        station = self.station
+        angles, air, instruments = station.table.angles(), station.chamber.temperature(), station.reader.instruments()
+        self.log_temperatures(instruments)
+        return angles, air, instruments
 
     def read_samples(self, record: Record) -> None:
         """Moves the samples from the slots' memories to the record; the unit of a slot that does not answer is given up."""

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pipelines.capture.acquisition import Acquisition
-from pipelines.capture.sink import CaptureSink
+from pipelines.capture.acquisition import Acquisition, CaptureSink
 from pipelines.capture.soak_response import Approach
 from pipelines.capture.supervision import LINK_ATTEMPTS, LOST_FOR, WARMING, StillSuspended, Supervisor
 from pipelines.capture.time_left import Remaining

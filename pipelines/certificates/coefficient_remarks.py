@@ -1,15 +1,17 @@
-"""Remarks for readers of coefficients: missing or foreign signatures, and differing versions of libraries."""
+"""Certified coefficients, and remarks for their readers: missing or foreign signatures, differing versions of libraries."""
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Iterable, Mapping
 from typing import Any
 
 from pipelines.archive import Run, files
 from pipelines.archive.signatures import BAD, GOOD, UNSIGNED, check, public_keys
-from pipelines.archive.store import Place
+from pipelines.archive.store import Place, first_line
 from pipelines.certificates.entries import folder_of
 from pipelines.certificates.ledger import Ledger
+from pipelines.certificates.validity import Calibration
 from schemas.errors import ArchiveUnusable
 
 TABLES = ("coefficients", "covariance", "grades")
@@ -95,3 +97,26 @@ def differing_libraries(run: str, manifests: Mapping[str, Mapping[str, Any]]) ->
 
 def _versions_text(by: Mapping[str, list[str]]) -> str:
     return " and ".join(f"{number} ({', '.join(names)})" for number, names in sorted(by.items()))
+
+
+def coefficients_of(run: Run, calibration: Calibration) -> list[dict[str, Any]]:
+    """Rows of the unit in the certified table of coefficients of the run."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    place = run.path / "coefficients.parquet"
+    try:
+        data = place.read_bytes()
+        if hashlib.sha256(data).hexdigest() != calibration.event.coefficients:
+            raise ArchiveUnusable(
+                f"calibrations: {place} is not the table of certificate {calibration.certificate} (its hash "
+                "differs); restore it from a copy"
+            )
+        # read_table imports pandas; and a thread pool that is still starting aborts so short a process at its end
+        table = pq.ParquetFile(pa.BufferReader(data), pre_buffer=False).read(use_threads=False)
+    except (OSError, pa.ArrowInvalid) as problem:
+        raise ArchiveUnusable(
+            f"calibrations: {place} cannot be read ({first_line(problem)}); restore it from a copy"
+        ) from None
+    # table.take would make an array of the row numbers, and pyarrow asks pandas whether they are a series
+    return [row for row in table.to_pylist() if row["unit"] == calibration.serial]

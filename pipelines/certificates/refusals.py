@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from pipelines.archive import Run
 from pipelines.certificates.days import months_after, today
+from pipelines.certificates.entries import LedgerEntry
 from pipelines.certificates.measured import measured_on
+from pipelines.certificates.validity import Calibration
 from schemas.errors import WrongUse
-
-if TYPE_CHECKING:
-    from pipelines.certificates.entries import LedgerEntry
-    from pipelines.certificates.validity import Calibration
 
 SERIAL = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+-]{0,63}")
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NotRequired
+from typing import Any, NotRequired, cast
 
 import numpy as np
 import pandas as pd
@@ -210,20 +210,10 @@ def _edge(row: dict[str, Any]) -> float:
 
 def _reference(document: dict[str, Any]) -> StatedReference:
     one = Reference.model_validate(document)
-    return {
-        "id": one.id,
-        "what": one.what,
-        "certificate": one.certificate,
-        "laboratory": one.laboratory,
-        "accreditation": one.accreditation,
-        "date": None if one.date is None else one.date.isoformat(),
-        "due": one.due.isoformat(),
-        "U": one.U,
-        "k": one.k,
-        "unit": one.unit,
-        "drift_per_year": one.drift_per_year,
-        "sha256": one.sha256,
-    }
+    days = {"date": None if one.date is None else one.date.isoformat(), "due": one.due.isoformat()}
+    return cast(
+        "StatedReference", {name: days.get(name, getattr(one, name)) for name in StatedReference.__annotations__}
+    )
 
 
 def _finite(value: float) -> float | None:

@@ -9,11 +9,11 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
+from pipelines.certificates.entries import LedgerEntry
 from schemas.errors import WrongUse
 
 if TYPE_CHECKING:
     from pipelines.certificates.documents import CalibrationDocument
-    from pipelines.certificates.entries import LedgerEntry
 
 
 @dataclass(frozen=True)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pandas as pd
 
 from pipelines.archive import Records, Run
-from pipelines.jobs.terms import budget_terms
+from pipelines.jobs.job import Job
 from pipelines.stages.fit import fit_tables
 from pipelines.stages.grade import GradeEvidence, grade
 from pipelines.stages.judge import judge
@@ -23,9 +23,6 @@ from pipelines.stages.verify import verify_tables
 from pipelines.tables.dwells import LotTables
 from pipelines.tables.samples import PROCEDURE
 from pipelines.tables.summaries import summarised
-
-if TYPE_CHECKING:
-    from pipelines.jobs.job import Job
 
 Tables = dict[str, "pd.DataFrame"]
 RECORDS = "records"
@@ -79,12 +76,12 @@ def _validate(job: Job, run: Run) -> Tables:
 
 def _reduce(job: Job, run: Run) -> Tables:
     tables = run.table("readings"), run.table("verdicts")
-    gravity, follows = job.recipe.local_gravity_m_s2, budget_terms(job).follows
+    gravity, follows = job.recipe.local_gravity_m_s2, job.terms.follows
     return {"dwells": reduced_summaries(_summaries(job, run), *tables, gravity, follows)}
 
 
 def _reduced_with(job: Job) -> dict[str, Any]:
-    follows = budget_terms(job).follows
+    follows = job.terms.follows
     own = {} if follows is None else {"supply": follows._asdict()}
     return {"local_gravity_m_s2": job.recipe.local_gravity_m_s2, **own}
 
@@ -139,7 +136,7 @@ def _budget(job: Job, run: Run) -> Tables:
     lot = _lot(run)
     own = (run.table(name) for name in _BUDGETED[2:])
     tables = BudgetTables(lot.dwells, lot.history, *own, lot=lot, calibration=None)
-    return budget(tables, budget_terms(job))
+    return budget(tables, job.terms)
 
 
 _EVIDENCE = (
@@ -226,7 +223,7 @@ STAGES: tuple[Stage, ...] = (
         name="budget",
         inputs=_BUDGETED,
         outputs=("budget", "uncertainties", "budget_covariance"),
-        parameters=lambda job: budget_terms(job).document(),
+        parameters=lambda job: job.terms.document(),
         call=_budget,
     ),
     Stage(

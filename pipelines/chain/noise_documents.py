@@ -23,6 +23,8 @@ SHORTEST_TAU = 8
 LONGEST_TAU = 8
 """Parts of a segment that the longest averaging time from the spectrum is: slower is not resolved."""
 
+CURVE = {"tau_s": "tau_s", "deviation": "deviation_ug", "low": "low_ug", "high": "high_ug"}
+"""Columns of the table ``allan`` by the key of the document."""
 ALLAN = {"statistic": "allan", "statistic_name": "overlapping Allan deviation"}
 
 
@@ -112,19 +114,9 @@ def allan_of_run(run: Run) -> dict[str, Any]:
     static = readings[readings["kind"] == "allan"]
     channels = []
     for (unit, axis), own in curves.groupby(["unit", "axis"], sort=False):
-        columns = ("tau_s", "deviation_ug", "low_ug", "high_ug")
-        tau, deviation, low, high = (own[name].tolist() for name in columns)
+        curve = {name: own[column].tolist() for name, column in CURVE.items()}
         fitted = own["fitted_ug"].tolist() if own["fitted_ug"].notna().all() else None
-        channels.append(
-            {
-                "channel": f"{unit} {axis}",
-                "tau_s": tau,
-                "deviation": deviation,
-                "low": low,
-                "high": high,
-                "fitted": fitted,
-            }
-        )
+        channels.append({"channel": f"{unit} {axis}", **curve, "fitted": fitted})
     rows = [
         {
             "channel": f"{row['unit']} {row['axis']}", "term": row["term"], "name": NAMES[row["term"]],

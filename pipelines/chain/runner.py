@@ -10,20 +10,17 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pandas as pd
 from threadpoolctl import threadpool_limits
 
 from pipelines.archive import Archive, Records, Run, code_hash, files, stage_key
 from pipelines.archive.locks import alone
-from pipelines.archive.run import START
-from pipelines.archive.run_files import SEALED
+from pipelines.archive.run import SEALED, START
 from pipelines.chain.chain import BY_NAME, ORDER, RECORDS, Stage
+from pipelines.jobs.job import Job
 from schemas.progress import Progress, silent
-
-if TYPE_CHECKING:
-    from pipelines.jobs.job import Job
 
 
 @dataclass(frozen=True)

@@ -15,10 +15,9 @@ from prefect import flow
 
 from pipelines.archive import Archive
 from pipelines.chain.attendance import Prompt
-from pipelines.chain.chain import ORDER
 from pipelines.chain.runner import Done, Runner
 from pipelines.flows.calibrate import requested, stage
-from pipelines.flows.local import reached
+from pipelines.flows.local import flow_run
 from pipelines.flows.operator import Paused
 from pipelines.inquiry.inquiry import FollowUp, Inquiry
 from pipelines.inquiry.lineage import JointDiagnosis
@@ -93,21 +92,14 @@ def investigate_locally(
     archive.prepare()
     job = request.job(archive)
     name = f"investigate {job.recipe.name} {job.capture_id}"
-    with reached(archive):
-        from pipelines.flows.calibrate import settle_history
-        from pipelines.orchestrator.archive_address import named
-        from pipelines.orchestrator.dead_runs import close_dead_runs
-
-        close_dead_runs(name)
-        with seated(participants), named(archive) as address:
-            flow = investigate.with_options(flow_run_name=name)
-            document: Any = flow(
-                **request.parameters(),
-                archive=address,
-                effects=list(settings.effects),
-                budget_min=settings.budget,
-                unseen=settings.unseen,
-                ask=ask,
-            )
-        settle_history(name, len(ORDER))
+    with flow_run(archive, name) as address, seated(participants):
+        flow = investigate.with_options(flow_run_name=name)
+        document: Any = flow(
+            **request.parameters(),
+            archive=address,
+            effects=list(settings.effects),
+            budget_min=settings.budget,
+            unseen=settings.unseen,
+            ask=ask,
+        )
     return document

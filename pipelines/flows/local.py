@@ -17,15 +17,15 @@ from contextlib import contextmanager
 from hashlib import sha256
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pipelines.archive import Archive, Run, code_hash
 from pipelines.chain.attendance import Operator
 from pipelines.chain.chain import BY_NAME, ORDER
 from pipelines.chain.runner import Done
+from pipelines.jobs.job import Job, Request
 from pipelines.orchestrator.credentials import without_credentials
-from pipelines.orchestrator.quick_imports import quick_imports
-from pipelines.orchestrator.server import ADDRESS, CLIENTS, START_LOCK, private_folder
+from pipelines.orchestrator.server import ADDRESS, CLIENTS, START_LOCK, private_folder, quick_imports
 from pipelines.orchestrator.server_check import check_server
 from pipelines.orchestrator.settings import CLIENT_KEY, KEY_FILE, STARTUP_S, cache_folder, new_key, settings, use_key
 from pipelines.parallel import with_environment
@@ -33,9 +33,6 @@ from pipelines.schedule.steps import steps
 from schemas.errors import ArchiveUnusable, StationTimeout, TumblelineError
 from schemas.installed import missing_in
 from schemas.progress import Progress
-
-if TYPE_CHECKING:
-    from pipelines.jobs.job import Job, Request
 
 POLL_S = 0.1
 PRIVATE = 0o600
@@ -66,8 +63,28 @@ def run_locally(
     """The run that the flow ``calibrate_lot`` made, on the server named by PREFECT_API_URL or on one of our own."""
     archive.prepare()
     progress(0, len(steps(job.recipe)), "starting the orchestrator")
-    with reached(archive, lambda: _prepare(job)):
-        return _run(request, job, archive, progress, report, operator)
+    name = f"{job.recipe.name} {job.capture_id}"
+    with flow_run(archive, name, lambda: _prepare(job)) as address:
+        from pipelines.flows.calibrate import calibrate_lot, listening
+
+        with listening(progress, report, operator):
+            flow = calibrate_lot.with_options(flow_run_name=name)
+            run_id = str(flow(**request.parameters(), archive=address))
+    return archive.run(run_id)
+
+
+@contextmanager
+def flow_run(archive: Archive, name: str, meanwhile: Callable[[], None] = lambda: None) -> Generator[str]:
+    """A block for one flow run of a name, with the address by which it finds an archive; its history is complete at the end."""
+    with reached(archive, meanwhile):
+        from pipelines.flows.calibrate import settle_history
+        from pipelines.orchestrator.archive_address import named
+        from pipelines.orchestrator.dead_runs import close_dead_runs
+
+        close_dead_runs(name)
+        with named(archive) as address:
+            yield address
+        settle_history(name, len(ORDER))
 
 
 def _prepare(job: Job) -> None:
@@ -118,27 +135,6 @@ def _home(archive: Archive) -> Path:
     if isinstance(archive.root, Path):
         return archive.root.resolve() / "orchestrator"
     return cache_folder() / f"orchestrator-{sha256(without_credentials(archive.address).encode()).hexdigest()[:16]}"
-
-
-def _run(
-    request: Request,
-    job: Job,
-    archive: Archive,
-    progress: Progress,
-    report: Callable[[Done], None],
-    operator: Operator | None,
-) -> Run:
-    from pipelines.flows.calibrate import calibrate_lot, listening, settle_history
-    from pipelines.orchestrator.archive_address import named
-    from pipelines.orchestrator.dead_runs import close_dead_runs
-
-    name = f"{job.recipe.name} {job.capture_id}"
-    close_dead_runs(name)
-    with listening(progress, report, operator), named(archive) as address:
-        flow = calibrate_lot.with_options(flow_run_name=name)
-        run_id = str(flow(**request.parameters(), archive=address))
-    settle_history(name, len(ORDER))
-    return archive.run(run_id)
 
 
 @contextmanager

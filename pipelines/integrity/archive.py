@@ -19,13 +19,12 @@ from pipelines.archive.signatures import GOOD, UNKNOWN, UNSIGNED
 from pipelines.archive.store import ObjectPath, Place
 from pipelines.certificates.entries import FOLDER as LEDGER
 from pipelines.certificates.ledger_index import DIGITS, INDEX_FOLDER, all_read, indexed_events, stamps_of
-from pipelines.integrity.calibrations import check_shard
 from pipelines.integrity.captures import check_capture, check_strangers
 from pipelines.integrity.causes import by_cause
 from pipelines.integrity.chain import check_chain
 from pipelines.integrity.findings import CHANGED, MISSING, SIGNATURE, UNREADABLE, IntegrityFinding, VerifiedPart
 from pipelines.integrity.runs import check_run
-from pipelines.integrity.seals import check_seals
+from pipelines.integrity.seals import check_seals, check_shard
 from pipelines.integrity.surroundings import SHOWN, check_links, check_mark, check_surroundings
 from schemas.errors import ArchiveUnusable
 

@@ -6,14 +6,10 @@ import os
 import re
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from pipelines.archive import Archive, files
 from pipelines.archive.store import Place
-from pipelines.integrity.findings import CHANGED, FOREIGN, MISSING, SIGNATURE, UNREADABLE
-
-if TYPE_CHECKING:
-    from pipelines.integrity.findings import VerifiedPart
+from pipelines.integrity.findings import CHANGED, FOREIGN, MISSING, SIGNATURE, UNREADABLE, VerifiedPart
 
 OURS = re.compile(
     r"archive\.json|(index|orchestrator)/.*|.*\.parquet"

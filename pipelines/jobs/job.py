@@ -14,11 +14,12 @@ from pipelines.archive.keys import digest
 from pipelines.jobs.model_files import read_model, refuse_unknown_effects, use_formulas
 from pipelines.jobs.range_of_station import refuse_beyond_station
 from pipelines.jobs.recipes import MAIN_JOB, folder_of, load_limits, load_recipe, lot_of, units_of
-from pipelines.jobs.terms import refuse_contradictions, refuse_unreachable, with_stability
+from pipelines.jobs.terms import budget_terms, refuse_contradictions, refuse_unreachable, with_stability
 from pipelines.procedures import refuse_unusable
 from pipelines.schedule.planned_state import refuse_unidentified
 from pipelines.stages.figures import UNITS
 from pipelines.stages.grade import refuse_limits_without_figures
+from pipelines.stages.uncertainty.budget_terms import BudgetTerms
 from pipelines.tables.dwell_table import covariates
 from schemas.errors import RecipeInvalid, WrongUse
 from schemas.fault import parse_fault
@@ -72,6 +73,11 @@ class Job:
     def __post_init__(self) -> None:
         """Formulas of the model are effects wherever this job is worked on."""
         use_formulas(self.recipe.formulas, f"recipe {self.recipe.name}")
+
+    @property
+    def terms(self) -> BudgetTerms:
+        """What is stated of the uncertainty."""
+        return budget_terms(self.recipe, self.station, self.limits)
 
     @property
     def capture_id(self) -> str:
@@ -165,13 +171,11 @@ class Request:
         _refuse_unknown_device(job)
         refuse_beyond_station(job.recipe, job.station)
         _refuse_inconsistent(job, recorded_columns(station.devices.reader))
-        refuse_unreachable(job)
+        refuse_unreachable(job.recipe, job.station, job.limits)
         return job
 
     def _of_run(self, archive: Archive | None) -> Job:
         """The job of an archived run: its recipe, station and units, with this request's count of repeats."""
-        from pipelines.archive import Archive as Store
-
         options = {"--station": self.station, "--units": self.units, "--fault": self.faults}
         given = [*(name for name, value in options.items() if value), *(["--seed"] if self.seed is not None else [])]
         if given:
@@ -179,13 +183,12 @@ class Request:
                 f"run: {self.recipe} measures the units of a run again on its station, {', '.join(given)} cannot change them; "
                 "leave it out, or name a recipe"
             )
-        return measured_again(job_of_run((archive or Store()).run(self.recipe.removeprefix(OF_RUN))), self.repeat)
+        return measured_again(job_of_run((archive or Archive()).run(self.recipe.removeprefix(OF_RUN))), self.repeat)
 
     def _line_model(self, archive: Archive | None, device: str) -> dict[str, Any]:
-        from pipelines.archive import Archive as Store
         from pipelines.jobs.releases import line_model
 
-        return line_model(archive or Store(), device, load_station(self.station).name)
+        return line_model(archive or Archive(), device, load_station(self.station).name)
 
 
 def job_of_run(run: Run, *, effects: Sequence[str] = (), model: Path | None = None, limits: str = "") -> Job:

@@ -7,9 +7,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import tomlkit
+from tomlkit.items import Array, Table
 
 from inertial import effects
 from inertial.effects.formula import Formula
@@ -20,9 +20,6 @@ from schemas.foreign import foreign, shown
 from schemas.model import ModelFile, VersionStep, load_model, parse_model
 from schemas.recipe import FormulaSpec
 from schemas.toml_files import read_text
-
-if TYPE_CHECKING:
-    from tomlkit.items import Array, Table
 
 STARTING_MODEL = ("bias", "scale", "misalignment", "bias_temperature", "scale_temperature")
 """The effects of a new model file: the standard thermal model."""

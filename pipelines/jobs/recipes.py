@@ -190,7 +190,6 @@ def _recipe_text(name: str) -> tuple[str, str, Path]:
     path = Path(name) if is_file(name) else own_file("recipes", name, built_in)
     if path is not None:
         refuse_built_in_name("recipes", name, path, built_in)
-    if path is not None:
         return read_text(path, "recipe"), f"recipe {path.name}", path.parent
     if name in built_in:
         text = (files("schemas") / "samples" / f"{name}.toml").read_text(encoding="utf-8")

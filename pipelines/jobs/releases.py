@@ -10,18 +10,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pipelines.archive import Archive, files, hash_chain
 from pipelines.archive.keys import digest
 from pipelines.archive.locks import alone
 from pipelines.archive.provenance import provenance
 from pipelines.jobs.documents import ReleaseRecord
+from pipelines.jobs.model_change import ModelChange
 from schemas.errors import RecipeInvalid, WrongUse
 from schemas.recipe import FormulaSpec
-
-if TYPE_CHECKING:
-    from pipelines.jobs.model_change import ModelChange
 
 FOLDER, EVIDENCE = "releases", "whatif"
 SCHEMA = 1
@@ -182,8 +180,8 @@ def _refuse_without(evidence: dict[str, Any] | None, change: ModelChange, device
 
 def releases(archive: Archive) -> list[Release]:
     """Every record, in the order of writing."""
-    numbers = sorted(int(place.stem) for place in (archive.root / FOLDER).glob("*.json") if place.stem.isdigit())
-    return [_read(archive, number) for number in numbers]
+    stems = (place.stem for place in (archive.root / FOLDER).glob("*.json"))
+    return [_read(archive, number) for number in sorted(int(stem) for stem in stems if hash_chain.is_number(stem))]
 
 
 def released(archive: Archive, device: str, station: str, when: datetime) -> Release | None:

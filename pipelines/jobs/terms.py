@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
-from pipelines.schedule.planned_dwells import planned_dwells
+from pipelines.schedule.planned_state import planned_dwells
 from pipelines.stages.uncertainty.budget_terms import BudgetTerms, terms_of
 from pipelines.stages.uncertainty.contributions import merged
 from pipelines.stages.uncertainty.reachable import PlannedDwells, reachable, unreachable
@@ -22,28 +22,8 @@ from schemas.validity import CertificateTerms, Stability
 GRAVITY_SIGMAS = 3.0
 
 
-class Measuring(Protocol):
-    """A recipe on a station."""
-
-    @property
-    def recipe(self) -> Recipe:
-        """What is measured."""
-        ...
-
-    @property
-    def limits(self) -> Limits:
-        """What is required."""
-        ...
-
-    @property
-    def station(self) -> StationConfig:
-        """Where."""
-        ...
-
-
-def budget_terms(job: Measuring) -> BudgetTerms:
+def budget_terms(recipe: Recipe, station: Any, limits: Limits) -> BudgetTerms:
     """The terms of a job's budget; the station of an archived job may be its document, as it was written."""
-    station: Any = job.station
     stated, pace = getattr(station, "uncertainty", None), getattr(station, "pace", None)
     if isinstance(stated, dict):
         stated = Uncertainty.model_validate(stated)
@@ -52,7 +32,7 @@ def budget_terms(job: Measuring) -> BudgetTerms:
     given = getattr(station, "reference", None) or []
     references = [Reference.model_validate(one) if isinstance(one, dict) else one for one in given]
     room = Pace().room_C if pace is None else pace.room_C
-    return terms_of(job.recipe, stated, references, room, job.limits.longest_validity_months)
+    return terms_of(recipe, stated, references, room, limits.longest_validity_months)
 
 
 def planned_terms(recipe: Recipe, station: StationConfig, limits: Limits | None) -> BudgetTerms:
@@ -63,20 +43,20 @@ def planned_terms(recipe: Recipe, station: StationConfig, limits: Limits | None)
     )
 
 
-def refuse_unreachable(job: Measuring) -> None:
+def refuse_unreachable(recipe: Recipe, station: StationConfig, limits: Limits) -> None:
     """Refuse limits that the stated references and the stability of the device cannot meet, before anything moves.
 
     The noise of the device is left out: what is refused here would fail with a device of no noise.
     """
-    terms = planned_terms(job.recipe, job.station, job.limits)
-    if terms.stated is None or not job.recipe.tumbles:
+    terms = planned_terms(recipe, station, limits)
+    if terms.stated is None or not recipe.tumbles:
         return  # without the multi-position test no figure rests on the budget
-    planned = without_noise(job.recipe, job.station)
-    wrong = unreachable(reachable(planned, terms, job.recipe.effects), job.limits, terms.certificate.validity_months)
+    planned = without_noise(recipe, station)
+    wrong = unreachable(reachable(planned, terms, recipe.effects), limits, terms.certificate.validity_months)
     if wrong:
         raise RecipeInvalid(
-            f"recipe {job.recipe.name} on station {job.station.name}: no unit can meet its limits, noise of the device left out: "
-            f"{'; '.join(wrong)}; nothing was moved; raise the limits in {job.recipe.limits}, or lower the uncertainty of the "
+            f"recipe {recipe.name} on station {station.name}: no unit can meet its limits, noise of the device left out: "
+            f"{'; '.join(wrong)}; nothing was moved; raise the limits in {recipe.limits}, or lower the uncertainty of the "
             f"largest contribution in [uncertainty]{_supply_not_measured(terms)} (see 'tumbleline plan')",
             key="limits",
         )

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from pipelines.archive import Archive, files
 from pipelines.archive.listing import RunInfo
-from pipelines.archive.run_files import SEALED
+from pipelines.archive.run import SEALED
 from pipelines.archive.store import Place
 from pipelines.capture.interruptions import interruptions
 from pipelines.certificates.days import today

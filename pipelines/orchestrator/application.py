@@ -9,17 +9,14 @@ from __future__ import annotations
 import base64
 import secrets
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from prefect.server.api.server import create_app
 from starlette.datastructures import Headers
 from starlette.middleware.trustedhost import TrustedHostMiddleware
 from starlette.responses import JSONResponse, PlainTextResponse
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from pipelines.orchestrator.credentials import REFUSED, credentials_in
-
-if TYPE_CHECKING:
-    from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 STORED = ("/api/flow_runs/", "/api/deployments/")
 """Addresses that receive parameters of flows."""

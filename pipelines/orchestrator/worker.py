@@ -13,19 +13,21 @@ progress, the watchdog of the station) have ended.
 from __future__ import annotations
 
 import argparse
+import ctypes
 import fcntl
 import os
 import platform
 import re
+import signal
 import subprocess
 import sys
 import time
-from collections.abc import Generator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager, nullcontext
 from datetime import timedelta
 from pathlib import Path
+from types import FrameType
 
-from pipelines.orchestrator.child_reaper import run_until_orphans_end
 from pipelines.orchestrator.server_check import POLL_S, check_server
 from pipelines.orchestrator.settings import CLIENT_KEY, JSON_FORMAT, STARTUP_S, use_key
 from pipelines.orchestrator.worker_health import heartbeat_of, period_s, watched
@@ -70,19 +72,7 @@ def start(
         if _marker(station).exists():
             _pause(pool, station, paused=False)
             _marker(station).unlink(missing_ok=True)
-        command = [
-            sys.executable,
-            "-m",
-            "prefect",
-            "worker",
-            "start",
-            "--pool",
-            pool,
-            "--limit",
-            "1",
-            "--name",
-            name,
-        ]
+        command = [sys.executable, "-m", "prefect", "worker", "start", "--pool", pool, "--limit", "1", "--name", name]
         for queue in (station, *queues):
             command += ["--work-queue", queue]
         command += ["--run-once"] if once else []
@@ -193,6 +183,60 @@ def main(arguments: Sequence[str] | None = None) -> int:
         f"{given.station}: {'no run in progress' if not going else 'still in progress: ' + ', '.join(going)}; its queue is paused"
     )
     return 1 if going else 0
+
+
+PR_SET_CHILD_SUBREAPER = 36  # linux/prctl.h
+STOPS = (signal.SIGTERM, signal.SIGINT)
+
+
+def run_until_orphans_end(
+    command: Sequence[str], begun: Callable[[subprocess.Popen[bytes]], None] = lambda _child: None
+) -> int:
+    """Run a command, wait for it and its orphans, and return its exit status: the watchdog of a killed flow finishes its work.
+
+    A service manager that stops a unit, and a container whose first process ends, kill the remaining processes. The main process
+    must therefore end after the watchdog: it adopts the orphans of its descendants (Linux, ``PR_SET_CHILD_SUBREAPER``).
+
+    Parameters
+    ----------
+    begun : called with the child; only this function waits for it.
+
+    Notes
+    -----
+    A SIGTERM to this process is passed to the command, not to its orphans. The exit status of a child that a
+    signal ended is 128 plus the signal's number, as in shells.
+    """
+    _adopt_orphans()
+    stopped = False
+
+    def pass_on(_number: int, _frame: FrameType | None) -> None:
+        nonlocal stopped
+        stopped = True
+        if child is not None and child.returncode is None:
+            os.kill(child.pid, signal.SIGTERM)
+
+    child: subprocess.Popen[bytes] | None = None
+    for number in STOPS:
+        signal.signal(number, pass_on)
+    child = subprocess.Popen(command, start_new_session=True)  # noqa: S603 - this process passes Ctrl-C on once
+    begun(child)
+    if stopped:
+        child.terminate()
+    status = 0
+    while True:
+        try:
+            pid, how = os.wait()
+        except ChildProcessError:
+            return status
+        if pid == child.pid:
+            child.returncode = code = os.waitstatus_to_exitcode(how)
+            status = code if code >= 0 else 128 - code
+
+
+def _adopt_orphans() -> None:
+    library = ctypes.CDLL(None, use_errno=True)
+    if library.prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0):
+        raise OSError(ctypes.get_errno(), "prctl(PR_SET_CHILD_SUBREAPER)")
 
 
 if __name__ == "__main__":

@@ -10,7 +10,7 @@ import numpy as np
 from inertial.arrays import Array
 from inertial.uncertainty.period import Windows, flicker_within
 from pipelines.planning.context import PlanContext
-from pipelines.schedule.planned_dwells import planned_dwells
+from pipelines.schedule.planned_state import planned_dwells
 from pipelines.stages.uncertainty.budget_terms import BudgetTerms
 from pipelines.stages.uncertainty.reachable import PlannedDwells, reachable, unreachable
 from pipelines.stages.uncertainty.tables import LABELS

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
@@ -12,8 +12,9 @@ from pydantic import Field
 
 from inertial.errors import NotIdentified
 from pipelines.drawing.chart import Chart
+from pipelines.procedures.columns import point_table
 from pipelines.procedures.figures import FigureSpec, FigureValue, Finding, Outcome, Texts, UnitOutcome
-from pipelines.procedures.recorded import Array, Device, ProcedureStep, Records, UnitRecord
+from pipelines.procedures.recorded import Array, Device, ProcedureStep, Records, Taken, UnitRecord, taken
 from schemas.errors import RecipeInvalid, did_you_mean
 from schemas.recipe import Recipe, Strict
 from schemas.station import StationConfig
@@ -32,15 +33,6 @@ class NominalScale(Part):
     """
 
     scale: Annotated[float, Field(gt=0.0, allow_inf_nan=False)] | None = None
-
-    def require_scale(self, recipe: Recipe) -> None:
-        """Refuse a recipe that gives no scale; :class:`schemas.errors.RecipeInvalid`."""
-        if self.scale is None and not recipe.tumbles:
-            raise RecipeInvalid(
-                f"recipe: procedure {self.kind} has no scale, output per g is needed for figures in g; set scale, or list "
-                "multi_position",
-                key="scale",
-            )
 
 
 class Procedure(ABC):
@@ -113,12 +105,29 @@ class Evaluated(Procedure):
         return [FigureValue.not_determined(spec.name, axis, note) for spec in self.figures]
 
 
+class RecordByRecord(Evaluated):
+    """A procedure whose records are reduced one by one, each for itself."""
+
+    def reduce(self, part: Any, records: Records, device: Device) -> pd.DataFrame:
+        """The points of every unit in every record."""
+        return point_table(row for one in taken(records) for row in self.points(part, one, device))
+
+    @abstractmethod
+    def points(self, part: Any, one: Taken, device: Device) -> Iterable[Mapping[str, Any]]:
+        """The points of one unit in one record."""
+
+
 class InG(Procedure):
     """A procedure whose figures are in g: a recipe without a scale is refused. Its part is a :class:`NominalScale`."""
 
     def check(self, part: NominalScale, recipe: Recipe, station: StationConfig) -> None:
         """Refuse a list without a scale."""
-        part.require_scale(recipe)
+        if part.scale is None and not recipe.tumbles:
+            raise RecipeInvalid(
+                f"recipe: procedure {part.kind} has no scale, output per g is needed for figures in g; set scale, or list "
+                "multi_position",
+                key="scale",
+            )
 
 
 class OnEquipment(Procedure):

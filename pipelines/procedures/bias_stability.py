@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -10,10 +11,10 @@ from pydantic import Field
 
 from inertial.dynamics.stability import StabilityFigures, block_means, stability
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace
-from pipelines.procedures.base import Evaluated, InG, NominalScale, scale_of
-from pipelines.procedures.columns import numbers, point_rows, point_table
+from pipelines.procedures.base import InG, NominalScale, RecordByRecord, scale_of
+from pipelines.procedures.columns import numbers, point_rows
 from pipelines.procedures.figures import FigureSpec, FigureValue, UnitOutcome, worst
-from pipelines.procedures.recorded import Device, ProcedureStep, Records, taken
+from pipelines.procedures.recorded import Device, ProcedureStep, Taken
 from pipelines.procedures.wording import with_uncertainty
 from schemas.bounds import Positive
 from schemas.poses import Pose
@@ -31,7 +32,7 @@ class BiasStabilityPart(NominalScale):
     pose_deg: tuple[float, float] = (0.0, 0.0)
 
 
-class BiasStability(InG, Evaluated):
+class BiasStability(InG, RecordByRecord):
     """A bias record of an hour."""
 
     name = "bias_stability"
@@ -51,26 +52,23 @@ class BiasStability(InG, Evaluated):
         pose = Pose(name="stability", outer_deg=part.pose_deg[0], inner_deg=part.pose_deg[1])
         return [ProcedureStep(pose.name, pose, part.temperature_C, lasting_s=part.lasting_s, rate_hz=part.rate_hz)]
 
-    def reduce(self, part: BiasStabilityPart, records: Records, device: Device) -> pd.DataFrame:
-        """Means of 1 s in µg from the start of the record; the points keep those of 10 s besides."""
-        rows: list[dict[str, Any]] = []
-        size = round(part.rate_hz)
-        for one in taken(records):
-            scale = scale_of(part, device, one.unit)
-            for i, axis in enumerate(AXES):
-                second = block_means(one.own.output[:, i], size) / scale[i] * MICRO
-                k = np.arange(second.size)
-                time = one.own.time[0] + k * size / part.rate_hz
-                rows += point_rows(
-                    unit=one.unit,
-                    axis=axis,
-                    series="mean_1s",
-                    point=k,
-                    setting=time - time[:1],
-                    value=second,
-                    uncertainty=second.std(ddof=1) if second.size > 1 else np.nan,
-                )
-        return point_table(rows)
+    def points(self, part: BiasStabilityPart, one: Taken, device: Device) -> Iterator[dict[str, Any]]:
+        """Means of 1 s in µg from the start of the record."""
+        size, scale = round(part.rate_hz), scale_of(part, device, one.unit)
+        for i, axis in enumerate(AXES):
+            second = block_means(one.own.output[:, i], size) / scale[i] * MICRO
+            k = np.arange(second.size)
+            time = one.own.time[0] + k * size / part.rate_hz
+            spread = second.std(ddof=1) if second.size > 1 else np.nan
+            yield from point_rows(
+                unit=one.unit,
+                axis=axis,
+                series="mean_1s",
+                point=k,
+                setting=time - time[:1],
+                value=second,
+                uncertainty=spread,
+            )
 
     def of_unit(self, part: BiasStabilityPart, unit: str, rows: pd.DataFrame, device: Device) -> UnitOutcome:
         """Figures of the worst axis; every definition as a finding, so that numbers of others can be compared."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import Annotated, Any, Literal
 
@@ -16,12 +16,19 @@ from inertial.dynamics.centrifuge_diagnosis import DEFAULT, SpinDiagnosis, diagn
 from inertial.dynamics.centrifuge_effects import EFFECTS, Spins
 from inertial.errors import NotIdentified
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace
-from pipelines.procedures.base import Evaluated, InG, NominalScale, OnEquipment, refuse_unknown_effects, scale_of
-from pipelines.procedures.centrifuge_radii import figures_of_radii, fitted_radii, of_radii, texts_of_radii
-from pipelines.procedures.centrifuge_radius import diagnosis_text, figures_of_radius, texts_of_radius
-from pipelines.procedures.columns import numbers, point_table
+from pipelines.procedures.base import InG, NominalScale, OnEquipment, RecordByRecord, refuse_unknown_effects, scale_of
+from pipelines.procedures.centrifuge_radii import (
+    diagnosis_text,
+    figures_of_radii,
+    figures_of_radius,
+    fitted_radii,
+    of_radii,
+    texts_of_radii,
+    texts_of_radius,
+)
+from pipelines.procedures.columns import numbers
 from pipelines.procedures.figures import FigureSpec, FigureValue, UnitOutcome
-from pipelines.procedures.recorded import REFERENCE, Device, ProcedureStep, Records, at_rest, taken
+from pipelines.procedures.recorded import REFERENCE, Device, ProcedureStep, Taken, on_equipment
 from schemas.bounds import NotNegative, Positive
 from schemas.errors import RecipeInvalid
 from schemas.recipe import Recipe
@@ -76,7 +83,7 @@ class CentrifugePart(NominalScale):
         return (self.radius_m,) if self.radii_m is None else tuple(self.radii_m)
 
 
-class CentrifugeTest(InG, OnEquipment, Evaluated):
+class CentrifugeTest(InG, OnEquipment, RecordByRecord):
     """Constant speeds on a centrifuge."""
 
     name = "centrifuge"
@@ -126,15 +133,13 @@ class CentrifugeTest(InG, OnEquipment, Evaluated):
     def steps(self, part: CentrifugePart, recipe: Recipe) -> list[ProcedureStep]:
         """One record at each speed: up, down again, then the same with the units reversed, and all at the next radius."""
         way = [*part.forces_g, *(part.forces_g[-2::-1] if part.down_again else ())]
-        pose = at_rest("centrifuge")
         return [
-            ProcedureStep(
+            on_equipment(
+                "centrifuge",
                 f"{'+' if sign > 0 else '−'}{force:g} g" + (f" at {radius:g} m" if part.radii_m else ""),
-                pose,
-                part.temperature_C,
-                lasting_s=part.record_s + 10.0,
-                role="centrifuge",
-                setting={"force_g": force, "direction": sign, "radius_m": radius, "record_s": part.record_s},
+                part,
+                part.record_s + 10.0,
+                {"force_g": force, "direction": sign, "radius_m": radius, "record_s": part.record_s},
             )
             for radius in part.radii
             for sign in ((1.0, -1.0) if part.reversed else (1.0,))
@@ -147,25 +152,20 @@ class CentrifugeTest(InG, OnEquipment, Evaluated):
         rate = math.degrees(math.sqrt(one["force_g"] * 9.80665 / one["radius_m"]))
         return equipment.spin(rate, int(one["direction"]), one["record_s"], slots, one["radius_m"])
 
-    def reduce(self, part: CentrifugePart, records: Records, device: Device) -> pd.DataFrame:
+    def points(self, part: CentrifugePart, one: Taken, device: Device) -> Iterator[dict[str, Any]]:
         """Mean output in g over the acceleration by the measured rate."""
-        rows: list[dict[str, Any]] = []
-        for one in taken(records):
-            rate = np.radians(one.record.samples[REFERENCE].output[:, 0].mean())
-            radius = one.record.step.setting["radius_m"]
-            force = one.record.step.setting["direction"] * radius * rate**2 / 9.80665
-            raw = one.own.output[:, INPUT]
-            output = raw / scale_of(part, device, one.unit)[INPUT]
-            clipped = device.at_end(raw) > 0
-            error = float(np.hypot(output.std(ddof=1) / np.sqrt(output.size), 1e-6 * part.point_ppm * abs(force)))
-            rows.append(
-                {
-                    "unit": one.unit, "axis": "z", "series": "output", "point": one.number, "setting": float(force),
-                    "value": np.nan if clipped else float(output.mean()), "uncertainty": error,
-                    "spread": float(output.std(ddof=1)), "radius_m": radius,
-                }
-            )  # fmt: skip
-        return point_table(rows)
+        rate = np.radians(one.record.samples[REFERENCE].output[:, 0].mean())
+        radius = one.record.step.setting["radius_m"]
+        force = one.record.step.setting["direction"] * radius * rate**2 / 9.80665
+        raw = one.own.output[:, INPUT]
+        output = raw / scale_of(part, device, one.unit)[INPUT]
+        clipped = device.at_end(raw) > 0
+        error = float(np.hypot(output.std(ddof=1) / np.sqrt(output.size), 1e-6 * part.point_ppm * abs(force)))
+        yield {
+            "unit": one.unit, "axis": "z", "series": "output", "point": one.number, "setting": float(force),
+            "value": np.nan if clipped else float(output.mean()), "uncertainty": error,
+            "spread": float(output.std(ddof=1)), "radius_m": radius,
+        }  # fmt: skip
 
     def of_unit(self, part: CentrifugePart, unit: str, rows: pd.DataFrame, device: Device) -> UnitOutcome:
         """Coefficients; the whole polynomial where the input is reversed."""

@@ -1,4 +1,4 @@
-"""Figures, findings and picture of a centrifuge test at several radii."""
+"""Figures, findings and picture of a centrifuge test at one radius or several, and its diagnosis in sentences."""
 
 from __future__ import annotations
 
@@ -9,11 +9,13 @@ import numpy as np
 import pandas as pd
 
 from inertial.dynamics.centrifuge import STANDARD_GRAVITY, Polynomial, columns, linearity_error, linearity_percent
+from inertial.dynamics.centrifuge_diagnosis import SpinDiagnosis
+from inertial.dynamics.centrifuge_effects import EFFECTS
 from inertial.dynamics.centrifuge_radii import RadiiFit, fit_radii
 from pipelines.drawing.chart import SEVERAL, Trace
 from pipelines.procedures.columns import numbers
 from pipelines.procedures.figures import FigureValue
-from pipelines.procedures.wording import verdict_of, with_uncertainty
+from pipelines.procedures.wording import diagnosis_texts, verdict_of, with_uncertainty
 from schemas.units import MICRO
 
 OF_RADII = ("centrifuge_mass_offset_um", "centrifuge_radius_consistency_ppm")
@@ -106,3 +108,54 @@ def _apart(fit: RadiiFit, x: Any, radius: float, force: Any) -> Any:
         return columns(a, fit.unit.names) @ fit.unit.value + scale * arm / radius
 
     return curve(x) - np.polyval(np.polyfit(force, curve(force), 1), x)
+
+
+def figures_of_radius(
+    fit: Polynomial, full_scale_g: float, radius_m: float, radius_error_m: float
+) -> list[FigureValue]:
+    """Figures of a unit at one radius; those that need two are not determined."""
+    return [
+        *figures_of_polynomial(fit, full_scale_g, 100.0 * radius_error_m / radius_m),
+        *(FigureValue.not_determined(name, "z", ONE_RADIUS) for name in OF_RADII),
+    ]
+
+
+def texts_of_radius(fit: Polynomial, radius_m: float, *, both: bool) -> list[tuple[str, str]]:
+    """Verdict on the polynomial at one radius, and the classes of effects that it holds: subject and text."""
+    out = [("model", f"polynomial {' + '.join(fit.names)} {verdict_of(fit)}")]
+    if not both:
+        text = (
+            "arm stretch, Koq and the offset of the proof mass cannot be separated from K2, K3 and bias; "
+            "measure with the units reversed"
+        )
+        return [*out, ("not determined", text)]
+    for name, text in (
+        (
+            "arm_stretch_or_odd_quadratic",
+            "arm stretch or Koq, one class: two radii (radii_m) or the optical radius at speed separate them",
+        ),
+        (
+            "mass_offset_or_asymmetry",
+            "offset of the proof mass from the turning centre, or K1′, one class: two radii (radii_m) separate them",
+        ),
+    ):
+        value, error = fit.of(name)
+        if abs(value) > 4.0 * error:
+            factor = 1e3 * radius_m if name.startswith("mass") else MICRO
+            unit = "mm of offset" if name.startswith("mass") else "µg/g²"
+            out.append(
+                ("effect found", f"{text}: {with_uncertainty(factor * value, 2.0 * factor * error)} {unit} (k = 2)")
+            )
+    return out
+
+
+def diagnosis_text(diagnosis: SpinDiagnosis) -> list[tuple[str, str]]:
+    """The diagnosis in sentences: subject and text."""
+
+    def size(name: str) -> str:
+        value, error = diagnosis.extended.of(name)
+        return f"{with_uncertainty(value, 2.0 * error)} {EFFECTS[name].unit} (k = 2)"
+
+    rms = (f"{MICRO * diagnosis.error_g:.3g}", f"{MICRO * diagnosis.extended_g:.3g}", "µg")
+    unexplained = "the residual; look at it over the acceleration"
+    return diagnosis_texts(diagnosis, "diagnosis", ("bias", "scale"), size, rms, ("points", "the points"), unexplained)

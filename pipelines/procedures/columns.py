@@ -1,4 +1,4 @@
-"""Tables that procedures write: points, figures and findings, made from rows."""
+"""Tables that procedures write: points with the noise of their records, figures and findings, made from rows."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from inertial.dynamics.stability import ShortNoise
 from pipelines.tables.frames import empty_table
 
 POINT_TEXTS, POINT_NUMBERS, POINT_WHOLE = "unit procedure axis series", "setting value uncertainty", "number point"
@@ -61,3 +62,19 @@ def finding_table(rows: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
     if not rows:
         return empty_table(texts="unit procedure subject text", whole="number")
     return pd.DataFrame(list(rows))
+
+
+EARLIER_SHARE = 0.8  # relative standard deviation of F² from two Allan variances, in points of earlier versions
+
+
+def noise_columns(noise: ShortNoise) -> dict[str, float]:
+    """Numbers of a point: N² per s, F², and the standard deviation of the estimate of F²."""
+    return {"white": noise.white, "flicker": noise.flicker, "flicker_error": noise.flicker_error}
+
+
+def pooled_noise(rows: pd.DataFrame) -> ShortNoise:
+    """Noise of one device from all its records in ``rows``: means, each record counting alike."""
+    white, flicker = (np.maximum(rows[name].to_numpy(dtype=float), 0.0) for name in ("white", "flicker"))
+    known = "flicker_error" in rows  # points of earlier versions have none
+    error = rows["flicker_error"].to_numpy(dtype=float) if known else EARLIER_SHARE * flicker
+    return ShortNoise(float(white.mean()), float(flicker.mean()), float(np.sqrt(np.sum(error**2)) / len(rows)))

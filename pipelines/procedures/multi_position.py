@@ -26,21 +26,27 @@ class MultiPosition(Procedure):
     part = MultiPositionPart
 
     def steps(self, part: Any, recipe: Recipe) -> list[ProcedureStep]:
-        """Per temperature the poses of the fit, then those for verification."""
+        """Per temperature the poses of the fit, and those for verification after them, or spread evenly among them."""
         steps: list[ProcedureStep] = []
         for soak, temperature in enumerate(recipe.temperatures_C):
             poses, waits, settled = recipe.poses_at(soak), recipe.waits_at(soak), recipe.settles_at(soak)
-            for pose, wait, off in zip(poses, waits, recipe.off_at(soak), strict=True):
-                steps.append(
-                    ProcedureStep(
-                        pose.name, pose, temperature, "dwell", wait_s=wait, off_s=off, soak=soak, settled=settled
-                    )
-                )
-            steps += [
+            fit = [
+                ProcedureStep(pose.name, pose, temperature, "dwell", wait_s=wait, off_s=off, soak=soak, settled=settled)
+                for pose, wait, off in zip(poses, waits, recipe.off_at(soak), strict=True)
+            ]
+            checks = [
                 ProcedureStep(pose.name, pose, temperature, "verification", soak=soak, settled=settled)
                 for pose in recipe.verification_at(soak)
             ]
+            steps += _interleaved(fit, checks) if recipe.verification_order == "interleaved" else [*fit, *checks]
         return steps
+
+
+def _interleaved(fit: list[ProcedureStep], checks: list[ProcedureStep]) -> list[ProcedureStep]:
+    """The records of a soak with those for verification spread among the others."""
+    places = [(k + 0.5) / len(own) for own in (fit, checks) for k in range(len(own))]
+    every = [*fit, *checks]
+    return [every[k] for k in sorted(range(len(every)), key=lambda k: (places[k], k))]
 
 
 PROCEDURE = MultiPosition()

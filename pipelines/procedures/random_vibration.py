@@ -17,7 +17,7 @@ from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace
 from pipelines.procedures.base import Evaluated, InG, NominalScale, OnEquipment, scale_of
 from pipelines.procedures.columns import numbers, point_rows, point_table
 from pipelines.procedures.figures import FigureSpec, FigureValue, Texts, UnitOutcome
-from pipelines.procedures.recorded import REFERENCE, Device, ProcedureStep, Records, at_rest, taken
+from pipelines.procedures.recorded import REFERENCE, Device, ProcedureStep, Records, on_equipment, taken
 from pipelines.procedures.wording import signed
 from schemas.bounds import Positive
 from schemas.recipe import Recipe
@@ -71,19 +71,11 @@ class RandomVibration(InG, OnEquipment, Evaluated):
 
     def steps(self, part: RandomVibrationPart, recipe: Recipe) -> list[ProcedureStep]:
         """One recording at each level."""
-        pose = at_rest("exciter")
+        profile = vibration_profiles().index(part.profile)
+        motion = {"axis": float(AXES.index(part.axis)), "profile": float(profile)}
         return [
-            ProcedureStep(
-                f"{part.profile}, {level:g} g rms",
-                pose,
-                part.temperature_C,
-                lasting_s=part.seconds,
-                role="exciter",
-                setting={
-                    "level_g": level,
-                    "axis": float(AXES.index(part.axis)),
-                    "profile": float(vibration_profiles().index(part.profile)),
-                },
+            on_equipment(
+                "exciter", f"{part.profile}, {level:g} g rms", part, part.seconds, {**motion, "level_g": level}
             )
             for level in part.levels_g
         ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Annotated, Any, Literal, cast
 
 import numpy as np
@@ -12,11 +13,10 @@ from inertial.dynamics.ratiometry import Follows, departures, largest_departure,
 from inertial.dynamics.stability import difference_error, short_noise
 from inertial.errors import NotIdentified
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Role, Trace, level
-from pipelines.procedures.base import Evaluated, Part, SetsEquipment
-from pipelines.procedures.columns import point_table
+from pipelines.procedures.base import Part, RecordByRecord, SetsEquipment
+from pipelines.procedures.columns import noise_columns, pooled_noise
 from pipelines.procedures.figures import FigureSpec, FigureValue, UnitOutcome, worst
-from pipelines.procedures.noise_columns import noise_columns, pooled_noise
-from pipelines.procedures.recorded import Device, ProcedureStep, Records, taken
+from pipelines.procedures.recorded import Device, ProcedureStep, Taken
 from pipelines.procedures.wording import with_uncertainty
 from schemas.bounds import NotNegative, Positive, Wait
 from schemas.errors import RecipeInvalid
@@ -64,7 +64,7 @@ class RatiometryPart(Part):
         return self
 
 
-class Ratiometry(SetsEquipment, Evaluated):
+class Ratiometry(SetsEquipment, RecordByRecord):
     """Zero and sensitivity at several supply voltages."""
 
     name = "ratiometry"
@@ -121,24 +121,19 @@ class Ratiometry(SetsEquipment, Evaluated):
         """Sets the supply; returns the ratio to its nominal voltage, which the monitor of the slots expects then."""
         return {"supply_ratio": equipment.set_voltage(step.setting["supply_V"])}
 
-    def reduce(self, part: RatiometryPart, records: Records, device: Device) -> pd.DataFrame:
-        """Mean of the axis on each face at each voltage, in the unit of the output, with the measured supply."""
-        rows: list[dict[str, Any]] = []
-        for one in taken(records):
-            setting, rate = one.record.step.setting, one.own.rate_hz
-            axis = int(setting["axis"])
-            output = one.own.output[:, axis]
-            rows.append(
-                {
-                    "unit": one.unit, "axis": AXES[axis], "series": "face", "point": one.number,
-                    "setting": setting["supply_V"], "value": float(output.mean()),
-                    "uncertainty": float(output.std(ddof=1) / np.sqrt(output.size)), "side": setting["side"],
-                    "window_s": output.size / rate, "time_s": float(one.own.time.mean()),
-                    "measured_V": float(one.reading["supply_V"]), "constant": float(np.ptp(output) == 0.0),
-                }
-                | noise_columns(short_noise(output, rate))
-            )  # fmt: skip
-        return point_table(rows)
+    def points(self, part: RatiometryPart, one: Taken, device: Device) -> Iterator[dict[str, Any]]:
+        """Mean of the axis on a face at a voltage, in the unit of the output, with the measured supply."""
+        setting, rate = one.record.step.setting, one.own.rate_hz
+        axis = int(setting["axis"])
+        output = one.own.output[:, axis]
+        point = {
+            "unit": one.unit, "axis": AXES[axis], "series": "face", "point": one.number,
+            "setting": setting["supply_V"], "value": float(output.mean()),
+            "uncertainty": float(output.std(ddof=1) / np.sqrt(output.size)), "side": setting["side"],
+            "window_s": output.size / rate, "time_s": float(one.own.time.mean()),
+            "measured_V": float(one.reading["supply_V"]), "constant": float(np.ptp(output) == 0.0),
+        }  # fmt: skip
+        yield point | noise_columns(short_noise(output, rate))
 
     def of_unit(self, part: RatiometryPart, unit: str, rows: pd.DataFrame, device: Device) -> UnitOutcome:
         """The figures of the worst axis."""

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from inertial.dynamics.wandering_means import IdentifiedNoise
 from schemas.poses import Pose
 from schemas.units import AXES
-
-if TYPE_CHECKING:
-    from inertial.dynamics.wandering_means import IdentifiedNoise
 
 Array = NDArray[np.float64]
 REFERENCE = "@reference"
@@ -56,6 +54,14 @@ class ProcedureStep:
 def at_rest(name: str) -> Pose:
     """The pose of records that turn nothing: both axes of the table at 0°."""
     return Pose(name=name, outer_deg=0.0, inner_deg=0.0)
+
+
+def on_equipment(
+    role: str, name: str, part: Any, lasting_s: float, setting: Mapping[str, float], *, pose: str = ""
+) -> ProcedureStep:
+    """A record that equipment performs while the table turns nothing; its pose is named for the role where no name is given."""
+    rest = at_rest(pose or role)
+    return ProcedureStep(name, rest, part.temperature_C, lasting_s=lasting_s, role=role, setting=setting)
 
 
 @dataclass(frozen=True)

@@ -13,19 +13,29 @@ from pydantic import Field, model_validator
 from inertial.dynamics.pulses import measured_pulse, velocity_change
 from inertial.dynamics.shock_diagnosis import DEFAULT
 from inertial.dynamics.shock_effects import EFFECTS
+from inertial.dynamics.stability import difference_error, error_of_mean, short_noise
 from inertial.dynamics.wander import stated_error
 from inertial.errors import NotIdentified
 from inertial.record_faults import clipped as at_extreme
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Role, Trace
 from pipelines.procedures import shock_waves
 from pipelines.procedures.base import FromWaveforms, InG, NominalScale, OnEquipment, refuse_unknown_effects, scale_of
-from pipelines.procedures.columns import numbers, point_table
-from pipelines.procedures.figures import FigureSpec, FigureValue, UnitOutcome
-from pipelines.procedures.recorded import REFERENCE, Device, ProcedureStep, Records, UnitRecord, at_rest, taken
-from pipelines.procedures.shock_bias import STUCK, bias_points, bias_shift
+from pipelines.procedures.columns import noise_columns, numbers, point_rows, point_table, pooled_noise
+from pipelines.procedures.figures import FigureSpec, FigureValue, UnitOutcome, worst
+from pipelines.procedures.recorded import (
+    REFERENCE,
+    Device,
+    ProcedureStep,
+    Records,
+    Taken,
+    UnitRecord,
+    at_rest,
+    on_equipment,
+    taken,
+)
 from schemas.bounds import NotNegative, Positive, Wait
 from schemas.recipe import Recipe
-from schemas.units import AXES
+from schemas.units import AXES, MICRO
 
 BEFORE_S = 0.04
 
@@ -86,31 +96,23 @@ class ShockTest(InG, OnEquipment, FromWaveforms):
 
     def steps(self, part: ShockPart, recipe: Recipe) -> list[ProcedureStep]:
         """The bias, the shocks, the bias again."""
-        still = at_rest("bias")
-        machine = at_rest("shock")
-        signs = (1.0, -1.0) if part.both_directions else (1.0,)
-
-        def bias(name: str) -> ProcedureStep:
-            return ProcedureStep(name, still, part.temperature_C, lasting_s=part.window_s, wait_s=part.settle_s)
-
+        before, after = (
+            ProcedureStep(name, at_rest("bias"), part.temperature_C, lasting_s=part.window_s, wait_s=part.settle_s)
+            for name in ("before", "after")
+        )
         shocks = [
-            ProcedureStep(
+            on_equipment(
+                "shock_machine",
                 f"shock {k + 1}, {'+' if sign > 0 else '−'}{part.axis}",
-                machine,
-                part.temperature_C,
-                lasting_s=5.0,
-                role="shock_machine",
-                setting={
-                    "peak_g": part.peak_g,
-                    "duration_s": 1e-3 * part.duration_ms,
-                    "direction": sign,
-                    "axis": float(AXES.index(part.axis)),
-                },
+                part,
+                5.0,
+                _setting(part, part.peak_g, sign),
+                pose="shock",
             )
-            for sign in signs
+            for sign in ((1.0, -1.0) if part.both_directions else (1.0,))
             for k in range(part.shocks)
         ]
-        return [bias("before"), *shocks, bias("after")]
+        return [before, *shocks, after]
 
     def measure(self, equipment: Any, step: ProcedureStep, slots: Sequence[int]) -> Any:
         """One shock."""
@@ -123,8 +125,7 @@ class ShockTest(InG, OnEquipment, FromWaveforms):
         wave = reference.output[:, axis]
         wave = wave - wave[: max(8, int(BEFORE_S * reference.rate_hz))].mean()
         peak = float(wave[int(np.argmax(np.abs(wave)))])
-        duration = 1e-3 * part.duration_ms
-        return {"peak_g": abs(peak), "duration_s": duration, "direction": float(np.sign(peak)), "axis": float(axis)}
+        return _setting(part, abs(peak), float(np.sign(peak)))
 
     def reduce(self, part: ShockPart, records: Records, device: Device) -> pd.DataFrame:
         """Peaks of reference and unit, waveforms and spectra of the first shock, and the bias before and after."""
@@ -178,6 +179,11 @@ class ShockTest(InG, OnEquipment, FromWaveforms):
         left = Plot("", PlotAxis("time / ms"), PlotAxis(f"acceleration on {part.axis} / g"), tuple(shown["wave"]))
         axes = PlotAxis("natural frequency / Hz", log=True), PlotAxis("maximax response, Q = 10 / g")
         return Chart(self.title, (left, Plot("", *axes, tuple(shown["spectrum"]))), 2)
+
+
+def _setting(part: ShockPart, peak_g: float, direction: float) -> dict[str, float]:
+    axis = float(AXES.index(part.axis))
+    return {"peak_g": peak_g, "duration_s": 1e-3 * part.duration_ms, "direction": direction, "axis": axis}
 
 
 def settings_of(part: ShockPart) -> shock_waves.WaveSettings:
@@ -246,3 +252,49 @@ def _ratio_figures(part: ShockPart, ratio: pd.DataFrame, good: pd.DataFrame) -> 
 
 
 PROCEDURE = ShockTest()
+
+
+STUCK = 1e-9
+
+
+def bias_points(one: Taken, scale: np.ndarray) -> list[dict[str, Any]]:
+    """Mean of every axis in µg, its uncertainty from the scatter of ten parts; ``setting`` is 0 before, 1 after."""
+    output, rate = one.own.output / scale * MICRO, one.own.rate_hz
+    noise = [noise_columns(short_noise(output[:, i], rate)) for i in range(3)]
+    return point_rows(
+        unit=one.unit,
+        axis=AXES,
+        series="bias",
+        point=one.number,
+        setting=0.0 if one.record.step.name == "before" else 1.0,
+        value=[output[:, i].mean() for i in range(3)],
+        uncertainty=error_of_mean(output),
+        window_s=len(output) / rate,
+        time_s=float(one.own.time.mean()),
+        **{name: [each[name] for each in noise] for name in noise[0]},
+    )
+
+
+def bias_shift(bias: pd.DataFrame) -> FigureValue:
+    """Bias after minus before of the axis with the largest shift; the uncertainty holds white noise and flicker."""
+    shifts: list[FigureValue] = []
+    pooled = _pooled_error(bias) if len(bias) else 0.0
+    for axis, own in bias.groupby("axis", sort=False):
+        before, after = own[own["setting"] == 0.0], own[own["setting"] > 0.0]
+        if before.empty or after.empty:
+            continue
+        value = float(after["value"].iloc[0] - before["value"].iloc[0])
+        error = max(pooled, float(np.hypot(after["uncertainty"].iloc[0], before["uncertainty"].iloc[0])))
+        stuck = float(after["uncertainty"].iloc[0]) <= STUCK
+        note = "the output is constant after the shocks: the unit has not survived" if stuck else ""
+        shifts.append(FigureValue("shock_bias_shift_ug", str(axis), value, error, identified=not stuck, note=note))
+    if not shifts:
+        return FigureValue.not_determined("shock_bias_shift_ug", "*", "no bias before or after")
+    return worst(shifts)
+
+
+def _pooled_error(bias: pd.DataFrame) -> float:
+    """Standard uncertainty of after minus before by white noise and flicker, pooled over the axes."""
+    window = float(bias["window_s"].mean())
+    time = bias["time_s"].to_numpy(dtype=float) if "time_s" in bias else np.zeros(1)  # earlier versions have none
+    return difference_error(pooled_noise(bias), window, float(np.ptp(time)))

@@ -10,7 +10,6 @@ import pandas as pd
 from scipy.interpolate import CubicSpline
 from scipy.signal import butter, sosfiltfilt
 
-from inertial.dynamics.goodness import p_value
 from inertial.dynamics.shock_diagnosis import ShockDiagnosis, diagnose_shock
 from inertial.dynamics.shock_effects import EFFECTS
 from inertial.dynamics.shock_fit import ShockRecord, Waves
@@ -18,7 +17,7 @@ from inertial.dynamics.shock_spectrum import octave_frequencies, shock_spectrum
 from inertial.errors import NotIdentified
 from pipelines.procedures.columns import numbers, point_rows
 from pipelines.procedures.recorded import UnitRecord
-from pipelines.procedures.wording import improvement, not_separated, probability, with_uncertainty
+from pipelines.procedures.wording import diagnosis_texts, with_uncertainty
 
 CUT = 6.0  # corner of the equal low-pass of both channels, over 1/D
 DRAWN = 400  # points of a waveform in the picture
@@ -106,37 +105,24 @@ def diagnosis_text(rows: pd.DataFrame, settings: WaveSettings, effects: Sequence
         return [("comparison of the waveforms", f"cannot be judged: {problem}")]
     if diagnosis is None:
         return []
-    model = " + ".join(("sensitivity", *diagnosis.fit.effects))
-    if diagnosis.adequate is None:
-        return [("comparison of the waveforms", f"{model} cannot be judged: {diagnosis.reason}")]
-    p = p_value(diagnosis.fit)
-    verdict = "adequate" if diagnosis.adequate else "not adequate"
-    text = f"{model} is {verdict} ({probability(p)}), rms residual {diagnosis.error_percent:.2g} % of the peak"
-    if not diagnosis.adequate:
-        text += f"; {100.0 * diagnosis.where[1]:.0f} % of χ² is in the samples of {diagnosis.where[0]}"
-    out = [("comparison of the waveforms", text)]
-    for one in diagnosis.classes:
-        best, rivals = one.effects[0], not_separated(one.effects, "the shocks")
-        out.append(
-            ("missing effect", f"{best}: {_size(diagnosis, best, settings)}, {probability(one.p_value)}{rivals}")
-        )
-    if diagnosis.classes:
-        errors = (f"{diagnosis.error_percent:.2g}", f"{diagnosis.extended_percent:.2g} % of the peak")
-        text = improvement(*errors, "samples", diagnosis.left_out)
-        out.append(("with the missing effects", text))
-    if diagnosis.unexplained:
-        out.append(
-            ("unexplained", "no known effect explains the difference of the waveforms; look at mounting and cable")
-        )
-    return [*out, *(("next measurement", step) for step in diagnosis.next_steps)]
+    misfit = f"; {100.0 * diagnosis.where[1]:.0f} % of χ² is in the samples of {diagnosis.where[0]}"
 
+    def size(name: str) -> str:
+        effect, fit = EFFECTS[name], diagnosis.extended
+        parameters = effect.parameters(settings.duration_s)
+        value, error = fit.coefficients[name] if name in fit.coefficients else fit.parameters[parameters[0].name]
+        return f"{with_uncertainty(value, 2.0 * error)} {effect.unit} (k = 2)"
 
-def _size(diagnosis: ShockDiagnosis, name: str, settings: WaveSettings) -> str:
-    one = EFFECTS[name]
-    parameters = one.parameters(settings.duration_s)
-    fit = diagnosis.extended
-    value, error = fit.coefficients[name] if name in fit.coefficients else fit.parameters[parameters[0].name]
-    return f"{with_uncertainty(value, 2.0 * error)} {one.unit} (k = 2)"
+    return diagnosis_texts(
+        diagnosis,
+        "comparison of the waveforms",
+        ("sensitivity",),
+        size,
+        (f"{diagnosis.error_percent:.2g}", f"{diagnosis.extended_percent:.2g}", "% of the peak"),
+        ("samples", "the shocks"),
+        "the difference of the waveforms; look at mounting and cable",
+        "" if diagnosis.adequate else misfit,
+    )
 
 
 def curves(pair: Pair, duration: float, before_s: float) -> list[dict[str, Any]]:

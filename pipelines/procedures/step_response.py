@@ -15,7 +15,7 @@ from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace, between
 from pipelines.procedures.base import FromWaveforms, OnEquipment, Part
 from pipelines.procedures.columns import numbers, point_rows, point_table
 from pipelines.procedures.figures import FigureSpec, FigureValue, UnitOutcome, worst
-from pipelines.procedures.recorded import REFERENCE, Device, ProcedureStep, Records, UnitRecord, at_rest
+from pipelines.procedures.recorded import REFERENCE, Device, ProcedureStep, Records, UnitRecord, on_equipment
 from schemas.bounds import Positive
 from schemas.recipe import Recipe
 from schemas.units import AXES
@@ -62,19 +62,10 @@ class StepResponse(OnEquipment, FromWaveforms):
 
     def steps(self, part: StepPart, recipe: Recipe) -> list[ProcedureStep]:
         """One record for each step."""
-        pose = at_rest("step")
-        hold = 1e-3 * part.hold_ms
-        return [
-            ProcedureStep(
-                f"step {k + 1}",
-                pose,
-                part.temperature_C,
-                lasting_s=2.0 * hold,
-                role="step_generator",
-                setting={"volts": part.volts, "hold_s": hold, "before_s": BEFORE_SHARE * hold},
-            )
-            for k in range(part.steps)
-        ]
+        setting = _setting(part, part.volts)
+        names = [f"step {k + 1}" for k in range(part.steps)]
+        lasting = 2.0 * setting["hold_s"]
+        return [on_equipment("step_generator", name, part, lasting, setting, pose="step") for name in names]
 
     def measure(self, equipment: Any, step: ProcedureStep, slots: Sequence[int]) -> Any:
         """One step."""
@@ -83,8 +74,7 @@ class StepResponse(OnEquipment, FromWaveforms):
 
     def setting_of(self, part: StepPart, reference: UnitRecord) -> dict[str, float]:
         """Voltage of the step, from the recorded drive."""
-        hold = 1e-3 * part.hold_ms
-        return {"volts": float(np.ptp(reference.output[:, 0])), "hold_s": hold, "before_s": BEFORE_SHARE * hold}
+        return _setting(part, float(np.ptp(reference.output[:, 0])))
 
     def reduce(self, part: StepPart, records: Records, device: Device) -> pd.DataFrame:
         """The averaged response of every axis as a share of the step, over the time from the edge of the drive."""
@@ -148,6 +138,11 @@ class StepResponse(OnEquipment, FromWaveforms):
             (band, *last),
         )
         return Chart(self.title, (left, right), 2)
+
+
+def _setting(part: StepPart, volts: float) -> dict[str, float]:
+    hold = 1e-3 * part.hold_ms
+    return {"volts": volts, "hold_s": hold, "before_s": BEFORE_SHARE * hold}
 
 
 def axis_figures(part: StepPart, rows: pd.DataFrame) -> StepFigures:

@@ -15,9 +15,15 @@ from pipelines.drawing.chart import Chart
 from pipelines.procedures.base import FromWaveforms, OnEquipment
 from pipelines.procedures.columns import point_table
 from pipelines.procedures.figures import FigureSpec, UnitOutcome
-from pipelines.procedures.recorded import REFERENCE, Device, ProcedureStep, Records, UnitRecord, at_rest, taken
-from pipelines.procedures.sweep_plan import FEWEST_POINTS, SweepPart
-from pipelines.procedures.sweep_points import clocks_of, condition_texts, response_point, transfer_points
+from pipelines.procedures.recorded import REFERENCE, Device, ProcedureStep, Records, UnitRecord, on_equipment, taken
+from pipelines.procedures.sweep_points import (
+    FEWEST_POINTS,
+    SweepPart,
+    clocks_of,
+    condition_texts,
+    response_point,
+    transfer_points,
+)
 from pipelines.procedures.transfer_chart import bode_chart
 from pipelines.procedures.transfer_figures import diagnosis_text, figures_of_transfer, sampling_text
 from schemas.errors import RecipeInvalid
@@ -60,17 +66,11 @@ class Sweep(OnEquipment, FromWaveforms):
 
     def steps(self, part: SweepPart, recipe: Recipe) -> list[ProcedureStep]:
         """One dwell for each point."""
-        pose = at_rest("exciter")
+        axis = float(AXES.index(part.axis))
         return [
-            ProcedureStep(
-                f"{frequency:.4g} Hz, {level:.3g} g",
-                pose,
-                part.temperature_C,
-                lasting_s=part.lasting(frequency),
-                role="exciter",
-                setting={"frequency_hz": frequency, "level_g": level, "axis": float(AXES.index(part.axis))},
-            )
+            on_equipment("exciter", f"{frequency:.4g} Hz, {level:.3g} g", part, part.lasting(frequency), setting)
             for frequency, level in part.plan()
+            for setting in ({"frequency_hz": frequency, "level_g": level, "axis": axis},)
         ]
 
     def check(self, part: SweepPart, recipe: Recipe, station: StationConfig) -> None:

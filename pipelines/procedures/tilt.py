@@ -12,10 +12,10 @@ from scipy.stats import norm
 from inertial.dynamics.tilt import TiltFit, fit_tilt, left_open
 from inertial.errors import NotIdentified
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Role, Trace, level
-from pipelines.procedures.base import Evaluated, Part
-from pipelines.procedures.columns import numbers, point_rows, point_table
+from pipelines.procedures.base import Part, RecordByRecord
+from pipelines.procedures.columns import numbers, point_rows
 from pipelines.procedures.figures import FigureSpec, FigureValue, Texts, UnitOutcome, worst
-from pipelines.procedures.recorded import Device, ProcedureStep, Records, taken
+from pipelines.procedures.recorded import Device, ProcedureStep, Taken
 from schemas.bounds import NotNegative, Positive
 from schemas.poses import Pose
 from schemas.recipe import Recipe
@@ -52,7 +52,7 @@ class TiltPart(Part):
         return self
 
 
-class Tilt(Evaluated):
+class Tilt(RecordByRecord):
     """The output of the axes that lie in one plane, over a whole turn."""
 
     name = "tilt"
@@ -75,31 +75,27 @@ class Tilt(Evaluated):
     def steps(self, part: TiltPart, recipe: Recipe) -> list[ProcedureStep]:
         """One dwell at each angle, in order of angle."""
         inner = 0.0 if part.about == "x" else 90.0
-        steps: list[ProcedureStep] = []
-        for k in range(round(360.0 / part.step_deg)):
-            angle = k * part.step_deg if k * part.step_deg <= 180.0 else k * part.step_deg - 360.0
-            pose = Pose(name=f"t{angle:+07.2f}", outer_deg=angle, inner_deg=inner)
-            steps.append(
-                ProcedureStep(pose.name, pose, part.temperature_C, lasting_s=part.dwell_s, setting={"angle_deg": angle})
-            )
-        return steps
+        turned = [k * part.step_deg for k in range(round(360.0 / part.step_deg))]
+        angles = [angle if angle <= 180.0 else angle - 360.0 for angle in turned]
+        poses = [Pose(name=f"t{angle:+07.2f}", outer_deg=angle, inner_deg=inner) for angle in angles]
+        return [
+            ProcedureStep(p.name, p, part.temperature_C, lasting_s=part.dwell_s, setting={"angle_deg": p.outer_deg})
+            for p in poses
+        ]
 
-    def reduce(self, part: TiltPart, records: Records, device: Device) -> pd.DataFrame:
-        """Mean output of every axis at every angle; the angle is the encoder's."""
-        rows: list[dict[str, Any]] = []
-        for one in taken(records):
-            output = one.own.output
-            rows += point_rows(
-                unit=one.unit,
-                axis=AXES,
-                series="output",
-                point=one.number,
-                setting=float(one.reading["outer_deg"]),
-                value=output.mean(axis=0),
-                uncertainty=output.std(axis=0, ddof=1) / np.sqrt(len(output)),
-                time_s=float(one.own.time.mean()),
-            )
-        return point_table(rows)
+    def points(self, part: TiltPart, one: Taken, device: Device) -> list[dict[str, Any]]:
+        """Mean output of every axis at an angle, which is the encoder's."""
+        output = one.own.output
+        return point_rows(
+            unit=one.unit,
+            axis=AXES,
+            series="output",
+            point=one.number,
+            setting=float(one.reading["outer_deg"]),
+            value=output.mean(axis=0),
+            uncertainty=output.std(axis=0, ddof=1) / np.sqrt(len(output)),
+            time_s=float(one.own.time.mean()),
+        )
 
     def of_unit(self, part: TiltPart, unit: str, rows: pd.DataFrame, device: Device) -> UnitOutcome:
         """Figures of the axes in the plane, and their largest residuals."""

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from inertial.dynamics.transfer_diagnosis import TransferDiagnosis
 from inertial.dynamics.transfer_effects import Conditions
+from inertial.dynamics.transfer_model import Points, TransferFit
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Role, Trace, level
 
 Array = NDArray[np.float64]
-
-if TYPE_CHECKING:
-    from inertial.dynamics.transfer_diagnosis import TransferDiagnosis
-    from inertial.dynamics.transfer_model import Points, TransferFit
 
 COVERAGE = 2.0
 FINE = 300

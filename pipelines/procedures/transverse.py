@@ -24,7 +24,7 @@ from pipelines.procedures.recorded import (
     ProcedureStep,
     Records,
     UnitRecord,
-    at_rest,
+    on_equipment,
 )
 from pipelines.procedures.wording import verdict_of
 from schemas.bounds import NotNegative, Positive
@@ -81,22 +81,14 @@ class TransverseTest(InG, OnEquipment, Evaluated):
 
     def steps(self, part: TransversePart, recipe: Recipe) -> list[ProcedureStep]:
         """One dwell at each angle."""
-        pose = at_rest("exciter")
+        axis = float(AXES.index(part.axis))
+        motion = {"frequency_hz": part.frequency_hz, "level_g": part.level_g, "axis": axis}
+        angles = [k * part.step_deg for k in range(round(360.0 / part.step_deg))]
         return [
-            ProcedureStep(
-                f"across {part.axis}, {k * part.step_deg:g}°",
-                pose,
-                part.temperature_C,
-                lasting_s=part.record_s,
-                role="exciter",
-                setting={
-                    "frequency_hz": part.frequency_hz,
-                    "level_g": part.level_g,
-                    "axis": float(AXES.index(part.axis)),
-                    "angle_deg": k * part.step_deg,
-                },
+            on_equipment(
+                "exciter", f"across {part.axis}, {angle:g}°", part, part.record_s, {**motion, "angle_deg": angle}
             )
-            for k in range(round(360.0 / part.step_deg))
+            for angle in angles
         ]
 
     def measure(self, equipment: Any, step: ProcedureStep, slots: Sequence[int]) -> Any:

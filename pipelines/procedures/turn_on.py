@@ -10,10 +10,10 @@ from pydantic import Field
 
 from inertial.dynamics.stability import error_of_mean, repeatability
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace, level
-from pipelines.procedures.base import Evaluated, InG, NominalScale, scale_of
-from pipelines.procedures.columns import numbers, point_rows, point_table
+from pipelines.procedures.base import InG, NominalScale, RecordByRecord, scale_of
+from pipelines.procedures.columns import numbers, point_rows
 from pipelines.procedures.figures import FigureSpec, FigureValue, UnitOutcome, worst
-from pipelines.procedures.recorded import Device, ProcedureStep, Records, at_rest, taken
+from pipelines.procedures.recorded import Device, ProcedureStep, Taken, at_rest
 from schemas.bounds import Positive, Wait
 from schemas.recipe import Recipe
 from schemas.units import AXES, MICRO
@@ -33,7 +33,7 @@ class TurnOnPart(NominalScale):
     temperature_C: Annotated[float, Field(ge=-100.0, le=200.0)] = 25.0
 
 
-class TurnOn(InG, Evaluated):
+class TurnOn(InG, RecordByRecord):
     """Power cycles in one pose."""
 
     name = "turn_on"
@@ -62,21 +62,18 @@ class TurnOn(InG, Evaluated):
             for k in range(part.cycles)
         ]
 
-    def reduce(self, part: TurnOnPart, records: Records, device: Device) -> pd.DataFrame:
-        """Mean of every cycle in µg; its uncertainty from the scatter of ten parts of the window."""
-        rows: list[dict[str, Any]] = []
-        for one in taken(records):
-            output = one.own.output / scale_of(part, device, one.unit) * MICRO
-            rows += point_rows(
-                unit=one.unit,
-                axis=AXES,
-                series="mean",
-                point=one.number,
-                setting=one.number + 1.0,
-                value=[output[:, i].mean() for i in range(3)],
-                uncertainty=error_of_mean(output),
-            )
-        return point_table(rows)
+    def points(self, part: TurnOnPart, one: Taken, device: Device) -> list[dict[str, Any]]:
+        """Mean of a cycle in µg; its uncertainty from the scatter of ten parts of the window."""
+        output = one.own.output / scale_of(part, device, one.unit) * MICRO
+        return point_rows(
+            unit=one.unit,
+            axis=AXES,
+            series="mean",
+            point=one.number,
+            setting=one.number + 1.0,
+            value=[output[:, i].mean() for i in range(3)],
+            uncertainty=error_of_mean(output),
+        )
 
     def of_unit(self, part: TurnOnPart, unit: str, rows: pd.DataFrame, device: Device) -> UnitOutcome:
         """Scatter of the worst axis, and its upper limit: few cycles cannot pass a limit close to the estimate."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -13,10 +14,10 @@ from inertial.dynamics.stability import block_means, settled_error, short_noise
 from inertial.dynamics.warm_up import entered
 from inertial.errors import NotIdentified
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace, between
-from pipelines.procedures.base import Evaluated, InG, NominalScale, scale_of
-from pipelines.procedures.columns import numbers, point_rows, point_table
+from pipelines.procedures.base import InG, NominalScale, RecordByRecord, scale_of
+from pipelines.procedures.columns import numbers, point_rows
 from pipelines.procedures.figures import FigureSpec, FigureValue, UnitOutcome, worst
-from pipelines.procedures.recorded import Device, ProcedureStep, Records, at_rest, taken
+from pipelines.procedures.recorded import Device, ProcedureStep, Taken, at_rest
 from schemas.bounds import Positive
 from schemas.recipe import Recipe
 from schemas.units import AXES, MICRO
@@ -34,7 +35,7 @@ class WarmUpPart(NominalScale):
     temperature_C: Annotated[float, Field(ge=-100.0, le=200.0)] = 25.0
 
 
-class WarmUp(InG, Evaluated):
+class WarmUp(InG, RecordByRecord):
     """A record from power-on."""
 
     name = "warm_up"
@@ -50,33 +51,25 @@ class WarmUp(InG, Evaluated):
     def steps(self, part: WarmUpPart, recipe: Recipe) -> list[ProcedureStep]:
         """One record directly after power-on."""
         pose = at_rest("warm-up")
-        step = ProcedureStep(
-            pose.name,
-            pose,
-            part.temperature_C,
-            lasting_s=part.lasting_s,
-            rate_hz=part.rate_hz,
-            wait_s=0.0,
-            off_s=part.off_s,
-        )
-        return [step]
+        lasting, rate = part.lasting_s, part.rate_hz
+        return [
+            ProcedureStep(
+                pose.name, pose, part.temperature_C, lasting_s=lasting, rate_hz=rate, wait_s=0.0, off_s=part.off_s
+            )
+        ]
 
-    def reduce(self, part: WarmUpPart, records: Records, device: Device) -> pd.DataFrame:
+    def points(self, part: WarmUpPart, one: Taken, device: Device) -> Iterator[dict[str, Any]]:
         """Means of 1 s in µg over the time since power-on."""
-        rows: list[dict[str, Any]] = []
-        size = round(part.rate_hz)
-        for one in taken(records):
-            scale = scale_of(part, device, one.unit)
-            begun = float(one.reading["since_power_s"]) - 0.5 * float(one.reading["duration_s"])
-            for i, axis in enumerate(AXES):
-                second = block_means(one.own.output[:, i], size) / scale[i] * MICRO
-                noise = float(np.std(np.diff(second), ddof=1) / np.sqrt(2.0)) if second.size > 2 else np.nan
-                k = np.arange(second.size)
-                time = begun + (k + 0.5) * size / part.rate_hz
-                rows += point_rows(
-                    unit=one.unit, axis=axis, series="mean_1s", point=k, setting=time, value=second, uncertainty=noise
-                )
-        return point_table(rows)
+        size, scale = round(part.rate_hz), scale_of(part, device, one.unit)
+        begun = float(one.reading["since_power_s"]) - 0.5 * float(one.reading["duration_s"])
+        for i, axis in enumerate(AXES):
+            second = block_means(one.own.output[:, i], size) / scale[i] * MICRO
+            noise = float(np.std(np.diff(second), ddof=1) / np.sqrt(2.0)) if second.size > 2 else np.nan
+            k = np.arange(second.size)
+            time = begun + (k + 0.5) * size / part.rate_hz
+            yield from point_rows(
+                unit=one.unit, axis=axis, series="mean_1s", point=k, setting=time, value=second, uncertainty=noise
+            )
 
     def of_unit(self, part: WarmUpPart, unit: str, rows: pd.DataFrame, device: Device) -> UnitOutcome:
         """The time of the slowest axis; not determined where the record ends too soon, or noise alone exceeds the band."""

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Any
 
 from inertial.counts import degrees_of_freedom
 from inertial.dynamics.goodness import Fitted, adequate, p_value
@@ -28,15 +29,43 @@ def verdict_of(fit: Fitted) -> str:
     return f"{verdict}: χ² {fit.chi_square:.1f} for {degrees_of_freedom(fit.dof)}, {probability(p_value(fit))}"
 
 
-def not_separated(effects: Sequence[str], by: str) -> str:
-    """End of the sentence on a missing effect: the others of its class, which ``by`` (``the points``) does not separate."""
-    return f"; {by} do not separate it from {', '.join(effects[1:])}" if len(effects) > 1 else ""
+def diagnosis_texts(
+    diagnosis: Any,
+    subject: str,
+    first: Sequence[str],
+    size: Callable[[str], str],
+    rms: tuple[str, str, str],
+    counted: tuple[str, str],
+    unexplained: str,
+    where: str = "",
+) -> list[tuple[str, str]]:
+    """The diagnosis of a model in sentences: subject and text.
 
-
-def improvement(before: str, after: str, what: str, left_out: tuple[float, float]) -> str:
-    """What the missing effects bring: rms residuals with their unit, and residuals of what was left out (``points``)."""
-    text = f"rms residual {before} → {after}; {what} left out, in standard uncertainties: "
-    return f"{text}{left_out[0]:.2f} → {left_out[1]:.2f}"
+    Parameters
+    ----------
+    first : terms of every model; size : that of an effect, with its uncertainty
+    rms : residuals without and with the missing effects, and their unit
+    counted : what residuals are counted in, and what does not separate effects (``points``, ``the points``)
+    unexplained : what to do about a residual that no effect explains; where : part of the data with the misfit
+    """
+    model = " + ".join((*first, *diagnosis.fit.effects))
+    if diagnosis.adequate is None:
+        return [(subject, f"{model} cannot be judged: {diagnosis.reason}")]
+    (before, after, unit), (left_out, by) = rms, counted
+    verdict = "adequate" if diagnosis.adequate else "not adequate"
+    text = f"{model} is {verdict} ({probability(p_value(diagnosis.fit))}), rms residual {before} {unit}"
+    out = [(subject, text + where)]
+    for one in diagnosis.classes:
+        effect, *rivals = one.effects
+        alike = f"; {by} do not separate it from {', '.join(rivals)}" if rivals else ""
+        out.append(("missing effect", f"{effect}: {size(effect)}, {probability(one.p_value)}{alike}"))
+    if diagnosis.classes:
+        held = " → ".join(f"{value:.2f}" for value in diagnosis.left_out)
+        text = f"rms residual {before} → {after} {unit}; {left_out} left out, in standard uncertainties: {held}"
+        out.append(("with the missing effects", text))
+    if diagnosis.unexplained:
+        out.append(("unexplained", f"no known effect explains {unexplained}"))
+    return [*out, *(("next measurement", step) for step in diagnosis.next_steps)]
 
 
 def signed(value: float, places: int) -> str:

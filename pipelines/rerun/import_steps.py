@@ -1,4 +1,4 @@
-"""The stages of an import that its references and held-out dwells allow: verification by the norm, and the budget."""
+"""The stages of the chain for a run of imported dwells, as far as what was imported with them allows."""
 
 from __future__ import annotations
 
@@ -8,16 +8,23 @@ from typing import Any
 
 import pandas as pd
 
+from inertial.quantities import ANGLE_COLUMNS, FORCE_COLUMNS
 from pipelines.archive import Run, code_hash
 from pipelines.chain.chain import BY_NAME, Tables
 from pipelines.importers.plane import plane_answer
+from pipelines.stages.fit import fit
+from pipelines.stages.grade import GradeEvidence, grade
 from pipelines.stages.judge import judge
 from pipelines.stages.uncertainty.budget import budget
 from pipelines.stages.uncertainty.budget_terms import BudgetTables, BudgetTerms
 from pipelines.stages.unknown_poses.budget import norm_budget
-from pipelines.stages.unknown_poses.fit import fitted_dwells
+from pipelines.stages.unknown_poses.fit import fit_of_norms, fitted_dwells
 from pipelines.stages.unknown_poses.verify import verify_norms
+from pipelines.stages.verify import verify
 from pipelines.tables.frames import empty_table
+from pipelines.tables.leave_out import Dwells, leave_out
+from schemas.limits import Limits
+from schemas.units import STANDARD_GRAVITY_M_S2
 
 
 @dataclass(frozen=True)
@@ -32,44 +39,74 @@ class StageCall:
     call: Callable[[Run], Tables]
 
 
-def recorded_history(run: Run) -> pd.DataFrame:
-    """The temperatures between the dwells of a run; without rows where it has none."""
-    return run.table("history") if "history" in run.tables() else empty_table(texts="unit", numbers="time_s unit_C")
+@dataclass(frozen=True)
+class ImportedData:
+    """What was imported, as the stages need it.
+
+    history : whether temperatures between the dwells were; known : whether the poses are known, otherwise only the norm of
+    gravity is; gravity : where it was measured, g
+    """
+
+    history: bool
+    known: bool
+    gravity: float
+
+    def past(self, run: Run) -> pd.DataFrame | None:
+        """The temperatures between the dwells of a run; None where it has none."""
+        return run.table("history") if self.history else None
+
+    def read(self, *names: str) -> tuple[str, ...]:
+        """Tables that a stage reads: the dwells, the temperatures between them where there are any, and others."""
+        return ("dwells", *(("history",) if self.history else ()), *names)
 
 
-def no_noise() -> pd.DataFrame:
-    """The table of noise terms of an import, which has no static record."""
-    return empty_table(texts="unit axis term unit_text", numbers="value low high", flags="identified")
+def imported(run: Run, dwells: pd.DataFrame) -> ImportedData:
+    """What a run was imported with."""
+    return ImportedData("history" in run.tables(), has_poses(dwells), gravity_of_import(run.about))
 
 
-def verify_norms_step(gravity: float, *, history: bool) -> StageCall:
-    """Verification of a fit by the norm of gravity, g, on the dwells that were held out; no row where none was."""
-    stage = BY_NAME["verify"]
-    names = ("dwells", "coefficients", "covariance", "wander")
-
-    def call(run: Run) -> Tables:
-        dwells, coefficients, covariance, wander = (run.table(name) for name in names)
-        return verify_norms(
-            dwells, run.table("history") if history else None, coefficients, covariance, wander, gravity
-        )
-
-    code = code_hash("verify of norms")
-    inputs = (*names, "history") if history else names
-    return StageCall("verify", inputs, stage.outputs, {"gravity_g": gravity}, code, call)
+def has_poses(dwells: pd.DataFrame) -> bool:
+    """Whether dwells have a reference, force or angles; otherwise only the norm of gravity is known."""
+    return any(set(names) <= set(dwells.columns) for names in (FORCE_COLUMNS, ANGLE_COLUMNS))
 
 
-def judge_step(model: dict[str, Any], *, history: bool, known: bool) -> StageCall:
-    """The verdict on the model of an import; of dwells of unknown poses those that are held out are not judged."""
-    stage = BY_NAME["judge"]
+def gravity_of_import(about: dict[str, Any]) -> float:
+    """Gravity where an import was measured, g; the standard value where it was not given."""
+    given = (about.get("mapping") or {}).get("local_gravity_m_s2")
+    return 1.0 if given is None else float(given) / STANDARD_GRAVITY_M_S2
 
-    def call(run: Run) -> Tables:
-        dwells = run.table("dwells")
-        past = run.table("history") if history else None
-        return judge(dwells if known else fitted_dwells(dwells), past, model["effects"])
 
-    inputs = ("dwells", "history") if history else ("dwells",)
-    parameters = {"effects": model["effects"], "formulas": model["formulas"], "known_poses": known}
-    return StageCall("judge", inputs, stage.outputs, parameters, code_hash(stage.name), call)
+def _call(
+    stage: str, inputs: tuple[str, ...], parameters: dict[str, Any], call: Callable[[Run], Tables], code: str = ""
+) -> StageCall:
+    """A call of a stage of the chain; ``code`` names its code where it is not that of the stage."""
+    return StageCall(stage, inputs, BY_NAME[stage].outputs, parameters, code_hash(code or stage), call)
+
+
+def import_step(data: ImportedData, left_out: Dwells, old: Run) -> StageCall:
+    """The dwells as they were imported, or without those that are left out."""
+    names = data.read()
+    if not left_out:
+        return StageCall("import", (), names, {}, "", lambda run: {name: run.table(name) for name in names})
+    parameters = {"left_out": [list(one) for one in left_out], "dwells": old.manifest("dwells")["sha256"]}
+
+    def call(_: Run) -> Tables:
+        kept = {"dwells": leave_out(old.table("dwells"), left_out)}
+        return {**kept, **{name: old.table(name) for name in names[1:]}}
+
+    return StageCall("leave_out", (), names, parameters, "", call)
+
+
+def fit_step(model: dict[str, Any], data: ImportedData) -> StageCall:
+    """The fit of the chain; by the norm of gravity alone where the poses are not known."""
+    effects, parameters = model["effects"], {"effects": model["effects"], "formulas": model["formulas"]}
+    if data.known:
+        return _call("fit", data.read(), parameters, lambda run: fit(run.table("dwells"), data.past(run), effects))
+
+    def of_norms(run: Run) -> Tables:
+        return fit_of_norms(run.table("dwells"), data.past(run), effects, data.gravity)
+
+    return _call("fit", data.read(), {**parameters, "gravity_g": data.gravity}, of_norms, "fit of norms")
 
 
 def plane_step(across: int, gravity: float) -> StageCall:
@@ -84,28 +121,61 @@ def plane_step(across: int, gravity: float) -> StageCall:
     return StageCall("fit", ("dwells",), ("coefficients",), {"plane_across": across, "gravity_g": gravity}, code, call)
 
 
-def budget_step(terms: BudgetTerms, *, history: bool, known: bool) -> StageCall:
-    """The uncertainty budget of an import whose references are stated.
+def judge_step(model: dict[str, Any], data: ImportedData) -> StageCall:
+    """The verdict on the model; of dwells of unknown poses those that are held out are not judged."""
+    parameters = {"effects": model["effects"], "formulas": model["formulas"], "known_poses": data.known}
 
-    Parameters
-    ----------
-    known : whether its poses are known; otherwise only the norm of gravity is
-    """
-    stage = BY_NAME["budget"]
+    def call(run: Run) -> Tables:
+        dwells = run.table("dwells")
+        return judge(dwells if data.known else fitted_dwells(dwells), data.past(run), model["effects"])
+
+    return _call("judge", data.read(), parameters, call)
+
+
+def verify_step(data: ImportedData) -> StageCall:
+    """Verification of a fit on the dwells that were held out; by the norm of gravity where the poses are not known."""
+    fitted = ("coefficients", "covariance", "predictions" if data.known else "wander")
+
+    def call(run: Run) -> Tables:
+        dwells, past = run.table("dwells"), data.past(run)
+        coefficients, covariance, third = (run.table(name) for name in fitted)
+        if data.known:
+            return verify(dwells, past, coefficients, covariance, third)
+        return verify_norms(dwells, past, coefficients, covariance, third, data.gravity)
+
+    if data.known:
+        return _call("verify", data.read(*fitted), {}, call)
+    return _call("verify", data.read(*fitted), {"gravity_g": data.gravity}, call, "verify of norms")
+
+
+def budget_step(terms: BudgetTerms, data: ImportedData) -> StageCall:
+    """The uncertainty budget of an import whose references are stated."""
     names = ("coefficients", "covariance", "wander", "verification", "verification_poses")
 
     def call(run: Run) -> Tables:
-        tables = {name: run.table(name) for name in names}
-        whole = BudgetTables(
-            dwells=run.table("dwells"),
-            history=recorded_history(run),
-            noise=no_noise(),
-            lot=None,
-            calibration=None,
-            **tables,
-        )
-        return budget(whole, terms) if known else norm_budget(whole, terms)
+        made = {name: run.table(name) for name in names}
+        dwells, noise = run.table("dwells"), _no_noise()
+        tables = BudgetTables(dwells, data.past(run), noise=noise, lot=None, calibration=None, **made)
+        return budget(tables, terms) if data.known else norm_budget(tables, terms)
 
-    code = code_hash("budget" if known else "budget of norms")
-    inputs = ("dwells", *(("history",) if history else ()), *names)
-    return StageCall("budget", inputs, stage.outputs, terms.document(), code, call)
+    return _call("budget", data.read(*names), terms.document(), call, "" if data.known else "budget of norms")
+
+
+def grade_step(limits: Limits, zero: float, *, budgeted: bool) -> StageCall:
+    """The grades of an import against limits; ``zero`` : nominal output at 0 g."""
+    names = ("coefficients", "covariance", "residuals", "verification", "verification_poses")
+    names = (*names, "uncertainties", "budget_covariance") if budgeted else names
+
+    def call(run: Run) -> Tables:
+        tables: dict[str, Any] = {name: run.table(name) for name in names}
+        units = list(dict.fromkeys(tables["coefficients"]["unit"].astype(str)))
+        sound = {"unit": units, "slot": range(len(units)), "refused": False, "fault": "", "reason": ""}
+        return grade(GradeEvidence(verdicts=pd.DataFrame(sound), **tables, noise=_no_noise()), limits, zero)
+
+    parameters = {"limits": limits.model_dump(mode="json"), **({"zero_output": zero} if zero else {})}
+    return _call("grade", names, parameters, call)
+
+
+def _no_noise() -> pd.DataFrame:
+    """The table of noise terms of an import, which has no static record."""
+    return empty_table(texts="unit axis term unit_text", numbers="value low high", flags="identified")

@@ -12,7 +12,7 @@ from pipelines.diagnosis.imported_norms import fitted
 from pipelines.diagnosis.sentences import evidence_text, verdict
 from pipelines.importers.plane import plane_answer
 from pipelines.rerun.documents import ImportedFitDocument
-from pipelines.rerun.steps import gravity_of_import, has_poses
+from pipelines.rerun.import_steps import gravity_of_import, has_poses
 from pipelines.tables.frames import rows_of
 from schemas.units import AXES
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -13,10 +12,10 @@ from inertial.correction import correct
 from inertial.errors import InertialError
 from pipelines.archive import Archive, Run
 from pipelines.jobs.model_change import ModelChange
-from pipelines.jobs.terms import budget_terms
-from pipelines.rerun.archived_job import archived_job
 from pipelines.rerun.buffered_run import BufferedRun
+from pipelines.rerun.partition import Batch
 from pipelines.rerun.selection import SelectedRun, entry_of
+from pipelines.rerun.steps import archived_job
 from pipelines.stages.fit import fit_in_memory
 from pipelines.stages.grade import GradeEvidence, grade
 from pipelines.stages.uncertainty.budget_terms import BudgetTables
@@ -27,9 +26,6 @@ from pipelines.tables.dwells import KINDS, LotTables, lot_arrays
 from pipelines.tables.frames import ByUnit
 from schemas.errors import DataRejected, TumblelineError
 from schemas.units import MICRO
-
-if TYPE_CHECKING:
-    from pipelines.rerun.partition import Batch
 
 Sums = dict[str, tuple[float, int]]
 """Sum of squared errors, µg², and their number, by unit."""
@@ -47,11 +43,10 @@ OLD_TABLES = {
 class Side:
     """A lot under one model.
 
-    outcome, grade, reasons : by unit; fitted, verified : errors of the fit's dwells and of those not fitted
+    outcome, reasons : by unit; fitted, verified : errors of the fit's dwells and of those not fitted
     """
 
     outcome: dict[str, str]
-    grade: dict[str, str]
     reasons: dict[str, str]
     fitted: Sums
     verified: Sums
@@ -117,7 +112,7 @@ def _both(run: Run, change: ModelChange) -> tuple[Side, Side]:
         BudgetTables(
             lot.dwells, lot.history, *(new[name] for name in names), noise=old["noise"], lot=lot, calibration=own
         ),
-        budget_terms(job),
+        job.terms,
     )
     evidence = GradeEvidence(
         old["verdicts"],
@@ -136,12 +131,9 @@ def _calibration(tables: Mapping[str, pd.DataFrame]) -> Calibration | None:
 
 
 def _side(tables: Mapping[str, pd.DataFrame], calibration: Calibration | None) -> Side:
-    units, outcome, grades, reasons = (
-        tables["grades"][name].tolist() for name in ("unit", "outcome", "grade", "reasons")
-    )
+    units, outcome, reasons = (tables["grades"][name].tolist() for name in ("unit", "outcome", "reasons"))
     return Side(
         outcome=dict(zip(units, outcome, strict=True)),
-        grade=dict(zip(units, grades, strict=True)),
         reasons=dict(zip(units, reasons, strict=True)),
         fitted=_sums(tables["residuals"], "residual_ug"),
         verified=_sums(tables["verification"], "error_ug"),

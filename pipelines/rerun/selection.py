@@ -35,7 +35,7 @@ class SelectedRun:
 
 def entries(archive: Archive) -> list[SelectedRun]:
     """Every run, in the order of measurement."""
-    runs = [_entry(path.parent.name, files.read_json(path)) for path in (archive.root / "runs").glob("*/run.json")]
+    runs = [entry_of(path.parent.name, files.read_json(path)) for path in (archive.root / "runs").glob("*/run.json")]
     known = set[str]()
     for k, entry in enumerate(runs := sorted(runs, key=lambda entry: (entry.measured, entry.id))):
         if entry.capture in known:  # a fit of an older version does not state whose data it has
@@ -47,7 +47,18 @@ def entries(archive: Archive) -> list[SelectedRun]:
 
 def entry_of(run_id: str, about: dict[str, Any]) -> SelectedRun:
     """One run, from its ``run.json``."""
-    return _entry(run_id, about)
+    lot = about.get("lot", {})
+    when = datetime.fromisoformat(about.get("measured") or about["when"])
+    return SelectedRun(
+        id=run_id,
+        recipe=about.get("recipe", {}).get("name", "import" if "source" in about else about.get("name", "")),
+        device=lot.get("device", ""),
+        station=about.get("station", {}).get("name", ""),
+        units=tuple(unit["serial"] for unit in lot.get("units", [])),
+        measured=when if when.tzinfo else when.replace(tzinfo=UTC),
+        derived="rerun_of" in about or bool(about.get("parents")),
+        capture=str(about.get("capture") or ""),
+    )
 
 
 def selected(archive: Archive, words: Sequence[str]) -> list[SelectedRun]:
@@ -141,18 +152,3 @@ def _there_is(chosen: list[SelectedRun], filters: list[tuple[str, Any]]) -> str:
             names = sorted({str(getattr(entry, key)) for entry in chosen})
             texts.append(f"{key}: {', '.join(names[:5])}{' …' if len(names) > 5 else ''};")
     return " ".join(dict.fromkeys(texts))
-
-
-def _entry(run_id: str, about: dict[str, Any]) -> SelectedRun:
-    lot = about.get("lot", {})
-    when = datetime.fromisoformat(about.get("measured") or about["when"])
-    return SelectedRun(
-        id=run_id,
-        recipe=about.get("recipe", {}).get("name", "import" if "source" in about else about.get("name", "")),
-        device=lot.get("device", ""),
-        station=about.get("station", {}).get("name", ""),
-        units=tuple(unit["serial"] for unit in lot.get("units", [])),
-        measured=when if when.tzinfo else when.replace(tzinfo=UTC),
-        derived="rerun_of" in about or bool(about.get("parents")),
-        capture=str(about.get("capture") or ""),
-    )

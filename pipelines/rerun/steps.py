@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import pandas as pd
+from pydantic import ValidationError
 
-from inertial.quantities import ANGLE_COLUMNS, FORCE_COLUMNS
+from inertial.quantities import FORCE_COLUMNS
 from pipelines.archive import Archive, Run, code_hash
-from pipelines.chain.chain import BY_NAME, RECORDS, STAGES, Stage, Tables
+from pipelines.archive.signatures import ENTRY
+from pipelines.chain.chain import RECORDS, STAGES, Tables
 from pipelines.chain.runner import captured_tables
 from pipelines.diagnosis.diagnose import default_model
 from pipelines.importers.plane import axis_of_plane
@@ -18,26 +20,81 @@ from pipelines.jobs.job import Job
 from pipelines.jobs.model_change import ModelChange
 from pipelines.jobs.model_files import refuse_unknown_effects, use_formulas
 from pipelines.jobs.terms import archived_terms
-from pipelines.rerun.archived_job import ArchivedJob, archived_job, model_keys, without_provenance
 from pipelines.rerun.import_steps import (
+    ImportedData,
     StageCall,
     budget_step,
+    fit_step,
+    grade_step,
+    has_poses,
+    import_step,
+    imported,
     judge_step,
-    no_noise,
     plane_step,
-    recorded_history,
-    verify_norms_step,
+    verify_step,
 )
 from pipelines.stages.figures import UNITS
-from pipelines.stages.fit import fit
-from pipelines.stages.grade import GradeEvidence, grade
-from pipelines.stages.unknown_poses.fit import fit_of_norms
-from pipelines.stages.verify import verify
+from pipelines.stages.grade import refuse_limits_without_figures
 from pipelines.tables.leave_out import Dwells, leave_out
 from schemas.errors import DataRejected, WrongUse
-from schemas.limits import Limits, limits_of
-from schemas.recipe import FormulaSpec
-from schemas.units import AXES, STANDARD_GRAVITY_M_S2
+from schemas.limits import limits_of
+from schemas.lot import Lot
+from schemas.recipe import FormulaSpec, Recipe
+from schemas.station import StationConfig
+from schemas.toml_files import explain
+from schemas.units import AXES
+
+PROVENANCE = ("who", "where", "when", "software", "libraries", ENTRY, "rerun_of", "because", "measured")
+
+
+@dataclass(frozen=True)
+class ArchivedJob(Job):
+    """The job of an archived run, which opens no station: what the run tells of its capture and station stays as it is.
+
+    run_document : what ``run.json`` holds, without who made it, where and when
+    """
+
+    run_document: dict[str, Any] = field(default_factory=dict[str, Any])
+
+    @property
+    def about(self) -> dict[str, Any]:
+        """What is kept beside the run for readers."""
+        decided = {"recipe": self.recipe.model_dump(mode="json"), "limits": self.limits.model_dump(mode="json")}
+        return {**self.run_document, **decided, "lot": self.lot.model_dump(mode="json")}
+
+
+def archived_job(run: Run, change: ModelChange) -> ArchivedJob:
+    """The job of a captured run, with another model or other limits where they are given."""
+    about = run.about
+    try:
+        recipe = Recipe.model_validate({**about["recipe"], **model_keys(change)})
+        limits = change.limits or limits_of(about["limits"], UNITS)
+        lot = Lot.model_validate(about["lot"])
+    except ValidationError as problem:
+        raise explain(problem, f"run {run.id}", Recipe) from None
+    if change.limits is not None:
+        recipe = recipe.model_copy(update={"limits": change.limits_name})
+    run_document = without_provenance(about)
+    station = StationConfig.model_construct(**about.get("station", {}))
+    capture = about["capture"]
+    job = ArchivedJob(
+        recipe=recipe, limits=limits, lot=lot, station=station, captured=capture, run_document=run_document
+    )
+    refuse_unknown_effects(recipe.effects, f"run {run.id}")
+    refuse_limits_without_figures(limits, recipe)
+    return job
+
+
+def without_provenance(about: dict[str, Any]) -> dict[str, Any]:
+    """What ``run.json`` holds, without who made it, where and when."""
+    return {key: value for key, value in about.items() if key not in PROVENANCE}
+
+
+def model_keys(change: ModelChange) -> dict[str, Any]:
+    """The keys of a recipe that another model changes; none where the model stays."""
+    keys = change.of_model()
+    return {**keys, "formulas": [f.model_dump(mode="json") for f in change.formulas]} if keys else {}
+
 
 CAPTURED = ("readings", "history")
 RAW = ("validate", "reduce", "noise")
@@ -104,35 +161,34 @@ def _imported(run: Run, change: ModelChange, left_out: Dwells) -> Plan:
     """Fit, verification and, where limits are known, grades of dwells that were imported."""
     about = run.about
     dwells = leave_out(_fit_for_a_fit(run), left_out)
-    known = has_poses(dwells)
+    data = imported(run, dwells)
     across = None if change.effects or about.get("recipe", {}).get("effects") else axis_of_plane(dwells)
     if across is not None:
-        return _in_a_plane(run, change, left_out, across)
+        return _in_a_plane(run, change, left_out, across, data)
     model = _model_of(run, dwells, change)
     use_formulas([FormulaSpec.model_validate(f) for f in model["formulas"]], f"run {run.id}")
     refuse_unknown_effects(model["effects"], f"run {run.id}")
     limits = change.limits or (limits_of(about["limits"], UNITS) if about.get("limits") else None)
-    history = "history" in run.tables()
-    gravity = gravity_of_import(about)
-    steps = [_import_step(history, left_out, run), _fit_step(model, history, None if known else gravity)]
-    steps.append(judge_step(model, history=history, known=known))
-    steps += [_verify_step(history)] if known else [verify_norms_step(gravity, history=history)]
+    steps = [import_step(data, left_out, run), fit_step(model, data), judge_step(model, data), verify_step(data)]
     terms = archived_terms({**about, "limits": limits.model_dump(mode="json") if limits else about.get("limits")})
-    steps += [budget_step(terms, history=history, known=known)] if terms else []
+    steps += [budget_step(terms, data)] if terms else []
     zero = float((about.get("mapping") or {}).get("zero_output", 0.0))
-    steps += [_grade_step(limits, zero, budgeted=terms is not None)] if limits else []
+    steps += [grade_step(limits, zero, budgeted=terms is not None)] if limits else []
     recipe = {**about.get("recipe", {}), "name": "import", **model}
     recipe |= {"limits": change.limits_name} if change.limits else {}
-    kept = without_provenance(about)
-    new = {**kept, "recipe": recipe, "limits": limits.model_dump(mode="json") if limits else None}
-    data = {name: run.manifest(name)["sha256"] for name in ("dwells", "history") if name != "history" or history}
+    new = {
+        **without_provenance(about),
+        "recipe": recipe,
+        "limits": limits.model_dump(mode="json") if limits else None,
+    }
+    hashes = {name: run.manifest(name)["sha256"] for name in data.read()}
     code = {step.name: step.code for step in steps}
-    decisive = {"data": data, "model": model, "limits": new["limits"], "code": code}
+    decisive = {"data": hashes, "model": model, "limits": new["limits"], "code": code}
     _note_left_out(about, left_out, new, decisive)
     return Plan("import", tuple(steps), new, decisive)
 
 
-def _in_a_plane(run: Run, change: ModelChange, left_out: Dwells, across: int) -> Plan:
+def _in_a_plane(run: Run, change: ModelChange, left_out: Dwells, across: int, data: ImportedData) -> Plan:
     """The fit of a unit that was turned about one of its axes: its default model is of the two axes in the plane."""
     about, axis = run.about, AXES[across]
     if change.limits is not None:
@@ -140,16 +196,11 @@ def _in_a_plane(run: Run, change: ModelChange, left_out: Dwells, across: int) ->
             f"run {run.id}: turned about {axis} alone, limits need the scale of {axis} too; measure other orientations, or fit "
             "without limits"
         )
-    history = "history" in run.tables()
-    gravity = gravity_of_import(about)
-    steps = (_import_step(history, left_out, run), plane_step(across, gravity))
-    kept = without_provenance(about)
-    new: dict[str, Any] = {**kept, "recipe": {**about.get("recipe", {}), "name": "import"}, "plane_across": axis}
-    decisive: dict[str, Any] = {
-        "data": {"dwells": run.manifest("dwells")["sha256"]},
-        "plane": axis,
-        "code": steps[1].code,
-    }
+    steps = (import_step(data, left_out, run), plane_step(across, data.gravity))
+    recipe = {**about.get("recipe", {}), "name": "import"}
+    new: dict[str, Any] = {**without_provenance(about), "recipe": recipe, "plane_across": axis}
+    hashes = {"dwells": run.manifest("dwells")["sha256"]}
+    decisive: dict[str, Any] = {"data": hashes, "plane": axis, "code": steps[1].code}
     _note_left_out(about, left_out, new, decisive)
     return Plan("import", steps, new, decisive)
 
@@ -159,17 +210,6 @@ def _note_left_out(about: dict[str, Any], left_out: Dwells, new: dict[str, Any],
     if left_out:
         named = [f"{unit}:{dwell}" for unit, dwell in left_out]
         decisive["left_out"] = new["left_out"] = [*about.get("left_out", []), *named]
-
-
-def has_poses(dwells: pd.DataFrame) -> bool:
-    """Whether dwells have a reference, force or angles; otherwise only the norm of gravity is known."""
-    return any(set(names) <= set(dwells.columns) for names in (FORCE_COLUMNS, ANGLE_COLUMNS))
-
-
-def gravity_of_import(about: dict[str, Any]) -> float:
-    """Gravity where an import was measured, g; the standard value where it was not given."""
-    given = (about.get("mapping") or {}).get("local_gravity_m_s2")
-    return 1.0 if given is None else float(given) / STANDARD_GRAVITY_M_S2
 
 
 def _fit_for_a_fit(run: Run) -> pd.DataFrame:
@@ -198,74 +238,3 @@ def _model_of(run: Run, dwells: pd.DataFrame, change: ModelChange) -> dict[str, 
     if known.get("effects"):
         return {key: known[key] for key in ("effects", "formulas", "model_name", "model_version")}
     return {"effects": default_model(dwells), "formulas": [], "model_name": "", "model_version": 0}
-
-
-def _import_step(history: bool, left_out: Dwells, old: Run) -> StageCall:  # noqa: FBT001 - whether the import has one
-    names = ("dwells", *(("history",) if history else ()))
-    if left_out:
-        parameters = {"left_out": [list(one) for one in left_out], "dwells": old.manifest("dwells")["sha256"]}
-        others = names[1:]
-        return StageCall(
-            "leave_out",
-            (),
-            names,
-            parameters,
-            "",
-            lambda _: {
-                "dwells": leave_out(old.table("dwells"), left_out),
-                **{name: old.table(name) for name in others},
-            },
-        )
-    return StageCall("import", (), names, {}, "", lambda run: {name: run.table(name) for name in names})
-
-
-def _inputs(stage: Stage, *, history: bool) -> tuple[str, ...]:
-    """Tables that a stage reads of an import, which may have no temperatures between its dwells."""
-    return stage.inputs if history else tuple(name for name in stage.inputs if name != "history")
-
-
-def _fit_step(model: dict[str, Any], history: bool, gravity: float | None) -> StageCall:  # noqa: FBT001
-    """The fit of the chain; by the norm of gravity alone where its size is given."""
-    stage = BY_NAME["fit"]
-    parameters = {"effects": model["effects"], "formulas": model["formulas"]}
-    inputs = _inputs(stage, history=history)
-
-    if gravity is not None:
-
-        def of_norms(run: Run) -> Tables:
-            past = run.table("history") if history else None
-            return fit_of_norms(run.table("dwells"), past, model["effects"], gravity)
-
-        code = code_hash("fit of norms")
-        return StageCall("fit", inputs, stage.outputs, {**parameters, "gravity_g": gravity}, code, of_norms)
-
-    def call(run: Run) -> Tables:
-        return fit(run.table("dwells"), recorded_history(run), model["effects"])
-
-    return StageCall("fit", inputs, stage.outputs, parameters, code_hash(stage.name), call)
-
-
-def _verify_step(history: bool) -> StageCall:  # noqa: FBT001
-    stage = BY_NAME["verify"]
-    inputs = _inputs(stage, history=history)
-
-    def call(run: Run) -> Tables:
-        names = ("coefficients", "covariance", "predictions")
-        return verify(run.table("dwells"), recorded_history(run), *(run.table(name) for name in names))
-
-    return StageCall("verify", inputs, stage.outputs, {}, code_hash(stage.name), call)
-
-
-def _grade_step(limits: Limits, zero: float, *, budgeted: bool) -> StageCall:
-    stage = BY_NAME["grade"]
-    names = ("coefficients", "covariance", "residuals", "verification", "verification_poses")
-    names = (*names, "uncertainties", "budget_covariance") if budgeted else names
-
-    def call(run: Run) -> Tables:
-        tables: dict[str, Any] = {name: run.table(name) for name in names}
-        units = list(dict.fromkeys(tables["coefficients"]["unit"].astype(str)))
-        sound = {"unit": units, "slot": range(len(units)), "refused": False, "fault": "", "reason": ""}
-        return grade(GradeEvidence(verdicts=pd.DataFrame(sound), **tables, noise=no_noise()), limits, zero)
-
-    parameters = {"limits": limits.model_dump(mode="json"), **({"zero_output": zero} if zero else {})}
-    return StageCall("grade", names, stage.outputs, parameters, code_hash(stage.name), call)

@@ -1,9 +1,9 @@
-"""What a recipe will make a lot go through, as a state of the science: for checks before any chamber time is spent."""
+"""What a recipe will make a lot go through, as states of the science: for checks and budgets before any chamber time is spent."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -145,3 +145,25 @@ def refuse_unidentified(recipe: Recipe, recorded: Iterable[str] = ()) -> None:
     """
     state = planned_state(recipe, recorded=recorded)
     fit_lot(recipe.effects, state, state.force.copy())
+
+
+class Planned(NamedTuple):
+    """States of the dwells of the fit and of the verification; soak and temperature of each dwell of the fit."""
+
+    fit: State
+    verification: State | None
+    soak: NDArray[np.int64]
+    target_C: Array
+
+
+def planned_dwells(recipe: Recipe, station: StationConfig, activities: list[Activity] | None = None) -> Planned:
+    """The dwells that a recipe plans on a station."""
+    whole = schedule(steps(recipe), station, recipe) if activities is None else activities
+    own = [one for one in whole if one.kind == "dwell"]
+    checks = [one for one in whole if one.kind == "verification"]
+    return Planned(
+        fit=state_of(whole, station, recipe),
+        verification=state_of(whole, station, recipe, kinds=("verification",)) if checks else None,
+        soak=np.array([one.step.soak for one in own]),
+        target_C=np.array([one.step.temperature for one in own]),
+    )

@@ -5,15 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import Literal, get_args
 
 from inertial import timing
+from pipelines.schedule.steps import Step
 from schemas.poses import Pose
 from schemas.recipe import Recipe
 from schemas.station import StationConfig
-
-if TYPE_CHECKING:
-    from pipelines.schedule.steps import Step
 
 ActivityKind = Literal["soak", "move", "dwell", "verification", "allan", "procedure"]
 

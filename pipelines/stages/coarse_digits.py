@@ -4,15 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from inertial.noise.resolution import FINE, most, ripple, without_rounding
+from inertial.noise.terms import NoiseTerms
 from pipelines.stages.static_record import Digits
-
-if TYPE_CHECKING:
-    from inertial.noise.terms import NoiseTerms
 
 SHOWN = 0.02
 """Smallest share of rounding in the variance that is stated and subtracted."""

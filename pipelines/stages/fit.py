@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 LONG_S = 3600.0  # shortest record whose walk is extrapolated over a day: it then grows by a factor of three at most
 
 
-def fit(dwells: pd.DataFrame, history: pd.DataFrame, effects: Sequence[str]) -> dict[str, pd.DataFrame]:
+def fit(dwells: pd.DataFrame, history: pd.DataFrame | None, effects: Sequence[str]) -> dict[str, pd.DataFrame]:
     """Coefficients, covariance, residuals and noise of the recipe's effects for every unit of a lot.
 
     The white-noise error sd/√n of a dwell is a lower bound. Wander between dwells is estimated with the coefficients
@@ -35,7 +35,7 @@ def fit(dwells: pd.DataFrame, history: pd.DataFrame, effects: Sequence[str]) -> 
     Parameters
     ----------
     dwells : of every kind; those for verification are not fitted; they only state earlier conditions
-    history : temperatures between the dwells
+    history : temperatures between the dwells; None where there are none
     """
     return fit_tables(LotTables(dwells, history), effects)
 

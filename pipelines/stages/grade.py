@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 from pipelines.procedures import PROCEDURES, figures_of_recipe
 from pipelines.stages.figures import FIGURES, Figure, LotCoefficients, UnitTables, figures_of
 from pipelines.stages.figures.base import BudgetRow
+from pipelines.stages.uncertainty.decision_budget import DecisionBudget
 from pipelines.stages.uncertainty.lot_risks import lot_risks
 from pipelines.tables.calibration import Calibration, read_calibration
 from pipelines.tables.frames import ByUnit, empty_table
@@ -29,9 +29,6 @@ from schemas.decisions import (
 from schemas.errors import RecipeInvalid
 from schemas.limits import Limits
 from schemas.recipe import Recipe
-
-if TYPE_CHECKING:
-    from pipelines.stages.uncertainty.decision_budget import DecisionBudget
 
 NO_GRADE = "none"
 FIGURE_TEXTS, FIGURE_NUMBERS = "unit figure unit_text outcome rule", "value uncertainty limit accept pfa pfr"

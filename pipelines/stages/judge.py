@@ -68,33 +68,18 @@ def adequacy(dwells: pd.DataFrame, history: pd.DataFrame | None, effects: Sequen
         return _not_judged(every_unit_faulty(faults), faulty)
     with threadpool_limits(1):
         verdict = judged(lot, effects, generator())
+    units = len(measurement.units) - len(faulty)
     error = error_of(verdict.rms, verdict.floor, verdict.log_p)
-    return {
-        "adequate": verdict.adequate,
-        "reason": verdict.unjudged or None,
-        "rms_ug": error["rms_ug"],
-        "floor_ug": error["floor_ug"],
-        "p_value": error["p_value"],
-        "named": verdict.named,
-        "units": len(measurement.units) - len(faulty),
-        "faulty": faulty,
-    }
+    return _document(verdict.adequate, verdict.unjudged or None, error, verdict.named, units, faulty)
 
 
 def told_by(diagnosis: Mapping[str, Any], units: int) -> AdequacyDocument:
     """The verdict that a diagnosis of the same dwells of some units, and of the same model, has told."""
     faulty = sorted({unit for fault in diagnosis["blocked_by"] for unit in fault["units"]})
-    error = diagnosis["error"]
-    return {
-        "adequate": diagnosis["adequate"],
-        "reason": diagnosis["reason"],
-        "rms_ug": error["rms_ug"],
-        "floor_ug": error["floor_ug"],
-        "p_value": error["p_value"],
-        "named": bool(diagnosis["classes"] or diagnosis["unexplained"]),
-        "units": units - len(faulty) if diagnosis["adequate"] is not None or error["rms_ug"] is not None else 0,
-        "faulty": faulty,
-    }
+    adequate, error = diagnosis["adequate"], diagnosis["error"]
+    named = bool(diagnosis["classes"] or diagnosis["unexplained"])
+    judged = units - len(faulty) if adequate is not None or error["rms_ug"] is not None else 0
+    return _document(adequate, diagnosis["reason"], error, named, judged, faulty)
 
 
 def verdict_table(verdict: AdequacyDocument | None, effects: Sequence[str]) -> pd.DataFrame:
@@ -103,16 +88,16 @@ def verdict_table(verdict: AdequacyDocument | None, effects: Sequence[str]) -> p
         return empty_table(
             texts="model verdict reason faulty", numbers=" ".join(_FIGURES), whole="units", flags="named"
         )
-    figures = dict(zip(_FIGURES, (verdict["rms_ug"], verdict["floor_ug"], verdict["p_value"]), strict=True))
-    figures = {name: np.nan if value is None else value for name, value in figures.items()}
     row = {
         "model": ",".join(effects),
         "verdict": _TEXTS[verdict["adequate"]],
         "reason": verdict["reason"] or "",
-        **figures,
+        **{name: np.nan if verdict[name] is None else verdict[name] for name in _FIGURES},
+        "named": verdict["named"],
+        "units": verdict["units"],
+        "faulty": ", ".join(verdict["faulty"]),
     }
-    more = {"named": verdict["named"], "units": verdict["units"], "faulty": ", ".join(verdict["faulty"])}
-    return pd.DataFrame([{**row, **more}])
+    return pd.DataFrame([row])
 
 
 def verdict_of(table: pd.DataFrame) -> AdequacyDocument | None:
@@ -120,27 +105,31 @@ def verdict_of(table: pd.DataFrame) -> AdequacyDocument | None:
     if table.empty:
         return None
     (row,) = rows_of(table)
-    rms, floor, p = (None if np.isnan(row[name]) else float(row[name]) for name in _FIGURES)
-    return {
-        "adequate": {text: value for value, text in _TEXTS.items()}[str(row["verdict"])],
-        "reason": str(row["reason"]) or None,
-        "rms_ug": rms,
-        "floor_ug": floor,
-        "p_value": p,
-        "named": bool(row["named"]),
-        "units": int(row["units"]),
-        "faulty": str(row["faulty"]).split(", ") if row["faulty"] else [],
-    }
+    error = {name: None if np.isnan(row[name]) else float(row[name]) for name in _FIGURES}
+    adequate = {text: value for value, text in _TEXTS.items()}[str(row["verdict"])]
+    faulty = str(row["faulty"]).split(", ") if row["faulty"] else []
+    return _document(adequate, str(row["reason"]) or None, error, bool(row["named"]), int(row["units"]), faulty)
 
 
 def _not_judged(reason: str, faulty: Sequence[str] = ()) -> AdequacyDocument:
+    return _document(None, reason, dict.fromkeys(_FIGURES), False, 0, faulty)
+
+
+def _document(
+    adequate: bool | None,  # noqa: FBT001 - a value of the document
+    reason: str | None,
+    error: Mapping[str, float | None],
+    named: bool,  # noqa: FBT001 - a value of the document
+    units: int,
+    faulty: Sequence[str],
+) -> AdequacyDocument:
     return {
-        "adequate": None,
+        "adequate": adequate,
         "reason": reason,
-        "rms_ug": None,
-        "floor_ug": None,
-        "p_value": None,
-        "named": False,
-        "units": 0,
+        "rms_ug": error["rms_ug"],
+        "floor_ug": error["floor_ug"],
+        "p_value": error["p_value"],
+        "named": named,
+        "units": units,
         "faulty": list(faulty),
     }

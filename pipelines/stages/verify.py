@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 def verify(
     dwells: pd.DataFrame,
-    history: pd.DataFrame,
+    history: pd.DataFrame | None,
     coefficients: pd.DataFrame,
     covariance: pd.DataFrame,
     predictions: pd.DataFrame,
@@ -73,6 +73,19 @@ def verify_tables(
         "reading_ug": MICRO * np.sqrt(np.sum((toward * reading) ** 2, axis=-1)),
         **{name: values[:, None] + np.zeros_like(by_axis[..., 0]) for name, values in of_units.items()},
     }
+    return verification_rows(lot, unseen, columns, by_axis, expected)
+
+
+def verification_rows(
+    lot: LotArrays, unseen: NDArray[np.bool_], columns: dict[str, Array], by_axis: Array, expected: Array
+) -> dict[str, pd.DataFrame]:
+    """The tables of a verification.
+
+    Parameters
+    ----------
+    unseen : (n,), the m dwells for verification; columns : (units, m) each, by name; by_axis : (units, m, 3), errors, µg
+    expected : (units, m, m), covariance of ``error_ug`` of a correct model, µg²
+    """
     return {
         "verification": _rows(lot, unseen, columns, by_axis),
         "verification_poses": _pose_rows(lot, unseen, columns["error_ug"], expected),

@@ -11,8 +11,7 @@ from inertial.planning.sequences import SequenceStep
 from inertial.power import switched
 from pipelines.archive import Archive
 from pipelines.capture.capture import capture
-from pipelines.capture.power_cycling import Power
-from pipelines.capture.supervision import Supervisor
+from pipelines.capture.supervision import Power, Supervisor
 from pipelines.chain.chain import ORDER
 from pipelines.chain.runner import Runner
 from pipelines.inquiry.followup import follow_up

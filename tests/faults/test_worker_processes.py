@@ -23,7 +23,9 @@ ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT)}
 
 # -- the process that a service manager looks at ends after the watchdog, not before it -----------------------------------
 
-ATTEND = "import sys; from pipelines.orchestrator.child_reaper import run_until_orphans_end as run; sys.exit(run(sys.argv[1:]))"
+ATTEND = (
+    "import sys; from pipelines.orchestrator.worker import run_until_orphans_end as run; sys.exit(run(sys.argv[1:]))"
+)
 WATCHDOG = """
 import os, signal, sys, time
 signal.signal(signal.SIGTERM, signal.SIG_IGN)
@@ -123,7 +125,7 @@ time.sleep(600.0)
 """
 WATCHED = """
 import itertools, os, sys
-from pipelines.orchestrator.child_reaper import run_until_orphans_end
+from pipelines.orchestrator.worker import run_until_orphans_end
 from pipelines.orchestrator.worker_health import watched
 beats, child = itertools.count(), []
 def ask():

@@ -11,8 +11,8 @@ from cryptography.x509 import Certificate
 
 from pipelines.archive import Archive
 from pipelines.certificates.document.archive_comparison import compare
+from pipelines.certificates.document.dcc import DocumentInvalid, validate
 from pipelines.certificates.document.laboratory import LaboratoryFile
-from pipelines.certificates.document.schema_files import DocumentInvalid, validate
 from pipelines.certificates.document.signature_check import (
     ATTACHMENT,
     SignatureBroken,

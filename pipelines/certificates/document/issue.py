@@ -14,10 +14,9 @@ from pipelines.archive import Archive, Run, files
 from pipelines.certificates import Calibration, Ledger
 from pipelines.certificates.document.compose import compose
 from pipelines.certificates.document.content import CertificateContent
-from pipelines.certificates.document.dcc import dcc
+from pipelines.certificates.document.dcc import EXTRA, WHERE, dcc
 from pipelines.certificates.document.laboratory import LaboratoryFile
 from pipelines.certificates.document.pages import page_content
-from pipelines.certificates.document.schema_files import EXTRA, WHERE
 from pipelines.certificates.document.signing import SigningKey, sign_pdf, sign_xml
 from pipelines.tables.frames import rows_of
 from schemas.errors import WrongUse

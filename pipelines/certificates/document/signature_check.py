@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
+from contextlib import contextmanager
 from io import BytesIO
 from typing import Any
 
@@ -99,12 +100,8 @@ def xml_signature(data: bytes) -> tuple[Signer, Any]:
     expected = signxml.SignatureConfiguration(
         location="./", require_x509=True, verification_time=named[0].not_valid_after_utc
     )
-    try:
+    with _read_as("the signature does not hold: {}"):
         good = signxml.XMLVerifier().verify(root, x509_cert=pem, expect_config=expected)
-    except MemoryError:  # of this machine: no verdict on the file
-        raise
-    except Exception as problem:  # noqa: BLE001 - a file of others may break any part of the reader
-        raise SignatureBroken(f"the signature does not hold: {_line(problem)}") from None
     inside = [] if good.signed_xml is None else list(good.signed_xml)
     if len(inside) != 1:
         raise SignatureBroken(f"the signature covers {len(inside)} documents, one is needed")
@@ -120,14 +117,10 @@ def attachments(data: bytes) -> list[bytes]:
         It cannot be read as a PDF.
     """
     reader = library("pyhanko.pdf_utils.reader", EXTRA, WHERE)
-    try:
+    with _read_as("it cannot be read as a PDF ({})"):
         document = reader.PdfFileReader(BytesIO(data))
         names = document.root.get("/Names", {}).get("/EmbeddedFiles", {})
         return [spec["/EF"]["/F"].data for name, spec in _named(names, DEEPEST) if name == ATTACHMENT]
-    except MemoryError:  # of this machine: no verdict on the file
-        raise
-    except Exception as problem:  # noqa: BLE001 - the same
-        raise SignatureBroken(f"it cannot be read as a PDF ({_line(problem)})") from None
 
 
 def _named(tree: Any, levels: int) -> Iterator[tuple[str, Any]]:
@@ -148,15 +141,9 @@ def pdf_signers(data: bytes) -> list[Signer]:
         A signature does not hold, or something other than a further signature was added after it.
     """
     reader = library("pyhanko.pdf_utils.reader", EXTRA, WHERE)
-    try:
+    with _read_as("the signature of the PDF cannot be read ({})"):
         embedded = reader.PdfFileReader(BytesIO(data)).embedded_regular_signatures
         return [_pdf_signer(one) for one in embedded]
-    except SignatureBroken:
-        raise
-    except MemoryError:  # of this machine: no verdict on the file
-        raise
-    except Exception as problem:  # noqa: BLE001 - the same
-        raise SignatureBroken(f"the signature of the PDF cannot be read ({_line(problem)})") from None
 
 
 def _pdf_signer(embedded: Any) -> Signer:
@@ -183,5 +170,13 @@ def _certificate(one: Any) -> Certificate:
     return load_der_x509_certificate(one.dump())
 
 
-def _line(problem: Exception) -> str:
-    return " ".join((str(problem) or type(problem).__name__).split())[:200]
+@contextmanager
+def _read_as(fault: str) -> Generator[None]:
+    """A block that reads a file of others, which may break any part of the reader: ``fault`` tells the cause."""
+    try:
+        yield
+    except (SignatureBroken, MemoryError):  # the latter is of this machine: no verdict on the file
+        raise
+    except Exception as problem:  # noqa: BLE001 - see above
+        cause = " ".join((str(problem) or type(problem).__name__).split())[:200]
+        raise SignatureBroken(fault.format(cause)) from None

@@ -18,7 +18,7 @@ from cryptography.hazmat.primitives.serialization import (
 )
 from cryptography.x509 import Certificate, load_pem_x509_certificates
 
-from pipelines.certificates.document.schema_files import WHERE
+from pipelines.certificates.document.dcc import WHERE
 from pipelines.certificates.document.signers import not_valid
 from schemas.errors import WrongUse
 from schemas.library import library

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from pipelines.stages.bias_stability import HOUR_S, TERM
 from pipelines.stages.figures.base import FigureKind, UnitTables, Value, worst_axis
+from pipelines.stages.noise import HOUR_S, TERM
 from schemas.recipe import Recipe
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,18 +14,16 @@ from inertial.frames import angles_from_force
 from inertial.state import State
 from inertial.uncertainty.propagation import Propagated, norm_errors, rms_over
 from pipelines.stages.rms_error import OF_UNITS
+from pipelines.stages.uncertainty.budget_terms import BudgetTables, BudgetTerms
 from pipelines.stages.uncertainty.period import period_of
 from pipelines.stages.uncertainty.period_error import AxisErrors, largest_error
 from pipelines.tables.calibration import Calibration
+from pipelines.tables.dwells import LotArrays
 from pipelines.tables.frames import ByUnit
 from schemas.decisions import BOUND, LARGEST_ERROR, MEDIAN
 from schemas.units import AXES, MICRO
 
 Array = NDArray[np.float64]
-
-if TYPE_CHECKING:
-    from pipelines.stages.uncertainty.budget_terms import BudgetTables, BudgetTerms
-    from pipelines.tables.dwells import LotArrays
 
 EFFECTS = {
     "bias": "µg",
@@ -323,8 +320,8 @@ def _period(
         whole = [one for unit in lot.units if (one := period_of(tables, terms, unit, letter, span)) is not None]
         if len(whole) != len(lot.units) or own.axis_errors is None:
             return
-        names = dict.fromkeys(name for one in whole for name in one.parts)
-        later = {name: np.array([one.parts.get(name, 0.0) for one in whole]) for name in names}
+        names = dict.fromkeys(name for one in whole for name in one)
+        later = {name: np.array([one.get(name, 0.0) for one in whole]) for name in names}
         axes.append(replace(own.axis_errors, later=later))
     for letter, axis in zip(AXES, axes, strict=True):
         parts = {"run": axis.run, "budget": axis.fixed, **axis.later}

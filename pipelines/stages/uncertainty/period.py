@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
-
 import numpy as np
 import pandas as pd
 
@@ -19,34 +16,31 @@ from inertial.uncertainty.period import (
     logarithmic,
     walk_later,
 )
+from pipelines.stages.uncertainty.budget_terms import BudgetTables, BudgetTerms
 from schemas.validity import Ageing
-
-if TYPE_CHECKING:
-    from pipelines.stages.uncertainty.budget_terms import BudgetTables, BudgetTerms
 
 RECTANGULAR = float(np.sqrt(3.0))
 
 
-@dataclass(frozen=True)
-class Period:
-    """Standard deviations of the contributions over the period to the error of the run, µg."""
+def period_of(tables: BudgetTables, terms: BudgetTerms, unit: str, axis: str, span_s: float) -> dict[str, float] | None:
+    """The contributions over the period to the error of a unit's axis, see :func:`after_run`; None where B is not known, too."""
+    instability = instability_of(tables, unit, axis)
+    if terms.stability is None or not np.isfinite(instability):
+        return None
+    return after_run(terms, span_s, instability, walk_of(tables, unit, axis))
 
-    parts: dict[str, float]
 
+def after_run(terms: BudgetTerms, span_s: float, instability: float, walk: float = 0.0) -> dict[str, float] | None:
+    """Standard deviations, µg, of what is added to the error of a run until a use at the end of the period of validity.
 
-def period_of(tables: BudgetTables, terms: BudgetTerms, unit: str, axis: str, span_s: float) -> Period | None:
-    """The contributions over the period; None where the device's stability is not stated, or not for so long.
+    None where the stability of the device is not stated, or not for so long.
 
     Parameters
     ----------
-    span_s : of the dwells of the fit
+    span_s : of the dwells of the fit; instability : B, µg; walk : K, µg/√s
     """
-    stability, months = terms.stability, terms.certificate.validity_months
-    gap = months * MONTH_S
+    stability, gap = terms.stability, terms.certificate.validity_months * MONTH_S
     if stability is None or gap > stability.horizon_days * DAY_S * 1.001:
-        return None
-    instability = instability_of(tables, unit, axis)
-    if not np.isfinite(instability):
         return None
     windows = Windows(span_s, terms.certificate.use_window_s or terms.dwell_s, gap)
     later, within = (f(windows, stability.flicker_slowest_s) for f in (flicker_later, flicker_within))
@@ -55,12 +49,11 @@ def period_of(tables: BudgetTables, terms: BudgetTerms, unit: str, axis: str, sp
         "switch_on": stability.switch_on_ug,
         "switch_on_scale": stability.switch_on_ppm / RECTANGULAR,  # RMS of the force along an axis is 1/√3 g
     }
-    walk = walk_of(tables, unit, axis)
     if walk > 0.0:
         parts["random_walk"] = walk * walk_carried(windows, stability.flicker_slowest_s)
     if stability.ageing is not None:
         parts["ageing"] = ageing_u(stability.ageing, windows)
-    return Period({name: value for name, value in parts.items() if value > 0.0 or name == "flicker"})
+    return {name: value for name, value in parts.items() if value > 0.0 or name == "flicker"}
 
 
 def walk_carried(windows: Windows, slowest: float | None) -> float:
@@ -76,13 +69,9 @@ def walk_carried(windows: Windows, slowest: float | None) -> float:
 
 def walk_of(tables: BudgetTables, unit: str, axis: str) -> float:
     """Random walk K, µg/√s: of the static record if identified there, otherwise that of the fit, within the record's limit."""
-    rows, of_fit = tables.noise, float(np.nan_to_num(_of_fit(tables.wander, unit, axis, "bias_walk_ug_rts")))
-    own = rows[(rows["unit"] == unit) & (rows["axis"] == axis) & (rows["term"] == "K")] if len(rows) else rows
-    if not len(own):
-        return of_fit
-    first = own.iloc[0]
-    shown = float(first["value"] if bool(first["identified"]) else first["high"])
-    return float(np.fmin(shown, of_fit) if not bool(first["identified"]) else shown)
+    of_fit = float(np.nan_to_num(_of_fit(tables.wander, unit, axis, "bias_walk_ug_rts")))
+    shown, identified = _of_record(tables.noise, unit, axis, "K")
+    return shown if identified else float(np.fmin(shown, of_fit))
 
 
 def ageing_u(ageing: Ageing, windows: Windows) -> float:
@@ -99,14 +88,18 @@ def ageing_u(ageing: Ageing, windows: Windows) -> float:
 
 def instability_of(tables: BudgetTables, unit: str, axis: str) -> float:
     """Bias instability B, µg: of the static record, its upper limit where it is not identified; without one that of the fit."""
-    rows = tables.noise
-    own = rows[(rows["unit"] == unit) & (rows["axis"] == axis) & (rows["term"] == "B")] if len(rows) else rows
-    if len(own):
-        first = own.iloc[0]
-        value = float(first["value"] if bool(first["identified"]) else first["high"])
-        if np.isfinite(value):
-            return value
-    return _of_fit(tables.wander, unit, axis, "bias_instability_ug")
+    shown, _ = _of_record(tables.noise, unit, axis, "B")
+    return shown if np.isfinite(shown) else _of_fit(tables.wander, unit, axis, "bias_instability_ug")
+
+
+def _of_record(noise: pd.DataFrame, unit: str, axis: str, term: str) -> tuple[float, bool]:
+    """A term of the static record, else its upper limit, and whether it is identified; nan without a record."""
+    own = noise[(noise["unit"] == unit) & (noise["axis"] == axis) & (noise["term"] == term)] if len(noise) else noise
+    if not len(own):
+        return float("nan"), False
+    first = own.iloc[0]
+    identified = bool(first["identified"])
+    return float(first["value"] if identified else first["high"]), identified
 
 
 def _of_fit(wander: pd.DataFrame, unit: str, axis: str, name: str) -> float:

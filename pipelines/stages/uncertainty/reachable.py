@@ -11,13 +11,12 @@ from numpy.typing import NDArray
 from inertial import design
 from inertial.state import State
 from inertial.uncertainty.influences import MeasurementModel, sensitivity
-from inertial.uncertainty.period import MONTH_S, Windows, flicker_later, flicker_within
 from inertial.uncertainty.propagation import Propagated, fit_design, norm_errors, propagated, rms_over
 from pipelines.stages.uncertainty.budget import with_device_temperature
 from pipelines.stages.uncertainty.budget_terms import BudgetTerms
 from pipelines.stages.uncertainty.contributions import DwellConditions, influences
 from pipelines.stages.uncertainty.measurands import EFFECTS
-from pipelines.stages.uncertainty.period import ageing_u
+from pipelines.stages.uncertainty.period import after_run
 from pipelines.stages.uncertainty.period_error import AxisErrors, largest_error
 from schemas.decisions import BOUND, GRADES, LARGEST_ERROR
 from schemas.limits import Limits
@@ -25,7 +24,6 @@ from schemas.units import AXES, MICRO
 
 Array = NDArray[np.float64]
 
-DAY_S = 86_400.0
 LEAST_SHARE = 0.01
 """Smallest share of a contribution that a reason names."""
 FIGURES = {
@@ -119,7 +117,11 @@ def _reach(quantity: str, axis: str, unit: str, noise: float, errors: Array, nam
     parts = {"noise": MICRO * noise}
     for group in dict.fromkeys(names.tolist()):
         parts[group] = MICRO * float(np.sqrt(np.sum(errors[names == group] ** 2)))
-    return Reach(quantity, axis, unit, float(np.sqrt(sum(v**2 for v in parts.values()))), parts)
+    return Reach(quantity, axis, unit, _combined(parts), parts)
+
+
+def _combined(parts: dict[str, float]) -> float:
+    return float(np.sqrt(sum(part**2 for part in parts.values())))
 
 
 def _errors(
@@ -133,23 +135,21 @@ def _errors(
     errors = propagation.user_errors(columns, state.force, intrinsic=terms.certificate.frame == "intrinsic")
     out: list[Reach] = []
     axes: list[AxisErrors] = []
-    later = _later(planned, terms)
+    later = after_run(terms, float(np.ptp(planned.fit.time)) + terms.dwell_s, planned.instability_ug)
+    if later is not None:
+        later = {name: value for name, value in later.items() if value > 0.0}
     for axis, letter in enumerate(AXES):
-        parts = {
-            group: MICRO * float(rms_over(errors[..., axis, :][..., names == group]))
-            for group in dict.fromkeys(names.tolist())
-        }
-        u = float(np.sqrt(sum(v**2 for v in parts.values())))
+        own = errors[..., axis, :]
+        parts = {group: MICRO * float(rms_over(own[..., names == group])) for group in dict.fromkeys(names.tolist())}
+        u = _combined(parts)
         out.append(Reach("bias_error", letter, "µg", u, parts))
         if later is not None:
             whole = {"run": planned.run_ug, "budget": u, **later}
-            out.append(
-                Reach("bias_error_period", letter, "µg", float(np.sqrt(sum(v**2 for v in whole.values()))), whole)
-            )
-            flat = errors[..., axis, :].reshape(-1, errors.shape[-1])
+            out.append(Reach("bias_error_period", letter, "µg", _combined(whole), whole))
+            flat = own.reshape(-1, own.shape[-1])
             run, fixed, dof = (np.array([value]) for value in (planned.run_ug, u, float(len(state.force))))
-            own = {name: np.array([value]) for name, value in later.items()}
-            axes.append(AxisErrors(run, run, dof, 0.0 * run, fixed, flat.T @ flat, own))
+            after = {name: np.array([value]) for name, value in later.items()}
+            axes.append(AxisErrors(run, run, dof, 0.0 * run, fixed, flat.T @ flat, after))
     if axes:
         worst = max((one for one in out if one.quantity == "bias_error_period"), key=lambda one: one.u)
         _, bound = largest_error(axes, terms.switch_on_dof)
@@ -163,24 +163,6 @@ def _norm(errors: Array, state: State, names: Array) -> Reach:
     worst = along[int(np.argmax(np.sum(along**2, axis=-1)))]
     parts = {group: float(np.sqrt(np.sum(worst[names == group] ** 2))) for group in dict.fromkeys(names.tolist())}
     return Reach("verification_norm", "norm", "µg", float(np.sqrt(np.sum(worst**2))), parts)
-
-
-def _later(planned: PlannedDwells, terms: BudgetTerms) -> dict[str, float] | None:
-    """Contributions beyond the run, µg; None where the device's stability is not stated for so long."""
-    stability, months = terms.stability, terms.certificate.validity_months
-    if stability is None or months * MONTH_S > stability.horizon_days * DAY_S * 1.001:
-        return None
-    span = float(np.ptp(planned.fit.time)) + terms.dwell_s
-    windows = Windows(span, terms.certificate.use_window_s or terms.dwell_s, months * MONTH_S)
-    later, within = (f(windows, stability.flicker_slowest_s) for f in (flicker_later, flicker_within))
-    parts = {
-        "flicker": planned.instability_ug * float(np.sqrt(max(later**2 - within**2, 0.0))),
-        "switch_on": stability.switch_on_ug,
-        "switch_on_scale": stability.switch_on_ppm / float(np.sqrt(3.0)),
-    }
-    if stability.ageing is not None:
-        parts["ageing"] = ageing_u(stability.ageing, windows)
-    return {name: value for name, value in parts.items() if value > 0.0}
 
 
 def unreachable(reaches: Sequence[Reach], limits: Limits, months: int) -> list[str]:

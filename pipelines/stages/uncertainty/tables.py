@@ -4,21 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
 from inertial.uncertainty.degrees import coverage_factors, effective_degrees
+from pipelines.stages.uncertainty.budget_terms import BudgetTerms
 from pipelines.stages.uncertainty.contributions import UncertaintySource
+from pipelines.stages.uncertainty.measurands import BudgetQuantity, VarianceParts
 from pipelines.tables.frames import empty_table, picked
 
 Array = NDArray[np.float64]
-
-if TYPE_CHECKING:
-    from pipelines.stages.uncertainty.budget_terms import BudgetTerms
-    from pipelines.stages.uncertainty.measurands import BudgetQuantity, VarianceParts
 
 NOISE = "noise"
 BEYOND = {

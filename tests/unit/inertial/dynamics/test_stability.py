@@ -17,7 +17,7 @@ from inertial.dynamics.wander import logarithmic_kernel, stated_error, variance_
 from inertial.dynamics.wandering_means import IdentifiedNoise
 from inertial.dynamics.warm_up import entered
 from inertial.errors import NotIdentified
-from pipelines.stages.bias_stability import bias_stability
+from pipelines.stages.noise import bias_stability
 
 AT = np.arange(36)
 WALK = 100.0 * (np.minimum.outer(AT, AT) + np.where(np.equal.outer(AT, AT), 1 / 3, 0.5))

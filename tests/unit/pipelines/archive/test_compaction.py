@@ -12,8 +12,7 @@ from pipelines.archive import Archive, files, packs
 from pipelines.archive.backup import copy_archive
 from pipelines.archive.compaction import compact
 from pipelines.archive.locks import alone
-from pipelines.archive.pack_merging import due_of, merge_packs
-from pipelines.archive.pack_writing import FolderToPack, write_pack
+from pipelines.archive.pack_writing import FolderToPack, due_of, merge_packs, write_pack
 from pipelines.archive.packed_path import PackedPath
 from pipelines.audit.index import up_to_date
 from pipelines.audit.sql import ask

@@ -10,7 +10,7 @@ import pytest
 
 from pipelines.archive import Archive, Run, RunInfo, derived, files, listing
 from pipelines.archive.keys import digest
-from pipelines.archive.run_files import stages_of
+from pipelines.archive.run import stages_of
 
 LOTS = 40
 

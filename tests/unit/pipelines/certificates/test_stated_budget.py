@@ -18,7 +18,7 @@ from pipelines.cli import app
 from pipelines.jobs.job import job_of_run
 from pipelines.jobs.recipe_text import recipe_text
 from pipelines.jobs.recipes import load_recipe, resolved
-from pipelines.jobs.terms import budget_terms, refuse_contradictions
+from pipelines.jobs.terms import refuse_contradictions
 from pipelines.schedule.steps import steps
 from pipelines.stages.figures import UNITS
 from pipelines.stages.uncertainty.contributions import merged, sources
@@ -132,6 +132,10 @@ def test_the_order_of_verification_is_the_recipes() -> None:
     assert last == list("ddddvddddv")
     assert [one.kind[0] for one in spread] == list("ddvddddvdd")
     assert [one.record for one in spread] == list(range(10))
+    listed = recipe.model_copy(update={"verification_order": "interleaved", "procedures": [{"kind": "multi_position"}]})
+    assert [(one.kind, one.pose, one.soak) for one in steps(listed)] == [
+        (one.kind, one.pose, one.soak) for one in spread
+    ]
     assert "verification_order" not in recipe.model_dump()  # captures of earlier versions keep their names
 
 
@@ -168,7 +172,7 @@ def test_a_run_keeps_its_budget_and_the_risk_of_its_decisions(run: Run) -> None:
 
 def test_a_validity_beyond_the_horizon_has_no_figure_over_the_period(run: Run) -> None:
     assert (run.table("uncertainties")["quantity"] == "bias_error_period").any()
-    terms = budget_terms(job_of_run(run))
+    terms = job_of_run(run).terms
     assert terms.stability.horizon_days > 366.0
 
 

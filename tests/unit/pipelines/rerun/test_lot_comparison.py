@@ -14,8 +14,7 @@ from capture_double import small_run
 
 from pipelines.archive import Archive, Run
 from pipelines.jobs.model_change import ModelChange
-from pipelines.jobs.terms import budget_terms
-from pipelines.rerun.archived_job import ArchivedJob, archived_job
+from pipelines.rerun.steps import ArchivedJob, archived_job
 from pipelines.stages.figures.base import BudgetRow
 from pipelines.stages.fit import fit_in_memory, fit_tables
 from pipelines.stages.grade import GradeEvidence, grade
@@ -42,7 +41,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
 def given(run: Run, request: pytest.FixtureRequest) -> tuple[ArchivedJob, BudgetTables, BudgetTerms]:
     job = archived_job(run, ModelChange())
     stability = Stability.model_validate(STABLE) if request.param == "with stability" else None
-    terms = replace(budget_terms(job), stability=stability)
+    terms = replace(job.terms, stability=stability)
     tables: dict[str, Any] = {name: run.table(name) for name in READ}
     return job, BudgetTables(**tables), terms
 

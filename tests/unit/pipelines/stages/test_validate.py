@@ -7,8 +7,7 @@ from small_station import lot_of
 
 from inertial.operators import first_order_lag
 from pipelines.inquiry.lineage import RunSequence
-from pipelines.stages.frozen import frozen
-from pipelines.stages.validate import _stale_temperatures, validate
+from pipelines.stages.validate import _stale_temperatures, frozen, validate
 from schemas.errors import DataRejected
 
 SOAKS, DWELLS = 3, 11

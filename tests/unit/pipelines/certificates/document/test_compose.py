@@ -22,12 +22,11 @@ from pipelines.archive import Archive, Run
 from pipelines.certificates import Ledger
 from pipelines.certificates.document.compose import compose
 from pipelines.certificates.document.content import CertificateContent, Coefficient, ReferenceStandard
-from pipelines.certificates.document.dcc import DCC, SI, dcc
+from pipelines.certificates.document.dcc import DCC, SI, dcc, validate
 from pipelines.certificates.document.issue import pdf
 from pipelines.certificates.document.laboratory import LaboratoryFile, read_laboratory
 from pipelines.certificates.document.numbers import si_unit, with_uncertainty
 from pipelines.certificates.document.pages import page_content
-from pipelines.certificates.document.schema_files import validate
 from pipelines.certificates.documents import CertificateDocument
 from pipelines.chain.certify import certify
 from pipelines.cli import app
