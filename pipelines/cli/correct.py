@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -25,7 +25,7 @@ from schemas.errors import DONE, PART_FAILED, WrongUse
 
 if TYPE_CHECKING:
     from pipelines.export.corrected import Corrected
-    from pipelines.export.documents import CorrectDocument
+    from pipelines.export.documents import CorrectDocument, TrackedBiasDocument
     from pipelines.export.recording import CorrectableRecording
 
 PART = "Results"
@@ -162,7 +162,7 @@ def _print(document: CorrectDocument, show: Callable[..., None]) -> None:
         show(f"written: {document['output']}")
 
 
-def _print_bias(bias: dict[str, Any], show: Callable[..., None]) -> None:
+def _print_bias(bias: TrackedBiasDocument, show: Callable[..., None]) -> None:
     """Print the tracked bias, and whether the innovations agree with the stated noise."""
     show(f"bias at the end, µg: {_axes(bias['last_ug'])}; standard uncertainty: {_axes(bias['u_last_ug'])}")
     limits = bias["u_last_at_limits_ug"]

@@ -48,7 +48,7 @@ def show_validity(archive: Archive, serial: str, at: str, known: str, *, as_json
 
 def _made(archive: Archive, valid: Calibration) -> dict[str, Any]:
     """The coefficients of a calibration, with the code, libraries and data that made them."""
-    from pipelines.certificates.certified_coefficients import coefficients_of
+    from pipelines.certificates.coefficient_remarks import coefficients_of
 
     run = Run(archive, valid.run)
     if not (run.path / "run.json").is_file():

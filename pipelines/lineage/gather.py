@@ -146,7 +146,7 @@ class Gatherer:
     def _certificate(self, one: Calibration) -> str:
         event = one.event
         place = f"{folder_of(event.serial)}/{event.sequence:06d}.json"
-        name = self.graph.add(Node(place, "certificate", one.certificate, place, about=one.document()))
+        name = self.graph.add(Node(place, "certificate", one.certificate, place, about=dict(one.document())))
         rests = tuple(f"runs/{event.run}/{table}.parquet" for table, _ in event.evidence)
         used = tuple(node for node in (*rests, f"runs/{event.run}") if node in self.graph.nodes)
         self.graph.put(ProvActivity(f"{event.action} {event.certificate}", event.action, used, (name,), _by(event)))

@@ -8,7 +8,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from pydantic import TypeAdapter
 
-from pipelines.workbench.state import PAGES, MissingPage, PageState, UnitsPage
+from pipelines.workbench.state import MissingPage, PageState, UnitsPage
+
+PAGES = sorted(PageState.__subclasses__(), key=lambda kind: kind.__name__)
 
 CALM = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])  # the first texts load a table
 TEXT = st.text(st.characters(exclude_categories=["Cs"]), max_size=40)

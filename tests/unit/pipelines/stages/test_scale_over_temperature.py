@@ -11,7 +11,7 @@ from inertial.correction import correct, predict
 from inertial.fits.linear import fit_lot
 from inertial.state import State
 from pipelines.diagnosis.diagnose import diagnose
-from pipelines.export.polynomials import _one
+from pipelines.export.polynomials import corrected_output, polynomials
 from pipelines.stages.fit import fit
 from pipelines.tables.calibration import read_calibration
 from stations.plant.device import PlantDevices, draw_truth, rotation
@@ -97,10 +97,10 @@ def test_what_firmware_gets_corrects_the_device_at_its_temperatures() -> None:
     calibration = read_calibration(stage["coefficients"], stage["covariance"])
     force = np.random.default_rng(7).standard_normal((20, 3))
     for unit in range(4):
-        one = _one(calibration, f"U{unit}", {"outcome": "pass", "grade": "A"}, "g", (-10.0, 60.0))
+        exported = polynomials(calibration, f"U{unit}")
         for heat in (-10.0, 25.0, 60.0):
             out = made.output(np.repeat(force[:, None], 4, axis=1), np.full((20, 4), heat))[:, unit]
-            np.testing.assert_allclose(one.correct(out, heat), force, atol=1e-6)
+            np.testing.assert_allclose(corrected_output(*exported, out, heat), force, atol=1e-6)
 
 
 def test_poses_that_differ_between_soaks_give_the_same_axes() -> None:
