@@ -76,7 +76,16 @@ CODE = {
         *(*_DRAWN, "stations", "pipelines.capture", "pipelines.importers"),
         *("pipelines.diagnosis.sections", "pipelines.diagnosis.sentences", "pipelines.jobs", "pipelines.schedule"),
     ),
-    "report of an import": (*_DRAWN, "pipelines.diagnosis"),
-    "inquiry": ("schemas", "inertial", "pipelines.diagnosis", "pipelines.procedures", "pipelines.tables"),
+    "report of an import": (*_DRAWN, "pipelines.diagnosis", "pipelines.jobs.model_files", "pipelines.parallel"),
+    "inquiry": (
+        *(
+            "schemas",
+            "inertial",
+            "pipelines.diagnosis",
+            "pipelines.parallel",
+            "pipelines.procedures",
+            "pipelines.tables",
+        ),
+    ),
 }
 """Modules and packages by the name of the stage, or of what else is stored under a key."""

@@ -21,7 +21,7 @@ def command(
     run: options.RunArgument = "latest", archive: options.ArchiveOption = None, *, as_json: options.JsonOption = False
 ) -> None:
     """Print the path of a run's report; write the report if it is missing or older than the run's tables."""
-    from pipelines.report import make_report
+    from pipelines.report.any_run import make_report
 
     stored = Archive(archive).run(run)
     with error_console().status("drawing the report"):

@@ -13,7 +13,7 @@ from pipelines.report.panel import rendered
 from pipelines.report.templates import page_hash, template
 from schemas.errors import WrongUse
 
-__all__ = ["make_report", "render", "renew_report"]
+__all__ = ["TABLES", "make_report", "render"]
 
 PANELS = "pipelines.report.panels"
 
@@ -30,11 +30,7 @@ def render(run: Run, certificates: Mapping[str, Stated] | None = None) -> str:
 
 
 def make_report(run: Run) -> bool:
-    """Write the run's report if it is missing or older than its tables; return whether it was up to date."""
-    if not _captured(run):
-        from pipelines.report.imported import make_imported_report  # loads the search for effects
-
-        return make_imported_report(run)
+    """Write the report of a captured run if it is missing or older than its tables; return whether it was up to date."""
     if run.about.get("parents") and run.report.is_file():
         return True  # a follow-up has no decisions: its report is the diagnosis of all runs together
     _refuse_unfinished(run)
@@ -50,17 +46,6 @@ def make_report(run: Run) -> bool:
         return True
     run.save_report(key, render(run, certificates), {"inputs": inputs, "parameters": parameters, "code": code})
     return False
-
-
-def renew_report(run: Run) -> None:
-    """Write an existing report again after a change of the ledger."""
-    if (run.path / "report.json").is_file() and (not _captured(run) or set(TABLES) <= set(run.tables())):
-        make_report(run)
-
-
-def _captured(run: Run) -> bool:
-    """Whether a run was measured on a station, or is one of a lot that was, not imported."""
-    return bool(run.about.get("capture") or run.about.get("parents"))
 
 
 def _refuse_unfinished(run: Run) -> None:

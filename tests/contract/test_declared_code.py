@@ -29,7 +29,8 @@ STARTS = {
     "import": "pipelines.importers",
     "import of waveforms": "pipelines.importers.waveforms pipelines.procedures",
     "import of a transfer function": "pipelines.importers.transfer",
-    "report": "pipelines.report pipelines.procedures",
+    "report": "pipelines.report.context pipelines.report.interactive pipelines.report.panel pipelines.report.panels "
+    "pipelines.report.templates pipelines.report.unit_panels pipelines.procedures",
     "report of an import": "pipelines.report.diagnosis pipelines.report.imported pipelines.diagnosis.diagnose",
     "inquiry": "pipelines.diagnosis.diagnose inertial",
 }

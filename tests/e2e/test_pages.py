@@ -247,7 +247,7 @@ def test_the_mapping_file_of_the_guide_to_imports_does_what_its_options_do(share
     assert by_options["error"]["rms_ug"] < 112.0
     shown = document_of("show", by_options["run"], "coefficients")
     assert {row["effect"] for row in shown["rows"]} == {"bias", "scale", "misalignment"}
-    (chamber,) = (c for c, _ in pages.examples(page) if "imu_raw_data" in c and " import " in c and "m/s^2" in c)
+    (chamber,) = (c for c, _ in pages.examples(page) if "imu_raw_data" in c and "--fit temperature" in c)
     words = shlex.split(chamber.replace("m/s^2", "g").replace("$DATA", str(shared_data)))[1:]
     status, out, err = given(*words, "--archive", "none")
     assert (status, out, "looks like m/s^2" in err) == (2, "", True)

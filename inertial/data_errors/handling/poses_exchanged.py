@@ -4,7 +4,6 @@ from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inertial.estimation.alternative import Array, Handling, common_force
 from inertial.estimation.lot import Lot
@@ -29,8 +28,8 @@ class PosesExchanged(Handling):
         if lot.radial:
             return []
         step = np.linalg.norm(np.diff(common_force(lot), axis=-2), axis=-1).max(axis=0)
-        there: NDArray[np.bool_] = np.asarray(np.isfinite(lot.error)).all(axis=-1).any(axis=0)
-        return [{"at": float(k)} for k in np.flatnonzero((step > _APART) & there[:-1] & there[1:])]
+        there = set(np.flatnonzero(np.isfinite(lot.error).all(axis=-1).any(axis=0)).tolist())
+        return [{"at": float(k)} for k in np.flatnonzero(step > _APART) if {k, k + 1} <= there]
 
     def change(self, lot: "Lot", slope: Array | None, **place: float) -> Array:
         """What each of the two dwells has in place of its own force."""

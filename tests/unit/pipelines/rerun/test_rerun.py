@@ -196,7 +196,7 @@ def test_a_check_writes_nothing_and_names_the_table_and_the_size_of_what_differs
     assert comparison.same
     assert comparison.tables == dict.fromkeys(run.tables(), SAME)
     assert sorted(str(path) for path in run.archive.root.rglob("*")) == before
-    real = steps.BY_NAME["verify"].call
+    (real,) = (stage.call for stage in steps.STAGES if stage.name == "verify")
 
     def moved(job: object, own: Run) -> dict[str, pd.DataFrame]:
         made = real(job, own)

@@ -228,7 +228,7 @@ def test_verdicts_on_models_that_are_equally_good_are_seldom_better(archive: Arc
     """Errors of six units under two models of one truth, which differ by noise alone: 'better' in 2.5 % of archives."""
     rng, units = np.random.default_rng(2611), [f"U{u}" for u in range(6)]
     entry = judged(Batch(archive.address, (archive.runs()[0].id,), change_from_options("", None)))[0].entry
-    side = Side(dict.fromkeys(units, "pass"), {}, {}, {}, {}, None)
+    side = Side(dict.fromkeys(units, "pass"), {}, {}, {}, None)
     verdicts: Counter[str] = Counter()
     for _ in range(1000):
         squares = rng.chisquare(18, (6, 2)) * 25.0
