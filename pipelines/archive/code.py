@@ -73,8 +73,7 @@ CODE = {
     "import of waveforms": (*_PROCEDURES, "pipelines.archive", "pipelines.importers"),
     "import of a transfer function": _READ,
     "report": (
-        *(*_DRAWN, "stations", "pipelines.capture", "pipelines.importers"),
-        *("pipelines.diagnosis.sections", "pipelines.diagnosis.sentences", "pipelines.jobs", "pipelines.schedule"),
+        *(*_DRAWN, "stations", "pipelines.capture", "pipelines.importers", "pipelines.jobs", "pipelines.schedule"),
     ),
     "report of an import": (*_DRAWN, "pipelines.diagnosis", "pipelines.jobs.model_files", "pipelines.parallel"),
     "inquiry": (
