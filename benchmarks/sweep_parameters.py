@@ -1,4 +1,4 @@
-"""``python -m benchmarks.sweep_parameters N SEED``: what sweeps state of sensors that have a low-pass of an unknown kind behind them.
+"""``python -m benchmarks.sweep_parameters N SEED``: what sweeps state of sensors with an unknown low-pass behind them.
 
 Sprung masses of 0.7 to 4 kHz, lightly and heavily damped, alone or behind one pole, two poles or a moving average near their
 natural frequency, with a delay; stepped sines to 1, 2, 5 or 10 kHz. The truth is computed by scipy's filters and by a sinc.
