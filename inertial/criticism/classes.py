@@ -88,6 +88,9 @@ def class_of(field: Candidates, model: Model, term: Term) -> EffectClass:
     near = [t for t in near if term.effect.id not in t.effect.after]
     judged = [judge_refined(field, rest, t, model.noise) for t in near]
     judged = ranked([own, *judged])
+    if isinstance(term.effect, Handling):
+        # an effect that explains far more than an error of handling is beside it, and no rival of it
+        judged = [rival for rival in judged if rival is own or rival.cost > own.cost - CLASS_WIDTH]
     jumps = jumps_instead(field, rest, judged[0])
     if jumps is not None:
         judged = _with_jumps(judged, jumps)
