@@ -102,7 +102,7 @@ def publish(path: Place, data: bytes, what: str = "archive", remedy: str = IN_AR
     ----------
     what, remedy : beginning and end of the error message.
     """
-    with writing(path.parent, what, remedy):
+    with writing(path, what, remedy):
         if isinstance(path, ObjectPath):
             path.write_bytes(data)
             return

@@ -240,7 +240,8 @@ def main() -> None:
         _leave(str(problem), UNUSABLE)
     except SystemExit as left:
         if left.code == INTERRUPTED:
-            _leave("stopped; give the command again to continue the run", INTERRUPTED)
+            goes_on = sys.argv[1:2] in (["run"], ["investigate"])
+            _leave(f"stopped; give the command again{' to continue the run' if goes_on else ''}", INTERRUPTED)
         if left.code == 1 and isinstance(left.__context__, OSError) and left.__context__.errno == errno.EPIPE:
             sys.exit(PIPE_CLOSED)  # status 1 is a verdict
         raise
@@ -252,6 +253,13 @@ def _unexpected(problem: Exception) -> None:
     """End with what a person can do about an exception, or with a report for the developers."""
     if isinstance(problem, MemoryError):
         _leave("the command needs more memory than is available; give it less data at once", UNUSABLE)
+    if isinstance(problem, OSError) and problem.errno in {errno.ENOSPC, errno.EDQUOT, errno.EROFS}:
+        named = f"'{shown(str(problem.filename))}'" if problem.filename else "a file"
+        _leave(
+            f"{named} cannot be written ({problem.strerror}); make room, or choose a folder with write permission, and give the "
+            "command again",
+            UNUSABLE,
+        )
     if isinstance(problem, OSError) and problem.errno == errno.ENAMETOOLONG:
         _leave(
             f"'{shown(str(problem.filename))}': the file name is too long for this system; give a shorter one",

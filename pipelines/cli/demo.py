@@ -12,7 +12,7 @@ import typer
 
 from pipelines.cli import options
 from pipelines.cli.next_commands import command_line, extension, judged_data
-from pipelines.cli.printing import error_console, give_lines, print_json, publish, say
+from pipelines.cli.printing import error_console, give_lines, print_json, publish, remark, say
 from pipelines.cli.text.demo_text import print_ending
 from schemas.progress import Progress
 
@@ -59,10 +59,13 @@ def command(
     hidden = scene(effect, drawn)
     with writing(folder, "demo", ELSEWHERE):
         folder.mkdir(parents=True, exist_ok=True)
-        (folder / "model.toml").unlink(missing_ok=True)
+        earlier = _put_aside(folder / "model.toml")
+    if earlier is not None:
+        remark(f"demo: the model of an earlier demonstration is kept as {earlier}")
     with _bar() as progress:
         lot = measure(hidden, drawn, progress)
-    lot.write(folder)
+    with writing(folder, "demo", ELSEWHERE):
+        lot.write(folder)
     if by_hand:
         _hand_over(folder, hidden, as_json=as_json)
         return
@@ -70,6 +73,14 @@ def command(
     document = game.play()
     if as_json:
         print_json({"seed": drawn, **document})
+
+
+def _put_aside(model: Path) -> Path | None:
+    """Rename a model file to the first free name with a number; its new name, None where there is no file."""
+    if not model.exists():
+        return None
+    number = next(k for k in range(1, 10_000) if not model.with_name(f"{model.stem}-{k}{model.suffix}").exists())
+    return model.rename(model.with_name(f"{model.stem}-{number}{model.suffix}"))
 
 
 @contextmanager

@@ -14,6 +14,7 @@ from inertial.decisions import BLOCKS, CONFIRMED, LEFT_OUT, RISES
 from inertial.estimation.comparison import estimate, residuals_of, rms
 from inertial.estimation.model import Model
 from inertial.estimation.problem import Lot, Problem
+from inertial.uncertainty.rounding import short
 from pipelines.diagnosis.result_rows import known
 from schemas.units import MICRO
 
@@ -137,7 +138,7 @@ def _rise(what: str, before: float, after: float) -> str | None:
         return None
     if after <= (1.0 + RISES) * before:
         return None
-    return f"{what} rises from {MICRO * before:.3g} to {MICRO * after:.3g} µg"
+    return f"{what} rises from {short(MICRO * before)} to {short(MICRO * after)} µg"
 
 
 def _rises_left_out(first: LeftOut, after: LeftOut) -> str | None:

@@ -115,6 +115,8 @@ def undetected(document: dict[str, Any]) -> str:
     if not evidence:
         return ""
     smallest = evidence["smallest_cubic_ug"]
+    if smallest is None and "third_order" in document.get("effects", ()):
+        return "few dwells" if few_dwells(document) else ""  # the model has a cubic term: none is missing
     seen = f"below {short(smallest)} µg/g³" if smallest is not None else "of any size"
     return f"{'few dwells: ' if few_dwells(document) else ''}a cubic term {seen} is not detected (probability 0.5)"
 

@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from pipelines.archive import Archive, Run, code_hash
+from pipelines.archive.files import ELSEWHERE, writing
 from pipelines.chain.attendance import Operator
 from pipelines.chain.chain import BY_NAME, ORDER
 from pipelines.chain.runner import Done
@@ -212,7 +213,10 @@ def _start(home: Path, meanwhile: Callable[[], None]) -> tuple[int, str]:
             found = f"does not answer after {STARTUP_S} s" if status is None else f"ended with status {status}"
             raise StationTimeout(f"orchestrator: its server {found}; read {log_path}, or run with --direct")
         time.sleep(POLL_S)
-    with os.fdopen(_private_file(home / ADDRESS, os.O_TRUNC), "w", encoding="utf-8") as file:
+    with (
+        writing(home / ADDRESS, "orchestrator", ELSEWHERE),
+        os.fdopen(_private_file(home / ADDRESS, os.O_TRUNC), "w", encoding="utf-8") as file,
+    ):
         json.dump({"port": port, "pid": process.pid, "key": key}, file)
     return port, key
 

@@ -20,7 +20,7 @@ class Lineage:
 
     Parameters
     ----------
-    kind : ``unit``, ``run`` or ``file``.
+    kind : ``unit``, ``certificate``, ``run`` or ``file``.
     focus : ids of the nodes of the target.
     """
 
@@ -53,6 +53,12 @@ def lineage(archive: Archive, target: str) -> Lineage:
         gatherer = Gatherer(archive)
         names = gatherer.calibrations(target)
         return Lineage(target, "unit", tuple(names), gatherer.graph.around(names))
+    serial, _, number = target.rpartition("/")
+    if number.isdecimal() and Ledger(archive).events(serial):
+        gatherer = Gatherer(archive)
+        names = [name for name in gatherer.calibrations(serial) if name.endswith(f"/{int(number):06d}.json")]
+        if names:
+            return Lineage(target, "certificate", tuple(names), gatherer.graph.around(names))
     ids = archive.run_ids()
     if target == "latest" or any(target and name.startswith(target) for name in ids):
         return _of_run(archive, archive.run(target))
@@ -64,7 +70,8 @@ def lineage(archive: Archive, target: str) -> Lineage:
         names = [name for name in gatherer.graph.nodes if name in {f"runs/{run}/grades.parquet" for run in runs}]
         names = names or [f"runs/{run}" for run in runs]
         return Lineage(target, "unit", tuple(names), gatherer.graph.around(names))
-    message = f"lineage: '{target}' is neither a unit, a run nor a file of archive {archive.root}; {did_you_mean(target, ids)}"
+    message = f"lineage: '{target}' is neither a unit, a certificate, a run nor a file of archive {archive.root}"
+    message += f"; {did_you_mean(target, ids)}"
     raise WrongUse(message if ids else f"archive {archive.root}: no run exists; make one with 'tumbleline run'")
 
 

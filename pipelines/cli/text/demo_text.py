@@ -36,7 +36,7 @@ def _print_class(document: dict[str, Any], named: str) -> None:
     group = next(group for group in document["not_told_apart"] if document["hidden"]["effect"] in group)
     added = [name for name in document["added"] if name in group]
     others = ", ".join(name for name in group if name not in added)
-    one = f"the added effect,  {' and '.join(added)}, is one of a class" if added else "nothing of its class was added"
+    one = f"the added effect, {' and '.join(added)}, is one of a class" if added else "nothing of its class was added"
     text = f"The diagnosis named {named}. Found in a class, not separated: {one}; these data fit equally well with {others}."
     say(text, style="bold yellow")
     rows = [row for row in document["next_measurements"] if set(row["why"].split(":")[0].split(" | ")) & set(group)]

@@ -1,5 +1,6 @@
 """What commands load, take from their words, ask at the terminal, and say at the end of a demonstration."""
 
+import errno
 import io
 import json
 import subprocess
@@ -14,13 +15,14 @@ from in_process import command
 from typer.core import TyperCommand
 from typer.testing import CliRunner
 
+from pipelines import cli
 from pipelines.certificates.ledger import Ledger
 from pipelines.chain.certify import certify
-from pipelines.cli import take_texts_as_given
+from pipelines.cli import demo, take_texts_as_given
 from pipelines.cli.terminal import agreed
 from pipelines.cli.text.demo_text import print_ending
 from pipelines.demo.scenes import scene
-from schemas.errors import WrongUse
+from schemas.errors import UNUSABLE, WrongUse
 
 SHOWN = """
 import json, sys
@@ -178,3 +180,24 @@ def test_where_no_measurement_parts_the_class_that_is_said(capsys: pytest.Captur
 def test_an_effect_that_stands_alone_is_found(capsys: pytest.CaptureFixture[str]) -> None:
     said = ending(capsys, classes=[["warm_up"]], told_apart=True, not_told_apart=[])
     assert "The diagnosis named warm_up. Found." in said
+
+
+def test_a_full_disk_is_no_defect_of_the_program(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def full() -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(cli, "app", full)
+    with pytest.raises(SystemExit) as left:
+        cli.main()
+    assert left.value.code == UNUSABLE
+    assert "make room" in capsys.readouterr().err
+
+
+def test_a_demonstration_keeps_the_model_of_the_one_before(tmp_path: Path) -> None:
+    (tmp_path / "model.toml").write_text("mine", "utf-8")
+    aside = demo._put_aside(tmp_path / "model.toml")
+    assert aside == tmp_path / "model-1.toml"
+    assert aside.read_text("utf-8") == "mine"
+    assert demo._put_aside(tmp_path / "model.toml") is None
