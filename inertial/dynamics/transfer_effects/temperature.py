@@ -14,7 +14,7 @@ class Temperature(TransferEffect):
     breaker: ClassVar[str] = "the same frequencies at another temperature"
 
     def parameters(self, points: Conditions) -> tuple[Parameter, ...]:
-        span = float(np.ptp(points.temperature))
+        span = float(np.ptp(points.temperature)) or 1.0  # of points that are only planned, all at one temperature
         return (Parameter("tempco_per_K", "1/K", -0.2 / span, 0.2 / span, (0.0,)),)
 
     def factor(self, points: Conditions, values: Array) -> Complex:

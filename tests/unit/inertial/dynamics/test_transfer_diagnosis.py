@@ -118,6 +118,19 @@ def test_with_the_frequencies_that_are_proposed_the_natural_frequency_is_stated(
     assert abs(natural.value - 2475.0) < 2.0 * natural.uncertainty < 100.0
 
 
+def test_frequencies_are_proposed_where_a_sensitivity_follows_the_temperature(rng: np.random.Generator) -> None:
+    """The points that are planned next are all at one temperature, where the effect has nothing to follow."""
+    f = 5.0 * 2.0 ** (np.arange(46) / 6.0)
+    warm = 25.0 + np.cumsum(rng.normal(size=f.size))
+    h = filtered(f, 1581.0) * (1.0 + 2e-3 * (warm - warm.mean()))
+    one = points(f, h, 1e-3, 1e-3, rng)
+    c = Conditions(f, np.ones(f.size), warm, np.ones(f.size))
+    diagnosis = diagnose_transfer(Points(c, one.value, one.magnitude_error, one.phase_error), highest_hz=10000.0)
+    assert "temperature" in diagnosis.recommended
+    assert not diagnosis.parameter("natural_hz").identified
+    assert max(diagnosis.next_hz) > 1000.0
+
+
 @pytest.mark.parametrize(("natural", "damping"), [(900.0, 0.05), (2406.0, 0.08), (1391.0, 0.42)])
 def test_a_resonance_far_below_the_highest_frequency_is_found(natural: float, damping: float) -> None:
     """The magnitude falls to 1 % there, and every start is off by hundreds of uncertainties."""
