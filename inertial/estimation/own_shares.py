@@ -58,7 +58,7 @@ def own_shares(
             return (
                 _deviance(problem, block, columns, shares)
                 if quick is None
-                else problem.covariance.logdet_of_block(block, shares) + quick
+                else problem.covariance.whitener_of_block(block, shares).logdet + quick
             )
 
         best = best_shares(deviance, common, finest=_STRIDE)
@@ -81,8 +81,8 @@ def _deviance(problem: "Problem", block: int, columns: Array, shares: Shares) ->
     """−2 log restricted likelihood of one block, its columns and behind them its measurements (n, p + 1), at shares."""
     covariance = problem.covariance
     there = covariance.there[block]
-    whitener, factors, logdet = covariance.whitener_of_block(block, shares)
-    white = (columns * factors[:, None] if whitener is None else whitener @ columns)[there] / covariance.level[block]
+    whitener = covariance.whitener_of_block(block, shares)
+    white = whitener.columns(columns[None])[0, there] / covariance.level[block]
     size = np.linalg.norm(white[:, :-1], axis=0)
     seen = size > 0.0
     upper = np.linalg.qr(np.concatenate([white[:, :-1][:, seen] / size[seen], white[:, -1:]], axis=1), mode="r")
@@ -90,4 +90,4 @@ def _deviance(problem: "Problem", block: int, columns: Array, shares: Shares) ->
     determined = diagonal[:-1] > 1e-6
     dof = int(there.sum()) - int(determined.sum())
     information = 2.0 * float(np.sum(np.log(diagonal[:-1][determined] * size[seen][determined])))
-    return logdet + information + dof * float(np.log(max(diagonal[-1] ** 2, 1e-300)))
+    return whitener.logdet + information + dof * float(np.log(max(diagonal[-1] ** 2, 1e-300)))

@@ -8,9 +8,11 @@ from numpy.typing import NDArray
 from scipy.linalg import qr
 
 from inertial.estimation.candidate import Candidate, times_rows
-from inertial.estimation.whitener import applied, applied_back
+from inertial.estimation.whitener import Whitener
 
 Array = NDArray[np.float64]
+Groups = Iterable[tuple[NDArray[np.intp], Whitener]]
+"""Places of the blocks that share a whitener, and it."""
 
 PIECE = 1_000_000
 """Largest number of columns' values that are whitened at a time for their products."""
@@ -23,25 +25,22 @@ _ROUNDING = 1e-13
 """Part of columns of unit length that is rounding."""
 
 
-def products_of(
-    candidate: Candidate, level: Array, groups: Iterable[tuple[NDArray[np.intp], Array | None, Array]]
-) -> Array:
+def products_of(candidate: Candidate, level: Array, groups: Groups) -> Array:
     """Products cᵀV⁻¹c (b, grid, p, p) of a candidate's columns; rows that blocks share are whitened once.
 
     Parameters
     ----------
     level : (b,), typical white standard error of each block, g
-    groups : places of the blocks that share a whitener, and it: (n, n), or if that is None by dwell (n,)
     """
     columns = candidate.columns
     count, _, grid, p = columns.shape
     row_of = np.arange(count) if candidate.rows is None else candidate.rows
     out = np.empty((level.size, grid, p, p))
-    for own, whitener, white in groups:
+    for own, whitener in groups:
         rows, back = np.unique(row_of[own], return_inverse=True)
         few = max(PIECE // columns[0].size, 1)
         parts = np.split(rows, range(few, rows.size, few))
-        out[own] = np.concatenate([_squares(columns[some], whitener, white) for some in parts])[back]
+        out[own] = np.concatenate([_squares(columns[some], whitener) for some in parts])[back]
     return out / level[:, None, None, None] ** 2
 
 
@@ -49,7 +48,7 @@ def products_with(
     candidate: Candidate,
     rows: Array,
     level: Array,
-    groups: Iterable[tuple[NDArray[np.intp], Array | None, Array]],
+    groups: Groups,
 ) -> tuple[Array, Array]:
     """Products cᵀV⁻¹c (blocks, p, p) of a candidate's columns at one value, and those with rows in g: (blocks, p, k).
 
@@ -60,12 +59,12 @@ def products_with(
     count, p = level.size, candidate.columns.shape[-1]
     row_of = np.arange(count) if candidate.rows is None else candidate.rows
     own, across = np.empty((count, p, p)), np.empty((count, p, rows.shape[1]))
-    for members, whitener, white in groups:
+    for members, whitener in groups:
         few, place = np.unique(row_of[members], return_inverse=True)
         columns = np.swapaxes(candidate.columns[few, :, 0], -1, -2)
-        made = columns * white if whitener is None else applied(whitener, columns)
+        made = whitener.rows(columns)
         own[members] = (made @ np.swapaxes(made, -1, -2))[place]
-        back = made * white if whitener is None else applied_back(whitener, made)
+        back = whitener.back(made)
         solved = Candidate(
             np.swapaxes(back, -1, -2)[:, :, None], shared=False, rows=None if few.size == members.size else place
         )
@@ -89,7 +88,7 @@ class Spanned:
         columns: Array,
         places: NDArray[np.intp],
         level: Array,
-        groups: Iterable[tuple[NDArray[np.intp], Array | None, Array]],
+        groups: Groups,
     ) -> tuple[Array, Array]:
         """The same as :func:`products_with`: (blocks, p, p) and (blocks, p, k).
 
@@ -99,9 +98,9 @@ class Spanned:
         """
         p = self.inside.shape[1]
         own, across = np.empty((level.size, p, p)), np.empty((level.size, p, places.shape[1]))
-        for members, whitener, white in groups:
-            made = self.series * white if whitener is None else applied(whitener, self.series)
-            back = made * white if whitener is None else applied_back(whitener, made)
+        for members, whitener in groups:
+            made = whitener.rows(self.series)
+            back = whitener.back(made)
             inside = self.inside[members]
             own[members] = inside @ (made @ made.T) @ np.swapaxes(inside, -1, -2)
             few, place = np.unique(places[members], return_inverse=True)
@@ -132,9 +131,8 @@ def spanned(columns: Array) -> Spanned | None:
     return Spanned(np.ascontiguousarray(basis[:, :count].T), inside.reshape(blocks, p, count))
 
 
-def _squares(columns: Array, whitener: Array | None, white: Array) -> Array:
-    """Products (rows, grid, p, p) of columns (rows, n, grid, p) with each other after a whitener (n, n), or one by dwell (n,)."""
+def _squares(columns: Array, whitener: Whitener) -> Array:
+    """Products (rows, grid, p, p) of columns (rows, n, grid, p) with each other after whitening."""
     rows, n, grid, p = columns.shape
-    own = columns.transpose(0, 2, 3, 1).reshape(rows * grid, p, n)
-    white = own * white if whitener is None else applied(whitener, own)
+    white = whitener.rows(columns.transpose(0, 2, 3, 1).reshape(rows * grid, p, n))
     return (white @ np.swapaxes(white, -1, -2)).reshape(rows, grid, p, p)

@@ -10,7 +10,6 @@ from inertial.estimation.factors import Left, beside_common, factorised
 from inertial.estimation.noise_shares import Shares
 from inertial.estimation.problem import Problem
 from inertial.estimation.products import PIECE, Spanned, spanned
-from inertial.estimation.whitener import applied
 
 Array = NDArray[np.float64]
 
@@ -180,9 +179,7 @@ class ShareStatistics:
             return self._kept[shares][block]
         if (block, shares) not in self._single:
             covariance = self.problem.covariance
-            whitener, white, _ = covariance.whitener_of_block(block, shares)
-            rows = self._rows_of(block)
-            made = rows * white if whitener is None else applied(whitener, rows)
+            made = covariance.whitener_of_block(block, shares).rows(self._rows_of(block))
             self._single[block, shares] = made @ made.T / covariance.level[block] ** 2
         return self._single[block, shares]
 

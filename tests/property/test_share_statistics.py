@@ -19,6 +19,7 @@ from inertial.estimation.noise_shares import Shares
 from inertial.estimation.own_shares import _deviance, own_shares
 from inertial.estimation.products import products_with, spanned
 from inertial.estimation.share_statistics import ShareStatistics
+from inertial.estimation.whitener import Whitener
 from inertial.estimation.shares import shares_at
 from inertial.estimation.term import Term
 from pipelines.tables.dwells import lot_of, measured
@@ -112,7 +113,9 @@ def test_shares_of_single_blocks_by_products_are_those_of_the_whitened_series(na
     differences = [
         [of(block, Shares(3.0, 1.0)) - of(block, lot) for block in range(model.problem.blocks)]
         for of in (
-            lambda block, shares: quick(block, shares) + model.problem.covariance.logdet_of_block(block, shares),
+            lambda block, shares: (
+                quick(block, shares) + model.problem.covariance.whitener_of_block(block, shares).logdet
+            ),
             lambda block, shares: _alone(model, series, block, shares),
         )
     ]
@@ -150,7 +153,11 @@ def test_products_of_columns_that_few_series_span_are_those_of_the_columns(seed:
     rows, places = rng.standard_normal((8, n)), rng.integers(0, 8, (blocks, 3))
     level = rng.uniform(0.5, 2.0, blocks)
     lower = np.tril(rng.standard_normal((n, n)))
-    groups = [(np.array([0, 2, 5]), lower, np.ones(n)), (np.array([1, 3, 4]), None, rng.uniform(0.5, 2.0, n))]
+    there = np.ones(n, dtype=bool)
+    groups = [
+        (np.array([0, 2, 5]), Whitener(there, np.ones(n), 0.0, lower)),
+        (np.array([1, 3, 4]), Whitener(there, rng.uniform(0.5, 2.0, n), 0.0)),
+    ]
     few = spanned(np.swapaxes(columns, -1, -2))
     assert few is not None
     assert len(few.series) == rank
