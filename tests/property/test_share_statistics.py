@@ -19,9 +19,9 @@ from inertial.estimation.noise_shares import Shares
 from inertial.estimation.own_shares import _deviance, own_shares
 from inertial.estimation.products import products_with, spanned
 from inertial.estimation.share_statistics import ShareStatistics
-from inertial.estimation.whitener import Whitener
 from inertial.estimation.shares import shares_at
 from inertial.estimation.term import Term
+from inertial.estimation.whitener import Whitener
 from pipelines.tables.dwells import lot_of, measured
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks" / "worlds"))
