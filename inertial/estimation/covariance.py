@@ -20,7 +20,7 @@ from inertial.decisions import SHARE_STEP
 from inertial.estimation.candidate import Candidate
 from inertial.estimation.noise import LONGEST
 from inertial.estimation.noise_shares import Noise, Shares
-from inertial.estimation.products import PIECE, Spanned, products_of, products_with
+from inertial.estimation.products import PIECE, products_of
 from inertial.estimation.whitener import Whitener, grouped, whitener_of
 from inertial.noise.flicker import flicker_kernel
 from inertial.noise.measurands import walk_kernel
@@ -255,16 +255,6 @@ class Covariance:
         else:
             self._kept.move_to_end(name)
         return kept
-
-    def products_with(self, candidate: Candidate, rows: Array, shares: Shares) -> tuple[Array, Array]:
-        """Products cᵀV⁻¹c (blocks, p, p) of a candidate's columns at one value, and with rows (blocks, k, n): (blocks, p, k)."""
-        return products_with(candidate, rows, self.level, self._by_whitener(shares))
-
-    def products_of_spanned(
-        self, spanned: Spanned, columns: Array, places: NDArray[np.intp], shares: Shares
-    ) -> tuple[Array, Array]:
-        """The same of columns that a few series span; with columns (rows, n), those of each block at places (blocks, k)."""
-        return spanned.products_with(columns, places, self.level, self._by_whitener(shares))
 
     def logdet(self, shares: Shares) -> Array:
         """Log-determinants of the blocks' covariances over their white variance, (blocks,)."""

@@ -1,6 +1,6 @@
 """An effect in a model, at values of its nonlinear parameters."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from inertial.effects.base import AnyEffect
 from inertial.estimation.alternative import Handling
@@ -45,8 +45,3 @@ class Term:
     def candidate(self, problem: Problem) -> Candidate:
         """The term's columns in a problem, as a candidate."""
         return problem.candidate(self.effect, [self.keywords], first=self.first)
-
-    def with_start(self, problem: Problem) -> Candidate:
-        """The same with the columns of the unknown state of its memory."""
-        made = problem.varied(self.effect, [self.keywords], first=self.first, start=not self.rest)
-        return replace(made, key=self.key)

@@ -13,15 +13,12 @@ from inertial import effects as catalogue
 from inertial.criticism.examination import ExaminedRun
 from inertial.criticism.unknown import suspects
 from inertial.data_errors.handling.gain_step import GainStep
-from inertial.estimation.candidate import Candidate
 from inertial.estimation.model import Model
 from inertial.estimation.noise_shares import Shares
 from inertial.estimation.own_shares import _deviance, own_shares
-from inertial.estimation.products import products_with, spanned
 from inertial.estimation.share_statistics import ShareStatistics
 from inertial.estimation.shares import shares_at
 from inertial.estimation.term import Term
-from inertial.estimation.whitener import Whitener
 from pipelines.tables.dwells import lot_of, measured
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks" / "worlds"))
@@ -91,8 +88,8 @@ def test_a_deviance_by_products_is_that_of_the_whitened_series(
 ) -> None:
     model = model_of(name, gaps=gaps)
     shares = shares_at(place, tuple((block, *shares_at(each)[:2]) for block, *each in sorted(apart)))
-    statistics = model.statistics
-    quick = statistics.beside_shared(shares, model._weights) if model._joined else statistics.at(shares)
+    statistics = model._statistics
+    quick = statistics.left(shares, model._weights)
     assert quick is not None
     space = model._rough(shares)
     assert quick.information == pytest.approx(space.information, rel=1e-9)
@@ -142,39 +139,10 @@ def test_what_is_known_of_equal_models_is_what_each_of_them_finds() -> None:
 PLACES = [(4, None), (0, 8), (None, 16), (12, 4), (-8, -8)]
 
 
-@given(seed=st.integers(0, 2**32 - 1), rank=st.integers(1, 6), p=st.integers(6, 12))
-@settings(max_examples=30, deadline=None)
-def test_products_of_columns_that_few_series_span_are_those_of_the_columns(seed: int, rank: int, p: int) -> None:
-    rng = np.random.default_rng(seed)
-    blocks, n = 6, 30
-    columns = rng.standard_normal((blocks, p, rank)) @ (
-        rng.standard_normal((rank, n)) * 10.0 ** rng.uniform(-3, 3, (rank, 1))
-    )
-    rows, places = rng.standard_normal((8, n)), rng.integers(0, 8, (blocks, 3))
-    level = rng.uniform(0.5, 2.0, blocks)
-    lower = np.tril(rng.standard_normal((n, n)))
-    there = np.ones(n, dtype=bool)
-    groups = [
-        (np.array([0, 2, 5]), Whitener(there, np.ones(n), 0.0, lower)),
-        (np.array([1, 3, 4]), Whitener(there, rng.uniform(0.5, 2.0, n), 0.0)),
-    ]
-    few = spanned(np.swapaxes(columns, -1, -2))
-    assert few is not None
-    assert len(few.series) == rank
-    found = few.products_with(rows, places, level, groups)
-    every = Candidate(np.swapaxes(columns, -1, -2)[:, :, None], shared=False)
-    for one, other in zip(found, products_with(every, rows[places], level, groups), strict=True):
-        np.testing.assert_allclose(one, other, rtol=1e-8, atol=1e-9 * np.abs(other).max())
-
-
-def test_columns_that_need_many_series_are_whitened_themselves() -> None:
-    assert spanned(np.random.default_rng(1).standard_normal((6, 60, 8))) is None
-
-
 def test_columns_of_the_table_span_fewer_directions_than_they_are() -> None:
     model = base(gaps=False)
     columns = of_the_table(model)
-    found = ShareStatistics(model.problem, model.local).independent(np.concatenate([columns, columns], axis=-1))
+    found = ShareStatistics(model.problem, model.local, np.concatenate([columns, columns], axis=-1))._directions
     assert 0 < found.shape[-1] <= columns.shape[-1]
     flat = found.reshape(-1, found.shape[-1])
     np.testing.assert_allclose(flat.T @ flat, np.eye(found.shape[-1]), atol=1e-9)
