@@ -16,7 +16,7 @@ from inertial.correction import correct
 from inertial.design import Values
 from inertial.errors import NotIdentified
 from inertial.fits.linear import LotFit, force_along_axes, response_matrix
-from inertial.norm_noise import PlausibleNoise, SolvedNorms
+from inertial.fits.norm_noise import PlausibleNoise, SolvedNorms
 from inertial.state import State
 
 Array = NDArray[np.float64]

@@ -1,7 +1,7 @@
-"""Coefficients of a model by generalised least squares, and their residuals on their own run and on a fresh run."""
+"""Coefficients of a model, and their residuals on their own run, on dwells that were left out, and on a fresh run."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from inertial.estimation.model import Model
 from inertial.estimation.problem import Problem
 from inertial.estimation.term import Term
+from inertial.state import History
 
 Array = NDArray[np.float64]
 
@@ -135,3 +136,88 @@ def _columns(problem: Problem, terms: Sequence[Term]) -> Array:
 def rms(values: Array) -> float:
     """Root mean square of the values that are not missing."""
     return float(np.sqrt(np.nanmean(values**2)))
+
+
+def residuals(problem: Problem, terms: Sequence[Term], train: NDArray[np.bool_]) -> Array:
+    """Residuals (blocks, n) in g of least squares on some dwells, weighted by the white standard errors.
+
+    Parameters
+    ----------
+    train : (n,), dwells that are fitted; all are predicted
+    """
+    left = Fitting(problem, terms).left(problem.series[..., None], train)[..., 0]
+    return np.where(np.isfinite(problem.error), left, np.nan)
+
+
+class Fitting:
+    """A model's columns in a problem, ready to be fitted to some dwells of any series."""
+
+    def __init__(self, problem: Problem, terms: Sequence[Term]) -> None:
+        self._x = _stacked(problem, [t for t in terms if not t.shared])
+        self._z = _stacked(problem, [t for t in terms if t.shared])
+        self._weight = np.where(np.isfinite(problem.error), 1.0 / problem.error, 0.0)
+
+    def left(self, series: Array, train: NDArray[np.bool_]) -> Array:
+        """Residuals of a fit to the dwells ``train`` (n,) on series (blocks, n, m), on all dwells."""
+        x, z, weight = self._x, self._z, self._weight * train
+        solve = _solver(x, weight)
+        if z.shape[-1]:
+            free = (z - x @ solve(z)) * weight[..., None]
+            target = (series - x @ solve(series)) * weight[..., None]
+            flat = free.reshape(-1, free.shape[-1])
+            series = series - z @ np.linalg.lstsq(flat, target.reshape(flat.shape[0], -1), rcond=1e-9)[0]
+        return series - x @ solve(series)
+
+
+def fit_rms(problem: Problem, terms: Sequence[Term]) -> float:
+    """RMS residual in g of the fit to all dwells."""
+    left = residuals(problem, terms, np.ones(problem.n, dtype=bool))
+    return float(np.sqrt(np.nanmean(left**2)))
+
+
+def _stacked(problem: Problem, terms: Sequence[Term]) -> Array:
+    columns = [problem.columns(t.effect, t.keywords)[..., : t.first] for t in terms]
+    return np.concatenate(columns, axis=-1) if columns else np.zeros((problem.blocks, problem.n, 0))
+
+
+class _solver:  # noqa: N801  # a function with a prepared factor
+    """Coefficients (blocks, p, m) for targets (blocks, n, m) in weighted least squares on columns (blocks, n, p)."""
+
+    def __init__(self, x: Array, weight: Array) -> None:
+        weighted = x * weight[..., None]
+        self.size = np.sqrt(np.einsum("bnp,bnp->bp", weighted, weighted))
+        self.size = np.where(self.size > 0.0, self.size, 1.0)
+        self.scaled, self.weight = weighted / self.size[:, None, :], weight
+        self.inverse = np.linalg.pinv(np.swapaxes(self.scaled, -1, -2) @ self.scaled, rcond=1e-9, hermitian=True)
+
+    def __call__(self, target: Array) -> Array:
+        right = np.swapaxes(self.scaled, -1, -2) @ (target * self.weight[..., None])
+        return (self.inverse @ right) / self.size[..., None]
+
+
+_WARMER = 0.5
+"""Change of temperature, K, by which the response to it is found."""
+
+
+def slope_of(model: Model) -> Array | None:
+    """∂E/∂T of every unit at every dwell, (units, n, 3), g/K; None if no temperature is recorded or the model has none."""
+    lot = model.problem.lot
+    state = lot.state
+    if state.temperature is None or lot.radial:
+        return None
+    fit = estimate(model)
+    ends: list[Array] = []
+    for sign in (1.0, -1.0):
+        history = (
+            None if state.history is None else History(state.history.time, state.history.temperature + sign * _WARMER)
+        )
+        moved = replace(state, temperature=state.temperature + sign * _WARMER, history=history, memory={})
+        problem = Problem(replace(lot, state=moved))
+        local = [t for t in fit.terms if not t.shared]
+        columns = [problem.columns(t.effect, t.keywords)[..., : t.first] for t in local]
+        whole = np.concatenate(columns, axis=-1)
+        ends.append(np.einsum("bnp,bp->bn", whole, fit.local[:, : whole.shape[-1]]))
+    slope = (ends[0] - ends[1]) / (2.0 * _WARMER)
+    if float(np.max(np.abs(slope))) <= 0.0:
+        return None
+    return np.swapaxes(slope.reshape(state.time.shape[0], 3, -1), 1, 2)

@@ -2,7 +2,7 @@
 
 A block is the series of one unit and axis. Its covariance is s²·(diag(e²) + F·K_F + W·K_W), where e is the white standard error
 of its dwells and F and W, in units of the lot's white variance, are the same for all blocks but those whose wander is of another
-kind (:mod:`inertial.estimation.own_shares`). Blocks that have the same dwells at
+kind (:mod:`inertial.estimation.shares`). Blocks that have the same dwells at
 the same times and about the same white noise share a whitener; a missing dwell only leaves out its row.
 
 Where only the norm of gravity is known, a block is a unit. Wander along one axis enters the norm in proportion to the force along
@@ -10,7 +10,7 @@ that axis: the kernels are then (F·K_F + W·K_W) ∘ (u·uᵀ) with the directi
 """
 
 from collections import OrderedDict
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from functools import cached_property, lru_cache
 
 import numpy as np
@@ -18,14 +18,15 @@ from numpy.typing import NDArray
 
 from inertial.decisions import SHARE_STEP
 from inertial.estimation.candidate import Candidate
-from inertial.estimation.noise import LONGEST
-from inertial.estimation.noise_shares import Noise, Shares
-from inertial.estimation.products import PIECE, products_of
+from inertial.estimation.noise_shares import LONGEST, Noise, Shares
 from inertial.estimation.whitener import Whitener, grouped, whitener_of
 from inertial.noise.flicker import flicker_kernel
 from inertial.noise.measurands import walk_kernel
 
 Array = NDArray[np.float64]
+
+PIECE = 1_000_000
+"""Largest number of columns' values that are whitened at a time."""
 
 _WHITENERS = 18_000_000
 """Largest number of stored whiteners."""
@@ -246,7 +247,7 @@ class Covariance:
         kept = None if candidate.key is None else self._kept.get(name)
         if kept is None:
             level = self.level if candidate.blocks is None else self.level[candidate.blocks]
-            kept = products_of(candidate, level, self._by_whitener(shares, candidate.blocks))
+            kept = _products_of(candidate, level, self._by_whitener(shares, candidate.blocks))
             if candidate.key is not None:
                 self._kept[name] = kept
                 self._used += kept.size
@@ -280,3 +281,29 @@ class Covariance:
         """Noise of another covariance, of the same blocks, in the units of this one."""
         factor = other.white / self.white
         return Noise(noise.shares.times(factor, factor * self.span / other.span), noise.scale, noise.prior)
+
+
+def _products_of(candidate: Candidate, level: Array, groups: Iterable[tuple[NDArray[np.intp], Whitener]]) -> Array:
+    """Products cᵀV⁻¹c (b, grid, p, p) of a candidate's columns; rows that blocks share are whitened once.
+
+    Parameters
+    ----------
+    level : (b,), typical white standard error of each block, g; groups : places of the blocks that share a whitener, and it
+    """
+    columns = candidate.columns
+    count, _, grid, p = columns.shape
+    row_of = np.arange(count) if candidate.rows is None else candidate.rows
+    out = np.empty((level.size, grid, p, p))
+    for own, whitener in groups:
+        rows, back = np.unique(row_of[own], return_inverse=True)
+        few = max(PIECE // columns[0].size, 1)
+        parts = np.split(rows, range(few, rows.size, few))
+        out[own] = np.concatenate([_squares(columns[some], whitener) for some in parts])[back]
+    return out / level[:, None, None, None] ** 2
+
+
+def _squares(columns: Array, whitener: Whitener) -> Array:
+    """Products (rows, grid, p, p) of columns (rows, n, grid, p) with each other after whitening."""
+    rows, n, grid, p = columns.shape
+    white = whitener.rows(columns.transpose(0, 2, 3, 1).reshape(rows * grid, p, n))
+    return (white @ np.swapaxes(white, -1, -2)).reshape(rows, grid, p, p)

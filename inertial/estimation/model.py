@@ -6,14 +6,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.estimation import variance
+from inertial.errors import NotIdentified
 from inertial.estimation.candidate import Candidate
 from inertial.estimation.covariance import LARGE
-from inertial.estimation.noise_shares import Noise, Shares
-from inertial.estimation.own_shares import own_shares
+from inertial.estimation.noise_shares import Noise, Shares, deviance_of, moderated
 from inertial.estimation.problem import KnownDeviances, Problem
 from inertial.estimation.share_statistics import ShareStatistics
-from inertial.estimation.shares import best_shares, plausible_shares
+from inertial.estimation.shares import best_shares, own_shares, plausible_shares
 from inertial.estimation.space import Space
 from inertial.estimation.term import Term
 
@@ -144,7 +143,7 @@ class Model:
     def noise_at(self, shares: Shares) -> Noise:
         """The noise at given shares: each block's variance shrunk towards the others as far as they are similar."""
         space = self._rough(shares)
-        squares, prior = variance.moderated(space.squares, space.by_block)
+        squares, prior = moderated(space.squares, space.by_block)
         return Noise(shares, np.sqrt(np.maximum(squares, self._least)), prior)
 
     @cached_property
@@ -181,7 +180,7 @@ class Model:
     def _own_scale(self) -> Array:
         """Standard deviations of the blocks under white noise: weights for columns that all share."""
         space = self._space(self.problem.covariance.white_noise())
-        return np.sqrt(variance.moderated(space.squares, space.by_block)[0])
+        return np.sqrt(moderated(space.squares, space.by_block)[0])
 
     def _restricted(self, shares: Shares) -> float:
         """−2 log restricted likelihood, each block with its own variance if it has enough degrees of freedom."""
@@ -211,7 +210,7 @@ class Model:
             level = np.maximum(squares[known] / dof[known], np.maximum(self._least[known], 1e-300))
             return logdet + information + float(np.sum(dof[known] * np.log(level) + squares[known] / level))
         if float(np.median(dof)) < _OWN:
-            return logdet + information + variance.deviance(squares, dof)
+            return logdet + information + deviance_of(squares, dof)
         known = dof > 0
         own = dof[known] * np.log(np.maximum(squares[known], 1e-300) / dof[known])
         return logdet + information + float(np.sum(own))
@@ -343,3 +342,19 @@ class Model:
     def without_term(self, term: Term) -> "Model":
         """The model less one term; a model that was kept holds an equal one."""
         return self._variant([t for t in self.terms if t.key != term.key])
+
+
+def refuse_without_freedom(model: Model) -> None:
+    """Refuse to judge a model that has as many coefficients as there are measurements: it fits any data.
+
+    Raises
+    ------
+    NotIdentified
+        No degree of freedom is left.
+    """
+    if model.at(model.problem.covariance.white_noise()).dof < 1:
+        count, series = model.problem.count, model.problem.blocks
+        raise NotIdentified(
+            f"model: {count // series} dwells a unit leave no degree of freedom to judge the model, more dwells than its "
+            "coefficients on an axis are needed; measure more poses or repeats, or judge a smaller model"
+        )

@@ -11,11 +11,10 @@ from numpy.typing import NDArray
 from inertial.effects import SensorEffect
 from inertial.effects.base import AnyEffect, excited, has_start
 from inertial.estimation.alternative import Handling, by_block
-from inertial.estimation.candidate import Candidate
+from inertial.estimation.candidate import Candidate, finest_rows, shared_rows
 from inertial.estimation.covariance import Covariance
 from inertial.estimation.lot import Lot
 from inertial.estimation.noise_shares import Shares
-from inertial.estimation.shared_rows import finest_rows, shared_rows
 
 Array = NDArray[np.float64]
 

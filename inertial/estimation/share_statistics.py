@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial.estimation.bases import SEEN
+from inertial.estimation.covariance import PIECE
 from inertial.estimation.noise_shares import Shares
 from inertial.estimation.problem import Problem
-from inertial.estimation.products import PIECE
 
 Array = NDArray[np.float64]
 

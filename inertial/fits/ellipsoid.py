@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from inertial.errors import NotIdentified
-from inertial.estimation.noise import LONGEST
-from inertial.fits.norm_wander import WALK_ABOUT_MEAN, NormNoise, norm_noise
+from inertial.estimation.noise_shares import LONGEST
+from inertial.fits.norm_noise import WALK_ABOUT_MEAN, NormNoise, norm_noise
 from inertial.fits.wander import student
 
 Array = NDArray[np.float64]

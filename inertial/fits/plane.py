@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from inertial.distributions import f_tail
 from inertial.errors import NotIdentified
-from inertial.fits.norm_wander import norm_noise
+from inertial.fits.norm_noise import norm_noise
 from inertial.fits.wander import student
 
 Array = NDArray[np.float64]

@@ -15,9 +15,8 @@ from inertial.criticism.unknown import suspects
 from inertial.data_errors.handling.gain_step import GainStep
 from inertial.estimation.model import Model
 from inertial.estimation.noise_shares import Shares
-from inertial.estimation.own_shares import _deviance, own_shares
 from inertial.estimation.share_statistics import ShareStatistics
-from inertial.estimation.shares import shares_at
+from inertial.estimation.shares import _deviance_of_block, own_shares, shares_at
 from inertial.estimation.term import Term
 from pipelines.tables.dwells import lot_of, measured
 
@@ -122,7 +121,9 @@ def test_shares_of_single_blocks_by_products_are_those_of_the_whitened_series(na
 
 
 def _alone(model: Model, series: np.ndarray, block: int, shares: Shares) -> float:
-    return _deviance(model.problem, block, np.concatenate([model.local[block], series[block][:, None]], axis=1), shares)
+    return _deviance_of_block(
+        model.problem, block, np.concatenate([model.local[block], series[block][:, None]], axis=1), shares
+    )
 
 
 def test_what_is_known_of_equal_models_is_what_each_of_them_finds() -> None:
