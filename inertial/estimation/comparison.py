@@ -1,6 +1,6 @@
 """Coefficients of a model, and their residuals on their own run, on dwells that were left out, and on a fresh run."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -118,19 +118,22 @@ def residuals_of(problem: Problem, fit: Estimate) -> Array:
     """Residuals (blocks, n) in g of a problem under given coefficients; NaN where a dwell is missing."""
     local = [t for t in fit.terms if not t.shared]
     shared = [t for t in fit.terms if t.shared]
-    left = problem.series.copy()
-    if local:
-        left -= np.einsum("bnp,bp->bn", _columns(problem, local), fit.local)
+    left = problem.series - np.einsum("bnp,bp->bn", _with_start(problem, local), fit.local)
     if shared:
-        left -= _columns(problem, shared) @ fit.shared
+        left -= _with_start(problem, shared) @ fit.shared
     return np.where(np.isfinite(problem.error), left, np.nan)
 
 
 def _columns(problem: Problem, terms: Sequence[Term]) -> Array:
-    own = [problem.columns(t.effect, t.keywords)[..., : t.first] for t in terms]
-    # as in the model: a memory that was at rest has no unknown state
+    """Columns (blocks, n, p) of terms, without those of the unknown state of their memory."""
+    columns = [problem.columns(t.effect, t.keywords)[..., : t.first] for t in terms]
+    return np.concatenate(columns, axis=-1) if columns else np.zeros((problem.blocks, problem.n, 0))
+
+
+def _with_start(problem: Problem, terms: Sequence[Term]) -> Array:
+    """The same with them: as in the model, a memory that was at rest has no unknown state."""
     started = [problem.start(t.effect, t.keywords) for t in terms if not t.rest]
-    return np.concatenate([*own, *started], axis=-1)
+    return np.concatenate([_columns(problem, terms), *started], axis=-1)
 
 
 def rms(values: Array) -> float:
@@ -153,8 +156,8 @@ class Fitting:
     """A model's columns in a problem, ready to be fitted to some dwells of any series."""
 
     def __init__(self, problem: Problem, terms: Sequence[Term]) -> None:
-        self._x = _stacked(problem, [t for t in terms if not t.shared])
-        self._z = _stacked(problem, [t for t in terms if t.shared])
+        self._x = _columns(problem, [t for t in terms if not t.shared])
+        self._z = _columns(problem, [t for t in terms if t.shared])
         self._weight = np.where(np.isfinite(problem.error), 1.0 / problem.error, 0.0)
 
     def left(self, series: Array, train: NDArray[np.bool_]) -> Array:
@@ -175,24 +178,14 @@ def fit_rms(problem: Problem, terms: Sequence[Term]) -> float:
     return float(np.sqrt(np.nanmean(left**2)))
 
 
-def _stacked(problem: Problem, terms: Sequence[Term]) -> Array:
-    columns = [problem.columns(t.effect, t.keywords)[..., : t.first] for t in terms]
-    return np.concatenate(columns, axis=-1) if columns else np.zeros((problem.blocks, problem.n, 0))
-
-
-class _solver:  # noqa: N801  # a function with a prepared factor
-    """Coefficients (blocks, p, m) for targets (blocks, n, m) in weighted least squares on columns (blocks, n, p)."""
-
-    def __init__(self, x: Array, weight: Array) -> None:
-        weighted = x * weight[..., None]
-        self.size = np.sqrt(np.einsum("bnp,bnp->bp", weighted, weighted))
-        self.size = np.where(self.size > 0.0, self.size, 1.0)
-        self.scaled, self.weight = weighted / self.size[:, None, :], weight
-        self.inverse = np.linalg.pinv(np.swapaxes(self.scaled, -1, -2) @ self.scaled, rcond=1e-9, hermitian=True)
-
-    def __call__(self, target: Array) -> Array:
-        right = np.swapaxes(self.scaled, -1, -2) @ (target * self.weight[..., None])
-        return (self.inverse @ right) / self.size[..., None]
+def _solver(x: Array, weight: Array) -> Callable[[Array], Array]:
+    """What gives the coefficients (blocks, p, m) of weighted least squares on columns (blocks, n, p) for targets (..., m)."""
+    weighted = x * weight[..., None]
+    size = np.sqrt(np.einsum("bnp,bnp->bp", weighted, weighted))
+    size = np.where(size > 0.0, size, 1.0)
+    across = np.swapaxes(weighted / size[:, None, :], -1, -2)
+    inverse = np.linalg.pinv(across @ np.swapaxes(across, -1, -2), rcond=1e-9, hermitian=True)
+    return lambda target: (inverse @ (across @ (target * weight[..., None]))) / size[..., None]
 
 
 _WARMER = 0.5
@@ -213,9 +206,7 @@ def slope_of(model: Model) -> Array | None:
         )
         moved = replace(state, temperature=state.temperature + sign * _WARMER, history=history, memory={})
         problem = Problem(replace(lot, state=moved))
-        local = [t for t in fit.terms if not t.shared]
-        columns = [problem.columns(t.effect, t.keywords)[..., : t.first] for t in local]
-        whole = np.concatenate(columns, axis=-1)
+        whole = _columns(problem, [t for t in fit.terms if not t.shared])
         ends.append(np.einsum("bnp,bp->bn", whole, fit.local[:, : whole.shape[-1]]))
     slope = (ends[0] - ends[1]) / (2.0 * _WARMER)
     if float(np.max(np.abs(slope))) <= 0.0:

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial.estimation.bases import SEEN
+from inertial.estimation.candidate import shared_rows
 from inertial.estimation.covariance import PIECE
 from inertial.estimation.noise_shares import Shares
 from inertial.estimation.problem import Problem
@@ -151,7 +152,7 @@ class ShareStatistics:
         places: list[NDArray[np.intp]] = []
         count = 0
         for column in np.swapaxes(self._rows, 0, 1):
-            rows = self.problem.rows_of(column)
+            rows = shared_rows(column, radial=self.problem.lot.radial)
             few.append(column if rows is None else column[np.unique(rows, return_index=True)[1]])
             places.append(count + (np.arange(blocks) if rows is None else rows))
             count += len(few[-1])

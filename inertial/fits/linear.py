@@ -122,7 +122,8 @@ def fit_lot(
         columns = design.shared_columns(station, state, values, response_matrix(theta, names))
         shared, shared_covariance, z = _solve_shared(local, columns, z, design.shared_names(station))
         theta = local.solve(z)
-    residual = z - local.apply(theta)
+    residual = local.apply(theta)
+    np.subtract(z, residual, out=residual)  # no third array of the size of the lot
     chi2, dof = local.chi2(residual)
     covariance = local.inverse
     if weight is None:
