@@ -22,9 +22,6 @@ _LONG = 400
 """Number of dwells above which shares are searched by half decades, because each whitener takes time and memory."""
 
 
-_SPACES = 2_000_000
-"""Largest number of whitened values stored for shares that were tried; of small lots at least two spaces are stored."""
-
 _SHARE_OF_WHITE = 0.5
 """Part of the recorded white variance that the noise of norms has at the least."""
 
@@ -163,8 +160,7 @@ class Model:
     def _rough(self, shares: Shares) -> Space:
         """The space at shares, with the blocks weighted by their known variances."""
         if shares not in self._spaces:
-            most = max(2 if self.problem.y.size <= LARGE else 1, _SPACES // max(self.local.size, 1))
-            while len(self._spaces) >= most:  # the oldest first: a search for shares seldom goes back
+            if len(self._spaces) >= (2 if self.problem.y.size <= LARGE else 1):  # a search for shares seldom goes back
                 del self._spaces[next(iter(self._spaces))]
             self._spaces[shares] = self._space(Noise(shares, self._weights))
         return self._spaces[shares]

@@ -27,15 +27,6 @@ _PIECE = 1_000_000
 _WIDE = 3_000_000
 """The same of the columns of one effect at several values: each pass over them goes through the model's own columns once."""
 
-_FEW = 1000
-"""Values of a column of all blocks up to which it takes longer to find equal columns than to work on all."""
-
-_MOST = 40
-"""Values of a grid at a time, where blocks have equal columns."""
-
-_PART = 4
-"""Part of the room, one over this, that the columns of one effect may take."""
-
 _WIDEST = 3
 """Usual largest number of columns of an effect per axis."""
 
@@ -196,28 +187,22 @@ class Problem:
             return np.einsum("uni,uinq->unq", self._direction, seen)
         return seen.reshape(self.blocks, self.n, -1)
 
-    def candidate(
-        self, effect: AnyEffect | Handling, grid: Sequence[Values], *, first: int | None = None, of: int = 1
-    ) -> Candidate:
+    def candidate(self, effect: AnyEffect | Handling, grid: Sequence[Values], *, first: int | None = None) -> Candidate:
         """Columns of an effect over values of its nonlinear parameters.
 
         Parameters
         ----------
         first : how many columns an axis; all if None
-        of : number of values of the whole grid, of which these are a part
         """
         key = (effect.id, len(grid), tuple(grid[0].items()), tuple(grid[-1].items()), first)
-        # columns of many values, which differ from block to block, are made again: they would take the room of all others
-        return self._stored(
-            key, lambda: self._made(effect, grid, first, key), of / len(grid) * _PART if len(grid) < of else 1.0
-        )
+        return self._stored(key, lambda: self._made(effect, grid, first, key))
 
-    def _stored(self, key: tuple[object, ...], make: Callable[[], Candidate], least: float = 1.0) -> Candidate:
-        """A candidate, made where it is not kept; it is kept where so many times its columns have room."""
+    def _stored(self, key: tuple[object, ...], make: Callable[[], Candidate]) -> Candidate:
+        """A candidate, made where it is not kept, and kept where its columns have room."""
         kept = self._kept.get(key)
         if kept is None:
             kept = make()
-            if kept.columns.size * least < self._room:
+            if kept.columns.size < self._room:
                 self._room -= kept.columns.size
                 self._kept[key] = kept
         return kept
@@ -256,7 +241,7 @@ class Problem:
             own = (self._columns(effect, values) if known is None else known)[..., :first]
             if start:
                 own = np.concatenate([own, self.start(effect, values)], axis=-1)
-            rows = None if shared or self.blocks * self.n <= _FEW else shared_rows(own, radial=self.lot.radial)
+            rows = None if shared else shared_rows(own, radial=self.lot.radial)
             every.append(own if rows is None else own[np.unique(rows, return_index=True)[1]])
             rows_of.append(rows)
         rows = finest_rows(rows_of, radial=self.lot.radial)
@@ -277,11 +262,11 @@ class Problem:
             return
         size, begin = self.at_a_time, 0
         while begin < len(grid):
-            made = self.candidate(effect, grid[begin : begin + size], first=first, of=len(grid))
+            made = self.candidate(effect, grid[begin : begin + size], first=first)
             yield made
             begin += size
             if made.rows is not None:
-                size = max(1, min(_MOST, _PIECE // made.columns[:, :, 0].size))
+                size = max(1, _PIECE // made.columns[:, :, 0].size)
 
     def _places(self, effect: Handling, grid: Sequence[Values]) -> Iterator[Candidate]:
         """The places of an alternative, those of units one unit after another, no more at a time than a piece has room for."""

@@ -26,9 +26,6 @@ _ROUNDING = 1e-11
 _FAR = 1e3
 """Multiple of the limit, of the squares, above which the eigenvalues of the products of columns decide on their rank."""
 
-_KEPT = 1_000_000
-"""Largest number of products that are kept."""
-
 _HANGING = 1e-3
 """Independent part of a column below which a single factorisation is inaccurate."""
 
@@ -162,10 +159,7 @@ class ShareStatistics:
         """Products (blocks, r + q + 1, r + q + 1) of the columns and the measurements with each other."""
         common = shares.common
         if common not in self._kept:
-            made = self._made(common)
-            while self._kept and (len(self._kept) + 1) * made.size > _KEPT:
-                del self._kept[next(iter(self._kept))]
-            self._kept[common] = made
+            self._kept = {common: self._made(common)}  # the last alone: a search for shares seldom goes back
         products = self._kept[common]
         if shares.own:
             products = products.copy()

@@ -13,12 +13,6 @@ Array = NDArray[np.float64]
 _factor, _invert = get_lapack_funcs(("potrf", "trtri"), dtype=np.float64)
 _times, _solve = get_blas_funcs(("trmm", "trsm"), dtype=np.float64)
 
-_ROWS = 48
-"""Rows of a kernel that are scaled at a time: an array of all of them is memory that the system has to clear first."""
-
-_FEW = 16
-"""Columns of a block up to which a triangular product, including its transposition, is faster than a general one."""
-
 EVEN = 1.5
 """White standard errors of a block that differ by less than this factor are taken as equal."""
 
@@ -127,8 +121,6 @@ class Whitener:
         """Columns (b, n, m) with white noise."""
         if self.lower is None:
             return columns * self.white[:, None]
-        if columns.shape[-1] > _FEW:
-            return np.matmul(self.lower, columns)
         return np.swapaxes(self.rows(np.swapaxes(columns, -1, -2)), -1, -2)
 
     def back(self, series: Array) -> Array:
@@ -170,9 +162,7 @@ def whitener_of(dwells: DwellProfile, index: list[int | None], wander: tuple[Arr
     covariance.reshape(-1)[:: there.size + 1] = dwells.white**2
     for i, each in zip(index, wander, strict=True):
         if i is not None:
-            kernel, share = dwells.louder(each), 10.0 ** (i / SHARE_STEP)
-            for rows in (slice(first, first + _ROWS) for first in range(0, there.size, _ROWS)):
-                covariance[rows] += share * kernel[rows]
+            covariance += 10.0 ** (i / SHARE_STEP) * dwells.louder(each)
     if not whole:
         covariance = covariance[np.ix_(there, there)]
     # of the transpose, which is in Fortran order: no copy
