@@ -31,12 +31,14 @@ def descended(theta: Array, step: Callable[[Array], Array], cost: Callable[[Arra
 def _advanced(theta: Array, step: Array, before: Array, cost: Callable[[Array], Array]) -> tuple[Array, Array]:
     """Parameters and costs after a step that is halved for each unit until it does not harm."""
     length = np.ones((len(theta), *[1] * (theta.ndim - 1)))
+    trial = theta + step
+    after = cost(trial)
     for _ in range(_STEPS):
-        trial = theta + length * step
-        after = cost(trial)
         worse = ~(after <= before)
         if not worse.any():
             return trial, after
         length[worse] *= 0.5
-    trial = np.where(worse.reshape(length.shape), theta, trial)
-    return trial, cost(trial)
+        trial = theta + length * step
+        after = cost(trial)
+    worse = ~(after <= before)
+    return np.where(worse.reshape(length.shape), theta, trial), np.where(worse, before, after)

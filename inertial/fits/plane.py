@@ -281,6 +281,6 @@ def _descended(flat: Array, theta: Array, norm: float, whiten: Array) -> Array:
         return -(np.linalg.lstsq(white / size, whiten @ left, rcond=None)[0] / size)[None]
 
     def cost(at: Array) -> Array:
-        return np.sum((whiten @ _state(flat, at[0], norm)[2]) ** 2, keepdims=True)
+        return np.array([np.sum((whiten @ _state(flat, at[0], norm)[2]) ** 2)])
 
     return descended(theta[None], step, cost, _SETTLED)[0]
