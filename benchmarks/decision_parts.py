@@ -72,8 +72,8 @@ def coarse_steps(world: World, seed: int) -> Counts:
 def together(world: World, seed: int) -> Counts:
     """Lots whose units are taken to share noise where two rivals are compared."""
     from inertial import effects as catalogue
+    from inertial.estimation.likelihood import shared_factor
     from inertial.estimation.model import Model
-    from inertial.estimation.shared_noise import shared_factor
     from inertial.estimation.term import Term
 
     model = run_of(world, seed).model()

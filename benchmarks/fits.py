@@ -24,9 +24,8 @@ sys.path.insert(0, str(ROOT))
 import numpy as np  # noqa: E402
 
 from inertial import poses  # noqa: E402
-from inertial.fits.ferraris import ferraris  # noqa: E402
+from inertial.fits.faces import ferraris, six_position  # noqa: E402
 from inertial.fits.linear import fit_lot  # noqa: E402
-from inertial.fits.six_position import six_position  # noqa: E402
 from inertial.frames import force_from_angles  # noqa: E402
 from inertial.state import State  # noqa: E402
 from pipelines.parallel import one_thread_each  # noqa: E402

@@ -15,13 +15,13 @@ from inertial import design
 from inertial.correction import correct
 from inertial.design import Values
 from inertial.errors import NotIdentified
+from inertial.fits.descent import descended
 from inertial.fits.linear import LotFit, force_along_axes, response_matrix
-from inertial.norm_noise import PlausibleNoise, SolvedNorms
+from inertial.fits.norm_noise import PlausibleNoise, SolvedNorms
 from inertial.state import State
 
 Array = NDArray[np.float64]
 
-_STEPS, _HALVINGS = 40, 12
 _SETTLED = 1e-10  # share of the cost that a step no longer takes off
 _SINGULAR = 1e-6  # smallest singular value of the whitened columns of unit length, over the largest
 _STEP = 1e-3  # relative, for the derivative by a nonlinear parameter
@@ -87,14 +87,7 @@ def fit_norms(  # noqa: PLR0913 - what a fit needs, and what its errors are aver
     for name, given in (nonlinear or {}).items():
         values[name] = {**values.get(name, {}), **given}
     work = _Work(tuple(effects), state, output, whiten, norm, values)
-    theta = work.begun(*start)
-    cost = work.cost(theta)
-    for _ in range(_STEPS):
-        theta, lower = work.advanced(theta, cost)
-        settled = bool(np.all(cost - lower <= _SETTLED * (cost + 1e-300)))
-        cost = lower
-        if settled:
-            break
+    theta = descended(work.begun(*start), work.step, work.cost, _SETTLED)
     return work.finished(theta, list(plausible), weights)
 
 
@@ -187,25 +180,13 @@ class _Work:
         felt = force_along_axes(response_matrix(theta, self.names), force)
         return replace(self.state, force=force, felt=felt, memory={})
 
-    def advanced(self, theta: Array, cost: Array) -> tuple[Array, Array]:
-        """Coefficients and costs after a step that is halved for each unit until it does not harm."""
-        rows, _ = self.rows(theta)
-        white, left = self.white(rows), self.white(self.left(theta)[..., None])[..., 0]
+    def step(self, theta: Array) -> Array:
+        """Change (units, 3, p) of the coefficients by the linear model about them."""
+        white, left = self.white(self.rows(theta)[0]), self.white(self.left(theta)[..., None])[..., 0]
         step = np.zeros_like(theta)
         for unit, (own, target) in enumerate(zip(white, left, strict=True)):
-            unscaled = self._solved(own, target)
-            step[unit][self.free] = -unscaled
-        length = np.ones((len(theta), 1, 1))
-        for _ in range(_HALVINGS):
-            trial = theta + length * step
-            lower = self.cost(trial)
-            worse = ~(lower <= cost)
-            if not worse.any():
-                return trial, lower
-            length[worse] *= 0.5
-        kept = (self.cost(theta + length * step) <= cost)[:, None, None]
-        trial = np.where(kept, theta + length * step, theta)
-        return trial, self.cost(trial)
+            step[unit][self.free] = -self._solved(own, target)
+        return step
 
     def _solved(self, rows: Array, target: Array) -> Array:
         """Least squares of one unit; refused where a direction of the coefficients does not show."""

@@ -149,23 +149,6 @@ class State:
 
         return self.remember(key, run)
 
-    def of(self, units: slice, count: int) -> Self:
-        """Some of the ``count`` units of a lot; arrays that all units share stay as they are."""
-
-        def some(name: str, value: Array | None) -> Array | None:
-            own = value is not None and value.ndim == _DIMENSIONS.get(name, 2) and len(value) == count
-            return value[units] if own and value is not None else value
-
-        changed: dict[str, object] = {
-            item.name: some(item.name, value)
-            for item in fields(self)
-            if isinstance(value := getattr(self, item.name), np.ndarray)
-        }
-        changed["covariates"] = {name: some(name, value) for name, value in self.covariates.items()}
-        if self.history is not None:
-            changed["history"] = replace(self.history, temperature=some("temperature", self.history.temperature))
-        return replace(self, **changed, memory={})
-
     def pick(self, index: slice | NDArray[np.intp]) -> Self:
         """The units at ``index`` along the first batch dimension."""
         changed: dict[str, object] = {}

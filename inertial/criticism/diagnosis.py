@@ -23,9 +23,8 @@ from inertial.data_errors.bad_dwells import BadDwell
 from inertial.decisions import ADEQUATE_ABOVE
 from inertial.effects.covariate import Covariate
 from inertial.estimation.alternative import Handling
-from inertial.estimation.comparison import estimate, residuals_of
+from inertial.estimation.comparison import estimate, fit_rms, residuals_of
 from inertial.estimation.comparison import rms as rms_of
-from inertial.estimation.heldout import fit_rms
 from inertial.estimation.model import Model
 from inertial.estimation.problem import Lot, Problem
 from inertial.estimation.space import Space

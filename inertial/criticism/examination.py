@@ -20,16 +20,13 @@ from inertial.data_errors.bad_dwells import BadDwell, bad_dwells, without
 from inertial.data_errors.handling import alternatives
 from inertial.decisions import CLASS_WIDTH, RISES
 from inertial.estimation.alternative import Exchangeable, Handling, Misfit, soaks
-from inertial.estimation.freedom import refuse_without_freedom
-from inertial.estimation.heldout import fit_rms
+from inertial.estimation.comparison import fit_rms, slope_of
 from inertial.estimation.loudness import loudness_of
-from inertial.estimation.model import Model
+from inertial.estimation.model import Model, refuse_without_freedom
 from inertial.estimation.penalty import cost_of_model
 from inertial.estimation.problem import Lot, Problem
 from inertial.estimation.refinement import better_placed, replaced, terms_of
-from inertial.estimation.slope import slope_of
-from inertial.estimation.term import Term
-from inertial.estimation.turn_on import with_turn_on
+from inertial.estimation.term import Term, with_turn_on
 
 Array = NDArray[np.float64]
 

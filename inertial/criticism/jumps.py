@@ -6,7 +6,7 @@ jump does. What the jumps of a few axes explain together is therefore compared w
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from math import comb
+from math import comb, log
 
 import numpy as np
 from numpy.typing import NDArray
@@ -116,7 +116,7 @@ def _evenness(drops: Array) -> float:
     for m in range(1, count):
         top, rest = float(ordered[:m].sum()), float(ordered[m:].sum())
         ratio = (top / m) / max(rest / (count - m), 1.0)
-        chances = float(np.log(comb(count, m) * count))
+        chances = log(comb(count, m) * count)  # beyond the integers of numpy in large lots
         unlikely = min(unlikely, 2.0 * (float(log_f_tail(ratio, m, count - m)) + chances))
     return unlikely
 

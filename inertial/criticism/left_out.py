@@ -25,9 +25,9 @@ from inertial import decisions
 from inertial.decisions import BLOCKS
 from inertial.estimation.alternative import Handling, soaks
 from inertial.estimation.bases import orthonormal
-from inertial.estimation.heldout import Fitting
+from inertial.estimation.comparison import Fitting
 from inertial.estimation.model import Model
-from inertial.estimation.noise import LONGEST
+from inertial.estimation.noise_shares import LONGEST
 from inertial.estimation.problem import Problem
 from inertial.estimation.term import Term
 

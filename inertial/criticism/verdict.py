@@ -19,9 +19,8 @@ from inertial.data_errors.bad_dwells import BadDwell
 from inertial.data_errors.tails import with_tails
 from inertial.decisions import ADEQUATE_ABOVE, NAMED_BELOW
 from inertial.estimation.bases import SEEN
-from inertial.estimation.comparison import estimate, residuals_of
+from inertial.estimation.comparison import estimate, fit_rms, residuals_of
 from inertial.estimation.comparison import rms as rms_of
-from inertial.estimation.heldout import fit_rms
 from inertial.estimation.likelihood import shared_noise
 from inertial.estimation.model import Model
 from inertial.estimation.penalty import PER_COEFFICIENT, log_p_value

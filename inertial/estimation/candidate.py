@@ -1,5 +1,6 @@
-"""Columns of an effect as a candidate for a model, and rows times them."""
+"""Columns of an effect as a candidate for a model, rows times them, and the rows that several blocks have in common."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -57,3 +58,36 @@ def times_rows(rows: Array, candidate: Candidate) -> Array:
         if not sorted_:
             product = product[np.argsort(order)]
     return np.swapaxes(product, -1, -2).reshape(blocks, grid, p, k)
+
+
+def shared_rows(columns: Array, *, radial: bool) -> NDArray[np.intp] | None:
+    """The row of each block where columns (blocks, ...) are equal: of all blocks, by axis, or in each unit; else None.
+
+    Parameters
+    ----------
+    radial : whether a block is a unit; otherwise it is an axis of one
+    """
+    blocks = len(columns)
+    if radial:
+        return np.zeros(blocks, dtype=np.intp) if np.all(columns == columns[:1]) else None
+    by_unit = columns.reshape(-1, 3, *columns.shape[1:])
+    # most candidates differ in a few values already
+    axes = np.array_equal(by_unit[-1, 0, -1], by_unit[-1, 2, -1]) and bool(np.all(by_unit == by_unit[:, :1]))
+    units = len(by_unit) > 1 and np.array_equal(by_unit[-1, :, -1], by_unit[0, :, -1])
+    units = units and bool(np.all(by_unit == by_unit[:1]))
+    if not axes and not units:
+        return None
+    place = np.arange(blocks)
+    unit, axis = (0 if units else place // 3), (0 if axes else place % 3)
+    return unit * (1 if axes else 3) + axis + np.zeros(blocks, dtype=np.intp)
+
+
+def finest_rows(rows_of: Sequence[NDArray[np.intp] | None], *, radial: bool) -> NDArray[np.intp] | None:
+    """The rows of blocks for the columns of several values: where they differ at one, they differ."""
+    known = [rows for rows in rows_of if rows is not None]
+    if len(known) < len(rows_of):
+        return None
+    finest = max(known, key=lambda rows: int(rows.max()))
+    by_unit = not radial and finest.size > 3 and any(rows[0] != rows[3] for rows in known)
+    by_axis = not radial and any(rows[0] != rows[1] for rows in known)
+    return None if by_unit and by_axis else finest

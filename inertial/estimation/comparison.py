@@ -1,7 +1,7 @@
-"""Coefficients of a model by generalised least squares, and their residuals on their own run and on a fresh run."""
+"""Coefficients of a model, and their residuals on their own run, on dwells that were left out, and on a fresh run."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from inertial.estimation.model import Model
 from inertial.estimation.problem import Problem
 from inertial.estimation.term import Term
+from inertial.state import History
 
 Array = NDArray[np.float64]
 
@@ -117,21 +118,97 @@ def residuals_of(problem: Problem, fit: Estimate) -> Array:
     """Residuals (blocks, n) in g of a problem under given coefficients; NaN where a dwell is missing."""
     local = [t for t in fit.terms if not t.shared]
     shared = [t for t in fit.terms if t.shared]
-    left = problem.series.copy()
-    if local:
-        left -= np.einsum("bnp,bp->bn", _columns(problem, local), fit.local)
+    left = problem.series - np.einsum("bnp,bp->bn", _with_start(problem, local), fit.local)
     if shared:
-        left -= _columns(problem, shared) @ fit.shared
+        left -= _with_start(problem, shared) @ fit.shared
     return np.where(np.isfinite(problem.error), left, np.nan)
 
 
 def _columns(problem: Problem, terms: Sequence[Term]) -> Array:
-    own = [problem.columns(t.effect, t.keywords)[..., : t.first] for t in terms]
-    # as in the model: a memory that was at rest has no unknown state
+    """Columns (blocks, n, p) of terms, without those of the unknown state of their memory."""
+    columns = [problem.columns(t.effect, t.keywords)[..., : t.first] for t in terms]
+    return np.concatenate(columns, axis=-1) if columns else np.zeros((problem.blocks, problem.n, 0))
+
+
+def _with_start(problem: Problem, terms: Sequence[Term]) -> Array:
+    """The same with them: as in the model, a memory that was at rest has no unknown state."""
     started = [problem.start(t.effect, t.keywords) for t in terms if not t.rest]
-    return np.concatenate([*own, *started], axis=-1)
+    return np.concatenate([_columns(problem, terms), *started], axis=-1)
 
 
 def rms(values: Array) -> float:
     """Root mean square of the values that are not missing."""
     return float(np.sqrt(np.nanmean(values**2)))
+
+
+def residuals(problem: Problem, terms: Sequence[Term], train: NDArray[np.bool_]) -> Array:
+    """Residuals (blocks, n) in g of least squares on some dwells, weighted by the white standard errors.
+
+    Parameters
+    ----------
+    train : (n,), dwells that are fitted; all are predicted
+    """
+    left = Fitting(problem, terms).left(problem.series[..., None], train)[..., 0]
+    return np.where(np.isfinite(problem.error), left, np.nan)
+
+
+class Fitting:
+    """A model's columns in a problem, ready to be fitted to some dwells of any series."""
+
+    def __init__(self, problem: Problem, terms: Sequence[Term]) -> None:
+        self._x = _columns(problem, [t for t in terms if not t.shared])
+        self._z = _columns(problem, [t for t in terms if t.shared])
+        self._weight = np.where(np.isfinite(problem.error), 1.0 / problem.error, 0.0)
+
+    def left(self, series: Array, train: NDArray[np.bool_]) -> Array:
+        """Residuals of a fit to the dwells ``train`` (n,) on series (blocks, n, m), on all dwells."""
+        x, z, weight = self._x, self._z, self._weight * train
+        solve = _solver(x, weight)
+        if z.shape[-1]:
+            free = (z - x @ solve(z)) * weight[..., None]
+            target = (series - x @ solve(series)) * weight[..., None]
+            flat = free.reshape(-1, free.shape[-1])
+            series = series - z @ np.linalg.lstsq(flat, target.reshape(flat.shape[0], -1), rcond=1e-9)[0]
+        return series - x @ solve(series)
+
+
+def fit_rms(problem: Problem, terms: Sequence[Term]) -> float:
+    """RMS residual in g of the fit to all dwells."""
+    left = residuals(problem, terms, np.ones(problem.n, dtype=bool))
+    return float(np.sqrt(np.nanmean(left**2)))
+
+
+def _solver(x: Array, weight: Array) -> Callable[[Array], Array]:
+    """What gives the coefficients (blocks, p, m) of weighted least squares on columns (blocks, n, p) for targets (..., m)."""
+    weighted = x * weight[..., None]
+    size = np.sqrt(np.einsum("bnp,bnp->bp", weighted, weighted))
+    size = np.where(size > 0.0, size, 1.0)
+    across = np.swapaxes(weighted / size[:, None, :], -1, -2)
+    inverse = np.linalg.pinv(across @ np.swapaxes(across, -1, -2), rcond=1e-9, hermitian=True)
+    return lambda target: (inverse @ (across @ (target * weight[..., None]))) / size[..., None]
+
+
+_WARMER = 0.5
+"""Change of temperature, K, by which the response to it is found."""
+
+
+def slope_of(model: Model) -> Array | None:
+    """∂E/∂T of every unit at every dwell, (units, n, 3), g/K; None if no temperature is recorded or the model has none."""
+    lot = model.problem.lot
+    state = lot.state
+    if state.temperature is None or lot.radial:
+        return None
+    fit = estimate(model)
+    ends: list[Array] = []
+    for sign in (1.0, -1.0):
+        history = (
+            None if state.history is None else History(state.history.time, state.history.temperature + sign * _WARMER)
+        )
+        moved = replace(state, temperature=state.temperature + sign * _WARMER, history=history, memory={})
+        problem = Problem(replace(lot, state=moved))
+        whole = _columns(problem, [t for t in fit.terms if not t.shared])
+        ends.append(np.einsum("bnp,bp->bn", whole, fit.local[:, : whole.shape[-1]]))
+    slope = (ends[0] - ends[1]) / (2.0 * _WARMER)
+    if float(np.max(np.abs(slope))) <= 0.0:
+        return None
+    return np.swapaxes(slope.reshape(state.time.shape[0], 3, -1), 1, 2)

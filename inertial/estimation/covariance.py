@@ -2,7 +2,7 @@
 
 A block is the series of one unit and axis. Its covariance is s²·(diag(e²) + F·K_F + W·K_W), where e is the white standard error
 of its dwells and F and W, in units of the lot's white variance, are the same for all blocks but those whose wander is of another
-kind (:mod:`inertial.estimation.own_shares`). Blocks that have the same dwells at
+kind (:mod:`inertial.estimation.shares`). Blocks that have the same dwells at
 the same times and about the same white noise share a whitener; a missing dwell only leaves out its row.
 
 Where only the norm of gravity is known, a block is a unit. Wander along one axis enters the norm in proportion to the force along
@@ -10,7 +10,7 @@ that axis: the kernels are then (F·K_F + W·K_W) ∘ (u·uᵀ) with the directi
 """
 
 from collections import OrderedDict
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from functools import cached_property, lru_cache
 
 import numpy as np
@@ -18,17 +18,15 @@ from numpy.typing import NDArray
 
 from inertial.decisions import SHARE_STEP
 from inertial.estimation.candidate import Candidate
-from inertial.estimation.noise import LONGEST
-from inertial.estimation.noise_shares import Noise, Shares
-from inertial.estimation.products import PIECE, Spanned, products_of, products_with
-from inertial.estimation.whitener import applied, applied_back, grouped, solved, whitener_of
+from inertial.estimation.noise_shares import LONGEST, Noise, Shares
+from inertial.estimation.whitener import Whitener, grouped, whitener_of
 from inertial.noise.flicker import flicker_kernel
 from inertial.noise.measurands import walk_kernel
 
 Array = NDArray[np.float64]
 
-_FEW = 16
-"""Columns of a block up to which a triangular product, including its transposition, is faster than a general one."""
+PIECE = 1_000_000
+"""Largest number of columns' values that are whitened at a time."""
 
 _WHITENERS = 18_000_000
 """Largest number of stored whiteners."""
@@ -83,7 +81,7 @@ class Covariance:
         """White variance that is the unit of the shares, g²."""
         self.span = max(float(np.ptp(time)), 1.0)
         self._kernels, self._groups = grouped(time, error, direction, self.level, self.white, loudness)
-        self._whiteners: OrderedDict[tuple[int, int | None, int | None], tuple[Array, float]] = OrderedDict()
+        self._whiteners: OrderedDict[tuple[int, int | None, int | None], Whitener] = OrderedDict()
         self._kept: OrderedDict[tuple[object, Shares], Array] = OrderedDict()
         self._used = 0
 
@@ -140,51 +138,25 @@ class Covariance:
         groups = [(place, steps, blocks[~np.isin(blocks, apart)], common) for place, steps, blocks in self._groups]
         groups = [group for group in groups if group[2].size]
         for block, flicker, walk in shares.own:
-            place, steps = self.group_of(block)
-            groups.append((place, steps, np.array([block]), Shares(flicker, walk)))
+            groups.append((*self._group_of[block], np.array([block]), Shares(flicker, walk)))
         return groups
-
-    def group_of(self, block: int) -> tuple[int, int]:
-        """Place of the profile of a block, and its steps."""
-        return self._group_of[block]
 
     @cached_property
     def _group_of(self) -> dict[int, tuple[int, int]]:
+        """Place of the profile of each block, and its steps."""
         return {int(block): (place, steps) for place, steps, blocks in self._groups for block in blocks}
 
-    @cached_property
-    def _white(self) -> list[tuple[Array, float]]:
-        """Factors (n,) that make white noise one of variance one, and the log-determinant of its covariance, by profile."""
-        return [
-            (np.where(k.there, 1.0 / k.white, 0.0), 2.0 * float(np.sum(np.log(k.white[k.there]))))
-            for k in self._kernels
-        ]
+    def whitener_of_block(self, block: int, shares: Shares) -> Whitener:
+        """What makes the noise of a block at shares white."""
+        return self._whitener(*self._group_of[block], shares)
 
-    def whitener_of_block(self, block: int, shares: Shares) -> tuple[Array | None, Array, float]:
-        """What makes the noise of a block at shares white, and the log-determinant of its covariance.
-
-        A lower triangle (n, n), or if that is None factors by dwell (n,).
-        """
-        place, steps = self.group_of(block)
-        factors, logdet = self._white[place]
-        made = self._whitener(place, steps, shares)
-        return (None, factors, logdet) if made is None else (made[0], factors, made[1])
-
-    def logdet_of_block(self, block: int, shares: Shares) -> float:
-        """Log-determinant of the covariance of one block over its white variance."""
-        return self.whitener_of_block(block, shares)[2]
-
-    def _whitener(self, place: int, steps: int, shares: Shares) -> tuple[Array, float] | None:
-        """Lower triangle (n, n) that makes a block's noise white, and the log-determinant of its covariance."""
-        wander = self._wander
-        if wander is None:
-            return None
+    def _whitener(self, place: int, steps: int, shares: Shares) -> Whitener:
         index = [None if step is None else step + steps for step in _lattice(shares)]
-        if index == [None, None]:
-            return None
         key = (place, index[0], index[1])
         if key not in self._whiteners:
-            self._whiteners[key] = whitener_of(self._kernels[place], index, (wander[0][place], wander[1][place]))
+            wander = self._wander if index != [None, None] else None
+            kernels = None if wander is None else (wander[0][place], wander[1][place])
+            self._whiteners[key] = whitener_of(self._kernels[place], index, kernels)
             # applied to many blocks, a whitener costs little beside its use
             room = _WHITENERS if self.there.size <= LARGE else _WHITENERS // 6
             most = max(room // self.there.shape[1] ** 2, 4)
@@ -193,51 +165,10 @@ class Covariance:
         self._whiteners.move_to_end(key)
         return self._whiteners[key]
 
-    def whiten(self, columns: Array, shares: Shares, blocks: NDArray[np.intp] | None = None) -> Array:
-        """Columns (blocks, n, m) of all or some blocks with white noise of variance s² in them; zero where a dwell is missing."""
-        if len(self._groups) == 1 and not shares.own:
-            place, steps, _ = self._groups[0]
-            level = self.level if blocks is None else self.level[blocks]
-            whitener = self._whitener(place, steps, shares)
-            if whitener is not None:
-                if columns.shape[-1] > _FEW:
-                    white = np.matmul(whitener[0], columns)
-                    white /= level[:, None, None]
-                    return white
-                b, n, m = columns.shape
-                white = np.empty((b, m, n))
-                few = max(PIECE // max(n * m, 1), 1)
-                for some in (slice(start, start + few) for start in range(0, b, few)):
-                    own = columns[some] / level[some, None, None]
-                    white[some] = applied(whitener[0], np.swapaxes(own, -1, -2))
-                return np.swapaxes(white, -1, -2)
-        place_of = np.arange(len(self.level)) if blocks is None else blocks
-        where = np.full(len(self.level), -1)
-        where[place_of] = np.arange(place_of.size)
-        out = np.empty(columns.shape)
-        for place, steps, members, common in self._groups_at(shares):
-            rows = where[members]
-            rows = rows[rows >= 0]
-            if rows.size:
-                own = columns[rows] / self.level[place_of[rows], None, None]
-                whitener = self._whitener(place, steps, common)
-                if whitener is None:
-                    out[rows] = own * self._white[place][0][:, None]
-                else:
-                    n, m = columns.shape[1:]
-                    flat = whitener[0] @ own.transpose(1, 0, 2).reshape(n, -1)
-                    out[rows] = flat.reshape(n, rows.size, m).transpose(1, 0, 2)
-        return out
-
-    def whiteners(self, shares: Shares) -> Iterator[tuple[NDArray[np.intp], Array]]:
-        """Blocks that share a whitener, and the whitener (n, n), lower triangle, for white noise of variance one."""
-        for members, whitener, white in self._by_whitener(shares):
-            yield members, np.diag(white) if whitener is None else whitener
-
     def _by_whitener(
         self, shares: Shares, blocks: NDArray[np.intp] | None = None
-    ) -> Iterator[tuple[NDArray[np.intp], Array | None, Array]]:
-        """Places, among all or some blocks, of those that share a whitener, and it: (n, n), or if that is None by dwell (n,)."""
+    ) -> Iterator[tuple[NDArray[np.intp], Whitener]]:
+        """Places, among all or some blocks, of those that share a whitener, and it."""
         where = np.arange(len(self.level))
         if blocks is not None:
             where = np.full(len(self.level), -1)
@@ -246,49 +177,45 @@ class Covariance:
             own = where[members]
             own = own[own >= 0]
             if own.size:
-                whitener = self._whitener(place, steps, common)
-                yield own, None if whitener is None else whitener[0], self._white[place][0]
+                yield own, self._whitener(place, steps, common)
+
+    def whiten(self, columns: Array, shares: Shares, blocks: NDArray[np.intp] | None = None) -> Array:
+        """Columns (blocks, n, m) of all or some blocks with white noise of variance s² in them; zero where a dwell is missing."""
+        level = self.level if blocks is None else self.level[blocks]
+        out = np.empty(columns.shape)
+        few = max(PIECE // max(columns[0].size, 1), 1)
+        for members, whitener in self._by_whitener(shares, blocks):
+            for some in np.split(members, range(few, members.size, few)):
+                out[some] = whitener.columns(columns[some] / level[some, None, None])
+        return out
+
+    def whiteners(self, shares: Shares) -> Iterator[tuple[NDArray[np.intp], Array]]:
+        """Blocks that share a whitener, and the whitener (n, n), lower triangle, for white noise of variance one."""
+        return ((members, whitener.matrix) for members, whitener in self._by_whitener(shares))
 
     def coloured(self, noise: Noise, drawn: Array) -> Array:
         """Series (blocks, m, n), g, with this noise, in place of independent normal numbers; zero where a dwell is missing."""
         few = max(PIECE // max(drawn[0].size, 1), 1)
-        for place, steps, members, common in self._groups_at(noise.shares):
-            kernel = self._kernels[place]
-            whitener = self._whitener(place, steps, common)
+        for members, whitener in self._by_whitener(noise.shares):
             for some in np.split(members, range(few, members.size, few)):
-                own = drawn[some]
-                if whitener is None:
-                    own *= kernel.white * kernel.there
-                elif kernel.there.all():
-                    own = solved(whitener[0], own, overwrite=True)
-                else:
-                    inside = solved(whitener[0][np.ix_(kernel.there, kernel.there)], own[..., kernel.there])
-                    own = np.zeros(own.shape)
-                    own[..., kernel.there] = inside
-                drawn[some] = own * (self.level * noise.scale)[some, None, None]
+                drawn[some] = whitener.coloured(drawn[some]) * (self.level * noise.scale)[some, None, None]
         return drawn
 
     def white_rows(self, rows: Array, shares: Shares, blocks: slice) -> Array:
         """Series (b, m, n) of some blocks with white noise of variance one over their level in them, in their place."""
-        for own, whitener, white in self._by_whitener(shares, np.arange(len(self.level))[blocks]):
-            if whitener is None:
-                rows[own] *= white
-            elif own.size == len(rows):
-                rows = applied(whitener, rows, overwrite=True)
-            else:
-                rows[own] = applied(whitener, rows[own], overwrite=True)
+        for own, whitener in self._by_whitener(shares, np.arange(len(self.level))[blocks]):
+            if own.size == len(rows):
+                return whitener.rows(rows, overwrite=True)
+            rows[own] = whitener.rows(rows[own], overwrite=True)
         return rows
 
     def back(self, rows: Array, shares: Shares, blocks: NDArray[np.intp] | None = None) -> Array:
         """Rows (blocks, k, n) of whitened series of all or some blocks times the whiteners, for white noise of variance one."""
         out = np.empty(rows.shape)
-        for own, whitener, white in self._by_whitener(shares, blocks):
-            if whitener is None:
-                out[own] = rows[own] * white
-                continue
-            few = max(PIECE // max(rows[0].size, 1), 1)
+        few = max(PIECE // max(rows[0].size, 1), 1)
+        for own, whitener in self._by_whitener(shares, blocks):
             for some in np.split(own, range(few, own.size, few)):
-                out[some] = applied_back(whitener, rows[some])
+                out[some] = whitener.back(rows[some])
         return out
 
     def solved(
@@ -300,18 +227,15 @@ class Covariance:
         ----------
         columns : (rows, n); places : (blocks, p), the columns of each block
         """
-        for members, whitener, white in self._by_whitener(shares):
+        for members, whitener in self._by_whitener(shares):
             own = np.unique(places[members])
-            if whitener is None:
-                yield members, own, columns[own] * white**2
-            else:
-                yield members, own, applied_back(whitener, applied(whitener, columns[own]))
+            yield members, own, whitener.back(whitener.rows(columns[own]))
 
     def precision(self, noise: Noise) -> Array:
         """Diagonal of V⁻¹ of every block, (blocks, n), 1/g²; zero where a dwell is missing."""
         out = np.empty(self.there.shape)
-        for members, whitener, white in self._by_whitener(noise.shares):
-            out[members] = white**2 if whitener is None else np.einsum("mn,mn->n", whitener, whitener)
+        for members, whitener in self._by_whitener(noise.shares):
+            out[members] = whitener.precision
         return out / (self.level * noise.scale)[:, None] ** 2
 
     def products(self, candidate: Candidate, shares: Shares) -> Array:
@@ -323,7 +247,7 @@ class Covariance:
         kept = None if candidate.key is None else self._kept.get(name)
         if kept is None:
             level = self.level if candidate.blocks is None else self.level[candidate.blocks]
-            kept = products_of(candidate, level, self._by_whitener(shares, candidate.blocks))
+            kept = _products_of(candidate, level, self._by_whitener(shares, candidate.blocks))
             if candidate.key is not None:
                 self._kept[name] = kept
                 self._used += kept.size
@@ -333,27 +257,16 @@ class Covariance:
             self._kept.move_to_end(name)
         return kept
 
-    def products_with(self, candidate: Candidate, rows: Array, shares: Shares) -> tuple[Array, Array]:
-        """Products cᵀV⁻¹c (blocks, p, p) of a candidate's columns at one value, and with rows (blocks, k, n): (blocks, p, k)."""
-        return products_with(candidate, rows, self.level, self._by_whitener(shares))
-
-    def products_of_spanned(
-        self, spanned: Spanned, columns: Array, places: NDArray[np.intp], shares: Shares
-    ) -> tuple[Array, Array]:
-        """The same of columns that a few series span; with columns (rows, n), those of each block at places (blocks, k)."""
-        return spanned.products_with(columns, places, self.level, self._by_whitener(shares))
-
     def logdet(self, shares: Shares) -> Array:
         """Log-determinants of the blocks' covariances over their white variance, (blocks,)."""
         logdets = np.zeros(len(self.level))
-        for place, steps, members, common in self._groups_at(shares):
-            whitener = self._whitener(place, steps, common)
-            logdets[members] = self._white[place][1] if whitener is None else whitener[1]
+        for members, whitener in self._by_whitener(shares):
+            logdets[members] = whitener.logdet
         return logdets
 
     def of_dwells(self, block: int, noise: Noise, dwells: NDArray[np.intp]) -> Array:
         """Covariance (k, k), g², of some dwells of a block."""
-        place, steps = self.group_of(block)
+        place, steps = self._group_of[block]
         kernel = self._kernels[place]
         covariance, shares = np.diag(kernel.white**2), noise.shares.of_block(block)
         for share, each in zip((shares.flicker, shares.walk), self._wander or (), strict=False):
@@ -368,3 +281,29 @@ class Covariance:
         """Noise of another covariance, of the same blocks, in the units of this one."""
         factor = other.white / self.white
         return Noise(noise.shares.times(factor, factor * self.span / other.span), noise.scale, noise.prior)
+
+
+def _products_of(candidate: Candidate, level: Array, groups: Iterable[tuple[NDArray[np.intp], Whitener]]) -> Array:
+    """Products cᵀV⁻¹c (b, grid, p, p) of a candidate's columns; rows that blocks share are whitened once.
+
+    Parameters
+    ----------
+    level : (b,), typical white standard error of each block, g; groups : places of the blocks that share a whitener, and it
+    """
+    columns = candidate.columns
+    count, _, grid, p = columns.shape
+    row_of = np.arange(count) if candidate.rows is None else candidate.rows
+    out = np.empty((level.size, grid, p, p))
+    for own, whitener in groups:
+        rows, back = np.unique(row_of[own], return_inverse=True)
+        few = max(PIECE // columns[0].size, 1)
+        parts = np.split(rows, range(few, rows.size, few))
+        out[own] = np.concatenate([_squares(columns[some], whitener) for some in parts])[back]
+    return out / level[:, None, None, None] ** 2
+
+
+def _squares(columns: Array, whitener: Whitener) -> Array:
+    """Products (rows, grid, p, p) of columns (rows, n, grid, p) with each other after whitening."""
+    rows, n, grid, p = columns.shape
+    white = whitener.rows(columns.transpose(0, 2, 3, 1).reshape(rows * grid, p, n))
+    return (white @ np.swapaxes(white, -1, -2)).reshape(rows, grid, p, p)

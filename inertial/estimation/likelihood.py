@@ -11,12 +11,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.decisions import TOGETHER
+from inertial.decisions import TOGETHER, UNITS_TOGETHER
 from inertial.distributions import chi2_quantile
-from inertial.estimation import variance
 from inertial.estimation.alternative import Handling, by_block, tilts
+from inertial.estimation.comparison import estimate, residuals
 from inertial.estimation.model import Model
-from inertial.estimation.noise_shares import Noise
+from inertial.estimation.noise_shares import Noise, deviance_of
 from inertial.estimation.penalty import freedom, price
 from inertial.estimation.space import Space
 from inertial.estimation.term import Term
@@ -97,7 +97,7 @@ def weighed(deviance: float, rank: int, nonlinear: int, places: int = 1) -> Rati
 
 def _deviance(contrasts: Space, left: Space) -> float:
     """−2 log likelihood of the error contrasts of one model, with what another leaves."""
-    return left.logdet + contrasts.information + variance.deviance(left.squares, contrasts.by_block)
+    return left.logdet + contrasts.information + deviance_of(left.squares, contrasts.by_block)
 
 
 def shared_noise(model: Model) -> float:
@@ -174,3 +174,50 @@ def along_mean(model: Model, noise: Noise, term: Term) -> float:
     fitted = fitted.reshape(units, 3, -1)
     whole = float(np.sum(fitted**2))
     return float(units * np.sum(fitted.mean(axis=0) ** 2) / whole) if whole > 0.0 else 0.0
+
+
+def shared_factor(model: Model, term: Term) -> float:
+    """Factor, 1 at least, by which common noise widens the scatter of the separation of a term from its rivals.
+
+    One for an effect with different signs from unit to unit, up to the number of units for one that is equal in all.
+
+    Parameters
+    ----------
+    model : with the term in it; its residual is the noise
+    """
+    problem = model.problem
+    units = problem.lot.state.time.shape[0]
+    if units < 2 or problem.lot.radial:
+        return 1.0
+    together = _together(model, units)
+    return 1.0 + (units - 1) * together * (1.0 if term.shared else _alike(model, term, units))
+
+
+def _together(model: Model, units: int) -> float:
+    """Correlation of the residuals between units, on the same axis; zero if within chance."""
+    problem = model.problem
+    left = np.nan_to_num(residuals(problem, model.terms, np.ones(problem.n, dtype=bool)) / problem.error)
+    correlation = _pairwise(left.reshape(units, -1))
+    chance = 1.0 / np.sqrt(left.size / units * units * (units - 1) / 2.0)
+    return correlation if correlation > UNITS_TOGETHER * chance else 0.0
+
+
+def _alike(model: Model, term: Term, units: int) -> float:
+    """Part of a term that is equal in every unit, 0 … 1."""
+    fit = estimate(model)
+    at = 0
+    for other in (t for t in model.terms if not t.shared):
+        columns = model.problem.columns(other.effect, other.keywords)[..., : other.first]
+        if other.effect.id == term.effect.id:
+            series = np.einsum("bnp,bp->bn", columns, fit.local[:, at : at + columns.shape[-1]])
+            series = (series - series.mean(axis=1, keepdims=True)) / model.problem.error
+            return max(_pairwise(series.reshape(units, -1)), 0.0)
+        at += columns.shape[-1]
+    return 1.0
+
+
+def _pairwise(series: Array) -> float:
+    """Mean correlation between the rows (units, m), by their common size."""
+    units = len(series)
+    whole = float(np.sum(series**2))
+    return 0.0 if whole <= 0.0 else (float(np.sum(series.sum(axis=0) ** 2)) / whole - 1.0) / (units - 1)

@@ -17,7 +17,7 @@ from inertial.distributions import f_tail
 from inertial.estimation.alternative import soaks
 from inertial.estimation.comparison import estimate
 from inertial.estimation.model import Model
-from inertial.estimation.noise import LONGEST
+from inertial.estimation.noise_shares import LONGEST
 
 Array = NDArray[np.float64]
 

@@ -6,14 +6,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.estimation import variance
+from inertial.errors import NotIdentified
 from inertial.estimation.candidate import Candidate
 from inertial.estimation.covariance import LARGE
-from inertial.estimation.noise_shares import Noise, Shares
-from inertial.estimation.own_shares import own_shares
+from inertial.estimation.noise_shares import Noise, Shares, deviance_of, moderated
 from inertial.estimation.problem import KnownDeviances, Problem
 from inertial.estimation.share_statistics import ShareStatistics
-from inertial.estimation.shares import best_shares, plausible_shares
+from inertial.estimation.shares import best_shares, own_shares, plausible_shares
 from inertial.estimation.space import Space
 from inertial.estimation.term import Term
 
@@ -22,12 +21,6 @@ Array = NDArray[np.float64]
 _LONG = 400
 """Number of dwells above which shares are searched by half decades, because each whitener takes time and memory."""
 
-
-_SPACES = 2_000_000
-"""Largest number of whitened values stored for shares that were tried; of small lots at least two spaces are stored."""
-
-_RICHER = 2
-"""Number of models with one more term that a model keeps."""
 
 _SHARE_OF_WHITE = 0.5
 """Part of the recorded white variance that the noise of norms has at the least."""
@@ -47,7 +40,7 @@ class Model:
     ----------
     near : noise at which the search for this model's noise starts
     curves, shared_curves : (blocks, n, d), columns of a driver that is not an effect, sized by block or for all blocks
-    simpler : the model without the last term or without the curves, whose products serve this one, too; None where there is none
+    known : where the noise of a model of these terms is kept, once it is found
     """
 
     def __init__(
@@ -58,15 +51,14 @@ class Model:
         near: Noise | None = None,
         curves: Array | None = None,
         shared_curves: Array | None = None,
-        simpler: "Model | None" = None,
+        known: list[Noise] | None = None,
     ) -> None:
         self.problem, self.terms, self._near = problem, tuple(terms), near
         self._curves, self._shared_curves = curves, shared_curves
-        self._simpler, self._noises = simpler, dict[tuple[object, ...], Noise]()
-        self._added = None if simpler is None or len(simpler.terms) == len(self.terms) else self.terms[-1]
+        self._found = [] if known is None else known
+        self._noises: dict[tuple[object, ...], list[Noise]] = {}
         self._spaces: dict[Shares, Space] = {}
         self._last: Space | None = None
-        self._richer: dict[tuple[object, ...], Model] = {}
 
     @cached_property
     def local(self) -> Array:
@@ -114,15 +106,10 @@ class Model:
     @cached_property
     def noise(self) -> Noise:
         """Shares of wander by restricted likelihood, pooled over the blocks, and variances of the blocks."""
-        # a model with one more term is made again, where it is too large to be kept: its noise is not
-        noises = {} if self._simpler is None else self._simpler._noises  # noqa: SLF001  # of its own kind
-        known = None if self._added is None else noises.get(self._added.key)
-        if known is None:
-            known = self.noise_at(self._best_shares())
+        if not self._found:
+            self._found.append(self.noise_at(self._best_shares()))
             self._spaces.clear()
-            if self._added is not None:
-                noises[self._added.key] = known
-        return known
+        return self._found[0]
 
     def _best_shares(self) -> Shares:
         """Shares of the smallest restricted deviance; blocks whose wander is of another kind have their own."""
@@ -141,10 +128,9 @@ class Model:
 
     def forget(self) -> None:
         """Drop what is kept for models that follow: of a large lot it takes much memory."""
-        self._richer.clear()
         self._spaces.clear()
         self._last = None
-        for name in ("space", "statistics", "_even"):
+        for name in ("space", "_statistics", "_even"):
             self.__dict__.pop(name, None)
 
     def plausible_shares(self) -> list[tuple[Shares, float]]:
@@ -154,7 +140,7 @@ class Model:
     def noise_at(self, shares: Shares) -> Noise:
         """The noise at given shares: each block's variance shrunk towards the others as far as they are similar."""
         space = self._rough(shares)
-        squares, prior = variance.moderated(space.squares, space.by_block)
+        squares, prior = moderated(space.squares, space.by_block)
         return Noise(shares, np.sqrt(np.maximum(squares, self._least)), prior)
 
     @cached_property
@@ -174,8 +160,7 @@ class Model:
     def _rough(self, shares: Shares) -> Space:
         """The space at shares, with the blocks weighted by their known variances."""
         if shares not in self._spaces:
-            most = max(2 if self.problem.y.size <= LARGE else 1, _SPACES // max(self.local.size, 1))
-            while len(self._spaces) >= most:  # the oldest first: a search for shares seldom goes back
+            if len(self._spaces) >= (2 if self.problem.y.size <= LARGE else 1):  # a search for shares seldom goes back
                 del self._spaces[next(iter(self._spaces))]
             self._spaces[shares] = self._space(Noise(shares, self._weights))
         return self._spaces[shares]
@@ -191,7 +176,7 @@ class Model:
     def _own_scale(self) -> Array:
         """Standard deviations of the blocks under white noise: weights for columns that all share."""
         space = self._space(self.problem.covariance.white_noise())
-        return np.sqrt(variance.moderated(space.squares, space.by_block)[0])
+        return np.sqrt(moderated(space.squares, space.by_block)[0])
 
     def _restricted(self, shares: Shares) -> float:
         """−2 log restricted likelihood, each block with its own variance if it has enough degrees of freedom."""
@@ -207,11 +192,11 @@ class Model:
 
         And whether it is the same for all models of equal terms.
         """
-        quick = self.statistics.beside_shared(shares, self._weights) if self._joined else self.statistics.at(shares)
+        quick = self._statistics.left(shares, self._weights)
         if quick is None:
             space = self._rough(shares)
             return self._deviance_of(shares, space.information, space.squares, space.by_block), False
-        dof = self.problem.covariance.count - float(self.statistics.rank)
+        dof = self.problem.covariance.count - float(self._statistics.rank)
         return self._deviance_of(shares, quick.information, quick.squares, dof), self._alike and quick.firm
 
     def _deviance_of(self, shares: Shares, information: float, squares: Array, dof: Array) -> float:
@@ -221,7 +206,7 @@ class Model:
             level = np.maximum(squares[known] / dof[known], np.maximum(self._least[known], 1e-300))
             return logdet + information + float(np.sum(dof[known] * np.log(level) + squares[known] / level))
         if float(np.median(dof)) < _OWN:
-            return logdet + information + variance.deviance(squares, dof)
+            return logdet + information + deviance_of(squares, dof)
         known = dof > 0
         own = dof[known] * np.log(np.maximum(squares[known], 1e-300) / dof[known])
         return logdet + information + float(np.sum(own))
@@ -231,15 +216,15 @@ class Model:
 
         What all blocks share has the coefficients that it has at the best shares.
         """
-        beside = self.statistics.beside_shared(best, self._weights) if self._joined else None
+        beside = self._statistics.left(best, self._weights) if self._joined else None
         if self._joined and beside is None:
             return lambda _, __: None
         sizes = None if beside is None else beside.sizes
 
         def deviance(block: int, shares: Shares) -> float | None:
             known = self._known.of_blocks.get((block, shares))
-            if known is None and (left := self.statistics.left_of_block(block, shares, sizes)) is not None:
-                dof = int(self.problem.covariance.count[block]) - self.statistics.rank
+            if known is None and (left := self._statistics.left_of_block(block, shares, sizes)) is not None:
+                dof = int(self.problem.covariance.count[block]) - self._statistics.rank
                 known = left.information + dof * float(np.log(max(float(left.squares[0]), 1e-300)))
                 if self._alike and left.firm:
                     self._known.of_blocks[block, shares] = known
@@ -265,22 +250,9 @@ class Model:
         )
 
     @cached_property
-    def statistics(self) -> ShareStatistics:
+    def _statistics(self) -> ShareStatistics:
         """Products of the columns and of the measurements, at any shares."""
-        before, further = self._simpler, None
-        if self._added is not None:
-            further = self._added.with_start(self.problem)
-        elif before is not None and self._curves is not before._curves and self._curves is not None:  # noqa: SLF001  # of its own kind
-            further = Candidate(self._curves[:, :, None], shared=False)
-        elif before is not None and self._shared_curves is not None:
-            further = Candidate(before.statistics.independent(self._shared_curves)[:, :, None], shared=True)
-        return ShareStatistics(
-            self.problem,
-            self.local,
-            None if before is None or further is None else before.statistics,
-            further,
-            self.shared,
-        )
+        return ShareStatistics(self.problem, self.local, self.shared)
 
     @cached_property
     def space(self) -> Space:
@@ -335,7 +307,7 @@ class Model:
         terms: Sequence[Term],
         curves: Array | None = None,
         shared_curves: Array | None = None,
-        simpler: "Model | None" = None,
+        known: list[Noise] | None = None,
     ) -> "Model":
         """Another model near this one; curves are kept unless others are given."""
         return Model(
@@ -344,28 +316,20 @@ class Model:
             near=self.noise,
             curves=self._curves if curves is None else curves,
             shared_curves=self._shared_curves if shared_curves is None else shared_curves,
-            simpler=simpler,
+            known=known,
         )
 
     def with_term(self, term: Term) -> "Model":
-        """The model with one more term; the last few are kept, as a term is fitted, judged and sized one after the other."""
-        key = term.key
-        richer = self._richer.get(key)
-        if richer is None:
-            richer = self._variant([*self.terms, term], simpler=self)
-            if self.problem.y.size <= LARGE:
-                while len(self._richer) >= _RICHER:
-                    del self._richer[next(iter(self._richer))]
-                self._richer[key] = richer
-        return richer
+        """The model with one more term; its noise is kept, as a term is fitted, judged and sized one after the other."""
+        return self._variant([*self.terms, term], known=self._noises.setdefault(term.key, []))
 
     def with_curves(self, columns: Array) -> "Model":
         """The model with the columns (blocks, n, d) of a driver, sized by block."""
-        return self._variant(self.terms, curves=columns, simpler=self if self._curves is None else None)
+        return self._variant(self.terms, curves=columns)
 
     def with_shared_curves(self, columns: Array) -> "Model":
         """The model with the columns (blocks, n, d) of a driver, whose coefficients all blocks share."""
-        return self._variant(self.terms, shared_curves=columns, simpler=self if self._shared_curves is None else None)
+        return self._variant(self.terms, shared_curves=columns)
 
     def without(self, effect_id: str) -> "Model":
         """The model less one effect."""
@@ -374,3 +338,19 @@ class Model:
     def without_term(self, term: Term) -> "Model":
         """The model less one term; a model that was kept holds an equal one."""
         return self._variant([t for t in self.terms if t.key != term.key])
+
+
+def refuse_without_freedom(model: Model) -> None:
+    """Refuse to judge a model that has as many coefficients as there are measurements: it fits any data.
+
+    Raises
+    ------
+    NotIdentified
+        No degree of freedom is left.
+    """
+    if model.at(model.problem.covariance.white_noise()).dof < 1:
+        count, series = model.problem.count, model.problem.blocks
+        raise NotIdentified(
+            f"model: {count // series} dwells a unit leave no degree of freedom to judge the model, more dwells than its "
+            "coefficients on an axis are needed; measure more poses or repeats, or judge a smaller model"
+        )

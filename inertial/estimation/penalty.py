@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from inertial.estimation import variance
 from inertial.estimation.alternative import Handling
 from inertial.estimation.model import Model
+from inertial.estimation.noise_shares import deviance_of
 from inertial.estimation.space import Gain, Space
 from inertial.estimation.term import Term
 from inertial.probability import log_f_tail
@@ -55,7 +55,7 @@ def cost_of_model(model: Model) -> float:
     columns = model.local.shape[-1] + model.shared.shape[-1]
     rank = space.local_rank + space.shared_rank
     count = model.problem.covariance.count.astype(np.float64)
-    deviance = space.logdet + variance.deviance(space.squares, count)
+    deviance = space.logdet + deviance_of(space.squares, count)
     return deviance + cost_of(rank, columns, nonlinear)
 
 

@@ -11,11 +11,10 @@ from numpy.typing import NDArray
 from inertial.effects import SensorEffect
 from inertial.effects.base import AnyEffect, excited, has_start
 from inertial.estimation.alternative import Handling, by_block
-from inertial.estimation.candidate import Candidate
+from inertial.estimation.candidate import Candidate, finest_rows, shared_rows
 from inertial.estimation.covariance import Covariance
 from inertial.estimation.lot import Lot
 from inertial.estimation.noise_shares import Shares
-from inertial.estimation.shared_rows import finest_rows, shared_rows
 
 Array = NDArray[np.float64]
 
@@ -27,15 +26,6 @@ _PIECE = 1_000_000
 
 _WIDE = 3_000_000
 """The same of the columns of one effect at several values: each pass over them goes through the model's own columns once."""
-
-_FEW = 1000
-"""Values of a column of all blocks up to which it takes longer to find equal columns than to work on all."""
-
-_MOST = 40
-"""Values of a grid at a time, where blocks have equal columns."""
-
-_PART = 4
-"""Part of the room, one over this, that the columns of one effect may take."""
 
 _WIDEST = 3
 """Usual largest number of columns of an effect per axis."""
@@ -53,19 +43,11 @@ def on_axis(values: Values, axis: int) -> dict[str, float]:
     return {name: value[axis] if isinstance(value, tuple) else value for name, value in values.items()}
 
 
-def _by_axis(values: Values) -> list[dict[str, float]]:
-    """The values of each sensor axis; the same where no parameter has one for each."""
-    if any(isinstance(value, tuple) for value in values.values()):
-        return [on_axis(values, axis) for axis in range(3)]
-    return [on_axis(values, 0)] * 3
-
-
 def _of_axes(effect: SensorEffect, values: Values, made: Callable[[int, dict[str, float]], Array]) -> list[Array]:
     """What is made for each sensor axis; the same three times where the effect depends on none, and its values neither."""
-    each = _by_axis(values)
-    if effect.same_on_axes and each[0] is each[2]:
-        return [made(0, each[0])] * 3
-    return [made(axis, own) for axis, own in enumerate(each)]
+    if effect.same_on_axes and not any(isinstance(value, tuple) for value in values.values()):
+        return [made(0, on_axis(values, 0))] * 3
+    return [made(axis, on_axis(values, axis)) for axis in range(3)]
 
 
 @dataclass(frozen=True)
@@ -174,16 +156,12 @@ class Problem:
         """Columns (blocks, n, k) of the unknown state of an effect's memory before the first dwell."""
         if isinstance(effect, Handling) or not has_start(effect):
             return np.zeros((self.blocks, self.n, 0))
-        if isinstance(effect, SensorEffect):
-            state = self.lot.state
-            columns = self._by_axis(
-                _of_axes(effect, values, lambda axis, own: effect.start_columns(state, axis, **own))
-            )
-        else:
-            columns = self.seen(effect.start_change(self.lot.state, **on_axis(values, 0)))
         # a state that decays before the second dwell leaves a column of one dwell only: it is kept, and this dwell has no
         # information
-        return columns
+        state = self.lot.state
+        if isinstance(effect, SensorEffect):
+            return self._by_axis(_of_axes(effect, values, lambda axis, own: effect.start_columns(state, axis, **own)))
+        return self.seen(effect.start_change(state, **on_axis(values, 0)))
 
     def _by_axis(self, axes: list[Array]) -> Array:
         """Columns of three axes, each (units or 1, n, p), by block."""
@@ -209,22 +187,22 @@ class Problem:
             return np.einsum("uni,uinq->unq", self._direction, seen)
         return seen.reshape(self.blocks, self.n, -1)
 
-    def candidate(
-        self, effect: AnyEffect | Handling, grid: Sequence[Values], *, first: int | None = None, of: int = 1
-    ) -> Candidate:
+    def candidate(self, effect: AnyEffect | Handling, grid: Sequence[Values], *, first: int | None = None) -> Candidate:
         """Columns of an effect over values of its nonlinear parameters.
 
         Parameters
         ----------
         first : how many columns an axis; all if None
-        of : number of values of the whole grid, of which these are a part
         """
         key = (effect.id, len(grid), tuple(grid[0].items()), tuple(grid[-1].items()), first)
+        return self._stored(key, lambda: self._made(effect, grid, first, key))
+
+    def _stored(self, key: tuple[object, ...], make: Callable[[], Candidate]) -> Candidate:
+        """A candidate, made where it is not kept, and kept where its columns have room."""
         kept = self._kept.get(key)
         if kept is None:
-            kept = self._made(effect, grid, first, key)
-            # columns of many values, which differ from block to block, are made again: they would take the room of all others
-            if kept.columns.size / len(grid) * max(of, len(grid)) < self._room / (_PART if len(grid) < of else 1):
+            kept = make()
+            if kept.columns.size < self._room:
                 self._room -= kept.columns.size
                 self._kept[key] = kept
         return kept
@@ -263,7 +241,7 @@ class Problem:
             own = (self._columns(effect, values) if known is None else known)[..., :first]
             if start:
                 own = np.concatenate([own, self.start(effect, values)], axis=-1)
-            rows = None if shared or self.blocks * self.n <= _FEW else self.rows_of(own)
+            rows = None if shared else shared_rows(own, radial=self.lot.radial)
             every.append(own if rows is None else own[np.unique(rows, return_index=True)[1]])
             rows_of.append(rows)
         rows = finest_rows(rows_of, radial=self.lot.radial)
@@ -275,10 +253,6 @@ class Problem:
             columns[:, place] = np.swapaxes(own, -1, -2)
         return Candidate(columns.transpose(0, 3, 1, 2), shared, rows=rows, key=key)
 
-    def rows_of(self, columns: Array) -> NDArray[np.intp] | None:
-        """The row of each block where columns (blocks, ...) are equal: of all blocks, by axis, or in each unit; else None."""
-        return shared_rows(columns, radial=self.lot.radial)
-
     def pieces(
         self, effect: AnyEffect | Handling, grid: Sequence[Values], *, first: int | None = None
     ) -> Iterator[Candidate]:
@@ -288,11 +262,11 @@ class Problem:
             return
         size, begin = self.at_a_time, 0
         while begin < len(grid):
-            made = self.candidate(effect, grid[begin : begin + size], first=first, of=len(grid))
+            made = self.candidate(effect, grid[begin : begin + size], first=first)
             yield made
             begin += size
             if made.rows is not None:
-                size = max(1, min(_MOST, _PIECE // made.columns[:, :, 0].size))
+                size = max(1, _PIECE // made.columns[:, :, 0].size)
 
     def _places(self, effect: Handling, grid: Sequence[Values]) -> Iterator[Candidate]:
         """The places of an alternative, those of units one unit after another, no more at a time than a piece has room for."""
@@ -313,16 +287,15 @@ class Problem:
     ) -> Iterator[Candidate]:
         """The places of an alternative of one unit, for some units; at most ``size`` units at a time if their columns differ."""
         key = (effect.id, units.size, int(units[0]), len(places), *places[0].items(), *places[-1].items())
-        kept = self._kept.get(key)
-        if kept is None:
+
+        def made() -> Candidate:
             columns = np.stack([effect.of_each_unit(self.lot, self.slope, **on_axis(p, 0)) for p in places], axis=3)
             few, n, _, g, k = columns.shape
-            kept = Candidate(np.swapaxes(columns, 1, 2).reshape(3 * few, n, g, k), shared=True, units=units, key=key)
-            if few == 1:
-                kept = replace(kept, rows=np.tile(np.arange(3), units.size))
-            if kept.columns.size < self._room:
-                self._room -= kept.columns.size
-                self._kept[key] = kept
+            rows = np.tile(np.arange(3), units.size) if few == 1 else None
+            by_block = np.swapaxes(columns, 1, 2).reshape(3 * few, n, g, k)
+            return Candidate(by_block, shared=True, rows=rows, units=units, key=key)
+
+        kept = self._stored(key, made)
         if kept.rows is not None:
             yield kept
             return
@@ -334,18 +307,16 @@ class Problem:
     def _together(self, effect: Handling, places: Sequence[Values]) -> Candidate:
         """An alternative of the whole lot at some places."""
         key = (effect.id, len(places), *places[0].items(), *places[-1].items())
-        kept = self._kept.get(key)
-        if kept is None:
+
+        def made() -> Candidate:
             changes = [effect.change(self.lot, self.slope, **on_axis(place, 0)) for place in places]
             units = self.lot.state.time.shape[0]
             rows = np.tile(np.arange(3), units) if all(len(f) == 1 for f in changes) else None
             if rows is None:
                 changes = [np.broadcast_to(f, (units, *f.shape[1:])) for f in changes]
-            kept = Candidate(np.stack([by_block(f) for f in changes], axis=2), shared=True, rows=rows, key=key)
-            if kept.columns.size < self._room:
-                self._room -= kept.columns.size
-                self._kept[key] = kept
-        return kept
+            return Candidate(np.stack([by_block(f) for f in changes], axis=2), shared=True, rows=rows, key=key)
+
+        return self._stored(key, made)
 
 
 def _without_unit(places: Sequence[Values]) -> tuple[tuple[tuple[str, float | tuple[float, ...]], ...], ...]:

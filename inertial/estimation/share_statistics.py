@@ -1,16 +1,16 @@
 """What a model and its measurements say about the shares of the noise: products of its columns at any shares."""
 
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.estimation.candidate import Candidate
-from inertial.estimation.factors import Left, beside_common, factorised
+from inertial.estimation.bases import SEEN
+from inertial.estimation.candidate import shared_rows
+from inertial.estimation.covariance import PIECE
 from inertial.estimation.noise_shares import Shares
 from inertial.estimation.problem import Problem
-from inertial.estimation.products import PIECE, Spanned, spanned
-from inertial.estimation.whitener import applied
 
 Array = NDArray[np.float64]
 
@@ -26,8 +26,39 @@ _ROUNDING = 1e-11
 _FAR = 1e3
 """Multiple of the limit, of the squares, above which the eigenvalues of the products of columns decide on their rank."""
 
-_KEPT = 1_000_000
-"""Largest number of products that are kept for models with one more term."""
+_HANGING = 1e-3
+"""Independent part of a column below which a single factorisation is inaccurate."""
+
+_FIRM = 1e4
+"""Largest inverse eigenvalue of the products of columns of unit length at which their order is of no account."""
+
+_ABSORBED = 1e-8
+"""Share of the squares of a column that all blocks share below which products are too inaccurate for what is left of it."""
+
+
+@dataclass(frozen=True)
+class Left:
+    """What columns with coefficients by block leave of measurements, beside those that all blocks share.
+
+    information : log|HᵀV⁻¹H| of the columns H with coefficients by block; squares : (blocks,), sums of squares
+    sizes : (q + 1,), what the columns that all blocks share, and the measurements, have in what is left; None if there are none
+    root : (blocks, r, r), lower factor of the products of the columns of unit length
+    """
+
+    information: float
+    squares: Array
+    sizes: Array | None = None
+    root: Array | None = None
+
+    @property
+    def firm(self) -> bool:
+        """Whether another order of the same columns gives the same numbers: no combination of them nearly vanishes.
+
+        The smallest eigenvalue of the products is at least one over the sum of squares of the inverse factor.
+        """
+        if self.root is None:
+            return False
+        return float(np.max(np.sum(np.linalg.inv(self.root) ** 2, axis=(1, 2)), initial=0.0)) < _FIRM
 
 
 class ShareStatistics:
@@ -36,25 +67,11 @@ class ShareStatistics:
     Parameters
     ----------
     local : (blocks, n, p), columns, g per unit of the coefficient
-    shared : (blocks, n, q), columns whose coefficients all blocks share; None for none
-    before : those of a model without its last term, whose products serve all that follow it; None without one
-    further : the columns of the last term, at one value of its parameters
+    shared : (blocks, n, q), columns whose coefficients all blocks share
     """
 
-    def __init__(
-        self,
-        problem: Problem,
-        local: Array,
-        before: "ShareStatistics | None" = None,
-        further: Candidate | None = None,
-        shared: Array | None = None,
-    ) -> None:
-        self.problem, self.local = problem, local
-        self._shared = local[..., :0] if shared is None else shared
-        self.whole = self._determined is local
-        # a combination that vanishes mixes the columns: then all are whitened together
-        nested = before is not None and further is not None and self.whole and before.whole
-        self._before, self._further = (before, further) if nested else (None, None)
+    def __init__(self, problem: Problem, local: Array, shared: Array) -> None:
+        self.problem, self._local, self._shared = problem, local, shared
         self._kept: dict[Shares, Array] = {}
         self._single: dict[tuple[int, Shares], Array] = {}
 
@@ -63,12 +80,10 @@ class ShareStatistics:
         """Number of columns with coefficients by block, without combinations that vanish."""
         return int(self._determined.shape[-1])
 
-    @cached_property
-    def _common(self) -> NDArray[np.bool_]:
-        """Whether all blocks share the coefficient of each column, in the order of the products, (r,)."""
-        if self._before is None or self._further is None:
-            return np.repeat([False, True], [self.rank, self._independent.shape[-1]])
-        return np.append(self._before._common, np.full(self._further.columns.shape[-1], self._further.shared))  # noqa: SLF001
+    @property
+    def _whole(self) -> bool:
+        """Whether no combination of the columns vanishes."""
+        return self._determined is self._local
 
     @cached_property
     def _determined(self) -> Array:
@@ -78,42 +93,28 @@ class ShareStatistics:
         among the information, a combination that vanishes takes off ln F per share F of wander: the largest would always be best.
         """
         there = self.problem.covariance.there.astype(np.float64)
-        products = np.swapaxes(self.local, -1, -2) @ (self.local * there[..., None])
+        products = np.swapaxes(self._local, -1, -2) @ (self._local * there[..., None])
         size = np.sqrt(np.maximum(np.diagonal(products, axis1=-2, axis2=-1), 0.0))
         size = np.where(size > 0.0, size, 1.0)
         squares = np.linalg.eigvalsh(products / (size[:, :, None] * size[:, None, :]))
         if not squares.size or bool(np.all(squares[:, 0] > _FAR * VANISHING**2 * squares[:, -1])):
-            return self.local
-        unit = self.local * there[..., None] / size[:, None, :]
+            return self._local
+        unit = self._local * there[..., None] / size[:, None, :]
         _, values, turn = np.linalg.svd(unit, full_matrices=False)
         ranks = np.sum(values > VANISHING * values[:, :1], axis=1)
         rank = int(ranks.max())
-        if rank == self.local.shape[-1] or int(ranks.min()) != rank:
-            return self.local
-        scaled = self.local / np.where(size > 0.0, size, 1.0)[:, None, :]
-        return scaled @ np.swapaxes(turn[:, :rank], -1, -2)
+        if rank == self._local.shape[-1] or int(ranks.min()) != rank:
+            return self._local
+        return (self._local / size[:, None, :]) @ np.swapaxes(turn[:, :rank], -1, -2)
 
     @cached_property
     def _rows(self) -> Array:
-        """The columns, and the measurements behind them, as rows, (blocks, r + 1, n).
+        """The columns by block, the directions of those that all share, and the measurements, as rows (blocks, r + q + 1, n).
 
-        Of the measurements a plain fit is taken off before: what the model leaves of them is a millionth of their squares. With
-        products of a model without the last term, it is the fit of that model: the measurements are the same in all of them.
+        Of the measurements a plain fit is taken off before: what the model leaves of them is a millionth of their squares.
         """
-        if self._before is None or self._further is None:
-            columns = np.concatenate([self._determined, self._independent], axis=-1)
-            y = self._after_plain_fit(self.problem.y[..., None])
-            return np.swapaxes(np.concatenate([columns, y], axis=-1), -1, -2)
-        rows, further = self._before._rows, self._further.of_blocks[:, :, 0]  # noqa: SLF001  # of its own kind
-        return np.concatenate([rows[:, :-1], np.swapaxes(further, -1, -2), rows[:, -1:]], axis=1)
-
-    def _rows_of(self, block: int) -> Array:
-        """The rows (r + 1, n) of one block."""
-        if "_rows" in self.__dict__ or self._before is None or self._further is None:
-            return self._rows[block]
-        before, row_of = self._before._rows_of(block), self._further.rows  # noqa: SLF001  # of its own kind
-        further = self._further.columns[block if row_of is None else row_of[block], :, 0]
-        return np.concatenate([before[:-1], further.T, before[-1:]])
+        y = self._after_plain_fit(self.problem.y[..., None])
+        return np.swapaxes(np.concatenate([self._determined, self._directions, y], axis=-1), -1, -2)
 
     def _after_plain_fit(self, series: Array) -> Array:
         """What the columns with coefficients by block leave of series (blocks, n, k) in a fit of equal weights."""
@@ -126,68 +127,47 @@ class ShareStatistics:
         return (series - fitted) * there
 
     @cached_property
-    def _independent(self) -> Array:
-        """Directions of the columns that all blocks share."""
-        return self.independent(self._shared) if self._shared.shape[-1] else self._shared
-
-    def independent(self, shared: Array) -> Array:
-        """Orthonormal directions (blocks, n, r) that span columns (blocks, n, q) of all blocks, without those that vanish.
+    def _directions(self) -> Array:
+        """Orthonormal directions (blocks, n, r) that span the columns that all blocks share, without those that vanish.
 
         A plain fit of the columns with coefficients by block is taken off before.
         """
-        q = shared.shape[-1]
-        size = np.linalg.norm((shared * self.problem.covariance.there[..., None]).reshape(-1, q), axis=0)
-        flat = self._after_plain_fit(shared).reshape(-1, q) / np.where(size > 0.0, size, 1.0)
+        q = self._shared.shape[-1]
+        if not q:
+            return self._shared
+        size = np.linalg.norm((self._shared * self.problem.covariance.there[..., None]).reshape(-1, q), axis=0)
+        flat = self._after_plain_fit(self._shared).reshape(-1, q) / np.where(size > 0.0, size, 1.0)
         left, values, _ = np.linalg.svd(flat, full_matrices=False)
         seen = values > max(_VANISHED * values[0], _ROUNDING)
-        return left[:, seen].reshape(*shared.shape[:2], -1)
+        return left[:, seen].reshape(*self._shared.shape[:2], -1)
 
     @cached_property
     def _distinct(self) -> tuple[Array, NDArray[np.intp]]:
-        """The columns that differ, (rows, n), and where each column of each block is among them, (blocks, r + 1)."""
+        """The columns that differ, (rows, n), and where each column of each block is among them, (blocks, r + q + 1)."""
         blocks = self.problem.blocks
         few: list[Array] = []
         places: list[NDArray[np.intp]] = []
         count = 0
         for column in np.swapaxes(self._rows, 0, 1):
-            rows = self.problem.rows_of(column)
+            rows = shared_rows(column, radial=self.problem.lot.radial)
             few.append(column if rows is None else column[np.unique(rows, return_index=True)[1]])
             places.append(count + (np.arange(blocks) if rows is None else rows))
             count += len(few[-1])
         return np.concatenate(few), np.stack(places, axis=1)
 
-    def products(self, shares: Shares) -> Array:
-        """Products (blocks, r + 1, r + 1) of the columns and the measurements with each other."""
-        made = self._alike(shares.common)
+    def _products(self, shares: Shares) -> Array:
+        """Products (blocks, r + q + 1, r + q + 1) of the columns and the measurements with each other."""
+        common = shares.common
+        if common not in self._kept:
+            self._kept = {common: self._made(common)}  # the last alone: a search for shares seldom goes back
+        products = self._kept[common]
         if shares.own:
-            made = made.copy()
+            products = products.copy()
             for block, flicker, walk in shares.own:
-                made[block] = self.of_block(block, Shares(flicker, walk))
-        return made
+                products[block] = self._of_block(block, Shares(flicker, walk))
+        return products
 
-    def _alike(self, shares: Shares) -> Array:
-        """The same at shares that no block has for itself; they are kept, whatever shares of their own some blocks have."""
-        if shares not in self._kept:
-            made = self._whole(shares) if self._before is None or self._further is None else self._nested(shares)
-            while self._kept and (len(self._kept) + 1) * made.size > _KEPT:
-                del self._kept[next(iter(self._kept))]
-            self._kept[shares] = made
-        return self._kept[shares]
-
-    def of_block(self, block: int, shares: Shares) -> Array:
-        """Products (r + 1, r + 1) of one block, at shares that are its own or the lot's."""
-        if shares in self._kept:
-            return self._kept[shares][block]
-        if (block, shares) not in self._single:
-            covariance = self.problem.covariance
-            whitener, white, _ = covariance.whitener_of_block(block, shares)
-            rows = self._rows_of(block)
-            made = rows * white if whitener is None else applied(whitener, rows)
-            self._single[block, shares] = made @ made.T / covariance.level[block] ** 2
-        return self._single[block, shares]
-
-    def _whole(self, shares: Shares) -> Array:
-        """The products of all columns that differ."""
+    def _made(self, shares: Shares) -> Array:
         covariance = self.problem.covariance
         columns, places = self._distinct
         out = np.empty((self.problem.blocks, places.shape[1], places.shape[1]))
@@ -199,47 +179,26 @@ class ShareStatistics:
         out /= covariance.level[:, None, None] ** 2
         return out
 
-    def _nested(self, shares: Shares) -> Array:
-        """Those of the model without its last term, and those of this term: V⁻¹ is applied to the columns of the term alone."""
-        if self._before is None or self._further is None:
-            return self._whole(shares)
-        known = self._before.products(shares)
-        own, across = self._with_further(self._before, self._further, shares)
-        # the measurements stay last
-        r = known.shape[-1] - 1
-        above = np.concatenate([known[:, :r, :r], np.swapaxes(across, -1, -2)[:, :r], known[:, :r, r:]], axis=-1)
-        beside = np.concatenate([across[..., :r], own, across[..., r:]], axis=-1)
-        last = np.concatenate([known[:, r:, :r], np.swapaxes(across, -1, -2)[:, r:], known[:, r:, r:]], axis=-1)
-        return np.concatenate([above, beside, last], axis=1)
+    def _of_block(self, block: int, shares: Shares) -> Array:
+        """The products of one block, at shares that are its own or the lot's."""
+        if shares in self._kept:
+            return self._kept[shares][block]
+        if (block, shares) not in self._single:
+            covariance = self.problem.covariance
+            made = covariance.whitener_of_block(block, shares).rows(self._rows[block])
+            self._single[block, shares] = made @ made.T / covariance.level[block] ** 2
+        return self._single[block, shares]
 
-    def _with_further(self, before: "ShareStatistics", further: Candidate, shares: Shares) -> tuple[Array, Array]:
-        """Products of the columns of the last term, with each other and with all those before it."""
-        covariance = self.problem.covariance
-        if self._spanned is None:
-            return covariance.products_with(further, before._rows, shares)  # noqa: SLF001  # of its own kind
-        return covariance.products_of_spanned(self._spanned, *before._distinct, shares)  # noqa: SLF001
-
-    @cached_property
-    def _spanned(self) -> Spanned | None:
-        """The columns of the last term by the few series that span them; None if it takes too many."""
-        if self._further is None or self._further.rows is not None:
-            return None
-        return spanned(self._further.columns[:, :, 0])
-
-    def at(self, shares: Shares) -> Left | None:
-        """What is left of the measurements, by one factorisation; None if columns are collinear."""
-        return factorised(self.products(shares))
-
-    def beside_shared(self, shares: Shares, scale: Array) -> Left | None:
-        """The same where all blocks share some coefficients; None if any columns are collinear.
+    def left(self, shares: Shares, scale: Array) -> Left | None:
+        """What is left of the measurements; None if columns are collinear.
 
         Parameters
         ----------
-        scale : (blocks,), standard deviations of the blocks, by which they weigh in the common coefficients
+        scale : (blocks,), standard deviations of the blocks, by which they weigh in the coefficients that all share
         """
-        if not self.whole:
-            return None
-        return beside_common(self.products(shares), self._common, scale)
+        if not self._shared.shape[-1]:
+            return _factorised(self._products(shares))
+        return _beside_common(self._products(shares), self.rank, scale) if self._whole else None
 
     def left_of_block(self, block: int, shares: Shares, sizes: Array | None = None) -> Left | None:
         """What is left of the measurements of one block; None if columns are collinear.
@@ -248,12 +207,56 @@ class ShareStatistics:
         ----------
         sizes : (q + 1,), what the columns that all blocks share, and the measurements, have in the series; None if there are none
         """
-        if not self.whole:
+        if not self._whole:
             return None
-        products = self.of_block(block, shares)
+        products = self._of_block(block, shares)
         if sizes is not None:
             turn = np.zeros((len(products), self.rank + 1))
-            turn[np.flatnonzero(~self._common), np.arange(self.rank)] = 1.0
-            turn[np.append(np.flatnonzero(self._common), len(products) - 1), -1] = sizes
+            turn[range(self.rank), range(self.rank)] = 1.0
+            turn[self.rank :, -1] = sizes
             products = turn.T @ products @ turn
-        return factorised(products[None])
+        return _factorised(products[None])
+
+
+def _factorised(products: Array) -> Left | None:
+    """What columns leave of measurements; None if columns are collinear.
+
+    Parameters
+    ----------
+    products : (blocks, r + 1, r + 1), of the columns, and of the measurements, which are last
+    """
+    size = np.sqrt(np.maximum(np.diagonal(products, axis1=-2, axis2=-1), 1e-300))
+    try:
+        root = np.linalg.cholesky(products / (size[:, :, None] * size[:, None, :]))
+    except np.linalg.LinAlgError:
+        return None
+    diagonal = np.diagonal(root, axis1=-2, axis2=-1)
+    if float(diagonal[:, :-1].min(initial=1.0)) < _HANGING:
+        return None
+    information = 2.0 * float(np.sum(np.log(diagonal[:, :-1] * size[:, :-1])))
+    squares = np.asarray((diagonal[:, -1] * size[:, -1]) ** 2, dtype=np.float64)
+    return Left(information, squares, root=np.asarray(root[:, :-1, :-1], dtype=np.float64))
+
+
+def _beside_common(products: Array, rank: int, scale: Array) -> Left | None:
+    """The same where all blocks share the coefficients of the columns after the first ``rank``; ``scale`` as of ``left``."""
+    size = np.sqrt(np.maximum(np.diagonal(products, axis1=-2, axis2=-1), 1e-300))
+    unit = products / (size[:, :, None] * size[:, None, :])
+    inner, across = unit[:, :rank, :rank], unit[:, :rank, rank:]
+    values = np.linalg.eigvalsh(inner)
+    if float(values[:, :1].min(initial=1.0)) < SEEN**2:
+        return None  # some are limited in what they count
+    left = unit[:, rank:, rank:] - np.swapaxes(across, -1, -2) @ np.linalg.solve(inner, across)
+    left *= size[:, rank:, None] * size[:, None, rank:]
+    whole = np.sum(left / scale[:, None, None] ** 2, axis=0)
+    before = np.sum((size[:, rank:] / scale[:, None]) ** 2, axis=0)
+    after = np.diagonal(whole)
+    if float((after[:-1] / before[:-1]).min(initial=1.0)) < _ABSORBED:
+        return None
+    root = np.sqrt(after[:-1])
+    gram, right = whole[:-1, :-1] / np.outer(root, root), whole[:-1, -1] / root
+    if float(np.linalg.eigvalsh(gram).min(initial=1.0)) < _ABSORBED:
+        return None
+    sizes = np.append(-np.linalg.solve(gram, right) / root, 1.0)
+    information = float(np.sum(np.log(values))) + 2.0 * float(np.sum(np.log(size[:, :rank])))
+    return Left(information, np.einsum("s,bst,t->b", sizes, left, sizes), sizes)

@@ -1,11 +1,17 @@
-"""An effect in a model, at values of its nonlinear parameters."""
+"""An effect in a model, at values of its nonlinear parameters; the allowance for a bias that differs after a power cycle."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
 
-from inertial.effects.base import AnyEffect
+import numpy as np
+
+from inertial.effects.base import AnyEffect, Array, SensorEffect, stack
 from inertial.estimation.alternative import Handling
 from inertial.estimation.candidate import Candidate
 from inertial.estimation.problem import SHARED, Problem
+from inertial.power import switched
+from inertial.state import State
 
 
 @dataclass(frozen=True)
@@ -46,7 +52,32 @@ class Term:
         """The term's columns in a problem, as a candidate."""
         return problem.candidate(self.effect, [self.keywords], first=self.first)
 
-    def with_start(self, problem: Problem) -> Candidate:
-        """The same with the columns of the unknown state of its memory."""
-        made = problem.varied(self.effect, [self.keywords], first=self.first, start=not self.rest)
-        return replace(made, key=self.key)
+
+class TurnOnBias(SensorEffect):
+    """Bias that differs from one power-on to the next: not an effect to search for, but one to allow for."""
+
+    id: ClassVar[str] = "turn_on_bias"
+    symbol: ClassVar[str] = "kP"
+    equation: ClassVar[str] = "kP·[since the n-th power-on]"
+    source: ClassVar[str] = "repeatability of the bias, IEEE Std 1293-1998"
+    typical_ug: ClassVar[tuple[float, float]] = (1.0, 1000.0)
+    breaker: ClassVar[str] = "the same pose before and after"
+
+    def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
+        """A step at every power-on but the first, (..., n, p)."""
+        dwell = np.arange(state.time.shape[-1])
+        steps = [np.broadcast_to((dwell >= k).astype(float), state.time.shape) for k in switched(state)]
+        return stack(state, steps) if steps else np.zeros((*state.time.shape, 0))
+
+    def names(self, axis: int) -> tuple[str, ...]:
+        """Its one name."""
+        return ("kP",)
+
+
+TURN_ON = Term(TurnOnBias())
+
+
+def with_turn_on(state: State, terms: Sequence[Term]) -> list[Term]:
+    """Terms, and the bias of every power-on beside them where the state has more than one."""
+    named = any(t.effect.id == TURN_ON.effect.id for t in terms)
+    return [*terms] if named or not switched(state) else [*terms, TURN_ON]

@@ -1,4 +1,4 @@
-"""The lower triangle that makes the noise of one set of dwells white, by Cholesky factors."""
+"""What makes the noise of one set of dwells white: a lower triangle by Cholesky factors, or one factor for each dwell."""
 
 from dataclasses import dataclass
 
@@ -12,9 +12,6 @@ Array = NDArray[np.float64]
 
 _factor, _invert = get_lapack_funcs(("potrf", "trtri"), dtype=np.float64)
 _times, _solve = get_blas_funcs(("trmm", "trsm"), dtype=np.float64)
-
-_ROWS = 48
-"""Rows of a kernel that are scaled at a time: an array of all of them is memory that the system has to clear first."""
 
 EVEN = 1.5
 """White standard errors of a block that differ by less than this factor are taken as equal."""
@@ -85,22 +82,87 @@ def grouped(
     return profiles, [(place, steps, np.array(blocks)) for (place, steps), blocks in groups.items()]
 
 
-def whitener_of(dwells: DwellProfile, index: list[int | None], wander: tuple[Array, Array]) -> tuple[Array, float]:
-    """Lower triangle (n, n) that makes a block's noise white, and the log-determinant of its covariance.
+@dataclass(frozen=True)
+class Whitener:
+    """What makes the noise of dwells white, of variance one over the block's level.
+
+    there : (n,), the dwells that are not missing; the others become zero
+    white : (n,), factors of the dwells for white noise alone
+    logdet : log-determinant of the covariance of the dwells
+    lower : (n, n), lower triangle where the noise wanders; None where it is white
+    """
+
+    there: NDArray[np.bool_]
+    white: Array
+    logdet: float
+    lower: Array | None = None
+
+    @property
+    def matrix(self) -> Array:
+        """The whitener as a matrix (n, n)."""
+        return np.diag(self.white) if self.lower is None else self.lower
+
+    @property
+    def precision(self) -> Array:
+        """Diagonal (n,) of the inverse covariance."""
+        return self.white**2 if self.lower is None else np.einsum("mn,mn->n", self.lower, self.lower)
+
+    def rows(self, series: Array, *, overwrite: bool = False) -> Array:
+        """Series (..., n) with white noise; ``overwrite``: the result may take their place."""
+        if self.lower is None:
+            return np.multiply(series, self.white, out=series if overwrite else None)
+        # half of the products, as the matrix is triangular
+        flat = _flat(series)
+        return _times(1.0, self.lower.T, flat.T, side=0, lower=0, trans_a=1, overwrite_b=overwrite).T.reshape(
+            series.shape
+        )
+
+    def columns(self, columns: Array) -> Array:
+        """Columns (b, n, m) with white noise."""
+        if self.lower is None:
+            return columns * self.white[:, None]
+        return np.swapaxes(self.rows(np.swapaxes(columns, -1, -2)), -1, -2)
+
+    def back(self, series: Array) -> Array:
+        """Series (..., n) times the transpose of the whitener: their products with series in g are those of whitened ones."""
+        if self.lower is None:
+            return series * self.white
+        return _times(1.0, self.lower.T, _flat(series).T, side=0, lower=0).T.reshape(series.shape)
+
+    def coloured(self, series: Array) -> Array:
+        """White series (..., n) with this noise; zero where a dwell is missing."""
+        if self.lower is None:
+            return series * np.divide(1.0, self.white, out=np.zeros_like(self.white), where=self.there)
+        out = np.zeros(series.shape)
+        inside = np.ascontiguousarray(self.lower[np.ix_(self.there, self.there)])
+        flat = _flat(series[..., self.there])
+        solved = _solve(1.0, inside.T, flat.T, side=0, lower=0, trans_a=1, overwrite_b=1).T
+        out[..., self.there] = solved.reshape(*series.shape[:-1], -1)
+        return out
+
+
+def _flat(series: Array) -> Array:
+    """Series (..., n) as rows, (m, n)."""
+    return np.ascontiguousarray(series).reshape(-1, series.shape[-1])
+
+
+def whitener_of(dwells: DwellProfile, index: list[int | None], wander: tuple[Array, Array] | None) -> Whitener:
+    """The whitener of a block.
 
     Parameters
     ----------
     index : steps of the lattice at which the shares of 1/f and of random walk stand; None for none
-    wander : covariances (n, n) of 1/f and of random walk of variance one
+    wander : covariances (n, n) of 1/f and of random walk of variance one; None for records too long for them
     """
     there, whole = dwells.there, bool(dwells.there.all())
+    white = np.where(there, 1.0 / dwells.white, 0.0)
+    if wander is None or index == [None, None]:
+        return Whitener(there, white, 2.0 * float(np.sum(np.log(dwells.white[there]))))
     covariance = np.zeros((there.size, there.size))
     covariance.reshape(-1)[:: there.size + 1] = dwells.white**2
     for i, each in zip(index, wander, strict=True):
         if i is not None:
-            kernel, share = dwells.louder(each), 10.0 ** (i / SHARE_STEP)
-            for rows in (slice(first, first + _ROWS) for first in range(0, there.size, _ROWS)):
-                covariance[rows] += share * kernel[rows]
+            covariance += 10.0 ** (i / SHARE_STEP) * dwells.louder(each)
     if not whole:
         covariance = covariance[np.ix_(there, there)]
     # of the transpose, which is in Fortran order: no copy
@@ -108,34 +170,9 @@ def whitener_of(dwells: DwellProfile, index: list[int | None], wander: tuple[Arr
     if failed:
         raise np.linalg.LinAlgError("the covariance of the noise is not positive definite")
     logdet = 2.0 * float(np.sum(np.log(np.diagonal(upper))))
-    inverse = _invert(upper, lower=0, overwrite_c=1)[0].T
-    if whole:
-        return inverse, logdet
-    filled = np.zeros((there.size, there.size))
-    filled[np.ix_(there, there)] = inverse
-    return filled, logdet
-
-
-def applied(lower: Array, series: Array, *, overwrite: bool = False) -> Array:
-    """Series (blocks, m, n) times a lower triangle (n, n), by half of the products, as the matrix is triangular.
-
-    Parameters
-    ----------
-    overwrite : whether the result may take the place of the series
-    """
-    flat = np.ascontiguousarray(series).reshape(-1, lower.shape[0])
-    return _times(1.0, lower.T, flat.T, side=0, lower=0, trans_a=1, overwrite_b=overwrite).T.reshape(series.shape)
-
-
-def solved(lower: Array, series: Array, *, overwrite: bool = False) -> Array:
-    """Series (blocks, m, n) that a lower triangle (n, n) makes the given ones; parameters as of :func:`applied`."""
-    flat = np.ascontiguousarray(series).reshape(-1, lower.shape[0])
-    return _solve(
-        1.0, np.ascontiguousarray(lower).T, flat.T, side=0, lower=0, trans_a=1, overwrite_b=overwrite
-    ).T.reshape(series.shape)
-
-
-def applied_back(lower: Array, series: Array) -> Array:
-    """Series (..., n) times the transpose of a lower triangle (n, n), by half of the products."""
-    flat = np.ascontiguousarray(series).reshape(-1, lower.shape[0])
-    return _times(1.0, lower.T, flat.T, side=0, lower=0).T.reshape(series.shape)
+    lower = _invert(upper, lower=0, overwrite_c=1)[0].T
+    if not whole:
+        filled = np.zeros((there.size, there.size))
+        filled[np.ix_(there, there)] = lower
+        lower = filled
+    return Whitener(there, white, logdet, lower)

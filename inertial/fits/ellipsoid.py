@@ -7,15 +7,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from inertial.errors import NotIdentified
-from inertial.estimation.noise import LONGEST
-from inertial.fits.norm_wander import WALK_ABOUT_MEAN, NormNoise, norm_noise
+from inertial.estimation.noise_shares import LONGEST
+from inertial.fits.descent import descended
+from inertial.fits.norm_noise import WALK_ABOUT_MEAN, NormNoise, norm_noise
 from inertial.fits.wander import student
 
 Array = NDArray[np.float64]
 Shape = Literal["nine", "six"]
 
 _ROUNDS = 3  # of the noise, which depends on the directions of the force
-_STEPS = 60  # of Gauss-Newton, and halvings of one
 _SETTLED = 1e-12  # share of the cost that a step no longer takes off
 _SINGULAR = 1e-10  # eigenvalue of the scaled normal matrix below which a parameter is not determined
 _UPPER = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
@@ -229,19 +229,13 @@ class _Sphere:
 
     def solve(self, theta: Array) -> Array:
         """Parameters (u, 12) of least squared residuals: Gauss-Newton, each unit's step halved while it does not help."""
-        cost = self._cost(theta)
-        for _ in range(_STEPS):
-            step = np.zeros_like(theta)
-            step[:, self.free] = _solve(self._weighted(self.rows(theta)), -self._left(theta))
-            theta, lower = self._advance(theta, step, cost)
-            settled = np.all(cost - lower <= _SETTLED * (cost + np.finfo(float).tiny))
-            cost = lower
-            if settled:
-                break
-        return theta
 
-    def _cost(self, theta: Array) -> Array:
-        return np.sum(self._left(theta) ** 2, axis=-1)
+        def step(at: Array) -> Array:
+            change = np.zeros_like(at)
+            change[:, self.free] = _solve(self._weighted(self.rows(at)), -self._left(at))
+            return change
+
+        return descended(theta, step, lambda at: np.sum(self._left(at) ** 2, axis=-1), _SETTLED)
 
     def _weighted(self, rows: Array) -> Array:
         return rows if self.whiten is None else self.whiten @ rows
@@ -249,21 +243,6 @@ class _Sphere:
     def _left(self, theta: Array) -> Array:
         """Residuals (u, n), weighted where their noise is known."""
         return self._weighted(self.residuals(theta)[..., None])[..., 0]
-
-    def _advance(self, theta: Array, step: Array, cost: Array) -> tuple[Array, Array]:
-        """Parameters and costs (u,) after a step that is halved for each unit until it does not harm."""
-        length = np.ones(theta.shape[0])
-        for _ in range(_STEPS):
-            trial = theta + length[:, None] * step
-            lower = self._cost(trial)
-            worse = ~(lower <= cost)
-            if not worse.any():
-                return trial, lower
-            length[worse] *= 0.5
-        trial = np.where(
-            (self._cost(theta + length[:, None] * step) <= cost)[:, None], theta + length[:, None] * step, theta
-        )
-        return trial, self._cost(trial)
 
 
 def _scaled(rows: Array) -> tuple[Array, Array]:

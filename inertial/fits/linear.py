@@ -7,25 +7,25 @@ the cost stays linear in the units.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inertial import design
 from inertial.design import Values
-from inertial.effects import SensorEffect
 from inertial.errors import NotIdentified
-from inertial.fits.normal_equations import SINGULAR, LocalColumns
 from inertial.state import State
 
 Array = NDArray[np.float64]
 
-_PIECE = 192
-"""Units with designs of their own that are solved at a time: their columns stay in the processor's cache."""
+_SINGULAR = 1e-11
+"""Smallest eigenvalue of the scaled normal matrix: below, a coefficient is not determined."""
 
-_BATCHED = 3
-"""Dimensions of an array with one series for each unit and axis."""
+_DELICATE = 1e3
+"""Variance inflation of a coefficient above which the solution is refined once."""
+
+_SUSPICIOUS = 1e9
+"""Variance inflation above which the eigenvalues are looked at."""
 
 
 @dataclass(frozen=True)
@@ -116,15 +116,16 @@ def fit_lot(
     names = tuple(design.local_names(sensor, axis, values) for axis in range(3))
     weight = None if standard_error is None else 1.0 / np.swapaxes(standard_error, -1, -2)
     shared, shared_covariance = np.zeros(0), np.zeros((0, 0))
-    if not station:
-        solved = _in_pieces(sensor, state, values, z, weight, names)
-    else:
-        local = LocalColumns(design.local_columns(sensor, state, values), weight, names)
-        theta = local.solve(z)
+    local = _LocalColumns(design.local_columns(sensor, state, values), weight, names)
+    theta = local.solve(z)
+    if station:
         columns = design.shared_columns(station, state, values, response_matrix(theta, names))
         shared, shared_covariance, z = _solve_shared(local, columns, z, design.shared_names(station))
-        solved = _solved(local, z)
-    theta, residual, (chi2, dof), covariance = solved
+        theta = local.solve(z)
+    residual = local.apply(theta)
+    np.subtract(z, residual, out=residual)  # no third array of the size of the lot
+    chi2, dof = local.chi2(residual)
+    covariance = local.inverse
     if weight is None:
         variance = chi2 / np.maximum(dof, 1)
         covariance = covariance * variance[..., None, None]
@@ -142,58 +143,6 @@ def fit_lot(
         chi2=chi2,
         dof=dof,
     )
-
-
-def _solved(local: LocalColumns, z: Array) -> "_Solution":
-    theta = local.solve(z)
-    residual = local.apply(theta)
-    np.subtract(z, residual, out=residual)
-    return _Solution(theta, residual, local.chi2(residual), local.inverse)
-
-
-def _in_pieces(
-    sensor: Sequence[SensorEffect],
-    state: State,
-    values: Values,
-    z: Array,
-    weight: Array | None,
-    names: Sequence[Sequence[tuple[str, str]]],
-) -> "_Solution":
-    """The solution of a lot whose units have nothing in common but the model, some units at a time where each has its own design.
-
-    What bounds it is memory: the columns of a thousand units pass through the cache once for each product, those of a piece stay.
-    """
-    own = state.temperature is not None and state.temperature.ndim > 1
-    if z.ndim != _BATCHED or len(z) <= _PIECE or not (own or state.force.ndim == _BATCHED or _varies(weight, len(z))):
-        return _solved(LocalColumns(design.local_columns(sensor, state, values), weight, names), z)
-    units = len(z)
-    kept: list[_Solution] = []
-    for start in range(0, units, _PIECE):
-        piece = slice(start, start + _PIECE)
-        some = weight[piece] if _varies(weight, units) and weight is not None else weight
-        kept.append(
-            _solved(LocalColumns(design.local_columns(sensor, state.of(piece, units), values), some, names), z[piece])
-        )
-    theta, residual = (
-        np.concatenate(parts) for parts in zip(*((one.theta, one.residual) for one in kept), strict=True)
-    )
-    chi2, dof = (np.concatenate(parts) for parts in zip(*(one.chi2 for one in kept), strict=True))
-    shape = (units, *kept[0].covariance.shape[-3:])
-    covariance = np.concatenate([np.broadcast_to(one.covariance, (len(one.theta), *shape[1:])) for one in kept])
-    return _Solution(theta, residual, (chi2, dof), covariance)
-
-
-def _varies(weight: Array | None, units: int) -> bool:
-    return weight is not None and weight.ndim == _BATCHED and len(weight) == units
-
-
-class _Solution(NamedTuple):
-    """Coefficients (..., 3, p), residuals (..., 3, n), χ² and degrees of freedom (..., 3), covariance (..., 3, p, p)."""
-
-    theta: Array
-    residual: Array
-    chi2: tuple[Array, Array]
-    covariance: Array
 
 
 _SAME_G = 1e-5
@@ -252,7 +201,7 @@ def pseudo_inverses(columns: Array) -> Array:
 
 
 def _solve_shared(
-    local: LocalColumns, columns: Array, z: Array, names: Sequence[tuple[str, str]]
+    local: "_LocalColumns", columns: Array, z: Array, names: Sequence[tuple[str, str]]
 ) -> tuple[Array, Array, Array]:
     """Shared parameters, their covariance, and the targets without their part."""
     columns = np.broadcast_to(columns, (*z.shape, columns.shape[-1]))
@@ -271,10 +220,111 @@ def _solve_shared(
         )
     scaled = flat / size
     gram = scaled.T @ scaled
-    if np.linalg.eigvalsh(gram)[0] < SINGULAR:
+    if np.linalg.eigvalsh(gram)[0] < _SINGULAR:
         raise NotIdentified(
             f"fit: the plan cannot tell these apart: {', '.join(f'{e} ({n})' for e, n in names)}; leave one out of the model"
         )
     inverse = np.linalg.inv(gram)
     shared = (inverse @ (scaled.T @ target.reshape(-1))) / size
     return shared, inverse / np.outer(size, size), z - np.matmul(columns, shared)
+
+
+class _LocalColumns:
+    """Normal equations of the units' own columns, scaled; one system serves all units where they share design and weights."""
+
+    def __init__(self, columns: Array, weight: Array | None, names: Sequence[Sequence[tuple[str, str]]]) -> None:
+        self.columns, self.weight = columns, weight
+        self.weighted = columns if weight is None else columns * weight[..., None]
+        # columns are not scaled one by one: that is a second array as large as they are
+        gram = np.swapaxes(self.weighted, -1, -2) @ self.weighted
+        self.scale = np.sqrt(np.diagonal(gram, axis1=-2, axis2=-1))
+        self._refuse_empty(names)
+        self.gram_inverse = self._inverted(gram / (self.scale[..., :, None] * self.scale[..., None, :]), names)
+        # the largest variance inflation: 1/v² of the column that the others leave least of
+        self.delicate = float(np.max(np.diagonal(self.gram_inverse, axis1=-2, axis2=-1))) > _DELICATE
+        self.inverse = self.gram_inverse / (self.scale[..., :, None] * self.scale[..., None, :])
+
+    def _refuse_empty(self, names: Sequence[Sequence[tuple[str, str]]]) -> None:
+        empty = np.argwhere(self.scale <= 0.0)
+        if empty.size:
+            axis, column = int(empty[0, -2]), int(empty[0, -1])
+            effect, name = names[axis][column]
+            raise NotIdentified(
+                f"fit: {effect} ({name} of axis {'xyz'[axis]}) is zero in every dwell; "
+                f"the plan must excite it; add poses or conditions that do, or leave it out of the model"
+            )
+
+    def _inverted(self, gram: Array, names: Sequence[Sequence[tuple[str, str]]]) -> Array:
+        """Inverse of the scaled normal matrices; a singular one is refused with the coefficients it confuses."""
+        inverse: Array
+        try:
+            inverse = np.linalg.inv(gram).astype(np.float64)
+        except np.linalg.LinAlgError:
+            inverse = np.full(gram.shape, np.inf)
+        inflation = np.diagonal(inverse, axis1=-2, axis2=-1)
+        if np.all(inflation < _SUSPICIOUS) and np.all(inflation > 0.0):
+            return inverse
+        self._refuse_singular(gram, names)
+        return inverse
+
+    def _refuse_singular(self, gram: Array, names: Sequence[Sequence[tuple[str, str]]]) -> None:
+        values, vectors = np.linalg.eigh(gram)
+        bad = np.argwhere(values[..., 0] < _SINGULAR)
+        if not bad.size:
+            return
+        where = tuple(int(i) for i in bad[0])
+        axis = where[-1]
+        share = np.abs(vectors[(*where, slice(None), 0)])
+        involved = [names[axis][i] for i in np.argsort(-share) if share[i] > 0.1]
+        listed = ", ".join(f"{effect} ({name})" for effect, name in involved)
+        raise NotIdentified(
+            f"fit: the plan cannot tell these coefficients of axis {'xyz'[axis]} apart: {listed}; "
+            f"add poses or temperatures that separate them, or leave one out of the model"
+        )
+
+    def solve(self, z: Array) -> Array:
+        """Coefficients (..., 3, p) for targets (..., 3, n); with one step of refinement against the rounding of HᵀWH."""
+        theta = self._step(z)
+        return theta + self._step(z - self.apply(theta)) if self.delicate else theta
+
+    def _step(self, z: Array) -> Array:
+        weighted = z if self.weight is None else z * self.weight
+        right = _apply(np.swapaxes(self.weighted, -1, -2), weighted) / self.scale
+        return _apply(self.gram_inverse, right) / self.scale
+
+    def apply(self, theta: Array) -> Array:
+        """The model's output (..., 3, n)."""
+        return _apply(self.columns, theta)
+
+    def project_out(self, columns: Array) -> Array:
+        """Weighted columns (..., 3, n, q) less what the local columns explain."""
+        weighted = columns if self.weight is None else columns * self.weight[..., None]
+        scaled = self.weighted / self.scale[..., None, :]
+        inside = np.matmul(self.gram_inverse, np.matmul(np.swapaxes(scaled, -1, -2), weighted))
+        return weighted - np.matmul(scaled, inside)
+
+    def chi2(self, residual: Array) -> tuple[Array, Array]:
+        """Weighted sum of squares and degrees of freedom, each (..., 3)."""
+        weighted = residual if self.weight is None else residual * self.weight
+        count = (
+            np.full(residual.shape[:-1], residual.shape[-1])
+            if self.weight is None
+            or self.weight.all()  # to count along an axis takes as long as a product of all columns
+            else np.count_nonzero(np.broadcast_to(self.weight, residual.shape), axis=-1)
+        )
+        return np.einsum("...n,...n->...", weighted, weighted), count - self.columns.shape[-1]
+
+
+def _apply(matrices: Array, vectors: Array) -> Array:
+    """Matrices (..., 3, m, k) times vectors (..., 3, k), (..., 3, m).
+
+    Matrices that all units share are put side by side in one (3k, 3m), so that the whole lot is a single product without a copy.
+    """
+    if matrices.ndim > 3 or vectors.ndim != 3:
+        return np.matmul(matrices, vectors[..., None])[..., 0]
+    _, m, k = matrices.shape
+    together = np.zeros((k, 3, m, 3))
+    for axis in range(3):
+        together[:, axis, :, axis] = matrices[axis].T
+    flat = np.swapaxes(vectors, -1, -2).reshape(-1, 3 * k)
+    return np.swapaxes((flat @ together.reshape(3 * k, 3 * m)).reshape(-1, m, 3), -1, -2)

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from inertial.distributions import f_tail
 from inertial.errors import NotIdentified
-from inertial.fits.norm_wander import norm_noise
+from inertial.fits.descent import descended
+from inertial.fits.norm_noise import norm_noise
 from inertial.fits.wander import student
 
 Array = NDArray[np.float64]
@@ -36,8 +37,7 @@ Without it a bias and a scale that grow together make every force alike, and |f|
 
 FEWEST_DOF = 15
 _LEAST, _TURNED = 4, 0.8
-_STEPS = 40
-_ROUNDS = 3
+_ROUNDS, _SETTLED = 3, 1e-12
 _NO_ELLIPSE = (
     "plane: the outputs of the two axes lie on no ellipse; turn further about the third axis, check the channels"
 )
@@ -272,24 +272,15 @@ def _ellipse(flat: Array, norm: float) -> Array:
 
 
 def _descended(flat: Array, theta: Array, norm: float, whiten: Array) -> Array:
-    """Gauss–Newton, each step halved until it does not increase the residual."""
+    """Parameters of the least whitened residual."""
 
-    def cost(at: Array) -> float:
-        return float(np.sum((whiten @ _state(flat, at, norm)[2]) ** 2))
-
-    best = cost(theta)
-    for _ in range(_STEPS):
-        _, rows, left = _state(flat, theta, norm)
+    def step(at: Array) -> Array:
+        _, rows, left = _state(flat, at[0], norm)
         white = whiten @ rows
         size = np.linalg.norm(white, axis=0)
-        step = -np.linalg.lstsq(white / size, whiten @ left, rcond=None)[0] / size
-        length = 1.0
-        while length > 1e-4 and not cost(theta + length * step) <= best:
-            length *= 0.5
-        moved = cost(theta + length * step)
-        if not moved <= best:
-            break
-        theta, before, best = theta + length * step, best, moved
-        if before - best <= 1e-12 * best:
-            break
-    return theta
+        return -(np.linalg.lstsq(white / size, whiten @ left, rcond=None)[0] / size)[None]
+
+    def cost(at: Array) -> Array:
+        return np.array([np.sum((whiten @ _state(flat, at[0], norm)[2]) ** 2)])
+
+    return descended(theta[None], step, cost, _SETTLED)[0]

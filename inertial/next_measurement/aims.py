@@ -8,12 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial.decisions import CLASS_WIDTH
-from inertial.estimation.heldout import Fitting
+from inertial.estimation.comparison import Fitting
 from inertial.estimation.model import Model
 from inertial.estimation.penalty import freedom, price
 from inertial.estimation.problem import Lot, Problem
-from inertial.estimation.term import Term
-from inertial.estimation.turn_on import with_turn_on
+from inertial.estimation.term import Term, with_turn_on
 from inertial.next_measurement.separation import (
     Apart,
     Rivals,

@@ -16,14 +16,13 @@ from inertial.decisions import AXES_DIFFER
 from inertial.estimation.alternative import Handling
 from inertial.estimation.comparison import estimate
 from inertial.estimation.covariance import Covariance
+from inertial.estimation.likelihood import shared_factor
 from inertial.estimation.model import Model
 from inertial.estimation.noise_shares import Noise
 from inertial.estimation.problem import Lot, Problem
 from inertial.estimation.profile import LikelihoodProfile
-from inertial.estimation.shared_noise import shared_factor
 from inertial.estimation.space import Space
-from inertial.estimation.term import Term
-from inertial.estimation.turn_on import with_turn_on
+from inertial.estimation.term import Term, with_turn_on
 from inertial.planning.sequences import SequenceStep, StationPace, extended
 
 Array = NDArray[np.float64]

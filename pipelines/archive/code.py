@@ -41,7 +41,7 @@ CODE = {
         "pipelines.stages.uncertainty.bias_measurands",
     ),
     "fit of norms": (
-        *(*_ENGINE, "inertial.correction", "inertial.norm_fit", "inertial.norm_noise"),
+        *(*_ENGINE, "inertial.correction", "inertial.norm_fit"),
         *("pipelines.stages.uncertainty.bias_measurands", "pipelines.stages.unknown_poses"),
     ),
     "fit in a plane": (
@@ -55,14 +55,14 @@ CODE = {
     ),
     "verify": (*_ENGINE, "inertial.correction", "pipelines.stages.rms_error", "pipelines.stages.verify"),
     "verify of norms": (
-        *(*_ENGINE, "inertial.correction", "inertial.norm_fit", "inertial.norm_noise", "inertial.uncertainty"),
+        *(*_ENGINE, "inertial.correction", "inertial.norm_fit", "inertial.uncertainty"),
         *("pipelines.stages.rms_error", "pipelines.stages.unknown_poses", "pipelines.stages.verify"),
     ),
     "noise": _NOISE,
     "budget": _BUDGET,
     "budget of norms": (
         *(*_BUDGET, "inertial.data_errors", "inertial.decisions", "inertial.estimation"),
-        *("inertial.norm_fit", "inertial.norm_noise", "pipelines.stages.unknown_poses"),
+        *("inertial.norm_fit", "pipelines.stages.unknown_poses"),
     ),
     "procedures": (*_PROCEDURES, "pipelines.stages.procedures"),
     "grade": (

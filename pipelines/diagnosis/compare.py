@@ -20,8 +20,7 @@ from inertial.effects import StationEffect
 from inertial.errors import InertialError
 from inertial.estimation.alternative import Handling
 from inertial.estimation.comparison import Estimate, estimate, residuals_of, rms
-from inertial.estimation.freedom import refuse_without_freedom
-from inertial.estimation.model import Model
+from inertial.estimation.model import Model, refuse_without_freedom
 from inertial.estimation.problem import Lot, Problem
 from inertial.estimation.refinement import intervals, settled, terms_of
 from inertial.estimation.term import Term

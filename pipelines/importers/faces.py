@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from inertial.fits.ferraris import Faces, faces, ferraris
+from inertial.fits.faces import Faces, faces, ferraris
 from inertial.probability import passes
 from inertial.quantities import OUTPUT_COLUMNS, SPREAD_COLUMNS
 from inertial.uncertainty.rounding import equal

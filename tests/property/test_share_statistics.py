@@ -13,13 +13,10 @@ from inertial import effects as catalogue
 from inertial.criticism.examination import ExaminedRun
 from inertial.criticism.unknown import suspects
 from inertial.data_errors.handling.gain_step import GainStep
-from inertial.estimation.candidate import Candidate
 from inertial.estimation.model import Model
 from inertial.estimation.noise_shares import Shares
-from inertial.estimation.own_shares import _deviance, own_shares
-from inertial.estimation.products import products_with, spanned
 from inertial.estimation.share_statistics import ShareStatistics
-from inertial.estimation.shares import shares_at
+from inertial.estimation.shares import _deviance_of_block, own_shares, shares_at
 from inertial.estimation.term import Term
 from pipelines.tables.dwells import lot_of, measured
 
@@ -90,8 +87,8 @@ def test_a_deviance_by_products_is_that_of_the_whitened_series(
 ) -> None:
     model = model_of(name, gaps=gaps)
     shares = shares_at(place, tuple((block, *shares_at(each)[:2]) for block, *each in sorted(apart)))
-    statistics = model.statistics
-    quick = statistics.beside_shared(shares, model._weights) if model._joined else statistics.at(shares)
+    statistics = model._statistics
+    quick = statistics.left(shares, model._weights)
     assert quick is not None
     space = model._rough(shares)
     assert quick.information == pytest.approx(space.information, rel=1e-9)
@@ -112,7 +109,9 @@ def test_shares_of_single_blocks_by_products_are_those_of_the_whitened_series(na
     differences = [
         [of(block, Shares(3.0, 1.0)) - of(block, lot) for block in range(model.problem.blocks)]
         for of in (
-            lambda block, shares: quick(block, shares) + model.problem.covariance.logdet_of_block(block, shares),
+            lambda block, shares: (
+                quick(block, shares) + model.problem.covariance.whitener_of_block(block, shares).logdet
+            ),
             lambda block, shares: _alone(model, series, block, shares),
         )
     ]
@@ -122,7 +121,9 @@ def test_shares_of_single_blocks_by_products_are_those_of_the_whitened_series(na
 
 
 def _alone(model: Model, series: np.ndarray, block: int, shares: Shares) -> float:
-    return _deviance(model.problem, block, np.concatenate([model.local[block], series[block][:, None]], axis=1), shares)
+    return _deviance_of_block(
+        model.problem, block, np.concatenate([model.local[block], series[block][:, None]], axis=1), shares
+    )
 
 
 def test_what_is_known_of_equal_models_is_what_each_of_them_finds() -> None:
@@ -139,35 +140,10 @@ def test_what_is_known_of_equal_models_is_what_each_of_them_finds() -> None:
 PLACES = [(4, None), (0, 8), (None, 16), (12, 4), (-8, -8)]
 
 
-@given(seed=st.integers(0, 2**32 - 1), rank=st.integers(1, 6), p=st.integers(6, 12))
-@settings(max_examples=30, deadline=None)
-def test_products_of_columns_that_few_series_span_are_those_of_the_columns(seed: int, rank: int, p: int) -> None:
-    rng = np.random.default_rng(seed)
-    blocks, n = 6, 30
-    columns = rng.standard_normal((blocks, p, rank)) @ (
-        rng.standard_normal((rank, n)) * 10.0 ** rng.uniform(-3, 3, (rank, 1))
-    )
-    rows, places = rng.standard_normal((8, n)), rng.integers(0, 8, (blocks, 3))
-    level = rng.uniform(0.5, 2.0, blocks)
-    lower = np.tril(rng.standard_normal((n, n)))
-    groups = [(np.array([0, 2, 5]), lower, np.ones(n)), (np.array([1, 3, 4]), None, rng.uniform(0.5, 2.0, n))]
-    few = spanned(np.swapaxes(columns, -1, -2))
-    assert few is not None
-    assert len(few.series) == rank
-    found = few.products_with(rows, places, level, groups)
-    every = Candidate(np.swapaxes(columns, -1, -2)[:, :, None], shared=False)
-    for one, other in zip(found, products_with(every, rows[places], level, groups), strict=True):
-        np.testing.assert_allclose(one, other, rtol=1e-8, atol=1e-9 * np.abs(other).max())
-
-
-def test_columns_that_need_many_series_are_whitened_themselves() -> None:
-    assert spanned(np.random.default_rng(1).standard_normal((6, 60, 8))) is None
-
-
 def test_columns_of_the_table_span_fewer_directions_than_they_are() -> None:
     model = base(gaps=False)
     columns = of_the_table(model)
-    found = ShareStatistics(model.problem, model.local).independent(np.concatenate([columns, columns], axis=-1))
+    found = ShareStatistics(model.problem, model.local, np.concatenate([columns, columns], axis=-1))._directions
     assert 0 < found.shape[-1] <= columns.shape[-1]
     flat = found.reshape(-1, found.shape[-1])
     np.testing.assert_allclose(flat.T @ flat, np.eye(found.shape[-1]), atol=1e-9)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from inertial.fits.ellipsoid import fit_ellipsoid
-from inertial.fits.ferraris import faces, ferraris
+from inertial.fits.faces import faces, ferraris
 from inertial.fits.polynomial import fit_temperature_curve
 from inertial.static_intervals import find
 from pipelines.diagnosis.imported_norms import norm

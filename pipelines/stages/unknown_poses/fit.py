@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from inertial import effects as catalogue
 from inertial.errors import InertialError
 from inertial.estimation.model import Model
-from inertial.estimation.noise import LONGEST
+from inertial.estimation.noise_shares import LONGEST
 from inertial.estimation.problem import Problem
 from inertial.estimation.refinement import terms_of
 from inertial.fits.wander import student

@@ -113,3 +113,4 @@ def test_coefficients_of_one_distribution_are_even_and_two_of_many_are_not() -> 
     assert np.mean(np.array(even) < -5.0) < 0.05
     assert _evenness(np.array([600.0, 150.0, *np.full(22, 1.0)])) < -50.0
     assert _evenness(np.array([141.0, 0.0, 0.0])) > -20.0  # three axes cannot say much
+    assert np.isfinite(_evenness(40.0 * rng.standard_normal(300) ** 2))  # 100 units: binomials beyond 64 bits

@@ -10,7 +10,7 @@ from inertial.criticism.drivers import drivers_of
 from inertial.criticism.field import Candidates
 from inertial.criticism.noise_draws import NoiseDraws
 from inertial.data_errors.handling import alternatives
-from inertial.estimation import covariance, model, problem, products, share_statistics, space
+from inertial.estimation import covariance, problem, share_statistics, space
 from inertial.estimation.lot import Lot
 from inertial.estimation.model import Model
 from inertial.estimation.problem import Problem
@@ -42,9 +42,8 @@ def test_small_pieces_and_empty_stores_change_no_number(lot: Lot, monkeypatch: p
     whole = numbers(lot)
     assert whole[0] > np.log(adequacy.CERTAIN_BELOW)  # then noise is drawn
     for names, modules, value in (
-        ("_PIECE", (problem, noise_draws, space), 300), ("PIECE", (covariance, products, share_statistics), 300),
-        ("_CACHE", (problem,), 0), ("_PRODUCTS", (covariance,), 0), ("_KEPT", (share_statistics, noise_draws), 0),
-        ("_SPACES", (model,), 0),
+        ("_PIECE", (problem, noise_draws, space), 300), ("PIECE", (covariance, share_statistics), 300),
+        ("_CACHE", (problem,), 0), ("_PRODUCTS", (covariance,), 0), ("_KEPT", (noise_draws,), 0),
     ):  # fmt: skip
         for module in modules:
             monkeypatch.setattr(module, names, value)

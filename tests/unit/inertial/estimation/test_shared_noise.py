@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from inertial import effects as catalogue
+from inertial.estimation.likelihood import shared_factor
 from inertial.estimation.model import Model
 from inertial.estimation.problem import Lot, Problem
-from inertial.estimation.shared_noise import shared_factor
 from inertial.estimation.term import Term
 from inertial.frames import force_from_angles
 from inertial.state import State

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from inertial.errors import NotIdentified
-from inertial.fits.ferraris import faces, ferraris
+from inertial.fits.faces import faces, ferraris, six_position
 from inertial.fits.polynomial import fit_axis_polynomial, fit_temperature_curve
-from inertial.fits.six_position import six_position
 
 K = np.array([[101.0, 0.4, -0.7], [0.0, 99.0, 0.3], [0.0, 0.0, 102.5]])
 BIAS = np.array([3.0, -12.0, 0.5])

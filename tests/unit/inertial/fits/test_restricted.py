@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from inertial.fits import restricted
+from inertial.fits import generalised
 from inertial.fits.generalised import Series
 from inertial.fits.wander import wander_kernels
 
@@ -42,14 +42,14 @@ def test_columns_that_all_blocks_have_are_taken_out_wherever_they_stand(rng: np.
     z = 1e4 * h.sum(axis=-1) + np.cumsum(rng.normal(size=(4, 3, n)), axis=-1)
     lot = Series(h, np.zeros((4, 3, n, 0)), z, rng.uniform(0.9, 1.1, n), wander_kernels(time))
     assert_grid_is_the_fit(lot, np.array([0.0, 0.4, 70.0]), np.array([0.0, 0.4, 70.0]))
-    alone = restricted.Restricted(h.reshape(-1, n, 6), z.reshape(-1, n), lot.white, lot.kernels)
+    alone = generalised.Restricted(h.reshape(-1, n, 6), z.reshape(-1, n), lot.white, lot.kernels)
     assert alone.width == 3  # the two columns of its own, and the measurements
 
 
 def test_large_lots_in_pieces_give_the_same(rng: np.random.Generator, monkeypatch: pytest.MonkeyPatch) -> None:
     own, shares = series(rng), np.array([0.0, 0.7, 9.0])
     whole = own.deviances(shares, shares)
-    monkeypatch.setattr(restricted, "_PIECE", 5)
+    monkeypatch.setattr(generalised, "_PIECE", 5)
     np.testing.assert_allclose(own.deviances(shares, shares), whole, rtol=0.0, atol=1e-8)
 
 

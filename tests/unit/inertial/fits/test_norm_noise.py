@@ -4,7 +4,7 @@ import numpy as np
 
 from benchmarks.made_recordings import Recording, make
 from benchmarks.recording_intervals import pulls
-from inertial.norm_noise import SolvedNorms
+from inertial.fits.norm_noise import SolvedNorms
 from pipelines.stages.unknown_poses.fit import bias_uncertainty, norms_fitted
 
 PLAIN = ("bias", "scale", "misalignment")
