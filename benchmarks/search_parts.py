@@ -14,9 +14,9 @@ from tables import HIDDEN, NULLS
 from world import World
 
 if TYPE_CHECKING:
-    from inertial.criticism.field import Candidates
+    from inertial.criticism.field import Candidates, Rival
     from inertial.criticism.lot_part import LotPart
-    from inertial.criticism.search import Rival, SearchResult
+    from inertial.criticism.search import SearchResult
     from inertial.estimation.model import Model
 
 

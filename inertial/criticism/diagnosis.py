@@ -12,13 +12,13 @@ from inertial.criticism.classes import EffectClass, class_of
 from inertial.criticism.drivers import Driver, Misfit, looks_of, places
 from inertial.criticism.evidence import Evidence, evidence
 from inertial.criticism.examination import Named, worst
-from inertial.criticism.field import Candidates
+from inertial.criticism.field import Candidates, Rival
 from inertial.criticism.influence import CarriedEvidence, carried_by, influence
 from inertial.criticism.left_out import left_out
-from inertial.criticism.search import Rival
 from inertial.criticism.smallest import Smallest, smallest_named
+from inertial.criticism.unknown import Unexplained
 from inertial.criticism.unseen import unseen
-from inertial.criticism.verdict import Unexplained, judged
+from inertial.criticism.verdict import judged
 from inertial.data_errors.bad_dwells import BadDwell
 from inertial.decisions import ADEQUATE_ABOVE
 from inertial.effects.covariate import Covariate

@@ -1,6 +1,6 @@
 """A run under examination: bad dwells and handling errors are removed before effects are judged."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -9,13 +9,12 @@ from numpy.typing import NDArray
 from inertial import effects as catalogue
 from inertial.criticism.bad_or_effect import bad_beside_effects, candidates_of
 from inertial.criticism.classes import EffectClass, class_of
-from inertial.criticism.drift import Drift, one_drift
 from inertial.criticism.field import Candidates
 from inertial.criticism.influence import CarriedEvidence, carried_by
-from inertial.criticism.jumps import jumps_instead
 from inertial.criticism.left_out import LeftOut, left_out
 from inertial.criticism.lot_part import LotPart, part_of
-from inertial.criticism.search import Rival, SearchResult, convincing, judge, search
+from inertial.criticism.search import SearchResult, convincing, judge, search
+from inertial.criticism.unknown import Unexplained
 from inertial.data_errors.bad_dwells import BadDwell, bad_dwells, without
 from inertial.data_errors.handling import alternatives
 from inertial.decisions import CLASS_WIDTH, RISES
@@ -82,7 +81,7 @@ class ExaminedRun:
     handled: list[Named] = field(default_factory=list[Named])
     removed: list[BadDwell] = field(default_factory=list[BadDwell])
     barred: set[str] = field(default_factory=set[str])
-    drift: Drift | None = None
+    drift: Unexplained | None = None
     soak: NDArray[np.intp] | None = None
     _made: tuple[list[object], Model] | None = None
 
@@ -90,7 +89,7 @@ class ExaminedRun:
         """Handling errors that are searched."""
         return [a for a in alternatives() if a.id not in self.barred]
 
-    def listen(self) -> None:
+    def estimate_loudness(self) -> None:
         """Estimate the noise of each soak again: an error that was corrected is none of it."""
         self.lot = replace(self.lot, loudness=None)
         if self.soak is None:
@@ -99,7 +98,7 @@ class ExaminedRun:
         if loudness is not None:
             self.lot = replace(self.lot, loudness=loudness)
 
-    def comes_again(self, term: Term) -> bool:
+    def was_found(self, term: Term) -> bool:
         """Whether a sudden change of the whole lot was found before."""
         return "unit" not in term.keywords and any(
             t.effect.id == term.effect.id and "unit" not in t.keywords for t in self.beside
@@ -107,13 +106,13 @@ class ExaminedRun:
 
     def withdraw(self, part: LotPart, further: Sequence[Term]) -> bool:
         """Withdraw sudden changes that are one drift, with what was found beside them; whether there were any."""
-        drift = one_drift(part, self.beside, further)
-        if drift is None:
+        found = part.drift_of(self.beside, further)
+        if found is None:
             return False
-        self.drift = drift
-        self.barred |= drift.imitated
-        self.beside = [t for t in self.beside if t.effect.id not in drift.imitated]
-        self.handled = [one for one in self.handled if one.term is None or one.term.effect.id not in drift.imitated]
+        self.drift, imitations = found
+        self.barred |= imitations
+        self.beside = [t for t in self.beside if t.effect.id not in imitations]
+        self.handled = [each for each in self.handled if each.term is None or each.term.effect.id not in imitations]
         return True
 
     def model(self) -> Model:
@@ -135,7 +134,7 @@ class ExaminedRun:
 def examined(lot: Lot, effects: Sequence[str]) -> "tuple[ExaminedRun, EffectSearch]":
     """A run without bad dwells and handling errors, and the search for effects in it."""
     run = ExaminedRun(lot, tuple(effects))
-    run.listen()
+    run.estimate_loudness()
     run.removed = bad_beside_effects(run.model(), run.effects)
     searched = mended(run)
     for _ in range(_TURNS):
@@ -203,11 +202,11 @@ def mended(run: ExaminedRun) -> EffectSearch:
         base = run.model()
         fields = Candidates(base.problem, candidates_of(base, run.effects), run.alternatives())
         part = part_of(fields, base, wide=run.drift is not None)
-        searched, of = search(part.field, part.base, part.imitates, _jumps_in(part.field)), part.field
+        searched, of = search(part.field, part.base, part.imitates), part.field
         if not searched.handling and part.field is not fields:
             part.base.problem.forget()
             part.base.forget()
-            whole = search(fields, base, part.imitates, _jumps_in(fields), start=searched.added)
+            whole = search(fields, base, part.imitates, start=searched.added)
             searched, of = replace(whole, ladder=searched.ladder), fields
         if part.field is not fields:
             base.forget()
@@ -215,22 +214,12 @@ def mended(run: ExaminedRun) -> EffectSearch:
             if run.withdraw(part, searched.added):
                 continue
             return EffectSearch(base, fields, part, searched)
-        if run.comes_again(searched.handling[0]) and run.withdraw(part, searched.handling):
+        if run.was_found(searched.handling[0]) and run.withdraw(part, searched.handling):
             continue
         for term in searched.handling:
             others = [other for other in searched.handling if other is not term]
             beside = Model(of.problem, [*searched.model.terms, *others], near=searched.model.noise)
             _mend(run, of, replace(searched, model=beside if others else searched.model), term)
-
-
-def _jumps_in(fields: Candidates) -> Callable[[Model, Rival], tuple[Term, ...]]:
-    """The jumps of single axes that explain more than an effect."""
-
-    def instead(model: Model, rival: Rival) -> tuple[Term, ...]:
-        jumps = jumps_instead(fields, model, rival)
-        return jumps.terms if jumps is not None and jumps.ahead > 0.0 else ()
-
-    return instead
 
 
 def _mend(run: ExaminedRun, fields: Candidates, searched: SearchResult, term: Term) -> None:
@@ -256,7 +245,7 @@ def _mend(run: ExaminedRun, fields: Candidates, searched: SearchResult, term: Te
     else:
         run.lot = lot
     if run.lot.loudness is not None:
-        run.listen()
+        run.estimate_loudness()
 
 
 def _misfit(model: Model, richer: Model) -> Misfit:

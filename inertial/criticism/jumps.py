@@ -11,8 +11,7 @@ from math import comb
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.criticism.field import Candidates
-from inertial.criticism.search import Rival
+from inertial.criticism.field import Candidates, Rival
 from inertial.decisions import CLASS_WIDTH, JUMPS_RARE
 from inertial.estimation.alternative import Handling
 from inertial.estimation.bases import SEEN
@@ -54,7 +53,7 @@ class _OfAxis:
     terms: tuple[Term, ...]
 
 
-def jumps_instead(field: Candidates, model: Model, rival: Rival) -> Jumps | None:
+def jumps_in_place_of(field: Candidates, model: Model, rival: Rival) -> Jumps | None:
     """The jumps of single axes that explain about as much as an effect with coefficients for every axis; None if none do."""
     alternatives = [a for a in field.handling if a.of_one_axis]
     if not alternatives or rival.term.shared or not rival.rank:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from inertial.dynamics.goodness import p_value
+from inertial.dynamics.missing_effects import p_value
 from inertial.dynamics.transfer_effects import EFFECTS, Conditions, Parameter
 from inertial.errors import NotIdentified
 
