@@ -39,11 +39,13 @@ class Driver:
 
     name : as in the exchange format (``unit_C``, ``time_s``, a covariate), or ``pose``, ``approach``, ``temperature_rate``
     make : its columns
+    values : (units, n) of the driver itself, None if it is not a single quantity
     part : what of the output follows it
     """
 
     name: str
     make: Callable[[], Candidate]
+    values: Array | None
     part: Part = "bias"
 
     @property
@@ -68,16 +70,16 @@ def drivers_of(problem: Problem) -> list[Driver]:
     """Every driver that varies in a lot."""
     state = problem.lot.state
     drivers = [
-        Driver(name, partial(_by_block, problem, curve(values, knots)))
+        Driver(name, partial(_by_block, problem, curve(values, knots)), values)
         for name, values, knots in quantities(state)
         if varies(values)
     ]
     pose = _pose_columns(state, most=max(4, (problem.n - 8) // 3))
     if pose.shape[-1]:
-        drivers.append(Driver("pose", partial(_by_block, problem, pose)))
+        drivers.append(Driver("pose", partial(_by_block, problem, pose), None))
     approach = np.tanh(state.force_step / 0.05)
     if np.any(np.abs(approach) > 0.1):
-        drivers.append(Driver("approach", partial(_by_axis, problem, approach)))
+        drivers.append(Driver("approach", partial(_by_axis, problem, approach), None))
     return drivers
 
 
@@ -92,9 +94,9 @@ def looks_of(problem: Problem) -> list[Driver]:
     state = problem.lot.state
     for name, values in (("unit_C", state.temperature), ("time_s", state.time)):
         if values is not None and varies(values):
-            looks.append(Driver(name, partial(_across_axes, problem, values), "axes"))
+            looks.append(Driver(name, partial(_across_axes, problem, values), None, "axes"))
     if state.temperature is not None and varies(state.temperature):
-        looks.append(Driver("unit_C", partial(_transfer_curve, problem, state.temperature), "transfer"))
+        looks.append(Driver("unit_C", partial(_transfer_curve, problem, state.temperature), None, "transfer"))
     return looks
 
 

@@ -15,8 +15,9 @@ from inertial.criticism.left_out import LeftOut, left_out
 from inertial.criticism.lot_part import LotPart, part_of
 from inertial.criticism.search import SearchResult, convincing, judge, search
 from inertial.criticism.unknown import Unexplained
-from inertial.data_errors.bad_dwells import BadDwell, bad_dwells, without
+from inertial.data_errors.bad_dwells import bad_dwells
 from inertial.data_errors.handling import alternatives
+from inertial.data_errors.removed_dwells import BadDwell, without
 from inertial.decisions import CLASS_WIDTH, RISES
 from inertial.estimation.alternative import Exchangeable, Handling, Misfit, soaks
 from inertial.estimation.freedom import refuse_without_freedom
@@ -123,7 +124,7 @@ class ExaminedRun:
         return self._made[1]
 
     def _new_model(self) -> Model:
-        lot = without(self.lot, self.removed) if self.removed else self.lot
+        lot = without(self.lot, [d.place for d in self.removed]) if self.removed else self.lot
         problem = Problem(lot)
         base = Model(problem, with_turn_on(lot.state, terms_of(catalogue.get_all(self.effects), problem)))
         refuse_without_freedom(base)
@@ -143,7 +144,7 @@ def examined(lot: Lot, effects: Sequence[str]) -> "tuple[ExaminedRun, EffectSear
         # dwells that an effect or a handling error explains are not bad; with it in the model smaller ones become visible
         whole = Problem(run.lot, slope=searched.base.problem.slope)
         kept = bad_dwells(replaced(Model(whole, searched.model.terms, near=searched.model.noise)))
-        same = {(d.unit, d.dwell) for d in kept} == {(d.unit, d.dwell) for d in run.removed}
+        same = {d.place for d in kept} == {d.place for d in run.removed}
         if same and not _placed_again(run, searched.model) and not _dropped(run, searched):
             break
         run.removed = kept

@@ -53,7 +53,7 @@ class LotPart:
         fit = better[0]
         problem = self.field.problem
         effects = cost_of_model(Model(problem, [*self.base.terms, *chosen], near=fit.model.noise))
-        by_far = effects - fit.cost > decisions.DECISIVE * (cost_of_model(self.base) - fit.cost)
+        by_far = effects - fit.cost > decisions.CURVE_SHARE * (cost_of_model(self.base) - fit.cost)
         return by_far or not anything(self.field, fit.model)
 
     def drift_of(self, changes: Sequence[Term], further: Sequence[Term]) -> tuple[Unexplained, frozenset[str]] | None:

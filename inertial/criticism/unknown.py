@@ -139,15 +139,14 @@ def better_curve(base: Model, chosen: Sequence[Term], field: Sequence[Suspect]) 
     if len(chosen) > 1:
         # the first two of its driver: a dependence of the bias, and levels
         alike = [s for s in field if s.driver == suspect.driver and s.ways == 1][:2] if suspect.ways == 1 else [suspect]
-        best, kept = _with_others(
-            base, chosen, alike, best, max(decisions.OTHERS, decisions.OTHERS_SHARE * (bare - best.cost))
-        )
-    replaced = len(chosen) - len(kept)
-    doubt = decisions.DOUBT.get(replaced, 0.0)
-    if replaced == 1:
-        share = (
-            decisions.DOUBT_MEMORY if any(t.effect.memory for t in chosen if t not in kept) else decisions.DOUBT_SHARE
-        )
+        worth = max(decisions.CURVE_AHEAD, decisions.CURVE_SHARE * (bare - best.cost))
+        best, kept = _with_others(base, chosen, alike, best, worth)
+    replaced = [t for t in chosen if t not in kept]
+    # more than two effects in place of one curve have no priority
+    doubt = decisions.CURVE_AHEAD / len(replaced) if 0 < len(replaced) < 3 else 0.0
+    if len(replaced) == 1:
+        # a curve over time can follow any memory of one run
+        share = (3.0 if replaced[0].effect.memory else 1.0) * decisions.CURVE_SHARE
         doubt = max(doubt, share * (bare - best.cost))
     return (best, kept) if replaced and best.cost + doubt < whole else None
 

@@ -15,7 +15,7 @@ from inertial.criticism.examination import EffectSearch, ExaminedRun, examined
 from inertial.criticism.lot_part import LotPart
 from inertial.criticism.search import SearchResult
 from inertial.criticism.unknown import Suspect, Unexplained, better_curve, unexplained_by
-from inertial.data_errors.bad_dwells import BadDwell
+from inertial.data_errors.removed_dwells import BadDwell
 from inertial.data_errors.tails import with_tails
 from inertial.decisions import ADEQUATE_ABOVE, NAMED_BELOW
 from inertial.estimation.bases import SEEN

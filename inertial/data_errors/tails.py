@@ -20,7 +20,8 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.data_errors.bad_dwells import BadDwell, deletion_residuals
+from inertial.data_errors.bad_dwells import deletion_residuals
+from inertial.data_errors.removed_dwells import BadDwell
 from inertial.decisions import HEAVY, TAILS, TAILS_REACH
 from inertial.distributions import chi2_tail, kurtosis_tail, normal_tail, student_tail
 from inertial.estimation.model import Model

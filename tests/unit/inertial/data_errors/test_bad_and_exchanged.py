@@ -8,8 +8,8 @@ from made_worlds import BASE, HIDDEN, NULLS, Noise, World, lot_in, make
 from scipy import integrate, stats
 
 from inertial.data_errors import tails
-from inertial.data_errors.bad_dwells import BadDwell
 from inertial.data_errors.handling.units_swapped import UnitsSwapped
+from inertial.data_errors.removed_dwells import BadDwell
 from inertial.data_errors.tails import with_tails
 from pipelines.tables.sound_lot import sound_lot
 
