@@ -173,7 +173,7 @@ def _placed_again(run: ExaminedRun, model: Model) -> bool:
         best = None if one.term is None else better_placed(model, one.term)
         if one.term is None or best is None or not isinstance(best.effect, Handling):
             continue
-        place = {k: v for k, v in best.keywords.items() if isinstance(v, float)}
+        place = _place(best)
         size = model.without_term(one.term).with_term(best).shared_sizes(best)
         evidence, dwells = best.effect.describe(run.lot, size, **place), best.effect.dwells(run.lot, **place)
         run.beside = [best if t is one.term else t for t in run.beside]
@@ -223,9 +223,14 @@ def mended(run: ExaminedRun) -> EffectSearch:
             _mend(run, of, replace(searched, model=beside if others else searched.model), term)
 
 
+def _place(term: Term) -> dict[str, float]:
+    """The place of a handling error."""
+    return {k: v for k, v in term.keywords.items() if isinstance(v, float)}
+
+
 def _mend(run: ExaminedRun, fields: Candidates, searched: SearchResult, term: Term) -> None:
     """Remove a handling error from a run, and record it."""
-    alternative, place = term.effect, {k: v for k, v in term.keywords.items() if isinstance(v, float)}
+    alternative, place = term.effect, _place(term)
     if not isinstance(alternative, Handling):
         raise TypeError(term.effect.id)
     place = alternative.placed(run.lot, **place)
@@ -235,7 +240,7 @@ def _mend(run: ExaminedRun, fields: Candidates, searched: SearchResult, term: Te
     problem = fields.problem
     size = model.shared_sizes(term)
     units = alternative.units(**place)
-    evidence, dwells = _happened(fields, searched.model, term, alternative, size)
+    evidence, dwells = _described(fields, searched.model, term, alternative, size)
     before, after = left_out(searched.model), left_out(model, term)
     errors = fit_rms(problem, model.terms), *worst(before, after)
     lot = alternative.settled(run.lot, size, _misfit(searched.model, model), **place)
@@ -267,11 +272,11 @@ def _misfit(model: Model, richer: Model) -> Misfit:
     return left
 
 
-def _happened(
+def _described(
     fields: Candidates, beside: Model, term: Term, alternative: Handling, size: Array
 ) -> tuple[str, tuple[int, ...]]:
     """The description of a handling error, and its dwells: at each place that explains the run equally well."""
-    lot, place = fields.problem.lot, {k: v for k, v in term.keywords.items() if isinstance(v, float)}
+    lot, place = fields.problem.lot, _place(term)
     best = judge(fields, beside, term).cost
     texts: list[str] = []
     dwells = list(alternative.dwells(lot, **place))
