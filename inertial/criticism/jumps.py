@@ -30,9 +30,6 @@ _AXES = 6
 _JUMPS = 4
 """Largest number of jumps of one axis."""
 
-_BEYOND = 1.5
-"""Largest ratio of what jumps explain to what the effect explains in the same axes: below it jumps of few axes are not tried."""
-
 
 @dataclass(frozen=True)
 class Jumps:
@@ -63,7 +60,8 @@ def jumps_in_place_of(field: Candidates, model: Model, rival: Rival) -> Jumps | 
     drops = _drops(space, rival.term.candidate(model.problem))
     score = _score(drops, rival)
     largest = np.argsort(drops)[::-1][:_AXES]
-    if _BEYOND * float(drops[largest].sum()) < score - CLASS_WIDTH:
+    # in the same axes jumps explain half as much again as an effect at most
+    if 1.5 * float(drops[largest].sum()) < score - CLASS_WIDTH:
         return None
     single = _single_jumps(field, space, alternatives)
     of_axes = sorted((_best(field, space, int(b), single) for b in largest), key=lambda one: -one.score)

@@ -28,7 +28,7 @@ _AGAIN = 3  # the same for the second examination of an effect
 _MOST = 6  # largest number of effects of one search
 _AS_MUCH = 1.0  # score by which further columns of an effect must be better than its leading column
 _INEXACT = 0.01  # share of a wrong angle that the scale factors and misalignments of the devices leave of it
-_REFINED, _SAME = 3, 0.05  # turns of refinement, and the change of a nonlinear parameter that ends them
+_REFINED, _UNCHANGED = 3, 0.05  # turns of refinement, and the change of a nonlinear parameter that ends them
 
 
 @dataclass(frozen=True)
@@ -209,7 +209,7 @@ def _refined(field: Candidates, model: Model, term: Term, noise: Noise | None) -
 def _moved(before: Term, after: Term) -> bool:
     """Whether a nonlinear parameter moved: then part of the effect had counted as noise, and the noise changes."""
     old, new = (np.ravel(np.array([np.mean(v) for v in t.keywords.values()])) for t in (before, after))
-    return bool(np.any(np.abs(new - old) > _SAME * np.abs(old) + 1e-12))
+    return bool(np.any(np.abs(new - old) > _UNCHANGED * np.abs(old) + 1e-12))
 
 
 def judge(field: Candidates, model: Model, term: Term) -> Rival:
