@@ -233,7 +233,6 @@ SAME = {
     "ENOUGH": "ADEQUATE_ABOVE",
     "REFUTED": "CONFIRMED",
     "BLOCKS": "LEFT_OUT",
-    "OTHERS_SHARE": "OTHERS",
 }
 """Numbers that are measured with another."""
 

@@ -1,6 +1,6 @@
 """Decisions of the search for effects at half, at their value and at twice as much, each search made once.
 
-`python benchmarks/characteristics.py --only DOUBT` and the other names of `SEARCH_PARTS`.
+`python benchmarks/characteristics.py --only CURVE_AHEAD` and the other names of `SEARCH_PARTS`.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ from tables import HIDDEN, NULLS
 from world import World
 
 if TYPE_CHECKING:
-    from inertial.criticism.field import Candidates
+    from inertial.criticism.field import Candidates, Rival
     from inertial.criticism.lot_part import LotPart
-    from inertial.criticism.search import Rival, SearchResult
+    from inertial.criticism.search import SearchResult
     from inertial.estimation.model import Model
 
 
@@ -58,12 +58,6 @@ def curve(world: World, seed: int) -> Counts:
     return int(
         bool(result.added) and better_curve(part.base, result.added, part.suspected(result.added)) is not None
     ), 1
-
-
-def ended(world: World, seed: int) -> Counts:
-    """Lots in which a curve of one driver ends the search beside the effects that were found."""
-    part, result = searched(world, seed)
-    return int(bool(result.added) and part.imitates(result.added)), 1
 
 
 def in_class(world: World, seed: int) -> Counts:
@@ -110,8 +104,7 @@ _KNOWN = {name: WORLDS[name] for name in ("third_order_2", "warm_up_1", "two_eff
 _SLOW = {name: HIDDEN[name] for name in ("aging_linear_1", "warm_up_1")}
 _UP = World(units=4, poses=9, soaks=(0.0, 20.0, 40.0, 60.0), hours=1.2, hidden=(("step_change", 4.0),))
 SEARCH_PARTS: dict[str, Part] = {
-    **dict.fromkeys(("DOUBT", "DOUBT_MEMORY", "DOUBT_SHARE", "OTHERS"), (curve, _KNOWN)),
-    "DECISIVE": (ended, _KNOWN),
+    **dict.fromkeys(("CURVE_AHEAD", "CURVE_SHARE"), (curve, _KNOWN)),
     "RIVAL_NEAR": (
         in_class,
         {**{name: WORLDS[name] for name in ("bias_temperature_quadratic_2", "warm_up_1")}, "step, soaks up": _UP},

@@ -260,42 +260,13 @@ twice as much: noise alone, and K 4, in 24, 0, 0 of 48 each; a square of the tem
 those that vary with the soaks.
 """
 
-DECISIVE = 0.2
-"""Share of its gain by which a curve must exceed the chosen effects to end the search.
+CURVE_AHEAD, CURVE_SHARE = 40.0, 0.15
+"""Penalised chi-square by which a curve of one driver must be better than an effect to take its place (half of it for two
+effects), and the same as a share of the curve's gain; an effect beside the curve is kept by as much. Known physics has priority.
 
-`python benchmarks/characteristics.py --only DECISIVE --runs 4`, at half, at it, at twice as much: a search ended by a curve
-beside a cubic of size 2, a warm-up of size 1 and two effects in 0, 0, 0 of 4 lots each, beside what imitates a bump of no
-catalogue in 3, 3, 3 of 4.
-"""
-
-OTHERS, OTHERS_SHARE = 60.0, 0.1
-"""Smallest penalised chi-square of an effect beside a curve, and the same as a share of the gain of the curve.
-
-`python benchmarks/characteristics.py --only OTHERS --runs 4`, at half, at it, at twice as much: a curve preferred to a cubic of
-size 2, a warm-up of size 1 and two effects in 0, 0, 0 of 4 lots each, to what imitates a bump of no catalogue in 3, 3, 3 of 4.
-"""
-
-DOUBT = {0: 0.0, 1: 40.0, 2: 20.0}
-"""Penalised chi-square by which a curve must exceed so many effects: known physics has priority.
-
-`python benchmarks/characteristics.py --only DOUBT --runs 4`, at half, at it, at twice as much: a curve preferred to a cubic of
-size 2, a warm-up of size 1 and two effects in 0, 0, 0 of 4 lots each, to what imitates a bump of no catalogue in 3, 3, 3 of 4.
-"""
-
-DOUBT_MEMORY = 0.5
-"""The same, as a share, for an effect with memory: a curve over time can follow any memory of one run.
-
-`python benchmarks/characteristics.py --only DOUBT_MEMORY --runs 4`, at half, at it, at twice as much: a curve preferred to a
-cubic of size 2, a warm-up of size 1 and two effects in 0, 0, 0 of 4 lots each, to what imitates a bump of no catalogue in 3, 3,
-3 of 4.
-"""
-
-DOUBT_SHARE = 0.15
-"""Share of the gain of a curve that one effect must leave unexplained before the curve is preferred.
-
-`python benchmarks/characteristics.py --only DOUBT_SHARE --runs 4`, at half, at it, at twice as much: a curve preferred to a
-cubic of size 2, a warm-up of size 1 and two effects in 0, 0, 0 of 4 lots each, to what imitates a bump of no catalogue in 3, 3,
-3 of 4.
+`python benchmarks/characteristics.py --only CURVE_AHEAD --runs 4` (`CURVE_SHARE`), at half, at it, at twice as much: a curve
+preferred to a cubic of size 2, a warm-up of size 1, two effects, and to what imitates a bump of no catalogue in 0, 0, 0 of 4 lots
+each.
 """
 
 STEPS_UNEVEN = 5.0

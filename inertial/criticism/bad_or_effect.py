@@ -8,12 +8,12 @@ from inertial import effects as catalogue
 from inertial.criticism.drivers import varies
 from inertial.criticism.field import Candidates
 from inertial.criticism.search import contest, convincing, judge
-from inertial.data_errors.bad_dwells import BadDwell, bad_dwells, without
+from inertial.data_errors.bad_dwells import bad_dwells
+from inertial.data_errors.removed_dwells import BadDwell, model_without
 from inertial.effects.base import AnyEffect
 from inertial.effects.covariate import COVARIATE_PREFIX, Covariate
 from inertial.estimation.model import Model
 from inertial.estimation.penalty import price
-from inertial.estimation.problem import Problem
 from inertial.estimation.term import Term
 
 
@@ -31,13 +31,13 @@ def bad_beside_effects(base: Model, effects: Sequence[str]) -> list[BadDwell]:
     if not found:
         return found
     rivals = candidates_of(base, effects)
-    field = Candidates(base.problem, rivals, [])
+    field = Candidates(base.problem, rivals)
     best = next(iter(contest(field, base)), None)
     if best is None or not convincing(field, base, best):
         return found
     kept = bad_dwells(base.with_term(best.term))
-    places = {(d.unit, d.dwell) for d in kept}
-    explained = [d for d in found if (d.unit, d.dwell) not in places]
+    places = {d.place for d in kept}
+    explained = [d for d in found if d.place not in places]
     if not explained or -best.cost <= sum(_score(base, d) for d in explained):
         return found
     return kept if len(explained) > 1 or _seen_without(base, rivals, best.term, explained) else found
@@ -45,10 +45,8 @@ def bad_beside_effects(base: Model, effects: Sequence[str]) -> list[BadDwell]:
 
 def _seen_without(base: Model, effects: list[AnyEffect], term: Term, bad: list[BadDwell]) -> bool:
     """Whether a term explains more than its price with the bad dwells left out, by what a named effect has to: one look only."""
-    problem = Problem(without(base.problem.lot, bad), slope=base.problem.slope)
-    field = Candidates(problem, effects, [])
-    rest = Model(problem, base.terms, near=base.noise)
-    return -judge(field, rest, term).cost > float(np.log(max(problem.count, 1)))
+    rest = model_without(base, [d.place for d in bad])
+    return -judge(Candidates(rest.problem, effects), rest, term).cost > float(np.log(max(rest.problem.count, 1)))
 
 
 def _score(base: Model, bad: BadDwell) -> float:

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from inertial import decisions
-from inertial.criticism.field import Candidates
-from inertial.criticism.jumps import Jumps, jumps_instead
-from inertial.criticism.search import Rival, judge, judge_refined, ranked, scanned, size_of
+from inertial.criticism.field import Candidates, Rival
+from inertial.criticism.jumps import Jumps, jumps_in_place_of
+from inertial.criticism.search import judge, judge_refined, ranked, scanned, size_of
 from inertial.decisions import CLASS_WIDTH
 from inertial.estimation.alternative import Handling
 from inertial.estimation.candidate import Candidate
@@ -91,7 +91,7 @@ def class_of(field: Candidates, model: Model, term: Term) -> EffectClass:
     if isinstance(term.effect, Handling):
         # an effect that explains far more than an error of handling is beside it, and no rival of it
         judged = [rival for rival in judged if rival is own or rival.cost > own.cost - CLASS_WIDTH]
-    jumps = jumps_instead(field, rest, judged[0])
+    jumps = jumps_in_place_of(field, rest, judged[0])
     if jumps is not None:
         judged = _with_jumps(judged, jumps)
     best = judged[0]

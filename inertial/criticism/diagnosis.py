@@ -1,7 +1,7 @@
 """The diagnosis of a lot: adequacy, drivers of the residual, classes of missing effects, the unexplained remainder."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.random import Generator
@@ -12,14 +12,14 @@ from inertial.criticism.classes import EffectClass, class_of
 from inertial.criticism.drivers import Driver, Misfit, looks_of, places
 from inertial.criticism.evidence import Evidence, evidence
 from inertial.criticism.examination import Named, worst
-from inertial.criticism.field import Candidates
+from inertial.criticism.field import Candidates, Rival
 from inertial.criticism.influence import CarriedEvidence, carried_by, influence
 from inertial.criticism.left_out import left_out
-from inertial.criticism.search import Rival
 from inertial.criticism.smallest import Smallest, smallest_named
+from inertial.criticism.unknown import Unexplained
 from inertial.criticism.unseen import unseen
-from inertial.criticism.verdict import Unexplained, judged
-from inertial.data_errors.bad_dwells import BadDwell
+from inertial.criticism.verdict import judged
+from inertial.data_errors.removed_dwells import BadDwell, model_without
 from inertial.decisions import ADEQUATE_ABOVE
 from inertial.effects.covariate import Covariate
 from inertial.estimation.alternative import Handling
@@ -129,12 +129,8 @@ def _residuals(base: Model, fields: Candidates, rng: Generator | None) -> Carrie
     dwells = influence(base, None)
     if rng is None or not dwells:
         return CarriedEvidence(dwells)
-    lot = base.problem.lot
-    error = lot.error.copy()
-    for one in dwells:
-        error[one.unit, one.dwell] = np.inf
-    problem = Problem(replace(lot, error=error), slope=base.problem.slope)
-    model = Model(problem, base.terms, near=base.noise)
+    model = model_without(base, [(d.unit, d.dwell) for d in dwells])
+    problem = model.problem
     return CarriedEvidence(dwells, adequacy(Candidates(problem, fields.effects), looks_of(problem), model, rng))
 
 

@@ -1,6 +1,6 @@
 """A run under examination: bad dwells and handling errors are removed before effects are judged."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -9,15 +9,15 @@ from numpy.typing import NDArray
 from inertial import effects as catalogue
 from inertial.criticism.bad_or_effect import bad_beside_effects, candidates_of
 from inertial.criticism.classes import EffectClass, class_of
-from inertial.criticism.drift import Drift, one_drift
 from inertial.criticism.field import Candidates
 from inertial.criticism.influence import CarriedEvidence, carried_by
-from inertial.criticism.jumps import jumps_instead
 from inertial.criticism.left_out import LeftOut, left_out
 from inertial.criticism.lot_part import LotPart, part_of
-from inertial.criticism.search import Rival, SearchResult, convincing, judge, search
-from inertial.data_errors.bad_dwells import BadDwell, bad_dwells, without
+from inertial.criticism.search import SearchResult, convincing, judge, search
+from inertial.criticism.unknown import Unexplained
+from inertial.data_errors.bad_dwells import bad_dwells
 from inertial.data_errors.handling import alternatives
+from inertial.data_errors.removed_dwells import BadDwell, without
 from inertial.decisions import CLASS_WIDTH, RISES
 from inertial.estimation.alternative import Exchangeable, Handling, Misfit, soaks
 from inertial.estimation.comparison import fit_rms, slope_of
@@ -79,7 +79,7 @@ class ExaminedRun:
     handled: list[Named] = field(default_factory=list[Named])
     removed: list[BadDwell] = field(default_factory=list[BadDwell])
     barred: set[str] = field(default_factory=set[str])
-    drift: Drift | None = None
+    drift: Unexplained | None = None
     soak: NDArray[np.intp] | None = None
     _made: tuple[list[object], Model] | None = None
 
@@ -87,7 +87,7 @@ class ExaminedRun:
         """Handling errors that are searched."""
         return [a for a in alternatives() if a.id not in self.barred]
 
-    def listen(self) -> None:
+    def estimate_loudness(self) -> None:
         """Estimate the noise of each soak again: an error that was corrected is none of it."""
         self.lot = replace(self.lot, loudness=None)
         if self.soak is None:
@@ -96,7 +96,7 @@ class ExaminedRun:
         if loudness is not None:
             self.lot = replace(self.lot, loudness=loudness)
 
-    def comes_again(self, term: Term) -> bool:
+    def was_found(self, term: Term) -> bool:
         """Whether a sudden change of the whole lot was found before."""
         return "unit" not in term.keywords and any(
             t.effect.id == term.effect.id and "unit" not in t.keywords for t in self.beside
@@ -104,13 +104,13 @@ class ExaminedRun:
 
     def withdraw(self, part: LotPart, further: Sequence[Term]) -> bool:
         """Withdraw sudden changes that are one drift, with what was found beside them; whether there were any."""
-        drift = one_drift(part, self.beside, further)
-        if drift is None:
+        found = part.drift_of(self.beside, further)
+        if found is None:
             return False
-        self.drift = drift
-        self.barred |= drift.imitated
-        self.beside = [t for t in self.beside if t.effect.id not in drift.imitated]
-        self.handled = [one for one in self.handled if one.term is None or one.term.effect.id not in drift.imitated]
+        self.drift, imitations = found
+        self.barred |= imitations
+        self.beside = [t for t in self.beside if t.effect.id not in imitations]
+        self.handled = [each for each in self.handled if each.term is None or each.term.effect.id not in imitations]
         return True
 
     def model(self) -> Model:
@@ -121,7 +121,7 @@ class ExaminedRun:
         return self._made[1]
 
     def _new_model(self) -> Model:
-        lot = without(self.lot, self.removed) if self.removed else self.lot
+        lot = without(self.lot, [d.place for d in self.removed]) if self.removed else self.lot
         problem = Problem(lot)
         base = Model(problem, with_turn_on(lot.state, terms_of(catalogue.get_all(self.effects), problem)))
         refuse_without_freedom(base)
@@ -132,7 +132,7 @@ class ExaminedRun:
 def examined(lot: Lot, effects: Sequence[str]) -> "tuple[ExaminedRun, EffectSearch]":
     """A run without bad dwells and handling errors, and the search for effects in it."""
     run = ExaminedRun(lot, tuple(effects))
-    run.listen()
+    run.estimate_loudness()
     run.removed = bad_beside_effects(run.model(), run.effects)
     searched = mended(run)
     for _ in range(_TURNS):
@@ -141,7 +141,7 @@ def examined(lot: Lot, effects: Sequence[str]) -> "tuple[ExaminedRun, EffectSear
         # dwells that an effect or a handling error explains are not bad; with it in the model smaller ones become visible
         whole = Problem(run.lot, slope=searched.base.problem.slope)
         kept = bad_dwells(replaced(Model(whole, searched.model.terms, near=searched.model.noise)))
-        same = {(d.unit, d.dwell) for d in kept} == {(d.unit, d.dwell) for d in run.removed}
+        same = {d.place for d in kept} == {d.place for d in run.removed}
         if same and not _placed_again(run, searched.model) and not _dropped(run, searched):
             break
         run.removed = kept
@@ -170,7 +170,7 @@ def _placed_again(run: ExaminedRun, model: Model) -> bool:
         best = None if one.term is None else better_placed(model, one.term)
         if one.term is None or best is None or not isinstance(best.effect, Handling):
             continue
-        place = {k: v for k, v in best.keywords.items() if isinstance(v, float)}
+        place = _place(best)
         size = model.without_term(one.term).with_term(best).shared_sizes(best)
         evidence, dwells = best.effect.describe(run.lot, size, **place), best.effect.dwells(run.lot, **place)
         run.beside = [best if t is one.term else t for t in run.beside]
@@ -200,11 +200,11 @@ def mended(run: ExaminedRun) -> EffectSearch:
         base = run.model()
         fields = Candidates(base.problem, candidates_of(base, run.effects), run.alternatives())
         part = part_of(fields, base, wide=run.drift is not None)
-        searched, of = search(part.field, part.base, part.imitates, _jumps_in(part.field)), part.field
+        searched, of = search(part.field, part.base, part.imitates), part.field
         if not searched.handling and part.field is not fields:
             part.base.problem.forget()
             part.base.forget()
-            whole = search(fields, base, part.imitates, _jumps_in(fields), start=searched.added)
+            whole = search(fields, base, part.imitates, start=searched.added)
             searched, of = replace(whole, ladder=searched.ladder), fields
         if part.field is not fields:
             base.forget()
@@ -212,7 +212,7 @@ def mended(run: ExaminedRun) -> EffectSearch:
             if run.withdraw(part, searched.added):
                 continue
             return EffectSearch(base, fields, part, searched)
-        if run.comes_again(searched.handling[0]) and run.withdraw(part, searched.handling):
+        if run.was_found(searched.handling[0]) and run.withdraw(part, searched.handling):
             continue
         for term in searched.handling:
             others = [other for other in searched.handling if other is not term]
@@ -220,19 +220,14 @@ def mended(run: ExaminedRun) -> EffectSearch:
             _mend(run, of, replace(searched, model=beside if others else searched.model), term)
 
 
-def _jumps_in(fields: Candidates) -> Callable[[Model, Rival], tuple[Term, ...]]:
-    """The jumps of single axes that explain more than an effect."""
-
-    def instead(model: Model, rival: Rival) -> tuple[Term, ...]:
-        jumps = jumps_instead(fields, model, rival)
-        return jumps.terms if jumps is not None and jumps.ahead > 0.0 else ()
-
-    return instead
+def _place(term: Term) -> dict[str, float]:
+    """The place of a handling error."""
+    return {k: v for k, v in term.keywords.items() if isinstance(v, float)}
 
 
 def _mend(run: ExaminedRun, fields: Candidates, searched: SearchResult, term: Term) -> None:
     """Remove a handling error from a run, and record it."""
-    alternative, place = term.effect, {k: v for k, v in term.keywords.items() if isinstance(v, float)}
+    alternative, place = term.effect, _place(term)
     if not isinstance(alternative, Handling):
         raise TypeError(term.effect.id)
     place = alternative.placed(run.lot, **place)
@@ -242,7 +237,7 @@ def _mend(run: ExaminedRun, fields: Candidates, searched: SearchResult, term: Te
     problem = fields.problem
     size = model.shared_sizes(term)
     units = alternative.units(**place)
-    evidence, dwells = _happened(fields, searched.model, term, alternative, size)
+    evidence, dwells = _described(fields, searched.model, term, alternative, size)
     before, after = left_out(searched.model), left_out(model, term)
     errors = fit_rms(problem, model.terms), *worst(before, after)
     lot = alternative.settled(run.lot, size, _misfit(searched.model, model), **place)
@@ -253,7 +248,7 @@ def _mend(run: ExaminedRun, fields: Candidates, searched: SearchResult, term: Te
     else:
         run.lot = lot
     if run.lot.loudness is not None:
-        run.listen()
+        run.estimate_loudness()
 
 
 def _misfit(model: Model, richer: Model) -> Misfit:
@@ -274,11 +269,11 @@ def _misfit(model: Model, richer: Model) -> Misfit:
     return left
 
 
-def _happened(
+def _described(
     fields: Candidates, beside: Model, term: Term, alternative: Handling, size: Array
 ) -> tuple[str, tuple[int, ...]]:
     """The description of a handling error, and its dwells: at each place that explains the run equally well."""
-    lot, place = fields.problem.lot, {k: v for k, v in term.keywords.items() if isinstance(v, float)}
+    lot, place = fields.problem.lot, _place(term)
     best = judge(fields, beside, term).cost
     texts: list[str] = []
     dwells = list(alternative.dwells(lot, **place))

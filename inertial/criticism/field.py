@@ -1,6 +1,7 @@
 """The candidates of a search: effects at the values of their nonlinear parameters, alternatives at their places."""
 
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,10 +11,38 @@ from inertial.effects.base import AnyEffect
 from inertial.errors import MissingInput
 from inertial.estimation.alternative import Handling, OfOneDwell, by_block
 from inertial.estimation.candidate import Candidate
+from inertial.estimation.likelihood import Ratio
 from inertial.estimation.problem import Problem
 from inertial.estimation.space import Gain, Space
+from inertial.estimation.term import Term
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Rival:
+    """A candidate at its best values, judged in addition to a model.
+
+    drop : reduction of the deviance; rank : number of coefficients that the plan determines
+    cost : penalised deviance, the smaller the better
+    ratio : the likelihood ratio behind them; None if there is none
+    """
+
+    term: Term
+    drop: float
+    rank: int
+    cost: float
+    log_p: float
+    ratio: Ratio | None = None
+
+    @staticmethod
+    def of(term: Term, ratio: Ratio) -> "Rival":
+        """A term with its likelihood ratio."""
+        return Rival(term, ratio.deviance, ratio.rank, -ratio.score, ratio.log_p, ratio)
+
+    def at(self, shared: float) -> "Rival":
+        """The same rival with another φ."""
+        return self if self.ratio is None else Rival.of(self.term, self.ratio.at(shared))
 
 
 class Candidates:
@@ -62,16 +91,21 @@ class Candidates:
         """Number of places in the price of an alternative; one for an effect."""
         return self._looked.get(name, 1)
 
-    def gains(self, space: Space, leave: set[str], *, handling: bool = False) -> dict[str, Gain]:
-        """Gain of every candidate that the model does not hold already."""
-        return self.gains_in([space], leave, handling=handling)[0]
+    def gains(
+        self, spaces: Sequence[Space], leave: set[str], *, handling: bool = False, primary: bool = False
+    ) -> list[dict[str, Gain]]:
+        """Gain in each space of every candidate that the model does not hold already: columns are made once for all.
 
-    def gains_in(self, spaces: Sequence[Space], leave: set[str], *, handling: bool = False) -> list[dict[str, Gain]]:
-        """The same in each of some spaces: columns are made once for all."""
+        Parameters
+        ----------
+        leave : ids that are left out; handling : whether errors of handling are looked at
+        primary : of the leading columns alone, for effects of several columns whose first is an effect of its own
+        """
         gains: list[dict[str, Gain]] = [{} for _ in spaces]
         for effect in (*self.effects, *(self.handling if handling else ())):
-            if effect.id not in leave:
-                for each, gain in zip(gains, self._gain(spaces, effect, None), strict=True):
+            first = effect.primary if primary else None
+            if effect.id not in leave and (first is not None or not primary):
+                for each, gain in zip(gains, self._gain(spaces, effect, first), strict=True):
                     each[effect.id] = gain
         return gains
 
@@ -99,13 +133,3 @@ class Candidates:
         """Every effect at every value of its nonlinear parameters, in pieces."""
         for effect in self.effects:
             yield from self.problem.pieces(effect, self.grids[effect.id])
-
-    def primary_gains_in(self, spaces: Sequence[Space], leave: set[str]) -> list[dict[str, Gain]]:
-        """Gain of the leading column alone, for effects of several columns whose first is an effect of its own."""
-        gains: list[dict[str, Gain]] = [{} for _ in spaces]
-        for effect in self.effects:
-            first = effect.primary
-            if effect.id not in leave and first is not None:
-                for each, gain in zip(gains, self._gain(spaces, effect, first), strict=True):
-                    each[effect.id] = gain
-        return gains

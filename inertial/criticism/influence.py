@@ -1,14 +1,14 @@
 """Influence of dwells on a verdict: their shares of the deviance, and the verdict without the largest."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from inertial.data_errors.removed_dwells import model_without
 from inertial.estimation.likelihood import along_mean, of_station, scatter_of_poses, shared_noise, weighed
 from inertial.estimation.model import Model
 from inertial.estimation.penalty import fall, freedom
-from inertial.estimation.problem import Problem
 from inertial.estimation.term import Term
 
 Array = NDArray[np.float64]
@@ -85,13 +85,9 @@ def carried_by(model: Model, term: Term) -> CarriedEvidence:
 
 def log_p_without(model: Model, term: Term, dwells: tuple[Influence, ...]) -> float:
     """Log probability of a term without the dwells of largest influence, at the estimated noise."""
-    lot = model.problem.lot
-    error = lot.error.copy()
-    for one in dwells:
-        error[one.unit, one.dwell] = np.inf
-    problem = Problem(replace(lot, error=error), slope=model.problem.slope)
-    space = Model(problem, model.terms, near=model.noise).at(model.noise)
-    gain = space.gain(term.candidate(problem))
+    rest = model_without(model, [(d.unit, d.dwell) for d in dwells])
+    space = rest.at(model.noise)
+    gain = space.gain(term.candidate(rest.problem))
     rank = int(gain.rank[0])
     if rank == 0:
         return 0.0

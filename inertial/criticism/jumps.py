@@ -11,8 +11,7 @@ from math import comb, log
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.criticism.field import Candidates
-from inertial.criticism.search import Rival
+from inertial.criticism.field import Candidates, Rival
 from inertial.decisions import CLASS_WIDTH, JUMPS_RARE
 from inertial.estimation.alternative import Handling
 from inertial.estimation.bases import SEEN
@@ -30,9 +29,6 @@ _AXES = 6
 
 _JUMPS = 4
 """Largest number of jumps of one axis."""
-
-_BEYOND = 1.5
-"""Largest ratio of what jumps explain to what the effect explains in the same axes: below it jumps of few axes are not tried."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +50,7 @@ class _OfAxis:
     terms: tuple[Term, ...]
 
 
-def jumps_instead(field: Candidates, model: Model, rival: Rival) -> Jumps | None:
+def jumps_in_place_of(field: Candidates, model: Model, rival: Rival) -> Jumps | None:
     """The jumps of single axes that explain about as much as an effect with coefficients for every axis; None if none do."""
     alternatives = [a for a in field.handling if a.of_one_axis]
     if not alternatives or rival.term.shared or not rival.rank:
@@ -64,7 +60,8 @@ def jumps_instead(field: Candidates, model: Model, rival: Rival) -> Jumps | None
     drops = _drops(space, rival.term.candidate(model.problem))
     score = _score(drops, rival)
     largest = np.argsort(drops)[::-1][:_AXES]
-    if _BEYOND * float(drops[largest].sum()) < score - CLASS_WIDTH:
+    # in the same axes jumps explain half as much again as an effect at most
+    if 1.5 * float(drops[largest].sum()) < score - CLASS_WIDTH:
         return None
     single = _single_jumps(field, space, alternatives)
     of_axes = sorted((_best(field, space, int(b), single) for b in largest), key=lambda one: -one.score)

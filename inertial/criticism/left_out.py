@@ -15,6 +15,7 @@ outputs, not the path of poses and temperatures through them, which is known.
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -228,37 +229,38 @@ class _Fold:
         return not bool(np.all(self.expected + more < self.enough))
 
 
+@dataclass
 class _Group:
     """P of blocks that share a whitener, in whose units P is S − AᵀA with S = V⁻¹ of all and the few rows A of each.
 
-    Parameters
-    ----------
     there : (n,), dwells; whitener : (n, n)
     along : (b, r, n), A; level : (b,), g; py : (b, n), pz : (b, n, q), P times the measurements and shared columns, 1/g
     local : (b, n, p), columns with coefficients by block
     """
 
-    def __init__(
-        self,
-        members: NDArray[np.intp],
-        there: NDArray[np.bool_],
-        whitener: Array,
-        along: Array,
-        level: Array,
-        py: Array,
-        pz: Array,
-        local: Array,
-    ) -> None:
-        self.members, self.there, self.along = members, there, along
-        self.level, self.py, self.pz = level, py, pz
-        self.inverse = whitener.T @ whitener
-        own = np.flatnonzero(there)
-        root = solve_triangular(whitener[np.ix_(own, own)], np.eye(own.size), lower=True)
-        # P⁺ = (I − UUᵀ)V(I − UUᵀ) with an orthonormal basis U of the columns
-        basis, rank = orthonormal(local[:, own])
-        inside = np.einsum("bnp,bnp->b", root.T @ basis, root.T @ basis)
-        self.typical = level**2 * (np.sum(root**2) - inside) / np.maximum(own.size - rank, 1)
+    members: NDArray[np.intp]
+    there: NDArray[np.bool_]
+    whitener: Array
+    along: Array
+    level: Array
+    py: Array
+    pz: Array
+    local: Array
+
+    @cached_property
+    def inverse(self) -> Array:
+        """V⁻¹ of all dwells, (n, n)."""
+        return self.whitener.T @ self.whitener
+
+    @cached_property
+    def typical(self) -> Array:
         """Variance of what the model leaves of each block, (b,): nothing that it predicts should be much worse."""
+        own = np.flatnonzero(self.there)
+        root = solve_triangular(self.whitener[np.ix_(own, own)], np.eye(own.size), lower=True)
+        # P⁺ = (I − UUᵀ)V(I − UUᵀ) with an orthonormal basis U of the columns
+        basis, rank = orthonormal(self.local[:, own])
+        inside = np.einsum("bnp,bnp->b", root.T @ basis, root.T @ basis)
+        return self.level**2 * (np.sum(root**2) - inside) / np.maximum(own.size - rank, 1)
 
     def left_out(self, places: NDArray[np.intp]) -> _Fold | None:
         """The dwells at some places; None if the others determine too little.

@@ -9,8 +9,7 @@ import numpy as np
 from inertial import decisions
 from inertial.criticism.field import Candidates
 from inertial.criticism.search import anything
-from inertial.criticism.unknown import Suspect, better_curve, suspects
-from inertial.criticism.wide_suspects import wide_suspects
+from inertial.criticism.unknown import Suspect, Unexplained, better_curve, suspects, unexplained_by, wide_suspects
 from inertial.estimation.alternative import Handling
 from inertial.estimation.model import Model
 from inertial.estimation.penalty import cost_of_model
@@ -48,14 +47,39 @@ class LotPart:
 
     def imitates(self, chosen: Sequence[Term]) -> bool:
         """Whether a curve of one driver is better than the chosen effects: by far, or with no further effect left."""
-        instead = better_curve(self.base, chosen, self.suspected(chosen))
-        if instead is None:
+        better = better_curve(self.base, chosen, self.suspected(chosen))
+        if better is None:
             return False
-        fit = instead[0]
+        fit = better[0]
         problem = self.field.problem
         effects = cost_of_model(Model(problem, [*self.base.terms, *chosen], near=fit.model.noise))
-        by_far = effects - fit.cost > decisions.DECISIVE * (cost_of_model(self.base) - fit.cost)
+        by_far = effects - fit.cost > decisions.CURVE_SHARE * (cost_of_model(self.base) - fit.cost)
         return by_far or not anything(self.field, fit.model)
+
+    def drift_of(self, changes: Sequence[Term], further: Sequence[Term]) -> tuple[Unexplained, frozenset[str]] | None:
+        """The drift that sudden changes, with what was found beside them, are pieces of, and the ids of these changes.
+
+        One step of the reader's reference is an event. Two of them, one after the other, are what a scale factor that changes
+        slowly looks like; a fixture that moved, and misalignments that follow the temperature, are what a fixture that bends
+        looks like. A single change is never doubted: known causes have priority.
+
+        Parameters
+        ----------
+        changes : terms of the judged model that are changes of handling
+        further : effects or changes beyond that model
+        """
+        known = {t.key for t in changes}
+        held = [t for t in self.base.terms if t.key in known]
+        if not held or len(held) + len(further) < 2:
+            return None
+        base = Model(self.field.problem, [t for t in self.base.terms if t.key not in known], near=self.base.noise)
+        better = better_curve(base, [*held, *further], self.every_suspect)
+        if better is None:
+            return None
+        fit, kept = better
+        remaining = {t.key for t in kept}
+        imitations = frozenset(t.effect.id for t in held if t.key not in remaining)
+        return (unexplained_by(base, fit, len(self.every_suspect)), imitations) if imitations else None
 
 
 def part_of(field: Candidates, base: Model, *, wide: bool) -> LotPart:

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.data_errors.bad_dwells import bad_dwells, without
+from inertial.data_errors.bad_dwells import bad_dwells
+from inertial.data_errors.removed_dwells import without
 from inertial.decisions import BLOCKS, CONFIRMED, REFUTED
 from inertial.estimation.comparison import Estimate, residuals_of
 from inertial.estimation.likelihood import shared_noise
@@ -70,7 +71,7 @@ def reproduced_change(lot: Lot, before: Estimate, after: Estimate) -> Reproduced
     before, after : the models without and with the effect, fitted to the first run
     """
     whole = Model(Problem(lot), after.terms)
-    lot = without(lot, bad_dwells(whole))
+    lot = without(lot, [d.place for d in bad_dwells(whole)])
     problem = Problem(lot)
     noise = Model(problem, after.terms, near=whole.noise).noise
     zero = np.where(np.isfinite(problem.error), 1.0, 0.0)

@@ -7,17 +7,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial import decisions
-from inertial.criticism.field import Candidates
-from inertial.criticism.whole_dwell import only_tilted
-from inertial.decisions import CLASS_WIDTH, JUMPS_RARE, MATERIAL, NAMED_BELOW, REMAINDER
+from inertial.criticism.field import Candidates, Rival
+from inertial.criticism.jumps import jumps_in_place_of
+from inertial.decisions import CERTAIN_BELOW, CLASS_WIDTH, JUMPS_RARE, MATERIAL, NAMED_BELOW, REMAINDER
 from inertial.estimation.alternative import Handling, OfOneDwell
-from inertial.estimation.likelihood import Ratio, likelihood_ratio, weighed
+from inertial.estimation.candidate import Candidate
+from inertial.estimation.likelihood import likelihood_ratio, weighed
 from inertial.estimation.model import Model
 from inertial.estimation.noise_shares import Noise
 from inertial.estimation.penalty import cost_of_model, fall
 from inertial.estimation.refinement import refine
 from inertial.estimation.space import Gain, Space
 from inertial.estimation.term import Term
+from inertial.probability import log_chi2_tail
 
 Array = NDArray[np.float64]
 
@@ -25,27 +27,8 @@ _FINALISTS = 5  # finalists at each noise, for which the noise is estimated agai
 _AGAIN = 3  # the same for the second examination of an effect
 _MOST = 6  # largest number of effects of one search
 _AS_MUCH = 1.0  # score by which further columns of an effect must be better than its leading column
-_REFINED, _SAME = 3, 0.05  # turns of refinement, and the change of a nonlinear parameter that ends them
-
-
-@dataclass(frozen=True)
-class Rival:
-    """A candidate at its best values, judged in addition to a model.
-
-    drop : reduction of the deviance; cost : penalised deviance, the smaller the better
-    ratio : the likelihood ratio behind them; None if there is none
-    """
-
-    term: Term
-    drop: float
-    rank: int
-    cost: float
-    log_p: float
-    ratio: Ratio | None = None
-
-    def at(self, shared: float) -> "Rival":
-        """The same rival with another φ."""
-        return self if self.ratio is None else _rival(self.term, self.ratio.at(shared))
+_INEXACT = 0.01  # share of a wrong angle that the scale factors and misalignments of the devices leave of it
+_REFINED, _UNCHANGED = 3, 0.05  # turns of refinement, and the change of a nonlinear parameter that ends them
 
 
 @dataclass(frozen=True)
@@ -65,7 +48,6 @@ def search(
     field: Candidates,
     base: Model,
     stop: Callable[[Sequence[Term]], bool],
-    instead: Callable[[Model, "Rival"], tuple[Term, ...]],
     start: Sequence[Term] = (),
 ) -> SearchResult:
     """The effects that the measurements require beyond a base model, or the handling error that must be corrected first.
@@ -73,7 +55,6 @@ def search(
     Parameters
     ----------
     stop : called before the third and every further effect: whether the chosen ones only imitate another cause
-    instead : called before every effect: the handling errors that together explain more than it does
     start : effects that a part of the lot required already
     """
     chosen: list[Term] = list(start)
@@ -86,15 +67,16 @@ def search(
             break
         if isinstance(best.term.effect, Handling):
             return SearchResult(model, tuple(chosen), ladder, (best.term,))
-        if handled := instead(model, best):
-            return SearchResult(model, tuple(chosen), ladder, handled)
+        jumps = jumps_in_place_of(field, model, best)
+        if jumps is not None and jumps.ahead > 0.0:
+            return SearchResult(model, tuple(chosen), ladder, jumps.terms)
         best = _parent_first(field, model, best)
         chosen.append(best.term)
         model = model.with_term(best.term)
         if len(chosen) > 1:
-            model, chosen, instead_of = _reexamine(field, base, model, chosen)
-            if instead_of is not None:
-                return SearchResult(model, tuple(chosen), ladder, (instead_of,))
+            model, chosen, handled = _reexamine(field, base, model, chosen)
+            if handled is not None:
+                return SearchResult(model, tuple(chosen), ladder, (handled,))
     if len(chosen) > len(start):
         model, chosen = _replaced_by_two(field, base, model, chosen)
     return SearchResult(model, tuple(chosen), ladder)
@@ -164,21 +146,21 @@ def contest(field: Candidates, model: Model, barred: str = "", finalists: int = 
     for looked in scanned(field, [model.at(other) for other in others], leave):
         for term, _ in looked[:finalists]:
             chosen.setdefault(term.effect.id, term)
-    return ranked([_exact(field, model, term) for term in chosen.values()])
+    return ranked([judge_refined(field, model, term) for term in chosen.values()])
 
 
 def scanned(field: Candidates, spaces: Sequence[Space], leave: set[str]) -> list[list[tuple[Term, float]]]:
     """For each noise candidates at their best grid value with their scores, best first; without those below their price."""
-    whole, first = field.gains_in(spaces, leave, handling=True), field.primary_gains_in(spaces, leave)
-    return [_best_first(field, *each) for each in zip(spaces, whole, first, strict=True)]
+    complete, leading = field.gains(spaces, leave, handling=True), field.gains(spaces, leave, primary=True)
+    return [_best_first(field, *each) for each in zip(spaces, complete, leading, strict=True)]
 
 
 def _best_first(
-    field: Candidates, space: Space, whole: dict[str, Gain], first: dict[str, Gain]
+    field: Candidates, space: Space, complete: dict[str, Gain], leading: dict[str, Gain]
 ) -> list[tuple[Term, float]]:
     """The candidates at one noise, from their gains and those of their leading columns."""
     tried: dict[str, tuple[float, Term]] = {}
-    for primary, gains in ((False, whole), (True, first)):
+    for primary, gains in ((False, complete), (True, leading)):
         for name, gain in gains.items():
             score, place = _best_of(field, space, name, gain)
             # fewer columns that explain as much come first
@@ -203,34 +185,31 @@ def _best_of(field: Candidates, space: Space, name: str, gain: Gain) -> tuple[fl
     return (0.0 if likely else ratio.score), place
 
 
-def _exact(field: Candidates, model: Model, term: Term) -> Rival:
-    """A finalist with refined nonlinear parameters, and the noise estimated with it in the model."""
+def judge_refined(field: Candidates, model: Model, term: Term, noise: Noise | None = None) -> Rival:
+    """A term added to a model, with refined nonlinear parameters, for each beginning of its memory.
+
+    Parameters
+    ----------
+    noise : at which it is refined; None for that of the model with the term, estimated again while a parameter moves
+    """
     if isinstance(term.effect, Handling):
-        return judge(field, model, refine(model, term, model.with_term(term).noise))
-    return min((_refined(field, model, begun) for begun in _begun(model, term)), key=lambda r: r.cost)
+        return judge(field, model, refine(model, term, noise or model.with_term(term).noise))
+    return min((_refined(field, model, begun, noise) for begun in _begun(model, term)), key=lambda r: r.cost)
 
 
-def _refined(field: Candidates, model: Model, term: Term) -> Rival:
-    for _ in range(_REFINED if term.effect.nonlinear else 1):
+def _refined(field: Candidates, model: Model, term: Term, noise: Noise | None) -> Rival:
+    for _ in range(_REFINED if noise is None and term.effect.nonlinear else 1):
         before = term
-        term = refine(model, term, model.with_term(term).noise)
+        term = refine(model, term, noise or model.with_term(term).noise)
         if not _moved(before, term):
             break
     return _judged(field, model, term)
 
 
-def judge_refined(field: Candidates, model: Model, term: Term, noise: Noise) -> Rival:
-    """A term added to a model, with its nonlinear parameters refined at a noise for each beginning of its memory."""
-    if isinstance(term.effect, Handling):
-        return judge(field, model, refine(model, term, noise))
-    begun = (refine(model, each, noise) for each in _begun(model, term))
-    return min((_judged(field, model, each) for each in begun), key=lambda r: r.cost)
-
-
 def _moved(before: Term, after: Term) -> bool:
     """Whether a nonlinear parameter moved: then part of the effect had counted as noise, and the noise changes."""
     old, new = (np.ravel(np.array([np.mean(v) for v in t.keywords.values()])) for t in (before, after))
-    return bool(np.any(np.abs(new - old) > _SAME * np.abs(old) + 1e-12))
+    return bool(np.any(np.abs(new - old) > _UNCHANGED * np.abs(old) + 1e-12))
 
 
 def judge(field: Candidates, model: Model, term: Term) -> Rival:
@@ -244,11 +223,36 @@ def _possible(model: Model, term: Term, effect: Handling) -> bool:
     """Whether a handling error can have its size, and one of a single dwell leaves nothing else of the dwell."""
     if not effect.possible(model.with_term(term).shared_sizes(term)):
         return False
-    return not isinstance(effect, OfOneDwell) or only_tilted(model, term)
+    return not isinstance(effect, OfOneDwell) or _only_tilted(model, term)
+
+
+def _only_tilted(model: Model, term: Term) -> bool:
+    """Whether two wrong angles leave no more of a dwell than noise, and than their own second order.
+
+    A supply that sags, or a bias of the whole lot that is up for one dwell, pushes each unit and axis by its own amount. Some of
+    it looks like two angles, and the rest of it says that it is none. The unit with the largest rest is not counted: its dwell
+    may be bad for a reason of its own.
+    """
+    richer = model.with_term(term)
+    problem = model.problem
+    units = problem.lot.state.time.shape[0]
+    if units < 3 or problem.lot.radial:
+        return True
+    here = np.arange(problem.n) == int(float(np.mean(term.keywords["at"])))
+    column = np.broadcast_to(here.astype(np.float64)[None, :, None, None], (problem.blocks, problem.n, 1, 1))
+    gain = richer.space.gain(Candidate(column, shared=False))
+    of_units = gain.by_block[:, 0].reshape(units, 3).sum(axis=1)
+    # both angles are off by no more than this: their second order, and what each device makes of them
+    angle = float(np.linalg.norm(richer.shared_sizes(term)))
+    by_tilt = float(model.at(richer.noise).gain(term.candidate(problem)).drop[0])
+    second = (2.0 * (0.5 * angle + _INEXACT)) ** 2 * by_tilt
+    left = float(of_units.sum() - of_units.max()) - second
+    # as far beyond noise as adequacy asks for where tails are heavy, for the best of all dwells
+    return left <= 0.0 or float(log_chi2_tail(left, 3.0 * (units - 1))) > np.log(CERTAIN_BELOW**2 / problem.n)
 
 
 def _judged(field: Candidates, model: Model, term: Term) -> Rival:
-    return _rival(term, likelihood_ratio(model, term, field.places(term.effect.id)))
+    return Rival.of(term, likelihood_ratio(model, term, field.places(term.effect.id)))
 
 
 def _begun(model: Model, term: Term) -> tuple[Term, ...]:
@@ -263,10 +267,6 @@ def _begun(model: Model, term: Term) -> tuple[Term, ...]:
     if not model.problem.start(term.effect, term.keywords).shape[-1]:
         return (term,)
     return term, replace(term, rest=True)
-
-
-def _rival(term: Term, ratio: Ratio) -> Rival:
-    return Rival(term, ratio.deviance, ratio.rank, -ratio.score, ratio.log_p, ratio)
 
 
 def ranked(rivals: Sequence[Rival]) -> list[Rival]:

@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 
 from inertial import decisions, frames
 from inertial.criticism.curves import CurveFit, fit_curve
-from inertial.criticism.drivers import Part, curve, forces_along, quantities, varies
+from inertial.criticism.drivers import Part, across, curve, forces_along, quantities, transfer, varies
 from inertial.effects.covariate import COVARIATE_PREFIX
+from inertial.estimation.alternative import by_block, rotated_force
 from inertial.estimation.candidate import Candidate
 from inertial.estimation.model import Model
 from inertial.estimation.penalty import PER_COEFFICIENT, cost_of_model, log_p_value
@@ -22,6 +23,9 @@ Array = NDArray[np.float64]
 _KNOTS = 9  # of a smooth curve over a driver
 _TIME_KNOTS = 12  # the same over time
 _FEW_KNOTS = 6  # of a smooth dependence of the scale factors
+_WIDE_KNOTS = 6  # of a smooth curve of the misalignment
+_TURNED_KNOTS = 2  # of the same for the fixture's rotation, whose every column has three coefficients of the whole lot
+_FORCE_KNOTS = 7  # of the same over the force along an axis
 _HARMONICS = 5  # of a table angle
 _CYCLES = np.arange(1.0, 14.1, 0.5)  # of a swing within the run
 _LEVELS = 14  # number of groups of values from which on a driver is continuous
@@ -29,6 +33,21 @@ _VISITS = 1.5  # smallest mean number of visits to each level
 _CENTRES = np.linspace(0.0, 1.0, 21)  # of bumps and hinges, over the driver's range
 _WIDTHS = (0.02, 0.05, 0.1)  # of bumps, of that range
 _SHARPEST = 3  # suspects that are tested with bumps and hinges
+
+
+@dataclass(frozen=True)
+class Unexplained:
+    """A driver that a part of the output follows, without an effect of the catalogue that explains it.
+
+    log_p : natural logarithm of the probability that noise follows it as much
+    floor : noise of the measurement with the dependence in the model, g
+    """
+
+    driver: str
+    shape: str
+    log_p: float
+    part: Part = "bias"
+    floor: float = float("inf")
 
 
 @dataclass(frozen=True)
@@ -75,6 +94,33 @@ def suspects(problem: Problem) -> list[Suspect]:
     return suspected
 
 
+def wide_suspects(problem: Problem) -> list[Suspect]:
+    """For every driver that varies in a lot, curves of its misalignment, of the fixture's rotation and of the transfer curve.
+
+    A lot of columns: they are suspected only where several causes, changes of handling among them, were found together.
+    """
+    if problem.lot.radial:
+        return []
+    state = problem.lot.state
+    along = forces_along(problem)
+    rotated = rotated_force(problem.lot)
+    suspected: list[Suspect] = []
+    for name, values, _ in quantities(state):
+        if not varies(values) or (name == "chamber_C" and alike(values, state.temperature)):
+            continue
+        own = curve(values, _WIDE_KNOTS)  # (units or 1, n, d)
+        if own.shape[-1] < 2:  # a line, or levels that handling errors already are
+            continue
+        suspected.append(Suspect(name, _columns(across(along, own)), ways=2, part="axes"))
+        turned = rotated[..., :, None] * curve(values, _TURNED_KNOTS + is_clock(name))[:, :, None, None, :]
+        whole = np.broadcast_to(turned, (problem.blocks // 3, *turned.shape[1:]))
+        columns = by_block(whole.reshape(*whole.shape[:3], -1))
+        suspected.append(Suspect(name, _columns(columns, shared=True), part="axes"))
+        columns = transfer(along, values, _FORCE_KNOTS)
+        suspected.append(Suspect(name, _columns(columns), part="transfer"))
+    return suspected
+
+
 def better_curve(base: Model, chosen: Sequence[Term], field: Sequence[Suspect]) -> tuple[CurveFit, list[Term]] | None:
     """The curve that explains a lot better than the chosen effects, with the effects that remain; None if there is none."""
     held = {t.effect.id.removeprefix(COVARIATE_PREFIX) for t in chosen}
@@ -93,24 +139,24 @@ def better_curve(base: Model, chosen: Sequence[Term], field: Sequence[Suspect]) 
     if len(chosen) > 1:
         # the first two of its driver: a dependence of the bias, and levels
         alike = [s for s in field if s.driver == suspect.driver and s.ways == 1][:2] if suspect.ways == 1 else [suspect]
-        best, kept = _with_others(
-            base, chosen, alike, best, max(decisions.OTHERS, decisions.OTHERS_SHARE * (bare - best.cost))
-        )
-    replaced = len(chosen) - len(kept)
-    doubt = decisions.DOUBT.get(replaced, 0.0)
-    if replaced == 1:
-        share = (
-            decisions.DOUBT_MEMORY if any(t.effect.memory for t in chosen if t not in kept) else decisions.DOUBT_SHARE
-        )
+        worth = max(decisions.CURVE_AHEAD, decisions.CURVE_SHARE * (bare - best.cost))
+        best, kept = _with_others(base, chosen, alike, best, worth)
+    replaced = [t for t in chosen if t not in kept]
+    # more than two effects in place of one curve have no priority
+    doubt = decisions.CURVE_AHEAD / len(replaced) if 0 < len(replaced) < 3 else 0.0
+    if len(replaced) == 1:
+        # a curve over time can follow any memory of one run
+        share = (3.0 if replaced[0].effect.memory else 1.0) * decisions.CURVE_SHARE
         doubt = max(doubt, share * (bare - best.cost))
     return (best, kept) if replaced and best.cost + doubt < whole else None
 
 
-def log_p_of_curve(base: Model, fit: CurveFit, looks: int) -> float:
-    """Logarithm of the probability that noise beside a model follows one of so many curves as much."""
+def unexplained_by(base: Model, fit: CurveFit, looks: int) -> Unexplained:
+    """The dependence that a curve beside a model is, the best of so many curves."""
     before = base.at(fit.model.noise)
     drop = max(before.rss - fit.model.space.rss, 0.0)
-    return log_p_value(before, drop, fit.rank) + float(np.log(looks))
+    log_p = log_p_value(before, drop, fit.rank) + float(np.log(looks))
+    return Unexplained(fit.driver, "curve", log_p, fit.part, fit.model.floor())
 
 
 def _promising(base: Model, field: Sequence[Suspect]) -> list[Suspect]:

@@ -33,7 +33,7 @@ def unseen(field: Candidates, base: Model, candidates: Sequence[AnyEffect]) -> t
     An effect is not visible if its columns are zero under the plan or equal to columns of the model, or if its quantities were
     not recorded.
     """
-    gains = field.gains(base.at(base.problem.covariance.white_noise()), {t.effect.id for t in base.terms})
+    gains = field.gains([base.at(base.problem.covariance.white_noise())], {t.effect.id for t in base.terms})[0]
     blind = [name for name, gain in gains.items() if not gain.rank.any()]
     order = [e.id for e in candidates]
     state = base.problem.lot.state

@@ -9,13 +9,13 @@ from numpy.random import Generator
 from inertial import decisions
 from inertial import effects as catalogue
 from inertial.criticism.adequacy import adequacy
-from inertial.criticism.drivers import Driver, Part, looks_of
+from inertial.criticism.drivers import Driver, looks_of
 from inertial.criticism.evidence import GROSS, not_judged
 from inertial.criticism.examination import EffectSearch, ExaminedRun, examined
 from inertial.criticism.lot_part import LotPart
 from inertial.criticism.search import SearchResult
-from inertial.criticism.unknown import Suspect, better_curve, log_p_of_curve
-from inertial.data_errors.bad_dwells import BadDwell
+from inertial.criticism.unknown import Suspect, Unexplained, better_curve, unexplained_by
+from inertial.data_errors.removed_dwells import BadDwell
 from inertial.data_errors.tails import with_tails
 from inertial.decisions import ADEQUATE_ABOVE, NAMED_BELOW
 from inertial.estimation.bases import SEEN
@@ -31,20 +31,6 @@ from inertial.probability import passes
 _ALMOST_CONSTANT = 10.0 * SEEN
 """Standard deviation of the temperature over its distance from the reference, below which a run is one at one temperature: ten
 times what is visible of a column."""
-
-
-@dataclass(frozen=True)
-class Unexplained:
-    """A driver that a part of the output follows, without an effect of the catalogue that explains it.
-
-    floor : noise of the measurement with the dependence in the model, g
-    """
-
-    driver: str
-    shape: str
-    log_p: float
-    part: Part = "bias"
-    floor: float = float("inf")
 
 
 @dataclass(frozen=True)
@@ -112,10 +98,11 @@ def judged(lot: Lot, effects: Sequence[str], rng: Generator) -> Verdict:
         searched = SearchResult(base, (), searched.ladder)
     # a drift can hide where adequacy does not look
     sound = passed is True and not searched.added and run.drift is None
-    final, unexplained = (searched.model, None) if sound or unjudged else _beyond(search.part, base, searched, drivers)
+    final, unexplained = (
+        (searched.model, None) if sound or unjudged else _with_curves(search.part, base, searched, drivers)
+    )
     if unexplained is None and run.drift is not None and not unjudged:
-        drift = run.drift
-        unexplained = Unexplained(drift.driver, "curve", drift.log_p, drift.part, drift.floor)
+        unexplained = run.drift
     return Verdict(
         run=run,
         search=search,
@@ -171,23 +158,23 @@ def _rms(base: Model) -> float:
     return fit_rms(base.problem, base.terms)
 
 
-def _beyond(
+def _with_curves(
     part: LotPart, base: Model, searched: SearchResult, drivers: list[Driver]
 ) -> tuple[Model, Unexplained | None]:
     """The confirmed effects, and the remaining driver: effects that only imitate a curve of one driver are removed."""
     suspected = part.suspected(searched.added)
-    instead = _instead(part, base, searched, suspected)
-    if instead is not None:
-        return instead
+    by_curve = _curve_in_place_of(part, base, searched, suspected)
+    if by_curve is not None:
+        return by_curve
     final = searched.model
     convincing = [d for d in drivers if _convincing(final, d, len(drivers))]
     if not convincing:
         return final, None
     if searched.added and len(suspected) < len(part.every_suspect):
         # what the effects leave follows a driver: they may be pieces of a dependence of another kind
-        instead = _instead(part, base, searched, part.every_suspect)
-        if instead is not None:
-            return instead
+        by_curve = _curve_in_place_of(part, base, searched, part.every_suspect)
+        if by_curve is not None:
+            return by_curve
     best = max(convincing, key=lambda d: _worth(final, d))
     columns = best.candidate.of_blocks[:, :, 0, :]
     shape, floor = "line" if columns.shape[-1] == 1 else "curve", final.with_curves(columns).floor()
@@ -196,18 +183,15 @@ def _beyond(
     )
 
 
-def _instead(
+def _curve_in_place_of(
     part: LotPart, base: Model, searched: SearchResult, suspected: Sequence[Suspect]
 ) -> tuple[Model, Unexplained] | None:
     """The model with a curve in place of effects that only imitate it, less the curve; None if there is none."""
-    instead = better_curve(part.base, searched.added, suspected) if searched.added else None
-    if instead is None:
+    better = better_curve(part.base, searched.added, suspected) if searched.added else None
+    if better is None:
         return None
-    fit, kept = instead
-    log_p = log_p_of_curve(part.base, fit, len(suspected))
-    return Model(base.problem, [*base.terms, *kept]), Unexplained(
-        fit.driver, "curve", log_p, fit.part, fit.model.floor()
-    )
+    fit, kept = better
+    return Model(base.problem, [*base.terms, *kept]), unexplained_by(part.base, fit, len(suspected))
 
 
 def _convincing(model: Model, driver: Driver, looks: int) -> bool:

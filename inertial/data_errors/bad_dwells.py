@@ -4,17 +4,15 @@ With P = V⁻¹ − V⁻¹H(HᵀV⁻¹H)⁻¹HᵀV⁻¹ a dwell deleted from its
 chi-square: no further fit is needed. Deletion identifies the dwell; robust weights would change all dwells and identify none.
 """
 
-from dataclasses import dataclass, replace
-
 import numpy as np
 from numpy.typing import NDArray
 
 from inertial.data_errors.bad_norms import bad_norms
+from inertial.data_errors.removed_dwells import BadDwell, model_without
 from inertial.decisions import BAD_DWELL, COMMON, MOST_BAD
 from inertial.distributions import chi2_upper, f_tail
 from inertial.estimation.alternative import poses
 from inertial.estimation.model import Model
-from inertial.estimation.problem import Lot, Problem
 from inertial.estimation.space import Space
 
 Array = NDArray[np.float64]
@@ -40,74 +38,43 @@ _LEAST_DOF = 6
 """Degrees of freedom of a unit below which none of its dwells can be identified as bad."""
 
 
-@dataclass(frozen=True)
-class BadDwell:
-    """A dwell of one unit: its deviation from its neighbours in time and the model.
-
-    off : (axes,), g; by_axis : (axes,), the same in standard deviations; tail : whether the noise of the run reaches as far
-    """
-
-    unit: int
-    dwell: int
-    off: Array
-    by_axis: Array
-    tail: bool = False
-
-    @property
-    def deviations(self) -> float:
-        """Length of the deviation, standard deviations."""
-        return float(np.linalg.norm(self.by_axis))
-
-
-def without(lot: Lot, bad: list[BadDwell]) -> Lot:
-    """The lot without some dwells of some units."""
-    error = lot.error.copy()
-    for one in bad:
-        error[one.unit, one.dwell] = np.inf
-    return replace(lot, error=error)
-
-
 def bad_dwells(model: Model) -> list[BadDwell]:
     """The dwells that disagree with a model and its noise; the noise is estimated again without them."""
     if model.problem.lot.radial:
-        return [
-            BadDwell(one.unit, dwell, np.array([off]), np.array([deviations]))
-            for one in bad_norms(model)
-            for dwell, off, deviations in zip(one.dwells, one.off, one.deviations, strict=True)
-        ]
+        return bad_norms(model)
     bad: list[BadDwell] = []
-    lot = model.problem.lot
+    remaining = model
     for _ in range(_ROUNDS):
-        more = _round(model, max(int(MOST_BAD * lot.state.time.size) + 1, _AT_LEAST) - len(bad))
+        more = _round(remaining, max(int(MOST_BAD * model.problem.lot.state.time.size) + 1, _AT_LEAST) - len(bad))
         if not more:
             break
         bad += more
-        problem = Problem(without(lot, bad), slope=model.problem.slope)
-        model = Model(problem, model.terms, near=model.noise)
+        remaining = model_without(remaining, [d.place for d in more])
     return bad
 
 
 def _round(model: Model, most: int) -> list[BadDwell]:
     """Dwells that stand out at one noise, the largest first, each deleted before the next."""
-    space = model.space
-    axes = 1 if model.problem.lot.radial else 3
-    looked = _Deletion(space, axes)
-    if not model.problem.lot.radial and looked.units < _SEVERAL:
-        looked.leave(looked.off_every_time(poses(model.problem.lot)))
+    deletion = _Deletion(model.space, 3)
+    if deletion.units < _SEVERAL:
+        deletion.left_to_poses = deletion.off_every_time(poses(model.problem.lot))
     bad: list[BadDwell] = []
     while len(bad) < most:
-        best = looked.worst()
-        if best is None:
+        worst = deletion.worst()
+        if worst is None:
             break
-        unit, dwell, by_axis = best
+        unit, dwell, by_axis = worst
         if bad and float(np.linalg.norm(by_axis)) < _ALIKE * bad[0].deviations:
             break
-        bad.append(BadDwell(unit, dwell, looked.delete(unit, dwell), by_axis))
+        bad.append(BadDwell(unit, dwell, deletion.delete(unit, dwell), by_axis))
     return bad
 
 
 class _Deletion:
-    """Deletion statistics of every dwell of every unit, dwells deleted one by one."""
+    """Deletion statistics of every dwell of every unit, dwells deleted one by one.
+
+    left_to_poses : (n,), dwells that are left to the alternatives that concern a pose
+    """
 
     def __init__(self, space: Space, axes: int) -> None:
         self.space, self.axes = space, axes
@@ -123,10 +90,6 @@ class _Deletion:
             self.centre = np.maximum(space.noise.scale**2 * (self.dof + space.noise.prior) - self.squares, 0.0)
         self.prior, self.looks = space.noise.prior, max(int(self.there.sum()) // axes, 1)
         self.left_to_poses = np.zeros(self.n, dtype=bool)
-
-    def leave(self, dwells: NDArray[np.bool_]) -> None:
-        """Leave some dwells (n,) to the alternatives that concern a pose."""
-        self.left_to_poses = dwells
 
     def off_every_time(self, pose: NDArray[np.intp]) -> NDArray[np.bool_]:
         """Dwells (n,) of poses (n,) all of whose dwells, two at least, are off by about the same."""
@@ -199,7 +162,7 @@ class _Deletion:
 def deletion_residuals(model: Model) -> Array:
     """Deviation of each dwell when it is deleted, axis by axis, in standard deviations, (m,); without those left out."""
     space = model.space
-    looked = _Deletion(space, 1 if model.problem.lot.radial else 3)
-    known = looked.there & (looked.size > 1e-9 * looked.size.max())
-    scaled = looked.left / np.sqrt(np.where(known, looked.size, 1.0)) / space.noise.scale[:, None]
+    deletion = _Deletion(space, 1 if model.problem.lot.radial else 3)
+    known = deletion.there & (deletion.size > 1e-9 * deletion.size.max())
+    scaled = deletion.left / np.sqrt(np.where(known, deletion.size, 1.0)) / space.noise.scale[:, None]
     return scaled[known]

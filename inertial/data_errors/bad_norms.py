@@ -5,17 +5,14 @@ every suspicion is judged with the noise of the other dwells: with P = V⁻¹ �
 (P_BB)⁻¹(Py)_B, and (Py)_Bᵀ(P_BB)⁻¹(Py)_B over the variance is F with |B| and ν − |B| degrees of freedom.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import gammaln
 
+from inertial.data_errors.removed_dwells import BadDwell, model_without
 from inertial.distributions import chi2_quantile
 from inertial.estimation.model import Model
 from inertial.estimation.noise_shares import Noise
-from inertial.estimation.problem import Lot, Problem
 from inertial.probability import log_f_tail
 
 Array = NDArray[np.float64]
@@ -46,39 +43,20 @@ _LONG = 220  # largest number of dwells for the test of pairs: they hide each ot
 _HANGING = 1e-6  # of its weight: the part of a dwell beyond the model if it alone determines a coefficient
 
 
-@dataclass(frozen=True)
-class Suspicion:
-    """Bad dwells of one unit: deviation in g and in standard deviations, and the charged log probability."""
-
-    unit: int
-    dwells: tuple[int, ...]
-    off: tuple[float, ...]
-    deviations: tuple[float, ...]
-    log_p: float
-
-
-def bad_norms(model: Model) -> list[Suspicion]:
+def bad_norms(model: Model) -> list[BadDwell]:
     """The dwells that disagree with a model and its noise, the most certain first."""
-    suspicions: list[Suspicion] = []
+    bad: list[BadDwell] = []
+    most = max(2, int(MOST * model.problem.n))
     while True:
-        tried = [_judged(model, unit, dwells) for unit, dwells in _suspicions(model)]
-        known = [one for one in tried if one is not None and one.log_p < np.log(BAD_NORM)]
-        count = sum(len(one.dwells) for one in suspicions)
-        known = [one for one in known if count + len(one.dwells) <= max(2, int(MOST * model.problem.n))]
-        if not known:
-            return suspicions
+        judged = [_judged(model, unit, dwells) for unit, dwells in _suspicions(model)]
+        certain = [(log_p, dwells) for log_p, dwells in judged if log_p < np.log(BAD_NORM)]
+        certain = [(log_p, dwells) for log_p, dwells in certain if len(bad) + len(dwells) <= most]
+        if not certain:
+            return bad
         # of nested sets the smaller one, unless the larger is far more probable
-        best = min(known, key=lambda one: one.log_p + 4.0 * len(one.dwells))
-        suspicions.append(best)
-        model = _without(model, best.unit, best.dwells)
-
-
-def _without(model: Model, unit: int, dwells: Sequence[int]) -> Model:
-    """The model in the lot without some dwells of a unit."""
-    lot: Lot = model.problem.lot
-    error = lot.error.copy()
-    error[unit, list(dwells)] = np.inf
-    return Model(Problem(replace(lot, error=error), slope=model.problem.slope), model.terms, near=model.noise)
+        _, best = min(certain, key=lambda each: each[0] + 4.0 * len(each[1]))
+        bad += best
+        model = model_without(model, [d.place for d in best])
 
 
 def _suspicions(model: Model) -> list[tuple[int, tuple[int, ...]]]:
@@ -148,11 +126,11 @@ def _variance(rest: Model, unit: int) -> tuple[float, int]:
     return (dof * own + RECORDED_DOF / scale) / (dof + RECORDED_DOF), dof + RECORDED_DOF
 
 
-def _judged(model: Model, unit: int, dwells: tuple[int, ...]) -> Suspicion | None:
-    """A suspicion at the noise of the other dwells; None if these do not determine the model."""
-    rest = _without(model, unit, dwells)
+def _judged(model: Model, unit: int, dwells: tuple[int, ...]) -> tuple[float, list[BadDwell]]:
+    """Charged log probability of some dwells of a unit at the noise of the others; zero if these do not determine the model."""
+    rest = model_without(model, [(unit, dwell) for dwell in dwells])
     if rest.space.dof < FEWEST_DOF - len(dwells) or rest.space.local_rank < model.space.local_rank:
-        return None
+        return 0.0, []
     noise = model.problem.covariance.rescaled(rest.noise, rest.problem.covariance)
     p, py = _projector(model, noise, unit)
     own = p[np.ix_(dwells, dwells)]
@@ -161,10 +139,11 @@ def _judged(model: Model, unit: int, dwells: tuple[int, ...]) -> Suspicion | Non
     variance, dof = _variance(rest, unit)
     statistic = float(py[list(dwells)] @ off) / variance
     log_p = float(log_f_tail(statistic / size, size, dof)) + _looks(model, size)
-    error = np.sqrt(np.diagonal(np.linalg.inv(own)) * variance)
+    deviations = np.abs(off) / np.sqrt(np.diagonal(np.linalg.inv(own)) * variance)
     if size > 1:
         # each must be bad by itself beside the other
-        each = log_f_tail((off / error) ** 2, 1, dof) + _looks(model, 1)
+        each = log_f_tail(deviations**2, 1, dof) + _looks(model, 1)
         if not bool(np.all(each < np.log(SECOND))):
-            return None
-    return Suspicion(unit, dwells, tuple(off.tolist()), tuple(np.abs(off / error).tolist()), log_p)
+            return 0.0, []
+    pairs = zip(dwells, off, deviations, strict=True)
+    return log_p, [BadDwell(unit, dwell, np.array([left]), np.array([deviation])) for dwell, left, deviation in pairs]

@@ -20,7 +20,8 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.data_errors.bad_dwells import BadDwell, deletion_residuals
+from inertial.data_errors.bad_dwells import deletion_residuals
+from inertial.data_errors.removed_dwells import BadDwell
 from inertial.decisions import HEAVY, TAILS, TAILS_REACH
 from inertial.distributions import chi2_tail, kurtosis_tail, normal_tail, student_tail
 from inertial.estimation.model import Model
@@ -88,7 +89,7 @@ class _Noise:
         for k in range(len(_SHARES)):
             grid, density, _ = _table(k)
             for j, s in enumerate(scale.tolist()):
-                kept = 1.0 - float(_beyond(k, np.array([below / s]))[0])
+                kept = 1.0 - float(_probability_beyond(k, np.array([below / s]))[0])
                 each = np.log(np.maximum(np.interp(inside / s, grid, density), 1e-300))
                 log[k, j] = float(each.sum()) - inside.size * np.log(s * max(kept, 1e-12))
         prior = np.where(_WEIGHTS > 0.0, TAILS * _WEIGHTS, 1.0 - TAILS)
@@ -100,15 +101,15 @@ class _Noise:
         length, axes = float(np.linalg.norm(by_axis)), len(by_axis)
         total = 0.0
         for k in range(len(_SHARES)):
-            whole = axes * _beyond(k, length / self.scale)
-            each = np.stack([_beyond(k, abs(float(v)) / self.scale) for v in by_axis])
+            whole = axes * _probability_beyond(k, length / self.scale)
+            each = np.stack([_probability_beyond(k, abs(float(v)) / self.scale) for v in by_axis])
             together = chi2_tail(-2.0 * np.log(np.maximum(each, 1e-300)).sum(axis=0), 2.0 * axes)
             least = np.minimum(2.0 * dwells * np.minimum(whole, together), 1.0)
             total += float(np.sum(self.weight[k] * least))
         return total
 
 
-def _beyond(place: int, z: Array) -> Array:
+def _probability_beyond(place: int, z: Array) -> Array:
     """P(|x| > z) of a value of variance one; ``place`` is the index of the share of its heavy tails."""
     share = _SHARES[place]
     if share == 0.0:

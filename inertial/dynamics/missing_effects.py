@@ -8,10 +8,10 @@ import numpy as np
 
 from inertial.counts import degrees_of_freedom
 from inertial.distributions import chi2_tail
-from inertial.dynamics.goodness import Fitted, adequate
+from inertial.probability import passes
 
-AnyFit = TypeVar("AnyFit", bound=Fitted)
-
+ADEQUATE_P = 0.005
+"""Below this probability of the residuals a model is not adequate."""
 ADDED_P = 1e-3
 """Largest p-value of an added effect of a model that is not adequate, times the number of candidates."""
 CLASS_WIDTH = 9.0
@@ -20,6 +20,33 @@ MOST_ADDED = 3
 FEWEST_DOF = 6
 FOLDS = 5
 """Every so many points are left out in turn."""
+
+
+class Fitted(Protocol):
+    """A fit of a model, weighted by the uncertainties of its points."""
+
+    @property
+    def chi_square(self) -> float:
+        """Sum of the squared weighted residuals."""
+        ...
+
+    @property
+    def dof(self) -> int:
+        """Degrees of freedom."""
+        ...
+
+
+def p_value(fit: Fitted) -> float:
+    """Probability of a larger χ² where the model is right; nan without degrees of freedom."""
+    return float(chi2_tail(fit.chi_square, fit.dof))
+
+
+def adequate(fit: Fitted) -> bool | None:
+    """Whether a model agrees with its points; None where no degree of freedom is left to judge it."""
+    return passes(p_value(fit), ADEQUATE_P)
+
+
+AnyFit = TypeVar("AnyFit", bound=Fitted)
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial.distributions import chi2_tail
-from inertial.dynamics.goodness import ADEQUATE_P
+from inertial.dynamics.missing_effects import ADEQUATE_P
 
 Array = NDArray[np.float64]
 FEWEST_OF_PARABOLA = 3  # supplies: a parabola through the first has two coefficients

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from inertial.dynamics.shock_effects import EFFECTS
-from inertial.dynamics.transfer_effects.base import Parameter
+from inertial.dynamics.transfer_effects.base import Coordinates, Parameter
 from inertial.errors import NotIdentified
 
 Array = NDArray[np.float64]
@@ -73,6 +73,7 @@ def fit_shock(record: ShockRecord, effects: Sequence[str], rows: Sequence[NDArra
     """
     duration = record.duration_s
     parameters = [(name, p) for name in effects for p in EFFECTS[name].parameters(duration)]
+    coordinates = Coordinates([p for _, p in parameters])
     used = [np.ones(len(one.unit), dtype=bool) for one in record.shocks] if rows is None else list(rows)
     count = sum(int(one.sum()) for one in used)
     if count < len(effects) + len(parameters) + 2:
@@ -91,13 +92,12 @@ def fit_shock(record: ShockRecord, effects: Sequence[str], rows: Sequence[NDArra
         c = np.linalg.lstsq(columns / size, target, rcond=1e-12)[0] / size
         return c, columns @ c - target
 
-    x = _search(parameters, lambda y: solved(y)[1])
+    x = _search([p for _, p in parameters], coordinates, lambda y: solved(y)[1])
     c, left = solved(x)
     errors = _errors(design, x, c)
     added = [name for name in effects if EFFECTS[name].added(record.shocks[0].reference, record.rate_hz) is not None]
-    values = _values(parameters, x)
-    log = np.array([p.log for _, p in parameters], dtype=bool)
-    spread = np.where(log, values * errors[len(c) :], errors[len(c) :]) if parameters else np.zeros(0)
+    values = coordinates.values(x)
+    spread = np.where(coordinates.log, values * errors[len(c) :], errors[len(c) :])
     return ShockFit(
         tuple(effects),
         float(c[0]),
@@ -113,7 +113,7 @@ def fit_shock(record: ShockRecord, effects: Sequence[str], rows: Sequence[NDArra
 def predicted(record: ShockRecord, fit: ShockFit) -> float:
     """Rms residual of shocks that were not fitted, in % of the peak: sensitivity and effects applied to the reference."""
     parameters = [(name, p) for name in fit.effects for p in EFFECTS[name].parameters(record.duration_s)]
-    x = np.array([np.log(fit.parameters[p.name][0]) if p.log else fit.parameters[p.name][0] for _, p in parameters])
+    x = Coordinates([p for _, p in parameters]).of(np.array([fit.parameters[p.name][0] for _, p in parameters]))
     c = np.array([fit.sensitivity, *(value for value, _ in fit.coefficients.values())])
     left = _residuals(record, Design(record, fit.effects, parameters).at(x), c)
     return residual_percent(record, left)
@@ -129,15 +129,16 @@ class Design:
     def __init__(
         self, record: ShockRecord, effects: Sequence[str], parameters: Sequence[tuple[str, Parameter]]
     ) -> None:
-        self.record, self.effects, self.parameters = record, tuple(effects), tuple(parameters)
-        self._own = [np.array([of == name for of, _ in self.parameters], dtype=bool) for name in self.effects]
+        self.record, self.effects = record, tuple(effects)
+        self.coordinates = Coordinates([p for _, p in parameters])
+        self._own = [np.array([of == name for of, _ in parameters], dtype=bool) for name in self.effects]
         extra = [[EFFECTS[name].added(one.reference, record.rate_hz) for name in self.effects] for one in record.shocks]
         self._added = [[column for column in each if column is not None] for each in extra]
         self._waves: dict[tuple[object, ...], Array] = {}
 
     def at(self, x: Array) -> Array:
         """The design (n of all shocks, 1 + added effects)."""
-        values, parts = _values(self.parameters, x), list[Array]()
+        values, parts = self.coordinates.values(x), list[Array]()
         if len(self._waves) > _KEPT:
             self._waves.clear()
         for place, (one, added) in enumerate(zip(self.record.shocks, self._added, strict=True)):
@@ -149,7 +150,7 @@ class Design:
         """The waveform of a shock's reference after all effects."""
         key: tuple[object, ...] = (place,)
         for name, own in zip(self.effects, self._own, strict=True):
-            mine = values[own] if len(values) else values
+            mine = values[own]
             key = (*key, name, *mine.tolist())
             if key not in self._waves:
                 self._waves[key] = EFFECTS[name].changed(wave, self.record.rate_hz, mine)
@@ -168,21 +169,14 @@ def _residuals(record: ShockRecord, design: Array, c: Array) -> list[Array]:
     return left
 
 
-def _values(parameters: Sequence[tuple[str, Parameter]], x: Array) -> Array:
-    log = np.array([p.log for _, p in parameters], dtype=bool)
-    return np.where(log, np.exp(np.where(log, x, 0.0)), x) if len(x) else x
-
-
-def _search(parameters: Sequence[tuple[str, Parameter]], residual: Callable[[Array], Array]) -> Array:
-    """The nonlinear parameters of the best fit; an empty array where there are none."""
+def _search(parameters: Sequence[Parameter], coordinates: Coordinates, residual: Callable[[Array], Array]) -> Array:
+    """The coordinates of the nonlinear parameters of the best fit; an empty array where there are none."""
     if not parameters:
         return np.zeros(0)
-    scaled = [[float(np.log(v)) if p.log else v for v in p.starts] for _, p in parameters]
-    low = np.array([np.log(p.low) if p.log else p.low for _, p in parameters])
-    high = np.array([np.log(p.high) if p.log else p.high for _, p in parameters])
-    starts = [np.clip(np.array(one), low, high) for one in product(*scaled)]
+    low, high = coordinates.low, coordinates.high
+    starts = [np.clip(coordinates.of(np.array(start)), low, high) for start in product(*(p.starts for p in parameters))]
     best = sorted(starts, key=lambda x: float(np.sum(residual(x) ** 2)))[:2]
-    scale = np.where([p.log for _, p in parameters], 1.0, high - low)
+    scale = np.where(coordinates.log, 1.0, high - low)
     done = [
         least_squares(residual, x, bounds=(low, high), x_scale=scale, max_nfev=60, xtol=1e-9, ftol=1e-9) for x in best
     ]

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm
 
-from inertial.dynamics.wander import wander_variance
+from inertial.dynamics.wander import wander
 from inertial.errors import NotIdentified
 from inertial.noise.flicker import flicker_kernel
 
@@ -134,7 +134,7 @@ def fit_tilt(angle: Array, output: Array, error: Array, *, orders: int = 1, time
     whole = np.diag(error**2)
     if time is not None:
         kernel = flicker_kernel(time)
-        whole = whole + wander_variance(rows, output, whole, kernel) * kernel
+        whole = whole + wander(rows, output, whole, kernel).variance * kernel
     root = np.linalg.cholesky(whole)
     white_rows, white_output = np.linalg.solve(root, rows), np.linalg.solve(root, output)
     c = np.linalg.lstsq(white_rows, white_output, rcond=None)[0]

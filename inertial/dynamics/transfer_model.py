@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from inertial.dynamics.goodness import p_value
+from inertial.dynamics.missing_effects import p_value
 from inertial.dynamics.transfer_effects import EFFECTS, Conditions, Parameter
+from inertial.dynamics.transfer_effects.base import Coordinates
 from inertial.errors import NotIdentified
 
 Array = NDArray[np.float64]
@@ -152,13 +153,12 @@ def fit_transfer(
         raise NotIdentified(msg)
     low_end = np.argsort(conditions.frequency)[: max(3, len(points.value) // 5)]
     sign = -1.0 if np.median(np.abs(np.angle(points.value[low_end]))) > 0.5 * np.pi else 1.0
-    log = np.array([p.log for p in parameters], dtype=bool)
-    bounds = _bounds(parameters)
-
+    coordinates = Coordinates(parameters)
+    bounds = np.append(-np.inf, coordinates.low), np.append(np.inf, coordinates.high)
     error = np.concatenate([points.magnitude_error, points.phase_error])
 
     def deviation(x: Array) -> Array:
-        values = np.where(log, np.exp(np.where(log, x[1:], 0.0)), x[1:]) if len(parameters) else x[1:]
+        values = coordinates.values(x[1:])
         with np.errstate(all="ignore"):
             ratio = points.value / (sign * np.exp(x[0]) * factor(effects, conditions, values))
             return np.nan_to_num(
@@ -169,7 +169,8 @@ def fit_transfer(
         return np.clip(deviation(x) / error, -1e6, 1e6)
 
     level = float(np.log(np.median(np.abs(points.value[low_end]))))
-    starts = [np.concatenate([[level], start]) for start in _starts(parameters, near or {}, log, only_near=only_near)]
+    values = _starts(parameters, near or {}, only_near=only_near)
+    starts = [np.append(level, coordinates.of(start)) for start in values]
     # far from the solution all points are off by many of their uncertainties: starts are compared by the deviation itself
     screened = sorted(starts, key=lambda x: float(np.sum(deviation(x) ** 2)))[:SCREENED]
     tried = sorted(
@@ -181,7 +182,6 @@ def fit_transfer(
         for one in tried[:POLISHED]
     ]
     best = min(done, key=lambda one: one.cost)
-    values = np.where(log, np.exp(np.where(log, best.x[1:], 0.0)), best.x[1:])
     covariance = np.asarray(np.linalg.pinv(best.jac.T @ best.jac, rcond=1e-15))
     errors = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     left = residual(best.x)
@@ -190,7 +190,7 @@ def fit_transfer(
         float(sign * np.exp(best.x[0])),
         float(errors[0]),
         parameters,
-        values,
+        coordinates.values(best.x[1:]),
         errors[1:],
         float(left @ left),
         len(left) - len(best.x),
@@ -220,28 +220,14 @@ def best_of_exchange(points: Points, fit: TransferFit) -> tuple[TransferFit, Tra
     return first, second if second.chi_square - first.chi_square < 9.0 else None
 
 
-def _bounds(parameters: Sequence[Parameter]) -> tuple[Array, Array]:
-    low = [-np.inf, *(np.log(p.low) if p.log else p.low for p in parameters)]
-    high = [np.inf, *(np.log(p.high) if p.log else p.high for p in parameters)]
-    return np.array(low), np.array(high)
-
-
-def _starts(
-    parameters: Sequence[Parameter], near: Mapping[str, float], log: NDArray[np.bool_], *, only_near: bool
-) -> list[Array]:
-    """Combinations of the parameters' starts, thinned."""
+def _starts(parameters: Sequence[Parameter], near: Mapping[str, float], *, only_near: bool) -> list[Array]:
+    """Combinations of the parameters' starts, thinned, within their bounds."""
     choices = [
         ((near[p.name],) if only_near else (near[p.name], *p.starts)) if p.name in near else p.starts
         for p in parameters
     ]
-    whole = list(product(*choices))
-    step = max(1, -(-len(whole) // MOST_STARTS))
-    starts: list[Array] = []
-    for one in whole[::step]:
-        clipped = [
-            min(max(value, p.low * (1.0 + 1e-9) if p.log else p.low), p.high)
-            for value, p in zip(one, parameters, strict=True)
-        ]
-        x = np.array(clipped, dtype=np.float64)
-        starts.append(np.where(log, np.log(np.where(log, x, 1.0)), x) if len(x) else x)
-    return starts
+    every = list(product(*choices))
+    low = np.array([p.low * (1.0 + 1e-9) if p.log else p.low for p in parameters])
+    high = np.array([p.high for p in parameters])
+    step = max(1, -(-len(every) // MOST_STARTS))
+    return [np.minimum(np.maximum(start, low), high) for start in every[::step]]

@@ -25,11 +25,6 @@ class Wander:
     error: float
 
 
-def wander_variance(rows: Array, output: Array, known: Array, kernel: Array) -> float:
-    """Variance of wander as :func:`wander` estimates it."""
-    return wander(rows, output, known, kernel).variance
-
-
 def wander(rows: Array, output: Array, known: Array, kernel: Array) -> Wander:
     """Variance of wander with the correlation ``kernel`` (n, n) beside a known covariance, by restricted likelihood.
 

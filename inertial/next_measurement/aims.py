@@ -1,8 +1,9 @@
 """Aims of a next measurement: to separate rival effects, or to show unseen effects."""
 
-from collections.abc import Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +12,7 @@ from inertial.decisions import CLASS_WIDTH
 from inertial.estimation.comparison import Fitting
 from inertial.estimation.model import Model
 from inertial.estimation.penalty import freedom, price
-from inertial.estimation.problem import Lot, Problem
+from inertial.estimation.problem import Problem
 from inertial.estimation.term import Term, with_turn_on
 from inertial.next_measurement.separation import (
     Apart,
@@ -19,7 +20,6 @@ from inertial.next_measurement.separation import (
     apart,
     predictions,
     residual_squares,
-    separations,
     widened,
 )
 from inertial.planning.sequences import SequenceStep, StationPace
@@ -33,38 +33,6 @@ LEAST_WEIGHT = 0.02
 
 _SHOWN = 36.0
 """Chi-square, a coefficient, at which an effect of typical size counts as seen: six standard errors."""
-
-
-class Objective(Protocol):
-    """The aim of measurements; ``least`` is the smallest share of the aim that a further sequence must add."""
-
-    least: float
-
-    @property
-    def lot(self) -> Lot:
-        """A few units of what was measured."""
-        ...
-
-    @property
-    def terms(self) -> tuple[Term, ...]:
-        """The effects of the aim."""
-        ...
-
-    def worth(self, steps: Sequence[SequenceStep], pace: StationPace, *, fine: bool = False) -> float:
-        """Share, 0 … 1, of the aim that is reached after these steps; ``fine`` for the stated gain, not for the search."""
-        ...
-
-    def picks(
-        self, held: Sequence[SequenceStep], grid: Sequence[SequenceStep], pace: StationPace, count: int
-    ) -> list[SequenceStep]:
-        """Steps of a grid, each the best after those before it."""
-        ...
-
-    def effect_of_steps(
-        self, already: Sequence[SequenceStep], steps: Sequence[SequenceStep], pace: StationPace
-    ) -> "Promise":
-        """The gain of ``steps``, measured after ``already``."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -84,7 +52,56 @@ class Promise:
     remaining: tuple[str, ...] = ()
 
 
-class RivalDiscrimination:
+Score = Callable[[NDArray[np.bool_]], Array]
+"""Gain of each step of a grid, (grid,), after the dwells that are marked."""
+
+
+class Objective(ABC):
+    """The aim of measurements; ``least`` is the smallest share of the aim that a further sequence must add.
+
+    Parameters
+    ----------
+    rivals : with a few units of what was measured
+    terms : the effects of the aim
+    """
+
+    least: ClassVar[float]
+
+    def __init__(self, rivals: Rivals, terms: Sequence[Term]) -> None:
+        self.rivals, self.terms, self.lot = rivals, tuple(terms), rivals.lot
+
+    @abstractmethod
+    def worth(self, steps: Sequence[SequenceStep], pace: StationPace, *, fine: bool = False) -> float:
+        """Share, 0 … 1, of the aim that is reached after these steps; ``fine`` for the stated gain, not for the search."""
+
+    @abstractmethod
+    def score(self, problem: Problem, grid: slice) -> Score:
+        """The gain of each step of a grid, whose dwells in a problem are given."""
+
+    @abstractmethod
+    def effect_of_steps(
+        self, already: Sequence[SequenceStep], steps: Sequence[SequenceStep], pace: StationPace
+    ) -> Promise:
+        """The gain of ``steps``, measured after ``already``."""
+
+    def picks(
+        self, held: Sequence[SequenceStep], grid: Sequence[SequenceStep], pace: StationPace, count: int
+    ) -> list[SequenceStep]:
+        """Steps of a grid, each the best after those before it are fitted."""
+        problem = widened(self.rivals, [*held, *grid], pace)
+        n = problem.n - len(grid)
+        score, train = self.score(problem, slice(n, None)), np.arange(problem.n) < n
+        chosen: list[SequenceStep] = []
+        for _ in range(min(count, len(grid))):
+            gains = score(train)
+            gains[train[n:]] = -1.0
+            best = int(np.argmax(gains))
+            train[n + best] = True
+            chosen.append(grid[best])
+        return chosen
+
+
+class RivalDiscrimination(Objective):
     """Separation of rivals: for each truth, by its probability, every other rival must leave enough chi-square."""
 
     least = 0.03
@@ -92,22 +109,13 @@ class RivalDiscrimination:
     def __init__(
         self, rivals: Rivals, scores: Array, every: Rivals | None = None, never: NDArray[np.bool_] | None = None
     ) -> None:
-        self.rivals, self.every = rivals, every or rivals
+        super().__init__(rivals, rivals.terms)
+        self.every = every or rivals
         # (r, r): pairs that no measurement separates do not count
         self.never = np.eye(len(scores), dtype=bool) if never is None else never | np.eye(len(scores), dtype=bool)
         self.weight = np.maximum(np.exp(-0.5 * scores), LEAST_WEIGHT)
         self.needed = _needed(rivals, apart(rivals, fine=False))
         self._begun: dict[bool, Array] = {}
-
-    @property
-    def lot(self) -> Lot:
-        """A few units of what was measured."""
-        return self.rivals.lot
-
-    @property
-    def terms(self) -> tuple[Term, ...]:
-        """The rivals."""
-        return self.rivals.terms
 
     def worth(self, steps: Sequence[SequenceStep], pace: StationPace, *, fine: bool = False) -> float:
         """Share of the required separations that is reached after these steps."""
@@ -122,34 +130,30 @@ class RivalDiscrimination:
         """
         rivals = self.every if fine else self.rivals
         if fine not in self._begun:
-            self._begun[fine] = separations(rivals, fine=fine)
+            self._begun[fine] = apart(rivals, fine=fine).left
         if not steps:
             return rivals.observed, _needed(rivals, apart(rivals, fine=fine))
         separation = apart(rivals, steps, pace, fine=fine)
         return rivals.observed + np.maximum(separation.left - self._begun[fine], 0.0), _needed(rivals, separation)
 
-    def picks(
-        self, held: Sequence[SequenceStep], grid: Sequence[SequenceStep], pace: StationPace, count: int
-    ) -> list[SequenceStep]:
-        """Steps at which the rivals differ most after those before are fitted."""
+    def score(self, problem: Problem, grid: slice) -> Score:
+        """How much the rivals differ at each step after the dwells before are fitted."""
         rivals = self.rivals
-        problem = widened(rivals, [*held, *grid], pace)
         truths = predictions(rivals, problem)
         rest = with_turn_on(problem.lot.state, rivals.rest)
         fits = [Fitting(problem, [*rest, wrong]) for wrong in rivals.terms]
-        n = problem.n - len(grid)
-        error = _error(problem, rivals)[:, n:, None]
+        error = _error(problem, rivals)[:, grid, None]
 
         def separation(train: NDArray[np.bool_]) -> Array:
-            total = np.zeros(len(grid))
+            total = np.zeros(error.shape[1])
             for column, fit in enumerate(fits):
-                left = fit.left(truths, train)[:, n:] / error
+                left = fit.left(truths, train)[:, grid] / error
                 gained = np.sum(left**2, axis=0) * rivals.weight / rivals.variance  # (grid, truths)
                 gained[:, self.never[:, column]] = 0.0
                 total += np.minimum(gained / self.needed[:, column], 1.0) @ self.weight
             return total
 
-        return _greedy(grid, n, count, separation)
+        return separation
 
     def effect_of_steps(
         self, already: Sequence[SequenceStep], steps: Sequence[SequenceStep], pace: StationPace
@@ -171,23 +175,10 @@ class RivalDiscrimination:
         )
 
 
-class Sighting:
+class Sighting(Objective):
     """Unseen effects made visible: each coefficient, at the effect's typical size, by six standard errors."""
 
     least = 0.1
-
-    def __init__(self, rivals: Rivals, terms: Sequence[Term]) -> None:
-        self.rivals, self._terms = rivals, tuple(terms)
-
-    @property
-    def terms(self) -> tuple[Term, ...]:
-        """The unseen effects."""
-        return self._terms
-
-    @property
-    def lot(self) -> Lot:
-        """A few units of what was measured."""
-        return self.rivals.lot
 
     def worth(self, steps: Sequence[SequenceStep], pace: StationPace, *, fine: bool = False) -> float:
         """Mean share over the effects of the required chi-square."""
@@ -204,23 +195,19 @@ class Sighting:
         per_column = left * rivals.weight / rivals.variance / problem.blocks
         return np.array([float(np.mean(part)) for part in np.split(per_column, np.cumsum(sizes)[:-1])])
 
-    def picks(
-        self, held: Sequence[SequenceStep], grid: Sequence[SequenceStep], pace: StationPace, count: int
-    ) -> list[SequenceStep]:
-        """Steps at which the effects beyond the model are largest."""
+    def score(self, problem: Problem, grid: slice) -> Score:
+        """How large the effects beyond the model are at each step."""
         rivals = self.rivals
-        problem = widened(rivals, [*held, *grid], pace)
         columns, _ = _typical(problem, self.terms)
         fit = Fitting(problem, with_turn_on(problem.lot.state, rivals.rest))
-        n = problem.n - len(grid)
-        error = _error(problem, rivals)[:, n:, None]
+        error = _error(problem, rivals)[:, grid, None]
 
         def shown(train: NDArray[np.bool_]) -> Array:
-            left = fit.left(columns, train)[:, n:] / error
+            left = fit.left(columns, train)[:, grid] / error
             gained = np.sum(left**2, axis=0) * rivals.weight / rivals.variance / problem.blocks
             return np.sum(np.minimum(gained / _SHOWN, 1.0), axis=1)
 
-        return _greedy(grid, n, count, shown)
+        return shown
 
     def effect_of_steps(
         self, already: Sequence[SequenceStep], steps: Sequence[SequenceStep], pace: StationPace
@@ -245,27 +232,6 @@ def _typical(problem: Problem, terms: Sequence[Term]) -> tuple[Array, list[int]]
         size = 1e-6 * float(np.sqrt(max(low, 1e-3) * high))
         scaled.append(columns * np.where(largest > 0.0, size / np.where(largest > 0.0, largest, 1.0), 0.0))
     return np.concatenate(scaled, axis=-1), [f.shape[-1] for f in scaled]
-
-
-def _greedy(grid: Sequence[SequenceStep], n: int, count: int, score: "Score") -> list[SequenceStep]:
-    """The steps of a grid that score best one after the other; ``n`` dwells are before them."""
-    train = np.arange(n + len(grid)) < n
-    chosen: list[SequenceStep] = []
-    for _ in range(min(count, len(grid))):
-        apart = score(train)
-        apart[train[n:]] = -1.0
-        place = int(np.argmax(apart))
-        train[n + place] = True
-        chosen.append(grid[place])
-    return chosen
-
-
-class Score(Protocol):
-    """The gain of each step of a grid after some dwells."""
-
-    def __call__(self, train: NDArray[np.bool_]) -> Array:
-        """One value per step."""
-        ...
 
 
 def _error(problem: Problem, rivals: Rivals) -> Array:

@@ -135,9 +135,9 @@ def courses(state: State, reach: TableReach, best: Sequence[SequenceStep], here:
     ]
     if reach.temperature is not None:
         sequences += [
-            *_excursions(reach, here, chosen),
-            *_between(state, reach, here, chosen),
-            *_ramps(reach, here, chosen),
+            *_excursions(*reach.temperature, here, chosen),
+            *_between(state, here, chosen),
+            *_ramps(*reach.temperature, here, chosen),
         ]
     return [c for c in sequences if c.steps and all(reach.allows(s) for s in c.steps)]
 
@@ -207,11 +207,8 @@ def _power_cycles(chosen: Sequence[SequenceStep]) -> list[StepSequence]:
     return sequences
 
 
-def _excursions(reach: TableReach, here: float, chosen: Sequence[SequenceStep]) -> list[StepSequence]:
+def _excursions(low: float, high: float, here: float, chosen: Sequence[SequenceStep]) -> list[StepSequence]:
     """Soaks away from the present temperature and back, up and down, far and near."""
-    if reach.temperature is None:
-        return []
-    low, high = reach.temperature
     up, down = min(high, here + _EXCURSION_K), max(low, here - _EXCURSION_K)
     near_up, near_down = min(high, here + _MINOR_K), max(low, here - _MINOR_K)
     middle = 0.5 * (low + high)
@@ -227,11 +224,11 @@ def _excursions(reach: TableReach, here: float, chosen: Sequence[SequenceStep]) 
     return sequences
 
 
-def _between(state: State, reach: TableReach, here: float, chosen: Sequence[SequenceStep]) -> list[StepSequence]:
+def _between(state: State, here: float, chosen: Sequence[SequenceStep]) -> list[StepSequence]:
     """Soaks half-way between those of the run, from the nearer end: only they show a curvature between two soaks."""
     soaks = np.array(sorted(levels(first_unit(state))))
     apart = np.flatnonzero(np.diff(soaks) > _VARIED_K)
-    if reach.temperature is None or apart.size < 1:
+    if apart.size < 1:
         return []
     halves = np.round(0.5 * (soaks[apart] + soaks[apart + 1]), 1)
     low, wide = soaks[apart], np.diff(soaks)[apart]
@@ -245,11 +242,8 @@ def _between(state: State, reach: TableReach, here: float, chosen: Sequence[Sequ
     return sequences
 
 
-def _ramps(reach: TableReach, here: float, chosen: Sequence[SequenceStep]) -> list[StepSequence]:
+def _ramps(low: float, high: float, here: float, chosen: Sequence[SequenceStep]) -> list[StepSequence]:
     """Dwell after dwell while the devices follow the air, one way and back."""
-    if reach.temperature is None:
-        return []
-    low, high = reach.temperature
     sequences: list[StepSequence] = []
     for away, times in product((min(high, here + _EXCURSION_K), max(low, here - _EXCURSION_K)), (8, 20)):
         if abs(away - here) < 5.0:

@@ -119,23 +119,16 @@ class Apart:
     whole: Array
 
 
-def separations(
+def apart(
     rivals: Rivals, steps: Sequence[SequenceStep] = (), pace: StationPace | None = None, *, fine: bool = True
-) -> Array:
-    """Chi-square (r, r) that the rival of a column leaves, fitted to what the rival of a row predicts, in the whole lot.
+) -> Apart:
+    """The separation of rivals, each fitted to what each other one predicts.
 
     Parameters
     ----------
     steps : after the present measurements; none for the separation by the present measurements
     fine : whether the wrong rival's nonlinear parameters are fitted, or only the best of their grid is used
     """
-    return apart(rivals, steps, pace, fine=fine).left
-
-
-def apart(
-    rivals: Rivals, steps: Sequence[SequenceStep] = (), pace: StationPace | None = None, *, fine: bool = True
-) -> Apart:
-    """The separation of rivals with steps after the present measurements; parameters as :func:`separations`."""
     problem = widened(rivals, steps, pace) if steps else Problem(rivals.lot)
     noise = problem.covariance.rescaled(rivals.noise, rivals.covariance)
     rest = Model(problem, with_turn_on(problem.lot.state, rivals.rest))
@@ -144,11 +137,6 @@ def apart(
     left = np.stack([profile.left(wrong, fine=fine) for wrong in rivals.terms], axis=1)
     np.fill_diagonal(left, 0.0)
     return Apart(left * to_lot, profile.whole * to_lot)
-
-
-def smallest(left: Array) -> Array:
-    """The smaller of the two directions of each pair, (r, r) symmetric: for either being true."""
-    return np.minimum(left, left.T)
 
 
 def residual_squares(model: Model, targets: Array, noise: Noise) -> Array:

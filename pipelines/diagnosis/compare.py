@@ -14,8 +14,8 @@ from inertial.arrays import Array
 from inertial.criticism.diagnosis import diagnose
 from inertial.criticism.left_out import left_out
 from inertial.criticism.verdict import judged
-from inertial.data_errors.bad_dwells import BadDwell
 from inertial.data_errors.faults import find_faults
+from inertial.data_errors.removed_dwells import BadDwell
 from inertial.effects import StationEffect
 from inertial.errors import InertialError
 from inertial.estimation.alternative import Handling

@@ -10,7 +10,7 @@ import numpy as np
 from inertial import effects as catalogue
 from inertial.criticism.diagnosis import Diagnosis, Named
 from inertial.criticism.influence import CarriedEvidence
-from inertial.data_errors.bad_dwells import BadDwell
+from inertial.data_errors.removed_dwells import BadDwell
 from inertial.estimation.model import Model
 from inertial.estimation.refinement import intervals, settled, terms_of
 from pipelines.tables.sound_lot import probability

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from pydantic import Field, model_validator
 
-from inertial.dynamics.goodness import adequate
+from inertial.dynamics.missing_effects import adequate
 from inertial.dynamics.sine_fit import HARMONICS, fit_tone, fit_tone_and_frequency
 from inertial.dynamics.transverse import Z95, Transverse, fit_transverse, relative_phase
 from inertial.errors import NotIdentified

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from inertial.counts import degrees_of_freedom
-from inertial.dynamics.goodness import Fitted, adequate, p_value
+from inertial.dynamics.missing_effects import Fitted, adequate, p_value
 from inertial.uncertainty.rounding import equal, rounded
 
 MINUS = "−"

@@ -14,7 +14,7 @@ from inertial.estimation.model import Model
 from inertial.estimation.problem import Lot, Problem
 from inertial.estimation.term import Term
 from inertial.next_measurement.proposals import Circumstances, proposal, rivals_in
-from inertial.next_measurement.separation import separations, smallest
+from inertial.next_measurement.separation import apart
 from inertial.planning.sequences import SequenceStep, StationPace
 from inertial.state import State
 
@@ -78,7 +78,8 @@ def ambiguous(lot):
 
 def information(model, group, steps):
     rivals = rivals_in(model, group)
-    return float(smallest(separations(rivals, steps))[0, 1])
+    left = apart(rivals, steps).left
+    return float(min(left[0, 1], left[1, 0]))
 
 
 def observed(model, group):

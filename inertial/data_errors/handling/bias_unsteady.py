@@ -1,51 +1,37 @@
 """The bias of one axis of one unit is another in every soak."""
 
-from typing import ClassVar
-
 import numpy as np
 
-from inertial.data_errors.handling.bias_jump import AXES
-from inertial.estimation.alternative import Array, Handling, soaks
+from inertial.data_errors.changes import AXES, OfOneAxis, axes_of_units
+from inertial.estimation.alternative import Array, soaks
 from inertial.estimation.lot import Lot
 
 _FEWEST = 3
 """Soaks from which it is not the same as a bias with a temperature coefficient."""
 
 
-class BiasUnsteady(Handling):
+class BiasUnsteady(OfOneAxis):
     """One axis of one unit whose bias changed from soak to soak by itself, and no other unit's.
 
     Slow telegraph noise of one sensor that stays at one level over a soak has the shape of any curve over temperature.
     """
 
-    id: ClassVar[str] = "bias_unsteady"
-    symbol: ClassVar[str] = "b(soak)"
-    equation: ClassVar[str] = "b of each soak, one axis of one unit"
-    breaker: ClassVar[str] = "the same soaks once more: an effect of the temperature returns, an unsteady bias does not"
-    hides_behind: ClassVar[tuple[str, ...]] = ("bias_temperature_quadratic", "thermal_hysteresis")
-    fewest_units: ClassVar[int] = 1
-    in_part: ClassVar[bool] = False
-    of_one_axis: ClassVar[bool] = True
+    id = "bias_unsteady"
+    symbol = "b(soak)"
+    equation = "b of each soak, one axis of one unit"
+    breaker = "the same soaks once more: an effect of the temperature returns, an unsteady bias does not"
+    hides_behind = ("bias_temperature_quadratic", "thermal_hysteresis")
 
-    def places(self, lot: "Lot") -> list[dict[str, float]]:
-        """Every axis of every unit; none where only a norm is known, or with less than three soaks."""
-        if lot.radial or int(soaks(lot.state).max(initial=0)) + 1 < _FEWEST:
-            return []
-        units = lot.state.time.shape[0]
-        return [{"unit": float(u), "axis": float(axis)} for u in range(units) for axis in range(len(AXES))]
+    def places(self, lot: Lot) -> list[dict[str, float]]:
+        """Every axis of every unit; none with less than three soaks."""
+        return axes_of_units(lot) if int(soaks(lot.state).max(initial=0)) + 1 >= _FEWEST else []
 
-    def change(self, lot: "Lot", slope: Array | None, **place: float) -> Array:
-        """One in each soak after the first, of the axis."""
-        return self.of_each_unit(lot, slope, axis=place["axis"])
-
-    def of_each_unit(self, lot: "Lot", slope: Array | None, **place: float) -> Array:
-        """The same for every unit."""
+    def levels(self, lot: Lot, **place: float) -> Array:
+        """One in each soak after the first."""
         soak = soaks(lot.state)
-        column = np.zeros((1, soak.size, len(AXES), int(soak.max())))
-        column[0, :, int(place["axis"])] = soak[:, None] == np.arange(1, int(soak.max()) + 1)
-        return column
+        return (soak[:, None] == np.arange(1, int(soak.max()) + 1)).astype(np.float64)
 
-    def describe(self, lot: "Lot", size: Array, **place: float) -> str:
+    def describe(self, lot: Lot, size: Array, **place: float) -> str:
         """The axis and its changes: what is linear in the temperature belongs to the bias and its temperature coefficient."""
         levels, warm = np.concatenate([[0.0], size]), _temperatures(lot)
         line = np.stack([np.ones(levels.size), warm - warm.mean()], axis=-1)
@@ -57,7 +43,7 @@ class BiasUnsteady(Handling):
         )
 
 
-def _temperatures(lot: "Lot") -> Array:
+def _temperatures(lot: Lot) -> Array:
     """Mean temperature of each soak, °C."""
     soak = soaks(lot.state)
     warm = np.zeros(soak.size) if lot.state.temperature is None else lot.state.temperature.mean(axis=0)

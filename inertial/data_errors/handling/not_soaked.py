@@ -1,7 +1,6 @@
 """The devices were behind the temperature that was read: they had not soaked, and the reading is the chamber's."""
 
 from dataclasses import replace
-from typing import ClassVar
 
 import numpy as np
 
@@ -23,27 +22,27 @@ class NotSoaked(Handling):
     What was read is the air, or a plate: the output follows the device, T_d' = (T − T_d)/τ, by the coefficients that it has.
     """
 
-    id: ClassVar[str] = "device_not_soaked"
-    symbol: ClassVar[str] = "τ"
-    equation: ClassVar[str] = "E(T_d) − E(T), T_d′ = (T − T_d)/τ, all units"
-    breaker: ClassVar[str] = "soaks until the outputs stand still, or the devices' own thermometers"
-    hides_behind: ClassVar[tuple[str, ...]] = ("thermal_lag",)
-    fewest_units: ClassVar[int] = 1
-    in_part: ClassVar[bool] = False
+    id = "device_not_soaked"
+    symbol = "τ"
+    equation = "E(T_d) − E(T), T_d′ = (T − T_d)/τ, all units"
+    breaker = "soaks until the outputs stand still, or the devices' own thermometers"
+    hides_behind = ("thermal_lag",)
+    fewest_units = 1
+    in_part = False
 
-    def places(self, lot: "Lot") -> list[dict[str, float]]:
+    def places(self, lot: Lot) -> list[dict[str, float]]:
         """Time constants, where the temperature changes."""
         state = lot.state
         if state.temperature is None or float(np.ptp(state.temperature)) < 1.0:
             return []
         return [{"tau": float(tau)} for tau in np.geomspace(_FASTEST, _SLOWEST, _GRID)]
 
-    def near(self, lot: "Lot", **place: float) -> list[dict[str, float]]:
+    def near(self, lot: Lot, **place: float) -> list[dict[str, float]]:
         """Time constants up to the neighbours in :meth:`places`."""
         step = (_SLOWEST / _FASTEST) ** (1.0 / (_GRID - 1))
         return [{**place, "tau": place["tau"] * step**x} for x in np.linspace(-1.0, 1.0, _BETWEEN)]
 
-    def change(self, lot: "Lot", slope: Array | None, **place: float) -> Array:
+    def change(self, lot: Lot, slope: Array | None, **place: float) -> Array:
         """What being behind adds, by each unit's own coefficients: one where they are known exactly."""
         units, n = lot.state.time.shape
         if slope is None:
@@ -59,7 +58,7 @@ class NotSoaked(Handling):
         """
         return bool(1.0 / _OF_ONE < size[0] < _OF_ONE)
 
-    def describe(self, lot: "Lot", size: Array, **place: float) -> str:
+    def describe(self, lot: Lot, size: Array, **place: float) -> str:
         """The time constant."""
         behind = np.abs(_temperature(lot.state, place["tau"]) - _temperature(lot.state, 0.0))
         alone = "unit" in place
@@ -69,7 +68,7 @@ class NotSoaked(Handling):
             f"{place['tau']:.0f} s, up to {float(behind.max()):.1f} K behind it; soak longer, or measure the device's temperature"
         )
 
-    def settled(self, lot: "Lot", size: Array, misfit: Misfit, **place: float) -> "Lot | None":
+    def settled(self, lot: Lot, size: Array, misfit: Misfit, **place: float) -> Lot | None:
         """With the temperatures of the devices in place of the readings, each unit's time constant found by its own dwells."""
         from scipy.optimize import minimize_scalar  # noqa: PLC0415  # a quarter of a second, and few lots need it
 
@@ -78,7 +77,7 @@ class NotSoaked(Handling):
         for unit in [int(place["unit"])] if "unit" in place else range(each.size):
             own = lot.units([unit])
 
-            def left(log_tau: float, own: "Lot" = own, unit: int = unit) -> float:
+            def left(log_tau: float, own: Lot = own, unit: int = unit) -> float:
                 return misfit(replace(own, state=delayed(own.state, np.array([np.exp(log_tau)]))), (unit,))
 
             bounds = (middle - reach, middle + reach)

@@ -1,7 +1,5 @@
 """The table was not at the commanded angles in every dwell of one pose."""
 
-from typing import ClassVar
-
 import numpy as np
 
 from inertial.estimation.alternative import Array, Handling, poses, tilts, without
@@ -11,13 +9,13 @@ from inertial.estimation.lot import Lot
 class PoseOff(Handling):
     """A pose that is wrong every time, for all units."""
 
-    id: ClassVar[str] = "pose_off"
-    symbol: ClassVar[str] = "Δα, Δβ"
-    equation: ClassVar[str] = "∂f/∂α·Δα + ∂f/∂β·Δβ in every dwell of one pose"
-    breaker: ClassVar[str] = "check the angles of that pose in the recipe, and measure it again"
-    fewest_units: ClassVar[int] = 1
+    id = "pose_off"
+    symbol = "Δα, Δβ"
+    equation = "∂f/∂α·Δα + ∂f/∂β·Δβ in every dwell of one pose"
+    breaker = "check the angles of that pose in the recipe, and measure it again"
+    fewest_units = 1
 
-    def places(self, lot: "Lot") -> list[dict[str, float]]:
+    def places(self, lot: Lot) -> list[dict[str, float]]:
         """Every pose with more than one dwell; none if the angles are unknown."""
         if lot.state.outer is None or lot.state.inner is None:
             return []
@@ -26,20 +24,20 @@ class PoseOff(Handling):
         several = number[count > 1]
         return [{"pose": float(k)} for k in several] if several.size > 3 * int(count.max() > 1) else []
 
-    def change(self, lot: "Lot", slope: Array | None, **place: float) -> Array:
+    def change(self, lot: Lot, slope: Array | None, **place: float) -> Array:
         """Errors of the two angles in the dwells of one pose."""
         return tilts(lot.state) * (poses(lot) == int(place["pose"]))[:, None, None]
 
-    def describe(self, lot: "Lot", size: Array, **place: float) -> str:
+    def describe(self, lot: Lot, size: Array, **place: float) -> str:
         """The two angles."""
         angles = np.degrees(size)
         off = f"about {angles[0]:+.3f}° (outer) and {angles[1]:+.3f}° (inner)"
         return f"the pose was off by {off} every time; its dwells are left out"
 
-    def mended(self, lot: "Lot", size: Array, **place: float) -> "Lot | None":
+    def mended(self, lot: Lot, size: Array, **place: float) -> Lot | None:
         """Without the dwells of the pose."""
         return without(lot, self.dwells(lot, **place))
 
-    def dwells(self, lot: "Lot", **place: float) -> list[int]:
+    def dwells(self, lot: Lot, **place: float) -> list[int]:
         """The dwells of the pose."""
         return np.flatnonzero(poses(lot) == int(place["pose"])).tolist()

@@ -1,7 +1,6 @@
 """The poses of two successive dwells stand in each other's row."""
 
 from dataclasses import replace
-from typing import ClassVar
 
 import numpy as np
 
@@ -18,20 +17,18 @@ _OF_ONE = 1.25
 class PosesExchanged(Handling):
     """Poses of two successive dwells that were written down in the wrong order, for all units: no coefficient but one."""
 
-    id: ClassVar[str] = "poses_exchanged"
-    symbol: ClassVar[str] = "a ↔ b"
-    equation: ClassVar[str] = "f_b − f_a in dwell a, the opposite in dwell b"
-    breaker: ClassVar[str] = "the log of the table, or both poses once more"
+    id = "poses_exchanged"
+    symbol = "a ↔ b"
+    equation = "f_b − f_a in dwell a, the opposite in dwell b"
+    breaker = "the log of the table, or both poses once more"
 
-    def places(self, lot: "Lot") -> list[dict[str, float]]:
-        """Each dwell whose successor has another pose; none where only the norm of the force is known."""
-        if lot.radial:
-            return []
+    def places(self, lot: Lot) -> list[dict[str, float]]:
+        """Each dwell whose successor has another pose."""
         step = np.linalg.norm(np.diff(common_force(lot), axis=-2), axis=-1).max(axis=0)
         there = set(np.flatnonzero(np.isfinite(lot.error).all(axis=-1).any(axis=0)).tolist())
         return [{"at": float(k)} for k in np.flatnonzero(step > _APART) if {k, k + 1} <= there]
 
-    def change(self, lot: "Lot", slope: Array | None, **place: float) -> Array:
+    def change(self, lot: Lot, slope: Array | None, **place: float) -> Array:
         """What each of the two dwells has in place of its own force."""
         first, force = int(place["at"]), common_force(lot)
         column = np.zeros((*force.shape, 1))
@@ -43,14 +40,14 @@ class PosesExchanged(Handling):
         """Whether the two poses changed places entirely."""
         return bool(1.0 / _OF_ONE < size[0] < _OF_ONE)
 
-    def describe(self, lot: "Lot", size: Array, **place: float) -> str:
+    def describe(self, lot: Lot, size: Array, **place: float) -> str:
         """Which poses."""
         force = common_force(lot)[0]
         first = int(place["at"])
         apart = np.degrees(np.arccos(np.clip(float(force[first] @ force[first + 1]), -1.0, 1.0)))
         return f"the poses of this dwell and the next, {apart:.0f}° apart, were exchanged for all units; they are exchanged back"
 
-    def mended(self, lot: "Lot", size: Array, **place: float) -> "Lot | None":
+    def mended(self, lot: Lot, size: Array, **place: float) -> Lot | None:
         """With the poses exchanged back."""
         first = int(place["at"])
         state = lot.state
@@ -73,6 +70,6 @@ class PosesExchanged(Handling):
             ),
         )
 
-    def dwells(self, lot: "Lot", **place: float) -> list[int]:
+    def dwells(self, lot: Lot, **place: float) -> list[int]:
         """Both."""
         return [int(place["at"]), int(place["at"]) + 1]

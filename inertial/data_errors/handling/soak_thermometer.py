@@ -1,10 +1,8 @@
 """All thermometers have the same offset in one soak."""
 
 from dataclasses import replace
-from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inertial.estimation.alternative import Array, Exchangeable, soaks
 from inertial.estimation.lot import Lot
@@ -14,28 +12,28 @@ from inertial.state import History
 class SoakThermometer(Exchangeable):
     """An offset of the temperature reading in one soak, for all units."""
 
-    id: ClassVar[str] = "soak_thermometer"
-    symbol: ClassVar[str] = "ΔT"
-    equation: ClassVar[str] = "−∂E/∂T·ΔT in one soak, all units"
-    breaker: ClassVar[str] = "a second thermometer, or a soak at a fourth temperature"
-    hides_behind: ClassVar[tuple[str, ...]] = ("scale_temperature_quadratic", "bias_temperature_quadratic")
+    id = "soak_thermometer"
+    symbol = "ΔT"
+    equation = "−∂E/∂T·ΔT in one soak, all units"
+    breaker = "a second thermometer, or a soak at a fourth temperature"
+    hides_behind = ("scale_temperature_quadratic", "bias_temperature_quadratic")
 
-    def places(self, lot: "Lot") -> list[dict[str, float]]:
+    def places(self, lot: Lot) -> list[dict[str, float]]:
         """Every soak, if there are more than two."""
         number = int(soaks(lot.state).max()) + 1
         return [{"soak": float(k)} for k in range(number)] if number > 2 else []
 
-    def change(self, lot: "Lot", slope: Array | None, **place: float) -> Array:
+    def change(self, lot: Lot, slope: Array | None, **place: float) -> Array:
         """The contribution of an offset of one kelvin, by each unit's own coefficients."""
         if slope is None:
             return np.zeros((*lot.state.time.shape, 3, 1))
         return -(slope * (soaks(lot.state) == int(place["soak"]))[:, None])[..., None]
 
-    def describe(self, lot: "Lot", size: Array, **place: float) -> str:
+    def describe(self, lot: Lot, size: Array, **place: float) -> str:
         """The offset."""
         return f"the thermometers read {self.short(size, **place)}; the readings are corrected by it"
 
-    def instead(self, lot: "Lot", **place: float) -> list[dict[str, float]]:
+    def instead(self, lot: Lot, **place: float) -> list[dict[str, float]]:
         """The other soaks: with three, an offset of one is one of another beside coefficients that are linear in temperature."""
         number = int(soaks(lot.state).max()) + 1
         return [{**place, "soak": float(k)} for k in range(number) if k != int(place["soak"])]
@@ -44,24 +42,20 @@ class SoakThermometer(Exchangeable):
         """The offset and the soak."""
         return f"{size[0]:+.2f} K off in soak {int(place['soak']) + 1}"
 
-    def mended(self, lot: "Lot", size: Array, **place: float) -> "Lot | None":
-        """With the readings of the soak corrected."""
-        return corrected(lot, soaks(lot.state) == int(place["soak"]), float(size[0]), None)
+    def mended(self, lot: Lot, size: Array, **place: float) -> Lot | None:
+        """With the readings of the soak lowered by the offset, of one unit or of all."""
+        state, wrong, offset = lot.state, soaks(lot.state) == int(place["soak"]), float(size[0])
+        if state.temperature is None:
+            return lot
+        units = np.arange(state.time.shape[0])
+        affected = (units == place.get("unit", units))[:, None]
+        history = state.history
+        if history is not None:
+            during = (history.time >= state.time[0, wrong].min()) & (history.time <= state.time[0, wrong].max())
+            history = History(history.time, history.temperature - offset * (affected & during))
+        temperature = state.temperature - offset * (affected & wrong)
+        return replace(lot, state=replace(state, temperature=temperature, history=history, memory={}))
 
-    def dwells(self, lot: "Lot", **place: float) -> list[int]:
+    def dwells(self, lot: Lot, **place: float) -> list[int]:
         """The dwells of the soak."""
         return np.flatnonzero(soaks(lot.state) == int(place["soak"])).tolist()
-
-
-def corrected(lot: "Lot", wrong: NDArray[np.bool_], offset: float, unit: int | None) -> "Lot":
-    """A lot whose readings are lowered by an offset in some dwells (n,), of one unit or of all."""
-    state = lot.state
-    if state.temperature is None:
-        return lot
-    units = np.ones(state.time.shape[0], dtype=bool) if unit is None else np.arange(state.time.shape[0]) == unit
-    temperature = state.temperature - offset * (units[:, None] & wrong)
-    history = state.history
-    if history is not None:
-        during = (history.time >= state.time[0, wrong].min()) & (history.time <= state.time[0, wrong].max())
-        history = History(history.time, history.temperature - offset * (units[:, None] & during))
-    return replace(lot, state=replace(state, temperature=temperature, history=history, memory={}))

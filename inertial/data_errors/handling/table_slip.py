@@ -1,30 +1,29 @@
 """The table slipped on its drives during the run."""
 
-from typing import ClassVar
-
-from inertial.estimation.alternative import Array, Handling, after, tilts, times
+from inertial.data_errors.changes import Change
+from inertial.estimation.alternative import Array, tilts
 from inertial.estimation.lot import Lot
 
 
-class TableSlip(Handling):
+class TableSlip(Change):
     """A table whose angles have offsets from a dwell on."""
 
-    id: ClassVar[str] = "table_slip"
-    symbol: ClassVar[str] = "εα, εβ(t)"
-    equation: ClassVar[str] = "(∂f/∂α·εα + ∂f/∂β·εβ)·H(t − t0)"
-    breaker: ClassVar[str] = "home the table, and measure a pose of the first half once more"
-    hides_behind: ClassVar[tuple[str, ...]] = ("outer_encoder_offset",)
-    fewest_units: ClassVar[int] = 1
+    id = "table_slip"
+    symbol = "εα, εβ(t)"
+    equation = "(∂f/∂α·εα + ∂f/∂β·εβ)·H(t − t0)"
+    breaker = "home the table, and measure a pose of the first half once more"
+    hides_behind = ("outer_encoder_offset",)
+    fewest_units = 1
 
-    def places(self, lot: "Lot") -> list[dict[str, float]]:
+    def moments(self, lot: Lot) -> list[int]:
         """Every place in time; none if the angles are unknown."""
-        return [] if lot.state.outer is None or lot.state.inner is None else [{"dwell": float(k)} for k in times(lot)]
+        return [] if lot.state.outer is None or lot.state.inner is None else super().moments(lot)
 
-    def change(self, lot: "Lot", slope: Array | None, **place: float) -> Array:
+    def addition(self, lot: Lot) -> Array:
         """Errors of the two angles."""
-        return tilts(lot.state) * after(lot, place["dwell"])[:, None, None]
+        return tilts(lot.state)
 
-    def describe(self, lot: "Lot", size: Array, **place: float) -> str:
+    def describe(self, lot: Lot, size: Array, **place: float) -> str:
         """The two angles."""
         off = f"{1e3 * size[0]:+.3f} mrad (outer) and {1e3 * size[1]:+.3f} mrad (inner)"
         return f"the table's angles changed by {off}; home it and repeat"

@@ -1,7 +1,6 @@
 """Two units were exchanged during the run: from a dwell on, each has the readings of the other."""
 
 from dataclasses import replace
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,40 +17,38 @@ _OF_ONE = 1.25
 class UnitsSwapped(Handling):
     """Two units that changed places, cables or names during the run: no coefficient, their readings are the other's."""
 
-    id: ClassVar[str] = "units_swapped"
-    symbol: ClassVar[str] = "a ↔ b"
-    equation: ClassVar[str] = "(E_b − E_a)·H(t − t0) in unit a, the opposite in unit b"
-    breaker: ClassVar[str] = "the serial numbers of both units in their seats, and a pose of the first half once more"
-    hides_behind: ClassVar[tuple[str, ...]] = ("misalignment_temperature", "scale_temperature_quadratic")
-    in_part: ClassVar[bool] = False
+    id = "units_swapped"
+    symbol = "a ↔ b"
+    equation = "(E_b − E_a)·H(t − t0) in unit a, the opposite in unit b"
+    breaker = "the serial numbers of both units in their seats, and a pose of the first half once more"
+    hides_behind = ("misalignment_temperature", "scale_temperature_quadratic")
+    in_part = False
 
-    def places(self, lot: "Lot") -> list[dict[str, float]]:
+    def places(self, lot: Lot) -> list[dict[str, float]]:
         """Pairs whose residuals by a plain fit are opposite to each other and vanish with an exchange, at the best dwells."""
-        if lot.radial:
-            return []
         fit = _plain_fit(lot)
         return [
             {"unit": float(a), "other": float(b), "dwell": float(k)} for a, b in fit.pairs() for k in fit.instants(a, b)
         ]
 
-    def placed(self, lot: "Lot", **place: float) -> dict[str, float]:
+    def placed(self, lot: Lot, **place: float) -> dict[str, float]:
         """At the dwell from which on an exchange leaves least: between dwells that were left out all were equally good."""
         near = _plain_fit(lot).instants(int(place["unit"]), int(place["other"]), around=0)
         return {**place, "dwell": float(near[0])} if near else place
 
-    def looks(self, lot: "Lot", places: int) -> int:
+    def looks(self, lot: Lot, places: int) -> int:
         """Every pair at every dwell."""
         units, n = lot.state.time.shape
         return units * (units - 1) // 2 * (n - 2 * EDGE + 1)
 
-    def change(self, lot: "Lot", slope: Array | None, **place: float) -> Array:
+    def change(self, lot: Lot, slope: Array | None, **place: float) -> Array:
         """The difference of the readings of the two units, from the dwell on."""
         one, other, after = _places(lot, **place)
         column = np.zeros((*lot.state.time.shape, 3, 1))
         column[[one, other], ..., 0] = (lot.output[[one, other]] - _of_other(lot, one, other)) * after[:, None]
         return column
 
-    def columns(self, lot: "Lot", slope: Array | None, **place: float) -> Array:
+    def columns(self, lot: Lot, slope: Array | None, **place: float) -> Array:
         """The same by block: two units are affected."""
         return by_block(self.change(lot, slope, **place))
 
@@ -59,13 +56,13 @@ class UnitsSwapped(Handling):
         """Whether the readings changed by the whole difference of the two units."""
         return bool(1.0 / _OF_ONE < size[0] < _OF_ONE)
 
-    def describe(self, lot: "Lot", size: Array, **place: float) -> str:
+    def describe(self, lot: Lot, size: Array, **place: float) -> str:
         """What was exchanged and what becomes of it."""
         one, other, after = _places(lot, **place)
         apart = 1e6 * float(np.sqrt(np.mean((lot.output[one, after] - _of_other(lot, one, other)[0, after]) ** 2)))
         return f"exchanged before this dwell, readings {apart:.0f} µg apart; they are exchanged back"
 
-    def settled(self, lot: "Lot", size: Array, misfit: Misfit, **place: float) -> "Lot | None":
+    def settled(self, lot: Lot, size: Array, misfit: Misfit, **place: float) -> Lot | None:
         """With the readings exchanged back: the temperatures, too, if the model fits better with them."""
         one, other, _ = _places(lot, **place)
         outputs = _outputs_exchanged(lot, **place)
@@ -74,26 +71,26 @@ class UnitsSwapped(Handling):
         return outputs if misfits[0] <= misfits[1] else whole
 
 
-def _places(lot: "Lot", **place: float) -> tuple[int, int, NDArray[np.bool_]]:
+def _places(lot: Lot, **place: float) -> tuple[int, int, NDArray[np.bool_]]:
     """The two units, and the dwells (n,) from which on both were measured as the other."""
     one, other = int(place["unit"]), int(place["other"])
     there = np.isfinite(lot.error[[one, other]]).all(axis=(0, 2))
     return one, other, there & (np.arange(lot.state.time.shape[1]) >= place["dwell"])
 
 
-def _plain_fit(lot: "Lot") -> PlainFit:
+def _plain_fit(lot: Lot) -> PlainFit:
     """The fit by which pairs are found."""
     there = np.all(np.isfinite(lot.error), axis=-1)
     return PlainFit(lot.output, lot.state.force, lot.state.theta, there, lambda one, other: _of_other(lot, one, other))
 
 
-def _of_other(lot: "Lot", one: int, other: int) -> Array:
+def _of_other(lot: Lot, one: int, other: int) -> Array:
     """Outputs (2, n, 3) of two units, each as that of the other: over the other's nominal scale; g."""
     outputs = lot.output[[other, one]]
     return outputs if lot.scale is None else outputs * (lot.scale[[other, one]] / lot.scale[[one, other]])[:, None]
 
 
-def _outputs_exchanged(lot: "Lot", **place: float) -> "Lot":
+def _outputs_exchanged(lot: Lot, **place: float) -> Lot:
     """The lot with the outputs of two units exchanged from a dwell on, and what is known of their noise."""
     one, other, after = _places(lot, **place)
     output, error = lot.output.copy(), lot.error.copy()

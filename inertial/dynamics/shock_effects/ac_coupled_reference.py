@@ -1,5 +1,3 @@
-from typing import ClassVar
-
 import numpy as np
 
 from inertial.dynamics.shock_effects.base import Array, ShockEffect
@@ -9,13 +7,11 @@ from inertial.dynamics.transfer_effects.base import Parameter
 class AcCoupledReference(ShockEffect):
     """A reference that is AC-coupled: its peak is low and it undershoots after the pulse, with the time constant RC."""
 
-    id: ClassVar[str] = "ac_coupled_reference"
-    equation: ClassVar[str] = "u = r + ∫r dt/RC"
-    source: ClassVar[str] = "charge amplifier, IEPE sensor: one-pole high-pass"
-    unit: ClassVar[str] = "s"
-    breaker: ClassVar[str] = (
-        "shocks in the other direction, and a longer record after the pulse: the output returns with RC"
-    )
+    id = "ac_coupled_reference"
+    equation = "u = r + ∫r dt/RC"
+    source = "charge amplifier, IEPE sensor: one-pole high-pass"
+    unit = "s"
+    breaker = "shocks in the other direction, and a longer record after the pulse: the output returns with RC"
 
     def parameters(self, duration_s: float) -> tuple[Parameter, ...]:
         return (

@@ -1,5 +1,4 @@
 from functools import lru_cache
-from typing import ClassVar
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -11,11 +10,11 @@ from inertial.dynamics.transfer_effects.base import Parameter
 class Delay(ShockEffect):
     """A delay between the channels: converter, linear-phase filter, time base."""
 
-    id: ClassVar[str] = "delay"
-    equation: ClassVar[str] = "u(t) = r(t − τ)"
-    source: ClassVar[str] = "time base"
-    unit: ClassVar[str] = "s"
-    breaker: ClassVar[str] = "a shared trigger edge on both channels"
+    id = "delay"
+    equation = "u(t) = r(t − τ)"
+    source = "time base"
+    unit = "s"
+    breaker = "a shared trigger edge on both channels"
 
     def parameters(self, duration_s: float) -> tuple[Parameter, ...]:
         return (Parameter("delay_s", "s", -0.3 * duration_s, 0.3 * duration_s, (0.0,)),)

@@ -1,5 +1,4 @@
 from functools import lru_cache
-from typing import ClassVar
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
@@ -11,11 +10,11 @@ from inertial.dynamics.transfer_effects.base import Parameter
 class FilterOfReference(ShockEffect):
     """A low-pass on the channel of the reference that the unit does not have: filters that do not match."""
 
-    id: ClassVar[str] = "filter_of_reference"
-    equation: ClassVar[str] = "two-pole Butterworth at f_c behind the reference"
-    source: ClassVar[str] = "SAE J211; equal filters on both channels"
-    unit: ClassVar[str] = "Hz"
-    breaker: ClassVar[str] = "equal filters on both channels, with a corner of 2/D or more"
+    id = "filter_of_reference"
+    equation = "two-pole Butterworth at f_c behind the reference"
+    source = "SAE J211; equal filters on both channels"
+    unit = "Hz"
+    breaker = "equal filters on both channels, with a corner of 2/D or more"
 
     def parameters(self, duration_s: float) -> tuple[Parameter, ...]:
         return (corner("reference_filter_hz", duration_s),)

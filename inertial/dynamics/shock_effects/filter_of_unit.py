@@ -1,5 +1,3 @@
-from typing import ClassVar
-
 import numpy as np
 
 from inertial.dynamics.shock_effects.base import Array, ShockEffect, corner, through
@@ -9,11 +7,11 @@ from inertial.dynamics.transfer_effects.base import Parameter
 class FilterOfUnit(ShockEffect):
     """A low-pass on the channel of the unit that the reference does not have: filters that do not match."""
 
-    id: ClassVar[str] = "filter_of_unit"
-    equation: ClassVar[str] = "two-pole Butterworth at f_c behind the unit"
-    source: ClassVar[str] = "SAE J211; equal filters on both channels"
-    unit: ClassVar[str] = "Hz"
-    breaker: ClassVar[str] = "equal filters on both channels, with a corner of 2/D or more"
+    id = "filter_of_unit"
+    equation = "two-pole Butterworth at f_c behind the unit"
+    source = "SAE J211; equal filters on both channels"
+    unit = "Hz"
+    breaker = "equal filters on both channels, with a corner of 2/D or more"
 
     def parameters(self, duration_s: float) -> tuple[Parameter, ...]:
         return (corner("filter_hz", duration_s),)

@@ -1,5 +1,3 @@
-from typing import ClassVar
-
 import numpy as np
 
 from inertial.dynamics.shock_effects.base import Array, ShockEffect, through
@@ -9,11 +7,11 @@ from inertial.dynamics.transfer_effects.base import Parameter
 class MountingResonance(ShockEffect):
     """A resonance of the mounting between the reference and the unit."""
 
-    id: ClassVar[str] = "mounting_resonance"
-    equation: ClassVar[str] = "(1 + 2jζr)/(1 − r² + 2jζr), r = f/f_m"
-    source: ClassVar[str] = "sprung mass on its mounting"
-    unit: ClassVar[str] = "Hz"
-    breaker: ClassVar[str] = "another torque, adhesive or fixture"
+    id = "mounting_resonance"
+    equation = "(1 + 2jζr)/(1 − r² + 2jζr), r = f/f_m"
+    source = "sprung mass on its mounting"
+    unit = "Hz"
+    breaker = "another torque, adhesive or fixture"
 
     def parameters(self, duration_s: float) -> tuple[Parameter, ...]:
         return (

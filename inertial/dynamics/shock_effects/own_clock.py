@@ -1,5 +1,3 @@
-from typing import ClassVar
-
 import numpy as np
 from scipy.interpolate import CubicSpline
 
@@ -10,11 +8,11 @@ from inertial.dynamics.transfer_effects.base import Parameter
 class OwnClock(ShockEffect):
     """A clock of the device that departs from that of the reference: the pulse is stretched."""
 
-    id: ClassVar[str] = "own_clock"
-    equation: ClassVar[str] = "u(t) = r(t·(1 + ε))"
-    source: ClassVar[str] = "time base"
-    unit: ClassVar[str] = "share"
-    breaker: ClassVar[str] = "a sweep, or a shared sample clock"
+    id = "own_clock"
+    equation = "u(t) = r(t·(1 + ε))"
+    source = "time base"
+    unit = "share"
+    breaker = "a sweep, or a shared sample clock"
 
     def parameters(self, duration_s: float) -> tuple[Parameter, ...]:
         return (Parameter("clock_share", "1", -0.05, 0.05, (0.0,)),)

@@ -1,5 +1,3 @@
-from typing import ClassVar
-
 import numpy as np
 
 from inertial.dynamics.shock_effects.base import Array, ShockEffect
@@ -8,11 +6,11 @@ from inertial.dynamics.shock_effects.base import Array, ShockEffect
 class SecondOrder(ShockEffect):
     """A quadratic nonlinearity of the unit."""
 
-    id: ClassVar[str] = "second_order"
-    equation: ClassVar[str] = "K2·r²"
-    source: ClassVar[str] = "IEEE Std 1293, K2"
-    unit: ClassVar[str] = "g/g²"
-    breaker: ClassVar[str] = "shocks in both directions and at several peaks"
+    id = "second_order"
+    equation = "K2·r²"
+    source = "IEEE Std 1293, K2"
+    unit = "g/g²"
+    breaker = "shocks in both directions and at several peaks"
 
     def added(self, wave: Array, rate_hz: float) -> Array:
         return np.asarray(wave**2)

@@ -1,5 +1,3 @@
-from typing import ClassVar
-
 import numpy as np
 
 from inertial.dynamics.shock_effects.base import Array, ShockEffect
@@ -8,11 +6,11 @@ from inertial.dynamics.shock_effects.base import Array, ShockEffect
 class ZeroShift(ShockEffect):
     """A zero of the unit that shifts with the pulse and stays, with one sign for shocks of both directions."""
 
-    id: ClassVar[str] = "zero_shift"
-    equation: ClassVar[str] = "z·∫|r|dt, of its final value"
-    source: ClassVar[str] = "mechanism: change of stress in the sensing element or its mounting"
-    unit: ClassVar[str] = "g"
-    breaker: ClassVar[str] = "shocks in the other direction, and a longer record after the pulse: the shift stays"
+    id = "zero_shift"
+    equation = "z·∫|r|dt, of its final value"
+    source = "mechanism: change of stress in the sensing element or its mounting"
+    unit = "g"
+    breaker = "shocks in the other direction, and a longer record after the pulse: the shift stays"
 
     def added(self, wave: Array, rate_hz: float) -> Array:
         whole = np.cumsum(np.abs(wave))

@@ -1,5 +1,3 @@
-from typing import ClassVar
-
 import numpy as np
 
 from inertial.dynamics.transfer_effects.base import Array, Complex, Conditions, Parameter, TransferEffect
@@ -8,10 +6,10 @@ from inertial.dynamics.transfer_effects.base import Array, Complex, Conditions, 
 class Amplitude(TransferEffect):
     """A sensitivity that depends on the amplitude: cubic nonlinearity seen by a sine."""
 
-    id: ClassVar[str] = "amplitude"
-    equation: ClassVar[str] = "1 + ¾·K3·a²"
-    source: ClassVar[str] = "describing function of K3·a³ for a sine of peak a"
-    breaker: ClassVar[str] = "one frequency at several levels"
+    id = "amplitude"
+    equation = "1 + ¾·K3·a²"
+    source = "describing function of K3·a³ for a sine of peak a"
+    breaker = "one frequency at several levels"
 
     def parameters(self, points: Conditions) -> tuple[Parameter, ...]:
         top = float(points.level.max())

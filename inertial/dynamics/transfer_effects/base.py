@@ -1,6 +1,7 @@
 """What an effect on a transfer function is, and the conditions of the points of a sweep."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
@@ -23,6 +24,26 @@ class Parameter(NamedTuple):
     high: float
     starts: tuple[float, ...]
     log: bool = False
+
+
+class Coordinates:
+    """Parameters (p,) as a search sees them: the logarithm of those that are positive.
+
+    log : (p,), which these are; low, high : (p,), bounds of the coordinates
+    """
+
+    def __init__(self, parameters: Sequence[Parameter]) -> None:
+        self.log = np.array([p.log for p in parameters], dtype=bool)
+        self.low = self.of(np.array([p.low for p in parameters], dtype=np.float64))
+        self.high = self.of(np.array([p.high for p in parameters], dtype=np.float64))
+
+    def of(self, values: Array) -> Array:
+        """Coordinates of values."""
+        return np.where(self.log, np.log(np.where(self.log, values, 1.0)), values)
+
+    def values(self, coordinates: Array) -> Array:
+        """Values at some coordinates."""
+        return np.where(self.log, np.exp(np.where(self.log, coordinates, 0.0)), coordinates)
 
 
 @dataclass(frozen=True)

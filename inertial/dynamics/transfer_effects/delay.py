@@ -1,5 +1,3 @@
-from typing import ClassVar
-
 import numpy as np
 
 from inertial.dynamics.transfer_effects.base import Array, Complex, Conditions, Parameter, TransferEffect
@@ -8,10 +6,10 @@ from inertial.dynamics.transfer_effects.base import Array, Complex, Conditions, 
 class Delay(TransferEffect):
     """A delay that is the same at all frequencies: linear-phase filter, converter, time base."""
 
-    id: ClassVar[str] = "delay"
-    equation: ClassVar[str] = "exp(−j2πfτ)"
-    source: ClassVar[str] = "time shift of a Fourier transform"
-    breaker: ClassVar[str] = "a shared trigger edge on both channels"
+    id = "delay"
+    equation = "exp(−j2πfτ)"
+    source = "time shift of a Fourier transform"
+    breaker = "a shared trigger edge on both channels"
 
     def parameters(self, points: Conditions) -> tuple[Parameter, ...]:
         reach = 2.0 / float(points.frequency.max())

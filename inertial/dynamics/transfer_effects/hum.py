@@ -1,5 +1,3 @@
-from typing import ClassVar
-
 import numpy as np
 
 from inertial.dynamics.transfer_effects.base import Array, Complex, Conditions, Parameter, TransferEffect
@@ -8,10 +6,10 @@ from inertial.dynamics.transfer_effects.base import Array, Complex, Conditions, 
 class Hum(TransferEffect):
     """Mains hum by a cable or ground loop, on the points within the resolution of its lines."""
 
-    id: ClassVar[str] = "hum"
-    equation: ClassVar[str] = "1 + c/level at 50 or 60 Hz and harmonics"
-    source: ClassVar[str] = "additive tone in the record of a point"
-    breaker: ClassVar[str] = "move the points away from the mains lines; record with the exciter off"
+    id = "hum"
+    equation = "1 + c/level at 50 or 60 Hz and harmonics"
+    source = "additive tone in the record of a point"
+    breaker = "move the points away from the mains lines; record with the exciter off"
 
     def parameters(self, points: Conditions) -> tuple[Parameter, ...]:
         return (

@@ -1,5 +1,3 @@
-from typing import ClassVar
-
 import numpy as np
 
 from inertial.dynamics.transfer_effects.base import Array, Complex, Conditions, Parameter, TransferEffect
@@ -8,10 +6,10 @@ from inertial.dynamics.transfer_effects.base import Array, Complex, Conditions, 
 class MountingResonance(TransferEffect):
     """A resonance of the mounting between the reference and the device."""
 
-    id: ClassVar[str] = "mounting_resonance"
-    equation: ClassVar[str] = "(1 + 2jζr)/(1 − r² + 2jζr), r = f/f_m"
-    source: ClassVar[str] = "transmissibility of a base-excited mass; ISO 5348"
-    breaker: ClassVar[str] = "another torque, adhesive or fixture"
+    id = "mounting_resonance"
+    equation = "(1 + 2jζr)/(1 − r² + 2jζr), r = f/f_m"
+    source = "transmissibility of a base-excited mass; ISO 5348"
+    breaker = "another torque, adhesive or fixture"
 
     def parameters(self, points: Conditions) -> tuple[Parameter, ...]:
         return (

@@ -1,5 +1,3 @@
-from typing import ClassVar
-
 import numpy as np
 
 from inertial.dynamics.transfer_effects.base import Array, Complex, Conditions, Parameter, TransferEffect
@@ -8,11 +6,11 @@ from inertial.dynamics.transfer_effects.base import Array, Complex, Conditions, 
 class MovingAverage(TransferEffect):
     """A moving average of length T, as of a decimating filter: linear phase."""
 
-    id: ClassVar[str] = "moving_average"
-    equation: ClassVar[str] = "sinc(fT)·exp(−jπfT)"
-    source: ClassVar[str] = "boxcar filter; −3 dB at 0.443/T, delay T/2"
-    breaker: ClassVar[str] = "points up to the first null at 1/T"
-    in_every_device: ClassVar[bool] = True
+    id = "moving_average"
+    equation = "sinc(fT)·exp(−jπfT)"
+    source = "boxcar filter; −3 dB at 0.443/T, delay T/2"
+    breaker = "points up to the first null at 1/T"
+    in_every_device = True
 
     def parameters(self, points: Conditions) -> tuple[Parameter, ...]:
         top = float(points.frequency.max())

@@ -1,5 +1,3 @@
-from typing import ClassVar
-
 import numpy as np
 
 from inertial.dynamics.transfer_effects.base import Array, Complex, Conditions, Parameter, TransferEffect
@@ -8,11 +6,11 @@ from inertial.dynamics.transfer_effects.base import Array, Complex, Conditions, 
 class OnePole(TransferEffect):
     """A one-pole low-pass behind the sensing element: RC filter of the output."""
 
-    id: ClassVar[str] = "one_pole"
-    equation: ClassVar[str] = "1/(1 + jf/f_c)"
-    source: ClassVar[str] = "first-order low-pass"
-    breaker: ClassVar[str] = "points beyond the corner, or the step response"
-    in_every_device: ClassVar[bool] = True
+    id = "one_pole"
+    equation = "1/(1 + jf/f_c)"
+    source = "first-order low-pass"
+    breaker = "points beyond the corner, or the step response"
+    in_every_device = True
 
     def parameters(self, points: Conditions) -> tuple[Parameter, ...]:
         top = float(points.frequency.max())

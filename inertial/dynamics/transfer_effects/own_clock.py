@@ -1,5 +1,3 @@
-from typing import ClassVar
-
 import numpy as np
 
 from inertial.dynamics.transfer_effects.base import Array, Complex, Conditions, Parameter, TransferEffect
@@ -8,10 +6,10 @@ from inertial.dynamics.transfer_effects.base import Array, Complex, Conditions, 
 class OwnClock(TransferEffect):
     """A clock of the device that departs from the reference, where the fit was made at the given frequency."""
 
-    id: ClassVar[str] = "own_clock"
-    equation: ClassVar[str] = "sinc(ε·f·T)"
-    source: ClassVar[str] = "sine fit at a wrong frequency, IEEE Std 1057"
-    breaker: ClassVar[str] = "fit the frequency too, or share a clock or sync edge"
+    id = "own_clock"
+    equation = "sinc(ε·f·T)"
+    source = "sine fit at a wrong frequency, IEEE Std 1057"
+    breaker = "fit the frequency too, or share a clock or sync edge"
 
     def parameters(self, points: Conditions) -> tuple[Parameter, ...]:
         top = float(np.max(points.frequency * points.record_s))

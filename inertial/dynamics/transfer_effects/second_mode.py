@@ -1,5 +1,3 @@
-from typing import ClassVar
-
 import numpy as np
 
 from inertial.dynamics.transfer_effects.base import Array, Complex, Conditions, Parameter, TransferEffect
@@ -8,10 +6,10 @@ from inertial.dynamics.transfer_effects.base import Array, Complex, Conditions, 
 class SecondMode(TransferEffect):
     """A second mode: a resonance of fixture or case that adds to the motion of the sensing element."""
 
-    id: ClassVar[str] = "second_mode"
-    equation: ClassVar[str] = "1 + a·r²/(1 − r² + 2jζr), r = f/f_2"
-    source: ClassVar[str] = "modal superposition; ISO 7626-1"
-    breaker: ClassVar[str] = "turn the unit about its axis, or move it on the fixture"
+    id = "second_mode"
+    equation = "1 + a·r²/(1 − r² + 2jζr), r = f/f_2"
+    source = "modal superposition; ISO 7626-1"
+    breaker = "turn the unit about its axis, or move it on the fixture"
 
     def parameters(self, points: Conditions) -> tuple[Parameter, ...]:
         top = float(points.frequency.max())

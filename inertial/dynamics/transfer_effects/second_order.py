@@ -1,5 +1,3 @@
-from typing import ClassVar
-
 import numpy as np
 
 from inertial.dynamics.transfer_effects.base import Array, Complex, Conditions, Parameter, TransferEffect
@@ -8,10 +6,10 @@ from inertial.dynamics.transfer_effects.base import Array, Complex, Conditions, 
 class SecondOrder(TransferEffect):
     """A sprung mass: second-order response of the sensing element."""
 
-    id: ClassVar[str] = "second_order"
-    equation: ClassVar[str] = "1/(1 − r² + 2jζr), r = f/f_n"
-    source: ClassVar[str] = "IEEE Std 1293, annex on the dynamic model"
-    breaker: ClassVar[str] = "points beyond the natural frequency"
+    id = "second_order"
+    equation = "1/(1 − r² + 2jζr), r = f/f_n"
+    source = "IEEE Std 1293, annex on the dynamic model"
+    breaker = "points beyond the natural frequency"
 
     def parameters(self, points: Conditions) -> tuple[Parameter, ...]:
         low, top = float(points.frequency.min()), float(points.frequency.max())

@@ -1,5 +1,3 @@
-from typing import ClassVar
-
 import numpy as np
 
 from inertial.dynamics.transfer_effects.base import Array, Complex, Conditions, Parameter, TransferEffect
@@ -8,10 +6,10 @@ from inertial.dynamics.transfer_effects.base import Array, Complex, Conditions, 
 class Temperature(TransferEffect):
     """A sensitivity that follows the temperature during the sweep."""
 
-    id: ClassVar[str] = "temperature"
-    equation: ClassVar[str] = "1 + kT·(T − mean T)"
-    source: ClassVar[str] = "thermal coefficient of sensitivity"
-    breaker: ClassVar[str] = "the same frequencies at another temperature"
+    id = "temperature"
+    equation = "1 + kT·(T − mean T)"
+    source = "thermal coefficient of sensitivity"
+    breaker = "the same frequencies at another temperature"
 
     def parameters(self, points: Conditions) -> tuple[Parameter, ...]:
         span = float(np.ptp(points.temperature)) or 1.0  # of points that are only planned, all at one temperature

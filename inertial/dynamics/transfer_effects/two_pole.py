@@ -1,5 +1,3 @@
-from typing import ClassVar
-
 import numpy as np
 
 from inertial.dynamics.transfer_effects.base import Array, Complex, Conditions, Parameter, TransferEffect
@@ -8,11 +6,11 @@ from inertial.dynamics.transfer_effects.base import Array, Complex, Conditions, 
 class TwoPole(TransferEffect):
     """A two-pole Butterworth low-pass behind the sensing element."""
 
-    id: ClassVar[str] = "two_pole"
-    equation: ClassVar[str] = "1/(1 − r² + j√2·r), r = f/f_c"
-    source: ClassVar[str] = "Butterworth low-pass of order 2"
-    breaker: ClassVar[str] = "points beyond the corner, or the step response"
-    in_every_device: ClassVar[bool] = True
+    id = "two_pole"
+    equation = "1/(1 − r² + j√2·r), r = f/f_c"
+    source = "Butterworth low-pass of order 2"
+    breaker = "points beyond the corner, or the step response"
+    in_every_device = True
 
     def parameters(self, points: Conditions) -> tuple[Parameter, ...]:
         top = float(points.frequency.max())

@@ -28,7 +28,7 @@ def test_a_column_of_one_dwell_gains_the_same_without_being_whitened():
     problem = Problem(lot_of(measured(made.dwells[there], made.history)))
     model = Model(problem, terms_of(catalogue.get_all([*BASE, "level_error"]), problem))
     field = Candidates(problem, [], [WrongPose()])
-    quick = field.gains(model.space, set(), handling=True)["wrong_pose"]
+    quick = field.gains([model.space], set(), handling=True)[0]["wrong_pose"]
     pieces = problem.pieces(WrongPose(), field.grids["wrong_pose"])
     plain = Gain.joined([model.space.gain(piece) for piece in pieces])
     np.testing.assert_array_equal(quick.rank, plain.rank)

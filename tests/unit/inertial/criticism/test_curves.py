@@ -9,7 +9,7 @@ from inertial import effects
 from inertial.criticism.curves import fit_curve
 from inertial.criticism.drivers import across, curve, forces_along, transfer
 from inertial.criticism.examination import ExaminedRun
-from inertial.criticism.wide_suspects import wide_suspects
+from inertial.criticism.unknown import wide_suspects
 from inertial.estimation.comparison import estimate
 from inertial.estimation.term import Term
 from pipelines.tables.dwells import lot_of, measured

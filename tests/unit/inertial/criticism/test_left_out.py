@@ -6,9 +6,9 @@ from made_worlds import World, make
 
 from inertial import effects as catalogue
 from inertial.criticism.left_out import left_out
-from inertial.data_errors.bad_dwells import BadDwell, without
 from inertial.data_errors.handling.table_slip import TableSlip
 from inertial.data_errors.handling.unit_moved import UnitMoved
+from inertial.data_errors.removed_dwells import without
 from inertial.estimation.model import Model
 from inertial.estimation.problem import Problem
 from inertial.estimation.refinement import terms_of
@@ -23,7 +23,7 @@ MOVED = Term(UnitMoved(), (("unit", 1.0), ("dwell", 4.0)))
 def model(effects: list[str], *handling: Term) -> Model:
     """A model of three units, two dwells of which are missing."""
     lot = lot_of(measured(make(World(units=3, poses=10), 20_261_122).dwells))
-    lot = without(lot, [BadDwell(1, k, np.zeros(3), np.zeros(3)) for k in (2, 9)])
+    lot = without(lot, [(1, 2), (1, 9)])
     problem = Problem(lot)
     return Model(problem, [*terms_of(catalogue.get_all(effects), problem), *handling])
 

@@ -32,7 +32,7 @@ def numbers(lot: Lot) -> list[np.ndarray]:
     """Gains of effects and of every place of an alternative, and the probability that noise fits as badly."""
     base = model_of(lot)
     field = Candidates(base.problem, [catalogue.get(name) for name in EFFECTS], alternatives())
-    gains = field.gains(base.space, set(), handling=True)
+    (gains,) = field.gains([base.space], set(), handling=True)
     assert len(gains) > 4 + len(EFFECTS)
     probability = adequacy.adequacy(field, drivers_of(base.problem), base, np.random.default_rng(1))
     return [np.array(probability), np.array(base.noise.shares[:2]), *(g.drop for _, g in sorted(gains.items()))]

@@ -8,8 +8,8 @@ from made_worlds import BASE, HIDDEN, NULLS, Noise, World, lot_in, make
 from scipy import integrate, stats
 
 from inertial.data_errors import tails
-from inertial.data_errors.bad_dwells import BadDwell
 from inertial.data_errors.handling.units_swapped import UnitsSwapped
+from inertial.data_errors.removed_dwells import BadDwell
 from inertial.data_errors.tails import with_tails
 from pipelines.tables.sound_lot import sound_lot
 
@@ -46,7 +46,7 @@ def test_tables_agree_with_an_integral_of_the_convolution(share, z):
             integrate.quad(lambda x: stats.norm.pdf(x, scale=rest) * stats.t.sf((z - x) / scale, 3), a, b)[0]
             for a, b in pairwise(points)
         )
-    probability = tails._beyond(tails._SHARES.index(share), np.array([z]))[0]
+    probability = tails._probability_beyond(tails._SHARES.index(share), np.array([z]))[0]
     # beyond eight standard deviations the normal part is left out, where it adds a few per cent
     assert probability == pytest.approx(expected, rel=0.002 if z < 8.0 else 0.15)
 

@@ -13,7 +13,7 @@ from inertial.estimation.model import Model
 from inertial.estimation.problem import Problem
 from inertial.estimation.term import Term
 from inertial.next_measurement.proposals import Proposal, proposal, rivals_in, twins
-from inertial.next_measurement.separation import predictions, residual_squares, separations, widened
+from inertial.next_measurement.separation import apart, predictions, residual_squares, widened
 from inertial.planning.sequences import SequenceStep
 from pipelines.diagnosis.next_measurement import Proposed, rows_of
 from pipelines.tables.dwells import lot_of, measured
@@ -57,7 +57,7 @@ def test_a_kink_that_may_move_is_not_promised_as_far_away_as_one_that_may_not() 
     model, group = rivals(problem, "bias_temperature_quadratic", "thermal_kink")
     pair = rivals_in(model, group)
     steps = [SequenceStep(o, 0.0, t, 2.0) for t in (30.0, 10.0) for o in (0.0, np.pi)]
-    free = separations(pair, steps)[0, 1]
+    free = apart(pair, steps).left[0, 1]
     wide = widened(pair, steps, None)
     noise = wide.covariance.rescaled(pair.noise, pair.covariance)
     fixed = residual_squares(Model(wide, [*pair.rest, group.members[1].term]), predictions(pair, wide), noise)[0]

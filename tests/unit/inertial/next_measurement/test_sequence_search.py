@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from inertial.next_measurement.menus import Kind, StepSequence
-from inertial.next_measurement.offers import Offers
+from inertial.next_measurement.sequence_search import Offers
 from inertial.planning.sequences import SequenceStep
 
 NOW, BUDGET, LEAST = 0.2, 90.0, 0.03

@@ -1,0 +1,92 @@
+"""What errors of handling have in common: a change from a dwell on, an error that one unit alone has, one of a single axis."""
+
+from abc import abstractmethod
+
+import numpy as np
+
+from inertial.estimation.alternative import Array, Handling, after, times
+from inertial.estimation.lot import Lot
+
+AXES = "xyz"
+
+_EVERY = 160
+"""Dwells up to which each is a place of a jump."""
+
+
+def every_dwell(lot: Lot) -> list[int]:
+    """Dwells from which on a bias may have changed.
+
+    A jump that is missed by one dwell explains half of itself, and a step in time between two dwells all of it.
+    """
+    n = lot.state.time.shape[1]
+    return list(range(1, n)) if n <= _EVERY else times(lot)
+
+
+class Change(Handling):
+    """What all units have in addition from a dwell on."""
+
+    @abstractmethod
+    def addition(self, lot: Lot) -> Array:
+        """Columns (units or 1, n, 3, k) of the change as if it were there in all dwells, g per unit of the coefficient."""
+
+    def moments(self, lot: Lot) -> list[int]:
+        """Dwells from which on the change is searched."""
+        return times(lot)
+
+    def places(self, lot: Lot) -> list[dict[str, float]]:
+        """Every place in time."""
+        return [{"dwell": float(k)} for k in self.moments(lot)]
+
+    def change(self, lot: Lot, slope: Array | None, **place: float) -> Array:
+        """The addition from the dwell on."""
+        return self.addition(lot) * after(lot, place["dwell"])[:, None, None]
+
+
+class OfOneUnit(Handling):
+    """The error of the next base class where one unit alone has it."""
+
+    in_part = False
+
+    def places(self, lot: Lot) -> list[dict[str, float]]:
+        """Every unit at every place of the error of all units."""
+        places = super().places(lot)
+        return [{"unit": float(u), **place} for u in range(lot.state.time.shape[0]) for place in places]
+
+    def change(self, lot: Lot, slope: Array | None, **place: float) -> Array:
+        """The columns of the unit."""
+        of_units = self.of_each_unit(lot, slope, **place)
+        unit = int(place["unit"])
+        return of_units[unit : unit + 1] if len(of_units) > 1 else of_units
+
+    def of_each_unit(self, lot: Lot, slope: Array | None, **place: float) -> Array:
+        """The columns of the error of all units."""
+        return super().change(lot, slope, **place)
+
+
+class OfOneAxis(Handling):
+    """An error of the bias of one axis of one unit, which no other unit has."""
+
+    fewest_units = 1
+    in_part = False
+    of_one_axis = True
+
+    @abstractmethod
+    def levels(self, lot: Lot, **place: float) -> Array:
+        """Columns (n, k) of the axis."""
+
+    def change(self, lot: Lot, slope: Array | None, **place: float) -> Array:
+        """The columns of the axis; none in the others."""
+        levels = self.levels(lot, **place)
+        column = np.zeros((1, len(levels), len(AXES), levels.shape[-1]))
+        column[0, :, int(place["axis"])] = levels
+        return column
+
+    def of_each_unit(self, lot: Lot, slope: Array | None, **place: float) -> Array:
+        """The same for every unit."""
+        return self.change(lot, slope, **place)
+
+
+def axes_of_units(lot: Lot) -> list[dict[str, float]]:
+    """Every axis of every unit, as places."""
+    units = lot.state.time.shape[0]
+    return [{"unit": float(u), "axis": float(axis)} for u in range(units) for axis in range(len(AXES))]

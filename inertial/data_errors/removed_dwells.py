@@ -1,0 +1,53 @@
+"""Single dwells of single units that are left out, and models without them."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial.estimation.lot import Lot
+from inertial.estimation.model import Model
+from inertial.estimation.problem import Problem
+
+Array = NDArray[np.float64]
+Place = tuple[int, int]
+"""A unit and its dwell."""
+
+
+@dataclass(frozen=True)
+class BadDwell:
+    """A dwell of one unit: its deviation from its neighbours in time and the model.
+
+    off : (axes,), g; by_axis : (axes,), the same in standard deviations; tail : whether the noise of the run reaches as far
+    """
+
+    unit: int
+    dwell: int
+    off: Array
+    by_axis: Array
+    tail: bool = False
+
+    @property
+    def place(self) -> Place:
+        """Its unit and dwell."""
+        return self.unit, self.dwell
+
+    @property
+    def deviations(self) -> float:
+        """Length of the deviation, standard deviations."""
+        return float(np.linalg.norm(self.by_axis))
+
+
+def without(lot: Lot, places: Iterable[Place]) -> Lot:
+    """The lot without some dwells of some units."""
+    error = lot.error.copy()
+    for place in places:
+        error[place] = np.inf
+    return replace(lot, error=error)
+
+
+def model_without(model: Model, places: Iterable[Place]) -> Model:
+    """The model in the lot without some dwells, its noise estimated again."""
+    problem = Problem(without(model.problem.lot, places), slope=model.problem.slope)
+    return Model(problem, model.terms, near=model.noise)
