@@ -105,7 +105,7 @@ def rising(rise: float, density: float) -> LeftOut:
 
 
 FALL, SAME, BETTER = (2e-4, 1e-4), (1e-4, 1e-4), missed(0.9e-4, 2.0)
-RISES = "the error on the fresh run rises from 200 to 1.45e+05 µg"
+RISES = "the error on the fresh run rises from 200 to 145000 µg"
 
 
 @each([  # uncertainty of the fall, residuals before and after, dwells left out, confirmed, what is said
