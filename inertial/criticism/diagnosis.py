@@ -23,7 +23,7 @@ from inertial.data_errors.removed_dwells import BadDwell, model_without
 from inertial.decisions import ADEQUATE_ABOVE
 from inertial.effects.covariate import Covariate
 from inertial.estimation.alternative import Handling
-from inertial.estimation.comparison import estimate, fit_rms, residuals_of
+from inertial.estimation.comparison import fitted_residuals
 from inertial.estimation.comparison import rms as rms_of
 from inertial.estimation.model import Model
 from inertial.estimation.problem import Lot, Problem
@@ -161,7 +161,7 @@ def _named(problem: Problem, base: Model, classes: Sequence[EffectClass]) -> tup
         after = left_out(model, also=terms)
         errors = worst(before, after) if before is not None else (float("nan"), float("nan"))
         rest = Model(problem, [*base.terms, *(t for t in terms if t is not first)], near=base.noise)
-        left = rms_of(residuals_of(problem, estimate(model))) if problem.lot.radial else fit_rms(problem, model.terms)
+        left = rms_of(fitted_residuals(model))
         named.append(Named(group, left, *errors, carried=carried_by(rest, first)))
         before = after
     return tuple(named)

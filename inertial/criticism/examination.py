@@ -20,7 +20,7 @@ from inertial.data_errors.handling import alternatives
 from inertial.data_errors.removed_dwells import BadDwell, without
 from inertial.decisions import CLASS_WIDTH, RISES
 from inertial.estimation.alternative import Exchangeable, Handling, Misfit, soaks
-from inertial.estimation.comparison import fit_rms, slope_of
+from inertial.estimation.comparison import fitted_residuals, rms, slope_of
 from inertial.estimation.loudness import loudness_of
 from inertial.estimation.model import Model, refuse_without_freedom
 from inertial.estimation.penalty import cost_of_model
@@ -234,12 +234,11 @@ def _mend(run: ExaminedRun, fields: Candidates, searched: SearchResult, term: Te
     term = Term(alternative, tuple(place.items()))
     model = searched.model.with_term(term)
     group = class_of(fields, model, term)
-    problem = fields.problem
     size = model.shared_sizes(term)
     units = alternative.units(**place)
     evidence, dwells = _described(fields, searched.model, term, alternative, size)
     before, after = left_out(searched.model), left_out(model, term)
-    errors = fit_rms(problem, model.terms), *worst(before, after)
+    errors = rms(fitted_residuals(model)), *worst(before, after)
     lot = alternative.settled(run.lot, size, _misfit(searched.model, model), **place)
     carried, lasting = carried_by(searched.model, term), term if lot is None else None
     run.handled.append(Named(group, *errors, units, dwells, evidence, carried, lasting))

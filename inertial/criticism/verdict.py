@@ -19,7 +19,7 @@ from inertial.data_errors.removed_dwells import BadDwell
 from inertial.data_errors.tails import with_tails
 from inertial.decisions import ADEQUATE_ABOVE, NAMED_BELOW
 from inertial.estimation.bases import SEEN
-from inertial.estimation.comparison import estimate, fit_rms, residuals_of
+from inertial.estimation.comparison import fitted_residuals
 from inertial.estimation.comparison import rms as rms_of
 from inertial.estimation.likelihood import shared_noise
 from inertial.estimation.model import Model
@@ -88,7 +88,7 @@ def judged(lot: Lot, effects: Sequence[str], rng: Generator) -> Verdict:
     log_p = adequacy(search.field, drivers, base, rng)
     removed = tuple(with_tails(searched.model, run.removed)) if run.removed else ()
     named_data = bool(run.handled) or any(not d.tail for d in removed)
-    rms = _rms(base)
+    rms = rms_of(fitted_residuals(base))
     unjudged = not_judged(base, rms)
     passed = passes(np.exp(log_p), ADEQUATE_ABOVE) if rms <= GROSS else False
     if passed is None and not unjudged:
@@ -149,13 +149,6 @@ def _adequate(*, sound: bool, named_data: bool, unjudged: str) -> bool | None:
     if named_data:
         return False
     return None if unjudged else sound
-
-
-def _rms(base: Model) -> float:
-    """Residual of the model that is judged, g: by the published fit if poses are unknown."""
-    if base.problem.lot.radial:
-        return rms_of(residuals_of(base.problem, estimate(base)))
-    return fit_rms(base.problem, base.terms)
 
 
 def _with_curves(

@@ -153,11 +153,15 @@ def residuals(problem: Problem, terms: Sequence[Term], train: NDArray[np.bool_])
 
 
 class Fitting:
-    """A model's columns in a problem, ready to be fitted to some dwells of any series."""
+    """A model's columns in a problem, ready to be fitted to some dwells of any series.
 
-    def __init__(self, problem: Problem, terms: Sequence[Term]) -> None:
-        self._x = _columns(problem, [t for t in terms if not t.shared])
-        self._z = _columns(problem, [t for t in terms if t.shared])
+    start : whether the unknown state of memories before the first dwell is fitted as well
+    """
+
+    def __init__(self, problem: Problem, terms: Sequence[Term], *, start: bool = False) -> None:
+        of_terms = _with_start if start else _columns
+        self._x = of_terms(problem, [t for t in terms if not t.shared])
+        self._z = of_terms(problem, [t for t in terms if t.shared])
         self._weight = np.where(np.isfinite(problem.error), 1.0 / problem.error, 0.0)
 
     def left(self, series: Array, train: NDArray[np.bool_]) -> Array:
@@ -172,10 +176,19 @@ class Fitting:
         return series - x @ solve(series)
 
 
-def fit_rms(problem: Problem, terms: Sequence[Term]) -> float:
-    """RMS residual in g of the fit to all dwells."""
-    left = residuals(problem, terms, np.ones(problem.n, dtype=bool))
-    return float(np.sqrt(np.nanmean(left**2)))
+def fitted_residuals(model: Model) -> Array:
+    """THE residuals of a model on its own dwells, (blocks, n) in g, of which everything that is printed and drawn is made.
+
+    Of least squares weighted by the white standard errors: what the model cannot follow, whatever noise is assumed. At a noise
+    that has taken a missing effect for wander, generalised least squares leaves more. With unknown poses they are those of the
+    published fit.
+    """
+    problem = model.problem
+    if problem.lot.radial:
+        return residuals_of(problem, estimate(model))
+    fitting = Fitting(problem, model.terms, start=True)
+    left = fitting.left(problem.series[..., None], np.ones(problem.n, dtype=bool))[..., 0]
+    return np.where(np.isfinite(problem.error), left, np.nan)
 
 
 def _solver(x: Array, weight: Array) -> Callable[[Array], Array]:

@@ -19,7 +19,7 @@ from inertial.data_errors.removed_dwells import BadDwell
 from inertial.effects import StationEffect
 from inertial.errors import InertialError
 from inertial.estimation.alternative import Handling
-from inertial.estimation.comparison import Estimate, estimate, residuals_of, rms
+from inertial.estimation.comparison import Estimate, estimate, fitted_residuals, residuals_of, rms
 from inertial.estimation.model import Model, refuse_without_freedom
 from inertial.estimation.problem import Lot, Problem
 from inertial.estimation.refinement import intervals, settled, terms_of
@@ -71,7 +71,7 @@ def _compared(
     refuse_without_freedom(model)
     model = settled(model)
     fitted = estimate(model)
-    left = residuals_of(problem, fitted)
+    left = fitted_residuals(model)
     out = left_out(model)
     units = _by_unit(measurement, left)
     answer: dict[str, Any] = {

@@ -9,7 +9,7 @@ import numpy as np
 from inertial.arrays import Array, Index
 from inertial.criticism.diagnosis import Diagnosis
 from inertial.criticism.drivers import drivers_of
-from inertial.estimation.comparison import estimate, residuals_of
+from inertial.estimation.comparison import fitted_residuals
 from inertial.estimation.model import Model
 from inertial.estimation.problem import Problem
 from inertial.quantities import axis_labels, shown_factor
@@ -61,7 +61,7 @@ class DriverValues:
 
 
 def lot_residuals(diagnosis: Diagnosis, units: tuple[str, ...]) -> LotResiduals:
-    """Residuals before and after, by generalised least squares with each model's own noise."""
+    """Residuals before and after, of the dwells that are fitted."""
     before = residuals_of_model(diagnosis.base, len(units))
     after = before if not added(diagnosis) else residuals_of_model(diagnosis.final, len(units))
     sizes = np.nanmean(before**2, axis=(1, 2))
@@ -77,7 +77,7 @@ def axes_of(problem: Problem) -> tuple[str, ...]:
 def residuals_of_model(model: Model, units: int) -> Array:
     """The residuals of a model, µg, (units, axes, n)."""
     shape = (units, len(axes_of(model.problem)), model.problem.n)
-    return MICRO * residuals_of(model.problem, estimate(model)).reshape(shape)
+    return MICRO * fitted_residuals(model).reshape(shape)
 
 
 def added(diagnosis: Diagnosis) -> list[str]:

@@ -220,7 +220,7 @@ def test_a_run_brings_its_history_and_its_own_model_unless_another_is_named(tmp_
     run = small_run(tmp_path, None, (plain, plain.replace("]", ', "second_order"]')))
     own, where = run.about["recipe"]["effects"], ("--archive", run.archive.root)
     compared = document_of("compare", "latest", "--fresh", run.id, *where)
-    assert compared["fresh_rms_ug"] == pytest.approx(compared["rms_ug"], rel=1e-6)
+    assert compared["fresh_rms_ug"] == pytest.approx(compared["rms_ug"], rel=0.01)
     judged = document_of("diagnose", run.id, *where)
     assert judged["effects"] == compared["effects"] == own
     assert {name for group in judged["classes"] for name in group["effects"]}.isdisjoint(own)
