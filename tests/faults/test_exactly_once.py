@@ -69,6 +69,12 @@ def trouble(rng):
     return script
 
 
+def another_angle(rng, present: float) -> float:
+    """A target of at least a degree away: an axis that already stands at its target, within the tolerance, need not move."""
+    drawn = float(np.round(rng.uniform(-150.0, 150.0), 2))
+    return drawn if abs(drawn - present) > 1.0 else another_angle(rng, present)
+
+
 def run_many(drive: str, runs: int, seed: int):
     """Moves ordered by drive in so many runs under trouble: orders taken per axis, tries, spoilt frames."""
     config = station_with(axis=drive)
@@ -79,7 +85,7 @@ def run_many(drive: str, runs: int, seed: int):
     with PlantServer(plant) as server, ChaosProxy(server.host, server.port, trouble(rng)) as proxy:
         table, links = table_through(proxy, config, plant)
         for n in range(runs):
-            outer, inner = (float(np.round(v, 2)) for v in rng.uniform(-150.0, 150.0, 2))
+            outer, inner = (another_angle(rng, axis.move.target) for axis in (plant.outer, plant.inner))
             before = plant.outer._moves, plant.inner._moves
             tries += moved_until_there(table, outer, inner)
             assert (plant.outer._moves - before[0], plant.inner._moves - before[1]) == (1, 1), f"run {n}"
@@ -95,7 +101,7 @@ def run_many(drive: str, runs: int, seed: int):
 @pytest.mark.parametrize("drive", DRIVES)
 def test_nothing_moves_twice_under_a_bad_network(drive, runs):
     # refuses any run in which an axis was not moved exactly once
-    tries, spoilt = run_many(drive, runs, seed=3 if runs == 3 else 11)
+    tries, spoilt = run_many(drive, runs, seed=3)
     assert spoilt > runs
     assert tries >= runs
     assert runs == 3 or tries > runs  # the trouble was real: runs had to be tried again
