@@ -95,6 +95,10 @@ def _by_fresh(progress: dict[str, Any], fall: str) -> str:
 
 
 def _fall(progress: dict[str, Any]) -> str:
-    """The decrease of the error with its uncertainty."""
+    """The decrease of the error with its uncertainty; of a fresh run, without what may change from day to day."""
     fall = progress["fall_ug"]
-    return "the error cannot be judged on dwells left out" if fall is None else fall_of(fall, progress["fall_u_ug"])
+    if fall is None:
+        return "the error cannot be judged on dwells left out"
+    beside = {"base": "the coefficients of the earlier model", "bias": "the bias of each unit"}
+    again = beside.get(progress["estimated_again"] or "")
+    return fall_of(fall, progress["fall_u_ug"]) + (f" where {again} may change from day to day" if again else "")
