@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import butter, sosfiltfilt
 
 from inertial.errors import NotIdentified
 
@@ -106,6 +107,77 @@ def measured_pulse(record: Array, rate_hz: float, *, before_s: float) -> Pulse:
         start=first,
         stop=last,
     )
+
+
+HALF_WIDTH = 2.0 / 3.0
+"""Part of a half sine's duration between the points at half of its peak."""
+CUT = 6.0
+"""Corner of the low-pass behind which a pulse is measured, over its duration: it takes 0.3 % off a half sine."""
+_ALIKE = 0.15
+_SETTLED = 0.02
+
+
+def low_passed(record: Array, rate_hz: float, duration_s: float) -> Array:
+    """A record (n,) behind the phaseless low-pass that belongs to a pulse of this duration."""
+    corner = min(CUT / duration_s, 0.4 * rate_hz)
+    return np.asarray(sosfiltfilt(butter(2, corner, fs=rate_hz, output="sos"), record))
+
+
+def found_duration(record: Array, rate_hz: float) -> tuple[float, float]:
+    """Duration of the half sine in a record (n,) of any unit, s, and the time at the beginning that is free of it, s.
+
+    The width at half of the peak decides the low-pass, which decides the width: from the narrowest excursion on until both agree,
+    so that neither ringing nor a filter for another pulse is taken for the pulse.
+
+    Raises
+    ------
+    NotIdentified
+        No pulse stands out of the noise, it begins with the record, or its widths at 10 and at 50 % are not those of a half sine.
+    """
+    plain = record - np.median(record)
+    noise = 1.4826 * float(np.median(np.abs(plain)))
+    y, duration = plain, 0.0
+    for _ in range(30):
+        y = y if y[np.argmax(np.abs(y))] > 0.0 else -y
+        top = int(np.argmax(y))
+        if not y[top] > 8.0 * noise:
+            msg = f"shock: the largest excursion is {y[top]:.3g} at a noise of {noise:.3g}, no pulse; check the trigger"
+            raise NotIdentified(msg)
+        start, stop = _crossings(y, top, 0.5 * float(y[top]))
+        wider = max((stop - start) / rate_hz / HALF_WIDTH, 4.0 / rate_hz)
+        if abs(wider - duration) < _SETTLED * wider:
+            break
+        duration = wider
+        y = low_passed(plain, rate_hz, duration)
+    top = int(np.argmax(y))
+    start, stop = _crossings(y, top, 0.1 * float(y[top]))
+    by_foot = (stop - start) / rate_hz / TEN_PERCENT
+    if abs(by_foot / duration - 1.0) > _ALIKE:
+        msg = (
+            f"shock: the pulse is no half sine: by its width at 10 % of the peak it lasts {1e3 * by_foot:.3g} ms, at 50 % "
+            f"{1e3 * duration:.3g} ms; state duration_ms, or look at the mounting"
+        )
+        raise NotIdentified(msg)
+    return by_foot, max(start / rate_hz - 0.5 * by_foot, 0.0)
+
+
+def return_time(record: Array, pulse: "Pulse", rate_hz: float, share: float = 0.02) -> float:
+    """Time after the pulse, s, until the record stays within a share of the peak of where it ends; NaN where it does not."""
+    after = record[pulse.stop :]
+    rest = after[-max(after.size // 5, 8) :]
+    allowed = max(share * abs(pulse.peak), 4.0 * pulse.noise)
+    if after.size < 40 or float(np.ptp(rest)) > 2.0 * allowed:
+        return float("nan")
+    beyond = np.flatnonzero(np.abs(after - rest.mean()) > allowed)
+    return (int(beyond[-1]) + 1) / rate_hz if beyond.size else 0.0
+
+
+def zero_shift(record: Array, pulse: "Pulse") -> tuple[float, float]:
+    """Mean of the last fifth after the pulse minus the baseline, and its standard uncertainty by white noise."""
+    after = record[pulse.stop :]
+    rest = after[-max(after.size // 5, 8) :]
+    before = max(pulse.start // 2, 8)
+    return float(rest.mean()) - pulse.baseline, pulse.noise * float(np.sqrt(1.0 / rest.size + 1.0 / before))
 
 
 def _span(y: Array, top: int, level: float) -> tuple[int, int]:

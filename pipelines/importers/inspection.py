@@ -18,6 +18,7 @@ from inertial.quantities import ANGLE_COLUMNS, FORCE_COLUMNS
 from pipelines.importers import clocks, files, sample_faults, sources, unit_check, values
 from pipelines.importers.content import Content
 from pipelines.importers.documents import ColumnDocument, InspectDocument, IntervalDocument
+from pipelines.importers.dynamic_guess import dynamic_guess, serial_of
 from pipelines.importers.exchange import is_exchange, read_dwells
 from pipelines.importers.guesses import EXCHANGE, Guesses, guesses, guesses_of_dwells, measurable
 from pipelines.importers.mapping import TIME_UNITS
@@ -63,7 +64,10 @@ def inspect(paths: Sequence[Path], *, join: str = "", group: str = "") -> Inspec
     faults = sample_faults.look(kept) if kept is not None and len(kept) > 3 and not guessed.dwells else None
     rate = _rate(own)
     intervals = _intervals(kept, own, rate) if kept is not None and rate else []
-    if output is None:
+    dynamic = dynamic_guess(paths[0], content, guessed, rate) if output is None and len(paths) == 1 else None
+    if dynamic is not None:
+        open_ += dynamic.open
+    elif output is None:
         missing = [axis for axis in "xyz" if not guessed.column(axis)]
         open_.append(f"columns of acceleration were not recognised: map {' and '.join(missing)} by name or number")
         few = len([one for one in guessed.columns.values() if one.meaning != "time"])
@@ -93,10 +97,14 @@ def inspect(paths: Sequence[Path], *, join: str = "", group: str = "") -> Inspec
         "faults": [] if faults is None or kept is None else faults.rows(_clock_of(kept, own)),
         "intervals": intervals,
         "open": open_,
-        "command": _command(
+        "command": dynamic.command
+        if dynamic is not None
+        else _command(
             paths, content, guessed, join=join, group=group, split=split, faulty=bool(faults), positions=positions
         ),
     }
+    if dynamic is not None:
+        dynamic.mark(document["columns"])
     return Inspection(document, own, kept)
 
 
@@ -276,7 +284,7 @@ def _command(
     heat = TEMPERATURE.get(content.units.get(guessed.column("temperature"), "").strip().lower(), "degC")
     units += [f"temperature={heat}"] if heat != "degC" else []
     words = ["tumbleline", "import", *(str(path) for path in paths), "--map", mapped, "--units", ",".join(units)]
-    words += ["--unit", _serial(paths[0])]
+    words += ["--unit", serial_of(paths[0])]
     words += ["--rows", "dwells"] if guessed.dwells else [] if time else ["--rate", "HZ"]
     words += ["--join", join] if join else []
     words += ["--group", group] if group else []
@@ -289,9 +297,3 @@ def _command(
 def _mapped(name: str, names: list[str]) -> str:
     """A column as a name for --map: by its number where its name has a comma or an equals sign, or blanks at its ends."""
     return str(names.index(name) + 1) if re.search(r"[,=]|^\s|\s$", name) or not name else name
-
-
-def _serial(path: Path) -> str:
-    """A serial number from the name of the file."""
-    stem = re.sub(r"[^A-Za-z0-9._+-]", "-", path.name.split(".")[0]).strip("._+-")
-    return stem[:64] or "UNIT-1"

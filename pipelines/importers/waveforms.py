@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -71,12 +71,19 @@ def import_waveforms(
     out_unit = ""
     records: list[ProcedureRecord] = []
     sources: list[files.SourceFile] = []
-    for number, path in enumerate(paths):
-        unit_record, reference, text, source = _recording(path, layout, own, one)
+    recordings = [_recording(path, layout, own, one) for path in paths]
+    own = _scaled(own, one, recordings[0].unit, part)
+    driven = [made.own if made.reference is None else made.reference for made in recordings]
+    try:
+        own = one.completed(own, driven)
+    except InertialError as problem:
+        raise DataRejected(f"{paths[0].name}: {problem}") from None
+    for number, (path, made, drive) in enumerate(zip(paths, recordings, driven, strict=True)):
+        text = made.unit
         out_unit = out_unit or text
         if text != out_unit:
             raise DataRejected(f"{path.name}: output in {text}, {out_unit} in the files before; import them apart")
-        setting = one.setting_of(own, reference)
+        setting = one.setting_of(own, drive)
         pose = Pose(name="imported", outer_deg=0.0, inner_deg=0.0)
         step = ProcedureStep(path.name, pose, own.temperature_C, role="imported", setting=setting)
         reading = {
@@ -86,10 +93,9 @@ def import_waveforms(
             "full_scale": full_scale,
             "out_unit": text,
         }
-        records.append(
-            ProcedureRecord(number, step, pd.DataFrame([reading]), {unit: unit_record, REFERENCE: reference})
-        )
-        sources.append(source)
+        samples = {unit: made.own} | ({} if made.reference is None else {REFERENCE: made.reference})
+        records.append(ProcedureRecord(number, step, pd.DataFrame([reading]), samples))
+        sources.append(made.source)
     device = Device({}, {}, full_scale, out_unit)
     try:
         points = one.reduce(own, records, device)
@@ -102,6 +108,7 @@ def import_waveforms(
     texts = [(f.subject, f.text) for f in outcome.findings]
     if not np.isfinite(full_scale):
         texts.append(("not judged", "clipping: full_scale is not given; add it to the file of --part"))
+    content |= own.model_dump(include={"duration_ms", "before_ms"} - set(content))
     stated = {"part": content, "columns": dict(layout.columns), "units": dict(layout.units), "rate_hz": layout.rate_hz}
     stated |= {"group": layout.group}
     about = {
@@ -150,23 +157,41 @@ def _part(procedure: str, path: Path | None) -> tuple[FromWaveforms, Any, dict[s
         own = part.model_validate(content)
     except ValidationError as problem:
         raise explain(problem, str(path or "--part"), part) from None
-    if isinstance(own, NominalScale) and own.scale is None:  # a recording made elsewhere has no multi-position test
-        raise WrongUse(
-            f"import: procedure {procedure} has no scale, output per g is needed for figures in g; add scale = … to "
-            f"{path or 'a file and give it with --part'}"
-        )
     return can[procedure], own, content, float(full_scale)
 
 
-def _recording(
-    path: Path, layout: RecordingLayout, part: Any, procedure: FromWaveforms
-) -> tuple[UnitRecord, UnitRecord, str, files.SourceFile]:
-    """The unit and the reference of one file, the unit of the output, and the source."""
+def _scaled(part: Any, procedure: FromWaveforms, out_unit: str, path: Path | None) -> Any:
+    """The part with a scale: one is stated, or follows from an output that is an acceleration.
+
+    A recording made elsewhere has no multi-position test that determines it.
+    """
+    if not isinstance(part, NominalScale) or part.scale is not None:
+        return part
+    if out_unit in ACCELERATION:
+        return part.model_copy(update={"scale": 1.0 / ACCELERATION[out_unit]})
+    raise WrongUse(
+        f"import: procedure {procedure.name} has no scale, output per g is needed for figures in g; add scale = … to "
+        f"{path or 'a file and give it with --part'}"
+    )
+
+
+class _Recording(NamedTuple):
+    """One file: the unit, the reference (None without one), the unit of the output, and the source."""
+
+    own: UnitRecord
+    reference: UnitRecord | None
+    unit: str
+    source: files.SourceFile
+
+
+def _recording(path: Path, layout: RecordingLayout, part: Any, procedure: FromWaveforms) -> _Recording:
+    """The channels of one file."""
     first, _, second = (piece.strip() for piece in layout.group.partition(","))
     content, source = files.read_content(path, first)
     other = files.read_content(path, second)[0] if second else content
     outputs = {axis: layout.columns[axis] for axis in AXES if axis in layout.columns}
-    if not outputs or "reference" not in layout.columns:
+    alone = "reference" not in layout.columns and not procedure.needs_reference
+    if not outputs or ("reference" not in layout.columns and not alone):
         there = ", ".join(shown(str(name)) for name in content.table.columns)
         raise WrongUse(
             f"import: reference and at least one of x, y, z are needed for {path.name} (its columns: {there}); add --map "
@@ -174,16 +199,17 @@ def _recording(
         )
     text = _unit(content, layout, "output", next(iter(outputs.values())), path.name)
     known = VOLT if procedure.reference_unit == "V" else ACCELERATION
+    own = UnitRecord(time := _clock(content, layout, path.name), np.zeros((len(time), 3)))
+    for axis, column in outputs.items():
+        own.output[:, AXES.index(axis)] = finite_column(content.table, column, path.name)
+    if alone:
+        return _Recording(own, None, text, source)
     reference_unit = _unit(other, layout, "reference", layout.columns["reference"], path.name)
     if reference_unit not in known:
         raise DataRejected(
             f"{path.name}: reference in '{shown(reference_unit)}', one of {', '.join(known)} is needed; state it with "
             "--units reference=…"
         )
-    time = _clock(content, layout, path.name)
-    wide = np.zeros((len(time), 3))
-    for axis, column in outputs.items():
-        wide[:, AXES.index(axis)] = finite_column(content.table, column, path.name)
     drive_time = _clock(other, layout, path.name)
     drive = np.zeros((len(drive_time), 3))
     place = AXES.index(part.axis) if hasattr(part, "axis") else 0
@@ -192,7 +218,7 @@ def _recording(
         if f"reference_{axis}" in layout.columns:
             column = layout.columns[f"reference_{axis}"]
             drive[:, k] = known[reference_unit] * finite_column(other.table, column, path.name)
-    return UnitRecord(time, wide), UnitRecord(drive_time, drive), text, source
+    return _Recording(own, UnitRecord(drive_time, drive), text, source)
 
 
 def _unit(content: Content, layout: RecordingLayout, meaning: str, column: str, where: str) -> str:

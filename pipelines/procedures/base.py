@@ -150,9 +150,15 @@ class FromWaveforms(Evaluated):
     """A procedure whose recordings may be made elsewhere and imported, one file a record.
 
     reference_unit : of the reference channel of such a recording, g or V
+    needs_reference : whether it gives no figure without one
     """
 
     reference_unit: ClassVar[str] = "g"
+    needs_reference: ClassVar[bool] = True
+
+    def completed(self, part: Any, references: Sequence[UnitRecord]) -> Any:
+        """The part with what recordings made elsewhere show and the user has not stated."""
+        return part
 
     @abstractmethod
     def setting_of(self, part: Any, reference: UnitRecord) -> dict[str, float]:

@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import suppress
 from typing import Annotated, Any, Literal, cast
 
 import numpy as np
 import pandas as pd
 from pydantic import Field, model_validator
 
-from inertial.dynamics.pulses import measured_pulse, velocity_change
+from inertial.dynamics.pulses import found_duration
 from inertial.dynamics.shock_diagnosis import DEFAULT
 from inertial.dynamics.shock_effects import EFFECTS
 from inertial.dynamics.stability import difference_error, error_of_mean, short_noise
-from inertial.dynamics.wander import stated_error
 from inertial.errors import NotIdentified
-from inertial.record_faults import clipped as at_extreme
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Role, Trace
-from pipelines.procedures import shock_waves
+from pipelines.procedures import shock_pulse, shock_waves
 from pipelines.procedures.base import FromWaveforms, InG, NominalScale, OnEquipment, refuse_unknown_effects, scale_of
 from pipelines.procedures.columns import noise_columns, numbers, point_rows, point_table, pooled_noise
 from pipelines.procedures.figures import FigureSpec, FigureValue, UnitOutcome, worst
@@ -37,19 +34,22 @@ from schemas.bounds import NotNegative, Positive, Wait
 from schemas.recipe import Recipe
 from schemas.units import AXES, MICRO
 
-BEFORE_S = 0.04
+TOO_FAR = 1.5
+"""Ratio of the stated to the recorded duration beyond which the low-pass for one would alter the peak of the other."""
 
 
 class ShockPart(NominalScale):
     """Shocks up and against the axis; the bias is measured on the table before and after, in one pose, over equal windows.
 
     ``effects`` is the model by which the waveforms of unit and reference are compared; the diagnosis names what is missing.
-    ``waveform_percent`` is the standard uncertainty of a sample of that comparison, of the peak.
+    ``waveform_percent`` is the standard uncertainty of a sample of that comparison, of the peak. Each record is free of the
+    pulse for ``before_ms``. In a recording made elsewhere both times are found where they are not stated.
     """
 
     kind: Literal["shock"]
     peak_g: Annotated[Positive, Field(le=50000.0)] = 30.0
     duration_ms: Annotated[Positive, Field(ge=0.05, le=60.0)] = 11.0
+    before_ms: Annotated[Positive, Field(le=10000.0)] = 40.0
     shocks: Annotated[int, Field(ge=1, le=20)] = 3
     both_directions: bool = True
     axis: Literal["x", "y", "z"] = "z"
@@ -72,12 +72,11 @@ class ShockTest(InG, OnEquipment, FromWaveforms):
     name = "shock"
     title = "Half-sine shock"
     order = 120
-    states = (
-        "sensitivity by comparison, undershoot after the pulse, bias shift, survival; spectrum of reference and unit"
-    )
+    states = "sensitivity by comparison, pulse, undershoot, return, zero and bias shift, survival; spectrum of reference and unit"
     source = "ISO 16063-22 (comparison), IEC 60068-2-27 (pulse), ISO 18431-4 (shock response spectrum)"
     roles = ("shock_machine",)
     part = ShockPart
+    needs_reference = False
     figures = (
         FigureSpec(
             "shock_sensitivity_percent",
@@ -92,6 +91,7 @@ class ShockTest(InG, OnEquipment, FromWaveforms):
         FigureSpec(
             "shock_bias_shift_ug", "µg", "bias after the shocks minus before, same pose and temperature, worst axis"
         ),
+        *shock_pulse.OF_PULSE,
     )
 
     def steps(self, part: ShockPart, recipe: Recipe) -> list[ProcedureStep]:
@@ -123,28 +123,47 @@ class ShockTest(InG, OnEquipment, FromWaveforms):
         """Peak and direction of a shock, from the reference."""
         axis = AXES.index(part.axis)
         wave = reference.output[:, axis]
-        wave = wave - wave[: max(8, int(BEFORE_S * reference.rate_hz))].mean()
+        wave = wave - np.median(wave)
         peak = float(wave[int(np.argmax(np.abs(wave)))])
         return _setting(part, abs(peak), float(np.sign(peak)))
+
+    def completed(self, part: ShockPart, references: Sequence[UnitRecord]) -> ShockPart:
+        """The part with the duration of the pulse and the time before it from the recordings, where the user has stated none."""
+        axis = AXES.index(part.axis)
+        found = np.array([found_duration(one.output[:, axis], one.rate_hz) for one in references])
+        duration, before = 1e3 * float(np.median(found[:, 0])), 1e3 * float(found[:, 1].min())
+        stated = part.model_fields_set
+        if "duration_ms" in stated and not 1.0 / TOO_FAR < part.duration_ms / duration < TOO_FAR:
+            msg = f"duration_ms is {part.duration_ms:g}, the pulse lasts {duration:.3g} ms; correct it, or leave it out"
+            raise NotIdentified(msg)
+        own = {"duration_ms": duration, "before_ms": before}
+        return part.model_copy(update={name: value for name, value in own.items() if name not in stated})
 
     def reduce(self, part: ShockPart, records: Records, device: Device) -> pd.DataFrame:
         """Peaks of reference and unit, waveforms and spectra of the first shock, and the bias before and after."""
         rows: list[dict[str, Any]] = []
-        axis, duration = AXES.index(part.axis), 1e-3 * part.duration_ms
+        axis, duration, before_s = AXES.index(part.axis), 1e-3 * part.duration_ms, 1e-3 * part.before_ms
         first = next((k for k, record in enumerate(records) if record.step.role), -1)
         for one in taken(records):
             scale = scale_of(part, device, one.unit)
             if not one.record.step.role:
                 rows += bias_points(one, scale)
                 continue
-            pair = shock_waves.filtered_pair(one.record.samples[REFERENCE], one.own, axis, scale[axis], duration)
             direction = one.record.step.setting["direction"]
-            noise = shock_waves.noise_before(pair, BEFORE_S)
-            of_shock = [
-                *_pulse(one.number, direction, one.own.output[:, axis], pair, device),
-                *shock_waves.waves(one.number, pair, direction, settings_of(part), noise),
-                *(shock_waves.curves(pair, duration, BEFORE_S) if one.number == first else ()),
-            ]
+            alone = REFERENCE not in one.record.samples
+            in_g = UnitRecord(one.own.time, one.own.output / scale)
+            pair = shock_waves.filtered_pair(
+                in_g if alone else one.record.samples[REFERENCE], one.own, axis, scale[axis], duration
+            )
+            of_shock = shock_pulse.rows_of(
+                one.number, direction, one.own.output[:, axis], pair, before_s, device, alone=alone
+            )
+            names = ("unit",) if alone else ("reference", "unit")
+            if not alone:
+                noise = shock_waves.noise_before(pair, before_s)
+                of_shock += shock_waves.waves(one.number, pair, direction, settings_of(part), noise)
+            if one.number == first:
+                of_shock += shock_waves.curves(pair, names, duration, before_s)
             rows += [row | {"unit": one.unit, "axis": part.axis} for row in of_shock]
         return point_table(rows)
 
@@ -155,18 +174,13 @@ class ShockTest(InG, OnEquipment, FromWaveforms):
         good = ratio[np.isfinite(ratio["value"])]
         if len(bias) and bool((bias.loc[bias["setting"] > 0.0, "uncertainty"] <= STUCK).any()):
             texts.append(("survival", "the output is constant after the shocks: the unit has not survived"))
-        if len(reference):
-            peak, lasting = float(reference["value"].abs().mean()), float(reference["duration_s"].mean())
-            ideal = velocity_change(peak, lasting)
-            text = (
-                f"reference {peak:.4g} g, {1e3 * lasting:.3g} ms, velocity change "
-                f"{float(reference['velocity_m_s'].abs().mean()):.3g} m/s "
-                f"(half sine: {ideal:.3g} m/s; IEC 60068-2-27 allows ± 15 %)"
-            )
-            texts.append(("pulse", text))
-        if len(good):
+        pulse = rows[rows["series"] == "pulse"]
+        texts += shock_pulse.texts_of(reference, pulse)
+        apart = shock_pulse.no_comparison(good, reference, pulse)
+        if len(good) and not apart:
             texts += shock_waves.diagnosis_text(rows, settings_of(part), part.effects)
-        return [*_ratio_figures(part, ratio, good), bias_shift(bias)], texts
+        compared = shock_pulse.ratio_figures(part, ratio, good, apart)
+        return [*compared, bias_shift(bias), *shock_pulse.pulse_figures(part.axis, pulse, ratio)], texts
 
     def chart(self, part: ShockPart, points: pd.DataFrame) -> Chart:
         """First shock of reference and unit, and their shock response spectra."""
@@ -174,6 +188,8 @@ class ShockTest(InG, OnEquipment, FromWaveforms):
         for series, factor in (("wave", 1e3), ("spectrum", 1.0)):
             for name, role, width in (("reference", "before", 3.2), ("unit", "after", 1.1)):
                 own = points[points["series"] == f"{series}_{name}"]
+                if own.empty:  # recorded without a reference
+                    continue
                 x, y = numbers(own, "setting", "value")
                 shown[series].append(Trace(name, factor * x, y, "line", cast("Role", role), width=width))
         left = Plot("", PlotAxis("time / ms"), PlotAxis(f"acceleration on {part.axis} / g"), tuple(shown["wave"]))
@@ -188,67 +204,7 @@ def _setting(part: ShockPart, peak_g: float, direction: float) -> dict[str, floa
 
 def settings_of(part: ShockPart) -> shock_waves.WaveSettings:
     """What the comparison of the waveforms needs of a part."""
-    return shock_waves.WaveSettings(1e-3 * part.duration_ms, BEFORE_S, part.waveform_percent)
-
-
-def _pulse(
-    number: int, direction: float, raw: np.ndarray, pair: shock_waves.Pair, device: Device
-) -> list[dict[str, Any]]:
-    """Reference pulse and the unit's ratio to it; no value where a pulse is not found or the unit clips.
-
-    Parameters
-    ----------
-    raw : (n,), output of the unit as recorded; pair : both channels in g behind their low-pass
-    """
-    (reference, rate), (unit, unit_rate) = pair
-    drive = measured_pulse(reference, rate, before_s=BEFORE_S)
-    rows = [
-        {
-            "series": "reference", "point": number, "setting": direction, "value": drive.peak,
-            "uncertainty": drive.peak_error, "duration_s": drive.duration_s, "velocity_m_s": drive.velocity * 9.80665,
-        }
-    ]  # fmt: skip
-    still = np.median(raw[: int(BEFORE_S * unit_rate)])
-    # a rail of the unit itself, below the range of the data sheet, shows as an extreme at which it stands still
-    clipped = device.at_end(raw) + device.at_end(raw - still) + at_extreme(raw)[2] > 0
-    ratio = error = under = noise = np.nan
-    with suppress(NotIdentified):
-        if not clipped:
-            answer = measured_pulse(unit, unit_rate, before_s=BEFORE_S)
-            ratio, noise = answer.peak / drive.peak, answer.noise
-            error = abs(ratio) * float(np.hypot(answer.peak_error / answer.peak, drive.peak_error / drive.peak))
-            under = 100.0 * (answer.undershoot - drive.undershoot)
-    row = {
-        "series": "ratio", "point": number, "setting": direction, "value": ratio, "uncertainty": error,
-        "undershoot_percent": under, "clipped": float(clipped), "noise_g": noise,
-    }  # fmt: skip
-    return [*rows, row]
-
-
-def _ratio_figures(part: ShockPart, ratio: pd.DataFrame, good: pd.DataFrame) -> list[FigureValue]:
-    names = ("shock_sensitivity_percent", "shock_undershoot_percent")
-    if len(good) < len(ratio) or ratio.empty:
-        clipped = int((ratio["clipped"] > 0.0).sum()) if len(ratio) else 0
-        why = (
-            f"{clipped} of {len(ratio)} shocks clip the output"
-            if clipped
-            else f"{len(ratio) - len(good)} of {len(ratio)} shocks show no pulse"
-        )
-        note = f"{why}; lower the peak, or choose a wider range" if clipped else f"{why}; check cable and mounting"
-        return [FigureValue.not_determined(name, part.axis, note) for name in names]
-    _, value, each = numbers(good)
-    scatter = float(value.std(ddof=1) / np.sqrt(value.size)) if value.size > 2 else 0.0
-    spread = max(scatter, float(np.sqrt(np.mean(each**2)) / np.sqrt(value.size)))
-    under = good["undershoot_percent"].to_numpy(dtype=float)
-    floor = 100.0 * float(good["noise_g"].mean()) / part.peak_g / np.sqrt(under.size)
-    # shocks differ in duration, and so in undershoot: of a few, their scatter is itself uncertain
-    scatter = float(under.std(ddof=1) / np.sqrt(under.size)) if under.size > 1 else 0.0
-    error = float(np.hypot(100.0 * spread, part.reference_percent))
-    under_error = stated_error(floor**2 + scatter**2, 1.0, scatter**2 * np.sqrt(2.0 / max(1, under.size - 1)))
-    return [
-        FigureValue(names[0], part.axis, float(100.0 * (value.mean() - 1.0)), error),
-        FigureValue(names[1], part.axis, float(under.mean()), under_error),
-    ]
+    return shock_waves.WaveSettings(1e-3 * part.duration_ms, 1e-3 * part.before_ms, part.waveform_percent)
 
 
 PROCEDURE = ShockTest()

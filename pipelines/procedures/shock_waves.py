@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 from scipy.interpolate import CubicSpline
-from scipy.signal import butter, sosfiltfilt
 
+from inertial.dynamics.pulses import low_passed
 from inertial.dynamics.shock_diagnosis import ShockDiagnosis, diagnose_shock
 from inertial.dynamics.shock_effects import EFFECTS
 from inertial.dynamics.shock_fit import ShockRecord, Waves
@@ -19,7 +19,6 @@ from pipelines.procedures.columns import numbers, point_rows
 from pipelines.procedures.recorded import UnitRecord
 from pipelines.procedures.wording import diagnosis_texts, with_uncertainty
 
-CUT = 6.0  # corner of the equal low-pass of both channels, over 1/D
 DRAWN = 400  # points of a waveform in the picture
 PER_PULSE = 40  # samples of the compared waveforms in a duration of the pulse
 MOST_SAMPLES = 10_000  # of a compared waveform: they number its points
@@ -39,12 +38,7 @@ def filtered_pair(reference: UnitRecord, own: UnitRecord, axis: int, scale: floa
     """Reference and unit along an axis in g, each through the same phaseless low-pass, with their rates."""
     both = (reference.output[:, axis], reference.rate_hz), (own.output[:, axis] / scale, own.rate_hz)
     (first, rate), (second, unit_rate) = both
-    return (_filtered(first, rate, duration_s), rate), (_filtered(second, unit_rate, duration_s), unit_rate)
-
-
-def _filtered(wave: np.ndarray, rate_hz: float, duration_s: float) -> np.ndarray:
-    corner = min(CUT / duration_s, 0.4 * rate_hz)
-    return np.asarray(sosfiltfilt(butter(2, corner, fs=rate_hz, output="sos"), wave))
+    return (low_passed(first, rate, duration_s), rate), (low_passed(second, unit_rate, duration_s), unit_rate)
 
 
 def noise_before(pair: Pair, before_s: float) -> float:
@@ -125,10 +119,10 @@ def diagnosis_text(rows: pd.DataFrame, settings: WaveSettings, effects: Sequence
     )
 
 
-def curves(pair: Pair, duration: float, before_s: float) -> list[dict[str, Any]]:
+def curves(pair: Pair, names: Sequence[str], duration: float, before_s: float) -> list[dict[str, Any]]:
     """Waveforms and shock response spectra of one shock, thinned for the picture."""
     rows: list[dict[str, Any]] = []
-    for name, (wave, rate) in zip(("reference", "unit"), pair, strict=True):
+    for name, (wave, rate) in zip(names, pair[-len(names) :], strict=True):
         y = wave - wave[: int(before_s * rate)].mean()
         middle = int(np.argmax(np.abs(y)))
         inside = slice(max(0, middle - int(2.0 * duration * rate)), middle + int(3.0 * duration * rate))

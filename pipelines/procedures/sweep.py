@@ -21,6 +21,7 @@ from pipelines.procedures.sweep_points import (
     SweepPart,
     clocks_of,
     condition_texts,
+    response_bands,
     response_point,
     transfer_points,
 )
@@ -32,6 +33,8 @@ from schemas.station import StationConfig
 from schemas.units import AXES
 
 MOST_KEPT = 64
+SINGLE_TONE = 0.7
+"""Share of the power of a record that a stepped sine has in its largest tone; a sweep or random vibration has less."""
 
 
 class Sweep(OnEquipment, FromWaveforms):
@@ -89,25 +92,32 @@ class Sweep(OnEquipment, FromWaveforms):
         return equipment.sine(one["frequency_hz"], one["level_g"], int(one["axis"]), seconds, slots)
 
     def setting_of(self, part: SweepPart, reference: UnitRecord) -> dict[str, float]:
-        """Frequency and level of a dwell, from the largest tone of the reference."""
+        """Frequency and level of a dwell, from the largest tone of the reference; no frequency where there is no single tone."""
         axis = AXES.index(part.axis)
         wave = reference.output[:, [axis]] - reference.output[:, axis].mean()
         spectrum = np.abs(np.fft.rfft(wave[:, 0] * np.hanning(len(wave))))
-        coarse = float(np.argmax(spectrum[1:]) + 1) * reference.rate_hz / len(wave)
+        line = int(np.argmax(spectrum[1:])) + 1
+        tone_power, whole = np.sum(spectrum[max(line - 2, 1) : line + 3] ** 2), np.sum(spectrum[1:] ** 2)
+        if tone_power < SINGLE_TONE * whole:
+            return {"frequency_hz": np.nan, "level_g": float(np.std(wave)), "axis": float(axis)}
+        coarse = float(line) * reference.rate_hz / len(wave)
         tone = fit_tone_and_frequency(wave, reference.rate_hz, coarse)
         return {"frequency_hz": tone.frequency, "level_g": float(abs(tone.value[0])), "axis": float(axis)}
 
     def reduce(self, part: SweepPart, records: Records, device: Device) -> pd.DataFrame:
         """Magnitude, phase, and their uncertainty at every point; the device's clock is estimated from all points first."""
         axis = AXES.index(part.axis)
-        clocks = clocks_of(records, axis)
+        broadband = {id(r) for r in records if np.isnan(r.step.setting["frequency_hz"])}
+        clocks = clocks_of([r for r in records if id(r) not in broadband], axis)
         rows: list[dict[str, Any]] = []
         for one in taken(records):
             clock, pair = clocks.get(one.unit, (0.0, 0.0)), (one.record.samples[REFERENCE], one.own)
-            rows.append(
-                response_point(part, one.number, one.record.step.setting, pair, axis, clock, device)
-                | {"unit": one.unit, "temperature_C": float(one.reading["unit_C"])}
-            )
+            if id(one.record) in broadband:
+                points = response_bands(part, one.number, pair, axis, device)
+            else:
+                points = [response_point(part, one.number, one.record.step.setting, pair, axis, clock, device)]
+            about = {"unit": one.unit, "temperature_C": float(one.reading["unit_C"])}
+            rows += [point | about for point in points]
         return point_table(rows)
 
     def of_unit(self, part: SweepPart, unit: str, rows: pd.DataFrame, device: Device) -> UnitOutcome:

@@ -10,14 +10,17 @@ import pandas as pd
 from pydantic import Field, model_validator
 
 from inertial.dynamics import exciter
+from inertial.dynamics.frequency_response import frequency_response
 from inertial.dynamics.sine_fit import HARMONICS, fit_tone, fit_tone_and_frequency, harmonic_distortion
 from inertial.dynamics.transfer_effects import EFFECTS, Conditions
 from inertial.dynamics.transfer_model import Points
 from pipelines.procedures.base import Part, refuse_unknown_effects
+from pipelines.procedures.columns import point_rows
 from pipelines.procedures.recorded import REFERENCE, Array, Device, ProcedureRecord, UnitRecord
 from schemas.bounds import NotNegative, Positive
 
 FEWEST_POINTS = 8
+POINTS_OF_RECORD = 10_000  # numbers of points that belong to one record of many
 
 
 class SweepPart(Part):
@@ -155,6 +158,41 @@ def response_point(
         "clock_uncertainty_ppm": 1e6 * clock[1],
         "rate_hz": own.rate_hz,
     }
+
+
+def response_bands(
+    part: SweepPart, number: int, records: tuple[UnitRecord, UnitRecord], axis: int, device: Device
+) -> list[dict[str, Any]]:
+    """The points of a record of a swept sine, random vibration or an impact: bands of its whole spectrum.
+
+    Both channels have one clock. A record of constant output, or one that is clipped, gives one point without a value.
+    """
+    reference, own = records
+    drive, wave = reference.output[:, axis], own.output[:, axis]
+    about = {
+        "axis": part.axis, "series": "response", "level_g": float(np.std(drive)), "record_s": len(wave) / own.rate_hz,
+        "distortion_percent": 0.0, "transverse_percent": 0.0, "clock_ppm": 0.0, "clock_uncertainty_ppm": 0.0,
+        "rate_hz": own.rate_hz,
+    }  # fmt: skip
+    if float(np.ptp(wave)) == 0.0 or device.at_end(wave) > 0:
+        return [about | {"point": POINTS_OF_RECORD * number, "setting": np.nan, "value": np.nan}]
+    late = float(own.time[0] - reference.time[0])
+    bands = frequency_response((drive, reference.rate_hz), (wave, own.rate_hz), late_s=late)
+    size = np.abs(bands.h1)
+    magnitude = np.hypot(bands.error, 1e-2 * part.repeatability_percent)
+    phase = np.hypot(bands.error, np.radians(part.repeatability_deg))
+    rows = point_rows(
+        **about,
+        point=POINTS_OF_RECORD * number + np.arange(size.size),
+        setting=bands.frequency,
+        value=size,
+        uncertainty=size * magnitude,
+        phase_deg=np.degrees(np.angle(bands.h1)),
+        phase_uncertainty_deg=np.degrees(phase),
+        coherence=bands.coherence,
+        h2=np.abs(bands.h2),
+    )
+    return list(rows)
 
 
 def condition_texts(rows: pd.DataFrame) -> list[tuple[str, str]]:

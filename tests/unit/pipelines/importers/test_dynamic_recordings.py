@@ -1,0 +1,115 @@
+"""Recordings of dynamic tests as people have them: a swept sine or random vibration in one file, a shock of unknown duration."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy import signal
+
+from pipelines.importers.inspection import inspect
+from pipelines.importers.waveforms import RecordingLayout, import_waveforms
+from schemas.errors import DataRejected
+
+RATE_HZ = 10_000.0
+COLUMNS = {"time": "time [s]", "reference": "ref [m/s^2]", "z": "out [V]"}
+
+
+def second_order(x, natural_hz, damping, rate_hz):
+    """The answer of a mass on a spring by its differential equation."""
+    w = 2.0 * np.pi * natural_hz
+    system = signal.TransferFunction([w**2], [1.0, 2.0 * damping * w, w**2])
+    return signal.lsim(system, x, np.arange(x.size) / rate_hz)[1]
+
+
+def swept(rng):
+    t = np.arange(int(8.0 * RATE_HZ)) / RATE_HZ
+    return 0.5 * signal.chirp(t, 5.0, t[-1], 3000.0, method="log") * signal.windows.tukey(t.size, 0.02)
+
+
+def shaken(rng):
+    sos = signal.butter(4, 3000.0, fs=RATE_HZ, output="sos")
+    return 0.5 * signal.sosfilt(sos, rng.standard_normal(int(8.0 * RATE_HZ)))
+
+
+def written(path: Path, x, y, rng, noise_V):
+    frame = {"time [s]": np.arange(x.size) / RATE_HZ, "ref [m/s^2]": 9.80665 * x}
+    frame["out [V]"] = 0.02 + 0.1 * y + noise_V * rng.standard_normal(x.size)
+    pd.DataFrame(frame).to_csv(path, index=False, float_format="%.9g")
+    return path
+
+
+@pytest.mark.parametrize("motion", [swept, shaken])
+def test_one_file_of_a_sweep_or_of_random_vibration_is_recognised_and_identified(motion, tmp_path, rng):
+    x = motion(rng)
+    # the equation is integrated at ten times the rate of the file, where a hold between samples has no delay
+    fine = signal.resample_poly(x, 10, 1)
+    y = second_order(fine, 800.0, 0.6, 10.0 * RATE_HZ)[::10]
+    path = written(tmp_path / "shaker.csv", x, y, rng, 2e-4)
+    proposed = inspect([path]).document
+    assert "--procedure sweep --map time=1,reference=2,z=3" in proposed["command"]
+    assert proposed["open"] == []
+    layout = RecordingLayout(COLUMNS, {})
+    document = import_waveforms([path], "sweep", None, "S1", layout, str(tmp_path / "archive"))
+    figures = {one["figure"]: one for one in document["figures"]}
+    for name, true in (("sweep_natural_hz", 800.0), ("sweep_damping", 0.6)):
+        assert figures[name]["identified"]
+        assert abs(figures[name]["value"] - true) < max(2.0 * figures[name]["uncertainty"], 0.005 * true)
+
+
+def half_sine(peak_g, duration_s, rng, rate_hz=50_000.0):
+    t = np.arange(int(0.2 * rate_hz)) / rate_hz
+    on = (t >= 0.05) & (t < 0.05 + duration_s)
+    return np.where(on, peak_g * np.sin(np.pi * (t - 0.05) / duration_s), 0.0) + 0.2 * rng.standard_normal(t.size)
+
+
+def shock_file(path, rng, peak_g=480.0, duration_s=1e-3, *, reference=True):
+    base = half_sine(peak_g, duration_s, rng)
+    frame = {"t [s]": np.arange(base.size) / 50_000.0, "dut [g]": second_order(base, 9000.0, 0.7, 50_000.0)}
+    if reference:
+        frame["ref [g]"] = base
+    pd.DataFrame(frame).to_csv(path, index=False, float_format="%.8g")
+    return path
+
+
+@pytest.mark.parametrize("duration_ms", [0.5, 1.0, 11.0])
+def test_a_pulse_is_found_by_itself(duration_ms, tmp_path, rng):
+    path = shock_file(tmp_path / "drop.csv", rng, duration_s=1e-3 * duration_ms)
+    assert "--procedure shock" in inspect([path]).document["command"]
+    layout = RecordingLayout({"time": "t [s]", "reference": "ref [g]", "z": "dut [g]"}, {})
+    document = import_waveforms([path], "shock", None, "S1", layout, str(tmp_path / "archive"))
+    figures = {one["figure"]: one["value"] for one in document["figures"]}
+    assert figures["shock_peak_g"] == pytest.approx(480.0, rel=0.015)
+    assert figures["shock_duration_ms"] == pytest.approx(duration_ms, rel=0.03)
+    assert figures["shock_velocity_m_s"] == pytest.approx(2.0 * 480.0 * 9.80665 * 1e-3 * duration_ms / np.pi, rel=0.015)
+    assert any(line.startswith("pulse: reference 4") for line in document["text"])
+
+
+def test_a_sensor_alone_has_its_pulse_and_no_sensitivity(tmp_path, rng):
+    path = shock_file(tmp_path / "alone.csv", rng, reference=False)
+    layout = RecordingLayout({"time": "t [s]", "z": "dut [g]"}, {})
+    document = import_waveforms([path], "shock", None, "S1", layout, str(tmp_path / "archive"))
+    figures = {one["figure"]: one for one in document["figures"]}
+    assert figures["shock_peak_g"]["value"] == pytest.approx(480.0, rel=0.015)
+    assert "without a reference" in figures["shock_sensitivity_percent"]["note"]
+
+
+def test_a_stated_duration_that_is_not_that_of_the_pulse_is_refused(tmp_path, rng):
+    path, part = shock_file(tmp_path / "drop.csv", rng), tmp_path / "part.toml"
+    part.write_text("duration_ms = 11.0\n")
+    layout = RecordingLayout({"time": "t [s]", "reference": "ref [g]", "z": "dut [g]"}, {})
+    with pytest.raises(DataRejected, match=r"duration_ms is 11, the pulse lasts [01.9]+ ms"):
+        import_waveforms([path], "shock", part, "S1", layout, str(tmp_path / "archive"))
+
+
+def test_two_places_of_a_board_are_told_to_be_no_comparison(tmp_path, rng):
+    base = half_sine(480.0, 1e-3, rng)
+    far = second_order(base, 700.0, 0.05, 50_000.0)  # a board that rings at 700 Hz between the two
+    frame = {"t [s]": np.arange(base.size) / 50_000.0, "ref [g]": base, "dut [g]": far}
+    pd.DataFrame(frame).to_csv(tmp_path / "board.csv", index=False)
+    layout = RecordingLayout({"time": "t [s]", "reference": "ref [g]", "z": "dut [g]"}, {})
+    document = import_waveforms([tmp_path / "board.csv"], "shock", None, "S1", layout, str(tmp_path / "archive"))
+    sensitivity = next(one for one in document["figures"] if one["figure"] == "shock_sensitivity_percent")
+    assert not sensitivity["identified"]
+    assert "two places of a structure are no comparison" in sensitivity["note"]
+    assert not any("missing effect" in line for line in document["text"])
