@@ -34,6 +34,19 @@ class NoiseTermRow(TypedDict):
     unit: str
 
 
+class NavigationRow(TypedDict):
+    """What the identified terms of a channel do to velocity and position without aiding."""
+
+    channel: str
+    velocity_random_walk_m_s_rth: Annotated[float | None, "60·N; null: N is not identified"]
+    q_n_m2_s4_Hz: Annotated[float | None, "N², (m/s²)²/Hz"]
+    q_b_m2_s4: Annotated[float | None, "B², (m/s²)²; null: B is not identified"]
+    not_identified: Annotated[list[str], "terms that count as zero"]
+    time_s: list[float]
+    velocity_m_s: Annotated[list[float], "standard deviation after each time"]
+    position_m: Annotated[list[float], "likewise"]
+
+
 class AllanDocument(TypedDict):
     """``allan --json``: the overlapping Allan deviation of a record, or another statistic, and the noise terms."""
 
@@ -48,6 +61,7 @@ class AllanDocument(TypedDict):
     term_confidence: Annotated[float, "of the intervals and limits of the terms"]
     curves: list[AllanChannel]
     terms: Annotated[list[NoiseTermRow], "of the overlapping Allan deviation"]
+    navigation: Annotated[list[NavigationRow], "empty where the unit is none of acceleration"]
     notes: list[str]
 
 

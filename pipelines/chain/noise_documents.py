@@ -7,9 +7,11 @@ from typing import Any
 import numpy as np
 
 from inertial.noise.allan import CONFIDENCE, overlapping
+from inertial.noise.navigation import TIMES_S, TO_M_S2, navigation_error
 from inertial.noise.psd import allan_variance, one_sided
 from inertial.noise.terms import NAMES, NoiseTerms, fit_terms, model_deviation
 from pipelines.archive import Run
+from pipelines.chain.documents import NavigationRow
 from pipelines.importers.series import EvenSeries
 from pipelines.stages.noise import FEWEST, UNEXPLAINED_P, alike, limits_where_unexplained, static_record
 from pipelines.tables.frames import rows_of
@@ -82,9 +84,37 @@ def allan_document(series: EvenSeries, spacing: str = "octave", statistic: str =
             }
             for k, name in enumerate(names)
         ],
-        "terms": [row for k, name in enumerate(names) for row in _term_rows(name, terms, k, series.unit)],
+        "terms": (rows := [row for k, name in enumerate(names) for row in _term_rows(name, terms, k, series.unit)]),
+        "navigation": _navigation_rows(rows, series.unit),
         "notes": notes,
     }
+
+
+def _navigation_rows(terms: list[dict[str, Any]], unit: str) -> list[NavigationRow]:
+    """The errors of navigation of every channel with an identified term, in SI; none where the output is no acceleration."""
+    if unit not in TO_M_S2:
+        return []
+    by_channel: dict[str, dict[str, float | None]] = {}
+    for row in terms:
+        by_channel.setdefault(row["channel"], {})[row["term"]] = row["value"] if row["identified"] else None
+    made: list[NavigationRow] = []
+    for channel, own in by_channel.items():
+        if all(own.get(name) is None for name in "NBK"):
+            continue
+        error = navigation_error(own, unit, np.array(TIMES_S))
+        made.append(
+            {
+                "channel": channel,
+                "velocity_random_walk_m_s_rth": error.velocity_random_walk,
+                "q_n_m2_s4_Hz": error.q_n,
+                "q_b_m2_s4": error.q_b,
+                "not_identified": [name for name in "NBK" if own.get(name) is None],
+                "time_s": list(TIMES_S),
+                "velocity_m_s": error.velocity.tolist(),
+                "position_m": error.position.tolist(),
+            }
+        )
+    return made
 
 
 def _term_rows(channel: str, terms: NoiseTerms, place: int, unit: str) -> list[dict[str, Any]]:
@@ -137,6 +167,7 @@ def allan_of_run(run: Run) -> dict[str, Any]:
         "term_confidence": 0.95,
         "curves": channels,
         "terms": rows,
+        "navigation": _navigation_rows(rows, "µg"),
         "notes": notes,
     }
 

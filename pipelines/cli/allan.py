@@ -23,6 +23,8 @@ EXAMPLES = (
 SPACINGS = ("octave", "decade")
 STATISTICS = ("allan", "modified", "hadamard", "total", "time", "tie", "mtie")
 """The names of ``pipelines.stages.deviations``, which is not loaded for the first: allantools takes half a second."""
+NAVIGATION = ("velocity_random_walk_m_s_rth", "q_n_m2_s4_Hz", "q_b_m2_s4")
+SHOWN_S = (60.0, 3600.0)
 
 
 def command(
@@ -102,6 +104,28 @@ def _print_terms(document: dict[str, Any]) -> None:
     print_table(
         ["channel", "term", "name", "value", f"interval or upper limit, {level} %", "unit"], lines, title="Noise terms"
     )
+    _print_navigation(document["navigation"])
+
+
+def _print_navigation(rows: list[dict[str, Any]]) -> None:
+    """What the identified terms do to velocity and position without aiding."""
+    if not rows:
+        return
+    shown = [rows[0]["time_s"].index(time) for time in SHOWN_S]
+    head = ["channel", "velocity random\nwalk, m/s/√h", "Q_n = N²\n(m/s²)²/Hz", "Q_b = B²\n(m/s²)²"]
+    head += [f"σ_{what}({time:g} s)\n{unit}" for time in SHOWN_S for what, unit in (("v", "m/s"), ("p", "m"))]
+    lines = [
+        [
+            row["channel"],
+            *("" if row[name] is None else short(row[name]) for name in NAVIGATION),
+            *(short(row[what][k]) for k in shown for what in ("velocity_m_s", "position_m")),
+        ]
+        for row in rows
+    ]
+    print_table(head, lines, title="Error of navigation without aiding")
+    lacking = sorted({name for row in rows for name in row["not_identified"]})
+    beside = f"; {', '.join(lacking)} where not identified count as zero" if lacking else ""
+    say(f"σ by N, B (as a constant bias) and K of one axis from a known start{beside}", style="dim")
 
 
 def _print_curves(document: dict[str, Any]) -> None:
