@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from inertial.estimation.candidate import blocks_of_units
 from inertial import effects as catalogue
 from inertial.criticism.bad_or_effect import bad_beside_effects, candidates_of
 from inertial.criticism.classes import EffectClass, class_of
@@ -261,7 +262,7 @@ def _misfit(model: Model, richer: Model) -> Misfit:
             # the noise of soaks was that of the readings before they were corrected
             return cost_of_model(Model(Problem(replace(lot, error=error, loudness=None)), local))
         problem = Problem(replace(lot, error=error))
-        blocks = [3 * unit + axis for unit in units for axis in range(3)]
+        blocks = blocks_of_units(np.array(units), problem.per_unit)
         noise = problem.covariance.rescaled(richer.noise.pick(blocks), model.problem.covariance)
         return Model(problem, local).at(noise).rss
 

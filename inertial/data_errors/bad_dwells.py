@@ -55,7 +55,7 @@ def bad_dwells(model: Model) -> list[BadDwell]:
 
 def _round(model: Model, most: int) -> list[BadDwell]:
     """Dwells that stand out at one noise, the largest first, each deleted before the next."""
-    deletion = _Deletion(model.space, 3)
+    deletion = _Deletion(model.space, model.problem.per_unit)
     if deletion.units < _SEVERAL:
         deletion.left_to_poses = deletion.off_every_time(poses(model.problem.lot))
     bad: list[BadDwell] = []
