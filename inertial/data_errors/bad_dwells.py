@@ -162,7 +162,7 @@ class _Deletion:
 def deletion_residuals(model: Model) -> Array:
     """Deviation of each dwell when it is deleted, axis by axis, in standard deviations, (m,); without those left out."""
     space = model.space
-    deletion = _Deletion(space, 1 if model.problem.lot.radial else 3)
+    deletion = _Deletion(space, model.problem.per_unit)
     known = deletion.there & (deletion.size > 1e-9 * deletion.size.max())
     scaled = deletion.left / np.sqrt(np.where(known, deletion.size, 1.0)) / space.noise.scale[:, None]
     return scaled[known]

@@ -26,7 +26,7 @@ from pipelines.importers.stated_units import TEMPERATURE
 from schemas.errors import TumblelineError
 from schemas.units import AXES
 
-_NAMED = ("time", "x", "y", "z", "sd_x", "sd_y", "sd_z", "temperature", "dwell")
+_NAMED = ("time", "x", "y", "z", "sd_x", "sd_y", "sd_z", "n", "force_x", "tilt", "temperature", "dwell")
 _MOST_INTERVALS = 2000
 
 
@@ -63,7 +63,7 @@ def inspect(paths: Sequence[Path], *, join: str = "", group: str = "") -> Inspec
     faults = sample_faults.look(kept) if kept is not None and len(kept) > 3 and not guessed.dwells else None
     rate = _rate(own)
     intervals = _intervals(kept, own, rate) if kept is not None and rate else []
-    if output is None:
+    if output is None and not guessed.single:
         missing = [axis for axis in "xyz" if not guessed.column(axis)]
         open_.append(f"columns of acceleration were not recognised: map {' and '.join(missing)} by name or number")
         few = len([one for one in guessed.columns.values() if one.meaning != "time"])
@@ -265,7 +265,7 @@ def _command(
     names = list(guessed.columns)
     pairs = [(meaning, guessed.column(meaning)) for meaning in _NAMED if guessed.column(meaning)]
     words = [f"{meaning}={_mapped(name, names)}" for meaning, name in pairs]
-    words += [f"{axis}=COLUMN" for axis in "xyz" if not guessed.column(axis)]
+    words += [f"{axis}=COLUMN" for axis in "xyz" if not guessed.column(axis) and not guessed.single]
     mapped = ",".join(words)
     units = [f"output={guessed.output.meaning or 'UNIT'}"]
     time = guessed.column("time")
@@ -277,6 +277,7 @@ def _command(
     units += [f"temperature={heat}"] if heat != "degC" else []
     words = ["tumbleline", "import", *(str(path) for path in paths), "--map", mapped, "--units", ",".join(units)]
     words += ["--unit", _serial(paths[0])]
+    words += ["--axes", "x"] if guessed.single else []
     words += ["--rows", "dwells"] if guessed.dwells else [] if time else ["--rate", "HZ"]
     words += ["--join", join] if join else []
     words += ["--group", group] if group else []
