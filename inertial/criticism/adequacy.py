@@ -53,7 +53,9 @@ def _worst_look(field: Candidates, drivers: list[Driver], model: Model) -> tuple
             log_p = log_p_value(space, drop, rank)
             together = of_poses if candidate.shared else common
             if log_p < worst and together > 1.0:
-                log_p = log_p_value(space, drop * _own_part(space, candidate, place, together, model.problem.per_unit), rank)
+                log_p = log_p_value(
+                    space, drop * _own_part(space, candidate, place, together, model.problem.per_unit), rank
+                )
             worst = min(worst, log_p)
     return worst, looks
 

@@ -6,7 +6,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.estimation.candidate import blocks_of_units
 from inertial import effects as catalogue
 from inertial.criticism.bad_or_effect import bad_beside_effects, candidates_of
 from inertial.criticism.classes import EffectClass, class_of
@@ -21,6 +20,7 @@ from inertial.data_errors.handling import alternatives
 from inertial.data_errors.removed_dwells import BadDwell, without
 from inertial.decisions import CLASS_WIDTH, RISES
 from inertial.estimation.alternative import Exchangeable, Handling, Misfit, soaks
+from inertial.estimation.candidate import blocks_of_units
 from inertial.estimation.comparison import fitted_residuals, rms, slope_of
 from inertial.estimation.loudness import loudness_of
 from inertial.estimation.model import Model, refuse_without_freedom
@@ -263,7 +263,7 @@ def _misfit(model: Model, richer: Model) -> Misfit:
             return cost_of_model(Model(Problem(replace(lot, error=error, loudness=None)), local))
         problem = Problem(replace(lot, error=error))
         blocks = blocks_of_units(np.array(units), problem.per_unit)
-        noise = problem.covariance.rescaled(richer.noise.pick(blocks), model.problem.covariance)
+        noise = problem.covariance.rescaled(richer.noise.pick(blocks.tolist()), model.problem.covariance)
         return Model(problem, local).at(noise).rss
 
     return left

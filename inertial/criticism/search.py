@@ -248,7 +248,9 @@ def _only_tilted(model: Model, term: Term) -> bool:
     second = (2.0 * (0.5 * angle + _INEXACT)) ** 2 * by_tilt
     left = float(of_units.sum() - of_units.max()) - second
     # as far beyond noise as adequacy asks for where tails are heavy, for the best of all dwells
-    return left <= 0.0 or float(log_chi2_tail(left, problem.per_unit * (units - 1.0))) > np.log(CERTAIN_BELOW**2 / problem.n)
+    return left <= 0.0 or float(log_chi2_tail(left, problem.per_unit * (units - 1.0))) > np.log(
+        CERTAIN_BELOW**2 / problem.n
+    )
 
 
 def _judged(field: Candidates, model: Model, term: Term) -> Rival:

@@ -66,7 +66,9 @@ class Readings:
         """
         if not self.turned:
             return np.stack([self._nominal(f, o) for f, o in zip(self.force, self.output, strict=True)])
-        return np.stack([robust_fit(f, o) for f, o in zip(shown_force(self.force, self.axes), self.output, strict=True)])
+        return np.stack(
+            [robust_fit(f, o) for f, o in zip(shown_force(self.force, self.axes), self.output, strict=True)]
+        )
 
     def _nominal(self, force: Array, output: Array) -> Array:
         """Bias at the nominal response, (3, 4): 1 for g, 9.80665 for m/s², else the norm of the mean output."""

@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.design import of_axes
 from inertial.decisions import TOGETHER, UNITS_TOGETHER
+from inertial.design import of_axes
 from inertial.distributions import chi2_quantile
 from inertial.estimation.alternative import Handling, by_block, tilts
 from inertial.estimation.comparison import estimate, residuals

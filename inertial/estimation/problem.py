@@ -306,7 +306,8 @@ class Problem:
 
         def made() -> Candidate:
             columns = np.stack(
-                [of_outputs(self.lot, effect.of_each_unit(self.lot, self.slope, **on_axis(p, 0))) for p in places], axis=3
+                [of_outputs(self.lot, effect.of_each_unit(self.lot, self.slope, **on_axis(p, 0))) for p in places],
+                axis=3,
             )
             few, n, m, g, k = columns.shape
             rows = np.tile(np.arange(m), units.size) if few == 1 else None

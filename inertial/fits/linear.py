@@ -160,9 +160,7 @@ _WARM = 5.0
 """Range of temperature, K, from which on the bias' run with it would be taken for response where poses differ between soaks."""
 
 
-def felt_force(
-    force: Array, output: Array, theta: Array | None = None, axes: tuple[int, ...] = ALL_AXES
-) -> Array:
+def felt_force(force: Array, output: Array, theta: Array | None = None, axes: tuple[int, ...] = ALL_AXES) -> Array:
     """Specific force along the sensor's own axes, (..., n, 3), g, from a plain fit of response and bias.
 
     Parameters

@@ -12,9 +12,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.estimation.candidate import blocks_of_units
 from inertial.decisions import AXES_DIFFER
 from inertial.estimation.alternative import Handling
+from inertial.estimation.candidate import blocks_of_units
 from inertial.estimation.comparison import estimate
 from inertial.estimation.covariance import Covariance
 from inertial.estimation.likelihood import shared_factor

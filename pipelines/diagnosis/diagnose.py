@@ -154,7 +154,11 @@ def document(
     units = tuple(u for k, u in enumerate(measurement.units) if k not in faulty)
     names = Names(units, tuple(int(d) for d in measurement.dwells))
     terms = [*diagnosis.base.terms, *(m.term for n in diagnosis.named for m in n.effects.physics)]
-    warnings = [*sentences(measurement.state), *gaps(measurement, faults, left_out), *without_history(measurement, terms)]
+    warnings = [
+        *sentences(measurement.state),
+        *gaps(measurement, faults, left_out),
+        *without_history(measurement, terms),
+    ]
     return {
         "adequate": diagnosis.adequate,
         "reason": diagnosis.unjudged or None,

@@ -175,7 +175,9 @@ def _single_axis(numeric: dict[str, NDArray[np.float64]], guessed: dict[str, Gue
     guessed[reference] = Guess(meaning, "the reference of the one output")
     spread = [name for name in numeric if re.match(r"^(?:sd|std|noise|sigma)", name, re.IGNORECASE)]
     count = [name for name in numeric if re.match(r"^(?:n|samples|count)$", name, re.IGNORECASE)]
-    guessed |= {name: Guess("sd_x", "its name") for name in spread[:1]} | {name: Guess("n", "its name") for name in count[:1]}
+    guessed |= {name: Guess("sd_x", "its name") for name in spread[:1]} | {
+        name: Guess("n", "its name") for name in count[:1]
+    }
     return True
 
 

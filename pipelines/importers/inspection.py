@@ -77,7 +77,7 @@ def inspect(paths: Sequence[Path], *, join: str = "", group: str = "") -> Inspec
         open_.append(
             f"signed words of {bits} bits were read without their sign: subtract {2**bits} from {2 ** (bits - 1)} on"
         )
-    if guessed.output.meaning == "" and output is not None:
+    if guessed.output.meaning == "" and (output is not None or guessed.single):
         open_.append("the unit of the output: --units output=g|mg|m/s^2|V|mV|LSB")
     positions = (
         change_of_level.several_levels(kept)

@@ -116,7 +116,8 @@ def _prediction_rows(lot: LotArrays, fitted: NoisyFit) -> pd.DataFrame:
     dwells = lot.dwells[~lot.of_kind("dwell")]
     row, column = np.tril_indices(dwells.size)
     u, a, k = (
-        i.ravel() for i in np.meshgrid(np.arange(len(lot.units)), np.arange(len(lot.letters)), np.arange(row.size), indexing="ij")
+        i.ravel()
+        for i in np.meshgrid(np.arange(len(lot.units)), np.arange(len(lot.letters)), np.arange(row.size), indexing="ij")
     )
     values = _predicted(fitted)
     return pd.DataFrame(
@@ -138,7 +139,9 @@ def _predicted(fitted: NoisyFit) -> Array:
 def _wander_rows(lot: LotArrays, fitted: NoisyFit) -> pd.DataFrame:
     """The method that estimates the noise of the dwells, and the parts of the noise, by unit and axis."""
     scale = fitted.per_g
-    u, a = (index.ravel() for index in np.meshgrid(np.arange(len(lot.units)), np.arange(len(lot.letters)), indexing="ij"))
+    u, a = (
+        index.ravel() for index in np.meshgrid(np.arange(len(lot.units)), np.arange(len(lot.letters)), indexing="ij")
+    )
     parts = {"white_ug": fitted.white, "flicker_ug": fitted.flicker, "walk_ug": fitted.walk}
     return pd.DataFrame(
         {

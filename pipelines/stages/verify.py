@@ -108,7 +108,9 @@ def _expected(predictions: pd.DataFrame, units: tuple[str, ...]) -> Array:
     m = np.unique(dwell).size
     row, column = np.tril_indices(m)
     out = np.zeros((len(units), axis.max() + 1, m, m))
-    values = predictions["covariance_ug2"].to_numpy()[np.lexsort((other, dwell, axis, unit))].reshape(*out.shape[:2], -1)
+    values = (
+        predictions["covariance_ug2"].to_numpy()[np.lexsort((other, dwell, axis, unit))].reshape(*out.shape[:2], -1)
+    )
     out[..., row, column] = values
     out[..., column, row] = values
     return out

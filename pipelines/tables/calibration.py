@@ -53,7 +53,9 @@ class Calibration:
 
     def value(self, effect: str) -> NDArray[np.float64]:
         """Coefficients of one effect, (units, 3, columns of the effect)."""
-        return np.stack([self.coefficients[:, axis, self._where(effect, axis)] for axis in range(len(self.axes))], axis=1)
+        return np.stack(
+            [self.coefficients[:, axis, self._where(effect, axis)] for axis in range(len(self.axes))], axis=1
+        )
 
     def standard_error(self, effect: str) -> NDArray[np.float64]:
         """Standard errors of one effect's coefficients, (units, 3, columns of the effect)."""
@@ -181,7 +183,9 @@ def read_calibration(coefficients: pd.DataFrame, covariance: pd.DataFrame) -> Ca
     p = len(column_names(model, nonlinear, axes)[0])
     own = coefficients["value"].to_numpy()[(letters != EVERY_AXIS) & is_linear]
     if len(own) != len(units) * len(axes) * p:
-        raise DataRejected(f"coefficients: {len(own)} rows, the model needs {len(units) * len(axes) * p}; run the fit again")
+        raise DataRejected(
+            f"coefficients: {len(own)} rows, the model needs {len(units) * len(axes) * p}; run the fit again"
+        )
     matrix = np.zeros((len(units), len(axes), p, p))
     row, column = np.tril_indices(p)
     values = covariance["value"].to_numpy().reshape(len(units), len(axes), -1)

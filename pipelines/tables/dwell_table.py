@@ -10,7 +10,15 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from inertial import frames
-from inertial.quantities import ANGLE_COLUMNS, BY_ATTRIBUTE, FORCE_COLUMNS, OUTPUT_COLUMNS, RECORDED, SPREAD_COLUMNS, is_covariate
+from inertial.quantities import (
+    ANGLE_COLUMNS,
+    BY_ATTRIBUTE,
+    FORCE_COLUMNS,
+    OUTPUT_COLUMNS,
+    RECORDED,
+    SPREAD_COLUMNS,
+    is_covariate,
+)
 from inertial.state import History, State
 
 Array = NDArray[np.float64]

@@ -32,7 +32,5 @@ def sentences(state: State) -> list[str]:
     names = undetermined(state)
     if not names:
         return []
-    return [
-        f"cannot be determined from these poses: {', '.join(names)} (held at zero: the force across does not change in that "
-        "direction); turn the device about its own axis by 90° and tilt it again"
-    ]
+    text = f"cannot be determined from these poses: {', '.join(names)} (held at zero: the force across does not change in that "
+    return [f"{text}direction); turn the device about its own axis by 90° and tilt it again"]

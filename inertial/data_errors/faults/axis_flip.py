@@ -8,6 +8,7 @@ import numpy as np
 from inertial.data_errors.faults.fault import Fault, Look
 from inertial.data_errors.readings import Readings
 
+
 def flipped(readings: Readings) -> Iterator[Fault]:
     """Axes in another order or with another sign: the best signed permutation of the response is not the identity."""
     own = np.array(readings.axes)

@@ -15,7 +15,9 @@ def dead(readings: Readings) -> Iterator[Fault]:
         weak = np.flatnonzero(size < 0.2 * np.median(size)) if np.median(size) > 0.0 else np.arange(size.size)
         for axis in weak[:1]:
             share = size[axis] / max(float(np.median(size)), 1e-300)
-            evidence = f"axis {'xyz'[readings.axes[axis]]} responds to gravity with {share:.1%} of the other axes' scale"
+            evidence = (
+                f"axis {'xyz'[readings.axes[axis]]} responds to gravity with {share:.1%} of the other axes' scale"
+            )
             yield Fault("dead_channel", unit, (), evidence)
 
 

@@ -31,5 +31,7 @@ class BiasStep(OfOneUnit, Change):
 
     def describe(self, lot: Lot, size: Array, **place: float) -> str:
         """The change of each axis."""
-        changes = ", ".join(f"{axis} {1e6 * v:+.0f}" for axis, v in zip((AXES[k] for k in lot.state.axes), size, strict=True))
+        changes = ", ".join(
+            f"{axis} {1e6 * v:+.0f}" for axis, v in zip((AXES[k] for k in lot.state.axes), size, strict=True)
+        )
         return f"the bias of the unit changed on all axes ({changes} µg); measure the unit once more"
