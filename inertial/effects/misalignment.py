@@ -21,7 +21,7 @@ class Misalignment(SensorEffect):
     simplicity: ClassVar[int] = 2
 
     def constants(self, state: State) -> Mapping[str, float]:
-        """Zero for each direction across that the poses of a device with fewer than three axes do not show: it is held at zero."""
+        """Zero for each direction across that the poses of a device with one axis or two do not show."""
         unseen = unseen_directions(state.force) if len(state.axes) < len(ALL_AXES) else ()
         across = {direction for axis in state.axes for direction in others(axis)}
         return {AXES[direction]: 0.0 for direction in unseen if direction in across}

@@ -73,7 +73,7 @@ class LotFit:
 def response_matrix(
     coefficients: Array, names: Sequence[Sequence[tuple[str, str]]], axes: Sequence[int] = ALL_AXES
 ) -> Array:
-    """K from coefficients (..., m, p) of the m axes: ``scale`` and ``misalignment``, (..., 3, 3); rows without an output are zero."""
+    """K from coefficients (..., m, p) of the m axes: ``scale`` and ``misalignment``, (..., 3, 3); other rows are zero."""
     k = np.zeros((*coefficients.shape[:-2], 3, 3))
     for row, axis in enumerate(axes):
         for column, (effect, name) in enumerate(names[row]):

@@ -46,7 +46,8 @@ def imported_dwells(data: Imported) -> pd.DataFrame:
         )
     if not set(OUTPUT_COLUMNS) <= set(data.dwells.columns):
         raise WrongUse(
-            "import: a fit at import needs three axes, and this device has fewer; import without --fit, and then 'tumbleline fit RUN'"
+            "import: a fit at import needs three axes, and this device has fewer; import it without --fit, and then "
+            "'tumbleline fit RUN'"
         )
     return data.dwells
 

@@ -1,13 +1,14 @@
 """Devices with one axis or two, by textbook numbers: the ±1 g test by hand, and a tumble by its Fourier series."""
 
+import json
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
+from in_process import document_of, given, refused, text_of
 
 from pipelines.archive import Archive
-from tests.in_process import document_of, refused, text_of
 
 SCALE, BIAS, ACROSS, K2 = 0.35, 2e-3, 1.5e-3, 50e-6  # V/g, V, rad, g/g²
 OF_ONE = ("--axes", "x", "--units", "output=V", "--rows", "dwells", "--unit", "SF1")
@@ -72,7 +73,7 @@ def test_a_tumble_is_its_fourier_series(tmp_path):
         assert value == pytest.approx(harmonic[name], abs=0.5 * error), name
         assert abs(value - truth[name]) < 4.0 * error, name
     assert "report.html" in text_of("report", fit["run"], "--archive", archive)
-    unit = document_of("export", fit["run"], "--archive", archive)["units"][0]
+    unit = json.loads(given("export", fit["run"], "--format", "json", "--archive", archive)[1])["units"][0]
     assert (unit["axes"], np.shape(unit["bias"]), np.shape(unit["response"])) == (["x"], (4, 1), (4, 1, 3))
     assert unit["response"][0][0] == pytest.approx([found["K1"][0], found["Kxy"][0], 0.0])
     assert "x alone" in refused("export", plain["run"], "--format", "px4", "--archive", archive)
