@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial import design
-from inertial.design import Values
+from inertial.design import Values, of_axes
 from inertial.effects import SensorEffect
-from inertial.fits.linear import force_along_axes, response_matrix
-from inertial.state import State
+from inertial.fits.linear import force_along_axes, of_every_axis, response_matrix
+from inertial.state import ALL_AXES, State
 
 Array = NDArray[np.float64]
 
@@ -21,7 +21,8 @@ _STEPS = 12
 def predict(effects: Sequence[str], state: State, coefficients: Array, nonlinear: Values) -> Array:
     """Output of the model (..., n, 3), in the output's unit, for coefficients (..., 3, p); station effects left out."""
     sensor = design.split(effects)[0]
-    response = response_matrix(coefficients, tuple(design.local_names(sensor, axis, nonlinear) for axis in range(3)))
+    names = tuple(design.local_names(sensor, axis, nonlinear) for axis in state.axes)
+    response = response_matrix(coefficients, names, state.axes)
     felt = force_along_axes(response, state.force)
     return _output(sensor, replace(state, felt=felt, memory={}), coefficients, nonlinear)
 
@@ -51,8 +52,10 @@ def correct(effects: Sequence[str], state: State, output: Array, coefficients: A
     coefficients : (..., 3, p), as fitted
     nonlinear : values of nonlinear parameters and constants by effect id
     """
-    force = np.zeros(np.broadcast_shapes(output.shape, state.force.shape))
-    at = _Inverse(effects, coefficients, nonlinear)
+    # across the axes of a device with one or two the force is not measured: it is that of the state, zero where none is known
+    sensed = np.isin(np.arange(3), state.axes)
+    force = np.where(sensed, 0.0, np.broadcast_to(state.force, (*output.shape[:-1], 3)))
+    at = _Inverse(effects, coefficients, nonlinear, state.axes)
     for _ in range(_STEPS):
         step = at.step(state, output, force)
         force = force + step
@@ -70,24 +73,28 @@ def remaining_step(
     ----------
     force : (..., n, 3) in g, as :func:`correct` returns it; the others as there
     """
-    return _Inverse(effects, coefficients, nonlinear).step(state, output, force)
+    return _Inverse(effects, coefficients, nonlinear, state.axes).step(state, output, force)
 
 
 class _Inverse:
     """The inverse of a model's response, which every step uses; its parameters are those of :func:`correct`."""
 
-    def __init__(self, effects: Sequence[str], coefficients: Array, nonlinear: Values) -> None:
+    def __init__(
+        self, effects: Sequence[str], coefficients: Array, nonlinear: Values, axes: tuple[int, ...] = ALL_AXES
+    ) -> None:
         self._sensor = design.split(effects)[0]
-        names = tuple(design.local_names(self._sensor, axis, nonlinear) for axis in range(3))
+        names = tuple(design.local_names(self._sensor, axis, nonlinear) for axis in axes)
+        self._axes = axes
         self._coefficients, self._nonlinear = coefficients, nonlinear
-        self._response = response_matrix(coefficients, names)
-        self._inverse = np.linalg.inv(self._response)
+        self._response = response_matrix(coefficients, names, axes)
+        self._inverse = np.linalg.inv(of_axes(of_axes(self._response, axes, -1), axes, -2))
 
     def step(self, state: State, output: Array, force: Array) -> Array:
         """Change (..., n, 3) in g of a force (..., n, 3) in g towards the one that explains an output (..., n, 3)."""
         felt = replace(state, force=force, felt=force_along_axes(self._response, force), memory={})
         left = output - _output(self._sensor, felt, self._coefficients, self._nonlinear)
-        return np.einsum("...ij,...nj->...ni", self._inverse, left)
+        change = np.einsum("...ij,...nj->...ni", self._inverse, left)
+        return np.swapaxes(of_every_axis(np.swapaxes(change, -1, -2), self._axes), -1, -2)
 
 
 def output_covariance(
@@ -101,12 +108,13 @@ def output_covariance(
     coefficients : (3, p)
     covariance : (3p, 3p), of the coefficients of x, y and z in one vector
     """
-    names = tuple(design.local_names(design.split(effects)[0], axis, nonlinear) for axis in range(3))
-    response = response_matrix(coefficients, names)
+    names = tuple(design.local_names(design.split(effects)[0], axis, nonlinear) for axis in state.axes)
+    response = response_matrix(coefficients, names, state.axes)
     seen = replace(state, felt=force_along_axes(response, state.force), memory={})
     columns = design.local_columns(design.split(effects)[0], seen, nonlinear)
     p = columns.shape[-1]
-    blocks = covariance.reshape(3, p, 3, p)
+    m = len(state.axes)
+    blocks = covariance.reshape(m, p, m, p)
     inner = np.einsum("inp,ipjq,jnq->nij", columns, blocks, columns, optimize=True)
-    inverse = np.linalg.inv(response)
+    inverse = np.linalg.inv(of_axes(of_axes(response, state.axes, -1), state.axes, -2))
     return inverse @ inner @ inverse.T

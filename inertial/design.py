@@ -48,13 +48,13 @@ def starting_values(effects: Sequence[AnyEffect], state: State) -> dict[str, dic
 
 
 def local_columns(effects: Sequence[SensorEffect], state: State, values: Values) -> Array:
-    """Columns of the sensor's effects, (..., 3, n, p), g per unit of the coefficient; p counts the same on every axis."""
-    axes = [[e.columns(state, axis, **on_axis(values, e.id, axis)) for e in effects] for axis in range(3)]
+    """Columns of the sensor's effects, (..., m, n, p), g per unit of the coefficient; p counts the same on each of the m axes."""
+    axes = [[e.columns(state, axis, **on_axis(values, e.id, axis)) for e in effects] for axis in state.axes]
     # columns that all units share are repeated where others differ from unit to unit
     shapes = {c.shape[:-1] for columns in axes for c in columns}
     *batch, n = shapes.pop() if len(shapes) == 1 else np.broadcast_shapes(*shapes)
     # in memory one column after another: written across the rows of a large lot they take four times as long
-    design = np.empty((*batch, 3, sum(c.shape[-1] for c in axes[0]), n))
+    design = np.empty((*batch, len(axes), sum(c.shape[-1] for c in axes[0]), n))
     for axis, columns in enumerate(axes):
         start = 0
         for own in columns:
@@ -72,7 +72,12 @@ def shared_columns(effects: Sequence[StationEffect], state: State, values: Value
     response : (..., 3, 3), output per g: the matrix K of each unit
     """
     changes = np.concatenate([e.force_change(state, **on_axis(values, e.id)) for e in effects], axis=-1)
-    return np.einsum("...ij,...njq->...inq", response, changes)
+    return of_axes(np.einsum("...ij,...njq->...inq", response, changes), state.axes, -3)
+
+
+def of_axes(values: Array, axes: tuple[int, ...], dimension: int) -> Array:
+    """The values of the sensor axes that have an output; all as they are of a device with three."""
+    return values if len(axes) == 3 else np.take(values, axes, axis=dimension)
 
 
 def local_names(

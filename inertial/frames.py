@@ -13,6 +13,9 @@ UP: tuple[float, float, float] = (0.0, 0.0, 1.0)
 _ROUNDING = 1e-14  # g; smaller components are rounding of sines and cosines
 
 
+_TURNED_G = 0.05
+"""Change of the force along a direction, g, from which poses show a sensor's response to it; less is the wobble of a plane."""
+
 _UPRIGHT = 0.9
 """Cosine of the angle of x to the vertical above which the heading is that of y."""
 
@@ -58,6 +61,17 @@ def force_from_angles(outer: ArrayLike, inner: ArrayLike, up: ArrayLike = UP) ->
 def without_rounding(force: Array) -> Array:
     """A specific force in g with what rounding left of zeros made zero: the cosine of 90° is 6e‑17, not a force to fit."""
     return np.where(np.abs(force) < _ROUNDING, 0.0, force)
+
+
+def unseen_directions(force: Array) -> tuple[int, ...]:
+    """Directions of the fixture along which the force (..., n, 3), g, does not change: no pose shows the response to it."""
+    return tuple(np.flatnonzero(np.max(np.ptp(force, axis=-2).reshape(-1, 3), axis=0) < _TURNED_G).tolist())
+
+
+def shown_force(force: Array, axes: tuple[int, ...]) -> Array:
+    """The force (..., n, 3), g, less what stays the same along unseen directions, where a device has fewer than three axes."""
+    unseen = unseen_directions(force) if len(axes) < 3 else ()
+    return np.where(np.isin(np.arange(3), unseen), 0.0, force) if unseen else force
 
 
 def angles_from_force(force: ArrayLike) -> tuple[Array, Array]:

@@ -18,6 +18,8 @@ _DIMENSIONS = {"force": 3, "felt": 3, "output_run": 3, "slot": 1}
 _REMEMBERED = 3_000_000
 """Largest number of values that a state remembers of operators with memory."""
 
+ALL_AXES = (0, 1, 2)
+
 T_REFERENCE = 25.0
 """Reference temperature in °C: θ = T − 25 °C."""
 
@@ -54,6 +56,7 @@ class State:
     output_run : (..., n, 3), g, what bias and scale factor add to the output by their run with temperature, where it is known
     covariates : further recorded quantities by name, (..., n)
     reference : °C, what ``theta`` counts from
+    axes : sensor axes that have an output, in order; a single-axis device has one, and rows for the others do not exist
     """
 
     force: Array
@@ -74,6 +77,7 @@ class State:
     covariates: Mapping[str, Array] = field(default_factory=dict[str, Array])
     history: History | None = None
     reference: float = T_REFERENCE
+    axes: tuple[int, ...] = ALL_AXES
     memory: dict[tuple[object, ...], Array] = field(
         default_factory=dict[tuple[object, ...], Array], repr=False, compare=False
     )

@@ -79,8 +79,8 @@ TABLES: dict[str, Table] = {
         key=("unit",),
     ),
     "dwells": Table(
-        {"unit": text(), "dwell": whole(), "time_s": number(), **numbers(_OUT)},
-        measured=(*_SD, *_FORCE, "outer_deg", "inner_deg", "unit_C", "chamber_C"),
+        {"unit": text(), "dwell": whole(), "time_s": number()},
+        measured=(*_OUT, *_SD, *_FORCE, "outer_deg", "inner_deg", "unit_C", "chamber_C"),
         key=("unit", "dwell"),
     ),
     "coefficients": Table(
@@ -140,8 +140,9 @@ TABLES: dict[str, Table] = {
             "unit": text(),
             "dwell": whole(),
             "pose": text(),
-            **numbers(("norm_g", "error_ug", "uncertainty_ug", "error_x_ug", "error_y_ug", "error_z_ug")),
+            **numbers(("norm_g", "error_ug", "uncertainty_ug")),
         },
+        measured=("error_x_ug", "error_y_ug", "error_z_ug"),
         key=("unit", "dwell"),
     ),
     "verification_poses": Table(

@@ -22,7 +22,7 @@ __all__ = ["CLASS_WIDTH", "EffectClass", "Member", "class_of"]
 _MOST = 9
 """Rivals whose own noise is estimated."""
 
-_AXES, _FEWEST = 3, 3
+_FEWEST = 3
 """Axes of a unit, and units from which coefficients can be said to be alike."""
 
 
@@ -108,7 +108,7 @@ def _alike(model: Model, term: Term) -> bool:
     if units < _FEWEST or model.problem.lot.radial or term.shared:
         return False
     space, own = model.at(model.with_term(term).noise), term.candidate(model.problem)
-    by_axis = np.eye(_AXES)[np.arange(space.q.shape[0]) % _AXES]
+    by_axis = np.eye(model.problem.per_unit)[np.arange(space.q.shape[0]) % model.problem.per_unit]
     columns = np.einsum("bngp,ba->bngap", own.of_blocks, by_axis)
     common = space.gain(Candidate(columns.reshape(*columns.shape[:3], -1), shared=True))
     each = space.gain(own)

@@ -9,12 +9,14 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from inertial.design import of_axes
+from inertial.effects.base import AXES
 from inertial.estimation.candidate import Candidate
 from inertial.estimation.penalty import log_p_value
 from inertial.estimation.problem import Problem
 from inertial.estimation.space import Space
 from inertial.quantities import attribute_drivers, is_clock
-from inertial.state import State
+from inertial.state import ALL_AXES, State
 
 Array = NDArray[np.float64]
 
@@ -102,17 +104,17 @@ def looks_of(problem: Problem) -> list[Driver]:
 
 def _across_axes(problem: Problem, values: Array) -> Candidate:
     along, values = _typical(problem, values)
-    return _of_axes(problem, across(along, curve(values, _BENT_KNOTS)))
+    return _of_axes(problem, across(along, curve(values, _BENT_KNOTS), problem.axes))
 
 
 def _transfer_curve(problem: Problem, values: Array) -> Candidate:
     along, values = _typical(problem, values)
-    return _of_axes(problem, transfer(along, values, _TRANSFER_KNOTS))
+    return _of_axes(problem, transfer(of_axes(along, problem.axes, 1), values, _TRANSFER_KNOTS))
 
 
 def _of_axes(problem: Problem, columns: Array) -> Candidate:
     """Columns (blocks or 3, n, d), the same for all units where they are of three axes."""
-    rows = None if len(columns) == problem.blocks else np.arange(problem.blocks) % 3
+    rows = None if len(columns) == problem.blocks else np.arange(problem.blocks) % problem.per_unit
     return Candidate(columns[:, :, None, :], shared=False, rows=rows)
 
 
@@ -124,9 +126,14 @@ def _typical(problem: Problem, values: Array) -> tuple[Array, Array]:
 
 
 def forces_along(problem: Problem) -> Array:
-    """The force along each axis, (units, 3, n), g."""
+    """The force along each axis, those without an output too, (units, 3, n), g."""
     along = np.stack([problem.lot.state.along(axis) for axis in range(3)], axis=1)
-    return np.broadcast_to(along, (problem.blocks // 3, 3, problem.n))
+    return np.broadcast_to(along, (problem.blocks // problem.per_unit, 3, problem.n))
+
+
+def own_forces(problem: Problem) -> Array:
+    """The force along each axis with an output, (units, axes, n), g."""
+    return of_axes(forces_along(problem), problem.axes, 1)
 
 
 def transfer(along: Array, values: Array, knots: int) -> Array:
@@ -137,9 +144,9 @@ def transfer(along: Array, values: Array, knots: int) -> Array:
     return columns.reshape(-1, *columns.shape[2:])
 
 
-def across(along: Array, columns: Array) -> Array:
-    """Columns (units or 1, n, d) times the forces (units, 3, n) across each axis, (3 units, n, 2 d): one way, then the other."""
-    wide = [np.roll(along, -way, axis=1)[..., None] * columns[:, None] for way in (1, 2)]
+def across(along: Array, columns: Array, axes: tuple[int, ...] = ALL_AXES) -> Array:
+    """Columns (units or 1, n, d) times the forces (units, 3, n) across each axis, (blocks, n, 2 d): one way, then the other."""
+    wide = [of_axes(np.roll(along, -way, axis=1), axes, 1)[..., None] * columns[:, None] for way in (1, 2)]
     return np.concatenate([w.reshape(-1, *w.shape[2:]) for w in wide], axis=-1)
 
 
@@ -203,7 +210,7 @@ def _by_axis(problem: Problem, values: Array) -> Candidate:
     """One column per axis, (units, n, 3), as a candidate."""
     if problem.lot.radial:
         return _by_block(problem, values)
-    column = np.swapaxes(values, -1, -2).reshape(problem.blocks, problem.n, 1)
+    column = np.swapaxes(of_axes(values, problem.axes, -1), -1, -2).reshape(problem.blocks, problem.n, 1)
     return Candidate(column[:, :, None, :], shared=False)
 
 
@@ -243,6 +250,6 @@ def _axes(problem: Problem, by_block: Array, rank: int, variance: float) -> tupl
     """Axes with more than a tenth of the part that the driver explains beyond noise."""
     if problem.lot.radial:
         return ("norm",)
-    by_axis = by_block.reshape(-1, 3).sum(axis=0) - rank / 3.0 * variance
+    by_axis = by_block.reshape(-1, problem.per_unit).sum(axis=0) - rank / problem.per_unit * variance
     total = max(float(np.sum(np.maximum(by_axis, 0.0))), 1e-300)
-    return tuple(a for a, v in zip("xyz", by_axis, strict=True) if v > 0.1 * total)
+    return tuple(a for a, v in zip((AXES[axis] for axis in problem.axes), by_axis, strict=True) if v > 0.1 * total)

@@ -119,7 +119,7 @@ def _by_dwell(model: Model) -> tuple[float | None, float | None, tuple[int, int]
     columns = _bias_columns(model)
     if not columns:
         return None, None, None
-    space, axes = model.space, 1 if model.problem.lot.radial else 3
+    space, axes = model.space, model.problem.per_unit
     size = np.sqrt(np.einsum("bnp,bnp->bp", space.local, space.local))
     size = np.where(size > 0.0, size, 1.0)
     inverse = (np.linalg.pinv(space.local / size[:, None], rcond=1e-5) / size[..., None])[:, columns]
@@ -156,7 +156,7 @@ def _bias_columns(model: Model) -> list[int]:
 
 def _largest(model: Model) -> tuple[float, int, int] | None:
     """The dwell that deviates most from its prediction by all others: externally studentised residual, unit, dwell."""
-    space, axes = model.space, 1 if model.problem.lot.radial else 3
+    space, axes = model.space, model.problem.per_unit
     blocks = space.local.shape[0]
     each = _deleted(model)[1]
     squares = (each**2).reshape(blocks // axes, axes, -1).sum(axis=1)

@@ -20,6 +20,7 @@ from inertial.data_errors.handling import alternatives
 from inertial.data_errors.removed_dwells import BadDwell, without
 from inertial.decisions import CLASS_WIDTH, RISES
 from inertial.estimation.alternative import Exchangeable, Handling, Misfit, soaks
+from inertial.estimation.candidate import blocks_of_units
 from inertial.estimation.comparison import fitted_residuals, rms, slope_of
 from inertial.estimation.loudness import loudness_of
 from inertial.estimation.model import Model, refuse_without_freedom
@@ -261,8 +262,8 @@ def _misfit(model: Model, richer: Model) -> Misfit:
             # the noise of soaks was that of the readings before they were corrected
             return cost_of_model(Model(Problem(replace(lot, error=error, loudness=None)), local))
         problem = Problem(replace(lot, error=error))
-        blocks = [3 * unit + axis for unit in units for axis in range(3)]
-        noise = problem.covariance.rescaled(richer.noise.pick(blocks), model.problem.covariance)
+        blocks = blocks_of_units(np.array(units), problem.per_unit)
+        noise = problem.covariance.rescaled(richer.noise.pick(blocks.tolist()), model.problem.covariance)
         return Model(problem, local).at(noise).rss
 
     return left

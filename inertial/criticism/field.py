@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from inertial.design import grid_of
 from inertial.effects.base import AnyEffect
 from inertial.errors import MissingInput
-from inertial.estimation.alternative import Handling, OfOneDwell, by_block
+from inertial.estimation.alternative import Handling, OfOneDwell, by_block, of_outputs
 from inertial.estimation.candidate import Candidate
 from inertial.estimation.likelihood import Ratio
 from inertial.estimation.problem import Problem
@@ -125,8 +125,8 @@ class Candidates:
         """Columns (blocks, n, p) of an alternative of one dwell, for each dwell in turn."""
         if effect.id not in self._single:
             units, n = self.problem.lot.state.time.shape
-            change = effect.every_dwell(self.problem.lot)
-            self._single[effect.id] = by_block(np.broadcast_to(change, (units, n, 3, change.shape[-1])))
+            change = of_outputs(self.problem.lot, effect.every_dwell(self.problem.lot))
+            self._single[effect.id] = by_block(np.broadcast_to(change, (units, n, *change.shape[2:])))
         return self._single[effect.id]
 
     def pieces(self) -> Iterator[Candidate]:

@@ -58,7 +58,7 @@ def jumps_in_place_of(field: Candidates, model: Model, rival: Rival) -> Jumps | 
     space = model.at(model.with_term(rival.term).noise)
     # the variances are those with the effect, or with jumps in its place, in the model: at them deviances are sums of squares
     drops = _drops(space, rival.term.candidate(model.problem))
-    score = _score(drops, rival)
+    score = _score(drops, rival, field.problem.per_unit)
     largest = np.argsort(drops)[::-1][:_AXES]
     # in the same axes jumps explain half as much again as an effect at most
     if 1.5 * float(drops[largest].sum()) < score - CLASS_WIDTH:
@@ -89,9 +89,9 @@ def _drops(space: Space, candidate: Candidate) -> Array:
     return drops * max(whole / total, 1.0)
 
 
-def _score(drops: Array, rival: Rival) -> float:
+def _score(drops: Array, rival: Rival, per_unit: int) -> float:
     """Score of an effect of all axes, of one axis of all units, or of one unit, less what its unevenness within them costs."""
-    nonlinear, by_unit = freedom(rival.term), drops.reshape(-1, 3)
+    nonlinear, by_unit = freedom(rival.term), drops.reshape(-1, per_unit)
     scores: list[float] = []
     for parts in (by_unit.reshape(1, -1), by_unit.T, by_unit):
         part = parts[int(np.argmax(parts.sum(axis=1)))]
@@ -126,7 +126,7 @@ def _single_jumps(field: Candidates, space: Space, alternatives: Sequence[Handli
         paid = 2.0 * float(np.log(field.places(alternative.id)))
         places = zip(field.grids[alternative.id], gain.drop.tolist(), gain.rank.tolist(), strict=True)
         for place, drop, rank in places:
-            block = int(3 * place["unit"] + place["axis"])
+            block = int(field.problem.per_unit * place["unit"] + place["axis"])
             score = drop - price(drop, rank) - paid
             if block not in best or score > best[block].score:
                 best[block] = _OfAxis(float(score), (Term(alternative, tuple(place.items())),))
@@ -139,7 +139,7 @@ def _best(field: Candidates, space: Space, block: int, single: dict[int, _OfAxis
     tried = [_OfAxis(0.0, ()), *([single[block]] if block in single else [])]
     jump = next((a for a in field.handling if a.several and a.id in field.grids), None)
     if jump is not None:
-        unit, axis = divmod(block, 3)
+        unit, axis = divmod(block, field.problem.per_unit)
         for drop, dwells in _several(space, block):
             chosen = float(np.log(comb(space.q.shape[1] - 1, len(dwells)) * axes))
             places = ({"unit": float(unit), "axis": float(axis), "dwell": float(k)} for k in dwells)

@@ -120,7 +120,7 @@ def _together(model: Model, change: Array) -> float:
     units = model.problem.lot.state.time.shape[0]
     if units < 2 or model.problem.lot.radial:
         return 1.0
-    by_unit = change.reshape(units, 3, -1)
+    by_unit = change.reshape(units, model.problem.per_unit, -1)
     alike = float(units * np.sum(by_unit.mean(axis=0) ** 2) / max(float(np.sum(by_unit**2)), 1e-300))
     return 1.0 + alike * (shared_noise(model) - 1.0)
 

@@ -241,14 +241,16 @@ def _only_tilted(model: Model, term: Term) -> bool:
     here = np.arange(problem.n) == int(float(np.mean(term.keywords["at"])))
     column = np.broadcast_to(here.astype(np.float64)[None, :, None, None], (problem.blocks, problem.n, 1, 1))
     gain = richer.space.gain(Candidate(column, shared=False))
-    of_units = gain.by_block[:, 0].reshape(units, 3).sum(axis=1)
+    of_units = gain.by_block[:, 0].reshape(units, problem.per_unit).sum(axis=1)
     # both angles are off by no more than this: their second order, and what each device makes of them
     angle = float(np.linalg.norm(richer.shared_sizes(term)))
     by_tilt = float(model.at(richer.noise).gain(term.candidate(problem)).drop[0])
     second = (2.0 * (0.5 * angle + _INEXACT)) ** 2 * by_tilt
     left = float(of_units.sum() - of_units.max()) - second
     # as far beyond noise as adequacy asks for where tails are heavy, for the best of all dwells
-    return left <= 0.0 or float(log_chi2_tail(left, 3.0 * (units - 1))) > np.log(CERTAIN_BELOW**2 / problem.n)
+    return left <= 0.0 or float(log_chi2_tail(left, problem.per_unit * (units - 1.0))) > np.log(
+        CERTAIN_BELOW**2 / problem.n
+    )
 
 
 def _judged(field: Candidates, model: Model, term: Term) -> Rival:

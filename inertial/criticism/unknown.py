@@ -8,9 +8,10 @@ from numpy.typing import NDArray
 
 from inertial import decisions, frames
 from inertial.criticism.curves import CurveFit, fit_curve
-from inertial.criticism.drivers import Part, across, curve, forces_along, quantities, transfer, varies
+from inertial.criticism.drivers import Part, across, curve, forces_along, own_forces, quantities, transfer, varies
+from inertial.design import of_axes
 from inertial.effects.covariate import COVARIATE_PREFIX
-from inertial.estimation.alternative import by_block, rotated_force
+from inertial.estimation.alternative import by_block, of_outputs, rotated_force
 from inertial.estimation.candidate import Candidate
 from inertial.estimation.model import Model
 from inertial.estimation.penalty import PER_COEFFICIENT, cost_of_model, log_p_value
@@ -77,7 +78,7 @@ def suspects(problem: Problem) -> list[Suspect]:
     for name, values, _ in quantities(state):
         if varies(values) and not (name == "chamber_C" and alike(values, state.temperature)):
             knots = _TIME_KNOTS if is_clock(name) else _KNOTS
-            each = _unit_range(values if problem.lot.radial else np.repeat(values, 3, axis=0))
+            each = _unit_range(values if problem.lot.radial else np.repeat(values, problem.per_unit, axis=0))
             suspected.append(Suspect(name, _alike(problem, curve(values, knots)), each))
             # levels in time, one for each soak, could follow any memory of temperature: a dependence on time is smooth
             steps = None if is_clock(name) else _levels(values)
@@ -87,7 +88,7 @@ def suspects(problem: Problem) -> list[Suspect]:
                 # the same dependence of the scale factors: what the driver changes is then felt along each axis
                 suspected.append(Suspect(name, _columns(along_force(problem, curve(values, _FEW_KNOTS))), part="scale"))
     if not problem.lot.radial:
-        own = forces_along(problem).reshape(problem.blocks, problem.n)
+        own = own_forces(problem).reshape(problem.blocks, problem.n)
         suspected.append(Suspect("pose", _columns(curve(own, _KNOTS)), _unit_range(own)))
         suspected += _table(problem)
     suspected += [Suspect("time_s", _alike(problem, _swing(state.time, c))) for c in _CYCLES]
@@ -111,12 +112,12 @@ def wide_suspects(problem: Problem) -> list[Suspect]:
         own = curve(values, _WIDE_KNOTS)  # (units or 1, n, d)
         if own.shape[-1] < 2:  # a line, or levels that handling errors already are
             continue
-        suspected.append(Suspect(name, _columns(across(along, own)), ways=2, part="axes"))
+        suspected.append(Suspect(name, _columns(across(along, own, problem.axes)), ways=2, part="axes"))
         turned = rotated[..., :, None] * curve(values, _TURNED_KNOTS + is_clock(name))[:, :, None, None, :]
-        whole = np.broadcast_to(turned, (problem.blocks // 3, *turned.shape[1:]))
-        columns = by_block(whole.reshape(*whole.shape[:3], -1))
+        whole = np.broadcast_to(turned, (problem.blocks // problem.per_unit, *turned.shape[1:]))
+        columns = by_block(of_outputs(problem.lot, whole.reshape(*whole.shape[:3], -1)))
         suspected.append(Suspect(name, _columns(columns, shared=True), part="axes"))
-        columns = transfer(along, values, _FORCE_KNOTS)
+        columns = transfer(of_axes(along, problem.axes, 1), values, _FORCE_KNOTS)
         suspected.append(Suspect(name, _columns(columns), part="transfer"))
     return suspected
 
@@ -255,7 +256,7 @@ def _levels(values: Array) -> Array | None:
 
 def _alike(problem: Problem, columns: Array) -> Candidate:
     """Columns (units, n, d), the same for every axis."""
-    each = columns if problem.lot.radial else np.repeat(columns, 3, axis=0)
+    each = columns if problem.lot.radial else np.repeat(columns, problem.per_unit, axis=0)
     return _columns(np.broadcast_to(each, (problem.blocks, problem.n, columns.shape[-1])))
 
 
@@ -265,7 +266,7 @@ def _columns(columns: Array, *, shared: bool = False) -> Candidate:
 
 def along_force(problem: Problem, columns: Array) -> Array:
     """Columns (units, n, d) times the force along each axis, (blocks, n, d)."""
-    wide = forces_along(problem)[..., None] * columns[:, None]
+    wide = own_forces(problem)[..., None] * columns[:, None]
     return wide.reshape(problem.blocks, problem.n, -1)
 
 

@@ -55,7 +55,7 @@ def bad_dwells(model: Model) -> list[BadDwell]:
 
 def _round(model: Model, most: int) -> list[BadDwell]:
     """Dwells that stand out at one noise, the largest first, each deleted before the next."""
-    deletion = _Deletion(model.space, 3)
+    deletion = _Deletion(model.space, model.problem.per_unit)
     if deletion.units < _SEVERAL:
         deletion.left_to_poses = deletion.off_every_time(poses(model.problem.lot))
     bad: list[BadDwell] = []
@@ -162,7 +162,7 @@ class _Deletion:
 def deletion_residuals(model: Model) -> Array:
     """Deviation of each dwell when it is deleted, axis by axis, in standard deviations, (m,); without those left out."""
     space = model.space
-    deletion = _Deletion(space, 1 if model.problem.lot.radial else 3)
+    deletion = _Deletion(space, model.problem.per_unit)
     known = deletion.there & (deletion.size > 1e-9 * deletion.size.max())
     scaled = deletion.left / np.sqrt(np.where(known, deletion.size, 1.0)) / space.noise.scale[:, None]
     return scaled[known]

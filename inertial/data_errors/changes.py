@@ -77,7 +77,7 @@ class OfOneAxis(Handling):
     def change(self, lot: Lot, slope: Array | None, **place: float) -> Array:
         """The columns of the axis; none in the others."""
         levels = self.levels(lot, **place)
-        column = np.zeros((1, len(levels), len(AXES), levels.shape[-1]))
+        column = np.zeros((1, len(levels), len(lot.state.axes), levels.shape[-1]))
         column[0, :, int(place["axis"])] = levels
         return column
 
@@ -89,4 +89,4 @@ class OfOneAxis(Handling):
 def axes_of_units(lot: Lot) -> list[dict[str, float]]:
     """Every axis of every unit, as places."""
     units = lot.state.time.shape[0]
-    return [{"unit": float(u), "axis": float(axis)} for u in range(units) for axis in range(len(AXES))]
+    return [{"unit": float(u), "axis": float(axis)} for u in range(units) for axis in range(len(lot.state.axes))]

@@ -84,7 +84,7 @@ class PlainFit:
         squares = np.zeros(dwells.size)
         for difference, basis, rest in zip(apart, self.basis[pair], self.left[pair], strict=True):
             # ‖r + c‖² of the columns c = P·H·d, from running sums: cᵀc = dᵀHd − (QᵀHd)², rᵀc = rᵀHd
-            for axis in range(3):
+            for axis in range(difference.shape[-1]):
                 change = difference[:, axis]
                 along = after @ (basis * change[:, None])
                 squares += after @ change**2 - np.sum(along**2, axis=1) + 2.0 * (after @ (rest[:, axis] * change))

@@ -6,6 +6,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from inertial.frames import shown_force
+from inertial.state import ALL_AXES
+
 Array = NDArray[np.float64]
 
 STANDARD_GRAVITY = 9.80665  # m/s² in one g
@@ -25,6 +28,7 @@ class Readings:
     time : (units, n), s
     temperature, chamber, vibration : (units, n), °C, °C, g; None if not recorded
     unit_name : the output's unit if stated ("g", "V", "LSB")
+    axes : sensor axes with an output
     history_end : s, last time of the temperature history, if there is one
     """
 
@@ -39,6 +43,7 @@ class Readings:
     vibration: Array | None = None
     unit_name: str | None = None
     history_end: float | None = None
+    axes: tuple[int, ...] = ALL_AXES
 
     @cached_property
     def there(self) -> NDArray[np.bool_]:
@@ -49,31 +54,34 @@ class Readings:
     @cached_property
     def turned(self) -> bool:
         """Whether the poses separate response and bias; else faults of response cannot be detected."""
-        x = np.concatenate([np.ones((*self.force.shape[1:2], 1)), self.force[0]], axis=-1)
+        force = self.force[0][:, self.axes]
+        x = np.concatenate([np.ones((len(force), 1)), force], axis=-1)
         return bool(np.linalg.svd(x, compute_uv=False)[-1] > _TURNED * np.sqrt(len(x)))
 
     @cached_property
     def fits(self) -> Array:
-        """Robust bias and response of every unit, (units, 3, 4): columns 1, fx, fy, fz; output unit.
+        """Robust bias and response of every unit, (units, m, 4): columns 1, fx, fy, fz; output unit.
 
         If the poses do not turn, the response is the nominal one of the output's unit.
         """
         if not self.turned:
             return np.stack([self._nominal(f, o) for f, o in zip(self.force, self.output, strict=True)])
-        return np.stack([robust_fit(f, o) for f, o in zip(self.force, self.output, strict=True)])
+        return np.stack(
+            [robust_fit(f, o) for f, o in zip(shown_force(self.force, self.axes), self.output, strict=True)]
+        )
 
     def _nominal(self, force: Array, output: Array) -> Array:
         """Bias at the nominal response, (3, 4): 1 for g, 9.80665 for m/s², else the norm of the mean output."""
         known = {"g": 1.0, "m/s^2": STANDARD_GRAVITY}
         typical = float(np.linalg.norm(np.nanmedian(output, axis=0)))
         scale = known.get(self.unit_name or "", typical if typical > 0.0 else 1.0)
-        bias = np.nanmedian(output - scale * force, axis=0)
-        return np.concatenate([bias[:, None], scale * np.eye(3)], axis=1)
+        bias = np.nanmedian(output - scale * force[:, self.axes], axis=0)
+        return np.concatenate([bias[:, None], scale * np.eye(3)[list(self.axes)]], axis=1)
 
     @cached_property
     def scale(self) -> Array:
         """Typical output per g of every unit, (units,): the root of the mean squared response."""
-        return np.sqrt(np.sum(self.fits[:, :, 1:] ** 2, axis=(1, 2)) / 3.0)
+        return np.sqrt(np.sum(self.fits[:, :, 1:] ** 2, axis=(1, 2)) / len(self.axes))
 
     @cached_property
     def misfit(self) -> Array:
@@ -98,7 +106,7 @@ def robust_fit(force: Array, output: Array, theta: Array | None = None) -> Array
         x = np.concatenate([x, theta[:, None] * x], axis=-1)
     x, y = x[there], output[there]
     weight = np.ones(len(y))
-    coefficients = np.zeros((x.shape[1], 3))
+    coefficients = np.zeros((x.shape[1], output.shape[-1]))
     for turn in range(_ROUNDS):
         coefficients = np.linalg.lstsq(x * weight[:, None], y * weight[:, None], rcond=1e-9)[0].astype(np.float64)
         size = np.linalg.norm(y - x @ coefficients, axis=1)
@@ -163,7 +171,7 @@ def find_split(force: Array, output: Array) -> Split | None:
     errors = [_plain_fit(f[:p], y[:p])[1] + _plain_fit(f[p:], y[p:])[1] for p in near]
     best = int(near[int(np.argmin(errors))])
     before, after = _plain_fit(f[:best], y[:best])[0], _plain_fit(f[best:], y[best:])[0]
-    apart = float(np.max(np.abs(after - before))) > 0.01 * float(np.sqrt(np.sum(before[1:] ** 2) / 3.0))
+    apart = float(np.max(np.abs(after - before))) > 0.01 * float(np.sqrt(np.sum(before[1:] ** 2) / before.shape[1]))
     return Split(int(there[best]), before, after) if min(errors) < _BETTER * whole and apart else None
 
 

@@ -12,6 +12,7 @@ from typing import ClassVar, Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from inertial.design import of_axes
 from inertial.effects.base import Effect
 from inertial.estimation.lot import Lot
 from inertial.state import State
@@ -107,9 +108,9 @@ class Handling(Effect):
 
     def columns(self, lot: "Lot", slope: Array | None, **place: float) -> Array:
         """Columns of all blocks, (blocks, n, k); zero in unaffected units."""
-        change = self.change(lot, slope, **place)
+        change = of_outputs(lot, self.change(lot, slope, **place))
         units, n = lot.state.time.shape
-        whole = np.zeros((units, n, 3, change.shape[-1]))
+        whole = np.zeros((units, n, len(lot.state.axes), change.shape[-1]))
         if "unit" in place:
             whole[int(place["unit"])] = change[0]
         else:
@@ -137,10 +138,15 @@ class Exchangeable(Handling):
         """A short text for one of :meth:`instead`."""
 
 
+def of_outputs(lot: "Lot", change: Array) -> Array:
+    """Changes (units or 1, n, 3 or m, k) of the outputs that there are: a change of force shows on the axes that have one."""
+    return change if change.shape[2] == len(lot.state.axes) else of_axes(change, lot.state.axes, 2)
+
+
 def by_block(change: Array) -> Array:
-    """(units, n, 3, k) as (3·units, n, k)."""
-    units, n, _, k = change.shape
-    return np.swapaxes(change, 1, 2).reshape(3 * units, n, k)
+    """(units, n, m, k) as (m·units, n, k)."""
+    units, n, m, k = change.shape
+    return np.swapaxes(change, 1, 2).reshape(m * units, n, k)
 
 
 def stride(lot: "Lot") -> int:

@@ -26,6 +26,7 @@ class Candidate:
     rows: NDArray[np.intp] | None = None
     units: NDArray[np.intp] | None = None
     key: object = None
+    per_unit: int = 3
 
     @property
     def of_blocks(self) -> Array:
@@ -35,7 +36,12 @@ class Candidate:
     @property
     def blocks(self) -> NDArray[np.intp] | None:
         """The blocks of the units that the columns are of; None for all."""
-        return None if self.units is None else (3 * self.units[:, None] + np.arange(3)).reshape(-1)
+        return None if self.units is None else blocks_of_units(self.units, self.per_unit)
+
+
+def blocks_of_units(units: NDArray[np.intp], per_unit: int) -> NDArray[np.intp]:
+    """The blocks of some units, (units · axes,)."""
+    return (per_unit * units[:, None] + np.arange(per_unit)).reshape(-1)
 
 
 def times_rows(rows: Array, candidate: Candidate) -> Array:
@@ -60,34 +66,34 @@ def times_rows(rows: Array, candidate: Candidate) -> Array:
     return np.swapaxes(product, -1, -2).reshape(blocks, grid, p, k)
 
 
-def shared_rows(columns: Array, *, radial: bool) -> NDArray[np.intp] | None:
+def shared_rows(columns: Array, per_unit: int) -> NDArray[np.intp] | None:
     """The row of each block where columns (blocks, ...) are equal: of all blocks, by axis, or in each unit; else None.
 
     Parameters
     ----------
-    radial : whether a block is a unit; otherwise it is an axis of one
+    per_unit : blocks of a unit: one for each axis, or one alone
     """
     blocks = len(columns)
-    if radial:
+    if per_unit == 1:
         return np.zeros(blocks, dtype=np.intp) if np.all(columns == columns[:1]) else None
-    by_unit = columns.reshape(-1, 3, *columns.shape[1:])
+    by_unit = columns.reshape(-1, per_unit, *columns.shape[1:])
     # most candidates differ in a few values already
-    axes = np.array_equal(by_unit[-1, 0, -1], by_unit[-1, 2, -1]) and bool(np.all(by_unit == by_unit[:, :1]))
+    axes = np.array_equal(by_unit[-1, 0, -1], by_unit[-1, -1, -1]) and bool(np.all(by_unit == by_unit[:, :1]))
     units = len(by_unit) > 1 and np.array_equal(by_unit[-1, :, -1], by_unit[0, :, -1])
     units = units and bool(np.all(by_unit == by_unit[:1]))
     if not axes and not units:
         return None
     place = np.arange(blocks)
-    unit, axis = (0 if units else place // 3), (0 if axes else place % 3)
-    return unit * (1 if axes else 3) + axis + np.zeros(blocks, dtype=np.intp)
+    unit, axis = (0 if units else place // per_unit), (0 if axes else place % per_unit)
+    return unit * (1 if axes else per_unit) + axis + np.zeros(blocks, dtype=np.intp)
 
 
-def finest_rows(rows_of: Sequence[NDArray[np.intp] | None], *, radial: bool) -> NDArray[np.intp] | None:
+def finest_rows(rows_of: Sequence[NDArray[np.intp] | None], per_unit: int) -> NDArray[np.intp] | None:
     """The rows of blocks for the columns of several values: where they differ at one, they differ."""
     known = [rows for rows in rows_of if rows is not None]
     if len(known) < len(rows_of):
         return None
     finest = max(known, key=lambda rows: int(rows.max()))
-    by_unit = not radial and finest.size > 3 and any(rows[0] != rows[3] for rows in known)
-    by_axis = not radial and any(rows[0] != rows[1] for rows in known)
+    by_unit = per_unit > 1 and finest.size > per_unit and any(rows[0] != rows[per_unit] for rows in known)
+    by_axis = per_unit > 1 and any(rows[0] != rows[1] for rows in known)
     return None if by_unit and by_axis else finest

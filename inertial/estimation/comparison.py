@@ -86,9 +86,9 @@ def _pooled(model: Model, unit: Array, right: Array, scaled: Array, covariance: 
     size = np.where(seen, size, 1.0)
     value = np.where(seen, scaled / size, 0.0)
     error2 = np.diagonal(covariance, axis1=-2, axis2=-1) / size**2
-    by_axis = value.reshape(units, 3, -1)
+    by_axis = value.reshape(units, problem.per_unit, -1)
     mean = by_axis.mean(axis=0)
-    scatter = ((by_axis - mean) ** 2).sum(axis=(0, 1)) / (3.0 * (units - 1))
+    scatter = ((by_axis - mean) ** 2).sum(axis=(0, 1)) / (problem.per_unit * (units - 1.0))
     between = np.maximum(scatter - error2.mean(axis=0), 1e-3 * error2.mean(axis=0))
     variance = model.space.variance
     there = free & (between > 0.0)
@@ -224,4 +224,4 @@ def slope_of(model: Model) -> Array | None:
     slope = (ends[0] - ends[1]) / (2.0 * _WARMER)
     if float(np.max(np.abs(slope))) <= 0.0:
         return None
-    return np.swapaxes(slope.reshape(state.time.shape[0], 3, -1), 1, 2)
+    return np.swapaxes(slope.reshape(state.time.shape[0], model.problem.per_unit, -1), 1, 2)

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial.decisions import TOGETHER, UNITS_TOGETHER
+from inertial.design import of_axes
 from inertial.distributions import chi2_quantile
 from inertial.estimation.alternative import Handling, by_block, tilts
 from inertial.estimation.comparison import estimate, residuals
@@ -110,8 +111,8 @@ def shared_noise(model: Model) -> float:
     if units < 2 or lot.radial:
         return 1.0
     space = model.space
-    there = model.problem.covariance.there.reshape(units, 3, -1)
-    left = space.residual.reshape(units, 3, -1)
+    there = model.problem.covariance.there.reshape(units, model.problem.per_unit, -1)
+    left = space.residual.reshape(units, model.problem.per_unit, -1)
     count = there.sum(axis=0)
     mean = np.where(count > 1, left.sum(axis=0) / np.sqrt(np.maximum(count, 1)), np.nan)
     squares = mean[np.isfinite(mean)] ** 2
@@ -140,7 +141,7 @@ def scatter_of_poses(model: Model) -> float:
         return 1.0
     there = np.flatnonzero(np.isfinite(lot.error).all(axis=-1).any(axis=0))
     change = tilts(lot.state)
-    columns = by_block(np.broadcast_to(change, (units, n, 3, change.shape[-1])))
+    columns = by_block(of_axes(np.broadcast_to(change, (units, n, 3, change.shape[-1])), lot.state.axes, 2))
     gain = model.space.gain_of_dwells(columns, there)
     drop = gain.drop[gain.rank == 2]
     if drop.size < _FEWEST_POSES:
@@ -171,7 +172,7 @@ def along_mean(model: Model, noise: Noise, term: Term) -> float:
     unit = columns / np.where(size > 0.0, size, 1.0)[:, None, :]
     inverse = np.linalg.pinv(np.swapaxes(unit, -1, -2) @ unit, rcond=1e-4, hermitian=True)
     fitted = (unit @ (inverse @ (np.swapaxes(unit, -1, -2) @ space.residual[..., None])))[..., 0]
-    fitted = fitted.reshape(units, 3, -1)
+    fitted = fitted.reshape(units, model.problem.per_unit, -1)
     whole = float(np.sum(fitted**2))
     return float(units * np.sum(fitted.mean(axis=0) ** 2) / whole) if whole > 0.0 else 0.0
 

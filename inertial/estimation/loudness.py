@@ -84,7 +84,7 @@ def _of_soak(model: Model, series: Array, places: NDArray[np.intp]) -> Array:
         own = there[block]
         if np.count_nonzero(own) < _FEWEST:
             continue
-        here = force[block // 3][own], time[block // 3][own]
+        here = force[block // problem.per_unit][own], time[block // problem.per_unit][own]
         if before is None or not all(map(np.array_equal, here, before)):
             # the axes of a unit, and units in the same poses at the same times, have the same columns
             before, x = here, _columns(*here)
@@ -95,9 +95,9 @@ def _of_soak(model: Model, series: Array, places: NDArray[np.intp]) -> Array:
         left[block, own] = y - q @ (q.T @ y)
         v = covariance.of_dwells(block, model.noise, places[own])
         expected[block] = (np.trace(v) - np.trace(q.T @ v @ q)) / np.count_nonzero(own)
-    units = problem.blocks // 3
+    units = problem.blocks // problem.per_unit
     if units >= _TOGETHER:
-        by_axis = left.reshape(units, 3, -1)
+        by_axis = left.reshape(units, problem.per_unit, -1)
         known = np.isfinite(by_axis).sum(axis=0) >= _TOGETHER
         together = np.zeros(by_axis.shape[1:])
         together[known] = np.nanmedian(by_axis[:, known], axis=0)

@@ -8,10 +8,11 @@ from itertools import groupby
 import numpy as np
 from numpy.typing import NDArray
 
+from inertial.design import of_axes
 from inertial.effects import SensorEffect
 from inertial.effects.base import AnyEffect, excited, has_start
-from inertial.estimation.alternative import Handling, by_block
-from inertial.estimation.candidate import Candidate, finest_rows, shared_rows
+from inertial.estimation.alternative import Handling, by_block, of_outputs
+from inertial.estimation.candidate import Candidate, blocks_of_units, finest_rows, shared_rows
 from inertial.estimation.covariance import Covariance
 from inertial.estimation.lot import Lot
 from inertial.estimation.noise_shares import Shares
@@ -43,11 +44,13 @@ def on_axis(values: Values, axis: int) -> dict[str, float]:
     return {name: value[axis] if isinstance(value, tuple) else value for name, value in values.items()}
 
 
-def _of_axes(effect: SensorEffect, values: Values, made: Callable[[int, dict[str, float]], Array]) -> list[Array]:
-    """What is made for each sensor axis; the same three times where the effect depends on none, and its values neither."""
+def _of_axes(
+    effect: SensorEffect, values: Values, axes: Sequence[int], made: Callable[[int, dict[str, float]], Array]
+) -> list[Array]:
+    """What is made for each sensor axis; the same for all where the effect depends on none, and its values neither."""
     if effect.same_on_axes and not any(isinstance(value, tuple) for value in values.values()):
-        return [made(0, on_axis(values, 0))] * 3
-    return [made(axis, on_axis(values, axis)) for axis in range(3)]
+        return [made(0, on_axis(values, 0))] * len(axes)
+    return [made(axis, on_axis(values, axis)) for axis in axes]
 
 
 @dataclass(frozen=True)
@@ -72,7 +75,8 @@ class Problem:
     def __init__(self, lot: Lot, *, slope: Array | None = None) -> None:
         self.lot, self.slope = lot, slope
         units, n = lot.state.time.shape
-        self.blocks = units if lot.radial else 3 * units
+        self.axes = lot.state.axes
+        self.blocks = units if lot.radial else len(self.axes) * units
         self.n = n
         self.error = self._error()
         self.y = self._series()
@@ -93,7 +97,7 @@ class Problem:
     @cached_property
     def covariance(self) -> Covariance:
         """The covariances of the blocks, at any noise."""
-        time = self.lot.state.time if self.lot.radial else np.repeat(self.lot.state.time, 3, axis=0)
+        time = self.lot.state.time if self.lot.radial else np.repeat(self.lot.state.time, len(self.axes), axis=0)
         return Covariance(time, self.error, self._direction if self.lot.radial else None, self.lot.loudness)
 
     def forget(self) -> None:
@@ -127,6 +131,11 @@ class Problem:
         return Problem(self.lot.units([0]))
 
     @property
+    def per_unit(self) -> int:
+        """Blocks of one unit: its axes, or one where only the norm of gravity is known."""
+        return 1 if self.lot.radial else len(self.axes)
+
+    @property
     def count(self) -> int:
         """Number of measurements."""
         return int(np.isfinite(self.error).sum())
@@ -148,7 +157,12 @@ class Problem:
         if isinstance(effect, SensorEffect):
             state = self.lot.state
             return self._by_axis(
-                _of_axes(effect, values, lambda axis, own: excited(effect, effect.columns(state, axis, **own)))
+                _of_axes(
+                    effect,
+                    values,
+                    self.axes,
+                    lambda axis, own: excited(effect, effect.columns(state, axis, **own)),
+                )
             )
         return self.seen(effect.force_change(self.lot.state, **on_axis(values, 0)))
 
@@ -160,18 +174,20 @@ class Problem:
         # information
         state = self.lot.state
         if isinstance(effect, SensorEffect):
-            return self._by_axis(_of_axes(effect, values, lambda axis, own: effect.start_columns(state, axis, **own)))
+            return self._by_axis(
+                _of_axes(effect, values, self.axes, lambda axis, own: effect.start_columns(state, axis, **own))
+            )
         return self.seen(effect.start_change(state, **on_axis(values, 0)))
 
     def _by_axis(self, axes: list[Array]) -> Array:
-        """Columns of three axes, each (units or 1, n, p), by block."""
+        """Columns of all axes, each (units or 1, n, p), by block."""
         state = self.lot.state
         shape = state.time.shape
         if self.lot.radial:
             axes = [a if a.shape[:-1] == shape else np.broadcast_to(a, (*shape, a.shape[-1])) for a in axes]
             weighted = [a * self._direction[..., i, None] for i, a in enumerate(axes)]
             return np.concatenate(weighted, axis=-1)
-        joined = np.empty((shape[0], 3, shape[1], axes[0].shape[-1]))
+        joined = np.empty((shape[0], len(self.axes), shape[1], axes[0].shape[-1]))
         for axis, columns in enumerate(axes):
             joined[:, axis] = columns
         return joined.reshape(self.blocks, self.n, -1)
@@ -185,7 +201,7 @@ class Problem:
         seen = np.broadcast_to(seen, (state.time.shape[0], 3, self.n, seen.shape[-1]))
         if self.lot.radial:
             return np.einsum("uni,uinq->unq", self._direction, seen)
-        return seen.reshape(self.blocks, self.n, -1)
+        return of_axes(seen, self.axes, 1).reshape(self.blocks, self.n, -1)
 
     def candidate(self, effect: AnyEffect | Handling, grid: Sequence[Values], *, first: int | None = None) -> Candidate:
         """Columns of an effect over values of its nonlinear parameters.
@@ -241,10 +257,10 @@ class Problem:
             own = (self._columns(effect, values) if known is None else known)[..., :first]
             if start:
                 own = np.concatenate([own, self.start(effect, values)], axis=-1)
-            rows = None if shared else shared_rows(own, radial=self.lot.radial)
+            rows = None if shared else shared_rows(own, self.per_unit)
             every.append(own if rows is None else own[np.unique(rows, return_index=True)[1]])
             rows_of.append(rows)
-        rows = finest_rows(rows_of, radial=self.lot.radial)
+        rows = finest_rows(rows_of, self.per_unit)
         count = self.blocks if rows is None else int(rows.max()) + 1
         columns = np.empty((count, len(grid), every[0].shape[-1], self.n))
         for place, (own, of_own) in enumerate(zip(every, rows_of, strict=True)):
@@ -272,14 +288,14 @@ class Problem:
         """The places of an alternative, those of units one unit after another, no more at a time than a piece has room for."""
         if grid and ("unit" not in grid[0] or "other" in grid[0]):
             alike = len(effect.change(self.lot, self.slope, **on_axis(grid[0], 0))) == 1
-            size = max(1, _PIECE // ((3 if alike else self.blocks) * self.n * _WIDEST))
+            size = max(1, _PIECE // ((len(self.axes) if alike else self.blocks) * self.n * _WIDEST))
             for start in range(0, len(grid), size):
                 yield self._together(effect, grid[start : start + size])
             return
         by_unit = [list(places) for _, places in groupby(grid, key=lambda values: values["unit"])]
         for places, alike in groupby(by_unit, key=_without_unit):
             units = np.array([int(on_axis({"unit": own[0]["unit"]}, 0)["unit"]) for own in alike])
-            size = max(1, _PIECE // (3 * self.n * _WIDEST * len(places)))
+            size = max(1, _PIECE // (len(self.axes) * self.n * _WIDEST * len(places)))
             yield from self._of_units(effect, units, [dict(place) for place in places], size)
 
     def _of_units(
@@ -289,11 +305,14 @@ class Problem:
         key = (effect.id, units.size, int(units[0]), len(places), *places[0].items(), *places[-1].items())
 
         def made() -> Candidate:
-            columns = np.stack([effect.of_each_unit(self.lot, self.slope, **on_axis(p, 0)) for p in places], axis=3)
-            few, n, _, g, k = columns.shape
-            rows = np.tile(np.arange(3), units.size) if few == 1 else None
-            by_block = np.swapaxes(columns, 1, 2).reshape(3 * few, n, g, k)
-            return Candidate(by_block, shared=True, rows=rows, units=units, key=key)
+            columns = np.stack(
+                [of_outputs(self.lot, effect.of_each_unit(self.lot, self.slope, **on_axis(p, 0))) for p in places],
+                axis=3,
+            )
+            few, n, m, g, k = columns.shape
+            rows = np.tile(np.arange(m), units.size) if few == 1 else None
+            by_block = np.swapaxes(columns, 1, 2).reshape(m * few, n, g, k)
+            return Candidate(by_block, shared=True, rows=rows, units=units, key=key, per_unit=m)
 
         kept = self._stored(key, made)
         if kept.rows is not None:
@@ -301,7 +320,7 @@ class Problem:
             return
         for start in range(0, units.size, size):
             some = units[start : start + size]
-            blocks = (3 * some[:, None] + np.arange(3)).reshape(-1)
+            blocks = blocks_of_units(some, len(self.axes))
             yield replace(kept, columns=kept.columns[blocks], units=some, key=(*key, start, size))
 
     def _together(self, effect: Handling, places: Sequence[Values]) -> Candidate:
@@ -309,9 +328,9 @@ class Problem:
         key = (effect.id, len(places), *places[0].items(), *places[-1].items())
 
         def made() -> Candidate:
-            changes = [effect.change(self.lot, self.slope, **on_axis(place, 0)) for place in places]
+            changes = [of_outputs(self.lot, effect.change(self.lot, self.slope, **on_axis(p, 0))) for p in places]
             units = self.lot.state.time.shape[0]
-            rows = np.tile(np.arange(3), units) if all(len(f) == 1 for f in changes) else None
+            rows = np.tile(np.arange(len(self.axes)), units) if all(len(f) == 1 for f in changes) else None
             if rows is None:
                 changes = [np.broadcast_to(f, (units, *f.shape[1:])) for f in changes]
             return Candidate(np.stack([by_block(f) for f in changes], axis=2), shared=True, rows=rows, key=key)

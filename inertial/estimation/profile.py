@@ -168,7 +168,11 @@ class LikelihoodProfile:
             own = np.einsum("bnt,bnt->bt", both, both)[:, None, :] - np.sum(along**2, axis=2)
             own = np.maximum(own, 0.0)
             radial = self.problem.lot.radial
-            axes = None if radial else np.stack([own[a::3].sum(axis=0) for a in range(_AXES)])
+            axes = (
+                None
+                if radial or self.problem.per_unit < _AXES
+                else np.stack([own[a::3].sum(axis=0) for a in range(_AXES)])
+            )
             return own.sum(axis=0), axes
         whole = np.einsum("bnt,bns->ts", both, both) - np.einsum("bgpt,bgps->gts", along, along, optimize=True)
         inner = np.linalg.pinv(whole[:, r:, r:], rcond=_JITTER, hermitian=True)

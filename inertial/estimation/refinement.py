@@ -15,6 +15,7 @@ from inertial.estimation.noise_shares import Noise
 from inertial.estimation.problem import Problem, Values
 from inertial.estimation.space import Gain, Space
 from inertial.estimation.term import Term
+from inertial.state import ALL_AXES
 
 Array = NDArray[np.float64]
 
@@ -102,6 +103,8 @@ def _refine_one(space: Space, problem: Problem, term: Term, parameter: Nonlinear
 
 def _per_axis(space: Space, problem: Problem, term: Term, parameter: Nonlinear) -> Term:
     """The same for every axis by itself, if the axes differ by more than noise."""
+    if problem.per_unit < len(ALL_AXES):
+        return term
     common = float(_gain(space, problem, term, [term.keywords]).drop[0])
     values = np.repeat(parameter.grid()[:, None], 3, axis=1)
     width, best, taken = cell(parameter), values[0], np.zeros(3)

@@ -149,7 +149,7 @@ class ShareStatistics:
         places: list[NDArray[np.intp]] = []
         count = 0
         for column in np.swapaxes(self._rows, 0, 1):
-            rows = shared_rows(column, radial=self.problem.lot.radial)
+            rows = shared_rows(column, self.problem.per_unit)
             few.append(column if rows is None else column[np.unique(rows, return_index=True)[1]])
             places.append(count + (np.arange(blocks) if rows is None else rows))
             count += len(few[-1])

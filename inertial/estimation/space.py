@@ -210,7 +210,7 @@ class Space:
         """Gain of a candidate on the residuals."""
         found = self.products(candidate)
         if candidate.shared:
-            return self._gain_shared(found, one_unit=candidate.units is not None)
+            return self._gain_shared(found, per_unit=None if candidate.units is None else candidate.per_unit)
         size = np.sqrt(found.squares)
         size = np.where(size > 0.0, size, 1.0)
         values, vectors = eigen(found.left / (size[..., :, None] * size[..., None, :]))
@@ -270,9 +270,9 @@ class Space:
         after -= np.sum(np.einsum("bgrt,gt->bgr", along, turned) ** 2, axis=-1)
         return np.einsum("bn,bn->b", self.residual, self.residual)[:, None] - after
 
-    def _gain_shared(self, found: Products, *, one_unit: bool) -> Gain:
-        """Gain of columns whose coefficients all blocks share, or the three of each unit: units in turn, all values of each."""
-        together = 3 if one_unit else found.whole.shape[0]
+    def _gain_shared(self, found: Products, *, per_unit: int | None) -> Gain:
+        """Gain of columns whose coefficients all blocks share, or those of each unit: units in turn, all values of each."""
+        together = per_unit or found.whole.shape[0]
         own, squares, inside = (
             each.reshape(-1, together, *each.shape[1:]).sum(axis=1).reshape(-1, *each.shape[2:])
             for each in (found.left, found.squares, found.inside)

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from inertial import design
 from inertial.design import Values
 from inertial.errors import NotIdentified
-from inertial.state import State
+from inertial.frames import shown_force
+from inertial.state import ALL_AXES, State
 
 Array = NDArray[np.float64]
 
@@ -53,27 +54,33 @@ class LotFit:
     residuals: Array
     chi2: Array
     dof: Array
+    axes: tuple[int, ...] = ALL_AXES
 
     @property
     def standard_errors(self) -> Array:
         """Standard errors of the coefficients, (..., 3, p)."""
         return np.sqrt(np.diagonal(self.covariance, axis1=-2, axis2=-1))
 
+    def scale(self) -> Array:
+        """Output per g along itself of every axis that has an output, (..., m); zero without a scale in the model."""
+        return own_terms(self.response()[..., self.axes, :], self.axes)
+
     def response(self) -> Array:
         """The matrix K of each unit, (..., 3, 3), output per g: scale on the diagonal, misalignment beside it."""
-        return response_matrix(self.coefficients, self.names)
+        return response_matrix(self.coefficients, self.names, self.axes)
 
 
-def response_matrix(coefficients: Array, names: Sequence[Sequence[tuple[str, str]]]) -> Array:
-    """K from coefficients (..., 3, p): the columns of ``scale`` and ``misalignment``, (..., 3, 3)."""
+def response_matrix(
+    coefficients: Array, names: Sequence[Sequence[tuple[str, str]]], axes: Sequence[int] = ALL_AXES
+) -> Array:
+    """K from coefficients (..., m, p) of the m axes: ``scale`` and ``misalignment``, (..., 3, 3); other rows are zero."""
     k = np.zeros((*coefficients.shape[:-2], 3, 3))
-    for axis in range(3):
-        for column, (effect, _) in enumerate(names[axis]):
+    for row, axis in enumerate(axes):
+        for column, (effect, name) in enumerate(names[row]):
             if effect == "scale":
-                k[..., axis, axis] = coefficients[..., axis, column]
-        across = [c for c, (effect, _) in enumerate(names[axis]) if effect == "misalignment"]
-        for column, other in zip(across, ((axis + 1) % 3, (axis + 2) % 3), strict=False):
-            k[..., axis, other] = coefficients[..., axis, column]
+                k[..., axis, axis] = coefficients[..., row, column]
+            elif effect == "misalignment":
+                k[..., axis, "xyz".index(name[-1])] = coefficients[..., row, column]
     return k
 
 
@@ -105,7 +112,7 @@ def fit_lot(
     """
     sensor, station = design.split(effects)
     if state.felt is None and any(e.sharp for e in sensor):
-        felt = felt_force(state.force, output, state.theta)
+        felt = felt_force(state.force, output, state.theta, state.axes)
         first = fit_lot(effects, replace(state, felt=felt, memory={}), output, standard_error, nonlinear=nonlinear)
         better = own_axes(replace(state, felt=felt), first.response())
         return first if better is None else fit_lot(effects, better, output, standard_error, nonlinear=nonlinear)
@@ -113,13 +120,13 @@ def fit_lot(
     for name, given in (nonlinear or {}).items():
         values[name] = {**values.get(name, {}), **given}
     z = np.swapaxes(output, -1, -2)
-    names = tuple(design.local_names(sensor, axis, values) for axis in range(3))
+    names = tuple(design.local_names(sensor, axis, values) for axis in state.axes)
     weight = None if standard_error is None else 1.0 / np.swapaxes(standard_error, -1, -2)
     shared, shared_covariance = np.zeros(0), np.zeros((0, 0))
-    local = _LocalColumns(design.local_columns(sensor, state, values), weight, names)
+    local = _LocalColumns(design.local_columns(sensor, state, values), weight, names, state.axes)
     theta = local.solve(z)
     if station:
-        columns = design.shared_columns(station, state, values, response_matrix(theta, names))
+        columns = design.shared_columns(station, state, values, response_matrix(theta, names, state.axes))
         shared, shared_covariance, z = _solve_shared(local, columns, z, design.shared_names(station))
         theta = local.solve(z)
     residual = local.apply(theta)
@@ -142,6 +149,7 @@ def fit_lot(
         residuals=np.swapaxes(residual, -1, -2),
         chi2=chi2,
         dof=dof,
+        axes=state.axes,
     )
 
 
@@ -152,20 +160,34 @@ _WARM = 5.0
 """Range of temperature, K, from which on the bias' run with it would be taken for response where poses differ between soaks."""
 
 
-def felt_force(force: Array, output: Array, theta: Array | None = None) -> Array:
+def felt_force(force: Array, output: Array, theta: Array | None = None, axes: tuple[int, ...] = ALL_AXES) -> Array:
     """Specific force along the sensor's own axes, (..., n, 3), g, from a plain fit of response and bias.
 
     Parameters
     ----------
     theta : (..., n), temperature above the reference, K: a bias that follows it is no response
     """
-    x = np.concatenate([np.ones((*force.shape[:-1], 1)), force], axis=-1)
+    x = np.concatenate([np.ones((*force.shape[:-1], 1)), shown_force(force, axes)], axis=-1)
     if theta is not None and float(np.ptp(theta)) > _WARM:
         warm = np.stack([theta, theta**2], axis=-1) / float(np.max(np.abs(theta)))
         batch = np.broadcast_shapes(x.shape[:-1], warm.shape[:-1])
         x = np.concatenate([np.broadcast_to(c, (*batch, c.shape[-1])) for c in (x, warm)], axis=-1)
     coefficients = pseudo_inverses(x) @ output
-    return force_along_axes(np.swapaxes(coefficients[..., 1:4, :], -1, -2), force)
+    return force_along_axes(of_every_axis(np.swapaxes(coefficients[..., 1:4, :], -1, -2), axes), force)
+
+
+def of_every_axis(rows: Array, axes: tuple[int, ...], fill: float = 0.0) -> Array:
+    """Rows (..., m, k) of the axes with an output in their places among three, (..., 3, k); the others hold ``fill``."""
+    if len(axes) == 3:
+        return rows
+    whole = np.full((*rows.shape[:-2], 3, rows.shape[-1]), fill)
+    whole[..., axes, :] = rows
+    return whole
+
+
+def own_terms(rows: Array, axes: tuple[int, ...]) -> Array:
+    """The response of each axis to the force along itself, (..., m), from rows (..., m, 3)."""
+    return rows[..., np.arange(len(axes)), axes]
 
 
 def force_along_axes(response: Array, force: Array) -> Array:
@@ -232,7 +254,14 @@ def _solve_shared(
 class _LocalColumns:
     """Normal equations of the units' own columns, scaled; one system serves all units where they share design and weights."""
 
-    def __init__(self, columns: Array, weight: Array | None, names: Sequence[Sequence[tuple[str, str]]]) -> None:
+    def __init__(
+        self,
+        columns: Array,
+        weight: Array | None,
+        names: Sequence[Sequence[tuple[str, str]]],
+        axes: Sequence[int],
+    ) -> None:
+        self.letters = ["xyz"[axis] for axis in axes]
         self.columns, self.weight = columns, weight
         self.weighted = columns if weight is None else columns * weight[..., None]
         # columns are not scaled one by one: that is a second array as large as they are
@@ -250,7 +279,7 @@ class _LocalColumns:
             axis, column = int(empty[0, -2]), int(empty[0, -1])
             effect, name = names[axis][column]
             raise NotIdentified(
-                f"fit: {effect} ({name} of axis {'xyz'[axis]}) is zero in every dwell; "
+                f"fit: {effect} ({name} of axis {self.letters[axis]}) is zero in every dwell; "
                 f"the plan must excite it; add poses or conditions that do, or leave it out of the model"
             )
 
@@ -278,7 +307,7 @@ class _LocalColumns:
         involved = [names[axis][i] for i in np.argsort(-share) if share[i] > 0.1]
         listed = ", ".join(f"{effect} ({name})" for effect, name in involved)
         raise NotIdentified(
-            f"fit: the plan cannot tell these coefficients of axis {'xyz'[axis]} apart: {listed}; "
+            f"fit: the plan cannot tell these coefficients of axis {self.letters[axis]} apart: {listed}; "
             f"add poses or temperatures that separate them, or leave one out of the model"
         )
 
@@ -322,9 +351,9 @@ def _apply(matrices: Array, vectors: Array) -> Array:
     """
     if matrices.ndim > 3 or vectors.ndim != 3:
         return np.matmul(matrices, vectors[..., None])[..., 0]
-    _, m, k = matrices.shape
-    together = np.zeros((k, 3, m, 3))
-    for axis in range(3):
+    axes, m, k = matrices.shape
+    together = np.zeros((k, axes, m, axes))
+    for axis in range(axes):
         together[:, axis, :, axis] = matrices[axis].T
-    flat = np.swapaxes(vectors, -1, -2).reshape(-1, 3 * k)
-    return np.swapaxes((flat @ together.reshape(3 * k, 3 * m)).reshape(-1, m, 3), -1, -2)
+    flat = np.swapaxes(vectors, -1, -2).reshape(-1, axes * k)
+    return np.swapaxes((flat @ together.reshape(axes * k, axes * m)).reshape(-1, m, axes), -1, -2)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from inertial.decisions import AXES_DIFFER
 from inertial.estimation.alternative import Handling
+from inertial.estimation.candidate import blocks_of_units
 from inertial.estimation.comparison import estimate
 from inertial.estimation.covariance import Covariance
 from inertial.estimation.likelihood import shared_factor
@@ -76,7 +77,7 @@ def rivals_of(model: Model, terms: Sequence[Term], others: Sequence[Term], most:
     """
     units = model.problem.lot.state.time.shape[0]
     pick = np.unique(np.linspace(0, units - 1, min(units, most)).round().astype(int)).tolist()
-    blocks = pick if model.problem.lot.radial else [3 * u + a for u in pick for a in range(3)]
+    blocks = pick if model.problem.lot.radial else blocks_of_units(np.array(pick), model.problem.per_unit).tolist()
     # what memories held before the run is not known, whatever explains the run at the least price
     terms, others = ([replace(t, rest=False) for t in each] for each in (terms, others))
     others = [
@@ -172,7 +173,7 @@ def widened(rivals: Rivals, steps: Sequence[SequenceStep], pace: StationPace | N
     typical = scale * rivals.typical_error
     if not np.isfinite(typical).all():
         typical = np.where(np.isfinite(typical), typical, np.nanmedian(typical))
-    error = np.concatenate([lot.error, np.broadcast_to(typical, (units, len(steps), 3))], axis=1)
-    output = np.concatenate([lot.output, np.zeros((units, len(steps), 3))], axis=1)
+    error = np.concatenate([lot.error, np.broadcast_to(typical, (units, len(steps), lot.output.shape[-1]))], axis=1)
+    output = np.concatenate([lot.output, np.zeros((units, len(steps), lot.output.shape[-1]))], axis=1)
     loudness = None if lot.loudness is None else np.concatenate([lot.loudness, np.ones(len(steps))])
     return Problem(replace(lot, state=state, output=output, error=error, loudness=loudness))

@@ -139,7 +139,7 @@ def _missing_quantity(state: State, effect: AnyEffect) -> str:
     """The quantity that an effect needs and the dwells do not carry; empty where they carry all."""
     try:
         values = design.starting_values([effect], state).get(effect.id, {})
-        columns_of(state, effect, values, 0)
+        columns_of(state, effect, values, state.axes[0])
     except MissingInput as missing:
         return missing.quantity
     return ""
@@ -150,13 +150,13 @@ def _remaining_fraction(state: State, effect_id: str, base: Sequence[str], axis:
     seen = visibility.visibilities(state, base, _ERROR, [effect_id])
     if not seen:
         return 0.0
-    return seen[0].remaining_fraction if axis is None else seen[0].by_axis[axis]
+    return seen[0].remaining_fraction if axis is None else seen[0].by_axis[state.axes.index(axis)]
 
 
 def _column(state: State, effect: AnyEffect, axis: int | None) -> tuple[int, int, bool]:
     """Output axis and column for the sentence, and whether it is zero: a zero column is preferred to a confounded one."""
     values = design.starting_values([effect], state).get(effect.id, {})
-    axes = range(3) if axis is None else (axis,)
+    axes = state.axes if axis is None else (axis,)
     fallback = (axes[0], 0, True)
     for output_axis in axes:
         size = np.sqrt(np.mean(columns_of(state, effect, values, output_axis) ** 2, axis=0))

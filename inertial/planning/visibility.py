@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from inertial import design
 from inertial import effects as catalogue
+from inertial.design import of_axes
 from inertial.effects import SensorEffect
 from inertial.effects.base import AnyEffect, excited
 from inertial.errors import MissingInput
@@ -35,7 +36,7 @@ class Visibility:
 
     remaining_fraction : v, RMS of the column after the base model over its RMS, 0 … 1; the largest over columns, axes and
         nonlinear values
-    by_axis : v per sensor axis, (3,)
+    by_axis : v per sensor axis with an output
     floor : three standard errors of the coefficient, g per unit of the coefficient; infinite where not visible
     column : index of the effect's column that has this floor
     size : RMS over the dwells of an effect of the floor's size, g; infinite where not visible
@@ -47,7 +48,7 @@ class Visibility:
     effect: str
     seen: bool
     remaining_fraction: float
-    by_axis: tuple[float, float, float]
+    by_axis: tuple[float, ...]
     floor: float
     alias: tuple[str, ...]
     breaker: str
@@ -128,7 +129,7 @@ class _Remainder:
     """Columns (3, n, p) of an effect after the base model, and their remaining fraction."""
 
     remaining_fraction: float
-    by_axis: tuple[float, float, float]
+    by_axis: tuple[float, ...]
     columns: Array
     before: Array
     unseen: tuple[UnseenRange, ...] = ()
@@ -183,23 +184,23 @@ def _measured(columns: Array, after: Array) -> _Remainder:
     v = np.where(before > 1e-12, rest / np.where(before > 1e-12, before, 1.0), 0.0)
     v = np.where(v < 1e-6, 0.0, v)
     by_axis = v.max(axis=-1)
-    return _Remainder(float(v.max()), (float(by_axis[0]), float(by_axis[1]), float(by_axis[2])), after, before)
+    return _Remainder(float(v.max()), tuple(by_axis.tolist()), after, before)
 
 
 def _start(effect: AnyEffect, state: State, values: Mapping[str, float]) -> Array:
     """Columns (3, n, k) of the unknown state of a memory before the first dwell."""
     if isinstance(effect, SensorEffect):
-        axes = [effect.start_columns(state, axis, **values) for axis in range(3)]
+        axes = [effect.start_columns(state, axis, **values) for axis in state.axes]
         return np.stack([np.broadcast_to(c, (*state.time.shape, c.shape[-1])) for c in axes])
-    return np.moveaxis(effect.start_change(state, **values), -2, 0)
+    return np.moveaxis(of_axes(effect.start_change(state, **values), state.axes, -2), -2, 0)
 
 
 def _columns(effect: AnyEffect, state: State, values: Mapping[str, float]) -> Array:
     """Columns per axis, (3, n, p)."""
     if isinstance(effect, SensorEffect):
-        axes = [excited(effect, effect.columns(state, axis, **values)) for axis in range(3)]
+        axes = [excited(effect, effect.columns(state, axis, **values)) for axis in state.axes]
         return np.stack([np.broadcast_to(c, (*state.time.shape, c.shape[-1])) for c in axes])
-    return np.moveaxis(effect.force_change(state, **values), -2, 0)
+    return np.moveaxis(of_axes(effect.force_change(state, **values), state.axes, -2), -2, 0)
 
 
 def _visibility(

@@ -34,6 +34,7 @@ from pipelines.diagnosis.result_rows import (
 from pipelines.diagnosis.suggested_formula import as_toml, offer, what_follows
 from pipelines.parallel import keep_memory
 from pipelines.tables.dwells import Measured
+from pipelines.tables.fewer_axes import sentences, shows_misalignment
 from pipelines.tables.sound_lot import error_of, every_unit_faulty, gaps, generator, probability, sound_lot
 from schemas.errors import DataRejected
 
@@ -50,7 +51,8 @@ def default_model(dwells: pd.DataFrame) -> list[str]:
     """
     if _one_pose(dwells):
         return ["bias", *(THERMAL[:1] if "bias_temperature" in _of_temperature(dwells) else ())]
-    return _of_temperature(dwells)
+    model = _of_temperature(dwells)
+    return model if shows_misalignment(dwells) else [name for name in model if name != "misalignment"]
 
 
 def _one_pose(dwells: pd.DataFrame) -> bool:
@@ -152,7 +154,11 @@ def document(
     units = tuple(u for k, u in enumerate(measurement.units) if k not in faulty)
     names = Names(units, tuple(int(d) for d in measurement.dwells))
     terms = [*diagnosis.base.terms, *(m.term for n in diagnosis.named for m in n.effects.physics)]
-    warnings = [*gaps(measurement, faults, left_out), *without_history(measurement, terms)]
+    warnings = [
+        *sentences(measurement.state),
+        *gaps(measurement, faults, left_out),
+        *without_history(measurement, terms),
+    ]
     return {
         "adequate": diagnosis.adequate,
         "reason": diagnosis.unjudged or None,

@@ -17,7 +17,7 @@ from inertial.noise.bias_filter import Track, track
 from inertial.noise.gauss_markov import FlickerTerms, bias_model, flicker_of_steps
 from inertial.noise.likely_terms import LikelyTerms, likely_terms
 from pipelines.archive import Run
-from pipelines.export.polynomials import UnitCalibration, unit_calibrations
+from pipelines.export.polynomials import UnitCalibration, refuse_fewer_axes, unit_calibrations
 from pipelines.export.recording import CorrectableRecording
 from pipelines.export.unit_noise import UnitCurve, curve_of_unit, required_noise
 from pipelines.importers.exchange import refuse_other_procedures
@@ -114,6 +114,7 @@ def fit_of_unit(run: Run, unit: str, *, failed: bool, revoked: bool) -> FitOfUni
         )
     serial = unit or next(iter(calibration.units))
     exported = unit_calibrations(run, (serial,), failed=failed, revoked=revoked)[0]
+    refuse_fewer_axes([exported], "correct: it")
     u = calibration.units.index(serial)
     p = calibration.coefficients.shape[-1]
     covariance: Array = np.asarray(block_diag(*list(calibration.covariance[u])), dtype=np.float64)

@@ -10,8 +10,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from inertial.fits.linear import axis_rows
-from inertial.state import T_REFERENCE
+from inertial.effects.base import AXES, others
+from inertial.fits.linear import axis_rows, of_every_axis
+from inertial.state import ALL_AXES, T_REFERENCE
 from pipelines.archive import Run
 from pipelines.certificates.statement import Stated, stated
 from pipelines.export.unit_noise import UnitNoise, noise_of_units
@@ -31,8 +32,8 @@ EXPORTABLE = ("pass",)
 class UnitCalibration:
     """Calibration of one unit.
 
-    bias : (4, 3), output unit per K^k, coefficients of θ⁰ … θ³
-    response : (4, 3, 3), output unit per g and K^k
+    bias : (4, m), output unit per K^k, coefficients of θ⁰ … θ³, of the m axes that have an output
+    response : (4, m, 3), output unit per g and K^k
     left_out : effects of the model that have no place in this form
     certificate : that the unit has for this run; None where it was not certified
     noise : terms of its static record; None without one
@@ -52,6 +53,12 @@ class UnitCalibration:
     noise: UnitNoise | None = None
     full_scale: float | None = None
     nominal: float | None = None
+    axes: tuple[int, ...] = ALL_AXES
+
+    @property
+    def letters(self) -> tuple[str, ...]:
+        """Letters of the axes that have an output."""
+        return tuple(AXES[axis] for axis in self.axes)
 
     @property
     def certified(self) -> str:
@@ -97,10 +104,20 @@ def unit_calibrations(
         calibrations.append(
             UnitCalibration(
                 unit, outcome, grade, out_unit, *polynomials(calibration, unit), _temperatures(dwells, unit), left_out,
-                certificates.get(unit), noise.get(unit), full_scale.get(unit), nominal,
+                certificates.get(unit), noise.get(unit), full_scale.get(unit), nominal, calibration.axes,
             )
         )  # fmt: skip
     return calibrations
+
+
+def refuse_fewer_axes(units: Sequence[UnitCalibration], what: str) -> None:
+    """Refuse a correction that needs three outputs for a device with one axis or two."""
+    for unit in units:
+        if len(unit.axes) < len(AXES):
+            raise WrongUse(
+                f"{what} corrects three axes, and unit {unit.unit} has {', '.join(unit.letters)} alone; "
+                "'tumbleline export --format json' has its coefficients"
+            )
 
 
 UNGRADED = "no limits"
@@ -223,7 +240,8 @@ def effects_left_out(calibration: Calibration) -> tuple[str, ...]:
 def polynomials(calibration: Calibration, unit: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Bias (4, 3) and response (4, 3, 3) of a unit as coefficients of θ⁰ … θ³."""
     u = calibration.units.index(unit)
-    bias, response = np.zeros((ORDER, 3)), np.zeros((ORDER, 3, 3))
+    axes = calibration.axes
+    bias, response = np.zeros((ORDER, len(axes))), np.zeros((ORDER, len(axes), 3))
     for power, effect in enumerate(BIAS):
         values = calibration.value(effect)[u]
         if values.size:
@@ -231,11 +249,15 @@ def polynomials(calibration: Calibration, unit: str) -> tuple[NDArray[np.float64
     for power, effect in enumerate(ACROSS):
         values = calibration.value(effect)[u]
         if values.size:
-            for axis in range(3):
-                response[power, axis, [(axis + 1) % 3, (axis + 2) % 3]] = values[axis]
+            for row, axis in enumerate(axes):
+                # one column where the poses of a device with fewer axes show one direction across
+                own = [name for name_of, name in calibration.names[row] if name_of == effect]
+                shown = others(axis) if len(own) > 1 else ["xyz".index(own[0][-1])]
+                response[power, row, shown] = values[row]
     for power, effect in enumerate(SCALE):
         values = calibration.value(effect)[u]
         if values.size:
             # the temperature acts on the whole row: S(θ)·M
-            response[power] += values * (axis_rows(response[0]) if power else np.eye(3))
+            rows = axis_rows(of_every_axis(response[0], axes)) if power else np.eye(3)
+            response[power] += values * rows[list(axes)]
     return bias, response

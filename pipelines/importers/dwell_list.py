@@ -35,8 +35,10 @@ def dwell_rows(data: Imported, judged: FitAnswer | None, mapping: Mapping) -> li
                 "start_s": start,
                 "end_s": end,
                 "n": int(dwell["n"]) if "n" in dwell else None,
-                "mean": [float(dwell[f"out_{axis}"]) for axis in AXES],
-                "sd": [float(dwell[f"sd_{axis}"]) for axis in AXES] if "sd_x" in dwell else None,
+                "mean": [float(dwell[f"out_{axis}"]) for axis in AXES if f"out_{axis}" in dwell],
+                "sd": [float(dwell[f"sd_{axis}"]) for axis in AXES if f"sd_{axis}" in dwell]
+                if "sd_x" in dwell
+                else None,
                 "residual_ug": None if residual is None else MICRO * float(residual[k]),
                 "influence": None if influence is None else float(influence[k]),
             }

@@ -9,15 +9,16 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from inertial.quantities import ANGLE_COLUMNS, FORCE_COLUMNS, KNOWN_COLUMNS, SPREAD_COLUMNS
+from inertial.quantities import ANGLE_COLUMNS, FORCE_COLUMNS, KNOWN_COLUMNS, OUTPUT_COLUMNS, SPREAD_COLUMNS
 from pipelines.archive import Archive, Run
 from pipelines.importers import files, values
+from pipelines.tables.dwell_table import output_axes
 from schemas import table_check, tables
 from schemas.errors import DataRejected, WrongUse, close_matches, did_you_mean
 from schemas.foreign import shown
 from schemas.serials import refuse_unusable_serials
 
-REQUIRED = ("unit", "dwell", "time_s", "out_x", "out_y", "out_z")
+REQUIRED = ("unit", "dwell", "time_s")
 _TEXTS = ("kind", "pose", "out_unit", "status")
 _CORRECT = "correct it in the file"
 _LARGEST_FORCE = 1e3
@@ -27,7 +28,8 @@ _METRES = (9.7, 9.9)
 
 def is_exchange(names: Iterable[object]) -> bool:
     """Whether columns are those of a table of dwells in the exchange format."""
-    return set(REQUIRED) <= {str(name) for name in names}
+    known = {str(name) for name in names}
+    return set(REQUIRED) <= known and bool(output_axes(known))
 
 
 def read_dwells(source: str | Path, *, archive: str | Path | None = None) -> pd.DataFrame:
@@ -102,6 +104,7 @@ def checked(frame: pd.DataFrame, *, where: str, foreign: bool = False) -> pd.Dat
     foreign : whether they come from elsewhere; an archive keeps the serial numbers that older versions accepted.
     """
     _require(frame, REQUIRED, where)
+    _refuse_half_an_axis(frame, where)
     frame = frame.copy()
     frame["unit"] = _units(frame, where, foreign=foreign)
     for column in frame.columns:
@@ -110,12 +113,33 @@ def checked(frame: pd.DataFrame, *, where: str, foreign: bool = False) -> pd.Dat
         if column in KNOWN_COLUMNS or pd.api.types.is_numeric_dtype(frame[column]):
             frame[column] = _numbers(frame, column, where)
     frame["dwell"] = _whole(frame, "dwell", where)
+    if len(output_axes(frame.columns)) < len(OUTPUT_COLUMNS):
+        _known_along(frame)
     _all_or_none(frame, FORCE_COLUMNS, where)
     _all_or_none(frame, ANGLE_COLUMNS, where)
-    _all_or_none(frame, SPREAD_COLUMNS, where)
+    _all_or_none(frame, tuple(SPREAD_COLUMNS[axis] for axis in output_axes(frame.columns)), where)
     _plausible(frame, where)
     frame = table_check.check("dwells", frame, where=where)
     return frame.sort_values(["unit", "dwell"], kind="stable").reset_index(drop=True)
+
+
+def _refuse_half_an_axis(frame: pd.DataFrame, where: str) -> None:
+    """Refuse a table without an output, and one whose output of an axis has another name."""
+    axes = output_axes(frame.columns)
+    if not axes:
+        _require(frame, OUTPUT_COLUMNS, where)
+    for axis in set(range(len(OUTPUT_COLUMNS))) - set(axes):
+        name, others = OUTPUT_COLUMNS[axis], [str(c) for c in frame.columns if c not in KNOWN_COLUMNS]
+        if SPREAD_COLUMNS[axis] in frame.columns or close_matches(name, others):
+            _require(frame, (name,), where)
+
+
+def _known_along(frame: pd.DataFrame) -> None:
+    """A reference that states the force along each axis of a device with one or two: across them it states none."""
+    if all(FORCE_COLUMNS[axis] in frame.columns for axis in output_axes(frame.columns)):
+        for name in FORCE_COLUMNS:
+            if name not in frame.columns:
+                frame[name] = 0.0
 
 
 def _run(source: str | Path, archive: str | Path | None) -> Run:
@@ -155,7 +179,7 @@ def _numbers(frame: pd.DataFrame, column: str, where: str) -> NDArray[np.float64
         return values.seconds(frame[column], where)
     numbers = values.as_numbers(frame[column], where, flags=column not in KNOWN_COLUMNS)
     bad = np.flatnonzero(~np.isfinite(numbers))
-    needed = (*REQUIRED, *FORCE_COLUMNS, *ANGLE_COLUMNS)
+    needed = (*REQUIRED, *OUTPUT_COLUMNS, *FORCE_COLUMNS, *ANGLE_COLUMNS)
     if bad.size and not (column not in needed and bool(np.all(pd.isna(frame[column])))):
         row = int(bad[0])
         place = f"row {row} (unit {frame['unit'].iloc[row]}), column {shown(column)}"

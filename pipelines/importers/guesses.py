@@ -67,7 +67,12 @@ class Guesses:
     @property
     def dwells(self) -> bool:
         """Whether rows look like dwells: standard deviations beside the means, or a label of its own in each row."""
-        return self.sheet or all(self.column(f"sd_{axis}") for axis in "xyz")
+        return self.sheet or bool(self.single) or all(self.column(f"sd_{axis}") for axis in "xyz")
+
+    @property
+    def single(self) -> str:
+        """The output of a table of a device with one axis: it has its reference beside it, a force or an angle; else empty."""
+        return self.column("x") if self.column("force_x") or self.column("tilt") else ""
 
     def column(self, meaning: str) -> str:
         """The column with a meaning; empty if there is none."""
@@ -84,7 +89,8 @@ def guesses(content: Content) -> Guesses:
     guessed: dict[str, Guess] = {str(name): Guess("", "") for name in table.columns}
     numeric = {str(name): one for name in table.columns if (one := _numbers(table[name])) is not None}
     _time(table, numeric, guessed)
-    _axes(content, numeric, guessed)
+    if not _single_axis(numeric, guessed):
+        _axes(content, numeric, guessed)
     _others(content, table, numeric, guessed)
     sheet = _sheet(table, numeric, guessed)
     return Guesses(guessed, _time_unit(content, numeric, guessed), _output(content, numeric, guessed), sheet)
@@ -141,6 +147,37 @@ def _reads_as_time(column: pd.Series) -> bool:
         clocks.stamps(head, "")
     except Exception:  # noqa: BLE001 - whatever it is, it is no stamp
         return False
+    return True
+
+
+_REFERENCE = re.compile(r"^(?:force|ref|true|applied)\w*$|^g(?:_in)?$", re.IGNORECASE)
+_TILT = re.compile(r"angle|tilt|incl|theta|^deg", re.IGNORECASE)
+_SINGLE_OUT = re.compile(r"^(?:out|volt|output|acc|signal|reading|lsb|counts?|u)\w*$|^v$", re.IGNORECASE)
+_FOLLOWS = 0.99
+"""Correlation of an output with its reference from which a table is that of one axis."""
+
+
+def _single_axis(numeric: dict[str, NDArray[np.float64]], guessed: dict[str, Guess]) -> bool:
+    """Whether a table is that of a device with one axis: one output follows one force, or the sine or cosine of one angle."""
+    forces = [name for name in numeric if _REFERENCE.search(name)]
+    angles = [name for name in numeric if _TILT.search(name)]
+    outputs = [name for name in numeric if _SINGLE_OUT.search(name) and name not in (*forces, *angles)]
+    if len(outputs) != 1 or len(forces) + len(angles) != 1:
+        return False
+    (output,), ((reference,), meaning) = outputs, (forces, "force_x") if forces else (angles, "tilt")
+    expected = numeric[reference] if forces else np.sin(np.radians(numeric[reference]))
+    there = np.isfinite(expected) & np.isfinite(numeric[output])
+    if np.count_nonzero(there) < 2 or min(np.ptp(expected[there]), np.ptp(numeric[output][there])) == 0.0:
+        return False
+    if abs(float(np.corrcoef(expected[there], numeric[output][there])[0, 1])) < _FOLLOWS:
+        return False
+    guessed[output] = Guess("x", "the one output, which follows its reference")
+    guessed[reference] = Guess(meaning, "the reference of the one output")
+    spread = [name for name in numeric if re.match(r"^(?:sd|std|noise|sigma)", name, re.IGNORECASE)]
+    count = [name for name in numeric if re.match(r"^(?:n|samples|count)$", name, re.IGNORECASE)]
+    guessed |= {name: Guess("sd_x", "its name") for name in spread[:1]} | {
+        name: Guess("n", "its name") for name in count[:1]
+    }
     return True
 
 

@@ -27,7 +27,7 @@ from pipelines.importers.stated_units import TEMPERATURE
 from schemas.errors import TumblelineError
 from schemas.units import AXES
 
-_NAMED = ("time", "x", "y", "z", "sd_x", "sd_y", "sd_z", "temperature", "dwell")
+_NAMED = ("time", "x", "y", "z", "sd_x", "sd_y", "sd_z", "n", "force_x", "tilt", "temperature", "dwell")
 _MOST_INTERVALS = 2000
 
 
@@ -67,7 +67,7 @@ def inspect(paths: Sequence[Path], *, join: str = "", group: str = "") -> Inspec
     dynamic = dynamic_guess(paths[0], content, guessed, rate) if output is None and len(paths) == 1 else None
     if dynamic is not None:
         open_ += dynamic.open
-    elif output is None:
+    elif output is None and not guessed.single:
         missing = [axis for axis in "xyz" if not guessed.column(axis)]
         open_.append(f"columns of acceleration were not recognised: map {' and '.join(missing)} by name or number")
         few = len([one for one in guessed.columns.values() if one.meaning != "time"])
@@ -81,7 +81,7 @@ def inspect(paths: Sequence[Path], *, join: str = "", group: str = "") -> Inspec
         open_.append(
             f"signed words of {bits} bits were read without their sign: subtract {2**bits} from {2 ** (bits - 1)} on"
         )
-    if guessed.output.meaning == "" and output is not None:
+    if guessed.output.meaning == "" and (output is not None or guessed.single):
         open_.append("the unit of the output: --units output=g|mg|m/s^2|V|mV|LSB")
     positions = (
         change_of_level.several_levels(kept)
@@ -273,7 +273,7 @@ def _command(
     names = list(guessed.columns)
     pairs = [(meaning, guessed.column(meaning)) for meaning in _NAMED if guessed.column(meaning)]
     words = [f"{meaning}={_mapped(name, names)}" for meaning, name in pairs]
-    words += [f"{axis}=COLUMN" for axis in "xyz" if not guessed.column(axis)]
+    words += [f"{axis}=COLUMN" for axis in "xyz" if not guessed.column(axis) and not guessed.single]
     mapped = ",".join(words)
     units = [f"output={guessed.output.meaning or 'UNIT'}"]
     time = guessed.column("time")
@@ -285,6 +285,7 @@ def _command(
     units += [f"temperature={heat}"] if heat != "degC" else []
     words = ["tumbleline", "import", *(str(path) for path in paths), "--map", mapped, "--units", ",".join(units)]
     words += ["--unit", serial_of(paths[0])]
+    words += ["--axes", "x"] if guessed.single else []
     words += ["--rows", "dwells"] if guessed.dwells else [] if time else ["--rate", "HZ"]
     words += ["--join", join] if join else []
     words += ["--group", group] if group else []

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
+from inertial.quantities import OUTPUT_COLUMNS
 from pipelines.importers.mapping import Mapping
 from schemas.errors import DataRejected, WrongUse
 from schemas.units import AXES
@@ -42,6 +43,11 @@ def imported_dwells(data: Imported) -> pd.DataFrame:
         raise WrongUse(
             f"import: {units} units, a fit at import takes one; import them one by one, or without --fit and then "
             "'tumbleline rerun RUN --effects a,b,c'"
+        )
+    if not set(OUTPUT_COLUMNS) <= set(data.dwells.columns):
+        raise WrongUse(
+            "import: a fit at import needs three axes, and this device has fewer; import it without --fit, and then "
+            "'tumbleline fit RUN'"
         )
     return data.dwells
 

@@ -16,10 +16,13 @@ from schemas.toml_files import parse_toml, read_text
 from schemas.units import STANDARD_GRAVITY_M_S2
 
 NEEDED = ("x", "y", "z")
+TILT = "tilt_deg"
+"""Angle of a single axis above the horizontal, degrees: the force along it is g·sin of it."""
 MEANINGS: dict[str, str] = {
     **{row.mapped: row.column for row in RECORDED if row.mapped},
     "n": "n",
     "duration": "duration_s",
+    "tilt": TILT,
     **{name: name for name in (*SPREAD_COLUMNS, *FORCE_COLUMNS)},
 }
 """Further names of a mapping and the columns that they become."""
@@ -86,9 +89,9 @@ class Mapping(BaseModel):
     """Serial number, if the file has no column for it."""
     rows: Literal["samples", "dwells"] = "samples"
     rate_hz: Annotated[float, Field(gt=0.0, le=FASTEST_HZ)] | None = None
-    axes: tuple[Literal["x", "y", "z"], Literal["x", "y", "z"], Literal["x", "y", "z"]] = ("x", "y", "z")
-    """Mapped axes in the order in which they become x, y, z."""
-    signs: tuple[Literal["+", "-"], Literal["+", "-"], Literal["+", "-"]] = ("+", "+", "+")
+    axes: Annotated[tuple[Literal["x", "y", "z"], ...], Field(min_length=1, max_length=3)] = NEEDED
+    """Mapped axes in the order in which they become x, y, z; fewer than three for a device with one axis or two."""
+    signs: Annotated[tuple[Literal["+", "-"], ...], Field(min_length=1, max_length=3)] = ("+", "+", "+")
     local_gravity_m_s2: Annotated[float, Field(gt=9.7, lt=9.9)] | None = None
     poses: dict[str, str] = Field(default_factory=dict)
     """Label of a dwell → face up, as +x … -z; with any given, dwells with other labels are left out."""
@@ -124,9 +127,6 @@ class Mapping(BaseModel):
     @field_validator("columns")
     @classmethod
     def _complete(cls, value: dict[str, str]) -> dict[str, str]:
-        missing = [name for name in NEEDED if name not in value]
-        if missing:
-            raise ValueError(f"{', '.join(missing)} not mapped; x, y and z are needed")
         for name in value:
             if name in RESERVED and name not in KNOWN:
                 meaning = next((meaning for meaning, column in MEANINGS.items() if column == name), "")
@@ -140,7 +140,7 @@ class Mapping(BaseModel):
 
     @field_validator("axes")
     @classmethod
-    def _each_once(cls, value: tuple[str, str, str]) -> tuple[str, str, str]:
+    def _each_once(cls, value: tuple[str, ...]) -> tuple[str, ...]:
         if len(set(value)) < len(value):
             raise ValueError(f"{','.join(value)}: every axis is needed once")
         return value
@@ -152,6 +152,25 @@ class Mapping(BaseModel):
             if face not in FACES:
                 raise ValueError(f"'{label}': found '{shown(face)}', one of {', '.join(FACES)} is needed")
         return value
+
+    @model_validator(mode="after")
+    def _mapped_axes(self) -> Mapping:
+        mapped = [name for name in NEEDED if name in self.columns]
+        missing = [name for name in NEEDED if name in self.axes and name not in mapped]
+        if missing and len(self.axes) == len(NEEDED):
+            fewer = f", or --axes {','.join(mapped)} for a device with fewer axes" if mapped else ""
+            raise ValueError(f"{', '.join(missing)} not mapped; x, y and z are needed{fewer}")
+        if set(mapped) != set(self.axes):
+            raise ValueError(
+                f"axes are {', '.join(self.axes)}, and {', '.join(mapped) or 'no output'} mapped; each needs a column of its own"
+            )
+        if len(self.signs) not in {len(self.axes), len(NEEDED)}:
+            raise ValueError(f"{len(self.signs)} signs for {len(self.axes)} axes; one for each axis is needed")
+        if len(self.axes) < len(NEEDED) and "tilt" in self.columns and (self.poses or self.face or len(self.axes) > 1):
+            raise ValueError("tilt is the reference of a single axis; give it without poses, for one axis")
+        if "tilt" in self.columns and len(self.axes) == len(NEEDED):
+            raise ValueError("tilt is the reference of a single axis; give the angles of the table as outer and inner")
+        return self
 
     @model_validator(mode="after")
     def _headings_of_poses(self) -> Mapping:
@@ -167,6 +186,11 @@ class Mapping(BaseModel):
                 f"headings: {words}, a heading for every pose is needed; give --headings for the labels of --poses"
             )
         return self
+
+    @property
+    def letters(self) -> tuple[str, ...]:
+        """Letters of the outputs in the tables: x, y, z, or as many of them as the device has axes."""
+        return NEEDED[: len(self.axes)]
 
     @property
     def likely_slips(self) -> dict[str, tuple[str, ...]]:

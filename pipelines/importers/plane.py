@@ -45,7 +45,7 @@ def known_force(dwells: pd.DataFrame) -> Array | None:
 
 def axis_of_plane(dwells: pd.DataFrame) -> int | None:
     """The axis that a sensor was turned about alone, by its poses or, where these are not known, its outputs; else None."""
-    if len(dwells) < FEWEST or len(set(dwells["unit"])) != 1:
+    if len(dwells) < FEWEST or len(set(dwells["unit"])) != 1 or not set(OUT) <= set(dwells.columns):
         return None
     force = known_force(dwells)
     return quiet_axis(dwells[OUT].to_numpy(dtype=np.float64)) if force is None else plane_across(force)

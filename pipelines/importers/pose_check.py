@@ -48,6 +48,8 @@ def refuse_or_remark(dwells: pd.DataFrame, mapping: Mapping, where: str) -> tupl
     """
     if FORCE[0] not in dwells.columns and len(dwells) == 1:
         return (ONE_POSE,)
+    if len(mapping.axes) < len(AXES):
+        return ()  # one axis has no order, and its sign is judged with the dwells
     if not mapping.poses or FORCE[0] not in dwells.columns:
         silent = silent_axis(dwells)
         return (f"{CHECK_AXIS} {silent[0]}: {silent}",) if silent else ()

@@ -9,11 +9,13 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from inertial import frames
+from inertial.quantities import FORCE_COLUMNS
 from pipelines.importers import clocks, exchange, pose_check, sample_faults, unit_check, values
 from pipelines.importers.content import Content
 from pipelines.importers.documents import SampleFaultDocument
 from pipelines.importers.held_out import with_held_out
-from pipelines.importers.mapping import FACES, MEANINGS, OUTPUT_UNITS, Mapping
+from pipelines.importers.mapping import FACES, MEANINGS, OUTPUT_UNITS, TILT, Mapping
 from pipelines.importers.record_time import backwards, gaps_of, seconds, time_doubts
 from pipelines.importers.stated_units import column_name
 from pipelines.importers.stretches import Stretches, stretches
@@ -65,8 +67,10 @@ def imported(
     left_out_before = {int(k) + 1 for k in np.flatnonzero(np.diff(kept) > 1)}
     breaks = sorted({int(np.searchsorted(kept, k)) for k in breaks} | left_out_before)
     raw = np.column_stack([values.finite(columns[axis], where, content) for axis in mapping.axes])
-    raw = raw * [1.0 if sign == "+" else -1.0 for sign in mapping.signs]
-    remarks = (*content.remarks, *dropped, *unit_check.refuse_other_unit(raw, mapping.units.output, where))
+    raw = raw * [1.0 if sign == "+" else -1.0 for sign in mapping.signs[: len(mapping.axes)]]
+    three = len(mapping.axes) == len(AXES)
+    other = unit_check.refuse_other_unit(raw, mapping.units.output, where) if three else ()  # the norm is that of three
+    remarks = (*content.remarks, *dropped, *other)
     out_unit, factor = OUTPUT_UNITS[mapping.units.output]
     serials = _serials(columns, mapping, where)
     extras = _extras(columns, mapping, where, content)
@@ -90,7 +94,8 @@ def imported(
     )
     bad = faults.bad if mapping.faulty == "leave-out" else np.zeros(len(raw), dtype=bool)
     samples = pd.DataFrame({"unit": serials, "slot": 0, "record": 0, "kind": "dwell", "time_s": time})
-    samples[list(AXES)] = raw * factor
+    samples[list(AXES)] = np.nan  # of the axes that the device does not have
+    samples[list(mapping.letters)] = raw * factor
     samples = samples.assign(**extras)
     labels = columns["dwell"].astype(str).tolist() if "dwell" in columns else None
     intervals = stretches(labels, sample_faults.mended(raw, faults, bad), time, breaks, mapping, where)
@@ -138,7 +143,7 @@ def _with_numbers(
     columns: dict[str, pd.Series], mapping: Mapping, where: str, content: Content
 ) -> tuple[NDArray[np.int64], dict[str, pd.Series], tuple[str, ...]]:
     """Rows that are kept (k,), the columns with these rows, and a remark on the others, which lack a number."""
-    count = len(columns["x"])
+    count = len(next(iter(columns.values())))
     if mapping.gaps == "refuse":
         return np.arange(count), columns, ()
     whole = np.ones(count, dtype=bool)
@@ -182,7 +187,7 @@ def _serials(columns: dict[str, pd.Series], mapping: Mapping, where: str) -> lis
     if not mapping.unit:
         raise WrongUse(f"{where}: no unit is mapped, a serial number is needed; give --unit SN")
     refuse_unusable_serials([mapping.unit], where)
-    return [mapping.unit] * len(columns["x"])
+    return [mapping.unit] * len(next(iter(columns.values())))
 
 
 def _extras(
@@ -210,24 +215,26 @@ def _celsius(values: NDArray[np.float64], unit: str) -> NDArray[np.float64]:
 
 def _means(samples: pd.DataFrame, intervals: Stretches, extras: tuple[str, ...], mapping: Mapping) -> pd.DataFrame:
     """Dwells in the exchange format."""
-    numbers = samples[[*AXES, *extras]].to_numpy(dtype=np.float64)
+    letters = mapping.letters
+    m = len(letters)
+    numbers = samples[[*letters, *extras]].to_numpy(dtype=np.float64)
     time, record = samples["time_s"].to_numpy(dtype=np.float64), samples["record"].to_numpy()
     inside = [
         a + np.flatnonzero(record[a:b] == k + 1)
         for k, (a, b) in enumerate(zip(intervals.first, intervals.last, strict=True))
     ]
     mean = np.stack([numbers[rows].mean(axis=0) for rows in inside])
-    sd = np.stack([numbers[rows, :3].std(axis=0, ddof=1) if rows.size > 1 else np.zeros(3) for rows in inside])
+    sd = np.stack([numbers[rows, :m].std(axis=0, ddof=1) if rows.size > 1 else np.zeros(m) for rows in inside])
     frame = pd.DataFrame(
         {
             "unit": samples["unit"].iloc[0],
             "dwell": np.arange(len(intervals)),
             "time_s": [float(time[rows].mean()) for rows in inside],
-            **{f"out_{axis}": mean[:, k] for k, axis in enumerate(AXES)},
-            **{f"sd_{axis}": sd[:, k] for k, axis in enumerate(AXES)},
+            **{f"out_{axis}": mean[:, k] for k, axis in enumerate(letters)},
+            **{f"sd_{axis}": sd[:, k] for k, axis in enumerate(letters)},
             "n": [rows.size for rows in inside],
             "duration_s": [float(time[rows[-1]] - time[rows[0]]) for rows in inside],
-            **{name: mean[:, 3 + k] for k, name in enumerate(extras)},
+            **{name: mean[:, m + k] for k, name in enumerate(extras)},
             "record": np.arange(len(intervals)) + 1,
             "pose": list(intervals.labels),
         }
@@ -253,7 +260,7 @@ def _as_dwells(
         backwards(time, serials, where, together=True)  # units may follow one another, or alternate
         time = time - float(time.min())
     frame = pd.DataFrame({"unit": serials, "dwell": count, "time_s": time})
-    frame[["out_x", "out_y", "out_z"]] = output
+    frame[[f"out_{axis}" for axis in mapping.letters]] = output
     labels = columns["dwell"].astype(str).tolist() if "dwell" in columns else [f"dwell {k}" for k in count]
     sound, still = sample_faults.sound_dwells(extras, labels, mapping, where)
     frame = _finished(frame.assign(record=count, pose=labels, **extras), mapping)
@@ -266,6 +273,8 @@ def _as_dwells(
 def _finished(frame: pd.DataFrame, mapping: Mapping) -> pd.DataFrame:
     """The columns that every dwell has, and the reference if poses are stated."""
     frame = frame.assign(slot=0, kind="dwell", soak=0, out_unit=OUTPUT_UNITS[mapping.units.output][0])
+    if TILT in frame.columns:
+        return _tilted(frame, mapping)
     if not (mapping.poses or mapping.face):
         return frame
     if mapping.norm_g is None:
@@ -275,3 +284,11 @@ def _finished(frame: pd.DataFrame, mapping: Mapping) -> pd.DataFrame:
     if mapping.headings:
         frame["heading_deg"] = [mapping.headings[label] for label in frame["pose"]]
     return frame
+
+
+def _tilted(frame: pd.DataFrame, mapping: Mapping) -> pd.DataFrame:
+    """The force of a single axis turned in one plane: g·sin of its angle above the horizontal along it, g·cos of it across."""
+    angle = np.radians(frame[TILT].to_numpy(dtype=np.float64))
+    gravity = 1.0 if mapping.norm_g is None else mapping.norm_g
+    force = frames.without_rounding(np.stack([np.sin(angle), np.cos(angle), 0.0 * angle], axis=-1))
+    return frame.drop(columns=TILT).assign(**{name: gravity * force[:, k] for k, name in enumerate(FORCE_COLUMNS)})

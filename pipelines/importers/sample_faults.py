@@ -108,9 +108,9 @@ def sound_dwells(
         There are such dwells and the mapping does not state their treatment.
     """
     sound = np.ones(len(labels), dtype=bool)
-    if not all(f"sd_{axis}" in columns for axis in AXES):
+    if not all(f"sd_{axis}" in columns for axis in mapping.letters):
         return sound, ()
-    spread = np.column_stack([columns[f"sd_{axis}"] for axis in AXES])
+    spread = np.column_stack([columns[f"sd_{axis}"] for axis in mapping.letters])
     usual = np.median(spread, axis=0)
     still = (spread < 1e-6 * usual) & (usual > 0.0)
     rows = np.flatnonzero(still.any(axis=1))

@@ -18,6 +18,7 @@ from pipelines.certificates.programmed import TOP, add
 from pipelines.certificates.validity import Calibration
 from pipelines.chain.certify import certify
 from pipelines.export import UnitCalibration, unit_calibrations
+from pipelines.export.polynomials import refuse_fewer_axes
 from pipelines.programming.outcome import Choice, ProgrammingOutcome
 from pipelines.programming.process import Programmer
 from schemas.errors import WrongUse
@@ -38,6 +39,7 @@ def chosen_units(run: Run, serials: Sequence[str]) -> list[tuple[int, UnitCalibr
     slots = {unit["serial"]: int(unit["slot"]) for unit in run.about["lot"]["units"]}
     once = tuple(dict.fromkeys(serials))  # a device that is named twice is written once
     calibrations = unit_calibrations(run, once, failed=False, revoked=True)
+    refuse_fewer_axes(calibrations, "program: the block")
     allowed = [unit for unit in calibrations if not _revoked(unit)]
     revoked = [unit for unit in calibrations if _revoked(unit)]
     if revoked and (serials or not allowed):

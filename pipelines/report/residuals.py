@@ -71,7 +71,7 @@ def lot_residuals(diagnosis: Diagnosis, units: tuple[str, ...]) -> LotResiduals:
 
 def axes_of(problem: Problem) -> tuple[str, ...]:
     """The axes of a lot's residuals."""
-    return ("norm",) if problem.lot.radial else ("x", "y", "z")
+    return ("norm",) if problem.lot.radial else tuple("xyz"[axis] for axis in problem.axes)
 
 
 def residuals_of_model(model: Model, units: int) -> Array:

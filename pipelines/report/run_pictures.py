@@ -34,7 +34,7 @@ def model_chart(dwells: pd.DataFrame, residuals: pd.DataFrame) -> Chart:
     largest = 1.08 * float(residuals["residual_ug"].abs().max()) or 1.0
     across = PlotAxis(RESIDUAL, low=-largest, high=largest)
     rows: list[list[Plot]] = [[], [], []]
-    for axis in AXES:
+    for axis in (a for a in AXES if f"out_{a}" in dwells):
         own = residuals[residuals["axis"] == axis].merge(dwells[["dwell", "soak", f"out_{axis}"]], on="dwell")
         force, left = own["force_g"].to_numpy(float), own["residual_ug"].to_numpy(float)
         colour = None if scale is None else own["soak"].map(_soak_means(dwells)).to_numpy(float)
@@ -45,13 +45,13 @@ def model_chart(dwells: pd.DataFrame, residuals: pd.DataFrame) -> Chart:
         for row, x, label in zip(rows[1:], (force, own["unit_C"].to_numpy(float)), along, strict=True):
             points = Trace("residual", x, left, size=POINT, colour=colour, texts=_told(own), legend=False)
             row.append(Plot("", label, across, (level(x, 0.0, dashed=False), points)))
-    return Chart("Model and measurement", (*rows[0], *rows[1], *rows[2]), 3, scale, height=250)
+    return Chart("Model and measurement", (*rows[0], *rows[1], *rows[2]), len(rows[0]), scale, height=250)
 
 
 def response_chart(unit: str, residuals: pd.DataFrame, dwells: pd.DataFrame) -> Chart:
     """Measured output of a unit against specific force, axis by axis; a click on a point shows its dwell."""
     plots: list[Plot] = []
-    for axis in AXES:
+    for axis in (a for a in AXES if f"out_{a}" in dwells):
         own = residuals[residuals["axis"] == axis].merge(dwells[["dwell", f"out_{axis}", "out_unit"]], on="dwell")
         force, output = own["force_g"].to_numpy(float), own[f"out_{axis}"].to_numpy(float)
         points = Trace("measured", force, output, role=cast("Role", axis), size=6.0, picks=_picks(unit, own))

@@ -9,7 +9,7 @@ from typing import Any
 import pandas as pd
 from pydantic import ValidationError
 
-from inertial.quantities import FORCE_COLUMNS
+from inertial.quantities import FORCE_COLUMNS, SPREAD_COLUMNS
 from pipelines.archive import Archive, Run, code_hash
 from pipelines.archive.signatures import ENTRY
 from pipelines.chain.chain import RECORDS, STAGES, Tables
@@ -35,6 +35,7 @@ from pipelines.rerun.import_steps import (
 )
 from pipelines.stages.figures import UNITS
 from pipelines.stages.grade import refuse_limits_without_figures
+from pipelines.tables.dwell_table import output_axes
 from pipelines.tables.leave_out import Dwells, leave_out
 from schemas.errors import DataRejected, WrongUse
 from schemas.limits import limits_of
@@ -221,7 +222,8 @@ def _fit_for_a_fit(run: Run) -> pd.DataFrame:
     dwells = run.table("dwells")
     needed = ("kind", "pose", "out_unit")
     if has_poses(dwells):
-        needed = (*FORCE_COLUMNS, "sd_x", "sd_y", "sd_z", "n", *needed)
+        spreads = [SPREAD_COLUMNS[axis] for axis in output_axes(dwells.columns)]
+        needed = (*FORCE_COLUMNS, *spreads, "n", *needed)
     missing = [name for name in needed if name not in dwells.columns]
     if missing:
         raise DataRejected(

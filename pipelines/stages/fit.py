@@ -17,7 +17,7 @@ from pipelines.tables.calibration import Calibration, calibration_of, coefficien
 from pipelines.tables.dwells import LotArrays, LotTables
 from pipelines.tables.frames import empty_table, picked
 from schemas.errors import DataRejected
-from schemas.units import AXES, MICRO
+from schemas.units import MICRO
 
 Array = NDArray[np.float64]
 
@@ -84,7 +84,7 @@ def _rows(lot: LotArrays, fitted: NoisyFit) -> dict[str, pd.DataFrame]:
         "coefficients": coefficient_rows(
             lot.units, fitted.fit, fitted.fit.covariance, lot.out_unit, fitted.nonlinear_error
         ),
-        "covariance": covariance_rows(lot.units, fitted.fit.covariance),
+        "covariance": covariance_rows(lot.units, fitted.fit.covariance, lot.letters),
         "residuals": _residual_rows(lot, fitted),
         "wander": _wander_rows(lot, fitted),
     }
@@ -93,14 +93,14 @@ def _rows(lot: LotArrays, fitted: NoisyFit) -> dict[str, pd.DataFrame]:
 def _residual_rows(lot: LotArrays, fitted: NoisyFit) -> pd.DataFrame:
     used = lot.of_kind("dwell")
     scale = fitted.per_g[:, None, :]
-    force = np.broadcast_to(lot.state.force, lot.output.shape)[:, used]
+    force = np.broadcast_to(lot.state.force[..., lot.state.axes], lot.output.shape)[:, used]
     u, n, a = (index.ravel() for index in np.meshgrid(*(np.arange(size) for size in force.shape), indexing="ij"))
     temperature = lot.state.temperature
     return pd.DataFrame(
         {
             "unit": picked(lot.units, u),
             "dwell": lot.dwells[used][n],
-            "axis": picked(AXES, a),
+            "axis": picked(lot.letters, a),
             "pose": picked(lot.poses, np.flatnonzero(used)[n]),
             "force_g": force.ravel(),
             "residual_ug": (MICRO * fitted.fit.residuals / scale)[:, used].ravel(),
@@ -116,13 +116,14 @@ def _prediction_rows(lot: LotArrays, fitted: NoisyFit) -> pd.DataFrame:
     dwells = lot.dwells[~lot.of_kind("dwell")]
     row, column = np.tril_indices(dwells.size)
     u, a, k = (
-        i.ravel() for i in np.meshgrid(np.arange(len(lot.units)), np.arange(3), np.arange(row.size), indexing="ij")
+        i.ravel()
+        for i in np.meshgrid(np.arange(len(lot.units)), np.arange(len(lot.letters)), np.arange(row.size), indexing="ij")
     )
     values = _predicted(fitted)
     return pd.DataFrame(
         {
             "unit": picked(lot.units, u),
-            "axis": picked(AXES, a),
+            "axis": picked(lot.letters, a),
             "dwell": dwells[row][k],
             "other": dwells[column][k],
             "covariance_ug2": values[..., row, column].ravel(),
@@ -138,12 +139,14 @@ def _predicted(fitted: NoisyFit) -> Array:
 def _wander_rows(lot: LotArrays, fitted: NoisyFit) -> pd.DataFrame:
     """The method that estimates the noise of the dwells, and the parts of the noise, by unit and axis."""
     scale = fitted.per_g
-    u, a = (index.ravel() for index in np.meshgrid(np.arange(len(lot.units)), np.arange(3), indexing="ij"))
+    u, a = (
+        index.ravel() for index in np.meshgrid(np.arange(len(lot.units)), np.arange(len(lot.letters)), indexing="ij")
+    )
     parts = {"white_ug": fitted.white, "flicker_ug": fitted.flicker, "walk_ug": fitted.walk}
     return pd.DataFrame(
         {
             "unit": picked(lot.units, u),
-            "axis": picked(AXES, a),
+            "axis": picked(lot.letters, a),
             "method": picked([fitted.method], np.zeros(u.size, dtype=np.intp)),
             **{name: (MICRO * values / scale).ravel() for name, values in parts.items()},
             "lack_of_fit": fitted.lack_of_fit.ravel(),

@@ -13,7 +13,7 @@ from inertial import design
 from inertial import effects as catalogue
 from inertial.estimation.problem import Lot, Problem
 from inertial.estimation.refinement import terms_of
-from inertial.fits.linear import LotFit, felt_force, fit_lot, own_axes, pseudo_inverses
+from inertial.fits.linear import LotFit, felt_force, fit_lot, of_every_axis, own_axes, pseudo_inverses
 from inertial.fits.wander import WanderFit, fit_lot_with_wander, student
 from pipelines.tables.dwells import LotArrays
 from schemas.errors import DataRejected
@@ -83,7 +83,7 @@ def _felt(lot: LotArrays, used: NDArray[np.bool_]) -> Array:
     """Force along the sensors' own axes at every dwell, (units, n, 3), g; misalignment from the dwells of the fit alone."""
     force, own = lot.state.force, lot.state.force[:, used]
     theta = None if lot.state.theta is None else np.broadcast_to(lot.state.theta, lot.output.shape[:2])[:, used]
-    turn = pseudo_inverses(own) @ felt_force(own, lot.output[:, used], theta)
+    turn = pseudo_inverses(own) @ felt_force(own, lot.output[:, used], theta, lot.state.axes)
     return force @ turn
 
 
@@ -141,7 +141,7 @@ def _per_g(lot: LotArrays, lot_fit: LotFit) -> Array:
     DataRejected
         The model has no scale, and the output is in a unit of its own: its size in g is unknown.
     """
-    scale = np.abs(np.diagonal(lot_fit.response(), axis1=-2, axis2=-1))
+    scale = np.abs(lot_fit.scale())
     if "scale" in lot_fit.effects:
         return scale
     if lot.out_unit not in _PER_G:
@@ -175,8 +175,8 @@ def profiled(lot: LotArrays, effects: Sequence[str], used: NDArray[np.bool_]) ->
 
 def _in_g(lot: LotArrays, used: NDArray[np.bool_]) -> Lot:
     """The lot in g, over the nominal scale of each unit and axis; dwells that are not fitted count as missing."""
-    response = fit_lot(PLAIN, lot.state, lot.output, np.where(used[:, None], lot.standard_error, np.inf)).response()
-    scale = np.abs(np.diagonal(response, axis1=-2, axis2=-1))
+    plain = fit_lot(PLAIN, lot.state, lot.output, np.where(used[:, None], lot.standard_error, np.inf))
+    scale = np.abs(plain.scale())
     scale = np.where(scale > 0.0, scale, 1.0)
     error = lot.standard_error / scale[:, None, :]
     error = np.where(error > 0.0, error, np.median(error))
@@ -184,5 +184,5 @@ def _in_g(lot: LotArrays, used: NDArray[np.bool_]) -> Lot:
         lot.state,
         np.where(used[:, None], lot.output / scale[:, None, :], 0.0),
         np.where(used[:, None], error, np.inf),
-        response / scale[..., None],
+        plain.response() / of_every_axis(scale[..., None], lot.state.axes, 1.0),
     )

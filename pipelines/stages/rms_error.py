@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,7 +19,7 @@ _NODES, _RAW = np.polynomial.hermite_e.hermegauss(24)
 _WEIGHTS = _RAW / np.sqrt(2.0 * np.pi)
 
 
-def rms_columns(errors: Array, covariance: Array) -> dict[str, Array]:
+def rms_columns(errors: Array, covariance: Array, letters: Sequence[str] = AXES) -> dict[str, Array]:
     """Columns of a verification that are the same for all dwells of a unit, (...,) each, by their names.
 
     Uncertainty of the RMS of each axis, RMS of a correct model, and degrees of freedom of its square.
@@ -32,7 +34,7 @@ def rms_columns(errors: Array, covariance: Array) -> dict[str, Array]:
     return {
         name.format(letter): value[..., axis]
         for name, value in zip(OF_UNITS, values, strict=True)
-        for axis, letter in enumerate(AXES)
+        for axis, letter in enumerate(letters)
     }
 
 

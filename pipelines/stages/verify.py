@@ -7,6 +7,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from inertial.correction import correct, station_change
+from inertial.design import of_axes
+from inertial.fits.linear import own_terms
 from pipelines.stages.rms_error import OF_UNITS, rms_columns
 from pipelines.tables.calibration import Calibration, read_calibration
 from pipelines.tables.dwells import LotArrays, LotTables
@@ -58,22 +60,29 @@ def verify_tables(
     model, unseen = calibration.effects, lot.of_kind("verification")
     corrected = correct(model, lot.state, lot.output, calibration.coefficients, calibration.nonlinear)
     truth = lot.state.force + station_change(model, lot.state, calibration.shared, calibration.nonlinear)
-    norm = np.linalg.norm(corrected, axis=-1)
+    axes = lot.state.axes
+    corrected, truth = of_axes(corrected, axes, -1), of_axes(truth, axes, -1)
+    norm, expected_norm = _sizes(corrected), _sizes(of_axes(lot.state.force, axes, -1))
     toward = (corrected / norm[..., None])[:, unseen]
-    scale = np.abs(np.diagonal(calibration.response, axis1=-2, axis2=-1))[:, None, :]
+    scale = np.abs(own_terms(of_axes(calibration.response, axes, -2), axes))[:, None, :]
     reading = (lot.standard_error / scale)[:, unseen]
     by_axis = MICRO * (corrected - truth)[:, unseen]
     spread = predictions if isinstance(predictions, np.ndarray) else _expected(predictions, lot.units)
     expected = np.einsum("uja,uajk,uka->ujk", toward, spread, toward)
-    of_units = rms_columns(np.swapaxes(by_axis, 1, 2), spread)
+    of_units = rms_columns(np.swapaxes(by_axis, 1, 2), spread, lot.letters)
     columns = {
         "norm_g": norm[:, unseen],
-        "error_ug": MICRO * (norm - np.linalg.norm(lot.state.force, axis=-1))[:, unseen],
+        "error_ug": MICRO * (norm - expected_norm)[:, unseen],
         "uncertainty_ug": np.sqrt(np.diagonal(expected, axis1=-2, axis2=-1)),
         "reading_ug": MICRO * np.sqrt(np.sum((toward * reading) ** 2, axis=-1)),
         **{name: values[:, None] + np.zeros_like(by_axis[..., 0]) for name, values in of_units.items()},
     }
     return verification_rows(lot, unseen, columns, by_axis, expected)
+
+
+def _sizes(force: Array) -> Array:
+    """Norm of the force, g; of a single axis the force along it, with its sign."""
+    return force[..., 0] if force.shape[-1] == 1 else np.linalg.norm(force, axis=-1)
 
 
 def verification_rows(
@@ -98,8 +107,10 @@ def _expected(predictions: pd.DataFrame, units: tuple[str, ...]) -> Array:
     dwell, other = (predictions[name].to_numpy() for name in ("dwell", "other"))
     m = np.unique(dwell).size
     row, column = np.tril_indices(m)
-    out = np.zeros((len(units), 3, m, m))
-    values = predictions["covariance_ug2"].to_numpy()[np.lexsort((other, dwell, axis, unit))].reshape(len(units), 3, -1)
+    out = np.zeros((len(units), axis.max() + 1, m, m))
+    values = (
+        predictions["covariance_ug2"].to_numpy()[np.lexsort((other, dwell, axis, unit))].reshape(*out.shape[:2], -1)
+    )
     out[..., row, column] = values
     out[..., column, row] = values
     return out
@@ -134,7 +145,7 @@ def _rows(lot: LotArrays, unseen: NDArray[np.bool_], columns: dict[str, Array], 
             "dwell": lot.dwells[unseen][n],
             "pose": picked(lot.poses, np.flatnonzero(unseen)[n]),
             **{name: values.ravel() for name, values in columns.items()},
-            **{f"error_{letter}_ug": by_axis[..., axis].ravel() for axis, letter in enumerate(AXES)},
+            **{f"error_{letter}_ug": by_axis[..., axis].ravel() for axis, letter in enumerate(lot.letters)},
             "unit_C": np.full(u.size, np.nan) if temperature is None else temperature[:, unseen][u, n],
         }
     )

@@ -16,12 +16,12 @@ from inertial import design, effects
 from inertial.design import Values
 from inertial.effects import SensorEffect, StationEffect
 from inertial.fits.linear import LotFit, response_matrix
-from inertial.state import State
+from inertial.state import ALL_AXES, State
 from pipelines.tables.frames import picked
 from schemas.errors import DataRejected
 from schemas.units import AXES
 
-ALL_AXES = "*"
+EVERY_AXIS = "*"
 PROBE_T_C = 31.0
 
 
@@ -39,42 +39,47 @@ class Calibration:
     covariance: NDArray[np.float64]
     nonlinear: dict[str, dict[str, Any]]
     shared: NDArray[np.float64]
+    axes: tuple[int, ...] = ALL_AXES
 
     @cached_property
     def names(self) -> tuple[tuple[tuple[str, str], ...], ...]:
         """Per axis, (effect id, coefficient) of the p columns."""
-        return column_names(self.effects, self.nonlinear)
+        return column_names(self.effects, self.nonlinear, self.axes)
 
     @cached_property
     def response(self) -> NDArray[np.float64]:
         """The matrix K of each unit, (units, 3, 3), output per g."""
-        return response_matrix(self.coefficients, self.names)
+        return response_matrix(self.coefficients, self.names, self.axes)
 
     def value(self, effect: str) -> NDArray[np.float64]:
         """Coefficients of one effect, (units, 3, columns of the effect)."""
-        return np.stack([self.coefficients[:, axis, self._where(effect, axis)] for axis in range(3)], axis=1)
+        return np.stack(
+            [self.coefficients[:, axis, self._where(effect, axis)] for axis in range(len(self.axes))], axis=1
+        )
 
     def standard_error(self, effect: str) -> NDArray[np.float64]:
         """Standard errors of one effect's coefficients, (units, 3, columns of the effect)."""
         errors = np.sqrt(np.diagonal(self.covariance, axis1=-2, axis2=-1))
-        return np.stack([errors[:, axis, self._where(effect, axis)] for axis in range(3)], axis=1)
+        return np.stack([errors[:, axis, self._where(effect, axis)] for axis in range(len(self.axes))], axis=1)
 
     def _where(self, effect: str, axis: int) -> list[int]:
         return [column for column, (name, _) in enumerate(self.names[axis]) if name == effect]
 
 
-def column_names(model: Sequence[str], values: Values | None = None) -> tuple[tuple[tuple[str, str], ...], ...]:
+def column_names(
+    model: Sequence[str], values: Values | None = None, axes: tuple[int, ...] = ALL_AXES
+) -> tuple[tuple[tuple[str, str], ...], ...]:
     """Per axis, (effect id, coefficient) of a model's columns; all possible columns without values."""
     sensor, _ = design.split(model)
     if values:
-        return tuple(design.local_names(sensor, axis, values) for axis in range(3))
-    return _all_names(tuple(sensor))
+        return tuple(design.local_names(sensor, axis, values) for axis in axes)
+    return _all_names(tuple(sensor), axes)
 
 
 @lru_cache(maxsize=64)
-def _all_names(sensor: tuple[SensorEffect, ...]) -> tuple[tuple[tuple[str, str], ...], ...]:
+def _all_names(sensor: tuple[SensorEffect, ...], axes: tuple[int, ...]) -> tuple[tuple[tuple[str, str], ...], ...]:
     """Per axis, all columns that effects may have; the model of many lots is the same."""
-    return tuple(design.local_names(sensor, axis) for axis in range(3))
+    return tuple(design.local_names(sensor, axis) for axis in axes)
 
 
 def coefficient_rows(
@@ -88,7 +93,7 @@ def coefficient_rows(
     errors = np.sqrt(np.diagonal(covariance, axis1=-2, axis2=-1))
     common = _common_rows(fit, nonlinear_error)
     texts = {effect.id: unit_texts(effect, out_unit) for effect in design.split(fit.effects)[0]}
-    own = [(letter, *row) for letter, names in zip(AXES, fit.names, strict=True) for row in _with_units(names, texts)]
+    own = [(AXES[k], *row) for k, names in zip(fit.axes, fit.names, strict=True) for row in _with_units(names, texts)]
     axis, effect, name, text = zip(
         *own, *((row.axis, row.effect, row.name, row.unit_text) for row in common), strict=True
     )
@@ -134,27 +139,29 @@ def _common_rows(fit: LotFit, nonlinear_error: Mapping[str, Mapping[str, float]]
     """Parameters of the station, nonlinear parameters and constants: one for all axes, or one for each axis."""
     errors = np.sqrt(np.diagonal(fit.shared_covariance)) if fit.shared.size else np.zeros(0)
     rows = [
-        _Row(ALL_AXES, effect, name, float(fit.shared[q]), float(errors[q]), "rad")
+        _Row(EVERY_AXIS, effect, name, float(fit.shared[q]), float(errors[q]), "rad")
         for q, (effect, name) in enumerate(fit.shared_names)
     ]
     for effect, values in fit.nonlinear.items():
         known = {parameter.name: parameter.unit for parameter in effects.get(effect).nonlinear}
         for name, value in values.items():
             error, text = nonlinear_error.get(effect, {}).get(name, 0.0), known.get(name, "")
-            by_axis = zip(AXES, value, strict=True) if isinstance(value, tuple) else ((ALL_AXES, value),)
+            by_axis = zip(AXES, value, strict=True) if isinstance(value, tuple) else ((EVERY_AXIS, value),)
             rows += [_Row(axis, effect, name, float(one), float(error), text) for axis, one in by_axis]
     return rows
 
 
-def covariance_rows(units: Sequence[str], covariance: NDArray[np.float64]) -> pd.DataFrame:
+def covariance_rows(
+    units: Sequence[str], covariance: NDArray[np.float64], letters: Sequence[str] = AXES
+) -> pd.DataFrame:
     """The covariance (units, 3, p, p) as a long table of its lower triangles."""
     p = covariance.shape[-1]
     row, column = np.tril_indices(p)
-    u, a, k = np.meshgrid(np.arange(len(units)), np.arange(3), np.arange(row.size), indexing="ij")
+    u, a, k = np.meshgrid(np.arange(len(units)), np.arange(len(letters)), np.arange(row.size), indexing="ij")
     return pd.DataFrame(
         {
             "unit": picked(units, u.ravel()),
-            "axis": picked(AXES, a.ravel()),
+            "axis": picked(letters, a.ravel()),
             "row": row[k.ravel()],
             "column": column[k.ravel()],
             "value": covariance[:, :, row, column].ravel(),
@@ -166,21 +173,25 @@ def read_calibration(coefficients: pd.DataFrame, covariance: pd.DataFrame) -> Ca
     """The calibration that :func:`coefficient_rows` and :func:`covariance_rows` wrote."""
     texts = {column: coefficients[column].to_numpy(dtype=object) for column in ("unit", "effect", "name")}
     units, model = (tuple(dict.fromkeys(texts[column].tolist())) for column in ("unit", "effect"))
+    letters = coefficients["axis"].to_numpy(dtype=object)
+    axes = tuple(axis for axis, letter in enumerate(AXES) if letter in letters)
     linear = {pair for axis in column_names(model) for pair in axis}
     pairs = zip(texts["effect"].tolist(), texts["name"].tolist(), strict=True)
     is_linear = np.array([pair in linear for pair in pairs], dtype=bool)
     common = np.flatnonzero((texts["unit"] == units[0]) & ~is_linear)
     shared, nonlinear = _read_shared(coefficients.iloc[common], model) if common.size else (np.zeros(0), {})
-    p = len(column_names(model, nonlinear)[0])
-    own = coefficients["value"].to_numpy()[(coefficients["axis"].to_numpy(dtype=object) != ALL_AXES) & is_linear]
-    if len(own) != len(units) * 3 * p:
-        raise DataRejected(f"coefficients: {len(own)} rows, the model needs {len(units) * 3 * p}; run the fit again")
-    matrix = np.zeros((len(units), 3, p, p))
+    p = len(column_names(model, nonlinear, axes)[0])
+    own = coefficients["value"].to_numpy()[(letters != EVERY_AXIS) & is_linear]
+    if len(own) != len(units) * len(axes) * p:
+        raise DataRejected(
+            f"coefficients: {len(own)} rows, the model needs {len(units) * len(axes) * p}; run the fit again"
+        )
+    matrix = np.zeros((len(units), len(axes), p, p))
     row, column = np.tril_indices(p)
-    values = covariance["value"].to_numpy().reshape(len(units), 3, -1)
+    values = covariance["value"].to_numpy().reshape(len(units), len(axes), -1)
     matrix[:, :, row, column] = values
     matrix[:, :, column, row] = values
-    return Calibration(units, model, own.reshape(len(units), 3, p), matrix, nonlinear, shared)
+    return Calibration(units, model, own.reshape(len(units), len(axes), p), matrix, nonlinear, shared, axes)
 
 
 def calibration_of(
@@ -191,7 +202,7 @@ def calibration_of(
         return read_calibration(coefficients, covariance)
     model = tuple(dict.fromkeys(effect for axis in fit.names for effect, _ in axis))
     values = np.array(fit.coefficients, dtype=np.float64, order="C")
-    return Calibration(tuple(units), model, values, symmetric(fit.covariance), {}, np.zeros(0))
+    return Calibration(tuple(units), model, values, symmetric(fit.covariance), {}, np.zeros(0), fit.axes)
 
 
 def symmetric(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -215,7 +226,7 @@ def _read_shared(common: pd.DataFrame, model: Sequence[str]) -> tuple[NDArray[np
             if row.name in station:
                 shared.append(value)
             else:
-                own[str(row.name)] = value if row.axis == ALL_AXES else (*own.get(str(row.name), ()), value)
+                own[str(row.name)] = value if row.axis == EVERY_AXIS else (*own.get(str(row.name), ()), value)
     return np.array(shared), {name: values for name, values in nonlinear.items() if values}
 
 

@@ -10,7 +10,15 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from inertial import frames
-from inertial.quantities import ANGLE_COLUMNS, BY_ATTRIBUTE, FORCE_COLUMNS, RECORDED, is_covariate
+from inertial.quantities import (
+    ANGLE_COLUMNS,
+    BY_ATTRIBUTE,
+    FORCE_COLUMNS,
+    OUTPUT_COLUMNS,
+    RECORDED,
+    SPREAD_COLUMNS,
+    is_covariate,
+)
 from inertial.state import History, State
 
 Array = NDArray[np.float64]
@@ -24,6 +32,11 @@ def covariates(frame: pd.DataFrame) -> list[str]:
     kinds = zip(frame.columns, frame.dtypes, strict=True)
     numbers = (str(name) for name, kind in kinds if kind != np.bool_ and pd.api.types.is_numeric_dtype(kind))
     return [name for name in numbers if is_covariate(name)]
+
+
+def output_axes(columns: Collection[str]) -> tuple[int, ...]:
+    """The sensor axes whose output a table of dwells has, in order."""
+    return tuple(axis for axis, name in enumerate(OUTPUT_COLUMNS) if name in columns)
 
 
 class DwellTable:
@@ -56,6 +69,9 @@ class DwellTable:
         self.rows = len(order)
         self.whole = self.rows == self.shape[0] * self.shape[1]
         self._full_columns: dict[str, bool] = {}
+        self.axes = output_axes(frame.columns)
+        self.outputs = tuple(OUTPUT_COLUMNS[axis] for axis in self.axes)
+        self.spreads = tuple(SPREAD_COLUMNS[axis] for axis in self.axes)
 
     def has(self, *names: str) -> bool:
         """Whether the table has these columns, and a value in each of their rows."""
@@ -134,7 +150,7 @@ def state_of_table(table: DwellTable, history: pd.DataFrame | None = None) -> tu
         if history is None or known["temperature"] is None
         else history_on_grid(history, table.units, known["time"])
     )
-    return reference, State(force=force, **known, covariates=columns, history=past)
+    return reference, State(force=force, **known, covariates=columns, history=past, axes=table.axes)
 
 
 def _force(table: DwellTable, known: dict[str, Any]) -> tuple[str, Array]:

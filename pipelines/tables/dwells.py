@@ -16,12 +16,13 @@ from numpy.typing import NDArray
 
 from inertial.data_errors.readings import Readings, robust_fit
 from inertial.estimation.problem import Lot
-from inertial.fits.linear import force_along_axes
-from inertial.quantities import OUTPUT_COLUMNS, SPREAD_COLUMNS
+from inertial.fits.linear import force_along_axes, of_every_axis, own_terms
+from inertial.frames import shown_force
 from inertial.state import State
 from pipelines.tables.dwell_table import DwellTable, state_of_table
 from pipelines.tables.norms import lot_of_norms
 from schemas.errors import DataRejected
+from schemas.units import AXES
 
 Array = NDArray[np.float64]
 
@@ -68,6 +69,11 @@ class LotArrays:
     standard_error: NDArray[np.float64]
     out_unit: str
 
+    @property
+    def letters(self) -> tuple[str, ...]:
+        """Letters of the axes with an output, in order."""
+        return tuple(AXES[axis] for axis in self.state.axes)
+
     def of_kind(self, kind: str) -> NDArray[np.bool_]:
         """Which dwells are of a kind, (n,)."""
         return np.asarray(self.kinds == kind)
@@ -110,9 +116,10 @@ def measured(dwells: pd.DataFrame, history: pd.DataFrame | None = None) -> Measu
     reference, state = state_of_table(table, history)
     readings = Readings(
         force=state.force,
-        output=table.by_axis(OUTPUT_COLUMNS),
+        output=table.by_axis(table.outputs),
+        axes=table.axes,
         time=table.grid("time_s"),
-        spread=table.by_axis(SPREAD_COLUMNS) if table.has(*SPREAD_COLUMNS) else None,
+        spread=table.by_axis(table.spreads) if table.has(*table.spreads) else None,
         count=table.optional("n"),
         duration=table.optional("duration_s"),
         temperature=table.optional("unit_C"),
@@ -163,8 +170,8 @@ def lot_arrays(
         poses=table.per_dwell("pose"),
         kinds=np.asarray(table.per_dwell("kind"), dtype=np.str_),
         state=state,
-        output=table.by_axis(OUTPUT_COLUMNS),
-        standard_error=table.by_axis(SPREAD_COLUMNS) / np.sqrt(table.grid("n"))[..., None],
+        output=table.by_axis(table.outputs),
+        standard_error=table.by_axis(table.spreads) / np.sqrt(table.grid("n"))[..., None],
         out_unit=out_units[0],
     )
 
@@ -190,9 +197,10 @@ def lot_of(measurement: Measured, like: Measured | None = None, *, square: bool 
     if measurement.reference == "norm":
         return lot_of_norms(readings, measurement.state, (like or measurement).readings, square=square)
     coefficients = (like or measurement).readings.fits
-    scale = np.abs(np.diagonal(coefficients[:, :, 1:], axis1=1, axis2=2))
+    axes = readings.axes
+    scale = np.abs(own_terms(coefficients[:, :, 1:], axes))
     scale = np.where(scale > 0.0, scale, 1.0)
-    response = coefficients[:, :, 1:] / scale[:, :, None]
+    response = of_every_axis(coefficients[:, :, 1:] / scale[:, :, None], axes)
     output = readings.output / scale[:, None, :]
     there = readings.there
     error = np.where(there[..., None], _white_error(readings, scale, output), np.inf)
@@ -201,7 +209,11 @@ def lot_of(measurement: Measured, like: Measured | None = None, *, square: bool 
     return Lot(state, np.where(there[..., None], output, 0.0), error, response, scale=scale)
 
 
-_COLUMNS = 8  # bias and response, and their slopes over temperature
+def _columns(force: Array) -> int:
+    """Bias and response to the directions that the poses show, and their slopes over temperature."""
+    return 2 + 2 * int(np.count_nonzero(np.any(force != 0.0, axis=(0, 1))))
+
+
 _WARM = 5.0
 """Range of temperature, K, from which on its linear terms are worth to be taken out of the force that a sensor answers to."""
 
@@ -216,17 +228,20 @@ def _felt_with_temperature(measurement: Measured, response: Array, scale: Array)
     felt = force_along_axes(response, state.force)
     if state.theta is None or float(np.ptp(state.theta)) < _WARM or not readings.turned:
         return felt, None
-    run = np.zeros(readings.output.shape)
+    axes = readings.axes
+    run = np.zeros((*readings.output.shape[:2], 3))
     force = np.broadcast_to(state.force, run.shape)
+    shown = shown_force(force, axes)
     for unit, theta in enumerate(np.broadcast_to(state.theta, run.shape[:2])):
-        x = np.concatenate([np.ones((len(theta), 1)), force[unit]], axis=-1)
+        x = np.concatenate([np.ones((len(theta), 1)), shown[unit]], axis=-1)
         there = readings.there[unit]
-        if np.linalg.matrix_rank(np.concatenate([x, theta[:, None] * x], axis=-1)[there]) < _COLUMNS:
+        if np.linalg.matrix_rank(np.concatenate([x, theta[:, None] * x], axis=-1)[there]) < _columns(shown):
             continue  # the poses of the soaks do not determine the axes and their gain's run
-        own = robust_fit(force[unit], readings.output[unit], theta)
-        felt[unit] = force_along_axes(own[:, 1:4], force[unit])
-        gain = np.diagonal(own[:, 5:]) / np.where(np.diagonal(own[:, 1:4]) == 0.0, 1.0, np.diagonal(own[:, 1:4]))
-        run[unit] = theta[:, None] * (own[:, 4] / scale[unit] + gain * felt[unit])
+        own = robust_fit(shown[unit], readings.output[unit], theta)
+        felt[unit] = force_along_axes(of_every_axis(own[:, 1:4], axes), force[unit])
+        at_reference = own_terms(own[:, 1:4], axes)
+        gain = own_terms(own[:, 5:], axes) / np.where(at_reference == 0.0, 1.0, at_reference)
+        run[unit][:, axes] = theta[:, None] * (own[:, 4] / scale[unit] + gain * felt[unit][:, axes])
     return felt, run
 
 

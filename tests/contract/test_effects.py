@@ -263,7 +263,7 @@ def test_export_holds_it_or_says_that_it_does_not(name: str) -> None:
     """Effects beyond polynomials in temperature are told of in what is exported, never dropped silently."""
     p = len(effects.get(name).names(0)) if isinstance(effects.get(name), SensorEffect) else 0
     fitted = SimpleNamespace(
-        units=["U1"], effects=[*BASE, name],
+        units=["U1"], effects=[*BASE, name], axes=(0, 1, 2), names=[[(name, "Kxy"), (name, "Kxz")]] * 3,
         value=lambda effect: np.full((1, 3, p), 0.25) if effect == name and p else np.zeros((1, 3, 0)),
     )  # fmt: skip
     bias, response = polynomials(fitted, "U1")

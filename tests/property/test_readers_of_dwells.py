@@ -207,5 +207,5 @@ def test_every_recorded_quantity_is_in_the_state(lot):
 
 
 def test_every_field_of_the_state_is_a_recorded_quantity():
-    other = {"force", "felt", "output_run", "covariates", "history", "memory", "reference"}
+    other = {"force", "felt", "output_run", "covariates", "history", "memory", "reference", "axes"}
     assert {item.name for item in fields(State)} == other | set(BY_ATTRIBUTE)

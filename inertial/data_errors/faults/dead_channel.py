@@ -12,10 +12,12 @@ def dead(readings: Readings) -> Iterator[Fault]:
     """An axis that does not respond to gravity."""
     for unit, fit in enumerate(readings.fits):
         size = np.linalg.norm(fit[:, 1:], axis=1)
-        weak = np.flatnonzero(size < 0.2 * np.median(size)) if np.median(size) > 0.0 else np.arange(3)
+        weak = np.flatnonzero(size < 0.2 * np.median(size)) if np.median(size) > 0.0 else np.arange(size.size)
         for axis in weak[:1]:
             share = size[axis] / max(float(np.median(size)), 1e-300)
-            evidence = f"axis {'xyz'[axis]} responds to gravity with {share:.1%} of the other axes' scale"
+            evidence = (
+                f"axis {'xyz'[readings.axes[axis]]} responds to gravity with {share:.1%} of the other axes' scale"
+            )
             yield Fault("dead_channel", unit, (), evidence)
 
 

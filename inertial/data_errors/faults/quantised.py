@@ -23,18 +23,18 @@ def quantised(readings: Readings) -> Iterator[Fault]:
     """Outputs on a lattice whose step, over √12, exceeds the noise of a mean; or samples that jump between its steps."""
     for unit, out in enumerate(readings.output):
         there = readings.there[unit]
-        for axis in range(3):
+        for axis, sensed in enumerate(readings.axes):
             noise = _white(readings, unit, axis)
             step = lattice_step(out[there, axis])
             if step is not None and noise is not None and step / np.sqrt(12.0) > noise:
                 ratio = step / np.sqrt(12.0) / noise
-                evidence = f"axis {'xyz'[axis]} moves in steps of {step:.3g}: LSB/√12 is {ratio:.1f} times the noise"
+                evidence = f"axis {'xyz'[sensed]} moves in steps of {step:.3g}: LSB/√12 is {ratio:.1f} times the noise"
                 yield Fault("quantised", unit, (), evidence)
                 break
             coarse = _coarse_step(readings, unit, axis)
             if coarse is not None:
                 evidence = (
-                    f"the scatter of axis {'xyz'[axis]} follows where its mean lies between steps of {coarse:.4g}"
+                    f"the scatter of axis {'xyz'[sensed]} follows where its mean lies between steps of {coarse:.4g}"
                 )
                 yield Fault("quantised", unit, (), f"{evidence}: the samples jump between two of them")
                 break

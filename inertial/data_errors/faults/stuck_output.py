@@ -31,7 +31,11 @@ def _still(readings: Readings, unit: int) -> NDArray[np.intp]:
     if readings.spread is None or readings.count is None:
         return np.zeros(0, dtype=np.intp)
     spread = np.where((readings.count[unit] > 2.0)[:, None], readings.spread[unit], np.nan)
-    usual = np.nan_to_num(np.nanmedian(spread, axis=0)) if np.isfinite(spread).any(axis=0).all() else np.zeros(3)
+    usual = (
+        np.nan_to_num(np.nanmedian(spread, axis=0))
+        if np.isfinite(spread).any(axis=0).all()
+        else np.zeros(spread.shape[-1])
+    )
     return np.flatnonzero(np.any((spread < 1e-6 * usual) & (usual > 0.0), axis=-1))
 
 

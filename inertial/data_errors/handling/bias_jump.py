@@ -29,5 +29,5 @@ class BiasJump(OfOneAxis):
 
     def describe(self, lot: Lot, size: Array, **place: float) -> str:
         """The axis and the change."""
-        axis = AXES[int(place["axis"])]
+        axis = AXES[lot.state.axes[int(place["axis"])]]
         return f"the bias of axis {axis} of the unit changed by {1e6 * size[0]:+.0f} µg; measure the unit once more"

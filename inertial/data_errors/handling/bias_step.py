@@ -26,9 +26,12 @@ class BiasStep(OfOneUnit, Change):
 
     def addition(self, lot: Lot) -> Array:
         """One in each axis."""
-        return np.broadcast_to(np.eye(len(AXES)), (1, lot.state.time.shape[1], len(AXES), len(AXES)))
+        axes = len(lot.state.axes)
+        return np.broadcast_to(np.eye(axes), (1, lot.state.time.shape[1], axes, axes))
 
     def describe(self, lot: Lot, size: Array, **place: float) -> str:
         """The change of each axis."""
-        changes = ", ".join(f"{axis} {1e6 * v:+.0f}" for axis, v in zip(AXES, size, strict=True))
+        changes = ", ".join(
+            f"{axis} {1e6 * v:+.0f}" for axis, v in zip((AXES[k] for k in lot.state.axes), size, strict=True)
+        )
         return f"the bias of the unit changed on all axes ({changes} µg); measure the unit once more"

@@ -37,7 +37,7 @@ class BiasUnsteady(OfOneAxis):
         line = np.stack([np.ones(levels.size), warm - warm.mean()], axis=-1)
         levels = levels - line @ np.linalg.lstsq(line, levels, rcond=None)[0]
         by_soak = ", ".join(f"{1e6 * v:+.0f}" for v in levels)
-        axis = AXES[int(place["axis"])]
+        axis = AXES[lot.state.axes[int(place["axis"])]]
         return (
             f"the bias of axis {axis} of the unit differs from soak to soak ({by_soak} µg from a line over temperature)"
         )

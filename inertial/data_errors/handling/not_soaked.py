@@ -46,7 +46,7 @@ class NotSoaked(Handling):
         """What being behind adds, by each unit's own coefficients: one where they are known exactly."""
         units, n = lot.state.time.shape
         if slope is None:
-            return np.zeros((units, n, 3, 1))
+            return np.zeros((units, n, len(lot.state.axes), 1))
         behind = _temperature(lot.state, place["tau"]) - _temperature(lot.state, 0.0)
         return (slope * behind[..., None])[..., None]
 

@@ -26,7 +26,7 @@ class SoakThermometer(Exchangeable):
     def change(self, lot: Lot, slope: Array | None, **place: float) -> Array:
         """The contribution of an offset of one kelvin, by each unit's own coefficients."""
         if slope is None:
-            return np.zeros((*lot.state.time.shape, 3, 1))
+            return np.zeros((*lot.state.time.shape, len(lot.state.axes), 1))
         return -(slope * (soaks(lot.state) == int(place["soak"]))[:, None])[..., None]
 
     def describe(self, lot: Lot, size: Array, **place: float) -> str:

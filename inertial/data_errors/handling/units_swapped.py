@@ -44,7 +44,7 @@ class UnitsSwapped(Handling):
     def change(self, lot: Lot, slope: Array | None, **place: float) -> Array:
         """The difference of the readings of the two units, from the dwell on."""
         one, other, after = _places(lot, **place)
-        column = np.zeros((*lot.state.time.shape, 3, 1))
+        column = np.zeros((*lot.state.time.shape, len(lot.state.axes), 1))
         column[[one, other], ..., 0] = (lot.output[[one, other]] - _of_other(lot, one, other)) * after[:, None]
         return column
 

@@ -8,7 +8,7 @@ from importlib import import_module
 from pkgutil import iter_modules
 from typing import Protocol, cast
 
-from pipelines.export.polynomials import UnitCalibration
+from pipelines.export.polynomials import UnitCalibration, refuse_fewer_axes
 from pipelines.export.settings import ExportSettings
 from schemas.errors import WrongUse
 
@@ -16,7 +16,8 @@ from schemas.errors import WrongUse
 class Format(Protocol):
     """A module that writes calibrations in one format.
 
-    SUFFIX : of the file's name; ONE_UNIT where a file holds one unit; COMPLETE where it names effects that have no polynomial
+    SUFFIX : of the file's name; ONE_UNIT where a file holds one unit; COMPLETE where it names effects that have no polynomial;
+    FEWER_AXES where it holds devices with one axis or two
     """
 
     NAME: str
@@ -48,6 +49,8 @@ def export_files(
     form, chosen = FORMATS[name], settings or ExportSettings()
     if not getattr(form, "COMPLETE", False):
         _refuse_left_out(name, units)
+    if not getattr(form, "FEWER_AXES", False):
+        refuse_fewer_axes(units, f"export: format {name}")
     groups = [[unit] for unit in units] if getattr(form, "ONE_UNIT", False) else [list(units)]
     files: dict[str, bytes] = {}
     for group in groups:

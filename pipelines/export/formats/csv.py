@@ -12,6 +12,7 @@ from schemas.units import AXES
 
 NAME = "csv"
 SUFFIX = ".csv"
+FEWER_AXES = True
 
 
 def write(units: Sequence[UnitCalibration], run: str, settings: ExportSettings) -> str:
@@ -23,9 +24,9 @@ def write(units: Sequence[UnitCalibration], run: str, settings: ExportSettings) 
         certified = c.certified
         for k in range(ORDER):
             per = "" if k == 0 else f"/K^{k}"
-            for i, row in enumerate(AXES):
+            for i, row in enumerate(c.letters):
                 writer.writerow([c.unit, "bias", k, row, "", repr(float(c.bias[k, i])), c.out_unit + per, certified])
-            for i, row in enumerate(AXES):
+            for i, row in enumerate(c.letters):
                 for j, column in enumerate(AXES):
                     value = repr(float(c.response[k, i, j]))
                     writer.writerow([c.unit, "response", k, row, column, value, f"{c.out_unit}/g{per}", certified])

@@ -38,7 +38,7 @@ def render(unit: UnitContext) -> str | None:
     lines = [
         {
             "name": name,
-            "cells": {axis: significant(coverage * by_axis[axis][column]) or "not stated" for axis in "xyz"},
+            "cells": {axis: significant(coverage * by_axis[axis][column]) or "not stated" for axis in by_axis},
         }
         for column, name in MEASURANDS.items()
     ]

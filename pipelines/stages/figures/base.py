@@ -10,7 +10,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from inertial.design import of_axes
 from inertial.distributions import normal_tail
+from inertial.fits.linear import own_terms
+from inertial.state import ALL_AXES
 from inertial.uncertainty.deviation_law import DeviationLaw, dof_of_upper
 from pipelines.stages.noise import B_BOUND
 from pipelines.tables.calibration import Calibration
@@ -56,7 +59,8 @@ class LotCoefficients:
         self.zero_g = zero_g
         self.stated = stated
         self._calibration = calibration
-        self._scale = np.abs(np.diagonal(calibration.response, axis1=-2, axis2=-1))[..., None]
+        own = of_axes(calibration.response, calibration.axes, -2)
+        self._scale = np.abs(own_terms(own, calibration.axes))[..., None]
         self._values: dict[str, NDArray[np.float64]] = {}
         self._errors: dict[str, NDArray[np.float64]] = {}
         self._noise: dict[str, NDArray[np.float64]] = {}
@@ -86,11 +90,16 @@ class LotCoefficients:
         if self.stated is None:
             return self._calibration
         p = self._calibration.covariance.shape[-1]
-        own = np.stack([self.stated[:, a * p : (a + 1) * p, a * p : (a + 1) * p] for a in range(3)], axis=1)
+        own = np.stack(
+            [self.stated[:, a * p : (a + 1) * p, a * p : (a + 1) * p] for a in range(len(self._calibration.axes))],
+            axis=1,
+        )
         return replace(self._calibration, covariance=self._calibration.covariance + own)
 
     def angle(self, unit: int, first: int, second: int) -> tuple[float, float] | None:
         """Deviation from 90° of the angle between two axes and its standard uncertainty, rad; None without misalignment."""
+        if len(self._calibration.axes) < len(ALL_AXES):
+            return None  # a device with fewer axes has no three angles between them
         names, p = self._calibration.names, self._calibration.covariance.shape[-1]
         columns = []
         for axis, other in ((first, second), (second, first)):

@@ -12,7 +12,10 @@ from schemas.units import AXES
 def _value(tables: UnitTables) -> Value | None:
     if not len(tables.verification):
         return None
-    return max((_as_met(tables, axis) for axis in AXES), key=lambda value: value.reach(tables.guard))
+    return max(
+        (_as_met(tables, axis) for axis in AXES if f"error_{axis}_ug" in tables.verification),
+        key=lambda value: value.reach(tables.guard),
+    )
 
 
 def _as_met(tables: UnitTables, axis: str) -> Value:

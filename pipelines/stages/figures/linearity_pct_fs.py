@@ -16,8 +16,8 @@ def _value(tables: UnitTables) -> Value | None:
     if not any(lot.effect(effect, own.unit)[0].shape[-1] for effect in ORDERS):
         return None
     force = np.linspace(-1.0, 1.0, POINTS)
-    curve, variance = np.zeros((3, POINTS)), np.zeros(3)
-    scale = np.ones((3, 1))
+    scale = lot.effect("scale", own.unit)[2]
+    curve, variance = np.zeros((len(scale), POINTS)), np.zeros(len(scale))
     for effect, order in ORDERS.items():
         values, errors, scale = lot.effect(effect, own.unit)
         if values.shape[-1]:
