@@ -92,6 +92,7 @@ def moderated(squares: Array, dof: Array) -> tuple[Array, float]:
 
 def _deviance_at(squares: Array, dof: Array, prior: float) -> tuple[float, float]:
     """−2 log likelihood at so many prior degrees of freedom, and the centre of the variances."""
+    squares = np.maximum(squares, 0.0)  # those of a block that is fitted exactly can lie below by rounding
     total = float(np.sum(dof))
     pooled = max(float(np.sum(squares)) / max(total, 1.0), 1e-300)
     if not np.isfinite(prior):

@@ -8,6 +8,7 @@ from typing import Any
 
 from schemas.errors import RecipeInvalid, WrongUse
 from schemas.import_references import ImportReferences, read_references
+from schemas.units import AXES
 
 GRAVITY_SIGMAS = 3.0
 
@@ -20,8 +21,15 @@ def stated_references(path: Path, content: dict[str, Any]) -> ImportReferences:
     RecipeInvalid
         A key is wrong, or gravity contradicts --local-g.
     WrongUse
-        The day of the measurement is not given, which is needed to check whether references were due.
+        The day of the measurement is not given, which is needed to check whether references were due; or the device has fewer
+        axes than a budget.
     """
+    axes = content.get("axes")
+    if axes and len(axes) < len(AXES):
+        raise WrongUse(
+            f"import: --references states a budget of three axes, --axes has {', '.join(axes)} alone; leave --references out: the "
+            "uncertainties are then those of the noise"
+        )
     references = read_references(path)
     where = f"references {path.name}"
     _refuse_day(str(content.get("measured", "")), where)
