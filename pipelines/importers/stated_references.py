@@ -27,8 +27,8 @@ def stated_references(path: Path, content: dict[str, Any]) -> ImportReferences:
     axes = content.get("axes")
     if axes and len(axes) < len(AXES):
         raise WrongUse(
-            f"import: --references states a budget of three axes, --axes has {', '.join(axes)} alone; leave --references out: the "
-            "uncertainties are then those of the noise"
+            f"import: --references states a budget of three axes, --axes has {', '.join(axes)} alone; leave --references out: "
+            "the uncertainties are then those of the noise"
         )
     references = read_references(path)
     where = f"references {path.name}"

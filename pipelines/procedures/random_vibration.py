@@ -1,4 +1,4 @@
-"""Random vibration by a profile: density of the reference against its tolerance, and the vibration rectification of the units."""
+"""Random vibration by a profile: density of the reference, transfer function, and vibration rectification of the units."""
 
 from __future__ import annotations
 
@@ -7,19 +7,25 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 import pandas as pd
-from pydantic import Field, field_validator
+from pydantic import Field, field_validator, model_validator
 from scipy.signal import welch
 
+from inertial.dynamics.frequency_response import clock_departure
 from inertial.dynamics.random_vibration import interpolated, overall_level, rectification
 from inertial.dynamics.spectra import HANN_HALF, density_confidence, hann_mean
+from inertial.dynamics.transfer_diagnosis import TransferDiagnosis
+from inertial.dynamics.transfer_effects import EFFECTS
 from inertial.errors import NotIdentified
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace
-from pipelines.procedures.base import Evaluated, InG, NominalScale, OnEquipment, scale_of
+from pipelines.procedures.base import Evaluated, InG, NominalScale, OnEquipment, refuse_unknown_effects, scale_of
 from pipelines.procedures.columns import numbers, point_rows, point_table
 from pipelines.procedures.figures import FigureSpec, FigureValue, Texts, UnitOutcome
-from pipelines.procedures.recorded import REFERENCE, Device, ProcedureStep, Records, on_equipment, taken
+from pipelines.procedures.recorded import REFERENCE, Device, ProcedureStep, Records, UnitRecord, on_equipment, taken
+from pipelines.procedures.sweep_points import FEWEST_POINTS, condition_texts, response_bands, transfer_points
+from pipelines.procedures.transfer_chart import bode_chart
+from pipelines.procedures.transfer_figures import diagnosis_text, figures_of_model, judged_points
 from pipelines.procedures.wording import signed
-from schemas.bounds import Positive
+from schemas.bounds import NotNegative, Positive
 from schemas.recipe import Recipe
 from schemas.units import AXES, MICRO
 from schemas.vibration_profile import load_vibration_profile, vibration_profiles
@@ -31,7 +37,11 @@ SEGMENT_S = 0.2
 
 
 class RandomVibrationPart(NominalScale):
-    """Three levels or more, each with rest before and after in one recording; ``levels_g`` are overall g rms."""
+    """Three levels or more, each with rest before and after in one recording; ``levels_g`` are overall g rms.
+
+    ``effects`` is the model of the transfer function at the largest level. ``repeatability_percent`` and ``repeatability_deg``
+    are standard uncertainties of each of its points beside the noise.
+    """
 
     kind: Literal["random_vibration"]
     profile: str = "flat_20_2000"
@@ -41,6 +51,11 @@ class RandomVibrationPart(NominalScale):
     seconds: Annotated[Positive, Field(ge=2.0, le=60.0)] = 10.0
     axis: Literal["x", "y", "z"] = "z"
     window_s: Positive = 10.0
+    repeatability_percent: NotNegative = 0.1
+    repeatability_deg: NotNegative = 0.06
+    effects: Annotated[list[str], Field(min_length=1, max_length=6)] = Field(
+        default_factory=lambda: ["second_order", "delay"]
+    )
     temperature_C: Annotated[float, Field(ge=-100.0, le=200.0)] = 25.0
 
     @field_validator("profile")
@@ -50,6 +65,11 @@ class RandomVibrationPart(NominalScale):
             raise ValueError(f"no vibration profile '{name}', {', '.join(vibration_profiles())} are there; choose one")
         return name
 
+    @model_validator(mode="after")
+    def _effects_known(self) -> RandomVibrationPart:
+        refuse_unknown_effects(self.effects, EFFECTS, "sweeps")
+        return self
+
 
 class RandomVibration(InG, OnEquipment, Evaluated):
     """Gaussian vibration by a profile."""
@@ -57,8 +77,8 @@ class RandomVibration(InG, OnEquipment, Evaluated):
     name = "random_vibration"
     title = "Random vibration"
     order = 115
-    states = "vibration rectification over g rms² at three levels or more; density of the reference against tolerance"
-    source = "IEC 60068-2-64 (tolerances), IEEE Std 1293 (rectification); profiles as files in schemas/vibration"
+    states = "rectification over g rms²; transfer function H1 with coherence and its model; density against tolerance"
+    source = "IEC 60068-2-64 (tolerances), IEEE Std 1293 (rectification), Bendat and Piersol (H1); profiles in schemas/vibration"
     roles = ("exciter",)
     part = RandomVibrationPart
     figures = (
@@ -67,6 +87,9 @@ class RandomVibration(InG, OnEquipment, Evaluated):
             "µg/g²",
             "shift of the mean by vibration over g rms², line through the origin",
         ),
+        FigureSpec("random_bandwidth_hz", "Hz", "frequency at which the magnitude is 3 dB below that at rest", True),
+        FigureSpec("random_natural_hz", "Hz", "undamped natural frequency of the adequate model", True),
+        FigureSpec("random_damping", "1", "damping ratio of the adequate model", True),
     )
 
     def steps(self, part: RandomVibrationPart, recipe: Recipe) -> list[ProcedureStep]:
@@ -109,11 +132,13 @@ class RandomVibration(InG, OnEquipment, Evaluated):
             )  # fmt: skip
             if one.number == len(records) - 1:
                 rows += _density(one.unit, part.axis, driven, rate)
+                about = {"unit": one.unit, "temperature_C": part.temperature_C}
+                rows += [row | about for row in _response(part, one.number, (reference, one.own), device)]
         return point_table(rows)
 
     def of_unit(self, part: RandomVibrationPart, unit: str, rows: pd.DataFrame, device: Device) -> UnitOutcome:
         """Slope over g rms², its straightness tested; none where samples are clipped, which imitates it."""
-        rows = rows[rows["series"] == "shift"]
+        response, rows = rows[rows["series"] == "response"], rows[rows["series"] == "shift"]
         clipped = int(rows["clipped"].sum())
         if clipped:
             raise NotIdentified(
@@ -124,7 +149,11 @@ class RandomVibration(InG, OnEquipment, Evaluated):
             raise NotIdentified("the output does not follow the vibration; check cable and mounting")
         value, spread, chi_square = rectification(*numbers(rows))
         text = f"χ² {chi_square:.2g} for {len(rows) - 1} degrees of freedom of the line through the origin over g rms²"
-        return [FigureValue(self.figures[0].name, part.axis, value, spread)], [("straightness", text)]
+        transfer, texts = _transfer(part, response)
+        return [FigureValue(self.figures[0].name, part.axis, value, spread), *transfer], [
+            ("straightness", text),
+            *texts,
+        ]
 
     def of_lot(self, part: RandomVibrationPart, points: pd.DataFrame) -> Texts:
         """Overall level and lines against their tolerances, with the confidence of a line."""
@@ -175,7 +204,53 @@ class RandomVibration(InG, OnEquipment, Evaluated):
                 Trace("line through the origin", ends, rectification(rms, value, error)[0] * ends, "line", "before")
             )
         right = Plot("", PlotAxis("level² / g²"), PlotAxis("shift of the mean / µg"), tuple(traces))
-        return Chart(self.title, (left, right), 2)
+        response = points[(points["series"] == "response") & np.isfinite(points["value"])]
+        if len(response) < FEWEST_POINTS:
+            return Chart(self.title, (left, right), 2)
+        diagnosis = _diagnosis(part, response)
+        bode = bode_chart(transfer_points(response), diagnosis, numbers(response, "coherence")[0])
+        return Chart(self.title, (left, right, *bode.plots), 2)
+
+
+def _response(
+    part: RandomVibrationPart, number: int, pair: tuple[UnitRecord, UnitRecord], device: Device
+) -> list[dict[str, Any]]:
+    """The points of the transfer function at one level, by the clock of the reference; none of an output that is constant."""
+    first, last = 1.0 + GUARD_S, 1.0 + part.seconds - GUARD_S
+    cut: list[UnitRecord] = []
+    for one in pair:
+        a, b = (round(at * one.rate_hz) for at in (first, last))
+        cut.append(UnitRecord(one.time[a:b], one.output[a:b]))
+    axis = AXES.index(part.axis)
+    if float(np.ptp(cut[1].output[:, axis])) == 0.0:
+        return []
+    clock = clock_departure(*((one.output[:, axis], one.rate_hz) for one in cut))
+    try:
+        points = response_bands(part, number, (cut[0], cut[1]), axis, device, clock)
+    except NotIdentified:
+        return []
+    profile = np.array(load_vibration_profile(part.profile).breakpoints)[:, 0]
+    return [one for one in points if not (one["setting"] < profile[0] or one["setting"] > profile[-1])]
+
+
+def _diagnosis(part: RandomVibrationPart, response: pd.DataFrame) -> TransferDiagnosis:
+    return judged_points(transfer_points(response), part.effects, 10000.0)
+
+
+def _transfer(part: RandomVibrationPart, response: pd.DataFrame) -> tuple[list[FigureValue], list[tuple[str, str]]]:
+    """Figures and findings of the transfer function, judged as that of a sweep."""
+    names = ("random_bandwidth_hz", "random_natural_hz", "random_damping")
+    kept = response[np.isfinite(response["value"])]
+    note = f"{len(kept)} bands follow the vibration, {FEWEST_POINTS} are needed; check cable and range"
+    if len(kept) >= FEWEST_POINTS:
+        try:
+            diagnosis = _diagnosis(part, kept)
+        except NotIdentified as problem:
+            note = str(problem)
+        else:
+            made = figures_of_model(part.axis, diagnosis, transfer_points(kept), "random")
+            return made, [*diagnosis_text(diagnosis), *condition_texts(kept)]
+    return [FigureValue.not_determined(name, part.axis, note) for name in names], []
 
 
 def _shift(output: np.ndarray, rate_hz: float, seconds: float) -> tuple[float, float]:

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from inertial.dynamics.sine_fit import fit_tone_and_frequency
-from inertial.dynamics.transfer_diagnosis import TransferDiagnosis, diagnose_transfer
+from inertial.dynamics.transfer_diagnosis import TransferDiagnosis
 from inertial.errors import NotIdentified
 from pipelines.drawing.chart import Chart
 from pipelines.procedures.base import FromWaveforms, OnEquipment
@@ -26,13 +26,12 @@ from pipelines.procedures.sweep_points import (
     transfer_points,
 )
 from pipelines.procedures.transfer_chart import bode_chart
-from pipelines.procedures.transfer_figures import diagnosis_text, figures_of_transfer, sampling_text
+from pipelines.procedures.transfer_figures import diagnosis_text, figures_of_transfer, judged_points, sampling_text
 from schemas.errors import RecipeInvalid
 from schemas.recipe import Recipe
 from schemas.station import StationConfig
 from schemas.units import AXES
 
-MOST_KEPT = 64
 SINGLE_TONE = 0.7
 """Share of the power of a record that a stepped sine has in its largest tone; a sweep or random vibration has less."""
 
@@ -149,21 +148,9 @@ class Sweep(OnEquipment, FromWaveforms):
         return bode_chart(transfer_points(kept), judged(part, kept), kept["coherence"].to_numpy(dtype=float))
 
 
-_last_judged: dict[str, TransferDiagnosis] = {}
-"""Diagnoses of the last sweeps: the report draws what the stage has judged in the same process."""
-
-
 def judged(part: SweepPart, rows: pd.DataFrame) -> TransferDiagnosis:
     """The diagnosis of the part's model on the points of one unit."""
-    points = transfer_points(rows)
-    c = points.conditions
-    arrays = (c.frequency, c.level, c.temperature, c.record_s, points.value, points.magnitude_error, points.phase_error)
-    key = f"{part.model_dump_json()} {hash(b''.join(one.tobytes() for one in arrays))}"
-    if key not in _last_judged:
-        if len(_last_judged) >= MOST_KEPT:
-            _last_judged.clear()
-        _last_judged[key] = diagnose_transfer(points, part.effects, highest_hz=max(part.high_hz, 10000.0))
-    return _last_judged[key]
+    return judged_points(transfer_points(rows), part.effects, max(part.high_hz, 10000.0))
 
 
 PROCEDURE = Sweep()

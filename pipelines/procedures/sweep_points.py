@@ -161,26 +161,38 @@ def response_point(
 
 
 def response_bands(
-    part: SweepPart, number: int, records: tuple[UnitRecord, UnitRecord], axis: int, device: Device
+    part: Any,
+    number: int,
+    records: tuple[UnitRecord, UnitRecord],
+    axis: int,
+    device: Device,
+    clock: tuple[float, float] = (0.0, 0.0),
 ) -> list[dict[str, Any]]:
     """The points of a record of a swept sine, random vibration or an impact: bands of its whole spectrum.
 
-    Both channels have one clock. A record of constant output, or one that is clipped, gives one point without a value.
+    A record of constant output, or one that is clipped, gives one point without a value.
+
+    Parameters
+    ----------
+    part : of the recipe: axis, repeatability_percent, repeatability_deg
+    clock : departure of the unit's clock from the reference's as a share, and its standard uncertainty
     """
     reference, own = records
     drive, wave = reference.output[:, axis], own.output[:, axis]
     about = {
         "axis": part.axis, "series": "response", "level_g": float(np.std(drive)), "record_s": len(wave) / own.rate_hz,
-        "distortion_percent": 0.0, "transverse_percent": 0.0, "clock_ppm": 0.0, "clock_uncertainty_ppm": 0.0,
+        "distortion_percent": 0.0, "transverse_percent": 0.0, "clock_ppm": 1e6 * clock[0],
+        "clock_uncertainty_ppm": 1e6 * clock[1],
         "rate_hz": own.rate_hz,
     }  # fmt: skip
     if float(np.ptp(wave)) == 0.0 or device.at_end(wave) > 0:
         return [about | {"point": POINTS_OF_RECORD * number, "setting": np.nan, "value": np.nan}]
     late = float(own.time[0] - reference.time[0])
-    bands = frequency_response((drive, reference.rate_hz), (wave, own.rate_hz), late_s=late)
+    bands = frequency_response((drive, reference.rate_hz), (wave, own.rate_hz / (1.0 + clock[0])), late_s=late)
     size = np.abs(bands.h1)
     magnitude = np.hypot(bands.error, 1e-2 * part.repeatability_percent)
-    phase = np.hypot(bands.error, np.radians(part.repeatability_deg))
+    skew = np.pi * bands.frequency * clock[1] * len(wave) / own.rate_hz
+    phase = np.sqrt(bands.error**2 + np.radians(part.repeatability_deg) ** 2 + skew**2)
     rows = point_rows(
         **about,
         point=POINTS_OF_RECORD * number + np.arange(size.size),

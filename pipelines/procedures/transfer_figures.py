@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,13 +12,30 @@ from scipy.optimize import brentq
 
 from inertial.counts import degrees_of_freedom
 from inertial.dynamics.spectra import folded_share
-from inertial.dynamics.transfer_diagnosis import TransferDiagnosis
+from inertial.dynamics.transfer_diagnosis import TransferDiagnosis, diagnose_transfer
 from inertial.dynamics.transfer_effects import EFFECTS, Conditions
 from inertial.dynamics.transfer_model import IDENTIFIED_SHARE, PLAIN, Points, TransferFit, factor
 from pipelines.procedures.figures import FigureValue
 from pipelines.procedures.wording import probability
 
 Array = NDArray[np.float64]
+
+MOST_KEPT = 64
+_last_judged: dict[str, TransferDiagnosis] = {}
+"""Diagnoses of the last transfer functions: the report draws what the stage has judged in the same process."""
+
+
+def judged_points(points: Points, effects: Sequence[str], highest_hz: float) -> TransferDiagnosis:
+    """The diagnosis of a model on the points of one unit."""
+    c = points.conditions
+    arrays = (c.frequency, c.level, c.temperature, c.record_s, points.value, points.magnitude_error, points.phase_error)
+    key = f"{' '.join(effects)} {highest_hz} {hash(b''.join(one.tobytes() for one in arrays))}"
+    if key not in _last_judged:
+        if len(_last_judged) >= MOST_KEPT:
+            _last_judged.clear()
+        _last_judged[key] = diagnose_transfer(points, effects, highest_hz=highest_hz)
+    return _last_judged[key]
+
 
 WORD = {"delay_s": "delay", "natural_hz": "natural frequency", "damping": "damping ratio"}
 
@@ -31,20 +50,20 @@ def figures_of_transfer(
     part : of the recipe: axis, flat_to_hz, nominal_scale, reference_percent
     static : (3,), scale of the multi-position test, output per g; None without one
     """
-    fit, axis = diagnosis.extended, part.axis
+    model = figures_of_model(part.axis, diagnosis, points, "sweep")
+    return [*model, _flatness(part, points), _sensitivity(part, diagnosis.extended, static)]
+
+
+def figures_of_model(axis: str, diagnosis: TransferDiagnosis, points: Points, test: str) -> list[FigureValue]:
+    """Bandwidth, natural frequency and damping; ``test``: how the names of its figures begin."""
+    names = [f"{test}_{figure}" for figure in ("bandwidth_hz", "natural_hz", "damping")]
     if diagnosis.adequate is None or diagnosis.unexplained:
         why = diagnosis.reason or "the model, also with the effects found, does not describe the points"
-        lost = [
-            FigureValue.not_determined(name, axis, why)
-            for name in ("sweep_bandwidth_hz", "sweep_natural_hz", "sweep_damping")
-        ]
-        return [*lost, _flatness(part, points), _sensitivity(part, fit, static)]
+        return [FigureValue.not_determined(name, axis, why) for name in names]
     return [
-        _bandwidth(axis, diagnosis, points),
-        _parameter("sweep_natural_hz", "natural_hz", axis, diagnosis),
-        _parameter("sweep_damping", "damping", axis, diagnosis),
-        _flatness(part, points),
-        _sensitivity(part, fit, static),
+        replace(_bandwidth(axis, diagnosis, points), figure=names[0]),
+        _parameter(names[1], "natural_hz", axis, diagnosis),
+        _parameter(names[2], "damping", axis, diagnosis),
     ]
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from inertial.dynamics.frequency_response import frequency_response
+from inertial.dynamics.frequency_response import clock_departure, frequency_response
 from inertial.errors import NotIdentified
 
 RATE_HZ, NATURAL_HZ, DELAY_S = 10_000.0, 1200.0, 3.3e-4
@@ -80,3 +80,19 @@ def test_channels_of_two_rates_and_a_late_start_give_the_same_response():
 def test_an_output_that_does_not_follow_is_refused(y, said):
     with pytest.raises(NotIdentified, match=said):
         frequency_response((np.random.default_rng(2).standard_normal(50_000), RATE_HZ), (y, RATE_HZ))
+
+
+@pytest.mark.parametrize("departure", [0.0, 4e-5, -2e-4])
+def test_a_clock_that_departs_is_found_and_the_response_follows_from_it(departure):
+    rng, seconds, own_hz = np.random.default_rng(14), 6.0, 4000.0
+    x, y = recorded("random", 0.6, 0.0, rng, seconds=seconds + 0.1)
+    x, y = (signal.sosfiltfilt(signal.butter(8, 1500.0, fs=RATE_HZ, output="sos"), one) for one in (x, y))
+    # what a converter with a clock of its own samples, from the band-limited motion
+    fine = signal.resample(y, 8 * y.size)
+    at = np.arange(int(seconds * own_hz)) / own_hz * (1.0 + departure)
+    own = np.interp(at, np.arange(fine.size) / (8.0 * RATE_HZ), fine)
+    got, error = clock_departure((x, RATE_HZ), (own, own_hz))
+    assert abs(got - departure) < max(4.0 * error, 2e-7)
+    response = frequency_response((x, RATE_HZ), (own, own_hz / (1.0 + got)))
+    shown = (response.frequency > 20.0) & (response.frequency < 1000.0)
+    assert np.max(np.abs(np.log(response.h1 / truth(response.frequency, 0.6))[shown])) < 0.02
