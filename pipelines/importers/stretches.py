@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -13,7 +13,12 @@ from inertial import change_of_level, static_intervals
 from pipelines.importers.mapping import Mapping
 from schemas.errors import DataRejected, did_you_mean
 
-_MOST_LISTED = 6
+WINDOWS_S = (1.0, 0.5, 0.25, 0.12)
+"""Windows of the search for stops, s: a hand rests for a second or more, in a hurry for less."""
+_SHIFTED = 0.2
+"""Share of the stops in which a hand may have shifted the sensor."""
+_ENOUGH = 6
+"""Stops from which a longer window is preferred: the faces of a cube."""
 
 
 @dataclass(frozen=True)
@@ -33,6 +38,24 @@ class Stretches:
         """Some of them, by their numbers from 0."""
         first, last = (tuple(rows[k] for k in numbers) for rows in (self.first, self.last))
         return Stretches(first, last, tuple(self.labels[k] for k in numbers), self.remarks)
+
+
+@dataclass(frozen=True)
+class Stops:
+    """Stops of a record: the window by which they were found, s; the numbers of those that hold several positions."""
+
+    window_s: float
+    found: Stretches
+    several: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class _SearchOptions:
+    """Options of the search: window, s; shortest dwell, s; scatter that means motion."""
+
+    window_s: float
+    shortest_s: float
+    threshold: float | None
 
 
 def stretches(
@@ -64,9 +87,32 @@ def stretches(
     elif mapping.block_s is not None:
         intervals = _by_blocks(time, edges, mapping.block_s)
     else:
-        intervals = _static_stretches(output, time, edges, mapping)
-        _refuse_several_positions(intervals, output, where)
+        how = _SearchOptions(mapping.window_s or 1.0, mapping.shortest_s or 1.0, mapping.threshold)
+        intervals = _searched(output, time, edges, how)
+        intervals = _of_one_position(intervals, output, time, edges, where)
     return _named(intervals, mapping, where)
+
+
+def found_stops(output: NDArray[np.float64], time: NDArray[np.float64], edges: Sequence[int]) -> Stops:
+    """The stops of a record that was turned by hand, with the longest window that takes none of several positions for one.
+
+    Parameters
+    ----------
+    edges : 0, the samples before which some are missing, and their number
+    """
+    best: tuple[int, Stops] | None = None
+    for window in WINDOWS_S:
+        how = _SearchOptions(window, window, None)
+        found = _searched(output, time, edges, how)
+        pairs = list(zip(found.first, found.last, strict=True))
+        several = [k for k, (a, b) in enumerate(pairs) if change_of_level.several_levels(output[a:b]) > 1]
+        single = len(pairs) - len(several)
+        stops = Stops(window, found, tuple(several))
+        if not several and single >= _ENOUGH:
+            return stops
+        if best is None or (not several, single) > (not best[1].several, best[0]):
+            best = single, stops
+    return best[1] if best is not None else Stops(WINDOWS_S[0], Stretches((), (), ()), ())
 
 
 def _by_labels(labels: Sequence[str], edges: list[int]) -> Stretches:
@@ -95,44 +141,64 @@ def _by_positions(output: NDArray[np.float64], count: int, where: str) -> Stretc
     return Stretches(tuple(start.tolist()), tuple(stop.tolist()), names, (remark,))
 
 
-def _static_stretches(
-    output: NDArray[np.float64], time: NDArray[np.float64], edges: list[int], mapping: Mapping
+def _searched(
+    output: NDArray[np.float64], time: NDArray[np.float64], edges: Sequence[int], how: _SearchOptions
 ) -> Stretches:
-    window, shortest = mapping.window_s or 1.0, mapping.shortest_s or 1.0
     first: list[int] = []
     last: list[int] = []
     for a, b in pairwise(edges):
         if b - a < 3 or time[b - 1] <= time[a]:
             continue
-        rate = mapping.rate_hz or (b - a - 1) / float(time[b - 1] - time[a])
-        if b - a < 3 * max(3, round(window * rate)):
+        rate = (b - a - 1) / float(time[b - 1] - time[a])
+        if b - a < 3 * max(3, round(how.window_s * rate)):
             continue
         piece = static_intervals.find(
-            output[a:b], rate, window_s=window, shortest_s=shortest, threshold=mapping.threshold
+            output[a:b], rate, window_s=how.window_s, shortest_s=how.shortest_s, threshold=how.threshold
         )
         first += (piece.start + a).tolist()
         last += (piece.stop + a).tolist()
     return Stretches(tuple(first), tuple(last), tuple(f"dwell {k}" for k in range(len(first))))
 
 
-def _refuse_several_positions(intervals: Stretches, output: NDArray[np.float64], where: str) -> None:
-    """Refuse stretches with more scatter than noise: positions logged one after another."""
+def _of_one_position(
+    intervals: Stretches, output: NDArray[np.float64], time: NDArray[np.float64], edges: Sequence[int], where: str
+) -> Stretches:
+    """The stretches without a few that have more scatter than noise, as where a hand shifted the sensor; a remark on these.
+
+    Raises
+    ------
+    DataRejected
+        Many stretches do: positions were logged one after another.
+    """
     counts = [change_of_level.several_levels(output[a:b]) for a, b in zip(intervals.first, intervals.last, strict=True)]
     several = [k for k, count in enumerate(counts) if count > 1]
     if not several:
-        return
+        return intervals
+    if len(several) <= _SHIFTED * len(intervals) and len(intervals) - len(several) >= _ENOUGH:
+        spans = ", ".join(
+            f"{time[intervals.first[k]] - time[0]:.1f} to {time[intervals.last[k] - 1] - time[0]:.1f} s"
+            for k in several
+        )
+        left = intervals.only([k for k in range(len(intervals)) if k not in several])
+        return replace(left, remarks=(f"left out, since the sensor was shifted during the stop: {spans}",))
     worst = max(several, key=lambda k: counts[k])
     a, b = intervals.first[worst], intervals.last[worst]
-    total = change_of_level.several_levels(output)
-    offer = (
-        f"--positions {total} divides the record at the changes"
-        if total > 1
-        else "--window 0.2 --shortest 0.2 finds shorter dwells"
-    )
+    stops = found_stops(output, time, edges)
+    if len(stops.found) and not stops.several:
+        offer = f"{options_of(stops)} finds {len(stops.found)} stops, one position in each"
+    elif (total := change_of_level.several_levels(output)) > 1:
+        offer = f"--positions {total} divides the record at the changes"
+    else:
+        offer = f"{options_of(stops)} finds shorter dwells"
     raise DataRejected(
         f"{where}: rows {a + 1} to {b}: one dwell by its scatter, but about {counts[worst]} positions logged back to back by its "
         f"levels; a position per dwell is needed; {offer}, or map a column of labels as dwell=…"
     )
+
+
+def options_of(stops: Stops) -> str:
+    """The options of an import that find these stops."""
+    return f"--window {stops.window_s:g} --shortest {stops.window_s:g}"
 
 
 def _named(intervals: Stretches, mapping: Mapping, where: str) -> Stretches:
