@@ -48,12 +48,13 @@ _OPTIONS = {
 
 @dataclass(frozen=True)
 class Proposal:
-    """Keys of the mapping of an import, and the fit (empty: none); sentences on what was assumed and what is left out."""
+    """Keys of the mapping of an import, and the fit (empty: none); what was assumed, and remarks; count of stops or positions."""
 
     keys: dict[str, Any]
     fit: str = ""
     assumed: tuple[str, ...] = ()
     remarks: tuple[str, ...] = ()
+    stops: int = 0
 
     def command(self, paths: Sequence[Path]) -> str:
         """The import as a line for a shell; a value that nothing states is in capitals."""
@@ -129,7 +130,7 @@ def for_fit(
         return _still(keys | own, means, duration_s, heat, [*assumed, gravity])
     if means is not None and len(means) >= FEWEST_OF_NORM:
         return Proposal(keys | own, "norm", (*assumed, gravity))
-    return Proposal(keys, "", tuple(assumed))
+    return Proposal(keys, "", tuple(assumed), (), 0 if means is None else len(means))
 
 
 def _still(

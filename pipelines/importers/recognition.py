@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +16,7 @@ from pipelines.importers.content import Content
 from pipelines.importers.exchange import is_exchange
 from pipelines.importers.guesses import Guesses, measurable
 from pipelines.importers.mapping import TIME_UNITS
-from pipelines.importers.proposal import Proposal, columns_and_units, for_fit, of_stops
+from pipelines.importers.proposal import ASSUMED_HZ, Proposal, columns_and_units, for_fit, of_stops
 from pipelines.importers.record_time import gap_limit
 from schemas.units import AXES
 
@@ -56,10 +56,10 @@ class Recognition:
         if self.keys is None or self.output is None or any(text != _NO_CLOCK for text in self.open):
             return None
         means, stops, keys, duration = None, self.stops, self.keys, None
+        time = np.arange(len(self.output)) / ASSUMED_HZ if self.time is None else self.time
         if self.guessed.dwells:
             means = self.output
         else:
-            time = np.arange(len(self.output)) / 100.0 if self.time is None else self.time
             stops = self.stops or _stops(self.output, time)
             keys = self.keys if self.stops else _with_stops(self.keys, self.output, stops)
             duration = float(time[-1] - time[0])
@@ -68,7 +68,9 @@ class Recognition:
                 means = np.stack([self.output[a:b].mean(axis=0) for a, b in pairs])
         warm = self.guessed.column("temperature")
         heat = measurable(values.as_numbers(self.content.table[warm], warm)) if warm else None
-        return for_fit(keys, self.guessed, means, duration, heat)
+        proposal = for_fit(keys, self.guessed, means, duration, heat)
+        handled = "" if stops is None or duration is None or not proposal.fit else _handling(stops, time)
+        return replace(proposal, remarks=(*proposal.remarks, handled)) if handled else proposal
 
 
 _NO_CLOCK = "the rate of the samples: no column of time was recognised and the file states no interval; --rate HZ"
@@ -201,6 +203,17 @@ def _stops(output: Array, time: Array) -> stretches.Stops | None:
         return None
     edges = [0, *(np.flatnonzero(steps > gap_limit(steps)) + 1).tolist(), len(output)]
     return stretches.found_stops(output, time, edges)
+
+
+def _handling(stops: stretches.Stops, time: Array) -> str:
+    """A sentence on the motion before the first stop and after the last, which no dwell has; empty where there is none."""
+    if not len(stops.found):
+        return ""
+    first, last = float(time[stops.found.first[0]] - time[0]), float(time[stops.found.last[-1] - 1] - time[0])
+    ends = [f"0 to {first:.1f} s"] if first > stops.window_s else []
+    span = float(time[-1] - time[0])
+    ends += [f"{last:.1f} to {span:.1f} s"] if span - last > stops.window_s else []
+    return f"handling at the ends left out: {' and '.join(ends)}" if ends else ""
 
 
 def _with_stops(keys: dict[str, Any], output: Array, stops: stretches.Stops | None) -> dict[str, Any]:
