@@ -93,7 +93,7 @@ def command(
     from pipelines.cli.next_commands import judged_data
     from pipelines.cli.terminal import attended
     from pipelines.cli.text.improve_text import next_lines, print_improvement
-    from pipelines.cli.text.recording_text import print_recording
+    from pipelines.cli.text.recording_text import next_of_recording, print_recording
     from pipelines.diagnosis.inputs import history_beside, judged_effects
     from pipelines.importers.files import is_file
 
@@ -116,6 +116,7 @@ def command(
     document["next"] = next_lines(document, target, find, after=document["after"] or document["diagnosis"])
     if recording is not None:
         document["recording"] = recording
+        document["next"] = document["next"] or next_of_recording(document, archive)
     give(document, print_recording if brief else print_improvement, as_json=as_json)
     raise typer.Exit(DONE if document["adequate"] and not document["refuted"] else PART_FAILED)
 

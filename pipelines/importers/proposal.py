@@ -34,6 +34,7 @@ _OPTIONS = {
     "rate_hz": "--rate",
     "window_s": "--window",
     "shortest_s": "--shortest",
+    "threshold": "--threshold",
     "join": "--join",
     "group": "--group",
     "gaps": "--gaps",
@@ -100,9 +101,10 @@ def of_stops(keys: dict[str, Any], stops: stretches.Stops, levels: int) -> dict[
     """The keys with what finds the stops; ``levels``: positions logged back to back, above 1 where stops hold several."""
     if stops.several and levels > 1 and 2 * len(stops.several) >= len(stops.found):
         return keys | {"positions": levels}
-    if stops.window_s != stretches.WINDOWS_S[0] and len(stops.found):
-        return keys | {"window_s": stops.window_s, "shortest_s": stops.window_s}
-    return keys
+    if not len(stops.found) or (stops.window_s == stretches.WINDOWS_S[0] and stops.threshold is None):
+        return keys
+    limit = {} if stops.threshold is None else {"threshold": stops.threshold}
+    return keys | {"window_s": stops.window_s, "shortest_s": stops.window_s} | limit
 
 
 def for_fit(
@@ -147,7 +149,9 @@ def _still(
     face = f"{'+' if along[axis] > 0.0 else '-'}{'xyz'[axis]}"
     block = max(_SHORTEST_BLOCK_S, float(f"{duration_s / _BLOCKS:.1g}"))
     tilt = f"one pose, {face} taken as vertical: the bias of the other axes holds the tilt of the surface (1° is 17 mg)"
-    keys = {key: value for key, value in keys.items() if key not in {"window_s", "shortest_s", "positions"}}
+    keys = {
+        key: value for key, value in keys.items() if key not in {"window_s", "shortest_s", "threshold", "positions"}
+    }
     warm = heat is not None and float(np.ptp(heat[np.isfinite(heat)])) > _WARMS_C
     remark = () if warm else ("temperature does not change: only bias, noise and drift can be seen",)
     return Proposal(keys | {"face": face, "block_s": block}, "", (*assumed, tilt), remark)

@@ -13,10 +13,15 @@ from inertial import change_of_level, static_intervals
 from pipelines.importers.mapping import Mapping
 from schemas.errors import DataRejected, did_you_mean
 
-WINDOWS_S = (1.0, 0.5, 0.25, 0.12)
+WINDOWS_S = (1.0, 0.5, 0.25)
 """Windows of the search for stops, s: a hand rests for a second or more, in a hurry for less."""
+STRICT = (3.0, 2.0)
+"""Scatter that means motion, in that of the quietest stretch, where the limit found in the record takes two stops for one."""
 _SHIFTED = 0.2
 """Share of the stops in which a hand may have shifted the sensor."""
+HANDLED = 4.0
+"""Scatter of a block over that of most, above which the sensor is held by a hand."""
+_NEARLY = 0.9
 _ENOUGH = 6
 """Stops from which a longer window is preferred: the faces of a cube."""
 
@@ -42,11 +47,15 @@ class Stretches:
 
 @dataclass(frozen=True)
 class Stops:
-    """Stops of a record: the window by which they were found, s; the numbers of those that hold several positions."""
+    """Stops of a record: the window by which they were found, s; the numbers of those that hold several positions.
+
+    threshold : scatter of a window that means motion; None: found in the record
+    """
 
     window_s: float
     found: Stretches
     several: tuple[int, ...]
+    threshold: float | None = None
 
 
 @dataclass(frozen=True)
@@ -86,6 +95,7 @@ def stretches(
         intervals = _by_positions(output, mapping.positions, where)
     elif mapping.block_s is not None:
         intervals = _by_blocks(time, edges, mapping.block_s)
+        intervals = _without_handled_ends(intervals, output, time) if mapping.face else intervals
     else:
         how = _SearchOptions(mapping.window_s or 1.0, mapping.shortest_s or 1.0, mapping.threshold)
         intervals = _searched(output, time, edges, how)
@@ -100,19 +110,38 @@ def found_stops(output: NDArray[np.float64], time: NDArray[np.float64], edges: S
     ----------
     edges : 0, the samples before which some are missing, and their number
     """
-    best: tuple[int, Stops] | None = None
-    for window in WINDOWS_S:
-        how = _SearchOptions(window, window, None)
-        found = _searched(output, time, edges, how)
-        pairs = list(zip(found.first, found.last, strict=True))
-        several = [k for k, (a, b) in enumerate(pairs) if change_of_level.several_levels(output[a:b]) > 1]
-        single = len(pairs) - len(several)
-        stops = Stops(window, found, tuple(several))
-        if not several and single >= _ENOUGH:
+    plain = [_stops(output, time, edges, _SearchOptions(window, window, None)) for window in WINDOWS_S]
+    for stops in plain:
+        if not stops.several and len(stops.found) >= _ENOUGH:
             return stops
-        if best is None or (not several, single) > (not best[1].several, best[0]):
-            best = single, stops
-    return best[1] if best is not None else Stops(WINDOWS_S[0], Stretches((), (), ()), ())
+    # a hand that rests for a moment shakes little less than one that moves: stricter limits part what it runs together
+    quiet = _limits(output, time)
+    strict = [
+        _stops(output, time, edges, _SearchOptions(window, window, float(f"{times * sd:.3g}")))
+        for window, sd in quiet
+        for times in STRICT
+    ]
+    clean = [stops for stops in strict if not stops.several and len(stops.found) >= _ENOUGH]
+    if not clean:
+        return max(plain, key=lambda stops: len(stops.found) - len(stops.several))
+    most = max(len(stops.found) for stops in clean)
+    return next(
+        stops for stops in clean if len(stops.found) >= _NEARLY * most
+    )  # the longest window that finds nearly all
+
+
+def _stops(output: NDArray[np.float64], time: NDArray[np.float64], edges: Sequence[int], how: _SearchOptions) -> Stops:
+    found = _searched(output, time, edges, how)
+    pairs = zip(found.first, found.last, strict=True)
+    several = tuple(k for k, (a, b) in enumerate(pairs) if change_of_level.several_levels(output[a:b]) > 1)
+    return Stops(how.window_s, found, several, how.threshold)
+
+
+def _limits(output: NDArray[np.float64], time: NDArray[np.float64]) -> list[tuple[float, float]]:
+    """The windows of the search, s, and the scatter in the quietest stretch of each."""
+    rate = (len(time) - 1) / float(time[-1] - time[0])
+    usable = [window for window in WINDOWS_S if len(output) >= 3 * max(3, round(window * rate))]
+    return [(window, static_intervals.find(output, rate, window_s=window).quiet_sd) for window in usable]
 
 
 def _by_labels(labels: Sequence[str], edges: list[int]) -> Stretches:
@@ -127,6 +156,20 @@ def _by_blocks(time: NDArray[np.float64], edges: list[int], block_s: float) -> S
     first = sorted({*(np.flatnonzero(np.diff(number)) + 1).tolist(), *edges[:-1]})
     last = [*first[1:], time.size]
     return Stretches(tuple(first), tuple(last), tuple(f"block {k}" for k in range(len(first))))
+
+
+def _without_handled_ends(intervals: Stretches, output: NDArray[np.float64], time: NDArray[np.float64]) -> Stretches:
+    """The blocks of a still record without those at its ends in which a hand still holds the sensor; a remark on these."""
+    pairs = list(zip(intervals.first, intervals.last, strict=True))
+    scatter = np.array([float(np.linalg.norm(output[a:b].std(axis=0))) for a, b in pairs])
+    calm = np.flatnonzero(scatter <= HANDLED * np.median(scatter))
+    kept = intervals.only(range(int(calm[0]), int(calm[-1]) + 1)) if calm.size else intervals
+    if len(kept) == len(intervals):
+        return intervals
+    first, last, end = (float(time[k] - time[0]) for k in (kept.first[0], kept.last[-1] - 1, len(time) - 1))
+    ends = [f"0 to {first:.1f} s"] if calm[0] > 0 else []
+    ends += [f"{last:.1f} to {end:.1f} s"] if calm[-1] + 1 < len(intervals) else []
+    return replace(kept, remarks=(f"handling at the ends left out: {' and '.join(ends)}",))
 
 
 def _by_positions(output: NDArray[np.float64], count: int, where: str) -> Stretches:
@@ -146,6 +189,10 @@ def _searched(
 ) -> Stretches:
     first: list[int] = []
     last: list[int] = []
+    if len(edges) > 2 and how.threshold is None and time[-1] > time[0]:  # one limit for all parts of a record
+        rate = (len(time) - 1) / float(time[-1] - time[0])
+        if len(output) >= 3 * max(3, round(how.window_s * rate)):
+            how = replace(how, threshold=static_intervals.find(output, rate, window_s=how.window_s).threshold_sd)
     for a, b in pairwise(edges):
         if b - a < 3 or time[b - 1] <= time[a]:
             continue
@@ -198,7 +245,8 @@ def _of_one_position(
 
 def options_of(stops: Stops) -> str:
     """The options of an import that find these stops."""
-    return f"--window {stops.window_s:g} --shortest {stops.window_s:g}"
+    limit = "" if stops.threshold is None else f" --threshold {stops.threshold:g}"
+    return f"--window {stops.window_s:g} --shortest {stops.window_s:g}{limit}"
 
 
 def _named(intervals: Stretches, mapping: Mapping, where: str) -> Stretches:

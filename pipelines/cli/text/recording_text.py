@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from inertial.counts import number_of
 from pipelines.cli.chart import Line, chart
-from pipelines.cli.next_commands import print_next
+from pipelines.cli.next_commands import archive_words, command_line, print_next
 from pipelines.cli.printing import console, say
 from pipelines.cli.text.verdict_text import print_verdict
 from pipelines.diagnosis import sections, sentences
@@ -23,14 +24,28 @@ def print_recording(document: dict[str, Any]) -> None:
     print_verdict(judged)
     _picture(one)
     for line in one["lines"]:
-        if "bias" in line and "scale" in line:
-            say(f"  {line}")
+        if line.startswith("CHECK") or ("bias" in line and "scale" in line):
+            say(f"  {line}", style="yellow" if line.startswith("CHECK") else "")
     for text in filter(None, (sentences.evidence_text(judged), sentences.undetected(judged))):
         say(f"  {text}", style="dim")
     _missing(document)
     for text in sections.unseen(judged, brief=True).notes:
         say(f"  {text}", style="dim")
     print_next(document["next"])
+
+
+def next_of_recording(document: dict[str, Any], archive: str | None) -> list[str]:
+    """The command to give next: without faulty dwells, else the coefficients, else the whole diagnosis."""
+    run, words = document["recording"]["run"], archive_words(archive)
+    judged = document["after"] or document["diagnosis"]
+    left = [f"{one['unit']}:{one['dwell']}" for one in (judged["leave_out"] or {"dwells": []})["dwells"]]
+    for fault in judged["blocked_by"]:
+        left += [f"{unit}:{dwell}" for unit in fault["units"] for dwell in fault["dwells"]]
+    if left:
+        return [command_line("improve", run, "--leave-out", ",".join(dict.fromkeys(left)), *words)]
+    if judged["adequate"] and document["recording"]["fit"]:
+        return [command_line("export", run, "--format", "csv", *words)]
+    return [command_line("diagnose", run, "--all", *words)]
 
 
 def _recognised(one: dict[str, Any]) -> None:
@@ -79,6 +94,7 @@ def _missing(document: dict[str, Any]) -> None:
     for text in sentences.left_out(document["diagnosis"]):
         say(f"  {text}", style="yellow")
     for row in document["ladder"]:
-        held = "" if row["heldout_ug"] is None else f", on dwells left out {row['heldout_ug']:.0f} µg"
+        known = row["heldout_ug"] is not None and math.isfinite(row["heldout_ug"])
+        held = "" if not known else f", on dwells left out {row['heldout_ug']:.0f} µg"
         added = f" with {', '.join(row['added'])}" if row["added"] else ""
         say(f"  error{added}: fitted {row['fitted_ug']:.0f} µg{held}; noise {row['noise_ug']:.0f} µg")
