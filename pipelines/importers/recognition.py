@@ -63,7 +63,7 @@ class Recognition:
             stops = self.stops or _stops(self.output, time)
             keys = self.keys if self.stops else _with_stops(self.keys, self.output, stops)
             duration = float(time[-1] - time[0])
-            if len(stops.found):
+            if stops is not None and len(stops.found):
                 pairs = zip(stops.found.first, stops.found.last, strict=True)
                 means = np.stack([self.output[a:b].mean(axis=0) for a, b in pairs])
         warm = self.guessed.column("temperature")
@@ -89,7 +89,14 @@ def recognise(paths: Sequence[Path], *, join: str = "", group: str = "") -> Reco
     if len(paths) > 1:
         time_name = guesses.guesses(first).column("time")
         content, source, _ = sources.read(paths, join=join, time=time_name, group=group)
-    elif is_exchange(content.table.columns):
+    return of_content(content, source, paths, {"join": join} if join else {}, {"group": group} if group else {})
+
+
+def of_content(
+    content: Content, source: files.SourceFile, paths: Sequence[Path], *stated: dict[str, Any]
+) -> Recognition:
+    """The recording of a file that was read; ``stated``: keys of the mapping that the user gave."""
+    if len(paths) == 1 and is_exchange(content.table.columns):
         guessed = guesses.guesses_of_dwells(content.table)
         return Recognition(tuple(paths), content, source, guessed, is_exchange=True)
     guessed = guesses.guesses(content)
@@ -107,8 +114,8 @@ def recognise(paths: Sequence[Path], *, join: str = "", group: str = "") -> Reco
     keys = columns_and_units(content, guessed, paths[0])
     if stops is not None and kept is not None:
         keys = _with_stops(keys, kept, stops)
-    keys |= {"join": join} if join else {}
-    keys |= {"group": group} if group else {}
+    for more in stated:
+        keys |= more
     keys |= {"gaps": "split"} if gaps or not bool(whole.all()) else {}
     keys |= {"faulty": "leave-out"} if faults else {}
     open_ += _open(guessed, kept)

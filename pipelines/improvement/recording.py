@@ -49,8 +49,9 @@ def bring_in(paths: list[Path], archive: str | None, working: Working) -> Record
     build(proposal.keys, name)
     done = import_document(paths, proposal.keys, name, proposal.fit, archive, None, working)
     guessed = seen.guessed
+    files = [str(path) for path in paths]
     return {
-        "files": [str(path) for path in paths],
+        "files": files,
         "form": seen.source.form,
         "rows": len(seen.content.table),
         "columns": {meaning: one for meaning in proposal.keys["columns"] if (one := guessed.column(meaning))},
@@ -63,7 +64,7 @@ def bring_in(paths: list[Path], archive: str | None, working: Working) -> Record
         "remarks": [*done["remarks"], *proposal.remarks],
         "command": proposal.command(paths),
         "run": done["run"],
-        "fit": proposal.fit or None,
+        "fit": "norm" if proposal.fit else None,
         "lines": done["lines"],
         "dwell_list": done["dwell_list"],
     }
