@@ -64,6 +64,8 @@ class Proposal:
         words += ["--units", ",".join(f"{what}={unit}" for what, unit in self.keys["units"].items())]
         words += ["--unit", self.keys["unit"]]
         words += ["--axes", ",".join(self.keys["axes"])] if "axes" in self.keys else []
+        poses = self.keys.get("poses", {})
+        words += ["--poses", ",".join(f"{label}={face}" for label, face in poses.items())] if poses else []
         for key, option in _OPTIONS.items():
             if key in self.keys:
                 value = self.keys[key]
@@ -108,14 +110,19 @@ def of_stops(keys: dict[str, Any], stops: stretches.Stops, levels: int) -> dict[
 
 
 def for_fit(
-    keys: dict[str, Any], guessed: guesses.Guesses, means: Array | None, duration_s: float | None, heat: Array | None
+    keys: dict[str, Any],
+    guessed: guesses.Guesses,
+    means: Array | None,
+    labels: Sequence[str],
+    duration_s: float | None,
+    heat: Array | None,
 ) -> Proposal:
     """The keys with all that a fit needs, and the fit.
 
     Parameters
     ----------
     keys : complete but for the rate of the samples and what the fit needs
-    means : (k, 3), outputs of the stops or positions; None where none were found
+    means, labels : (k, 3), outputs of the stops or positions, None where none were found; and what an import calls them
     duration_s : of the record; None: rows are positions
     heat : (n,), °C; None where none was recorded
     """
@@ -132,7 +139,24 @@ def for_fit(
         return _still(keys | own, means, duration_s, heat, [*assumed, gravity])
     if means is not None and len(means) >= FEWEST_OF_NORM:
         return Proposal(keys | own, "norm", (*assumed, gravity))
+    poses = {} if means is None or sphere is None else _six_faces(means, labels, sphere.centre)
+    if poses:
+        told = "six faces taken as vertical: a tilt of 1° is 17 mg in the bias"
+        return Proposal(keys | {"poses": poses} | own, "faces", (*assumed, gravity, told))
     return Proposal(keys, "", tuple(assumed), (), 0 if means is None else len(means))
+
+
+def _six_faces(means: Array, labels: Sequence[str], centre: Array) -> dict[str, str]:
+    """Label of a dwell → face that is up, where there are six positions and each face is up once; else empty."""
+    along = (means - centre) / np.linalg.norm(means - centre, axis=1, keepdims=True)
+    axes = np.argmax(np.abs(along), axis=1)
+    faces = [f"{'+' if row[k] > 0.0 else '-'}{'xyz'[k]}" for row, k in zip(along, axes.tolist(), strict=True)]
+    clear = bool(np.all(np.abs(along).max(axis=1) > _UP)) and not any(re.search(r"[,=]", label) for label in labels)
+    return (
+        dict(zip(labels, faces, strict=True))
+        if clear and len(faces) == len(set(faces)) == len(set(labels)) == 6
+        else {}
+    )
 
 
 def _still(

@@ -68,7 +68,11 @@ class Recognition:
                 means = np.stack([self.output[a:b].mean(axis=0) for a, b in pairs])
         warm = self.guessed.column("temperature")
         heat = measurable(values.as_numbers(self.content.table[warm], warm)) if warm else None
-        proposal = for_fit(keys, self.guessed, means, duration, heat)
+        named = self.guessed.column("dwell")
+        count = 0 if means is None else len(means)
+        whole = bool(named) and len(self.content.table) == count
+        labels = self.content.table[named].astype(str).tolist() if whole else [f"dwell {k}" for k in range(count)]
+        proposal = for_fit(keys, self.guessed, means, labels, duration, heat)
         handled = "" if stops is None or duration is None or not proposal.fit else _handling(stops, time)
         return replace(proposal, remarks=(*proposal.remarks, handled)) if handled else proposal
 

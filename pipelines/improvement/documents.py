@@ -53,7 +53,7 @@ class RecordingDocument(TypedDict):
     remarks: list[str]
     command: Annotated[str, "the import that says the same"]
     run: str
-    fit: Literal["norm"] | None
+    fit: Literal["norm", "faces"] | None
     lines: Annotated[list[str], "the fit in words"]
     dwell_list: Annotated[list[dict[str, Any]], "as in `import --json`"]
 

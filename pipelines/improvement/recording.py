@@ -64,7 +64,7 @@ def bring_in(paths: list[Path], archive: str | None, working: Working) -> Record
         "remarks": [*done["remarks"], *proposal.remarks],
         "command": proposal.command(paths),
         "run": done["run"],
-        "fit": "norm" if proposal.fit else None,
+        "fit": "faces" if proposal.fit == "faces" else "norm" if proposal.fit else None,
         "lines": done["lines"],
         "dwell_list": done["dwell_list"],
     }

@@ -76,3 +76,22 @@ def test_a_doubt_and_too_few_positions_are_refused_with_what_to_add(rng: np.rand
     few.to_csv("few.csv", header=False, index=False)
     assert "10 positions at rest" in refused("improve", "few.csv")
     assert not Path("archive").exists()
+
+
+def test_six_faces_are_named_by_what_they_read_and_two_exchanged_labels_are_told(rng: np.random.Generator) -> None:
+    faces = ["+x", "-x", "+y", "-y", "+z", "-z"]
+    force = np.array([[float(f"{face[0]}1") * (face[1] == axis) for axis in "xyz"] for face in faces])
+    means = force * 1.01 + [0.02, -0.01, 0.03] + 0.002 * rng.normal(size=force.shape)
+    sheet = pd.DataFrame(means, columns=["X", "Y", "Z"]).assign(Position=[f"side {k}" for k in range(6)])
+    sheet.to_csv("six.csv", index=False, sep=";", decimal=",", float_format="%.4f")
+    document = document_of("improve", "six.csv", status=1)
+    assert document["recording"]["fit"] == "faces"
+    assert document["adequate"] is None  # six positions cannot tell it
+    table = Archive(None).run(document["recording"]["run"]).table("coefficients")
+    bias = [row["value"] for row in table.to_dict("records") if row["effect"] == "bias"]
+    np.testing.assert_allclose(bias, [0.02, -0.01, 0.03], atol=0.004)
+    how = ["--map", "x=X,y=Y,z=Z,dwell=Position", "--units", "output=g", "--rows", "dwells", "--unit", "A"]
+    labels = dict(zip([f"side {k}" for k in (2, 1, 0, 3, 4, 5)], faces, strict=True))  # +x and +y exchanged
+    poses = ",".join(f"{label}={face}" for label, face in labels.items())
+    answer = document_of("import", "six.csv", *how, "--poses", poses, "--local-g", G, "--fit", "faces", status=1)
+    assert "with +x and +y exchanged they agree" in answer["reason"]

@@ -24,7 +24,7 @@ def print_recording(document: dict[str, Any]) -> None:
     print_verdict(judged)
     _picture(one)
     for line in one["lines"]:
-        if line.startswith("CHECK") or ("bias" in line and "scale" in line):
+        if line.startswith("CHECK") or ": bias" in line:
             say(f"  {line}", style="yellow" if line.startswith("CHECK") else "")
     for text in filter(None, (sentences.evidence_text(judged), sentences.undetected(judged))):
         say(f"  {text}", style="dim")
@@ -62,7 +62,7 @@ def _recognised(one: dict[str, Any]) -> None:
 def _picture(one: dict[str, Any]) -> None:
     """The residual of the norm by dwell, or the drift of the outputs where no norm was fitted."""
     rows = one["dwell_list"]
-    if len(rows) < 3:
+    if len(rows) < 3 or one["fit"] == "faces":
         return
     times = [0.5 * (row["start_s"] + row["end_s"]) for row in rows]
     if rows[0]["residual_ug"] is not None:
