@@ -118,7 +118,7 @@ def _bandwidth(axis: str, diagnosis: TransferDiagnosis, points: Points) -> Figur
     low, high = float(min(end[0] for end in ends)), float(max(end[1] for end in ends))
     error = max(error, (value - low) / 1.96, (high - value) / 1.96)
     if error > IDENTIFIED_SHARE * value or value > 2.5 * top or len(ends) < len(found):
-        note = f"not identified by these points to {top:.4g} Hz: 95 % interval {low:.4g} … {high:.4g}; sweep to higher frequencies"
+        note = f"not identified by these points to {top:.4g} Hz: 95 % interval {low:.4g} … {high:.4g}; sweep higher"
         return FigureValue.not_determined("sweep_bandwidth_hz", axis, note, low, high)
     return FigureValue("sweep_bandwidth_hz", axis, value, error, low, high)
 
