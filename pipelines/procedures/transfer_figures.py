@@ -73,7 +73,7 @@ def _parameter(figure: str, name: str, axis: str, diagnosis: TransferDiagnosis) 
     one = diagnosis.parameter(name)
     if one.identified:
         return FigureValue(figure, axis, one.value, one.uncertainty, one.low, one.high)
-    note = f"not identified by this sweep: 95 % interval {one.low:.4g} … {one.high:.4g}"
+    note = f"not identified by these points: 95 % interval {one.low:.4g} … {one.high:.4g}"
     if one.rival is not None:
         model, of_rival = " + ".join(one.rival.effects), one.rival.of(name)[0]
         note += f"; {model}, with {of_rival:.4g}, describes the points as well"
@@ -118,7 +118,7 @@ def _bandwidth(axis: str, diagnosis: TransferDiagnosis, points: Points) -> Figur
     low, high = float(min(end[0] for end in ends)), float(max(end[1] for end in ends))
     error = max(error, (value - low) / 1.96, (high - value) / 1.96)
     if error > IDENTIFIED_SHARE * value or value > 2.5 * top or len(ends) < len(found):
-        note = f"not identified by this sweep to {top:.4g} Hz: 95 % interval {low:.4g} … {high:.4g}; sweep to higher frequencies"
+        note = f"not identified by these points to {top:.4g} Hz: 95 % interval {low:.4g} … {high:.4g}; sweep higher"
         return FigureValue.not_determined("sweep_bandwidth_hz", axis, note, low, high)
     return FigureValue("sweep_bandwidth_hz", axis, value, error, low, high)
 

@@ -27,7 +27,11 @@ def calibration(values: np.ndarray, errors: np.ndarray) -> SimpleNamespace:
         return what[None, :, None] if effect == "bias" else np.zeros((1, 3, 0))
 
     return SimpleNamespace(
-        units=("A",), response=np.eye(3)[None], value=lambda e: of(e, values), standard_error=lambda e: of(e, errors)
+        units=("A",),
+        axes=(0, 1, 2),
+        response=np.eye(3)[None],
+        value=lambda e: of(e, values),
+        standard_error=lambda e: of(e, errors),
     )
 
 
