@@ -54,6 +54,7 @@ def command(
     ] = "",
     archive: options.ArchiveOption = None,
     *,
+    show_all: options.AllOption = False,
     as_json: options.JsonOption = False,
 ) -> None:
     """Judge whether a model is adequate, where it fails, and which physical effect is missing.
@@ -87,7 +88,7 @@ def command(
         from pipelines.cli.next_commands import judged_data
         from pipelines.cli.text.diagnosis_text import print_diagnosis
 
-        print_diagnosis(document, data=partial(judged_data, dwells, beside, archive), model=model)
+        print_diagnosis(document, data=partial(judged_data, dwells, beside, archive), model=model, brief=not show_all)
     raise typer.Exit(DONE if document["adequate"] else PART_FAILED)
 
 

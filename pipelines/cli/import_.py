@@ -29,7 +29,7 @@ def command(
         list[Path],
         typer.Argument(
             metavar="FILE…",
-            help="Text, Parquet, MATLAB, WAV, LVM; with an extra HDF5, UFF58, TDMS, IDE, R. Also .gz.",
+            help="Text, Parquet, MATLAB, NumPy, WAV, LVM; with an extra HDF5, UFF58, TDMS, IDE, R. Also .gz.",
         ),
     ],
     columns: Annotated[

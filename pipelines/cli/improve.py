@@ -18,6 +18,7 @@ from schemas.errors import DONE, PART_FAILED, WrongUse
 if TYPE_CHECKING:
     import pandas as pd
 
+    from pipelines.improvement.documents import RecordingDocument
     from pipelines.jobs.job import Job
 
 PART = "Is the model good enough, and what is missing?"
@@ -25,6 +26,7 @@ ORDER = 215
 SUMMARY = "Diagnose a model, add what is missing, and judge it by a fresh run, in one command."
 EXAMPLES = (
     "tumbleline improve latest",
+    "tumbleline improve recording.csv",
     "tumbleline improve dwells.csv --model model.toml --fresh fresh.csv --yes",
 )
 CHOICES = "y or Enter adds it, n leaves it out; Ctrl-C stops, and nothing is written"
@@ -36,7 +38,10 @@ MEASURES = "y or Enter measures them, n leaves it; Ctrl-C stops, and the same co
 
 def command(
     data: Annotated[
-        str, typer.Argument(metavar="DATA|RUN", help="A file in the exchange format, or a run of the archive.")
+        str,
+        typer.Argument(
+            metavar="DATA|RUN", help="A recording in any format that import reads, a table of dwells, or a run."
+        ),
     ],
     effects: options.EffectsOption = "",
     model: Annotated[
@@ -72,9 +77,13 @@ def command(
             help="Let the station of a run measure its units again as the fresh run; default: ask at a terminal.",
         ),
     ] = None,
+    show_all: options.AllOption = False,
     as_json: options.JsonOption = False,
 ) -> None:
     """Diagnose a model, ask which of the missing effects to add, write the model file, and judge the change by a fresh run.
+
+    A recording of another system is recognised, imported and fitted first; what was decided is printed as the command that
+    says the same. What leaves a doubt is refused with the command to complete.
 
     One question per effect; effects that these data cannot separate are named in the question. Where DATA is a run and an effect
     was added, the fresh run is one of its archive, or the station measures it: one more question, or --measure. Exit status 0:
@@ -82,11 +91,16 @@ def command(
     """
     from pipelines.cli.inputs import add_effects, both_runs, without_dwells
     from pipelines.cli.next_commands import judged_data
+    from pipelines.cli.terminal import attended
     from pipelines.cli.text.improve_text import next_lines, print_improvement
+    from pipelines.cli.text.recording_text import next_of_recording, print_recording
     from pipelines.diagnosis.inputs import history_beside, judged_effects
     from pipelines.importers.files import is_file
 
     add_effects(effect_file)
+    recording = _brought_in(data, archive) if is_file(data) else None
+    data = data if recording is None else recording["run"]
+    yes = yes or (recording is not None and not attended())
     judged = judged_effects(data, archive, effects, model, "improve")
     target = _target(model, output)
     dwells, temperatures, again, again_temperatures = both_runs(data, history, fresh, fresh_history, archive)
@@ -94,13 +108,26 @@ def command(
     tables = ImprovedTables(dwells, temperatures, again, again_temperatures)
     beside = history or (history_beside(data) if is_file(data) else "")
     may_measure = True if yes and measure is None else measure
-    attendant = _Terminal(data, model, archive, quiet=as_json, measure=may_measure)
+    brief = recording is not None and not show_all
+    attendant = _Terminal(data, model, archive, quiet=as_json or brief, measure=may_measure)
     improvement = Improvement(data, tables, model, target, beside, by, fresh, attendant)
     document = improvement.run(judged, _names(choose), yes=yes)
     find = partial(judged_data, data, beside, archive)
     document["next"] = next_lines(document, target, find, after=document["after"] or document["diagnosis"])
-    give(document, print_improvement, as_json=as_json)
+    if recording is not None:
+        document["recording"] = recording
+        document["next"] = document["next"] or next_of_recording(document, archive)
+    give(document, print_recording if brief else print_improvement, as_json=as_json)
     raise typer.Exit(DONE if document["adequate"] and not document["refuted"] else PART_FAILED)
+
+
+def _brought_in(data: str, archive: str | None) -> RecordingDocument | None:
+    """The import of a recording of another system; None for a table of dwells."""
+    from pipelines.importers import limited
+    from pipelines.improvement.recording import bring_in
+
+    limited.start()
+    return bring_in([Path(data)], archive, error_console().status)
 
 
 class _Terminal:

@@ -15,6 +15,7 @@ ArchiveOption = Annotated[
         help="Folder or address (s3://…) of the archive; TUMBLELINE_ARCHIVE or ./archive by default.",
     ),
 ]
+AllOption = Annotated[bool, typer.Option("--all", help="Print the long tables, too.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")]
 RecipeArgument = Annotated[str, typer.Argument(metavar="[RECIPE]", help="A recipe file or a built-in recipe.")]
 StationOption = Annotated[

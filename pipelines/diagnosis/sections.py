@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import re
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from inertial import effects
+from inertial.counts import number_of
 from inertial.data_errors.handling import named as handling_error
+from inertial.quantities import BY_COLUMN
 from inertial.uncertainty.rounding import chance, short, short_values
 from pipelines.diagnosis import sentences
 
+_NOT_RECORDED = re.compile(r"the dwells carry no (\w+):")
 HIDDEN, SHOWN = 3.0, 4
 """Factor by which slow noise must raise the smallest detectable size of an effect to list it, and the number of effects
 listed."""
@@ -142,11 +147,29 @@ def next_measurement(proposed: list[dict[str, Any]]) -> Section:
     return Section("Measure next, in this order", columns, rows, notes)
 
 
-def unseen(document: dict[str, Any]) -> Section:
-    """The effects that the plan cannot show."""
+def unseen(document: dict[str, Any], *, brief: bool = False) -> Section:
+    """The effects that the plan cannot show.
+
+    Parameters
+    ----------
+    brief : one sentence counts those of quantities that were not recorded
+    """
     reasons = document.get("reasons", {})
     rows = [[name, reasons.get(name) or document["breakers"][name]] for name in document["unseen"]]
-    return Section("Effects that this plan cannot show", ("effect", "reason, and measurement that shows it"), rows, [])
+    counts = Counter(match[1] for _, text in rows if brief and (match := _NOT_RECORDED.match(text)))
+    kept = [row for row in rows if not (brief and _NOT_RECORDED.match(row[1]))]
+    listed = ", ".join(f"{_quantity(column)} ({number_of(count, 'effect')})" for column, count in counts.most_common())
+    notes = [f"not recorded: {listed}; --all lists them"] if listed else []
+    return Section(
+        "Effects that this plan cannot show", ("effect", "reason, and measurement that shows it"), kept, notes
+    )
+
+
+def _quantity(column: str) -> str:
+    """A recorded quantity for people."""
+    return {"outer_deg": "angles of a table", "unit_C": "temperature"}.get(column) or (
+        BY_COLUMN[column].label if column in BY_COLUMN else column
+    )
 
 
 def unseen_in_part(document: dict[str, Any]) -> Section:

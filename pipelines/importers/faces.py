@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,8 @@ from schemas.units import AXES, MICRO, STANDARD_GRAVITY_M_S2
 MODEL = ("bias", "scale", "misalignment")
 GROSS = 0.05
 """Smallest part of gravity along a face placed by hand: cos 18° is 0.95."""
+_OWN = 0.9
+"""Share of its own axis in the response of an output: 25° of a hand."""
 UNLIKELY = 0.01
 """Probability of a lack of fit below which six faces are not adequate."""
 
@@ -33,6 +36,8 @@ def six_faces(data: Imported, mapping: Mapping) -> FitAnswer:
     published, fit = ferraris(up, down, gravity), faces(up, down, gravity, error)
     per_g = np.linalg.norm(fit.response, axis=1)
     adequate, why = _verdict(fit, per_g * gravity)
+    if float(np.max(fit.rms / (per_g * gravity), initial=0.0)) > GROSS or not np.isfinite(fit.rms).all():
+        why += _exchanged(up, down, gravity)
     document = {
         "adequate": adequate,
         "reason": why or None,
@@ -91,6 +96,25 @@ def _verdict(fit: Faces, size: NDArray[np.float64]) -> tuple[bool | None, str]:
         None,
         "cannot be judged: the noise of the means is unknown; map n, sd_x, sd_y and sd_z, or import the samples",
     )
+
+
+def _exchanged(up: NDArray[np.float64], down: NDArray[np.float64], gravity: float) -> str:
+    """The two labels whose exchange makes the faces agree; empty where there are none.
+
+    The response has to be that of axes that read themselves, or an exchange of a whole axis would fit as well.
+    """
+    means = np.concatenate([up, down])
+    names = [f"{sign}{axis}" for sign in "+-" for axis in AXES]
+    agreeing: list[str] = []
+    for one, other in combinations(range(len(names)), 2):
+        order = np.arange(len(names))
+        order[[one, other]] = order[[other, one]]
+        fit = faces(means[order[:3]], means[order[3:]], gravity)
+        size = np.linalg.norm(fit.response, axis=1)
+        own = np.diagonal(fit.response) / size
+        if float(np.max(fit.rms / (size * gravity))) < GROSS and float(np.min(own)) > _OWN:
+            agreeing.append(f"{names[one]} and {names[other]}")
+    return f"; with {agreeing[0]} exchanged they agree" if len(agreeing) == 1 else ""
 
 
 def _by_face(

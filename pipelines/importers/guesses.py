@@ -3,30 +3,28 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
-from itertools import combinations
+from dataclasses import dataclass, field
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
 from inertial.quantities import ANGLE_COLUMNS, FORCE_COLUMNS, KNOWN_COLUMNS, LARGEST, SPREAD_COLUMNS
-from pipelines.importers import clocks, unit_check, values
+from pipelines.importers import clocks, triads, unit_check, values
 from pipelines.importers.clocks import typical_step
 from pipelines.importers.content import Content
 from pipelines.importers.stated_units import TEMPERATURE, output_unit
 
 _TIME = re.compile(r"time|stamp|elapsed|epoch|zeit|^t$|^ts$|^t[_ \[(]|sec(ond)?s?\b|x_value|date|clock", re.IGNORECASE)
-_COUNT = re.compile(r"sample|index|count|number|^n$|^#|window|row", re.IGNORECASE)
-_ACCELERATION = re.compile(r"acc|^a[_ .]?[xyz]|^[xyz]$|force|^channel|g[_ ]?[xyz]\b", re.IGNORECASE)
-_OTHER = re.compile(r"gyr|rot|omega|mag|quat|angle|roll|pitch|yaw|^sd|std|var|error|lux|uv|press", re.IGNORECASE)
-_AXIS = re.compile(r"(?:^|[^a-z])(?:acc\w*?|a|mean|out|force|channel)?[_ .\[(-]*([xyz])(?:[^a-z]|$)", re.IGNORECASE)
+_FINE = re.compile(r"sample_?time_?fine", re.IGNORECASE)
+"""Counter of Xsens devices in units of 100 µs (MT Low Level Communication Protocol, MTData2, SampleTimeFine)."""
+FINE_HZ = 1e4
+_AXIS = re.compile(r"(?:^|[_ .])[xyz](?:$|[_ .])", re.IGNORECASE)
 _SPREAD = re.compile(r"^(?:sd|std|sigma|s)[_ .]*(?:acc\w*?|a|out)?[_ .]*([xyz])$", re.IGNORECASE)
+_OF_SENSOR = re.compile(r"imu|acc|gyr|gtemp|sensor|die|chip|mpu|unit", re.IGNORECASE)
 _FASTEST_K_S = 2.0
 """Rate of temperature that no chamber reaches."""
-_HEAT = re.compile(r"temp|heat|^t_?c$|degc|°c", re.IGNORECASE)
-_MOST_COLUMNS = 24
-_SOME = 20_000
+_FEW = 30
 _MOST_POSITIONS = 500
 _LIKELY_HZ = 100.0
 EXCHANGE = "the exchange format"
@@ -55,14 +53,15 @@ class Guess:
 class Guesses:
     """Guesses of a file.
 
-    columns : column → guess · time_unit, output : units with their reasons; empty if unknown · sheet : whether each row has a
-    label of its own, as in a sheet of positions
+    columns : column → guess · time_unit, output : units with their reasons; empty if unknown · sheet : whether each row is a
+    position, by a label of its own or by its distance from its neighbours · triad : what was seen of the three axes
     """
 
     columns: dict[str, Guess]
     time_unit: Guess
     output: Guess
     sheet: bool = False
+    triad: triads.Triad = field(default_factory=triads.Triad)
 
     @property
     def dwells(self) -> bool:
@@ -89,11 +88,12 @@ def guesses(content: Content) -> Guesses:
     guessed: dict[str, Guess] = {str(name): Guess("", "") for name in table.columns}
     numeric = {str(name): one for name in table.columns if (one := _numbers(table[name])) is not None}
     _time(table, numeric, guessed)
-    if not _single_axis(numeric, guessed):
-        _axes(content, numeric, guessed)
+    found = triads.Triad() if _single_axis(numeric, guessed) else _axes(content, numeric, guessed)
     _others(content, table, numeric, guessed)
     sheet = _sheet(table, numeric, guessed)
-    return Guesses(guessed, _time_unit(content, numeric, guessed), _output(content, numeric, guessed), sheet)
+    positions = not _column(guessed, "time") and triads.are_positions(found.sphere, len(table))
+    output = _output(content, numeric, guessed, found.sphere)
+    return Guesses(guessed, _time_unit(content, numeric, guessed), output, sheet or positions, found)
 
 
 def _sheet(table: pd.DataFrame, numeric: dict[str, NDArray[np.float64]], guessed: dict[str, Guess]) -> bool:
@@ -130,11 +130,16 @@ def _time(table: pd.DataFrame, numeric: dict[str, NDArray[np.float64]], guessed:
             guessed[name] = Guess("time", "stamps of date or time")
             return
     growing = [name for name, numbers in numeric.items() if _grows(numbers)]
-    named = [name for name in growing if _TIME.search(name) and not _COUNT.search(name)]
+    fine = [name for name in growing if _FINE.search(name)]
+    named = fine or [name for name in growing if _TIME.search(name) and not triads.COUNT.search(name)]
     if named:
         guessed[named[0]] = Guess("time", "its name, and it only increases")
         return
-    even = [name for name in growing if not _COUNT.search(name) and not _AXIS.search(name)]
+    even = [
+        name
+        for name in growing
+        if not (triads.COUNT.search(name) or _AXIS.search(name) or triads.is_row_number(numeric[name]))
+    ]
     if even:
         guessed[even[0]] = Guess("time", "the first column that only increases")
 
@@ -181,72 +186,59 @@ def _single_axis(numeric: dict[str, NDArray[np.float64]], guessed: dict[str, Gue
     return True
 
 
-def _axes(content: Content, numeric: dict[str, NDArray[np.float64]], guessed: dict[str, Guess]) -> None:
-    free = [name for name in numeric if not guessed[name].meaning][:_MOST_COLUMNS]
-    named: dict[str, dict[str, str]] = {}
-    for name in free:
-        axis = _AXIS.search(name)
-        if axis and not _OTHER.search(name):
-            # the same name with another letter: acc_x, acc_y, acc_z
-            stem = name[: axis.start(1)] + "?" + name[axis.end(1) :]
-            named.setdefault(stem, {})[axis[1].lower()] = name
-    triples = [axes for axes in named.values() if len(axes) == 3]
-    triples.sort(
-        key=lambda axes: not (_ACCELERATION.search(axes["x"]) or output_unit(content.units.get(axes["x"], "")))
-    )
-    if triples:
-        for axis, name in triples[0].items():
-            guessed[name] = Guess(axis, "its name")
-        return
-    stated = [name for name in free if output_unit(content.units.get(name, ""))]
-    if len(stated) == 3:
-        for axis, name in zip("xyz", stated, strict=True):
-            guessed[name] = Guess(axis, f"one of three columns in {content.units[name]}")
-        return
-    live = [name for name in free if not _OTHER.search(name) and not _HEAT.search(name) and not _COUNT.search(name)]
-    best = _steadiest(numeric, live)
-    for axis, name in zip("xyz", best, strict=False):
-        guessed[name] = Guess(axis, "the three columns whose norm changes least, as gravity's does")
+def _axes(content: Content, numeric: dict[str, NDArray[np.float64]], guessed: dict[str, Guess]) -> triads.Triad:
+    free = {name: numbers for name, numbers in numeric.items() if not guessed[name].meaning and not _is_index(numbers)}
+    found = triads.triad(free, content.units)
+    for axis, name in zip("xyz", found.names, strict=False):
+        guessed[name] = Guess(axis, found.reason)
+    return found
 
 
-def _steadiest(numeric: dict[str, NDArray[np.float64]], names: list[str]) -> tuple[str, ...]:
-    """The three neighbouring columns with the steadiest norm, each of which changes; empty if there are not three."""
-    live = [name for name in names if np.nanstd(numeric[name][:_SOME]) > 0.0]
-    threes = [
-        three for three in combinations(live, 3) if len(live) < 6 or live.index(three[2]) - live.index(three[0]) == 2
-    ]
-
-    def unsteady(three: tuple[str, ...]) -> float:
-        size = np.linalg.norm(np.column_stack([numeric[name][:_SOME] for name in three]), axis=1)
-        middle = float(np.nanmedian(size))
-        return float(np.nanmedian(np.abs(size - middle))) / middle if middle > 0.0 else np.inf
-
-    return min(threes, key=unsteady, default=())
+def _is_index(numbers: NDArray[np.float64]) -> bool:
+    """Whether a column numbers the rows, or only grows as a clock does: no output of a sensor."""
+    return triads.is_row_number(numbers) or (numbers.size > _FEW and _grows(numbers))
 
 
 def _others(
     content: Content, table: pd.DataFrame, numeric: dict[str, NDArray[np.float64]], guessed: dict[str, Guess]
 ) -> None:
+    warm = _temperature(content, numeric, guessed)
+    if warm:
+        guessed[warm] = Guess("temperature", "its name or unit")
     for name in list(guessed):
         if guessed[name].meaning:
             continue
         spread = _SPREAD.match(name)
         if name in numeric and spread:
             guessed[name] = Guess(f"sd_{spread[1].lower()}", "its name")
-        elif name in numeric and (_HEAT.search(name) or TEMPERATURE.get(content.units.get(name, "").lower())):
-            middle = float(np.nanmedian(numeric[name]))
-            if -100.0 < middle < 500.0 and not _column(guessed, "temperature"):
-                guessed[name] = Guess("temperature", "its name or unit")
-        elif name not in numeric and not _column(guessed, "dwell"):
+        elif name not in numeric and table[name].dtype.kind not in "fiu" and not _column(guessed, "dwell"):
             distinct = int(table[name].nunique())
             if 1 < distinct <= max(2, len(table) // 10):
                 guessed[name] = Guess("dwell", f"{distinct} labels")
+
+
+def _temperature(content: Content, numeric: dict[str, NDArray[np.float64]], guessed: dict[str, Guess]) -> str:
+    """The column of the sensor's temperature: one by its name before others, and one that changes before one that does not."""
+
+    def rank(name: str) -> tuple[bool, bool]:
+        return bool(np.nanstd(numeric[name]) > 0.0), bool(_OF_SENSOR.search(name))
+
+    warm = [
+        name
+        for name in numeric
+        if not guessed[name].meaning
+        and (triads.HEAT.search(name) or TEMPERATURE.get(content.units.get(name, "").lower()))
+        and -100.0 < float(np.nanmedian(numeric[name])) < 500.0
+    ]
+    return max(warm, key=rank, default="")
 
 
 def _time_unit(content: Content, numeric: dict[str, NDArray[np.float64]], guessed: dict[str, Guess]) -> Guess:
     name = _column(guessed, "time")
     if not name or name not in numeric:
         return Guess("", "")
+    if _FINE.search(name):
+        return Guess("samples", f"counts of {1e6 / FINE_HZ:.0f} µs, by its name")
     numbers = numeric[name][np.isfinite(numeric[name])]
     seen = clocks.recognised(numbers, name, content.units.get(name, ""))
     if seen.unit or not seen.possible:
@@ -266,9 +258,13 @@ def _time_unit(content: Content, numeric: dict[str, NDArray[np.float64]], guesse
     return Guess(near, f"{seen.reason} allow {rates}: check")
 
 
-def _output(  # noqa: PLR0911 - one answer per reason
-    content: Content, numeric: dict[str, NDArray[np.float64]], guessed: dict[str, Guess]
+def _output(
+    content: Content,
+    numeric: dict[str, NDArray[np.float64]],
+    guessed: dict[str, Guess],
+    sphere: triads.Sphere | None,
 ) -> Guess:
+    """The unit of the output; one that the numbers do not settle is a guess with a doubt, which the user has to confirm."""
     names = [name for axis in "xyz" for name, guess in guessed.items() if guess.meaning == axis]
     if len(names) != 3:
         return Guess("", "")
@@ -279,17 +275,8 @@ def _output(  # noqa: PLR0911 - one answer per reason
     output = output[np.isfinite(output).all(axis=1)]
     if not len(output):
         return Guess("", "")
-    size = unit_check.size_of(output)
-    whole = bool(np.all(output[:1000] == np.rint(output[:1000])))
-    likely = unit_check.looks_like(size)
-    if likely and not (whole and likely != "mg"):
-        doubt = ", though whole numbers may be counts: check" if whole else ""
-        return Guess(likely, f"its norm is {size:.5g}, gravity in {likely} is {unit_check.GRAVITY[likely]:.5g}{doubt}")
-    if whole:
-        return Guess("LSB", f"whole numbers with a norm of {size:.5g}")
-    if unit_check.VOLTS_PER_G[0] <= size <= unit_check.VOLTS_PER_G[1]:
-        return Guess("V", f"its norm is {size:.5g}, no size of gravity, but one of volts: check")
-    return Guess("LSB", f"its norm is {size:.5g}, neither gravity nor volts: check")
+    size = sphere.radius if sphere is not None and sphere.fits else unit_check.size_of(output)
+    return Guess(*unit_check.unit_of(output, size))
 
 
 def guesses_of_dwells(table: pd.DataFrame) -> Guesses:

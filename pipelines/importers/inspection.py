@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,22 +11,18 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from inertial import change_of_level, record_faults, static_intervals
+from inertial import change_of_level, record_faults
 from inertial.counts import number_of
 from inertial.quantities import ANGLE_COLUMNS, FORCE_COLUMNS
-from pipelines.importers import clocks, files, sample_faults, sources, unit_check, values
 from pipelines.importers.content import Content
 from pipelines.importers.documents import ColumnDocument, InspectDocument, IntervalDocument
-from pipelines.importers.dynamic_guess import dynamic_guess, serial_of
-from pipelines.importers.exchange import is_exchange, read_dwells
-from pipelines.importers.guesses import EXCHANGE, Guesses, guesses, guesses_of_dwells, measurable
-from pipelines.importers.mapping import TIME_UNITS
-from pipelines.importers.record_time import GAP
-from pipelines.importers.stated_units import TEMPERATURE
+from pipelines.importers.dynamic_guess import dynamic_guess
+from pipelines.importers.exchange import read_dwells
+from pipelines.importers.guesses import EXCHANGE, Guesses, measurable
+from pipelines.importers.recognition import Recognition, recognise
+from pipelines.importers.stretches import Stops
 from schemas.errors import TumblelineError
-from schemas.units import AXES
 
-_NAMED = ("time", "x", "y", "z", "sd_x", "sd_y", "sd_z", "n", "force_x", "tilt", "temperature", "dwell")
 _MOST_INTERVALS = 2000
 
 
@@ -48,71 +43,38 @@ def inspect(paths: Sequence[Path], *, join: str = "", group: str = "") -> Inspec
     join : how several files are joined, ``rows`` or ``columns``.
     group : the group of channels, if a file has several.
     """
-    first, _ = files.read_content(paths[0], group)
-    time_name = guesses(first).column("time") if len(paths) > 1 else ""
-    content, source, _ = sources.read(paths, join=join, time=time_name, group=group)
-    if len(paths) == 1 and is_exchange(content.table.columns):
-        return Inspection(_of_dwells(paths[0], content, source.form), None, None)
-    guessed = guesses(content)
-    time, gaps, open_ = _time(content, guessed)
-    output = _output(content, guessed)
-    whole = np.ones(len(content.table), dtype=bool) if output is None else np.isfinite(output).all(axis=1)
-    if time is not None:
-        whole &= np.isfinite(time)
-    kept = None if output is None else output[whole]
-    own = None if time is None else time[whole]
-    faults = sample_faults.look(kept) if kept is not None and len(kept) > 3 and not guessed.dwells else None
-    rate = _rate(own)
-    intervals = _intervals(kept, own, rate) if kept is not None and rate else []
-    dynamic = dynamic_guess(paths[0], content, guessed, rate) if output is None and len(paths) == 1 else None
-    if dynamic is not None:
-        open_ += dynamic.open
-    elif output is None and not guessed.single:
-        missing = [axis for axis in "xyz" if not guessed.column(axis)]
-        open_.append(f"columns of acceleration were not recognised: map {' and '.join(missing)} by name or number")
-        few = len([one for one in guessed.columns.values() if one.meaning != "time"])
-        if few < len(AXES):
-            open_.append(
-                f"{few} column{'s' if few > 1 else ''} beside the time: an import needs three axes; a record at rest of fewer "
-                "has its noise by 'tumbleline allan' and 'tumbleline psd'"
-            )
-    bits = 0 if output is None else unit_check.unsigned_bits(output[np.isfinite(output).all(axis=1)])
-    if bits:
-        open_.append(
-            f"signed words of {bits} bits were read without their sign: subtract {2**bits} from {2 ** (bits - 1)} on"
-        )
-    if guessed.output.meaning == "" and (output is not None or guessed.single):
-        open_.append("the unit of the output: --units output=g|mg|m/s^2|V|mV|LSB")
-    positions = (
-        change_of_level.several_levels(kept)
-        if kept is not None and any(one["positions"] > 1 for one in intervals)
-        else 0
+    seen = recognise(paths, join=join, group=group)
+    if seen.is_exchange:
+        return Inspection(_of_dwells(paths[0], seen), None, None)
+    time, output, open_ = seen.time, seen.output, list(seen.open)
+    dynamic = (
+        dynamic_guess(paths[0], seen.content, seen.guessed, seen.rate_hz)
+        if output is None and len(paths) == 1
+        else None
     )
-    split = bool(gaps) or not bool(whole.all())
+    if dynamic is not None:
+        open_ = list(dynamic.open)
     document: InspectDocument = {
-        **_document(paths, content, source.form, guessed),
-        "rate_hz": rate,
-        "duration_s": float(own[-1] - own[0]) if own is not None and len(own) > 1 else None,
-        "gaps": gaps,
-        "faults": [] if faults is None or kept is None else faults.rows(_clock_of(kept, own)),
-        "intervals": intervals,
+        **_document(seen),
+        "rate_hz": seen.rate_hz,
+        "duration_s": float(time[-1] - time[0]) if time is not None and len(time) > 1 else None,
+        "gaps": seen.gaps,
+        "faults": [] if seen.faults is None or output is None else seen.faults.rows(_clock_of(output, time)),
+        "intervals": [] if output is None or time is None else _intervals(output, time, seen.stops),
         "open": open_,
-        "command": dynamic.command
-        if dynamic is not None
-        else _command(
-            paths, content, guessed, join=join, group=group, split=split, faulty=bool(faults), positions=positions
-        ),
+        "command": seen.import_command if dynamic is None else dynamic.command,
     }
     if dynamic is not None:
         dynamic.mark(document["columns"])
-    return Inspection(document, own, kept)
+    return Inspection(document, time, output)
 
 
-def _document(paths: Sequence[Path], content: Content, form: str, guessed: Guesses) -> InspectDocument:
+def _document(seen: Recognition) -> InspectDocument:
     """The document with what is known of the columns, and nothing of a record in them."""
+    content, guessed = seen.content, seen.guessed
     return {
-        "files": [str(path) for path in paths],
-        "form": form,
+        "files": [str(path) for path in seen.paths],
+        "form": seen.source.form,
         "rows": len(content.table),
         "columns": _columns(content, guessed),
         "remarks": list(content.remarks),
@@ -130,12 +92,12 @@ def _document(paths: Sequence[Path], content: Content, form: str, guessed: Guess
     }
 
 
-def _of_dwells(path: Path, content: Content, form: str) -> InspectDocument:
+def _of_dwells(path: Path, seen: Recognition) -> InspectDocument:
     """The document about a table of dwells in the exchange format, which ``diagnose`` reads as it is, without an import."""
-    document = _document([path], content, form, guesses_of_dwells(content.table))
+    document = _document(seen)
     for column in document["columns"]:
         column |= {"resolution": None, "clipped": 0}
-    document["remarks"].append(_content_of_dwells(content.table))
+    document["remarks"].append(_content_of_dwells(seen.content.table))
     document["command"] = shlex.join(["tumbleline", "diagnose", str(path)])
     try:
         read_dwells(path)
@@ -157,65 +119,15 @@ def _content_of_dwells(table: pd.DataFrame) -> str:
     return f"a table of dwells in {EXCHANGE}: {units}, {number_of(len(table), 'dwell')}; reference: {reference}"
 
 
-def _time(content: Content, guessed: Guesses) -> tuple[NDArray[np.float64] | None, int, list[str]]:
-    """Seconds of every row, count of gaps, and missing options."""
-    name = guessed.column("time")
-    if not name and guessed.dwells:
-        return None, 0, []
-    if not name:
-        return (
-            None,
-            0,
-            ["the rate of the samples: no column of time was recognised and the file states no interval; --rate HZ"],
-        )
-    column = content.table[name]
-    open_: list[str] = []
-    if values.is_moment(column):
-        time = values.seconds(column.ffill(), name)
-    elif clocks.is_stamps(column):
-        time = clocks.stamps(column.ffill().bfill(), name)
-    else:
-        numbers = measurable(np.asarray(values.as_numbers(column, name), dtype=np.float64))
-        unit = guessed.time_unit.meaning
-        if not unit:
-            open_.append(
-                f"the unit of time: {guessed.time_unit.reason}; --units time=s|ms|us|ns, or time=samples and --rate HZ"
-            )
-        first = numbers[np.isfinite(numbers)][0] if np.any(np.isfinite(numbers)) else 0.0
-        time = (numbers - first) * TIME_UNITS.get(unit, 1.0)
-    steps = np.diff(time[np.isfinite(time)])
-    usual = float(np.median(steps[steps > 0.0])) if np.any(steps > 0.0) else 0.0
-    if np.any(steps < 0.0) and not guessed.column("dwell"):
-        open_.append(
-            f"time runs back at row {int(np.flatnonzero(steps < 0.0)[0]) + 2}: sort the rows, or divide the file"
-        )
-    return time, int(np.count_nonzero(steps > GAP * usual)), open_
-
-
 def _clock_of(output: NDArray[np.float64], time: NDArray[np.float64] | None) -> NDArray[np.float64]:
     """Seconds, or the numbers of the samples if there is no time."""
     return np.arange(len(output), dtype=np.float64) if time is None else time
 
 
-def _rate(time: NDArray[np.float64] | None) -> float | None:
-    if time is None or len(time) < 2:
-        return None
-    step = clocks.typical_step(time)
-    return 1.0 / step if step > 0.0 else None
-
-
-def _output(content: Content, guessed: Guesses) -> NDArray[np.float64] | None:
-    names = [guessed.column(axis) for axis in "xyz"]
-    if not all(names):
-        return None
-    return np.column_stack([measurable(values.as_numbers(content.table[name], name)) for name in names])
-
-
-def _intervals(output: NDArray[np.float64], time: NDArray[np.float64] | None, rate: float) -> list[IntervalDocument]:
-    if time is None or len(output) < 3 * max(3, round(rate)) or not np.isfinite(rate):
+def _intervals(output: NDArray[np.float64], time: NDArray[np.float64], stops: Stops | None) -> list[IntervalDocument]:
+    if stops is None:
         return []
-    intervals = static_intervals.find(output, rate)
-    pairs = list(zip(intervals.start.tolist(), intervals.stop.tolist(), strict=True))[:_MOST_INTERVALS]
+    pairs = list(zip(stops.found.first, stops.found.last, strict=True))[:_MOST_INTERVALS]
     return [
         {
             "start_s": float(time[a] - time[0]),
@@ -223,9 +135,9 @@ def _intervals(output: NDArray[np.float64], time: NDArray[np.float64] | None, ra
             "samples": b - a,
             "mean": output[a:b].mean(axis=0).tolist(),
             "sd": output[a:b].std(axis=0, ddof=1).tolist(),
-            "positions": change_of_level.several_levels(output[a:b]),
+            "positions": change_of_level.several_levels(output[a:b]) if k in stops.several else 1,
         }
-        for a, b in pairs
+        for k, (a, b) in enumerate(pairs)
     ]
 
 
@@ -256,45 +168,3 @@ def _columns(content: Content, guessed: Guesses) -> list[ColumnDocument]:
             }
         )
     return columns
-
-
-def _command(
-    paths: Sequence[Path],
-    content: Content,
-    guessed: Guesses,
-    *,
-    join: str,
-    group: str,
-    split: bool,
-    faulty: bool,
-    positions: int,
-) -> str:
-    """The import command that is proposed; values that the file does not state are in capitals."""
-    names = list(guessed.columns)
-    pairs = [(meaning, guessed.column(meaning)) for meaning in _NAMED if guessed.column(meaning)]
-    words = [f"{meaning}={_mapped(name, names)}" for meaning, name in pairs]
-    words += [f"{axis}=COLUMN" for axis in "xyz" if not guessed.column(axis) and not guessed.single]
-    mapped = ",".join(words)
-    units = [f"output={guessed.output.meaning or 'UNIT'}"]
-    time = guessed.column("time")
-    if time and guessed.time_unit.meaning:
-        units.append(f"time={guessed.time_unit.meaning}")
-    elif time and content.table[time].dtype.kind in "fiu":
-        units.append("time=UNIT")
-    heat = TEMPERATURE.get(content.units.get(guessed.column("temperature"), "").strip().lower(), "degC")
-    units += [f"temperature={heat}"] if heat != "degC" else []
-    words = ["tumbleline", "import", *(str(path) for path in paths), "--map", mapped, "--units", ",".join(units)]
-    words += ["--unit", serial_of(paths[0])]
-    words += ["--axes", "x"] if guessed.single else []
-    words += ["--rows", "dwells"] if guessed.dwells else [] if time else ["--rate", "HZ"]
-    words += ["--join", join] if join else []
-    words += ["--group", group] if group else []
-    words += ["--gaps", "split"] if split else []
-    words += ["--faulty", "leave-out"] if faulty else []
-    words += ["--positions", str(positions)] if positions > 1 else []
-    return shlex.join(words)
-
-
-def _mapped(name: str, names: list[str]) -> str:
-    """A column as a name for --map: by its number where its name has a comma or an equals sign, or blanks at its ends."""
-    return str(names.index(name) + 1) if re.search(r"[,=]|^\s|\s$", name) or not name else name

@@ -26,6 +26,8 @@ LONGEST_MOVE_S = 300.0
 SHORTEST_RECORD_S = 3.0
 GAP = 5.0
 """Multiple of the usual step above which a step is a gap."""
+BURST, OFTEN = 3.0, 0.01
+"""Multiple of the usual step from which the longest steps, of this share, are those between bursts; and of these for a gap."""
 
 
 def seconds(
@@ -132,6 +134,19 @@ def backwards(time: NDArray[np.float64], group: Sequence[Any], where: str, *, to
         )
 
 
+def gap_limit(steps: NDArray[np.float64]) -> float:
+    """The step of a clock, s, above which samples are missing.
+
+    A logger that writes in bursts has a long step after each; steps that one in a hundred has are those of its clock.
+    """
+    forward = steps[steps > 0.0]
+    if not forward.size:
+        return 0.0
+    usual = float(np.median(forward))
+    often = float(np.quantile(forward, 1.0 - OFTEN))
+    return max(GAP * usual, BURST * often) if often > BURST * usual else GAP * usual
+
+
 def gaps_of(
     time: NDArray[np.float64], labels: pd.Series | None, breaks: Sequence[int], mapping: Mapping, where: str
 ) -> tuple[list[int], tuple[str, ...]]:
@@ -143,8 +158,7 @@ def gaps_of(
         There are unknown gaps, and the mapping does not allow them.
     """
     steps = np.diff(time)
-    usual = float(np.median(steps[steps > 0.0])) if np.any(steps > 0.0) else 0.0
-    wide = np.flatnonzero(steps > GAP * usual) + 1
+    wide = np.flatnonzero(steps > gap_limit(steps)) + 1
     if labels is not None:  # between two labels nothing needs to be recorded
         names = labels.astype(str).to_numpy(dtype=object)
         wide = wide[names[wide] == names[wide - 1]]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -13,7 +13,17 @@ from inertial import change_of_level, static_intervals
 from pipelines.importers.mapping import Mapping
 from schemas.errors import DataRejected, did_you_mean
 
-_MOST_LISTED = 6
+WINDOWS_S = (1.0, 0.5, 0.25)
+"""Windows of the search for stops, s: a hand rests for a second or more, in a hurry for less."""
+STRICT = (3.0, 2.0)
+"""Scatter that means motion, in that of the quietest stretch, where the limit found in the record takes two stops for one."""
+_SHIFTED = 0.2
+"""Share of the stops in which a hand may have shifted the sensor."""
+HANDLED = 4.0
+"""Scatter of a block over that of most, above which the sensor is held by a hand."""
+_NEARLY = 0.9
+_ENOUGH = 6
+"""Stops from which a longer window is preferred: the faces of a cube."""
 
 
 @dataclass(frozen=True)
@@ -33,6 +43,28 @@ class Stretches:
         """Some of them, by their numbers from 0."""
         first, last = (tuple(rows[k] for k in numbers) for rows in (self.first, self.last))
         return Stretches(first, last, tuple(self.labels[k] for k in numbers), self.remarks)
+
+
+@dataclass(frozen=True)
+class Stops:
+    """Stops of a record: the window by which they were found, s; the numbers of those that hold several positions.
+
+    threshold : scatter of a window that means motion; None: found in the record
+    """
+
+    window_s: float
+    found: Stretches
+    several: tuple[int, ...]
+    threshold: float | None = None
+
+
+@dataclass(frozen=True)
+class _SearchOptions:
+    """Options of the search: window, s; shortest dwell, s; scatter that means motion."""
+
+    window_s: float
+    shortest_s: float
+    threshold: float | None
 
 
 def stretches(
@@ -63,10 +95,53 @@ def stretches(
         intervals = _by_positions(output, mapping.positions, where)
     elif mapping.block_s is not None:
         intervals = _by_blocks(time, edges, mapping.block_s)
+        intervals = _without_handled_ends(intervals, output, time) if mapping.face else intervals
     else:
-        intervals = _static_stretches(output, time, edges, mapping)
-        _refuse_several_positions(intervals, output, where)
+        how = _SearchOptions(mapping.window_s or 1.0, mapping.shortest_s or 1.0, mapping.threshold)
+        intervals = _searched(output, time, edges, how)
+        intervals = _of_one_position(intervals, output, time, edges, where)
     return _named(intervals, mapping, where)
+
+
+def found_stops(output: NDArray[np.float64], time: NDArray[np.float64], edges: Sequence[int]) -> Stops:
+    """The stops of a record that was turned by hand, with the longest window that takes none of several positions for one.
+
+    Parameters
+    ----------
+    edges : 0, the samples before which some are missing, and their number
+    """
+    plain = [_stops(output, time, edges, _SearchOptions(window, window, None)) for window in WINDOWS_S]
+    for stops in plain:
+        if not stops.several and len(stops.found) >= _ENOUGH:
+            return stops
+    # a hand that rests for a moment shakes little less than one that moves: stricter limits part what it runs together
+    quiet = _limits(output, time)
+    strict = [
+        _stops(output, time, edges, _SearchOptions(window, window, float(f"{times * sd:.3g}")))
+        for window, sd in quiet
+        for times in STRICT
+    ]
+    clean = [stops for stops in strict if not stops.several and len(stops.found) >= _ENOUGH]
+    if not clean:
+        return max(plain, key=lambda stops: len(stops.found) - len(stops.several))
+    most = max(len(stops.found) for stops in clean)
+    return next(
+        stops for stops in clean if len(stops.found) >= _NEARLY * most
+    )  # the longest window that finds nearly all
+
+
+def _stops(output: NDArray[np.float64], time: NDArray[np.float64], edges: Sequence[int], how: _SearchOptions) -> Stops:
+    found = _searched(output, time, edges, how)
+    pairs = zip(found.first, found.last, strict=True)
+    several = tuple(k for k, (a, b) in enumerate(pairs) if change_of_level.several_levels(output[a:b]) > 1)
+    return Stops(how.window_s, found, several, how.threshold)
+
+
+def _limits(output: NDArray[np.float64], time: NDArray[np.float64]) -> list[tuple[float, float]]:
+    """The windows of the search, s, and the scatter in the quietest stretch of each."""
+    rate = (len(time) - 1) / float(time[-1] - time[0])
+    usable = [window for window in WINDOWS_S if len(output) >= 3 * max(3, round(window * rate))]
+    return [(window, static_intervals.find(output, rate, window_s=window).quiet_sd) for window in usable]
 
 
 def _by_labels(labels: Sequence[str], edges: list[int]) -> Stretches:
@@ -83,6 +158,20 @@ def _by_blocks(time: NDArray[np.float64], edges: list[int], block_s: float) -> S
     return Stretches(tuple(first), tuple(last), tuple(f"block {k}" for k in range(len(first))))
 
 
+def _without_handled_ends(intervals: Stretches, output: NDArray[np.float64], time: NDArray[np.float64]) -> Stretches:
+    """The blocks of a still record without those at its ends in which a hand still holds the sensor; a remark on these."""
+    pairs = list(zip(intervals.first, intervals.last, strict=True))
+    scatter = np.array([float(np.linalg.norm(output[a:b].std(axis=0))) for a, b in pairs])
+    calm = np.flatnonzero(scatter <= HANDLED * np.median(scatter))
+    kept = intervals.only(range(int(calm[0]), int(calm[-1]) + 1)) if calm.size else intervals
+    if len(kept) == len(intervals):
+        return intervals
+    first, last, end = (float(time[k] - time[0]) for k in (kept.first[0], kept.last[-1] - 1, len(time) - 1))
+    ends = [f"0 to {first:.1f} s"] if calm[0] > 0 else []
+    ends += [f"{last:.1f} to {end:.1f} s"] if calm[-1] + 1 < len(intervals) else []
+    return replace(kept, remarks=(f"handling at the ends left out: {' and '.join(ends)}",))
+
+
 def _by_positions(output: NDArray[np.float64], count: int, where: str) -> Stretches:
     try:
         levels = change_of_level.levels(output, count)
@@ -95,44 +184,69 @@ def _by_positions(output: NDArray[np.float64], count: int, where: str) -> Stretc
     return Stretches(tuple(start.tolist()), tuple(stop.tolist()), names, (remark,))
 
 
-def _static_stretches(
-    output: NDArray[np.float64], time: NDArray[np.float64], edges: list[int], mapping: Mapping
+def _searched(
+    output: NDArray[np.float64], time: NDArray[np.float64], edges: Sequence[int], how: _SearchOptions
 ) -> Stretches:
-    window, shortest = mapping.window_s or 1.0, mapping.shortest_s or 1.0
     first: list[int] = []
     last: list[int] = []
+    if len(edges) > 2 and how.threshold is None and time[-1] > time[0]:  # one limit for all parts of a record
+        rate = (len(time) - 1) / float(time[-1] - time[0])
+        if len(output) >= 3 * max(3, round(how.window_s * rate)):
+            how = replace(how, threshold=static_intervals.find(output, rate, window_s=how.window_s).threshold_sd)
     for a, b in pairwise(edges):
         if b - a < 3 or time[b - 1] <= time[a]:
             continue
-        rate = mapping.rate_hz or (b - a - 1) / float(time[b - 1] - time[a])
-        if b - a < 3 * max(3, round(window * rate)):
+        rate = (b - a - 1) / float(time[b - 1] - time[a])
+        if b - a < 3 * max(3, round(how.window_s * rate)):
             continue
         piece = static_intervals.find(
-            output[a:b], rate, window_s=window, shortest_s=shortest, threshold=mapping.threshold
+            output[a:b], rate, window_s=how.window_s, shortest_s=how.shortest_s, threshold=how.threshold
         )
         first += (piece.start + a).tolist()
         last += (piece.stop + a).tolist()
     return Stretches(tuple(first), tuple(last), tuple(f"dwell {k}" for k in range(len(first))))
 
 
-def _refuse_several_positions(intervals: Stretches, output: NDArray[np.float64], where: str) -> None:
-    """Refuse stretches with more scatter than noise: positions logged one after another."""
+def _of_one_position(
+    intervals: Stretches, output: NDArray[np.float64], time: NDArray[np.float64], edges: Sequence[int], where: str
+) -> Stretches:
+    """The stretches without a few that have more scatter than noise, as where a hand shifted the sensor; a remark on these.
+
+    Raises
+    ------
+    DataRejected
+        Many stretches do: positions were logged one after another.
+    """
     counts = [change_of_level.several_levels(output[a:b]) for a, b in zip(intervals.first, intervals.last, strict=True)]
     several = [k for k, count in enumerate(counts) if count > 1]
     if not several:
-        return
+        return intervals
+    if len(several) <= _SHIFTED * len(intervals) and len(intervals) - len(several) >= _ENOUGH:
+        spans = ", ".join(
+            f"{time[intervals.first[k]] - time[0]:.1f} to {time[intervals.last[k] - 1] - time[0]:.1f} s"
+            for k in several
+        )
+        left = intervals.only([k for k in range(len(intervals)) if k not in several])
+        return replace(left, remarks=(f"left out, since the sensor was shifted during the stop: {spans}",))
     worst = max(several, key=lambda k: counts[k])
     a, b = intervals.first[worst], intervals.last[worst]
-    total = change_of_level.several_levels(output)
-    offer = (
-        f"--positions {total} divides the record at the changes"
-        if total > 1
-        else "--window 0.2 --shortest 0.2 finds shorter dwells"
-    )
+    stops = found_stops(output, time, edges)
+    if len(stops.found) and not stops.several:
+        offer = f"{options_of(stops)} finds {len(stops.found)} stops, one position in each"
+    elif (total := change_of_level.several_levels(output)) > 1:
+        offer = f"--positions {total} divides the record at the changes"
+    else:
+        offer = f"{options_of(stops)} finds shorter dwells"
     raise DataRejected(
         f"{where}: rows {a + 1} to {b}: one dwell by its scatter, but about {counts[worst]} positions logged back to back by its "
         f"levels; a position per dwell is needed; {offer}, or map a column of labels as dwell=…"
     )
+
+
+def options_of(stops: Stops) -> str:
+    """The options of an import that find these stops."""
+    limit = "" if stops.threshold is None else f" --threshold {stops.threshold:g}"
+    return f"--window {stops.window_s:g} --shortest {stops.window_s:g}{limit}"
 
 
 def _named(intervals: Stretches, mapping: Mapping, where: str) -> Stretches:

@@ -20,6 +20,7 @@ _OF_NUMBERS = frozenset("0123456789+-.")
 """First characters of a line that is plainly neither empty nor a comment."""
 _SAMPLE = 300
 _TAIL = 40
+_RUN = 10
 _LONGEST = 64
 _POINT = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?")
 _COMMA = re.compile(r"[+-]?(?:\d+,\d+|\d+|,\d+)(?:[eEdD][+-]?\d+)?")
@@ -120,7 +121,9 @@ def _sampled(filled: list[str]) -> list[str]:
     if len(filled) <= _TAIL:
         return filled[len(filled) // 2 :]
     later = filled[len(filled) // 3 :]
-    return later[:: max(1, len(later) // _SAMPLE)]
+    # runs of lines, not every so many: some loggers fill some columns in every fourth line only
+    step = max(_RUN, len(later) * _RUN // _SAMPLE)
+    return [line for k in range(0, len(later), step) for line in later[k : k + _RUN]]
 
 
 def _divided(sample: Sequence[str]) -> tuple[str, str, int]:
@@ -130,8 +133,8 @@ def _divided(sample: Sequence[str]) -> tuple[str, str, int]:
     for order, (divider, decimal) in enumerate(_CANDIDATES):
         rows = [fields_of(line, divider) for line in sample]
         width, often = Counter(map(len, rows)).most_common(1)[0]
-        words = [word for row in rows if len(row) == width for word in row]
-        numbers = sum(is_number(word, decimal) for word in words) / len(words)
+        words = [word for row in rows if len(row) == width for word in row if word]
+        numbers = sum(is_number(word, decimal) for word in words) / max(1, len(words))
         alike = often / len(rows) >= _ALIKE
         # a divider that leaves nothing but numbers, then the more columns, then the usual order
         key = (float(alike and width > 1), round(numbers, 2), width, -order)

@@ -15,6 +15,10 @@ GRAVITY = {"g": 1.0, "m/s^2": STANDARD_GRAVITY_M_S2, "mg": 1e3}
 """Size of gravity in the units that need no sensitivity."""
 VOLTS_PER_G = (1e-3, 20.0)
 """Sensitivities of analog accelerometers: shock sensors to seismic ones."""
+DOUBT = ": check"
+"""End of a reason that is a guess."""
+_NEAR_POWER, _FEWEST_COUNTS = 0.05, 60.0
+"""Distance of the binary logarithm of a size from a whole number, and size, of means of counts."""
 _MOST = 200_000
 _BITS = (8, 10, 12, 14, 16, 18, 20, 24, 32)
 _STEADY = 0.1
@@ -34,10 +38,28 @@ def looks_like(size: float) -> str:
     return next((unit for unit, one in GRAVITY.items() if LIKELY[0] < size / one < LIKELY[1]), "")
 
 
+def unit_of(output: NDArray[np.float64], size: float) -> tuple[str, str]:
+    """The probable unit of a record (n, 3) in which gravity has a size, and the reason; it ends in DOUBT where it is a guess."""
+    whole = bool(np.all(output[:1000] == np.rint(output[:1000])))
+    likely = looks_like(size)
+    if likely and not (whole and likely != "mg"):
+        doubt = f", though whole numbers may be counts{DOUBT}" if whole else ""
+        return likely, f"its norm is {size:.5g}, gravity in {likely} is {GRAVITY[likely]:.5g}{doubt}"
+    if whole:
+        return "LSB", f"whole numbers with a norm of {size:.5g}"
+    power = np.log2(max(size, 1e-300))
+    if size > _FEWEST_COUNTS and abs(power - np.rint(power)) < _NEAR_POWER:
+        return "LSB", f"its norm is {size:.5g}, close to a power of two: means of counts"
+    if VOLTS_PER_G[0] <= size <= VOLTS_PER_G[1]:
+        return "V", f"its norm is {size:.5g}, no size of gravity, but one of volts{DOUBT}"
+    return "LSB", f"its norm is {size:.5g}, neither gravity nor volts{DOUBT}"
+
+
 def unsigned_bits(output: NDArray[np.float64]) -> int:
     """Bits of signed words that were read as unsigned in a record of counts (n, 3): −1 reads as 65535; 0 if there are none.
 
-    Shown by the norm: it is that of gravity only after 2^bits is subtracted from the upper half of the numbers.
+    Shown by the norm, which is that of gravity only after 2^bits is subtracted from the upper half of the numbers; where the
+    bias is large, by jumps over the range between neighbours, which are gone then.
     """
     x = output[:: max(1, len(output) // _MOST)]
     if not len(x) or np.any(x < 0.0) or np.any(x != np.rint(x)):
@@ -49,7 +71,17 @@ def unsigned_bits(output: NDArray[np.float64]) -> int:
     ends = np.mean(x < _END * whole), np.mean(x >= (1.0 - _END) * whole)
     if min(ends) < _OFTEN or np.mean(np.abs(x - 0.5 * whole) < _END * whole) > _SELDOM:
         return 0
-    return bits if _scatter(np.where(x >= 0.5 * whole, x - whole, x)) < _STEADY else 0
+    signed = np.where(x >= 0.5 * whole, x - whole, x)
+    return (
+        bits
+        if _scatter(signed) < _STEADY or _jumps(x, 0.5 * whole) > _OFTEN > 10.0 * _jumps(signed, 0.5 * whole)
+        else 0
+    )
+
+
+def _jumps(x: NDArray[np.float64], size: float) -> float:
+    """Share of neighbouring samples (n, 3) that are further apart than a size: words about zero jump by the whole range."""
+    return float(np.mean(np.abs(np.diff(x, axis=0)).max(axis=1) > size)) if len(x) > 1 else 0.0
 
 
 def _scatter(x: NDArray[np.float64]) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, NotRequired
+from typing import Annotated, Any, Literal, NotRequired
 
 from typing_extensions import TypedDict
 
@@ -37,10 +37,32 @@ class LadderRow(TypedDict):
     warnings: list[str]
 
 
+class RecordingDocument(TypedDict):
+    """A recording of another system as it was recognised and imported."""
+
+    files: list[str]
+    form: str
+    rows: int
+    columns: Annotated[dict[str, str], "meaning → column"]
+    reason: Annotated[str, "why these three columns are the axes"]
+    output_unit: str
+    output_reason: str
+    rate_hz: Annotated[float | None, "null: the file has no clock"]
+    dwells: int
+    assumed: Annotated[list[str], "what the file does not state and was taken"]
+    remarks: list[str]
+    command: Annotated[str, "the import that says the same"]
+    run: str
+    fit: Literal["norm", "faces"] | None
+    lines: Annotated[list[str], "the fit in words"]
+    dwell_list: Annotated[list[dict[str, Any]], "as in `import --json`"]
+
+
 class ImproveDocument(TypedDict):
     """``improve --json``: diagnosis of a model, effects added to it, and the error of each version."""
 
     data: str
+    recording: NotRequired[Annotated[RecordingDocument, "where DATA is a recording of another system"]]
     file: Annotated[str | None, "the model file; null: none was given and none written"]
     diagnosis: Annotated[DiagnosisDocument, "of the model to begin with"]
     choices: Annotated[list[ImprovementChoice], "one per class with a recommended effect"]

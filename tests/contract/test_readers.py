@@ -90,7 +90,13 @@ def lvm(path: Path) -> None:
     path.write_text("\r\n".join([*head, *rows]) + "\r\n", encoding="utf-8")
 
 
-SAMPLES = {"parquet": parquet, "matlab": matlab, "text": text, "hdf5": hdf5, "uff58": uff58, "tdms": tdms, "rdata": rdata,
+def numpy(path: Path) -> None:
+    records = np.array([*map(tuple, frame().to_numpy())], dtype=[(name, ">f8") for name in frame()])
+    with path.open("wb") as file:
+        np.save(file, records)
+
+
+SAMPLES = {"numpy": numpy, "parquet": parquet, "matlab": matlab, "text": text, "hdf5": hdf5, "uff58": uff58, "tdms": tdms, "rdata": rdata,
            "wav": wav, "lvm": lvm}  # fmt: skip
 
 

@@ -142,7 +142,7 @@ def test_an_import_a_fit_and_a_diagnosis_of_one_file_say_the_same() -> None:
 def test_ten_dwells_and_nine_parameters_are_not_called_adequate() -> None:
     answer = imported(Recording(10), 3, "--fit", "norm", status=1)
     assert answer["adequate"] is None
-    assert "15 are needed" in answer["reason"]
+    assert "9 are needed" in answer["reason"]
     assert answer["evidence"]["degrees_of_freedom"] == 1
     assert len(answer["bias_less_six_parameters"]) == 3
 

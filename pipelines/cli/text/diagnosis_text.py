@@ -15,13 +15,14 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 
-def print_diagnosis(document: dict[str, Any], *, data: FindData | None, model: Path | None) -> None:
+def print_diagnosis(document: dict[str, Any], *, data: FindData | None, model: Path | None, brief: bool = True) -> None:
     """Print a diagnosis.
 
     Parameters
     ----------
     data : gives the data as they were named on the command line, where commands to give next are printed; None: none are printed
     model : the model file as it was given there
+    brief : one sentence counts the effects of quantities that were not recorded
     """
     print_verdict(document)
     _dim(sentences.evidence_text(document))
@@ -34,7 +35,8 @@ def print_diagnosis(document: dict[str, Any], *, data: FindData | None, model: P
         _dim(sentences.not_separated(document))
     if document["unseen"]:
         say()
-    for section in (sections.unseen, sections.unseen_in_part, sections.hidden_by_noise):
+    print_section(sections.unseen(document, brief=brief))
+    for section in (sections.unseen_in_part, sections.hidden_by_noise):
         print_section(section(document))
     print_next_measurement(document["next_measurements"])
 

@@ -9,9 +9,9 @@ import tempfile
 import threading
 from collections import OrderedDict
 from collections.abc import Mapping as Mapped
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
@@ -22,6 +22,10 @@ from pipelines.workbench.settings import WorkbenchSettings
 from pipelines.workbench.state import UploadPage
 from schemas.errors import DataRejected, TumblelineError, WrongUse
 
+if TYPE_CHECKING:
+    from pipelines.importers.content import Content
+    from pipelines.importers.files import SourceFile
+
 FOLDER = "uploads"
 PART = ".part-"
 LOOK = ReadingLimits(560 * 2**20, 60, 90)
@@ -30,25 +34,18 @@ KEPT_LOOKS = 32
 WAIT_S = 120.0
 LARGEST = 400_000_000
 NAME = re.compile(r"[^A-Za-z0-9._ -]+")
-ENDINGS = (".csv", ".tsv", ".txt", ".dat", ".parquet", ".mat", ".csv.gz", ".tsv.gz", ".txt.gz", ".parquet.gz")
-GUESSES: dict[str, tuple[str, ...]] = {
-    "time": ("time", "time_s", "t", "timestamp", "times", "seconds", "time [s]", "time (s)"),
-    "x": ("x", "ax", "acc_x", "accx", "accel_x", "accelerometer_x", "out_x", "a_x", "acc_x (g)"),
-    "y": ("y", "ay", "acc_y", "accy", "accel_y", "accelerometer_y", "out_y", "a_y", "acc_y (g)"),
-    "z": ("z", "az", "acc_z", "accz", "accel_z", "accelerometer_z", "out_z", "a_z", "acc_z (g)"),
-    "temperature": ("temperature", "temp", "unit_c", "t_c", "temperature_c", "temp_c"),
-    "unit": ("unit", "serial", "sn", "device"),
-    "dwell": ("dwell",),
-}
-"""Columns proposed for a meaning, by their names; the user confirms them."""
+ENDINGS = (".csv", ".tsv", ".txt", ".dat", ".parquet", ".mat", ".npy", ".csv.gz", ".tsv.gz", ".txt.gz", ".parquet.gz")
 MOST_ROWS = 8
+MOST_LOOKED = 200_000
+"""Rows in which columns are recognised: an hour of 50 Hz."""
 
 
 @dataclass(frozen=True)
 class UploadReading:
     """A file as it was read.
 
-    columns : its own · head : the first rows · offered : meanings with the columns that their names suggest
+    columns : its own · head : the first rows · offered : meanings with the columns that are recognised, as ``inspect`` does
+    proposed : values of the form by name, where they are recognised · open : what the file does not state
     data : the result of the mapping, rows of its dwells · problem : the reason why it cannot be read
     """
 
@@ -58,6 +55,8 @@ class UploadReading:
     head: list[list[str]]
     offered: dict[str, str]
     is_exchange: bool
+    proposed: dict[str, str] = field(default_factory=dict[str, str])
+    open: tuple[str, ...] = ()
     units: tuple[str, ...] = ()
     out_unit: str = ""
     samples: int = 0
@@ -154,19 +153,37 @@ def look(place: Path, page: UploadPage) -> UploadReading:
     """The file of a page, read by this process."""
     from pipelines.importers import files
 
-    table, _ = files.read(place)
+    content, source = files.read_content(place)
+    table = content.table
     names = tuple(str(column) for column in table.columns)
-    offered = _offered(names)
     plain = UploadReading(
-        file=page.file, rows=len(table), columns=names, head=_head(table), offered=offered,
-        is_exchange=is_exchange(names),
-    )  # fmt: skip
+        file=page.file, rows=len(table), columns=names, head=_head(table), offered={}, is_exchange=is_exchange(names)
+    )
     if not page.columns or not page.output:
-        return plain
+        return _recognised(plain, replace(content, table=table.head(MOST_LOOKED)), source)
     try:
         return _read_as(plain, table, page)
     except TumblelineError as problem:
         return replace(plain, problem=str(problem))
+
+
+def _recognised(plain: UploadReading, content: Content, source: SourceFile) -> UploadReading:
+    """The file with what is recognised in its first rows; as it is where that fails."""
+    from pipelines.importers.recognition import of_content
+
+    try:
+        seen = of_content(content, source, [Path(plain.file)])
+    except TumblelineError as problem:
+        return replace(plain, open=(str(problem),))
+    offered = {guess.meaning: name for name, guess in seen.guessed.columns.items() if guess.meaning}
+    keys = seen.keys or {}
+    units = keys.get("units", {})
+    proposed = {
+        name: value for name in ("output", "time", "temperature") if (value := units.get(name, "")) not in {"", "UNIT"}
+    }
+    proposed |= {"rows": str(keys["rows"])} if "rows" in keys else {}
+    proposed |= {"rate": f"{keys['rate_hz']:g}"} if isinstance(keys.get("rate_hz"), float) else {}
+    return replace(plain, offered=offered, proposed=proposed, open=seen.open)
 
 
 def _read_as(plain: UploadReading, table: pd.DataFrame, page: UploadPage) -> UploadReading:
@@ -227,16 +244,6 @@ def imported(request: Mapped[str, Any]) -> dict[str, Any]:
         "lines": [] if judged is None else list(judged.lines), "remarks": list(data.remarks), "fit": request["fit"],
         "coefficients": [] if judged is None else [dict(row) for row in judged.coefficients or []],
     }  # fmt: skip
-
-
-def _offered(names: tuple[str, ...]) -> dict[str, str]:
-    lower = {name.lower().strip(): name for name in reversed(names)}
-    columns: dict[str, str] = {}
-    for meaning, words in GUESSES.items():
-        column = next((lower[word] for word in words if word in lower), None)
-        if column is not None:
-            columns[meaning] = column
-    return columns
 
 
 def _head(table: pd.DataFrame) -> list[list[str]]:

@@ -42,7 +42,7 @@ def test_the_verdict_does_not_depend_on_the_unit_of_the_samples() -> None:
 def test_few_dwells_cannot_be_judged_and_nothing_is_named_but_a_gross_misfit_is_not_adequate() -> None:
     document = diagnose(make(Recording(10, cubic=3000.0), 3).dwells)
     assert document["adequate"] is None
-    assert "1 degree of freedom, 15 are needed; measure 14 more dwells" in document["reason"]
+    assert "1 degree of freedom, 9 are needed; measure 8 more dwells" in document["reason"]
     assert document["classes"] == []
     assert verdict({**document, "units": ["HAND-1"]}).startswith("CANNOT BE JUDGED: ")
     dwells = make(Recording(14), 4).dwells

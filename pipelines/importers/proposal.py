@@ -1,0 +1,186 @@
+"""How a recognised recording is imported and fitted: the keys of the mapping, the fit, and the command that states them."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.importers import guesses, stretches
+from pipelines.importers.content import Content
+from pipelines.importers.dynamic_guess import serial_of
+from pipelines.importers.stated_units import TEMPERATURE
+from schemas.units import STANDARD_GRAVITY_M_S2
+
+Array = NDArray[np.float64]
+
+MAPPED = ("time", "x", "y", "z", "sd_x", "sd_y", "sd_z", "n", "force_x", "tilt", "temperature", "dwell")
+ASSUMED_HZ = 100.0
+"""Rate of samples without a clock: it decides how long a stop is, and nothing else of a fit to its means."""
+FEWEST_OF_NORM = 10
+"""Positions for bias, scale and the angles between the axes, and one that judges."""
+_BLOCKS, _SHORTEST_BLOCK_S = 60, 1.0
+_UP = 0.9
+"""Part of the size along an axis from which the face of a still record is known: 25° of a hand."""
+_WARMS_C = 5.0
+_OPTIONS = {
+    "rows": "--rows",
+    "rate_hz": "--rate",
+    "window_s": "--window",
+    "shortest_s": "--shortest",
+    "threshold": "--threshold",
+    "join": "--join",
+    "group": "--group",
+    "gaps": "--gaps",
+    "faulty": "--faulty",
+    "positions": "--positions",
+    "face": "--face",
+    "block_s": "--blocks",
+    "local_gravity_m_s2": "--local-g",
+}
+"""Keys of a mapping with an option of their own, in the order in which they are printed."""
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """Keys of the mapping of an import, and the fit (empty: none); what was assumed, and remarks; count of stops or positions."""
+
+    keys: dict[str, Any]
+    fit: str = ""
+    assumed: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()
+    stops: int = 0
+
+    def command(self, paths: Sequence[Path]) -> str:
+        """The import as a line for a shell; a value that nothing states is in capitals."""
+        words = ["tumbleline", "import", *(str(path) for path in paths)]
+        words += ["--map", ",".join(f"{meaning}={name}" for meaning, name in self.keys["columns"].items())]
+        words += ["--units", ",".join(f"{what}={unit}" for what, unit in self.keys["units"].items())]
+        words += ["--unit", self.keys["unit"]]
+        words += ["--axes", ",".join(self.keys["axes"])] if "axes" in self.keys else []
+        poses = self.keys.get("poses", {})
+        words += ["--poses", ",".join(f"{label}={face}" for label, face in poses.items())] if poses else []
+        for key, option in _OPTIONS.items():
+            if key in self.keys:
+                value = self.keys[key]
+                words += [option, f"{value:g}" if isinstance(value, float) else str(value)]
+        words += ["--fit", self.fit] if self.fit else []
+        return shlex.join(words)
+
+
+def columns_and_units(content: Content, guessed: guesses.Guesses, path: Path) -> dict[str, Any]:
+    """Columns, units and serial number; COLUMN, UNIT and HZ where the file shows none."""
+    names = list(guessed.columns)
+    columns = {meaning: _mapped(column, names) for meaning in MAPPED if (column := guessed.column(meaning))}
+    columns |= {axis: "COLUMN" for axis in "xyz" if not guessed.column(axis) and not guessed.single}
+    units = {"output": guessed.output.meaning or "UNIT"}
+    time = guessed.column("time")
+    if time and guessed.time_unit.meaning:
+        units["time"] = guessed.time_unit.meaning
+    elif time and content.table[time].dtype.kind in "fiu":
+        units["time"] = "UNIT"
+    heat = TEMPERATURE.get(content.units.get(guessed.column("temperature"), "").strip().lower(), "degC")
+    units |= {"temperature": heat} if heat != "degC" else {}
+    keys: dict[str, Any] = {"columns": columns, "units": units, "unit": serial_of(path)}
+    if guessed.single:
+        keys["axes"] = ["x"]
+    if guessed.dwells:
+        keys["rows"] = "dwells"
+    elif not time:
+        keys["rate_hz"] = "HZ"
+    elif guessed.time_unit.meaning == "samples":
+        keys["rate_hz"] = guesses.FINE_HZ
+    return keys
+
+
+def of_stops(keys: dict[str, Any], stops: stretches.Stops, levels: int) -> dict[str, Any]:
+    """The keys with what finds the stops; ``levels``: positions logged back to back, above 1 where stops hold several."""
+    if stops.several and levels > 1 and 2 * len(stops.several) >= len(stops.found):
+        return keys | {"positions": levels}
+    if not len(stops.found) or (stops.window_s == stretches.WINDOWS_S[0] and stops.threshold is None):
+        return keys
+    limit = {} if stops.threshold is None else {"threshold": stops.threshold}
+    return keys | {"window_s": stops.window_s, "shortest_s": stops.window_s} | limit
+
+
+def for_fit(
+    keys: dict[str, Any],
+    guessed: guesses.Guesses,
+    means: Array | None,
+    labels: Sequence[str],
+    duration_s: float | None,
+    heat: Array | None,
+) -> Proposal:
+    """The keys with all that a fit needs, and the fit.
+
+    Parameters
+    ----------
+    keys : complete but for the rate of the samples and what the fit needs
+    means, labels : (k, 3), outputs of the stops or positions, None where none were found; and what an import calls them
+    duration_s : of the record; None: rows are positions
+    heat : (n,), °C; None where none was recorded
+    """
+    assumed: list[str] = []
+    if keys.get("rate_hz") == "HZ":
+        keys = keys | {"rate_hz": ASSUMED_HZ}
+        assumed.append(
+            f"no clock: {ASSUMED_HZ:g} Hz assumed to find the stops; the coefficients do not depend on it (--rate HZ)"
+        )
+    gravity = f"local gravity not stated: {STANDARD_GRAVITY_M_S2:.5f} m/s² taken; scale factors are relative to it (--local-g)"
+    own = {"local_gravity_m_s2": STANDARD_GRAVITY_M_S2}
+    sphere = guessed.triad.sphere
+    if sphere is not None and sphere.still and duration_s is not None:
+        return _still(keys | own, means, duration_s, heat, [*assumed, gravity])
+    if means is not None and len(means) >= FEWEST_OF_NORM:
+        return Proposal(keys | own, "norm", (*assumed, gravity))
+    poses = {} if means is None or sphere is None else _six_faces(means, labels, sphere.centre)
+    if poses:
+        told = "six faces taken as vertical: a tilt of 1° is 17 mg in the bias"
+        return Proposal(keys | {"poses": poses} | own, "faces", (*assumed, gravity, told))
+    return Proposal(keys, "", tuple(assumed), (), 0 if means is None else len(means))
+
+
+def _six_faces(means: Array, labels: Sequence[str], centre: Array) -> dict[str, str]:
+    """Label of a dwell → face that is up, where there are six positions and each face is up once; else empty."""
+    along = (means - centre) / np.linalg.norm(means - centre, axis=1, keepdims=True)
+    axes = np.argmax(np.abs(along), axis=1)
+    faces = [f"{'+' if row[k] > 0.0 else '-'}{'xyz'[k]}" for row, k in zip(along, axes.tolist(), strict=True)]
+    clear = bool(np.all(np.abs(along).max(axis=1) > _UP)) and not any(re.search(r"[,=]", label) for label in labels)
+    return (
+        dict(zip(labels, faces, strict=True))
+        if clear and len(faces) == len(set(faces)) == len(set(labels)) == 6
+        else {}
+    )
+
+
+def _still(
+    keys: dict[str, Any], means: Array | None, duration_s: float, heat: Array | None, assumed: list[str]
+) -> Proposal:
+    """Blocks of a record in one pose with the face that is up, which is known where the output is an acceleration."""
+    size = 0.0 if means is None else float(np.linalg.norm(means.mean(axis=0)))
+    if means is None or not size > 0.0 or keys["units"]["output"] not in {"g", "mg", "m/s^2"}:
+        return Proposal(keys, "", tuple(assumed))
+    along = means.mean(axis=0) / size
+    axis = int(np.argmax(np.abs(along)))
+    if abs(along[axis]) < _UP:
+        return Proposal(keys, "", tuple(assumed))
+    face = f"{'+' if along[axis] > 0.0 else '-'}{'xyz'[axis]}"
+    block = max(_SHORTEST_BLOCK_S, float(f"{duration_s / _BLOCKS:.1g}"))
+    tilt = f"one pose, {face} taken as vertical: the bias of the other axes holds the tilt of the surface (1° is 17 mg)"
+    keys = {
+        key: value for key, value in keys.items() if key not in {"window_s", "shortest_s", "threshold", "positions"}
+    }
+    warm = heat is not None and float(np.ptp(heat[np.isfinite(heat)])) > _WARMS_C
+    remark = () if warm else ("temperature does not change: only bias, noise and drift can be seen",)
+    return Proposal(keys | {"face": face, "block_s": block}, "", (*assumed, tilt), remark)
+
+
+def _mapped(name: str, names: list[str]) -> str:
+    """A column as a name for --map: by its number where its name has a comma or an equals sign, or blanks at its ends."""
+    return str(names.index(name) + 1) if re.search(r"[,=]|^\s|\s$", name) or not name else name

@@ -1,0 +1,233 @@
+"""What a file of another system holds: columns, units, clock, stops, and how it is imported, for commands and pages."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial import change_of_level
+from pipelines.importers import clocks, files, guesses, sample_faults, sources, stretches, unit_check, values
+from pipelines.importers.content import Content
+from pipelines.importers.exchange import is_exchange
+from pipelines.importers.guesses import Guesses, measurable
+from pipelines.importers.mapping import TIME_UNITS
+from pipelines.importers.proposal import ASSUMED_HZ, Proposal, columns_and_units, for_fit, of_stops
+from pipelines.importers.record_time import gap_limit
+from schemas.units import AXES
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Recognition:
+    """A recording as it is recognised.
+
+    source : the files · time, output : (n,) s and (n, 3) of the rows with all numbers; None where there are none
+    gaps : in time · stops : None where no record was searched · faults : of the samples · open : what the file does not state
+    keys : of the mapping, with words in capitals for what is open · is_exchange : a table of dwells, read as it is
+    """
+
+    paths: tuple[Path, ...]
+    content: Content
+    source: files.SourceFile
+    guessed: Guesses
+    is_exchange: bool = False
+    time: Array | None = None
+    output: Array | None = None
+    gaps: int = 0
+    rate_hz: float | None = None
+    stops: stretches.Stops | None = None
+    faults: sample_faults.SampleFaults | None = None
+    open: tuple[str, ...] = ()
+    keys: dict[str, Any] | None = None
+
+    @property
+    def import_command(self) -> str:
+        """The command that imports it, for a shell."""
+        return "" if self.keys is None else Proposal(self.keys).command(self.paths)
+
+    def for_fit(self) -> Proposal | None:
+        """The import with a fit, where nothing has to be added but what may be assumed; None otherwise."""
+        if self.keys is None or self.output is None or any(text != _NO_CLOCK for text in self.open):
+            return None
+        means, stops, keys, duration = None, self.stops, self.keys, None
+        time = np.arange(len(self.output)) / ASSUMED_HZ if self.time is None else self.time
+        if self.guessed.dwells:
+            means = self.output
+        else:
+            stops = self.stops or _stops(self.output, time)
+            keys = self.keys if self.stops else _with_stops(self.keys, self.output, stops)
+            duration = float(time[-1] - time[0])
+            if stops is not None and len(stops.found):
+                pairs = zip(stops.found.first, stops.found.last, strict=True)
+                means = np.stack([self.output[a:b].mean(axis=0) for a, b in pairs])
+        warm = self.guessed.column("temperature")
+        heat = measurable(values.as_numbers(self.content.table[warm], warm)) if warm else None
+        named = self.guessed.column("dwell")
+        count = 0 if means is None else len(means)
+        whole = bool(named) and len(self.content.table) == count
+        labels = self.content.table[named].astype(str).tolist() if whole else [f"dwell {k}" for k in range(count)]
+        proposal = for_fit(keys, self.guessed, means, labels, duration, heat)
+        handled = "" if stops is None or duration is None or not proposal.fit else _handling(stops, time)
+        return replace(proposal, remarks=(*proposal.remarks, handled)) if handled else proposal
+
+
+_NO_CLOCK = "the rate of the samples: no column of time was recognised and the file states no interval; --rate HZ"
+
+
+def recognise(paths: Sequence[Path], *, join: str = "", group: str = "") -> Recognition:
+    """The recording of one or several files.
+
+    Parameters
+    ----------
+    join : how several files are joined, ``rows`` or ``columns``.
+    group : the group of channels, if a file has several.
+    """
+    first, source = files.read_content(paths[0], group)
+    content = first
+    if len(paths) > 1:
+        time_name = guesses.guesses(first).column("time")
+        content, source, _ = sources.read(paths, join=join, time=time_name, group=group)
+    return of_content(content, source, paths, {"join": join} if join else {}, {"group": group} if group else {})
+
+
+def of_content(
+    content: Content, source: files.SourceFile, paths: Sequence[Path], *stated: dict[str, Any]
+) -> Recognition:
+    """The recording of a file that was read; ``stated``: keys of the mapping that the user gave."""
+    if len(paths) == 1 and is_exchange(content.table.columns):
+        guessed = guesses.guesses_of_dwells(content.table)
+        return Recognition(tuple(paths), content, source, guessed, is_exchange=True)
+    guessed = guesses.guesses(content)
+    time, open_ = _time(content, guessed)
+    output = _output(content, guessed)
+    whole = np.ones(len(content.table), dtype=bool) if output is None else np.isfinite(output).all(axis=1)
+    if time is not None:
+        whole &= np.isfinite(time)
+    kept = None if output is None else output[whole]
+    own = None if time is None else time[whole]
+    steps = np.diff(own) if own is not None else np.zeros(0)
+    gaps = int(np.count_nonzero(steps > gap_limit(steps)))
+    faults = sample_faults.look(kept) if kept is not None and len(kept) > 3 and not guessed.dwells else None
+    stops = _stops(kept, own) if kept is not None and own is not None and not guessed.dwells else None
+    keys = columns_and_units(content, guessed, paths[0])
+    if stops is not None and kept is not None:
+        keys = _with_stops(keys, kept, stops)
+    for more in stated:
+        keys |= more
+    keys |= {"gaps": "split"} if gaps or not bool(whole.all()) else {}
+    keys |= {"faulty": "leave-out"} if faults else {}
+    open_ += _open(guessed, kept)
+    return Recognition(
+        tuple(paths), content, source, guessed, False, own, kept, gaps, _rate(own), stops, faults, tuple(open_), keys
+    )  # fmt: skip
+
+
+def _open(guessed: Guesses, output: Array | None) -> list[str]:
+    """What the file does not state of its outputs."""
+    open_ = [guessed.triad.doubt] if guessed.triad.doubt else []
+    if output is None:
+        if guessed.single and not guessed.output.meaning:
+            open_.append("the unit of the output: --units output=g|mg|m/s^2|V|mV|LSB")
+        if guessed.single or open_:
+            return open_
+        missing = [axis for axis in "xyz" if not guessed.column(axis)]
+        open_.append(f"columns of acceleration were not recognised: map {' and '.join(missing)} by name or number")
+        few = len([one for one in guessed.columns.values() if one.meaning != "time"])
+        if few < len(AXES):
+            open_.append(
+                f"{few} column{'s' if few > 1 else ''} beside the time: an import needs three axes; a record at rest of fewer "
+                "has its noise by 'tumbleline allan' and 'tumbleline psd'"
+            )
+        return open_
+    bits = unit_check.unsigned_bits(output)
+    if bits:
+        open_.append(
+            f"signed words of {bits} bits were read without their sign: subtract {2**bits} from {2 ** (bits - 1)} on"
+        )
+    if not guessed.output.meaning:
+        open_.append("the unit of the output: --units output=g|mg|m/s^2|V|mV|LSB")
+    elif guessed.output.reason.endswith(unit_check.DOUBT):
+        open_.append(f"the unit of the output; {guessed.output.meaning} is a guess, {guessed.output.reason}")
+    return open_
+
+
+def _time(content: Content, guessed: Guesses) -> tuple[Array | None, list[str]]:
+    """Seconds of every row, and missing options."""
+    name = guessed.column("time")
+    if not name:
+        return None, [] if guessed.dwells else [_NO_CLOCK]
+    column = content.table[name]
+    open_: list[str] = []
+    if values.is_moment(column):
+        time = values.seconds(column.ffill(), name)
+    elif clocks.is_stamps(column):
+        time = clocks.stamps(column.ffill().bfill(), name)
+    else:
+        numbers = measurable(np.asarray(values.as_numbers(column, name), dtype=np.float64))
+        unit = guessed.time_unit.meaning
+        if not unit:
+            open_.append(
+                f"the unit of time: {guessed.time_unit.reason}; --units time=s|ms|us|ns, or time=samples and --rate HZ"
+            )
+        first = numbers[np.isfinite(numbers)][0] if np.any(np.isfinite(numbers)) else 0.0
+        time = (numbers - first) * (1.0 / guesses.FINE_HZ if unit == "samples" else TIME_UNITS.get(unit, 1.0))
+    steps = np.diff(time[np.isfinite(time)])
+    if np.any(steps < 0.0) and not guessed.column("dwell"):
+        open_.append(
+            f"time runs back at row {int(np.flatnonzero(steps < 0.0)[0]) + 2}: sort the rows, or divide the file"
+        )
+    return time, open_
+
+
+def _rate(time: Array | None) -> float | None:
+    """Samples in a second; of a clock with bursts by the whole record."""
+    if time is None or len(time) < 2:
+        return None
+    step, mean = clocks.typical_step(time), float(time[-1] - time[0]) / (len(time) - 1)
+    if not step > 0.0:
+        return None
+    bursts = gap_limit(np.diff(time)) > _OF_BURSTS * step
+    return 1.0 / (mean if bursts and mean > 0.0 else step)
+
+
+_OF_BURSTS = 8.0
+"""Multiple of the usual step in a gap from which the usual step is that inside bursts."""
+
+
+def _output(content: Content, guessed: Guesses) -> Array | None:
+    names = [guessed.column(axis) for axis in "xyz"]
+    if not all(names):
+        return None
+    return np.column_stack([measurable(values.as_numbers(content.table[name], name)) for name in names])
+
+
+def _stops(output: Array, time: Array) -> stretches.Stops | None:
+    """The stops of a record; None of a few samples, or of a clock that does not advance."""
+    steps = np.diff(time)
+    if len(output) < 3 or np.any(steps < 0.0) or not np.any(steps > 0.0):
+        return None
+    edges = [0, *(np.flatnonzero(steps > gap_limit(steps)) + 1).tolist(), len(output)]
+    return stretches.found_stops(output, time, edges)
+
+
+def _handling(stops: stretches.Stops, time: Array) -> str:
+    """A sentence on the motion before the first stop and after the last, which no dwell has; empty where there is none."""
+    if not len(stops.found):
+        return ""
+    first, last = float(time[stops.found.first[0]] - time[0]), float(time[stops.found.last[-1] - 1] - time[0])
+    ends = [f"0 to {first:.1f} s"] if first > stops.window_s else []
+    span = float(time[-1] - time[0])
+    ends += [f"{last:.1f} to {span:.1f} s"] if span - last > stops.window_s else []
+    return f"handling at the ends left out: {' and '.join(ends)}" if ends else ""
+
+
+def _with_stops(keys: dict[str, Any], output: Array, stops: stretches.Stops | None) -> dict[str, Any]:
+    if stops is None:
+        return keys
+    return of_stops(keys, stops, change_of_level.several_levels(output) if stops.several else 1)

@@ -1,0 +1,88 @@
+"""A recording of another system as a run of the archive: recognised, imported and fitted, with the command that says the same."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pipelines.importers.mapping import build
+from pipelines.importers.recognition import Recognition, recognise
+from schemas.errors import DataRejected, WrongUse
+
+if TYPE_CHECKING:
+    from pipelines.importers.proposal import Proposal
+    from pipelines.improvement.documents import RecordingDocument
+
+Working = Callable[[str], AbstractContextManager[Any]]
+
+
+def bring_in(paths: list[Path], archive: str | None, working: Working) -> RecordingDocument | None:
+    """The import of a recording as it is recognised; None for a table of dwells, which needs none.
+
+    Parameters
+    ----------
+    working : shows what is done, until it is
+
+    Raises
+    ------
+    WrongUse
+        The file leaves something open; the message has the command to complete.
+    DataRejected
+        It has too few positions for a fit, or the import refuses it.
+    """
+    from pipelines.diagnosis.import_document import import_document
+
+    with working(f"recognising {paths[0].name}"):
+        seen = recognise(paths)
+        proposal = None if seen.is_exchange else seen.for_fit()
+    if seen.is_exchange:
+        return None
+    name = paths[0].name
+    if proposal is None:
+        raise WrongUse(
+            f"{name}: not recognised without doubt: {'; '.join(seen.open)}; complete the command: {seen.import_command}"
+        )
+    if not proposal.fit and "face" not in proposal.keys:
+        raise DataRejected(f"{name}: {_too_little(seen, proposal)}")
+    build(proposal.keys, name)
+    done = import_document(paths, proposal.keys, name, proposal.fit, archive, None, working)
+    guessed = seen.guessed
+    files = [str(path) for path in paths]
+    return {
+        "files": files,
+        "form": seen.source.form,
+        "rows": len(seen.content.table),
+        "columns": {meaning: one for meaning in proposal.keys["columns"] if (one := guessed.column(meaning))},
+        "reason": guessed.triad.reason,
+        "output_unit": guessed.output.meaning,
+        "output_reason": guessed.output.reason,
+        "rate_hz": seen.rate_hz,
+        "dwells": done["dwells"],
+        "assumed": list(proposal.assumed),
+        "remarks": [*done["remarks"], *proposal.remarks],
+        "command": proposal.command(paths),
+        "run": done["run"],
+        "fit": "faces" if proposal.fit == "faces" else "norm" if proposal.fit else None,
+        "lines": done["lines"],
+        "dwell_list": done["dwell_list"],
+    }
+
+
+def _too_little(seen: Recognition, proposal: Proposal) -> str:
+    """Why a recording supports no fit, what is needed, and what can be done with it."""
+    from pipelines.importers.proposal import FEWEST_OF_NORM
+
+    sphere = seen.guessed.triad.sphere
+    if sphere is not None and sphere.still:
+        found, needed = (
+            "one pose whose force is not known",
+            "its unit in g or m/s², and a face that is up, for its bias",
+        )
+    else:
+        stops = len(seen.output) if seen.guessed.dwells and seen.output is not None else proposal.stops
+        found, needed = f"{stops} stops in all", f"{FEWEST_OF_NORM} positions at rest for a fit to the norm of gravity"
+    return (
+        f"{found}, {needed} are needed; record each position for some seconds, or see its noise with 'tumbleline allan'"
+    )

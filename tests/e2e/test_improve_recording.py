@@ -1,0 +1,97 @@
+"""One command for a file of another system: recognised, imported, fitted, judged; what it decided can be pasted."""
+
+import shlex
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from hand import G, Hand, sensed
+from in_process import document_of, given, refused
+
+from pipelines.archive import Archive
+
+pytestmark = pytest.mark.usefixtures("home", "no_next_measurement")
+
+BIAS = (0.012, -0.021, 0.48)
+
+
+def hand_held(rng: np.random.Generator, **how: float) -> tuple[Hand, pd.DataFrame]:
+    """Columns as a board logs them, without names: time s, m/s² with a bias of half a g on z, rates."""
+    hand = Hand(rng, **how)
+    force = G * (hand.force + np.array(BIAS)) + 0.02 * rng.normal(size=(hand.n, 3))
+    return hand, pd.DataFrame(np.column_stack([hand.time, force, sensed(rng, hand.rate, 1.0, (0.0,) * 3, 0.003)]))
+
+
+def test_a_hand_held_record_is_recognised_fitted_and_judged_on_one_screen(rng: np.random.Generator) -> None:
+    _, frame = hand_held(rng, stops=28, rate=50.0)
+    frame.to_csv("board.txt", header=False, index=False, sep="\t", float_format="%.6f")
+    document = document_of("improve", "board.txt", status=0)
+    one = document["recording"]
+    assert one["columns"] == {"time": "1", "x": "2", "y": "3", "z": "4"}
+    assert 26 <= one["dwells"] <= 30
+    assert document["adequate"] is True
+    assert any("CHECK AXIS z: its bias is 0.48 of gravity" in line for line in one["lines"])
+    table = Archive(None).run(one["run"]).table("coefficients")
+    found = {(row["effect"], row["axis"]): row for row in table.to_dict("records")}
+    for axis, bias in zip("xyz", BIAS, strict=True):
+        row = found["bias", axis]
+        assert abs(row["value"] - G * bias) < max(4.0 * row["standard_error"], 2e-3)
+    pasted = document_of(*shlex.split(one["command"])[1:], status=0)
+    assert pasted["run"] == one["run"]
+    _, text, _ = given("improve", "board.txt", columns=120)
+    lines = text.rstrip().splitlines()
+    assert len(lines) < 45
+    assert one["command"] in " ".join(text.split())
+    assert lines[-1].split()[:2] == ["tumbleline", "export"]
+    assert any(line.lstrip().startswith("not recorded: temperature (") for line in lines)
+
+
+def test_a_still_record_is_blocks_of_one_pose_without_the_hand_at_its_ends(rng: np.random.Generator) -> None:
+    time = np.arange(0.0, 600.0, 0.05)
+    warm = 40.0 - 0.04 * time
+    held = (time < 21.0) | (time > 579.0)
+    force = np.array([0.0, 0.02, 1.0]) + 0.0004 * (warm - 25.0)[:, None] + 0.002 * rng.normal(size=(time.size, 3))
+    force[held] += 0.2 * rng.normal(size=(int(held.sum()), 3))
+    frame = pd.DataFrame({"ms": 1000.0 * time, **dict(zip(["ax", "ay", "az"], force.T, strict=True)), "gtemp": warm})
+    frame.to_csv("still.csv", index=False, float_format="%.5f")
+    document = document_of("improve", "still.csv", "--no-measure")
+    one = document["recording"]
+    assert "--face +z --blocks 10" in one["command"]
+    assert any(text.startswith("handling at the ends left out: 0 to 3") for text in one["remarks"])
+    slope = Archive(None).run(one["run"]).table("dwells")
+    fitted = np.polyfit(slope["unit_C"], slope["out_z"], 1)[0]
+    assert fitted == pytest.approx(0.0004, rel=0.05)
+    assert document["diagnosis"]["blocked_by"] == []
+
+
+def test_a_doubt_and_too_few_positions_are_refused_with_what_to_add(rng: np.random.Generator) -> None:
+    hand, frame = hand_held(rng, stops=20)
+    rates = frame[[0, 4, 5, 6]]
+    rates.to_csv("gyro.csv", header=False, index=False)
+    said = refused("improve", "gyro.csv")
+    assert "columns of acceleration were not recognised" in said
+    assert "x=COLUMN" in said
+    few = frame[frame[0] < hand.time[-1] * 0.3]
+    few.to_csv("few.csv", header=False, index=False)
+    assert "10 positions at rest" in refused("improve", "few.csv")
+    assert not Path("archive").exists()
+
+
+def test_six_faces_are_named_by_what_they_read_and_two_exchanged_labels_are_told(rng: np.random.Generator) -> None:
+    faces = ["+x", "-x", "+y", "-y", "+z", "-z"]
+    force = np.array([[float(f"{face[0]}1") * (face[1] == axis) for axis in "xyz"] for face in faces])
+    means = force * 1.01 + [0.02, -0.01, 0.03] + 0.002 * rng.normal(size=force.shape)
+    sheet = pd.DataFrame(means, columns=["X", "Y", "Z"]).assign(Position=[f"side {k}" for k in range(6)])
+    sheet.to_csv("six.csv", index=False, sep=";", decimal=",", float_format="%.4f")
+    document = document_of("improve", "six.csv", status=1)
+    assert document["recording"]["fit"] == "faces"
+    assert document["adequate"] is None  # six positions cannot tell it
+    table = Archive(None).run(document["recording"]["run"]).table("coefficients")
+    bias = [row["value"] for row in table.to_dict("records") if row["effect"] == "bias"]
+    np.testing.assert_allclose(bias, [0.02, -0.01, 0.03], atol=0.004)
+    how = ["--map", "x=X,y=Y,z=Z,dwell=Position", "--units", "output=g", "--rows", "dwells", "--unit", "A"]
+    labels = dict(zip([f"side {k}" for k in (2, 1, 0, 3, 4, 5)], faces, strict=True))  # +x and +y exchanged
+    poses = ",".join(f"{label}={face}" for label, face in labels.items())
+    answer = document_of("import", "six.csv", *how, "--poses", poses, "--local-g", G, "--fit", "faces", status=1)
+    assert "with +x and +y exchanged they agree" in answer["reason"]

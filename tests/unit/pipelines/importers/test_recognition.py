@@ -1,0 +1,295 @@
+"""Files as loggers, telephones and benches write them, and what is recognised in them: the right three columns, or none.
+
+The files are made from physics (gravity turned by a hand, rates of that turning, the field of the Earth) and know nothing of the
+recogniser. None is right where nothing in the file tells, and better than a wrong proposal.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from each import each
+from hand import G, Hand, sensed
+from scipy.io import savemat
+
+from pipelines.importers.recognition import Recognition, recognise
+
+Rng = np.random.Generator
+
+
+def accelerations(
+    rng: Rng, true: np.ndarray, scale: float = 1.0, bias: tuple[float, ...] = (0.01, -0.02, 0.03)
+) -> np.ndarray:
+    return sensed(rng, true, scale, bias, 0.003 * scale)
+
+
+def named(columns: dict[str, np.ndarray], names: str, three: np.ndarray) -> None:
+    columns.update(dict(zip(names.split(), three.T, strict=True)))
+
+
+def csv(path: Path, columns: dict[str, np.ndarray], *, header: bool = True, sep: str = ",") -> Path:
+    pd.DataFrame(columns).to_csv(path, index=False, header=header, sep=sep, float_format="%.6f")
+    return path
+
+
+# files with an answer: file → columns of x, y, z; unit of the output; unit of time; whether rows are positions
+
+
+def logger_of_imu(rng: Rng, at: Path) -> Path:
+    """Counts of a gyroscope before those of an accelerometer, time in µs since power-on, one pause of the logger."""
+    hand = Hand(rng)
+    columns = {"ustime": np.rint(2.3e9 + 1e6 * hand.time + np.where(hand.time > 40.0, 344_000.0, 0.0))}
+    named(columns, "gx gy gz", np.rint(sensed(rng, hand.rate, 1880.0, (0.02, -0.03, -0.02), 8.0)))
+    named(columns, "ax ay az", np.rint(accelerations(rng, hand.force, 16384.0)))
+    return csv(at / "a.csv", columns, sep=" ")
+
+
+def board_without_header(rng: Rng, at: Path) -> Path:
+    """Tab-divided, without names: time, m/s² with a bias of half a g on z, °/s, raw magnetometer, pressure, °C; 20 Hz."""
+    hand = Hand(rng, stops=14, rate=20.0, rest_s=5.0)
+    columns = {"t": hand.time}
+    named(columns, "a b c", G * accelerations(rng, hand.force, bias=(0.0, 0.0, 0.48)))
+    named(columns, "d e f", np.degrees(sensed(rng, hand.rate, 1.0, (0.02, 0.0, 0.0), 0.005)))
+    named(columns, "g h i", np.rint(rng.normal(50.0, 30.0, (hand.n, 3))) % 65536.0)
+    columns |= {"j": np.zeros(hand.n), "k": 97.99 + 0.002 * rng.normal(size=hand.n), "l": 34.6 + 0.01 * hand.time}
+    return csv(at / "a.txt", columns, header=False, sep="\t")
+
+
+def positions_without_header(rng: Rng, at: Path) -> Path:
+    """Means of counts in thirty positions, nothing else."""
+    means = accelerations(rng, Hand(rng, stops=30).stops, 16384.0)
+    np.savetxt(at / "a.txt", np.round(means, 3), delimiter=",", fmt="%.3f")
+    return at / "a.txt"
+
+
+def numbered_positions(rng: Rng, at: Path) -> Path:
+    columns = {"No": np.arange(1.0, 25.0), "Temp": np.full(24, 23.4)}
+    named(columns, "Vx Vy Vz", np.round(accelerations(rng, Hand(rng, stops=24).stops), 5))
+    return csv(at / "a.csv", columns)
+
+
+def telephone_matrix(rng: Rng, at: Path) -> Path:
+    """A MATLAB matrix under a long name, without a clock."""
+    force = G * accelerations(rng, Hand(rng, stops=30).force, bias=(-0.013, 0.0, -0.013))
+    savemat(str(at / "a.mat"), {"MobileAccData30orientationRawSample01": force})
+    return at / "a.mat"
+
+
+def matrix_with_clock(rng: Rng, at: Path) -> Path:
+    """Time and words of a converter with its zero in the middle, as one matrix."""
+    hand = Hand(rng, stops=30)
+    counts = np.rint(32768.0 + accelerations(rng, hand.force, 4060.0))
+    savemat(str(at / "a.mat"), {"IMU0x2Dalpha": np.column_stack([hand.time + 0.03, counts])})
+    return at / "a.mat"
+
+
+def bursts(rng: Rng, at: Path) -> Path:
+    """A buffer of eight samples each 12 ms, with temperatures of two other sensors that rest at zero."""
+    hand = Hand(rng, rate=8.0 / 0.0135)
+    stamp = 12.0 * (np.arange(hand.n) // 8) + 0.2 * (np.arange(hand.n) % 8) + 1.5 * (np.arange(hand.n) // 8)
+    columns = {"now[ms]": 71556.0 + stamp, "AHT_tmp[C]": np.zeros(hand.n), "BMP_pres": np.zeros(hand.n)}
+    named(columns, "gx gy gz", np.degrees(sensed(rng, hand.rate, 1.0, (0.1, 0.0, 0.0), 0.05)))
+    named(columns, "ax ay az", accelerations(rng, hand.force))
+    columns["gtemp"] = 41.0 + 0.3 * np.sin(hand.time)
+    named(columns, "magx magy magz", sensed(rng, hand.field, 1.0, (5.0, 8.0, -4.0), 0.5))
+    return csv(at / "a.csv", columns)
+
+
+def maker_of_sensors(rng: Rng, at: Path) -> Path:
+    """Lines of settings, counters of 100 µs, angles in every fourth row only."""
+    n = 4000
+    still = G * accelerations(rng, np.tile([1.0, 0.03, -0.01], (n, 1)))
+    angles = [["", "", ""] if k % 4 != 1 else [f"{v:.4f}" for v in (112.9, -88.2, 28.1)] for k in range(n)]
+    rows = [
+        "\t".join(
+            [
+                str(16213 + k),
+                str(10259826 + 25 * k),
+                *(f"{v:.6f}" for v in still[k]),
+                "0.001",
+                "-0.002",
+                "0.000",
+                *angles[k],
+            ]
+        )
+        for k in range(n)
+    ]
+    head = ["// General information: ", "//  version: 2022.0.0 ", "// Coordinate system: ENU"]
+    head.append("PacketCounter SampleTimeFine Acc_X Acc_Y Acc_Z Gyr_X Gyr_Y Gyr_Z Roll Pitch Yaw".replace(" ", "\t"))
+    (at / "a.txt").write_text("\n".join([*head, *rows]) + "\n", encoding="utf-8")
+    return at / "a.txt"
+
+
+def labelled_records(rng: Rng, at: Path) -> Path:
+    """Records of NumPy with a label in each, the time last; the sensor lies still."""
+    n = 1500
+    table = pd.DataFrame(accelerations(rng, np.tile([-0.02, 0.0, 1.03], (n, 1))), columns=["ax", "ay", "az"])
+    table[["gx", "gy", "gz"]] = rng.normal(0.0, 0.1, (n, 3))
+    table = table.assign(timestamp=28_902_133 + 10_000 * np.arange(n), label="Stationary")
+    kinds = {name: "<U32" if name == "label" else "<i8" if name == "timestamp" else "<f8" for name in table}
+    with (at / "a.npy").open("wb") as file:
+        np.save(file, np.array([*map(tuple, table.to_numpy())], dtype=[*kinds.items()]))
+    return at / "a.npy"
+
+
+def telephone_export(rng: Rng, at: Path) -> Path:
+    """Acceleration beside the gravity and the linear acceleration that a telephone computes."""
+    hand = Hand(rng)
+    columns = {"time": hand.time}
+    named(columns, "gravity_x gravity_y gravity_z", G * hand.force)
+    named(columns, "linear_x linear_y linear_z", rng.normal(0.0, 0.1, (hand.n, 3)))
+    named(columns, "accelerometer_x accelerometer_y accelerometer_z", G * accelerations(rng, hand.force))
+    return csv(at / "a.csv", columns)
+
+
+def volts_beside_force(rng: Rng, at: Path) -> Path:
+    """A bench: the force that was applied, in g and without noise, before the outputs in V."""
+    true, columns = Hand(rng, stops=24).stops, {"step": np.arange(24.0)}
+    named(columns, "force_x force_y force_z", true)
+    named(columns, "out_x[V] out_y[V] out_z[V]", 0.66 * accelerations(rng, true))
+    return csv(at / "a.csv", columns)
+
+
+RIGHT = {
+    logger_of_imu: ("ax ay az", "LSB", "us", False),
+    board_without_header: ("2 3 4", "m/s^2", "s", False),
+    positions_without_header: ("1 2 3", "LSB", "", True),
+    numbered_positions: ("Vx Vy Vz", "g", "", True),
+    telephone_matrix: (" ".join(f"MobileAccData30orientationRawSample01_{k}" for k in (1, 2, 3)), "m/s^2", "", False),
+    matrix_with_clock: ("IMU0x2Dalpha_2 IMU0x2Dalpha_3 IMU0x2Dalpha_4", "LSB", "s", False),
+    bursts: ("ax ay az", "g", "ms", False),
+    maker_of_sensors: ("Acc_X Acc_Y Acc_Z", "m/s^2", "samples", False),
+    labelled_records: ("ax ay az", "g", "us", False),
+    telephone_export: ("accelerometer_x accelerometer_y accelerometer_z", "m/s^2", "s", False),
+    volts_beside_force: ("out_x[V] out_y[V] out_z[V]", "V", "", True),
+}
+
+
+# sealed: what must not be proposed
+
+
+def gyroscope_alone(rng: Rng, at: Path) -> Path:
+    hand = Hand(rng)
+    savemat(
+        str(at / "a.mat"),
+        {"omega": np.column_stack([hand.time, np.rint(sensed(rng, hand.rate, 1880.0, (17.4,) * 3, 8.0))])},
+    )
+    return at / "a.mat"
+
+
+def gyroscope_as_xyz(rng: Rng, at: Path) -> Path:
+    hand, columns = Hand(rng), {}
+    columns["time"] = hand.time
+    named(columns, "x y z", sensed(rng, hand.rate, 1.0, (0.01, 0.02, -0.01), 0.002))
+    return csv(at / "a.csv", columns)
+
+
+def magnetometer_alone(rng: Rng, at: Path) -> Path:
+    hand, columns = Hand(rng), {}
+    columns["time"] = hand.time
+    named(columns, "mx my mz", sensed(rng, hand.field, 1.0, (5.0, 8.0, -4.0), 0.3))
+    return csv(at / "a.csv", columns)
+
+
+def two_sensors(rng: Rng, at: Path) -> Path:
+    hand, columns = Hand(rng), {}
+    columns["time"] = hand.time
+    named(columns, "acc1_x acc1_y acc1_z", accelerations(rng, hand.force))
+    named(columns, "acc2_x acc2_y acc2_z", accelerations(rng, hand.force))
+    return csv(at / "a.csv", columns)
+
+
+def two_sensors_mixed(rng: Rng, at: Path) -> Path:
+    """x and y of one sensor, z of another that is mounted otherwise; no names."""
+    hand = Hand(rng)
+    other = accelerations(rng, hand.force)[:, [1, 2, 0]]
+    rows = np.column_stack([hand.time, accelerations(rng, hand.force)[:, :2], other[:, 0]])
+    np.savetxt(at / "a.csv", rows, delimiter=",", fmt="%.6f")
+    return at / "a.csv"
+
+
+def weather(rng: Rng, at: Path) -> Path:
+    n = 3000
+    day = np.sin(np.arange(n) / 400.0)
+    columns = {
+        "row": np.arange(n),
+        "t": np.arange(n),
+        "T1": 20.0 + 5.0 * day,
+        "T2": 20.3 + 4.6 * day,
+        "T3": 19.0 + 5.5 * day,
+    }
+    columns = {
+        name: np.asarray(one, dtype=float) + 0.01 * rng.normal(size=n) * (name[0] == "T")
+        for name, one in columns.items()
+    }
+    return csv(at / "a.csv", columns)
+
+
+def reference_alone(rng: Rng, at: Path) -> Path:
+    columns = {"position": np.arange(24.0)}
+    named(columns, "ref_x ref_y ref_z", np.round(Hand(rng, stops=24).stops, 6))
+    return csv(at / "a.csv", columns)
+
+
+def drifting_voltages(rng: Rng, at: Path) -> Path:
+    walk = 1.65 + 0.001 * np.cumsum(rng.normal(size=(4000, 3)), axis=0)
+    np.savetxt(at / "a.csv", np.column_stack([np.arange(4000) / 50.0, walk]), delimiter=",", fmt="%.6f")
+    return at / "a.csv"
+
+
+def deviations(rng: Rng, at: Path) -> Path:
+    columns = {"time": np.arange(200.0) / 10.0}
+    named(columns, "sd_x sd_y sd_z", 0.003 * (1.0 + 0.1 * rng.normal(size=(200, 3))))
+    return csv(at / "a.csv", columns)
+
+
+SEALED = (
+    gyroscope_alone,
+    gyroscope_as_xyz,
+    magnetometer_alone,
+    two_sensors,
+    two_sensors_mixed,
+    weather,
+    reference_alone,
+    drifting_voltages,
+    deviations,
+)
+
+
+def axes_of(seen: Recognition) -> str:
+    return " ".join(filter(None, (seen.guessed.column(axis) for axis in "xyz")))
+
+
+@each(RIGHT)
+def test_the_three_columns_their_unit_and_the_clock_are_recognised(
+    write: Callable[[Rng, Path], Path], rng: Rng, tmp_path: Path
+) -> None:
+    seen = recognise([write(rng, tmp_path)])
+    columns, unit, time, positions = RIGHT[write]
+    assert axes_of(seen) == columns
+    assert seen.guessed.output.meaning == unit
+    assert seen.guessed.time_unit.meaning == time
+    assert seen.guessed.dwells is positions
+    assert [text for text in seen.open if not text.startswith("the rate of the samples")] == []
+
+
+@each(SEALED)
+def test_nothing_is_proposed_where_no_three_columns_are_one_accelerometer(
+    write: Callable[[Rng, Path], Path], rng: Rng, tmp_path: Path
+) -> None:
+    seen = recognise([write(rng, tmp_path)])
+    assert axes_of(seen) == ""
+    assert seen.open
+    assert "x=COLUMN" in seen.import_command
+
+
+def test_a_clock_that_writes_in_bursts_is_one_record_and_a_pause_is_a_gap(rng: Rng, tmp_path: Path) -> None:
+    burst = recognise([bursts(rng, tmp_path)])
+    assert burst.gaps == 0
+    assert burst.rate_hz == pytest.approx(8.0 / 0.0135, rel=0.01)
+    assert burst.guessed.column("temperature") == "gtemp"
+    assert recognise([logger_of_imu(rng, tmp_path)]).gaps == 1
