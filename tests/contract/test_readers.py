@@ -96,8 +96,10 @@ def numpy(path: Path) -> None:
         np.save(file, records)
 
 
-SAMPLES = {"numpy": numpy, "parquet": parquet, "matlab": matlab, "text": text, "hdf5": hdf5, "uff58": uff58, "tdms": tdms, "rdata": rdata,
-           "wav": wav, "lvm": lvm}  # fmt: skip
+SAMPLES = {
+    "numpy": numpy, "parquet": parquet, "matlab": matlab, "text": text, "hdf5": hdf5, "uff58": uff58, "tdms": tdms,
+    "rdata": rdata, "wav": wav, "lvm": lvm,
+}  # fmt: skip
 
 
 @each(READERS)
