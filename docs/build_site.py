@@ -1,4 +1,4 @@
-"""``python -m docs.build_site``: the documents and the reference of ``inertial`` as a site that is searched without a network.
+"""``python -m docs.build_site``: the documents and the references of packages as a site that is searched without a network.
 
 Pages link to each other, to pages of ``deploy/`` and to files of the source, so the site is built from a copy of these in which
 every relative link holds. ``mkdocs build --strict`` then fails for a link or an anchor that leads nowhere.
@@ -25,7 +25,10 @@ PICTURES = ("docs/pictures/*.svg", "docs/pictures/*.png")
 LINK = re.compile(r"(!?\[[^\]]*\]\()([^)\s]+)(\))")
 HEADINGS = {"tutorial": "Tutorial", "how-to": "How-to", "explanation": "Explanation", "reference": "Reference"}
 NEEDED = ("mkdocs", "material", "mkdocstrings")
-API = "reference/inertial"
+REFERENCES = {
+    "tumbleline": "The package for Python: read, fit, diagnose, improve, archives. Written from the docstrings.",
+    "inertial": "The science: numpy and scipy only, no files, no clock. Written from the docstrings.",
+}
 SHIM = "iframe-worker.js"
 
 
@@ -59,11 +62,9 @@ def _linked(page: Path, folder: Path) -> str:
     return LINK.sub(replaced, page.read_text(encoding="utf-8"))
 
 
-def modules() -> list[str]:
-    """Every public module of ``inertial``, by its name."""
-    names = [
-        ".".join(path.relative_to(ROOT).with_suffix("").parts) for path in sorted((ROOT / "inertial").rglob("*.py"))
-    ]
+def modules(package: str) -> list[str]:
+    """Every public module of a package, by its name."""
+    names = [".".join(path.relative_to(ROOT).with_suffix("").parts) for path in sorted((ROOT / package).rglob("*.py"))]
     plain = [name.removesuffix(".__init__") for name in names]
     return [name for name in plain if not any(part.startswith("_") for part in name.split("."))]
 
@@ -71,27 +72,29 @@ def modules() -> list[str]:
 def _reference(folder: Path) -> list[Path]:
     """One page for each module, and their list."""
     made: list[Path] = []
-    place = folder / "docs" / API
-    place.mkdir(parents=True, exist_ok=True)
-    for name in modules():
-        path = place / f"{name}.md"
-        path.write_text(f"# {name}\n\n::: {name}\n", encoding="utf-8")
-        made.append(path)
-    lines = [f"- [{name}]({name}.md)" for name in modules()]
-    head = "# Reference of inertial\n\nThe science: numpy and scipy only, no files, no clock. Written from the docstrings.\n\n"
-    (place / "index.md").write_text(head + "\n".join(lines) + "\n", encoding="utf-8")
-    return [*made, place / "index.md"]
+    for package, what in REFERENCES.items():
+        place = folder / "docs" / "reference" / package
+        place.mkdir(parents=True, exist_ok=True)
+        for name in modules(package):
+            path = place / f"{name}.md"
+            path.write_text(f"# {name}\n\n::: {name}\n", encoding="utf-8")
+            made.append(path)
+        lines = [f"- [{name}]({name}.md)" for name in modules(package)]
+        head = f"# Reference of {package}\n\n{what}\n\n"
+        (place / "index.md").write_text(head + "\n".join(lines) + "\n", encoding="utf-8")
+        made.append(place / "index.md")
+    return made
 
 
 def navigation(folder: Path) -> list[dict[str, object]]:
-    """The parts of the site: the kinds of documents, the decisions, deployment, and the reference of ``inertial``."""
+    """The parts of the site: the kinds of documents, the decisions, deployment, and the references of the packages."""
     parts: list[dict[str, object]] = [{"Start": ["README.md", "docs/README.md", "CHANGELOG.md", "CONTRIBUTING.md"]}]
     for name, heading in HEADINGS.items():
         parts.append({heading: _names(folder, f"docs/{name}")})
     parts.append({"Decisions": _names(folder, "docs/decisions")})
     parts.append({"Deployment": _names(folder, "deploy")})
     parts.append({"Benchmarks": ["benchmarks/README.md"]})
-    parts.append({"Reference of inertial": _names(folder, f"docs/{API}")})
+    parts += [{f"Reference of {name}": _names(folder, f"docs/reference/{name}")} for name in REFERENCES]
     return parts
 
 

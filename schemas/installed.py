@@ -9,7 +9,7 @@ from schemas.shipped import shipped
 
 LOCK = "requirements-run.lock"
 _TREE = Path(__file__).resolve().parents[1]
-_OWN = ("inertial", "schemas", "stations", "pipelines", "deploy")
+_OWN = ("inertial", "schemas", "stations", "pipelines", "tumbleline", "deploy")
 
 
 def not_installed(problem: BaseException | None) -> str | None:

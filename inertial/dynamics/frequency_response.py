@@ -177,6 +177,8 @@ def _sharpened(one: Response) -> Response:
 
 _PARTS = 8
 _SHORTEST_PART_S = 0.25
+_LARGEST_DEPARTURE = 0.01
+"""The share of a part that its window leaves at the end: a clock that departs by more runs out of the record."""
 
 
 def clock_departure(reference: tuple[Array, float], output: tuple[Array, float]) -> tuple[float, float]:
@@ -189,6 +191,11 @@ def clock_departure(reference: tuple[Array, float], output: tuple[Array, float])
     Parameters
     ----------
     reference, output : samples (n,) and nominal rate, Hz; both begin at one instant
+
+    Raises
+    ------
+    NotIdentified
+        The delays follow no clock near the nominal one, as where the output does not follow the reference.
     """
     (x, x_rate), (y, y_rate) = reference, output
     seconds = min(x.size / x_rate, y.size / y_rate)
@@ -204,6 +211,9 @@ def clock_departure(reference: tuple[Array, float], output: tuple[Array, float])
         slope = float(apart @ delays / (apart @ apart))
         left = delays - delays.mean() - slope * apart
         departure, error = departure - slope, float(np.sqrt(left @ left / (count - 2) / (apart @ apart)))
+        if not abs(departure) < _LARGEST_DEPARTURE:
+            msg = "response: the output has no common clock with the reference; check channels, cable and mounting"
+            raise NotIdentified(msg)
     return departure, error
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import os
 import shutil
 from collections.abc import Generator, Iterator
@@ -16,6 +15,7 @@ from pipelines.archive.locks import CLAIM, LEASE_S, alone
 from pipelines.archive.provenance import provenance
 from pipelines.archive.run import Run
 from pipelines.archive.store import ObjectPath, Place
+from schemas import host
 from schemas.errors import OperatorNeeded
 
 FOLDERS = ("runs", "captures", "calibrations", hash_chain.FOLDER, "index", packs.FOLDER)
@@ -98,7 +98,7 @@ def _owned(archive: Archive, place: Place) -> Generator[bool, None, None]:
             except OperatorNeeded:
                 yield False
                 return
-        yield held.enter_context(files.writers_of(place.parent, fcntl.LOCK_EX | fcntl.LOCK_NB))
+        yield held.enter_context(files.writers_of(place.parent, host.EXCLUSIVE | host.AT_ONCE))
 
 
 def _size(place: Place) -> int:

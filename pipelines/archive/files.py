@@ -6,7 +6,6 @@ A reader sees the whole file or none.
 
 from __future__ import annotations
 
-import fcntl
 import hashlib
 import json
 import os
@@ -20,6 +19,7 @@ from typing import Any
 from pipelines.archive.names import LinkInArchive, refuse_leading_out
 from pipelines.archive.signatures import signed
 from pipelines.archive.store import ObjectPath, Place, first_line
+from schemas import host
 from schemas.errors import ArchiveUnusable
 
 TEMPORARY = ".tmp-"
@@ -201,7 +201,7 @@ def sweep(folder: Place) -> None:
     """Remove temporary files of a killed writer, unless another process writes to the folder now."""
     if isinstance(folder, ObjectPath) or not folder.is_dir():  # an object store has no temporary names
         return
-    with writing(folder), writers_of(folder, fcntl.LOCK_EX | fcntl.LOCK_NB) as mine:
+    with writing(folder), writers_of(folder, host.EXCLUSIVE | host.AT_ONCE) as mine:
         for left in folder.glob(f"{TEMPORARY}*") if mine else ():
             shutil.rmtree(left) if left.is_dir() else left.unlink()
 
@@ -211,7 +211,7 @@ def _aside(folder: Path) -> Generator[Path, None, None]:
     """A temporary name in a folder for writing before publishing; it is removed in any case."""
     folder.mkdir(parents=True, exist_ok=True)
     aside = folder / f"{TEMPORARY}{uuid.uuid4().hex}"
-    with writers_of(folder, fcntl.LOCK_SH):
+    with writers_of(folder, host.SHARED):
         try:
             yield aside
         finally:
@@ -230,18 +230,16 @@ def writers_of(folder: Path, mode: int) -> Generator[bool, None, None]:
 
     Parameters
     ----------
-    mode : ``fcntl.LOCK_SH``, or ``fcntl.LOCK_EX | fcntl.LOCK_NB``.
+    mode : ``host.SHARED``, or ``host.EXCLUSIVE | host.AT_ONCE``.
     """
-    handle = os.open(folder, os.O_RDONLY)
-    try:
+    with host.opened_folder(folder) as handle:
         try:
-            fcntl.flock(handle, mode)
-            given = True
+            if handle is not None:
+                host.lock(handle, mode)
+            given = handle is not None
         except OSError:  # another process holds it, or the file system has no locks
             given = False
         yield given
-    finally:
-        os.close(handle)
 
 
 def _write_durably(path: Path, data: bytes) -> None:
@@ -252,8 +250,6 @@ def _write_durably(path: Path, data: bytes) -> None:
 
 
 def _sync_folder(path: Path) -> None:
-    handle = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)
+    with host.opened_folder(path) as handle:
+        if handle is not None:
+            os.fsync(handle)

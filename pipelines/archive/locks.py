@@ -8,7 +8,6 @@ continue. A claim is renewed at intervals; a claim that is too old belongs to a 
 
 from __future__ import annotations
 
-import fcntl
 import os
 import platform
 import random
@@ -21,6 +20,7 @@ from typing import TextIO
 
 from pipelines.archive import files
 from pipelines.archive.store import ObjectPath, Place
+from schemas import host
 from schemas.errors import OperatorNeeded
 
 LEASE_S = 120.0
@@ -45,7 +45,7 @@ def _locked(folder: Place, *, wait: bool) -> Generator[None, None, None]:
     while True:
         with _lock_file(folder) as lock:
             try:
-                fcntl.flock(lock, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+                host.lock(lock, host.EXCLUSIVE | (0 if wait else host.AT_ONCE))
             except BlockingIOError:
                 raise OperatorNeeded(_busy(folder)) from None
             if not _is_at(lock, str(folder / LOCK)):  # removed meanwhile with its folder, whose files were packed

@@ -7,7 +7,6 @@ runs make new parts.
 
 from __future__ import annotations
 
-import fcntl
 import hashlib
 import json
 import os
@@ -34,6 +33,7 @@ from pipelines.audit.run_files import in_order_of_disk, read_runs, stamps_of
 from pipelines.audit.run_rows import SCHEMAS, TABLES, rows_of_runs
 from pipelines.integrity.findings import CHANGED, VerifiedPart
 from pipelines.parallel import Distributor, map_partitions
+from schemas import host
 from schemas.errors import ArchiveUnusable
 
 FOLDER = "index"
@@ -72,10 +72,10 @@ class _Reading:
     """A shared lock: parts of the folder are not removed while a process holds it; it is released when the process dies."""
 
     def __init__(self, place: Path) -> None:
-        handle = os.open(place, os.O_RDONLY)
-        finalize(self, os.close, handle)
-        with suppress(OSError):  # a file system without locks
-            fcntl.flock(handle, fcntl.LOCK_SH)
+        with suppress(OSError):  # a file system without locks, a system that opens no folders
+            handle = os.open(place, os.O_RDONLY)
+            finalize(self, os.close, handle)
+            host.lock(handle, host.SHARED)
 
 
 @dataclass(frozen=True)
@@ -253,7 +253,7 @@ def remove_parts(place: Place, parts: Collection[Place]) -> None:
         for part in parts:
             (place / part.name).remove_all()
         return
-    with files.writers_of(place, fcntl.LOCK_EX | fcntl.LOCK_NB) if parts else nullcontext(enter_result=False) as mine:
+    with files.writers_of(place, host.EXCLUSIVE | host.AT_ONCE) if parts else nullcontext(enter_result=False) as mine:
         for part in parts if mine else ():
             shutil.rmtree(place / part.name, ignore_errors=True)
 

@@ -26,7 +26,6 @@ ORDER = 215
 SUMMARY = "Diagnose a model, add what is missing, and judge it by a fresh run, in one command."
 EXAMPLES = (
     "tumbleline improve latest",
-    "tumbleline improve recording.csv",
     "tumbleline improve dwells.csv --model model.toml --fresh fresh.csv --yes",
 )
 CHOICES = "y or Enter adds it, n leaves it out; Ctrl-C stops, and nothing is written"

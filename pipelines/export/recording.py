@@ -58,7 +58,14 @@ def read_recording(
         A column is missing, a value is not finite, or the time does not always increase.
     """
     table, _ = files.read(path)
-    there, where = list(table.columns), path.name
+    return recording_of(table, path.name, columns, time=time, rate_hz=rate_hz)
+
+
+def recording_of(
+    table: pd.DataFrame, where: str, columns: Sequence[str] = (), *, time: str = "", rate_hz: float | None = None
+) -> CorrectableRecording:
+    """The recording of a table of samples, as :func:`read_recording` reads it; ``where``: its name, for messages."""
+    there = list(table.columns)
     chosen = list(columns) or next((list(names) for names in USUAL if set(names) <= set(there)), [])
     if len(chosen) != 3:
         raise WrongUse(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import json
 import os
 import socket
@@ -31,6 +30,7 @@ from pipelines.orchestrator.server_check import check_server
 from pipelines.orchestrator.settings import CLIENT_KEY, KEY_FILE, STARTUP_S, cache_folder, new_key, settings, use_key
 from pipelines.parallel import with_environment
 from pipelines.schedule.steps import steps
+from schemas import host
 from schemas.errors import ArchiveUnusable, StationTimeout, TumblelineError
 from schemas.installed import missing_in
 from schemas.progress import Progress
@@ -146,9 +146,9 @@ def local_server(home: Path, meanwhile: Callable[[], None] = lambda: None) -> Ge
     private_folder(home / CLIENTS)
     client = home / CLIENTS / f"{os.getpid()}-{uuid.uuid4().hex[:8]}"
     with client.open("w") as held:
-        fcntl.flock(held, fcntl.LOCK_SH)
+        host.lock(held, host.SHARED)
         with (home / START_LOCK).open("w") as lock:
-            fcntl.flock(lock, fcntl.LOCK_EX)
+            host.lock(lock, host.EXCLUSIVE)
             port, key = _running(home) or _start(home, meanwhile)
         try:
             yield settings(home, port, key)
@@ -165,7 +165,7 @@ def environment_of(archive: Archive) -> dict[str, str]:
 
 def _refuse_foreign(home: Path) -> None:
     """Refuse the folder of another user's server: its key is that user's alone."""
-    if home.exists() and os.getuid() not in {home.stat().st_uid, 0}:
+    if home.exists() and host.user_id() not in {home.stat().st_uid, 0}:
         raise ArchiveUnusable(
             f"orchestrator: {home} belongs to another user (id {home.stat().st_uid}), whose server is private; name an "
             "orchestrator of the line in PREFECT_API_URL, or run with --direct"

@@ -63,7 +63,7 @@ def read_history(source: str | Path, *, archive: str | Path | None = None) -> pd
     """
     if files.is_file(source):
         frame, _ = files.read(Path(source))
-        return _checked_history(frame, Path(source).name, foreign=True)
+        return checked_history(frame, Path(source).name, foreign=True)
     return history_of_run(_run(source, archive))
 
 
@@ -81,7 +81,7 @@ def dwells_of_run(run: Run) -> pd.DataFrame:
 
 def history_of_run(run: Run) -> pd.DataFrame:
     """The temperatures of a run against time, as :func:`read_history` reads them by its name."""
-    return _checked_history(run.table("history"), f"run {run.id}", foreign=False)
+    return checked_history(run.table("history"), f"run {run.id}", foreign=False)
 
 
 def refuse_other_procedures(run: Run, wanted: str) -> None:
@@ -255,7 +255,8 @@ def _countable(frame: pd.DataFrame, where: str) -> None:
             )
 
 
-def _checked_history(frame: pd.DataFrame, where: str, *, foreign: bool) -> pd.DataFrame:
+def checked_history(frame: pd.DataFrame, where: str, *, foreign: bool) -> pd.DataFrame:
+    """Temperatures against time with their types made right, or `DataRejected` with what is needed; see :func:`checked`."""
     _require(frame, ("time_s",), where)
     heats = [name for name in ("unit_C", "chamber_C") if name in frame.columns]
     if not heats:

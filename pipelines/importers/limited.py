@@ -21,6 +21,7 @@ from typing import Any, ParamSpec, TypeVar, cast
 
 from pipelines.importers import limited_process
 from schemas.errors import DataRejected
+from schemas.host import resource
 
 Given = ParamSpec("Given")
 Result = TypeVar("Result")
@@ -54,7 +55,7 @@ class ReadingLimits:
 def limits_for(size: int) -> ReadingLimits:
     """The limits of a command for a file of this many bytes: a measured record of text takes 15 times its size, and 0.3 s/MB."""
     seconds = 60 + 2 * size // 10**6
-    installed = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    installed = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") if hasattr(os, "sysconf") else 2**40
     return ReadingLimits(min(1024 * MIB + 40 * size, installed), seconds, 3 * seconds)
 
 
@@ -97,6 +98,11 @@ class _Reader:
         self._socket.close()
 
 
+def _reads_itself() -> bool:
+    """Whether this process reads: it is the reader, or the system has no limits for one."""
+    return limited_process.is_reader() or resource is None
+
+
 _lock = threading.Lock()
 _idle: list[_Reader] = []
 
@@ -104,7 +110,7 @@ _idle: list[_Reader] = []
 def start() -> None:
     """Start the process, so that it imports its libraries while this one imports its own."""
     with _lock:
-        if not _idle and not limited_process.is_reader():
+        if not _idle and not _reads_itself():
             _idle.append(_Reader())
 
 
@@ -125,7 +131,7 @@ def in_reader(
     TumblelineError
         Of the function.
     """
-    if limited_process.is_reader():
+    if _reads_itself():
         return function(*given, **named)
     with _lock:
         reader, last = _idle.pop() if _idle else _Reader(), True

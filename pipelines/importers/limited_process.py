@@ -10,7 +10,6 @@ import math
 import os
 import pickle
 import queue
-import resource
 import signal
 import socket
 import struct
@@ -24,6 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from schemas.errors import TumblelineError
+from schemas.host import resource
 
 KEPT_BYTES = 192 * 2**20
 """A process that holds more after a reading ends, so that the memory is free again."""

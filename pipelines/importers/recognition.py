@@ -63,8 +63,10 @@ class Recognition:
             stops = self.stops or _stops(self.output, time)
             keys = self.keys if self.stops else _with_stops(self.keys, self.output, stops)
             duration = float(time[-1] - time[0])
-            if stops is not None and len(stops.found):
-                pairs = zip(stops.found.first, stops.found.last, strict=True)
+            found = stretches.by_positions(self.output, keys["positions"], "") if "positions" in keys else None
+            found = stops.found if found is None and stops is not None else found
+            if found is not None and len(found):
+                pairs = zip(found.first, found.last, strict=True)
                 means = np.stack([self.output[a:b].mean(axis=0) for a, b in pairs])
         warm = self.guessed.column("temperature")
         heat = measurable(values.as_numbers(self.content.table[warm], warm)) if warm else None

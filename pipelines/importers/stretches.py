@@ -92,7 +92,7 @@ def stretches(
     if labels is not None:
         intervals = _by_labels(labels, edges)
     elif mapping.positions is not None:
-        intervals = _by_positions(output, mapping.positions, where)
+        intervals = by_positions(output, mapping.positions, where)
     elif mapping.block_s is not None:
         intervals = _by_blocks(time, edges, mapping.block_s)
         intervals = _without_handled_ends(intervals, output, time) if mapping.face else intervals
@@ -172,7 +172,8 @@ def _without_handled_ends(intervals: Stretches, output: NDArray[np.float64], tim
     return replace(kept, remarks=(f"handling at the ends left out: {' and '.join(ends)}",))
 
 
-def _by_positions(output: NDArray[np.float64], count: int, where: str) -> Stretches:
+def by_positions(output: NDArray[np.float64], count: int, where: str) -> Stretches:
+    """The positions of a record without moves between them, divided at the ``count`` − 1 largest changes."""
     try:
         levels = change_of_level.levels(output, count)
     except ValueError as problem:

@@ -10,7 +10,6 @@ ends when no lock is held.
 from __future__ import annotations
 
 import argparse
-import fcntl
 import gc
 import os
 import sys
@@ -34,6 +33,7 @@ from pipelines.orchestrator.settings import (
 )
 from pipelines.serving.connections import MOST, ConnectionLimits, TimedRequests
 from pipelines.serving.listening import bound_socket
+from schemas import host
 from schemas.errors import TumblelineError, WrongUse
 from schemas.log_lines import JSON, tell, wants_json
 from stations.safety.folder import state_folder
@@ -138,7 +138,7 @@ def _left(home: Path) -> bool:
     if any_client(home):
         return False
     with (home / START_LOCK).open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
+        host.lock(lock, host.EXCLUSIVE)
         if any_client(home):  # registered in the meantime
             return False
         (home / ADDRESS).unlink(missing_ok=True)
@@ -151,7 +151,7 @@ def any_client(home: Path) -> bool:
     for path in (home / CLIENTS).glob("*"):
         with path.open("a") as file:
             try:
-                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                host.lock(file, host.EXCLUSIVE | host.AT_ONCE)
             except BlockingIOError:
                 alive = True
                 continue

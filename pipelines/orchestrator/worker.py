@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import argparse
 import ctypes
-import fcntl
 import os
 import platform
 import re
@@ -31,6 +30,7 @@ from types import FrameType
 from pipelines.orchestrator.server_check import POLL_S, check_server
 from pipelines.orchestrator.settings import CLIENT_KEY, JSON_FORMAT, STARTUP_S, use_key
 from pipelines.orchestrator.worker_health import heartbeat_of, period_s, watched
+from schemas import host
 from schemas.errors import OperatorNeeded, TumblelineError, WrongUse
 from schemas.log_lines import JSON, tell, wants_json
 from stations.safety.folder import state_folder
@@ -125,7 +125,7 @@ def _alone(station: str) -> Generator[None]:
     """A context in which no other worker of this computer works for the station."""
     with (state_folder() / f"worker-{station}.lock").open("a") as lock:
         try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            host.lock(lock, host.EXCLUSIVE | host.AT_ONCE)
         except BlockingIOError:
             raise OperatorNeeded(
                 f"worker: another worker works for station {station} on this computer, one is needed; stop it first"

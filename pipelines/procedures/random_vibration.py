@@ -224,8 +224,8 @@ def _response(
     axis = AXES.index(part.axis)
     if float(np.ptp(cut[1].output[:, axis])) == 0.0:
         return []
-    clock = clock_departure(*((one.output[:, axis], one.rate_hz) for one in cut))
     try:
+        clock = clock_departure(*((one.output[:, axis], one.rate_hz) for one in cut))
         points = response_bands(part, number, (cut[0], cut[1]), axis, device, clock)
     except NotIdentified:
         return []

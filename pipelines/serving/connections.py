@@ -9,17 +9,15 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import fcntl
 import math
-import resource
 import socket
-import sys
-import termios
 import time
 from collections.abc import Generator
 from dataclasses import dataclass, field
 from ipaddress import ip_address
 from typing import TYPE_CHECKING, Any
+
+from schemas import host
 
 if TYPE_CHECKING:
     from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -63,8 +61,7 @@ class ConnectionLimits:
     @property
     def fitting(self) -> int:
         """The connections that the limit of files permits."""
-        files = resource.getrlimit(resource.RLIMIT_NOFILE)[0]
-        return self.most if files == resource.RLIM_INFINITY else min(self.most, max(files // 2, 1))
+        return int(min(self.most, max(host.most_files() // 2, 1)))
 
 
 @dataclass(eq=False)
@@ -102,10 +99,7 @@ class Connection:
             self.close()
 
     def _unsent(self) -> int:
-        try:
-            return int.from_bytes(fcntl.ioctl(self.socket, termios.TIOCOUTQ, bytes(4)), sys.byteorder)
-        except (OSError, ValueError):
-            return 0
+        return host.unsent_bytes(self.socket)
 
     def close(self) -> None:
         """End it; the loop of events sees its end and frees it."""

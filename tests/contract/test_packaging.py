@@ -10,7 +10,7 @@ import pytest
 from each import each
 
 ROOT = Path(__file__).resolve().parents[2]
-SHIPPED = ("inertial", "schemas", "stations", "pipelines")
+SHIPPED = ("inertial", "schemas", "stations", "pipelines", "tumbleline")
 SETUP = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["setuptools"]
 
 MACHINE = re.compile(r"(?<![\w.~])/(?:work|tmp|root|home)/")

@@ -31,9 +31,12 @@ def test_every_page_of_the_documents_is_in_the_navigation(staged: Path) -> None:
     assert [name for name in listed if not (staged / name).is_file()] == []
 
 
-def test_every_module_of_the_science_has_a_page(staged: Path) -> None:
+def test_every_module_of_the_science_and_of_the_package_for_python_has_a_page(staged: Path) -> None:
     pages = {path.stem for path in (staged / "docs" / "reference" / "inertial").glob("inertial*.md")}
-    assert pages == set(modules())
+    assert pages == set(modules("inertial"))
+    assert {path.stem for path in (staged / "docs" / "reference" / "tumbleline").glob("t*.md")} == set(
+        modules("tumbleline")
+    )
     assert {"inertial.effects.third_order", "inertial.noise", "inertial.dynamics.spectra"} <= pages
 
 
@@ -59,7 +62,7 @@ def test_the_site_loads_no_fonts_of_others_and_checks_its_links() -> None:
 def test_the_site_is_built_is_searched_without_a_server_and_loads_nothing_from_elsewhere(tmp_path: Path) -> None:
     assert build_site.build(tmp_path) == 0
     pages = list(tmp_path.rglob("*.html"))
-    assert len(pages) > len(modules()) + 60
+    assert len(pages) > len(modules("inertial")) + 60
     assert [str(page) for page in pages if ELSEWHERE.search(page.read_text(encoding="utf-8"))] == []
     script = (tmp_path / "search" / "search_index.js").read_text(encoding="utf-8")
     index = json.loads(script[script.index("{") : script.rindex("}") + 1])

@@ -17,7 +17,7 @@ from deploy.weight import closure, kind_of, megabytes, table
 from schemas.locks import UNUSED
 
 ROOT = Path(__file__).resolve().parents[2]
-SHIPPED = ("inertial", "schemas", "stations", "pipelines")
+SHIPPED = ("inertial", "schemas", "stations", "pipelines", "tumbleline")
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 MOST_PACKAGES, MOST_MB = 110, 650.0
 ENTRY = re.compile(r"^([\w.-]+)(?:\[[\w, -]+\])?==[^\s;\\]+(?:\s*;\s*([^\\]+))?", re.MULTILINE)

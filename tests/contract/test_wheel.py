@@ -21,7 +21,7 @@ SAMPLES = (*(f"deploy/{name}" for name in OF_DEPLOYMENT), "requirements-run.lock
 LOADS = """
 import json, sys
 from pathlib import Path
-import inertial, pipelines, schemas, stations
+import inertial, pipelines, schemas, stations, tumbleline
 from pipelines.audit.rules import load_rules
 from pipelines.cli import COMMANDS
 from pipelines.export.formats import __path__ as formats
@@ -33,7 +33,7 @@ from stations.profile_files import load_profile, profile_names
 folder = Path(pipelines.__file__).parent
 load_rules(), load_station()
 print(json.dumps({
-    "from": sorted({str(Path(m.__file__).parents[1]) for m in (inertial, pipelines, schemas, stations)}),
+    "from": sorted({str(Path(m.__file__).parents[1]) for m in (inertial, pipelines, schemas, stations, tumbleline)}),
     "recipes": [load_limits(load_recipe(name)).name and name for name in sample_names()],
     "limits": [read_limits(name) and name for name in sample_names("limits-")],
     "presets": [load_preset(name) and name for name in preset_names()],

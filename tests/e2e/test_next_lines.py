@@ -92,7 +92,24 @@ def _imported(folder: Path) -> tuple[int, str, str]:
     return given("import", folder / "norms.csv", *words, "--archive", folder / "kept runs")
 
 
-CASES = {"rerun": _rerun, "run": _run, "history": _refuted, "import_text": _imported}
+def _improved(folder: Path) -> tuple[int, str, str]:
+    rng = np.random.default_rng(4)
+    force = rng.normal(size=(20, 3))
+    force /= np.linalg.norm(force, axis=1)[:, None]
+    output = np.repeat(force * [1.01, 0.99, 1.02] + [0.01, 0.02, -0.01], 200, axis=0) + 1e-3 * rng.normal(
+        size=(4000, 3)
+    )
+    pd.DataFrame(output, columns=["acc_x (g)", "acc_y (g)", "acc_z (g)"]).assign(time_s=np.arange(4000) / 100.0).to_csv(
+        folder / "turned by hand.csv", index=False
+    )
+    return given(
+        "improve", folder / "turned by hand.csv", "--out", folder / "improved.toml", "--archive", folder / "kept runs"
+    )
+
+
+CASES = {
+    "rerun": _rerun, "run": _run, "history": _refuted, "import_text": _imported, "recording_text": _improved,
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("module", CASES)

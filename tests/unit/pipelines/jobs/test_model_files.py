@@ -123,7 +123,7 @@ def judged(confirmed, part, error, fall, density=None):
     by = "fresh run" if part is not None else "dwells left out"
     return {
         "judged_by": by, "confirmed": confirmed, "part": part, "part_u": error, "fall_ug": fall, "fall_u_ug": 0.4,
-        "log_density": density,
+        "log_density": density, "estimated_again": None,
     }  # fmt: skip
 
 

@@ -1,0 +1,32 @@
+"""The notebooks of the documents run, and their outputs are of the kind that stands in them."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from docs import notebooks
+
+FILES = sorted(notebooks.FOLDER.glob("*.ipynb"))
+
+
+def kinds(notebook: dict[str, Any]) -> list[list[str]]:
+    """The forms of output of every cell."""
+    cells = [cell for cell in notebook["cells"] if cell["cell_type"] == "code"]
+    return [[form for one in cell["outputs"] for form in one.get("data", {one["output_type"]: ""})] for cell in cells]
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda one: one.stem)
+def test_a_notebook_runs_and_shows_what_it_did(path: Path) -> None:
+    kept = json.loads(path.read_text(encoding="utf-8"))
+    assert "assert" in "".join(
+        line for cell in kept["cells"] for line in cell["source"]
+    )  # it checks itself against its truth
+    assert kinds(notebooks.run(path)) == kinds(kept)
+    assert "<svg" in path.read_text(encoding="utf-8")
+    assert str(Path.home()) not in path.read_text(encoding="utf-8")
+
+
+def test_there_are_three() -> None:
+    assert len(FILES) == 3

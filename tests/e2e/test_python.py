@@ -1,0 +1,159 @@
+"""The package for Python, as a scientist uses it: truths from physics, answers and errors as those of the commands."""
+
+import inspect
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from in_process import document_of
+
+import tumbleline as tl
+
+ROOT = Path(__file__).resolve().parents[2]
+LIGHT = (
+    "import sys, time; t = time.perf_counter(); import tumbleline; t = time.perf_counter() - t; print(t, *sys.modules)"
+)
+
+
+@pytest.fixture(scope="module")
+def turned() -> pd.DataFrame:
+    """A record turned by hand to 24 positions, 3 s each; a spring that hardens: the output follows x with f = x + 0.02·x³."""
+    rng = np.random.default_rng(20261126)
+    force = rng.normal(size=(24, 3))
+    force /= np.linalg.norm(force, axis=1)[:, None]
+    x = force.copy()
+    for _ in range(60):
+        x = force - 0.02 * x**3
+    turn = np.array([[1.01, 0.002, -0.003], [0.001, 0.99, 0.004], [0.002, 0.0, 1.02]])
+    output = np.repeat(x @ turn.T + [0.02, -0.01, 0.03], 300, axis=0) + 1e-3 * rng.normal(size=(7200, 3))
+    return pd.DataFrame(output, columns=["ax", "ay", "az"]).assign(
+        t=np.arange(7200) / 100.0, turn=np.repeat(np.arange(24), 300)
+    )
+
+
+def test_a_record_of_ones_own_from_reading_to_corrected_samples(turned: pd.DataFrame) -> None:
+    run = tl.read(turned.drop(columns="turn"), units={"output": "g"})
+    assert any("ax, ay, az" in line for line in run.told)
+    assert len(run.dwells) == 24
+    fit = tl.fit(run)
+    diagnosis = tl.diagnose(run, fit)
+    assert diagnosis.adequate is False
+    assert diagnosis.missing["effect"].tolist() == ["third_order"]
+    better = tl.improve(run)
+    assert better.added == ["third_order"]
+    assert better.adequate is True
+    ladder = better.ladder
+    assert ladder["fitted_ug"].iloc[-1] < 0.1 * ladder["fitted_ug"].iloc[0]
+    rows = better.calibration.coefficients.query("effect == 'bias'")
+    assert np.all(np.abs(rows["value"] - [0.02, -0.01, 0.03]) < 1.5 * rows["U"])
+    sizes = []
+    for model in (fit, better):
+        corrected = model.correct(
+            turned[["ax", "ay", "az"]].set_axis(list("xyz"), axis=1), temperature=25.0, rate_hz=100.0
+        )
+        force = corrected[["force_x_g", "force_y_g", "force_z_g"]].groupby(turned["turn"]).mean()
+        sizes.append(np.sqrt(np.mean((np.linalg.norm(force, axis=1) - 1.0) ** 2)))
+    assert sizes[1] < 2e-4  # noise of a mean: 1 mg/√300 = 58 µg an axis
+    assert sizes[0] > 1e-3
+
+
+def test_the_answers_are_those_of_the_commands(tmp_path: Path) -> None:
+    lot = tl.example("cubic_transfer", seed=5)
+    lot.run.dwells.to_parquet(tmp_path / "dwells.parquet")
+    lot.run.history.to_parquet(tmp_path / "history.parquet")
+    document = document_of("diagnose", str(tmp_path / "dwells.parquet"), "--effects", ",".join(lot.model), status=1)
+    ours = tl.diagnose(tl.read(tmp_path / "dwells.parquet"), lot.model)
+    assert ours.verdict == tl.diagnose(lot.run, lot.model).verdict
+    for key in ("adequate", "classes", "recommended", "error", "next_measurements"):
+        assert json.loads(json.dumps(ours.document[key])) == document[key]
+    assert lot.reveal().startswith("third_order")
+    better = tl.improve(lot.run, lot.model, fresh=lot.fresh)
+    assert better.added == ["third_order"]
+    assert better.ladder["confirmed"].iloc[-1] is True or bool(better.ladder["confirmed"].iloc[-1])
+
+
+def test_objects_draw_themselves_and_export(turned: pd.DataFrame, tmp_path: Path) -> None:
+    run = tl.read(turned.drop(columns="turn"), units={"output": "g"}, serial="SN7")
+    fit = tl.fit(run)
+    diagnosis = tl.diagnose(run, fit)
+    for one in (run, fit, diagnosis):
+        assert "SN7" in one._repr_html_() or "NOT ADEQUATE" in one._repr_html_()
+        assert one.plot()._repr_svg_().startswith("<svg")
+    assert fit.plot().save(tmp_path / "residuals.svg").read_text().startswith("<svg")
+    assert "NOT ADEQUATE" in diagnosis.report(tmp_path / "report.html").read_text(encoding="utf-8")
+    assert json.loads(fit.export("json"))["units"][0]["unit"] == "SN7"
+    with pytest.raises(tl.WrongUse, match="no format is called 'jsom'"):
+        fit.export("jsom")
+
+
+def test_an_archive_as_tables(turned: pd.DataFrame, tmp_path: Path) -> None:
+    kept = tmp_path / "archive"
+    fit = tl.fit(tl.read(turned.drop(columns="turn"), units={"output": "g"}, serial="SN7", archive=kept))
+    view = tl.archive(kept)
+    assert fit.run.id in view.runs["id"].tolist()
+    rows = view.coefficients("SN7")
+    assert set(rows["effect"]) == {"bias", "scale", "misalignment"}
+    assert view.query("SELECT count(*) AS n FROM coefficients")["n"].iloc[0] == len(rows)
+    assert view.calibration(fit.run.id).rms_ug == fit.rms_ug
+    with pytest.raises(tl.WrongUse, match="no calibration of unit SN7 is valid on 2026-05-01"):
+        view.coefficients("SN7", at="2026-05-01")
+    with pytest.raises(tl.TumblelineError, match="holds no archive"):
+        tl.archive(tmp_path / "nothing")
+
+
+def test_what_is_open_is_refused_with_what_to_state(tmp_path: Path) -> None:
+    table = pd.DataFrame(np.random.default_rng(1).normal(size=(50, 2)), columns=["p", "q"])
+    with pytest.raises(tl.WrongUse, match="columns="):
+        tl.read(table)
+    with pytest.raises(tl.TumblelineError, match=r"absent\.csv"):
+        tl.read(tmp_path / "absent.csv")
+    lot = tl.example("cubic_transfer", seed=5)
+    with pytest.raises(tl.DataRejected, match="every unit is needed in both"):
+        tl.improve(lot.run, lot.model, fresh=lot.fresh.dwells.query("unit != 'DEMO-1'"))
+
+
+def test_a_name_is_imported_when_it_is_used() -> None:
+    done = subprocess.run([sys.executable, "-c", LIGHT], cwd=ROOT, capture_output=True, text=True, check=True)
+    seconds, *modules = done.stdout.split()
+    assert float(seconds) < 0.3
+    assert not {"numpy", "pandas", "prefect", "stations"} & set(modules)
+    assert len(tl.__all__) <= 25
+    for name in tl.__all__:
+        assert inspect.getdoc(getattr(tl, name)), name
+    with pytest.raises(AttributeError, match="it has ArchiveView"):
+        _ = tl.nothing
+
+
+WITHOUT = """
+import sys
+for name in ("fcntl", "termios", "resource", "prefect"):
+    sys.modules[name] = None
+from pathlib import Path
+import tumbleline as tl
+run = tl.read(Path("dwells.csv"), archive="archive")
+fit = tl.fit(run)
+assert tl.diagnose(run, fit).adequate is not None
+tl.diagnose(run, fit).report("report.html")
+from pipelines.importers import files
+assert len(files.read(Path("dwells.csv"))[0])
+from pipelines.workbench import application
+print(len(tl.archive("archive").runs))
+"""
+
+
+def test_the_desk_side_needs_no_module_that_windows_lacks(tmp_path: Path) -> None:
+    tl.example("cubic_transfer", seed=5).run.dwells.to_csv(tmp_path / "dwells.csv", index=False)
+    done = subprocess.run(
+        [sys.executable, "-c", WITHOUT],
+        cwd=tmp_path,
+        env={"PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.strip() == "2"

@@ -1,0 +1,119 @@
+"""An archive as tables: its runs, their tables, SQL over all of them, and the calibration of a unit on a date."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+
+import pandas as pd
+
+from pipelines.archive import Archive
+from tumbleline.calibrations import Calibration, K
+from tumbleline.pictures import Picture
+from tumbleline.recordings import Recording
+
+_OF_ALL_RUNS = "SELECT r.measured, c.* FROM coefficients c JOIN runs r USING (run) ORDER BY r.measured, c.run"
+
+
+@dataclass(frozen=True)
+class ArchiveView:
+    """An archive that is read."""
+
+    store: Archive = field(repr=False)
+
+    @property
+    def runs(self) -> pd.DataFrame:
+        """One row per run, oldest first."""
+        return pd.DataFrame([asdict(info) for info in self.store.runs()])
+
+    def read(self, run: str = "latest") -> Recording:
+        """The dwells of a run, by its name, the beginning of it, or ``latest``."""
+        return Recording(self.store.run(run))
+
+    def calibration(self, run: str = "latest") -> Calibration:
+        """The coefficients of a run."""
+        return Calibration(self.store.run(run))
+
+    def table(self, name: str, run: str = "latest") -> pd.DataFrame:
+        """A table of a run: ``figures``, ``grades``, ``residuals``, ``noise``, and others."""
+        return self.store.run(run).table(name)
+
+    def coefficients(self, unit: str = "", *, at: str = "", known: str = "") -> pd.DataFrame:
+        """Coefficients of a unit's certified calibration that is valid on a day; without a day those of every run, oldest first.
+
+        Parameters
+        ----------
+        unit : serial number; empty: of all units, without a day only
+        at : day as ``YYYY-MM-DD`` · known : as the archive was on this day
+
+        Raises
+        ------
+        WrongUse
+            No calibration of the unit is valid on that day, or a day is given without a unit.
+        """
+        from schemas.errors import WrongUse
+
+        if not at:
+            rows = self.query(_OF_ALL_RUNS)
+            rows = rows.assign(U=K * rows["standard_error"].astype(float))
+            return rows[rows["unit"] == unit].reset_index(drop=True) if unit else rows
+        if not unit:
+            raise WrongUse("coefficients: a day is given and no unit, both are needed; give unit='…'")
+        from pipelines.certificates import Ledger
+        from pipelines.certificates.coefficient_remarks import coefficients_of
+        from pipelines.certificates.days import day_of
+
+        day = day_of(at, "at")
+        history = Ledger(self.store).calibrations(unit, day_of(known, "known") if known else "")
+        valid = next((one for one in history if one.holds(day)), None)
+        if valid is None:
+            there = "; ".join(f"{one.certificate} from {one.start} until {one.until}, {one.state}" for one in history)
+            raise WrongUse(f"coefficients: no calibration of unit {unit} is valid on {day} ({there or 'it has none'})")
+        rows = pd.DataFrame(coefficients_of(self.store.run(valid.run), valid))
+        return rows.assign(U=K * rows["standard_error"].astype(float), certificate=valid.certificate, run=valid.run)
+
+    def plot(self, unit: str, effect: str = "bias") -> Picture:
+        """Change of a unit's coefficients of an effect since they were measured first, with U (k = 2) as bars, by day."""
+        from pipelines.drawing.chart import SEVERAL, Chart, Plot, PlotAxis, Trace
+        from schemas.errors import WrongUse
+
+        rows = self.coefficients(unit)
+        rows = rows[rows["effect"] == effect]
+        if not len(rows):
+            raise WrongUse(
+                f"plot: no run of this archive has coefficients of {effect} of unit {unit}; see .coefficients()"
+            )
+        days = (
+            pd.to_datetime(rows["measured"], utc=True, format="ISO8601").dt.tz_localize(None).to_numpy("datetime64[s]")
+        )
+        rows = rows.assign(day=days.astype(float) / 86400.0)
+        traces = tuple(
+            Trace(f"{axis} {name}", own["day"].to_numpy(dtype=float), (own["value"] - own["value"].iloc[0]).to_numpy(dtype=float),
+                  role=role, error=own["U"].to_numpy(dtype=float))
+            for role, ((axis, name), own) in zip(SEVERAL, rows.groupby(["axis", "name"]), strict=False)
+        )  # fmt: skip
+        title, value = f"{effect} of {unit}", f"change since the first / {rows['unit_text'].iloc[0]}"
+        return Picture(Chart(title, (Plot(title, PlotAxis("measured", dates=True), PlotAxis(value), traces),)))
+
+    def query(self, sql: str) -> pd.DataFrame:
+        """The answer to one SELECT over all runs; the views are those of ``tumbleline query``."""
+        from pipelines.audit.sql import ask
+
+        answer = ask(self.store, sql)
+        return pd.DataFrame(answer.rows, columns=list(answer.columns))
+
+    def _repr_html_(self) -> str:
+        return self.runs.to_html(index=False, border=0)
+
+
+def archive(folder: str | Path | None = None) -> ArchiveView:
+    """An archive; the folder of TUMBLELINE_ARCHIVE, else ``./archive``, by default.
+
+    Raises
+    ------
+    ArchiveUnusable
+        The folder holds no archive.
+    """
+    store = Archive(None if folder is None else str(folder))
+    store.refuse_none()
+    return ArchiveView(store)

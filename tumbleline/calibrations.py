@@ -1,0 +1,178 @@
+"""Coefficients of units with their uncertainty, and what can be done with them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from pipelines.archive import Archive, Run
+from tumbleline.pictures import Picture, as_html, as_text, rounded_table
+from tumbleline.recordings import Recording
+
+K = 2.0
+"""Coverage factor of U."""
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """A model that was fitted to a recording.
+
+    run : the run of the archive that holds it
+    """
+
+    run: Run = field(repr=False)
+
+    @property
+    def effects(self) -> list[str]:
+        """Ids of the effects of the model."""
+        return list(self.run.about["recipe"]["effects"])
+
+    @property
+    def coefficients(self) -> pd.DataFrame:
+        """One row per coefficient: ``unit, axis, effect, name, value, standard_error, U, unit_text``; U with k = 2."""
+        table = self.run.table("coefficients")
+        table = table.assign(U=K * table["standard_error"].astype(float))
+        return table[["unit", "axis", "effect", "name", "value", "standard_error", "U", "unit_text"]]
+
+    @property
+    def residuals(self) -> pd.DataFrame:
+        """One row per dwell and axis, in µg."""
+        return self.run.table("residuals")
+
+    @property
+    def rms_ug(self) -> float:
+        """Residual of the fit over all units and axes, µg."""
+        return float(np.sqrt(np.nanmean(self.residuals["residual_ug"].to_numpy(dtype=float) ** 2)))
+
+    @property
+    def recording(self) -> Recording:
+        """The dwells that were fitted."""
+        return Recording(self.run)
+
+    def correct(
+        self,
+        samples: pd.DataFrame | NDArray[np.float64],
+        *,
+        unit: str = "",
+        temperature: float | NDArray[np.float64] | None = None,
+        rate_hz: float | None = None,
+    ) -> pd.DataFrame:
+        """Specific force of raw samples, with its uncertainty by the calibration.
+
+        Parameters
+        ----------
+        samples : (n, 3) in output unit, or a table with x, y, z (or out_x, …) and the quantities of the model, e.g. ``unit_C``
+        unit : serial number; needed where there are several
+        temperature : °C, one or (n,); for an array of samples
+        rate_hz : where the samples have no column ``time_s``; it only decides ``time_s``
+
+        Returns
+        -------
+        pandas.DataFrame
+            ``time_s``, ``force_x_g`` …, ``u_x_ug`` … (standard uncertainties) and covariances.
+        """
+        from pipelines.export.corrected import corrected, fit_of_unit, table_of
+        from pipelines.export.recording import recording_of
+        from pipelines.jobs.model_files import use_formulas_of
+
+        table = samples if isinstance(samples, pd.DataFrame) else pd.DataFrame(np.asarray(samples), columns=list("xyz"))
+        if temperature is not None:
+            table = table.assign(unit_C=temperature)
+        rate = 1.0 if rate_hz is None and "time_s" not in table else rate_hz
+        use_formulas_of(self.run)
+        one = fit_of_unit(self.run, unit, failed=True, revoked=False)
+        recording = recording_of(table, "samples", rate_hz=rate)
+        return table_of(recording, corrected(recording, one, None))
+
+    def export(self, form: str = "json", output: str | Path | None = None, **settings: Any) -> str | bytes:
+        """The coefficients for firmware, autopilots and spreadsheets.
+
+        Parameters
+        ----------
+        form : a format of ``tumbleline export``: json, csv, c, ardupilot, px4, …
+        output : file to write; None: none is written
+        settings : of :class:`pipelines.export.settings.ExportSettings`: ``nominal``, ``arithmetic``, ``rate`` …
+
+        Returns
+        -------
+        str or bytes
+            The content of the file; bytes for a binary format.
+        """
+        from pipelines.archive import files
+        from pipelines.export import FORMATS, ExportSettings, export_files, unit_calibrations
+        from schemas.errors import WrongUse, did_you_mean
+
+        if form not in FORMATS:
+            raise WrongUse(f"export: no format is called '{form}'; {did_you_mean(form, FORMATS)}")
+        chosen = unit_calibrations(self.run, (), failed=True)
+        made = export_files(form, chosen, self.run.id, ExportSettings(**settings))
+        if len(made) > 1:
+            raise WrongUse(
+                f"export: {form} has a file for each of {len(made)} units; fit one unit, or use 'tumbleline export'"
+            )
+        content = next(iter(made.values()))
+        if output is not None:
+            files.publish(Path(output), content, "export", files.ELSEWHERE)
+        try:
+            return content.decode()
+        except UnicodeDecodeError:
+            return content
+
+    def plot(self) -> Picture:
+        """Residuals by dwell, of the first unit."""
+        from pipelines.drawing.chart import SEVERAL, Chart, Plot, PlotAxis, Trace
+
+        rows = self.residuals
+        rows = rows[rows["unit"] == rows["unit"].iloc[0]]
+        traces = tuple(
+            Trace(str(axis), own["dwell"].to_numpy(dtype=float), own["residual_ug"].to_numpy(dtype=float), role=role)
+            for role, (axis, own) in zip(SEVERAL, rows.groupby("axis", sort=True), strict=False)
+        )
+        title = f"Residuals of {rows['unit'].iloc[0]}"
+        return Picture(Chart(title, (Plot(title, PlotAxis("dwell"), PlotAxis("residual / µg"), traces),)))
+
+    def _lines(self) -> list[str]:
+        return [f"{', '.join(self.effects)}; residual {self.rms_ug:.3g} µg rms; U with k = 2; run {self.run.id}"]
+
+    def _repr_html_(self) -> str:
+        return as_html("Calibration", self._lines(), rounded_table(self.coefficients))
+
+    def __str__(self) -> str:
+        return as_text("Calibration", self._lines(), rounded_table(self.coefficients))
+
+
+def fit(
+    recording: Recording | str | Path | pd.DataFrame,
+    effects: Sequence[str] | None = None,
+    *,
+    leave_out: Sequence[str] = (),
+) -> Calibration:
+    """Coefficients of a model by generalised least squares with the noise that the dwells show, as ``tumbleline fit``.
+
+    Parameters
+    ----------
+    recording : from :func:`tumbleline.read`, or what it reads
+    effects : ids of :func:`tumbleline.effects`; None: bias, scale, misalignment, and the terms in temperature where it varies
+    leave_out : dwells as ``UNIT:DWELL``
+
+    Raises
+    ------
+    DataRejected
+        The dwells do not determine the model.
+    """
+    from pipelines.jobs.model_change import change_from_options
+    from pipelines.rerun.rerun import again
+    from pipelines.tables.leave_out import named_dwells
+    from tumbleline.recordings import read
+
+    given = recording if isinstance(recording, Recording) else read(recording)
+    archive = Archive(given.run.archive.root)
+    change = change_from_options(",".join(effects or ()), where="fit")
+    done = again(archive, given.run.id, change, left_out=named_dwells(",".join(leave_out)))
+    return Calibration(archive.run(done.new))

@@ -1,0 +1,146 @@
+"""Whether a model is adequate, where it fails, and which physical effect is missing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pandas as pd
+
+from tumbleline.calibrations import Calibration
+from tumbleline.pictures import Picture, as_html, as_text
+from tumbleline.recordings import Recording, read
+
+if TYPE_CHECKING:
+    from pipelines.diagnosis.diagnose import Examination
+
+_FIGURES = ("size_ug", "p_value", "rms_after_ug", "heldout_after_ug")
+
+
+@dataclass(frozen=True)
+class ModelDiagnosis:
+    """The diagnosis of a model.
+
+    document : with the keys of ``tumbleline diagnose --json``
+    """
+
+    document: dict[str, Any] = field(repr=False)
+    source: str = ""
+    _made: Examination | None = field(default=None, repr=False)
+
+    @property
+    def adequate(self) -> bool | None:
+        """Whether nothing but noise is left; None where these data cannot tell."""
+        return self.document["adequate"]
+
+    @property
+    def effects(self) -> list[str]:
+        """The model that was judged."""
+        return list(self.document["effects"])
+
+    @property
+    def verdict(self) -> str:
+        """The verdict in one sentence with its numbers."""
+        from pipelines.diagnosis.sentences import verdict
+
+        return verdict(self.document)
+
+    @property
+    def missing(self) -> pd.DataFrame:
+        """One row per class of effects that these data cannot separate: what is missing, first the one that is proposed.
+
+        ``size_ug``: of the effect; ``p_value``: of noise alone; ``rms_after_ug``, ``heldout_after_ug``: residual with it, of the
+        dwells that are fitted and of dwells left out.
+        """
+        from pipelines.diagnosis.sections import parameters_of
+
+        rows = [
+            {
+                "effect": next(
+                    (name for name in self.document["recommended"] if name in group["effects"]), group["effects"][0]
+                ),
+                "class": ", ".join(group["effects"]),
+                "scope": group["scope"],
+                **{key: group[key] for key in _FIGURES},
+                "parameters": group.get("evidence") or parameters_of(group),
+            }
+            for group in self.document["classes"]
+        ]
+        return pd.DataFrame(rows, columns=["effect", "class", "scope", *_FIGURES, "parameters"])
+
+    @property
+    def next_measurements(self) -> pd.DataFrame:
+        """What to measure next, to separate what these data do not."""
+        return pd.DataFrame(self.document["next_measurements"])
+
+    def plot(self) -> Picture:
+        """Residuals against the recorded quantities that they follow, before and after what was found.
+
+        Raises
+        ------
+        WrongUse
+            No unit could be judged, or no recorded quantity varies.
+        """
+        from pipelines.report.diagnosis_pictures import driver_chart
+        from pipelines.report.residuals import drivers_shown, lot_residuals
+        from schemas.errors import WrongUse
+
+        made = self._made
+        drivers = [] if made is None or made.diagnosis is None else drivers_shown(made.diagnosis)
+        if made is None or made.diagnosis is None or not drivers:
+            raise WrongUse("plot: no residual to be shown against a recorded quantity; see .document")
+        faulty = {unit for fault in self.document["blocked_by"] for unit in fault["units"]}
+        left = lot_residuals(made.diagnosis, tuple(unit for unit in made.measured.units if unit not in faulty))
+        return Picture(driver_chart(left, drivers, made.diagnosis.problem.lot.state.temperature))
+
+    def report(self, path: str | Path) -> Path:
+        """Write the diagnosis with its pictures as one HTML file."""
+        from pipelines.archive import files
+        from pipelines.report.diagnosis import render_diagnosis
+        from schemas.errors import WrongUse
+
+        if self._made is None:
+            raise WrongUse("report: this diagnosis was kept as a document alone; diagnose the recording again")
+        text = render_diagnosis(self.document, self._made.measured, self._made.diagnosis, self.source)
+        files.publish(Path(path), text.encode(), "report", files.ELSEWHERE)
+        return Path(path)
+
+    def _repr_html_(self) -> str:
+        from schemas.errors import WrongUse
+
+        try:
+            picture = self.plot()
+        except WrongUse:
+            picture = None
+        return as_html("Diagnosis", [self.verdict], self.missing, picture=picture)
+
+    def __str__(self) -> str:
+        return as_text("Diagnosis", [self.verdict], self.missing)
+
+
+def diagnose(
+    recording: Recording | str | Path | pd.DataFrame,
+    model: Calibration | Sequence[str] | None = None,
+    *,
+    leave_out: Sequence[str] = (),
+) -> ModelDiagnosis:
+    """Whether a model is adequate for a recording, where it fails, and which effect is missing, as ``tumbleline diagnose``.
+
+    Parameters
+    ----------
+    recording : from :func:`tumbleline.read`, or what it reads
+    model : a fit, or ids of effects; None: the default model
+    leave_out : dwells as ``UNIT:DWELL``
+    """
+    from pipelines.diagnosis.diagnose import examination
+    from pipelines.tables.leave_out import leave_out as without
+    from pipelines.tables.leave_out import named_dwells
+
+    given = recording if isinstance(recording, Recording) else read(recording)
+    judged = model.effects if isinstance(model, Calibration) else model
+    named = named_dwells(",".join(leave_out))
+    dwells = without(given.dwells, named) if named else given.dwells
+    made = examination(dwells, given.history, judged, [f"{unit}:{dwell}" for unit, dwell in named])
+    return ModelDiagnosis(made.document, given.run.id, made)

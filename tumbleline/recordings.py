@@ -1,0 +1,256 @@
+"""Recordings of accelerometers: a file of any system, a DataFrame, or a run of an archive, as dwells that can be fitted."""
+
+from __future__ import annotations
+
+import hashlib
+import tempfile
+from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass, field, replace
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pandas as pd
+
+from pipelines.archive import Archive, Run
+from tumbleline.pictures import Picture, as_html, as_text
+
+if TYPE_CHECKING:
+    from pipelines.importers.proposal import Proposal
+    from pipelines.importers.recognition import Recognition
+
+Source = str | Path | pd.DataFrame
+
+
+@cache
+def _session() -> tempfile.TemporaryDirectory[str]:
+    return tempfile.TemporaryDirectory(prefix="tumbleline-")
+
+
+def session_folder() -> Path:
+    """The folder of this process for what nobody asked to keep; it is removed when the process ends."""
+    return Path(_session().name)
+
+
+def silent(_: str = "") -> AbstractContextManager[Any]:
+    """Shows nothing while something is computed."""
+    return nullcontext()
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Dwells of one or several units, and how they came about.
+
+    run : that holds them, in the archive that was named, else in one of this process
+    told : what was recognised, assumed and left out, as sentences · command : the import that says the same; empty for dwells
+    """
+
+    run: Run = field(repr=False)
+    told: tuple[str, ...] = ()
+    command: str = ""
+
+    @property
+    def dwells(self) -> pd.DataFrame:
+        """One row per dwell, in the exchange format: outputs in ``out_unit``, forces in g, temperatures in °C, times in s."""
+        from pipelines.importers.exchange import dwells_of_run
+
+        return dwells_of_run(self.run)
+
+    @property
+    def history(self) -> pd.DataFrame | None:
+        """Temperatures against time; None where they were not recorded."""
+        from pipelines.importers.exchange import history_of_run
+
+        return history_of_run(self.run) if "history" in self.run.tables() else None
+
+    @property
+    def samples(self) -> pd.DataFrame | None:
+        """The raw samples of an import; None where the source had means."""
+        return self.run.table("samples") if "samples" in self.run.tables() else None
+
+    @property
+    def units(self) -> list[str]:
+        """Serial numbers."""
+        return list(dict.fromkeys(self.dwells["unit"].astype(str)))
+
+    def plot(self) -> Picture:
+        """The outputs of the first unit by dwell."""
+        from pipelines.drawing.chart import Chart, Plot, PlotAxis, Role, Trace
+
+        dwells = self.dwells
+        own = dwells[dwells["unit"] == dwells["unit"].iloc[0]]
+        names = [name for name in ("out_x", "out_y", "out_z") if name in own]
+        unit = str(own["out_unit"].iloc[0]) if "out_unit" in own else ""
+        x = own["dwell"].to_numpy(dtype=float)
+        roles: dict[str, Role] = {"x": "x", "y": "y", "z": "z"}
+        traces = tuple(Trace(name[-1], x, own[name].to_numpy(dtype=float), role=roles[name[-1]]) for name in names)
+        title = f"Outputs of {own['unit'].iloc[0]}"
+        return Picture(Chart(title, (Plot(title, PlotAxis("dwell"), PlotAxis(f"output / {unit}"), traces),)))
+
+    def _lines(self) -> list[str]:
+        counted = f"{len(self.dwells)} dwells of {len(self.units)} unit{'s' if len(self.units) != 1 else ''}"
+        return [f"{counted}; run {self.run.id}", *self.told, *([self.command] if self.command else [])]
+
+    def _repr_html_(self) -> str:
+        return as_html("Recording", self._lines(), self.dwells.head(6))
+
+    def __str__(self) -> str:
+        return as_text("Recording", self._lines())
+
+
+def read(
+    source: Source,
+    *,
+    history: Source | None = None,
+    columns: Mapping[str, str] | None = None,
+    units: Mapping[str, str] | None = None,
+    serial: str = "",
+    archive: str | Path | None = None,
+    **stated: Any,
+) -> Recording:
+    """A recording.
+
+    Parameters
+    ----------
+    source : a file in any format of ``tumbleline import``, a table of dwells in the exchange format, a DataFrame of either, or
+        the name of a run of ``archive``
+    history : temperatures against time; that beside a file of dwells by default
+    columns, units : meaning → column (``x``, ``y``, ``z``, ``time``, ``temperature``, …) and quantity → unit (``output``,
+        ``time``); what is not stated is recognised, and told in :attr:`Recording.told`
+    serial : serial number of the device; the name of the file, or A, by default
+    archive : folder that keeps the recording; None: it goes when the process ends
+    stated : further keys of a mapping, as in ``tumbleline import``: ``rate_hz``, ``local_gravity_m_s2``, ``poses``, ``rows`` …
+
+    Raises
+    ------
+    WrongUse
+        The recording leaves something open; the message says what to state.
+    DataRejected
+        The recording cannot be used; the message says why.
+    """
+    from pipelines.importers.exchange import is_exchange
+
+    if isinstance(source, pd.DataFrame):
+        if is_exchange(source.columns) and not columns:
+            return _kept(*_checked(source, history), "DataFrame", archive)
+        return replace(_imported(_as_file(source), columns, units, serial or "A", archive, stated), command="")
+    from pipelines.importers.files import is_file
+
+    if not is_file(str(source)):
+        return Recording(Archive(None if archive is None else str(archive)).run(str(source)))
+    path = Path(source)
+    if columns is None and _is_table_of_dwells(path):
+        from pipelines.diagnosis.inputs import dwells_and_history
+
+        beside = history if isinstance(history, str | Path) else ""
+        dwells, past, _ = dwells_and_history(str(path), str(beside), None)
+        return _kept(
+            dwells, _checked_history(history) if isinstance(history, pd.DataFrame) else past, path.name, archive
+        )
+    return _imported(path, columns, units, serial, archive, stated)
+
+
+def _is_table_of_dwells(path: Path) -> bool:
+    from pipelines.importers import files
+    from pipelines.importers.exchange import is_exchange
+
+    return is_exchange(files.read(path)[0].columns)
+
+
+def _checked(source: pd.DataFrame, history: Source | None) -> tuple[pd.DataFrame, pd.DataFrame | None]:
+    from pipelines.importers.exchange import checked, read_history
+
+    past = history if isinstance(history, pd.DataFrame) else None if history is None else read_history(history)
+    return checked(source, where="DataFrame", foreign=True), past
+
+
+def _checked_history(history: pd.DataFrame) -> pd.DataFrame:
+    from pipelines.importers.exchange import checked_history
+
+    return checked_history(history, "history", foreign=True)
+
+
+def _kept(dwells: pd.DataFrame, history: pd.DataFrame | None, name: str, archive: str | Path | None) -> Recording:
+    """A table of dwells as a run."""
+    from pipelines.importers.keep import keep_tables, lot_of_import
+
+    tables = {"dwells": dwells} if history is None else {"dwells": dwells, "history": history}
+    digest = hashlib.sha256()
+    for one in tables.values():
+        digest.update(one.to_csv(index=False).encode())
+    serials = list(dict.fromkeys(dwells["unit"].astype(str)))
+    about = {"name": f"dwells of {', '.join(serials[:3])}", "lot": lot_of_import(serials), "remarks": []}
+    run = keep_tables("import", digest.hexdigest(), {"dwells": name}, about, tables, _place(archive))
+    return Recording(run)
+
+
+def _place(archive: str | Path | None) -> str:
+    return str(session_folder() / "archive") if archive is None else str(archive)
+
+
+def _as_file(table: pd.DataFrame) -> Path:
+    """The table as a file that an import reads, named by its content."""
+    text = table.to_csv(index=False).encode()
+    path = session_folder() / hashlib.sha256(text).hexdigest()[:10] / "DataFrame.csv"
+    path.parent.mkdir(exist_ok=True)
+    path.write_bytes(text)
+    return path
+
+
+def _imported(
+    path: Path,
+    columns: Mapping[str, str] | None,
+    units: Mapping[str, str] | None,
+    serial: str,
+    archive: str | Path | None,
+    stated: dict[str, Any],
+) -> Recording:
+    """A recording of another system, with what was stated of it and what is recognised beyond that."""
+    from pipelines.diagnosis.import_document import import_document
+    from pipelines.importers.mapping import build
+    from pipelines.importers.recognition import recognise
+    from schemas.errors import WrongUse
+
+    seen = recognise([path])
+    proposal = seen.for_fit()
+    found = dict(proposal.keys if proposal is not None else seen.keys or {})
+    keys = found | stated
+    keys["columns"] = dict(columns) if columns is not None else found.get("columns", {})
+    keys["units"] = {**found.get("units", {}), **(units or {})}
+    keys |= {"unit": serial} if serial else {}
+    if open_ := _open(keys, seen, decided=proposal is not None):
+        raise WrongUse(
+            f"read: {path.name} does not state {'; '.join(open_)}; state it: columns={{'x': …}}, units={{'output': …}}, "
+            f"rate_hz=…; recognised: {seen.import_command}"
+        )
+    build(keys, path.name)
+    done = import_document([path], keys, path.name, "", _place(archive), None, silent)
+    run = Archive(_place(archive)).run(done["run"])
+    return Recording(run, _told(seen, proposal, done["remarks"]), _command(keys, path))
+
+
+def _open(keys: dict[str, Any], seen: Recognition, *, decided: bool) -> list[str]:
+    """What is neither stated nor recognised."""
+    blanks = {"COLUMN", "UNIT", "HZ"}
+    left = [f"column {m}" for m, name in keys["columns"].items() if name in blanks]
+    left += [f"unit of {what}" for what, unit in keys["units"].items() if unit in blanks]
+    left += ["rate_hz"] if keys.get("rate_hz") in blanks else []
+    return left or ([] if decided or not seen.open or keys["columns"] else list(seen.open))
+
+
+def _told(seen: Recognition, proposal: Proposal | None, remarks: Sequence[str]) -> tuple[str, ...]:
+    guessed = seen.guessed
+    axes = ", ".join(filter(None, (guessed.column(axis) for axis in "xyz")))
+    told = (
+        [f"x, y, z: {axes} ({guessed.triad.reason}); in {guessed.output.meaning}: {guessed.output.reason}"]
+        if axes
+        else []
+    )
+    return (*told, *(() if proposal is None else (*proposal.assumed, *proposal.remarks)), *remarks)
+
+
+def _command(keys: dict[str, Any], path: Path) -> str:
+    from pipelines.importers.proposal import Proposal
+
+    return Proposal(keys).command([path])
