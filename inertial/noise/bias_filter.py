@@ -44,6 +44,8 @@ class BiasFilter:
     rejected: int = 0
     innovations: list[tuple[int, float]] = field(default_factory=list[tuple[int, float]])
     """Channel and innovation over its standard deviation, of every update that was accepted; channel 3 is the magnitude."""
+    begin: "BiasState | None" = None
+    """Where it goes on; None: a new switch-on."""
     _x: Array = field(init=False, repr=False)
     _p: Array = field(init=False, repr=False)
     _mean: Array = field(init=False, repr=False)
@@ -52,14 +54,17 @@ class BiasFilter:
     )
 
     def __post_init__(self) -> None:
-        model = self.model
-        parts = model.sd.shape[1] + 1
-        width = parts + 1
-        first = np.concatenate([model.sd**2, model.turn_on[:, None] ** 2], axis=1)
-        into = np.vstack([np.eye(parts), np.ones(parts)])  # before the first step the mean is the value at that time
-        self._x = np.zeros(AXES * width)
-        self._p = _blocks([into @ np.diag(own) @ into.T for own in first])
-        self._mean = np.kron(np.eye(AXES), np.arange(width) == parts).astype(np.float64)
+        first = first_covariances(self.model)
+        width = first.shape[-1]
+        self._x, self._p = np.zeros(AXES * width), _blocks(list(first))
+        if self.begin is not None:
+            self._x, self._p = self.begin.x.copy(), self.begin.p.copy()
+        self._mean = np.kron(np.eye(AXES), np.arange(width) == width - 1).astype(np.float64)
+
+    @property
+    def state(self) -> "BiasState":
+        """What it takes to go on after a pause."""
+        return BiasState(self._x.copy(), self._p.copy())
 
     @property
     def bias(self) -> Array:
@@ -99,17 +104,8 @@ class BiasFilter:
 
     def _transition(self, seconds: float, *, mean: bool) -> tuple[Array, Array]:
         """Transition and added covariance, both (3w, 3w), of a time, whose mean or whose end is the bias."""
-        model = self.model
-        transitions, added = list[Array](), list[Array]()
-        for axis in range(AXES):
-            parts = [
-                *(step_of_process(s, t, seconds) for s, t in zip(model.sd[axis], model.correlation_s, strict=True)),
-                step_of_walk(model.walk[axis], seconds),
-            ]
-            own = _axis_step(parts if mean else [part.at_end() for part in parts])
-            transitions.append(own[0])
-            added.append(own[1])
-        return _blocks(transitions), _blocks(added)
+        transitions, added = transitions_by_axis(self.model, seconds, mean=mean)
+        return _blocks(list(transitions)), _blocks(list(added))
 
     def known_force(self, difference: Array, seconds: float) -> None:
         """Updates with corrected output minus true force (3,), g, each a mean over ``seconds``."""
@@ -141,6 +137,34 @@ class BiasFilter:
         self._x = self._x + gain * innovation
         left = np.eye(len(row)) - np.outer(gain, row)
         self._p = left @ self._p @ left.T + variance * np.outer(gain, gain)
+
+
+@dataclass(frozen=True)
+class BiasState:
+    """State (3w,) of a filter, in g, and its covariance (3w, 3w), of the w parts of every axis."""
+
+    x: Array
+    p: Array
+
+
+def first_covariances(model: BiasModel) -> Array:
+    """Covariance (3, w, w), g², of the parts and the mean of every axis at switch-on: the mean is then the value."""
+    parts = model.sd.shape[1] + 1
+    first = np.concatenate([model.sd**2, model.turn_on[:, None] ** 2], axis=1)
+    into = np.vstack([np.eye(parts), np.ones(parts)])
+    return np.stack([into @ np.diag(own) @ into.T for own in first])
+
+
+def transitions_by_axis(model: BiasModel, seconds: float, *, mean: bool) -> tuple[Array, Array]:
+    """Transition and added covariance (3, w, w) of a time; ``mean``: the last part is the mean over it, else its end."""
+    steps: list[tuple[Array, Array]] = []
+    for axis in range(AXES):
+        parts = [
+            *(step_of_process(s, t, seconds) for s, t in zip(model.sd[axis], model.correlation_s, strict=True)),
+            step_of_walk(model.walk[axis], seconds),
+        ]
+        steps.append(_axis_step(parts if mean else [part.at_end() for part in parts]))
+    return np.stack([phi for phi, _ in steps]), np.stack([grown for _, grown in steps])
 
 
 def _axis_step(parts: list[StepOfProcess]) -> tuple[Array, Array]:
@@ -211,9 +235,18 @@ class Track:
     updated: NDArray[np.bool_]
     consistency: Consistency
     rejected: int
+    end: BiasState
 
 
-def track(model: BiasModel, time: Array, force: Array, known: Array, magnitude: Array, seconds: float) -> Track:
+def track(
+    model: BiasModel,
+    time: Array,
+    force: Array,
+    known: Array,
+    magnitude: Array,
+    seconds: float,
+    begin: tuple[BiasState, float] | None = None,
+) -> Track:
     """The bias over steps, with updates where the force is known.
 
     Parameters
@@ -222,14 +255,16 @@ def track(model: BiasModel, time: Array, force: Array, known: Array, magnitude: 
     force : (n, 3), g, corrected output, means over steps of ``seconds``
     known : (n, 3), g, true force; NaN where it is not known
     magnitude : (n,), g, its magnitude where that alone is known; NaN elsewhere
+    begin : a state to go on with, and its time, s: the middle of the step after which it was kept
     """
-    tracker = BiasFilter(model)
+    tracker = BiasFilter(model, begin=None if begin is None else begin[0])
     n = len(time)
     bias, covariance, updated = np.empty((n, AXES)), np.empty((n, AXES, AXES)), np.zeros(n, dtype=np.bool_)
     expected, before = np.empty_like(bias), np.empty_like(covariance)
     for k in range(n):
         accepted = len(tracker.innovations)
-        tracker.predict(float(time[k] - time[k - 1]) if k else seconds, seconds)
+        since = float(time[k] - time[k - 1]) if k else seconds if begin is None else float(time[0] - begin[1])
+        tracker.predict(since, seconds)
         expected[k], before[k] = tracker.bias, tracker.covariance
         if np.all(np.isfinite(known[k])):
             tracker.known_force(force[k] - known[k], seconds)
@@ -237,4 +272,6 @@ def track(model: BiasModel, time: Array, force: Array, known: Array, magnitude: 
             tracker.known_magnitude(force[k], float(magnitude[k]), seconds)
         updated[k] = len(tracker.innovations) > accepted  # not where every innovation was beyond the gate
         bias[k], covariance[k] = tracker.bias, tracker.covariance
-    return Track(bias, covariance, expected, before, updated, consistency(tracker.innovations), tracker.rejected)
+    return Track(
+        bias, covariance, expected, before, updated, consistency(tracker.innovations), tracker.rejected, tracker.state
+    )

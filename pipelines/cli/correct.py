@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -25,7 +26,7 @@ from schemas.errors import DONE, PART_FAILED, WrongUse
 
 if TYPE_CHECKING:
     from pipelines.export.corrected import Corrected
-    from pipelines.export.documents import CorrectDocument, TrackedBiasDocument
+    from pipelines.export.documents import CorrectDocument, FilterDocument, TrackedBiasDocument
     from pipelines.export.recording import CorrectableRecording
 
 PART = "Results"
@@ -77,6 +78,24 @@ def command(
     step: Annotated[
         float, typer.Option("--step", metavar="S", min=1e-3, help="Time between updates of the bias.")
     ] = 1.0,
+    low_pass: Annotated[
+        str, typer.Option("--filter", metavar="butterworth|fir|moving-average", help="Low-pass behind the correction.")
+    ] = "",
+    cutoff: Annotated[
+        float | None,
+        typer.Option(
+            "--cutoff",
+            metavar="HZ",
+            min=1e-9,
+            help="Its -3 dB frequency; the unit's bandwidth that a run measured by default.",
+        ),
+    ] = None,
+    state: Annotated[
+        Path | None,
+        typer.Option(
+            "--state", metavar="FILE", help="Go on with filter and bias as kept in this file, and keep them in it."
+        ),
+    ] = None,
     archive: options.ArchiveOption = None,
     *,
     at_rest: Annotated[
@@ -89,18 +108,31 @@ def command(
     """Correct a recording: a = K⁻¹(ã − b) with all effects of the model, and the covariance of each sample.
 
     The bias is tracked where the specific force is known (--force, or columns force_x, force_y, force_z) or the unit is at rest
-    (--at-rest); between updates its standard deviation grows according to the unit's noise. Exit status 1: the updates
+    (--at-rest); between updates its standard deviation grows according to the unit's noise. --filter smooths the corrected
+    force and delays it, as stated. Exit status 1: the updates
     contradict the stated noise.
     """
     from pipelines.export.corrected import corrected, fit_of_unit
     from pipelines.export.correction import correction_document, tracking_of
+    from pipelines.export.filtering import (
+        Kept,
+        chosen_filter,
+        filter_document,
+        filter_rate,
+        filtered,
+        read_state,
+        write_state,
+    )
     from pipelines.export.recording import at_nominal_supply, read_recording
     from pipelines.jobs.model_files import use_formulas_of
     from pipelines.jobs.terms import archived_terms
 
     printed = is_standard_output(output, "correct", as_json=as_json)
     name, _, unit = calibration.partition(":")
-    run = Archive(archive).run(name)
+    if cutoff is not None and not low_pass:
+        raise WrongUse("correct: --cutoff is given and no filter; add --filter butterworth|fir|moving-average")
+    store = Archive(archive)
+    run = store.run(name)
     use_formulas_of(run)
     fit = fit_of_unit(run, unit, failed=failed, revoked=revoked)
     with error_console().status(f"reading {file.name}"):
@@ -111,10 +143,23 @@ def command(
     if turn_on is None and terms is not None and terms.stability is not None:
         turn_on = terms.stability.switch_on_ug
     tracking = tracking_of(run, recording, force, gravity, turn_on, step, at_rest=at_rest)
+    serial = fit.exported.unit
+    begin = None if state is None else read_state(state, serial)
+    if tracking is not None and begin is not None:
+        tracking = replace(tracking, begin=begin.track)
     done = corrected(recording, fit, tracking)
+    chosen, end, source = None, None, ""
+    if low_pass:
+        chosen, source = chosen_filter(low_pass, cutoff, filter_rate(recording, begin), store, serial)
+        done, end = filtered(recording, done, chosen, begin)
     if output is not None:
         _write(recording, done, output)
     document = correction_document(recording, fit, done, None if printed else output)
+    document["filter"] = None if chosen is None else filter_document(chosen, source)
+    if state is not None:
+        passed = None if chosen is None or end is None else (chosen, end)
+        write_state(state, Kept(serial, float(recording.time[-1]), passed, done.kept))
+        document["state"] = str(state)
     give(document, lambda _: _print(document, remark if printed else say), as_json=as_json)
     consistent = document["bias"] is None or document["bias"]["stated_uncertainty"] != "too small"
     raise typer.Exit(DONE if consistent else PART_FAILED)
@@ -156,10 +201,22 @@ def _print(document: CorrectDocument, show: Callable[..., None]) -> None:
     if document["outside_temperature"]:
         low, high = document["temperatures_C"]
         show(f"{document['outside_temperature']} samples are outside the measured {low:.1f} to {high:.1f} °C", "yellow")
+    if document["filter"] is not None:
+        _print_filter(document["filter"], show)
     if document["bias"] is not None:
         _print_bias(document["bias"], show)
     if document["output"]:
         show(f"written: {document['output']}")
+    if document["state"]:
+        show(f"kept for the next recording: {document['state']}")
+
+
+def _print_filter(one: FilterDocument, show: Callable[..., None]) -> None:
+    """Print cut-off, delay and noise bandwidth of the filter."""
+    show(
+        f"filter: {one['kind']}, {len(one['numerator'])} coefficients, -3 dB at {one['cutoff_hz']:.4g} Hz "
+        f"({one['cutoff_from']}), delay {1e3 * one['delay_s']:.3g} ms, noise bandwidth {one['noise_bandwidth_hz']:.4g} Hz"
+    )
 
 
 def _print_bias(bias: TrackedBiasDocument, show: Callable[..., None]) -> None:

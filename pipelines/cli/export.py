@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from pkgutil import iter_modules
 from typing import TYPE_CHECKING, Annotated
@@ -34,6 +35,7 @@ EPILOG = ("Formats:", *(f"{name}: {text}" for name, text in _FORMATS.items()))
 
 if TYPE_CHECKING:
     from pipelines.export import UnitCalibration
+    from pipelines.export.firmware import Firmware
 
 
 def command(
@@ -80,8 +82,20 @@ def command(
         ),
     ] = None,
     counts_per_g: Annotated[int, typer.Option("--counts-per-g", help="betaflight: counts of 1 g (acc_1G).")] = 2048,
+    low_pass: Annotated[
+        str, typer.Option("--filter", metavar="KIND", help="c: low-pass of the force, as in correct; with --rate.")
+    ] = "",
+    cutoff: Annotated[
+        float | None, typer.Option("--cutoff", metavar="HZ", min=1e-9, help="c: its -3 dB frequency, as in correct.")
+    ] = None,
+    turn_on: Annotated[
+        float | None,
+        typer.Option("--turn-on", metavar="UG", min=0.0, help="c, with --track: as in correct."),
+    ] = None,
+    step: Annotated[float, typer.Option("--step", metavar="S", min=1e-3, help="c, with --track: as in correct.")] = 1.0,
     archive: options.ArchiveOption = None,
     *,
+    track: Annotated[bool, typer.Option("--track", help="c: with the filter of the bias, as in correct.")] = False,
     failed: Annotated[bool, typer.Option("--failed", help="Also export units that failed their limits.")] = False,
     revoked: Annotated[
         bool, typer.Option("--revoked", help="Also export units whose calibration was revoked.")
@@ -106,9 +120,49 @@ def command(
     chosen = unit_calibrations(source, serials, failed=failed, revoked=revoked)
     ids = device_ids(device_id, [c.unit for c in chosen])
     settings = ExportSettings(nominal, ids, sensor, arithmetic, rate, counts_per_g)
+    if low_pass or track:
+        settings = replace(
+            settings, firmware=_firmware(source, chosen, form, (low_pass, cutoff, rate), (track, step, turn_on))
+        )
     files = export_files(form, chosen, source.id, settings)
     _print_certificates(source, chosen, signature_remarks(source, [c.unit for c in chosen]))
     _write(files, output)
+
+
+def _firmware(
+    run: Run,
+    chosen: Sequence[UnitCalibration],
+    form: str,
+    low_pass: tuple[str, float | None, float | None],
+    tracking: tuple[bool, float, float | None],
+) -> Firmware:
+    """The low-pass and the models of the bias that C code gets.
+
+    Parameters
+    ----------
+    low_pass : kind, cut-off and rate, Hz · tracking : whether, step in s, change of the bias from switch-on to switch-on in µg
+    """
+    from pipelines.export.filtering import chosen_filter
+    from pipelines.export.firmware import Firmware
+    from pipelines.export.tracked_units import bias_models
+
+    kind, cutoff, rate = low_pass
+    if form != "c":
+        raise WrongUse(
+            f"export: --filter and --track are for format c, found {form}; leave them out, or add --format c"
+        )
+    if kind and rate is None:
+        raise WrongUse("export: --filter needs the rate of the receiver's samples; add --rate HZ")
+    if kind and cutoff is None and len(chosen) > 1:
+        raise WrongUse(f"export: {len(chosen)} units share one filter, its cut-off is needed; add --cutoff HZ")
+    made = (
+        chosen_filter(kind, cutoff, rate, Archive(run.archive.root), chosen[0].unit)[0]
+        if kind and rate is not None
+        else None
+    )
+    wanted, step, turn_on = tracking
+    models = bias_models(run, [unit.unit for unit in chosen], step, turn_on) if wanted else None
+    return Firmware(made, models, step)
 
 
 def _write(files: dict[str, bytes], output: Path | None) -> None:

@@ -13,7 +13,7 @@ from scipy.linalg import block_diag
 
 from inertial import static_intervals
 from inertial.correction import correct, output_covariance, remaining_step
-from inertial.noise.bias_filter import Track, track
+from inertial.noise.bias_filter import BiasState, Track, track
 from inertial.noise.gauss_markov import FlickerTerms, bias_model, flicker_of_steps
 from inertial.noise.likely_terms import LikelyTerms, likely_terms
 from pipelines.archive import Run
@@ -56,6 +56,15 @@ class FitOfUnit:
 
 
 @dataclass(frozen=True)
+class KeptTrack:
+    """A filter of the bias between two recordings: state, middle of its last step, s, and processes of flicker noise."""
+
+    state: BiasState
+    time_s: float
+    flicker: FlickerTerms
+
+
+@dataclass(frozen=True)
 class Tracking:
     """How the bias is tracked.
 
@@ -63,12 +72,14 @@ class Tracking:
     magnitude : g, of the force on a unit at rest; None: the recording is not searched for rest
     turn_on_ug : standard deviation of the bias from one switch-on to the next
     step_s : time between updates
+    begin : the filter of an earlier recording, to go on with; None: the unit was switched on
     """
 
     force: Array | None
     magnitude: float | None
     turn_on_ug: float
     step_s: float = 1.0
+    begin: KeptTrack | None = None
 
 
 @dataclass(frozen=True)
@@ -77,7 +88,8 @@ class Corrected:
 
     force : (n, 3), g; covariance : (n, 3, 3), g², of the calibration; with a track also of the bias and of noise
     track : of the steps, and of the samples after the last whole step as one step without update
-    at_limits : the same with the upper limits (95 %) of the terms that the static record does not identify
+    at_limits : the same with the upper limits (95 %) of the terms that the static record does not identify; None where it goes on
+    kept : what the next recording goes on with · white : (3,), g/√Hz, of the samples
     bias, bias_covariance : at the samples; None without tracking
     outside : samples beyond the temperatures that were measured
     """
@@ -91,6 +103,8 @@ class Corrected:
     updated: NDArray[np.bool_] | None = None
     flicker: FlickerTerms | None = None
     at_limits: Track | None = None
+    kept: KeptTrack | None = None
+    white: Array | None = None
 
 
 def fit_of_unit(run: Run, unit: str, *, failed: bool, revoked: bool) -> FitOfUnit:
@@ -175,12 +189,7 @@ def corrected(recording: CorrectableRecording, fit: FitOfUnit, tracking: Trackin
 
 
 def _tracked(recording: CorrectableRecording, fit: FitOfUnit, tracking: Tracking, plain: Corrected) -> Corrected:
-    noise = required_noise(fit.exported.noise, fit.exported.unit, fit.run, "of the bias")
-    if not np.all(np.isfinite(noise.value["B"])):
-        raise DataRejected(
-            f"run {fit.run}: B of unit {fit.exported.unit} is not known; record the unit at rest for longer"
-        )
-    time, rate, gap = recording.time, *_rate_and_gaps(recording.time)
+    time, rate, gap = recording.time, *rate_and_gaps(recording.time)
     per = max(1, round(tracking.step_s * rate))
     steps = len(time) // per
     if not 2 <= steps <= LONGEST_STEPS:
@@ -204,23 +213,52 @@ def _tracked(recording: CorrectableRecording, fit: FitOfUnit, tracking: Tracking
         middle = np.append(middle, time[-1])
         force, known = (np.vstack([values, np.full((1, 3), np.nan)]) for values in (force, known))
         magnitude = np.append(magnitude, np.nan)
-    flicker = flicker_of_steps(per / rate, max(1000.0 * per / rate, float(time[-1] - time[0])))
-    limits = LikelyTerms(*(noise.value[symbol] / MICRO for symbol in ("N", "B", "K")))
-    terms = limits if fit.curve is None else _likely(fit.curve, limits, noise.identified["B"])
-    bias_track, at_limits = (
+    begin = tracking.begin
+    if begin is not None and not time[0] > begin.time_s:
+        raise DataRejected(
+            f"{recording.name}: it begins at {time[0]:g} s, the state was kept at {begin.time_s:g} s; a recording that goes on "
+            "after it is needed, or no --state"
+        )
+    flicker = steps_flicker(per / rate, float(time[-1] - time[0])) if begin is None else begin.flicker
+    terms, limits = terms_of_unit(fit)
+    tracks = [
         track(
             bias_model(one.white, one.instability, one.walk, tracking.turn_on_ug / MICRO, flicker),
-            middle, force, known, magnitude, per / rate,
+            middle, force, known, magnitude, per / rate, None if begin is None else (begin.state, begin.time_s),
         )
-        for one in (terms, limits)
-    )  # fmt: skip
+        for one in ((terms, limits) if begin is None else (terms,))
+    ]  # fmt: skip
+    bias_track, at_limits = tracks[0], tracks[1] if begin is None else None
     last = np.arange(len(time)) // per
     bias, own = bias_track.expected[last], bias_track.expected_covariance[last]
     covariance = plain.covariance + own + np.diag(_within_a_step(terms, per, rate))
     return replace(
         plain, force=plain.force - bias, covariance=covariance, track=bias_track, bias=bias, bias_covariance=own,
         updated=bias_track.updated[last], flicker=flicker, at_limits=at_limits,
+        kept=KeptTrack(bias_track.end, float(middle[-1]), flicker), white=terms.white,
     )  # fmt: skip
+
+
+def steps_flicker(step_s: float, lasting_s: float) -> FlickerTerms:
+    """Processes of flicker noise for steps, over the length of a recording and a thousand steps at least."""
+    return flicker_of_steps(step_s, max(1000.0 * step_s, lasting_s))
+
+
+def terms_of_unit(fit: FitOfUnit) -> tuple[LikelyTerms, LikelyTerms]:
+    """The likeliest terms of a unit's noise in g, and their upper limits where its static record does not identify them.
+
+    Raises
+    ------
+    WrongUse, DataRejected
+        The run has no static record, or B of the unit is not known.
+    """
+    noise = required_noise(fit.exported.noise, fit.exported.unit, fit.run, "of the bias")
+    if not np.all(np.isfinite(noise.value["B"])):
+        raise DataRejected(
+            f"run {fit.run}: B of unit {fit.exported.unit} is not known; record the unit at rest for longer"
+        )
+    limits = LikelyTerms(*(noise.value[symbol] / MICRO for symbol in ("N", "B", "K")))
+    return (limits if fit.curve is None else _likely(fit.curve, limits, noise.identified["B"])), limits
 
 
 def _likely(curve: UnitCurve, limits: LikelyTerms, identified: NDArray[np.bool_]) -> LikelyTerms:
@@ -238,7 +276,7 @@ def _within_a_step(terms: LikelyTerms, per: int, rate: float) -> Array:
     return terms.white**2 * rate + terms.instability**2 * np.log(per) / np.pi + terms.walk**2 * per / rate / 6.0
 
 
-def _rate_and_gaps(time: Array) -> tuple[float, NDArray[np.bool_]]:
+def rate_and_gaps(time: Array) -> tuple[float, NDArray[np.bool_]]:
     """Rate of the samples, Hz, and which samples (n,) follow a gap: over the whole time, a gap would count as a lower rate."""
     step = np.diff(time)
     usual = step <= GAP * np.median(step)

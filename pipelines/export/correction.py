@@ -78,6 +78,8 @@ def correction_document(
             *(["bias", "white noise of a sample"] if done.track is not None else []),
         ],
         "output": None if output is None else str(output),
+        "filter": None,
+        "state": None,
         "bias": None,
     }
     if done.track is None or done.flicker is None:

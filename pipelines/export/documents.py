@@ -7,6 +7,19 @@ from typing import Annotated, Any, Literal
 from typing_extensions import TypedDict
 
 
+class FilterDocument(TypedDict):
+    """A low-pass filter behind a correction: y = Σ b·x − Σ a·y."""
+
+    kind: Literal["butterworth", "fir", "moving-average"]
+    rate_hz: float
+    cutoff_hz: Annotated[float, "where the power has fallen to a half"]
+    cutoff_from: Annotated[str, "`given`, or the run that measured the bandwidth"]
+    delay_s: Annotated[float, "group delay at 0 Hz"]
+    noise_bandwidth_hz: float
+    numerator: list[float]
+    denominator: list[float]
+
+
 class TrackedBiasDocument(TypedDict):
     """The bias that was tracked along a recording."""
 
@@ -43,4 +56,6 @@ class CorrectDocument(TypedDict):
     u_ug: Annotated[dict[str, float], "standard uncertainty of a sample, RMS, by axis"]
     u_contains: Annotated[list[str], "what the uncertainty includes"]
     output: Annotated[str | None, "the file that was written; null: none"]
+    filter: Annotated[FilterDocument | None, "null: none was asked for"]
+    state: Annotated[str | None, "the file with which the next recording goes on; null: none"]
     bias: Annotated[TrackedBiasDocument | None, "null: the force is known nowhere, nothing was tracked"]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+from pipelines.export.firmware import Firmware
 from pipelines.export.polynomials import UnitCalibration
 from schemas.errors import WrongUse, did_you_mean
 from schemas.foreign import shown
@@ -24,6 +25,7 @@ class ExportSettings:
     arithmetic : of exported C code, one of :data:`ARITHMETICS`
     rate_hz : of the receiver's samples; that of the static record where None
     counts_per_g : acceleration of 1 g in counts of Betaflight's driver (``acc_1G``)
+    firmware : low-pass and filter of the bias in exported C code
     """
 
     nominal: float | None = None
@@ -32,6 +34,7 @@ class ExportSettings:
     arithmetic: str = "double"
     rate_hz: float | None = None
     counts_per_g: int = 2048
+    firmware: Firmware = field(default_factory=Firmware)
 
     def __post_init__(self) -> None:
         """Refuses settings outside their range."""

@@ -11,7 +11,8 @@ import pytest
 from c_compiler import FIXED, REAL, compiled
 from capture_double import LSB_PER_G, CaptureDouble, small_job
 from each import each
-from in_process import document_of, refused
+from in_process import document_of, given, refused
+from scipy import signal
 from test_guides import wrong
 
 from inertial.correction import correct as correct_output
@@ -146,6 +147,127 @@ def test_at_rest_the_bias_along_gravity_alone_is_found(run: Run, home: Path, rng
 
 
 UP = ("--turn-on", "300", "--force", "0,0,1")
+
+
+FILTERED_C = """
+        static tumbleline_bias_state bias, kept_bias;
+        static tumbleline_filter_state low_pass, kept_low_pass;
+        static double sum[3];
+        static int n;
+        double output[3] = {x, y, z}, force[3], b[3], known[3] = {0.0, 0.6, 0.8};
+        if (n == 0) tumbleline_bias_begin(&tumbleline_bias_A1, &bias);
+        if (n % 100 == 0) {
+            tumbleline_bias_step(&tumbleline_bias_A1, &bias);
+            memset(sum, 0, sizeof sum);
+        }
+        if (n == 5000) {  /* the power fails: memory is spoilt, and what was kept is put back */
+            kept_bias = bias;
+            kept_low_pass = low_pass;
+            memset(&bias, 0xAA, sizeof bias);
+            memset(&low_pass, 0xAA, sizeof low_pass);
+            bias = kept_bias;
+            low_pass = kept_low_pass;
+        }
+        if (tumbleline_correct(&tumbleline_A1, output, t, force)) return 1;
+        tumbleline_bias(&bias, b);
+        for (int i = 0; i < 3; i++) {
+            sum[i] += force[i] / 100;
+            force[i] -= b[i];
+        }
+        if (n == 0) tumbleline_filter_begin(&low_pass, force);
+        tumbleline_filter_step(&low_pass, force, force);
+        if (++n % 100 == 0 && n <= 6000) tumbleline_bias_known(&tumbleline_bias_A1, &bias, sum, known);
+        printf("%.17g %.17g %.17g\\n", force[0], force[1], force[2]);
+"""
+
+
+def tracked(run: Run, rng: np.random.Generator) -> pd.DataFrame:
+    """Two minutes in one pose with another bias; the force is known in the first."""
+    force = [0.0, 0.6, 0.8]
+    table = still(run, rng, 12_000, warm=30.0, force=force, bias=np.array([1.5e-3, -2e-3, 0.8e-3]))
+    table[["force_x", "force_y", "force_z"]] = force
+    table.loc[6000:, ["force_x", "force_y", "force_z"]] = np.nan
+    return table
+
+
+def test_the_filters_are_those_of_scipy_and_of_the_exported_c_with_the_bias(
+    run: Run, home: Path, rng: np.random.Generator
+) -> None:
+    table = tracked(run, rng)
+    own = ("--turn-on", "2000")
+    _, plain = corrected(run, table, *own)
+    force = plain[FORCES].to_numpy()
+    for kind in ("butterworth", "fir", "moving-average"):
+        document, done = corrected(run, table, *own, "--filter", kind, "--cutoff", "9")
+        one = document["filter"]
+        b, a = (np.array(one[name]) for name in ("numerator", "denominator"))
+        expected = signal.lfilter(b, a, force - force[0], axis=0) + force[0]
+        assert np.allclose(done[FORCES].to_numpy(), expected, atol=1e-12)
+        f, h = signal.freqz(b, a, fs=RATE, worN=2**14)
+        assert one["cutoff_hz"] == pytest.approx(f[np.argmax(np.abs(h) < np.sqrt(0.5))], abs=0.02)
+        assert one["cutoff_hz"] == pytest.approx(9.0, rel=0.03 if kind == "moving-average" else 1e-3)  # whole samples
+        assert one["delay_s"] == pytest.approx(float(-np.angle(h[4])) / (2 * np.pi * f[4]), rel=1e-3)
+        assert one["noise_bandwidth_hz"] == pytest.approx(float(np.trapezoid(np.abs(h) ** 2, f)), rel=1e-3)
+        after = slice(8000, None)
+        fall = done[FORCES].to_numpy()[after].var(axis=0) / force[after].var(axis=0)
+        assert fall.mean() == pytest.approx(2.0 * one["noise_bandwidth_hz"] / RATE, rel=0.3)
+        assert done["u_x_ug"].iloc[-1] < plain["u_x_ug"].iloc[-1]
+        words = (
+            "--format",
+            "c",
+            "--failed",
+            "--units",
+            "A1",
+            "--filter",
+            kind,
+            "--cutoff",
+            "9",
+            "--rate",
+            "100",
+            "--track",
+            *own,
+        )
+        header = text_of_export(run, "--format", "c", *words)
+        rows = table[["x", "y", "z", "unit_C"]].to_numpy()
+        assert np.max(np.abs(compiled(header, FILTERED_C, rows, home, "A1") - done[FORCES].to_numpy())) < 1e-10
+
+
+def text_of_export(run: Run, *words: str) -> str:
+    """What an export writes."""
+    assert given("export", run.id, "--archive", run.archive.root, *words, "--output", "out.h")[0] == 0
+    return Path("out.h").read_text(encoding="utf-8")
+
+
+def test_a_recording_goes_on_where_the_one_before_it_ended(run: Run, home: Path, rng: np.random.Generator) -> None:
+    table = tracked(run, rng)
+    words = ("--turn-on", "2000", "--filter", "butterworth", "--cutoff", "12")
+    _, whole = corrected(run, table, *words)
+    document, first = corrected(run, table.iloc[:7000], *words, "--state", "kept.json")
+    assert document["state"] == "kept.json"
+    document, second = corrected(
+        run, table.iloc[7000:].assign(force_x=0.0, force_y=0.6, force_z=0.8), *words, "--state", "kept.json"
+    )
+    assert document["bias"]["u_last_at_limits_ug"] is None
+    assert np.allclose(first[FORCES].to_numpy(), whole[FORCES].to_numpy()[:7000], atol=1e-12)
+    assert np.allclose(second[FORCES].to_numpy()[:100], whole[FORCES].to_numpy()[7000:7100], atol=1e-9)
+    assert second["u_bias_x_ug"].iloc[0] == pytest.approx(whole["u_bias_x_ug"].iloc[7000], rel=1e-6)
+    table.iloc[:500].to_csv("a.csv", index=False)
+    how = ("correct", "a.csv", "--calibration", "latest:A1", "--archive", run.archive.root, "--turn-on", "2000")
+    assert "it begins at 0 s, the state was kept at" in refused(*how, "--state", "kept.json")
+    assert "the state of unit A1, that of A2 is needed" in refused(
+        *how[:3], "latest:A2", *how[4:], "--state", "kept.json"
+    )
+    Path("kept.json").write_text("{}", encoding="utf-8")
+    assert "not the state that" in refused(*how, "--state", "kept.json")
+    assert "no bandwidth of unit A1 was measured" in refused(*how, "--filter", "fir")
+    assert "did you mean butterworth" in refused(*how, "--filter", "buterworth", "--cutoff", "3")
+    assert "at most 40 Hz is needed" in refused(*how, "--filter", "fir", "--cutoff", "49")
+    assert "add --filter" in refused(*how, "--cutoff", "49")
+    export = ("export", run.id, "--archive", run.archive.root, "--failed", "--units", "A1")
+    assert "need --arithmetic double or float" in refused(
+        *export, "--format", "c", "--filter", "fir", "--cutoff", "3", "--rate", "100", "--arithmetic", "q24"
+    )
+    assert "are for format c" in refused(*export, "--format", "csv", "--track")
 
 
 def test_a_wrong_force_is_told_by_the_innovations(run: Run, home: Path, rng: np.random.Generator) -> None:

@@ -1,11 +1,11 @@
-"""C: a C99 header with the coefficients of every unit, a checksum of each, and the function that applies them."""
+"""C: a C99 header with coefficients and checksum of every unit, and what applies them; low-pass and bias on request."""
 
 from __future__ import annotations
 
 import re
 import struct
 import zlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from importlib.resources import files
 from typing import Any
 
@@ -15,6 +15,7 @@ from pipelines.export.fixed_point import ONE, fixed_point
 from pipelines.export.omissions import comment, largest_error_ug
 from pipelines.export.polynomials import ORDER, UnitCalibration
 from pipelines.export.settings import ExportSettings
+from schemas.errors import WrongUse
 
 NAME = "c"
 SUFFIX = ".h"
@@ -34,6 +35,13 @@ def write(units: Sequence[UnitCalibration], run: str, settings: ExportSettings) 
     names |= {"RUN": run, "OUT_UNIT": units[0].out_unit, "ORDER": str(ORDER), "REAL": real, "F": suffix}
     names |= {"BYTES": str(struct.calcsize(_PACKED[kind])), "BITS": "uint64_t" if kind == "double" else "uint32_t"}
     names |= {"NUMBER": "int32_t" if fixed else real, "MATRIX": "inverse" if fixed else "response"}
+    if kind == "q24" and (settings.firmware.low_pass or settings.firmware.bias):
+        raise WrongUse("export: --filter and --track need --arithmetic double or float; choose one of them")
+    exact = np.float32 if kind == "float" else np.float64
+    own = settings.firmware.names(_literal(exact), _braces)
+    tail = tail.replace("#endif", _filled(_template("filter"), own) + "#endif") if own else tail
+    models = settings.firmware.models({unit.unit: _symbol(unit) for unit in units}, _literal(exact), _braces)
+    tail = tail.replace("#endif", _filled(_template("bias"), models) + "#endif") if models else tail
     names |= {"LOW": "low_mC", "HIGH": "high_mC"} if fixed else {"LOW": "low_C", "HIGH": "high_C"}
     return _filled(head, names) + "\n".join(blocks) + _filled(tail, names)
 
@@ -52,12 +60,7 @@ def _real_unit(unit: UnitCalibration, kind: str) -> str:
     exact = np.float32 if kind == "float" else np.float64
     bias, response = unit.bias.astype(exact), unit.response.astype(exact)
     limits = np.array(unit.temperatures, dtype=exact)
-    suffix = "f" if kind == "float" else ""
-
-    def literal(value: Any) -> str:
-        text = str(exact(value))
-        return (text if any(mark in text for mark in ".en") else text + ".0") + suffix
-
+    literal = _literal(exact)
     crc = checksum(unit.unit, _PACKED[kind], [*limits, *bias.ravel(), *response.ravel()])
     low, high = (literal(value) for value in limits)
     return (
@@ -66,6 +69,17 @@ def _real_unit(unit: UnitCalibration, kind: str) -> str:
         f'    "{unit.unit}", {low}, {high},\n    {_braces(bias, literal)},\n    {_braces(response, literal)},\n'
         f"    0x{crc:08X}u\n}};\n"
     )
+
+
+def _literal(exact: type[np.float32 | np.float64]) -> Callable[[Any], str]:
+    """Writes a number so that a compiler reads it back bit for bit."""
+    suffix = "f" if exact is np.float32 else ""
+
+    def literal(value: Any) -> str:
+        text = str(exact(value))
+        return (text if any(mark in text for mark in ".en") else text + ".0") + suffix
+
+    return literal
 
 
 def _fixed_unit(unit: UnitCalibration) -> str:
