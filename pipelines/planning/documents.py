@@ -1,8 +1,8 @@
-"""The JSON document of plan: keys that other programs read. A key that is NotRequired may be missing."""
+"""The JSON documents of plan and choose: keys that other programs read. A key that is NotRequired may be missing."""
 
 from __future__ import annotations
 
-from typing import Annotated, NotRequired
+from typing import Annotated, Literal, NotRequired
 
 from typing_extensions import TypedDict
 
@@ -153,3 +153,29 @@ class PlanDocument(TypedDict):
     bias: NotRequired[Annotated[PlannedBias | None, "null: the model has no bias"]]
     uncertainty: NotRequired[Annotated[ReachableUncertainty | None, "null: noise only, no `[uncertainty]` is stated"]]
     page: NotRequired[Annotated[str, "path of the page that `--page` wrote"]]
+
+
+class ChoiceRow(TypedDict):
+    """A kind of device with a calibration."""
+
+    device: str
+    calibration: Literal["none", "one temperature", "temperature", "temperature and centrifuge", "any"]
+    reaches: Annotated[bool, "the error that is asked for, and range, bandwidth and temperatures"]
+    error_ug: Annotated[float, "at the end of the range, with the coverage factor"]
+    terms_ug: Annotated[dict[str, float], "standard uncertainties by term"]
+    range_over_noise_dB: Annotated[float | None, "the range over the noise in the bandwidth; null: no noise is stated"]
+    cannot: Annotated[list[str], "what no calibration mends: range, bandwidth, temperatures"]
+    why: Annotated[list[str], "why it does not reach the error; empty: it does"]
+
+
+class ChoiceDocument(TypedDict):
+    """``choose --json``: which kind of device, with which calibration, reaches an error."""
+
+    range_g: float
+    temperatures_C: list[float]
+    bandwidth_hz: float
+    error_ug: Annotated[float, "that is asked for"]
+    coverage_factor: float
+    calibrations: Annotated[dict[str, str], "what each calibration is"]
+    assumptions: list[str]
+    candidates: Annotated[list[ChoiceRow], "those that reach the error first"]
