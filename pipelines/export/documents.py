@@ -1,4 +1,4 @@
-"""The JSON document of a corrected recording: keys that other programs read."""
+"""The JSON documents of a corrected recording and of a simulated one: keys that other programs read."""
 
 from __future__ import annotations
 
@@ -59,3 +59,20 @@ class CorrectDocument(TypedDict):
     filter: Annotated[FilterDocument | None, "null: none was asked for"]
     state: Annotated[str | None, "the file with which the next recording goes on; null: none"]
     bias: Annotated[TrackedBiasDocument | None, "null: the force is known nowhere, nothing was tracked"]
+
+
+class SimulateDocument(TypedDict):
+    """``simulate --json``: a trajectory through a calibrated unit."""
+
+    file: str
+    run: str
+    unit: str
+    out_unit: str
+    samples: int
+    bandwidth_hz: Annotated[float | None, "of the sensor; null: it follows at once"]
+    seed: Annotated[int | None, "of the noise; null: none was added"]
+    noise: Annotated[dict[str, list[float]], "terms of the static record by axis; empty: none was added"]
+    clipped: Annotated[int, "samples at the end of the range"]
+    error_at_25_C_ug: Annotated[dict[str, float], "RMS, by axis, that bias and response at 25 °C leave"]
+    told: Annotated[list[str], "what was assumed"]
+    output: str

@@ -13,6 +13,7 @@ from capture_double import LSB_PER_G, CaptureDouble, small_job
 from each import each
 from in_process import document_of, given, refused
 from scipy import signal
+from scipy.io import loadmat
 from test_guides import wrong
 
 from inertial.correction import correct as correct_output
@@ -268,6 +269,39 @@ def test_a_recording_goes_on_where_the_one_before_it_ended(run: Run, home: Path,
         *export, "--format", "c", "--filter", "fir", "--cutoff", "3", "--rate", "100", "--arithmetic", "q24"
     )
     assert "are for format c" in refused(*export, "--format", "csv", "--track")
+
+
+def test_a_trajectory_comes_back_from_the_output_of_a_unit(run: Run, home: Path, rng: np.random.Generator) -> None:
+    n = 3000
+    turns = 2.0 * np.pi * np.cumsum(rng.normal(size=(n, 3)), axis=0) / 40.0
+    flight = pd.DataFrame(np.sin(turns), columns=["force_x", "force_y", "force_z"])
+    flight = flight.assign(time_s=np.arange(n) / RATE, unit_C=np.linspace(5.0, 45.0, n))
+    flight.to_csv("flight.csv", index=False)
+    own = ("simulate", "flight.csv", "--calibration", "latest:A1", "--archive", run.archive.root, "--failed")
+    document = document_of(*own, "--no-noise", "--output", "raw.csv", status=0)
+    assert (document["samples"], document["noise"], document["clipped"], document["seed"]) == (n, {}, 0, None)
+    back = ("correct", "raw.csv", "--calibration", "latest:A1", "--archive", run.archive.root)
+    document_of(*back, "--columns", "x,y,z", "--output", "back.parquet")
+    force = flight[["force_x", "force_y", "force_z"]].to_numpy()
+    away = pd.read_parquet("back.parquet")[FORCES].to_numpy() - force
+    assert np.max(np.abs(away)) < 0.6 / LSB_PER_G  # whole counts
+    noise = document_of(*own, "--seed", "3", "--output", "raw.npy")["noise"]
+    seen = np.load("raw.npy")
+    plain = pd.read_csv("raw.csv")
+    added = np.stack([seen[axis] - plain[axis] for axis in "xyz"], axis=1) / LSB_PER_G
+    expected = 1e-6 * np.array(noise["N_ug_rtHz"]) * np.sqrt(RATE)
+    assert np.diff(added, axis=0).std(axis=0) / np.sqrt(2.0) == pytest.approx(expected, rel=0.1)
+    document_of(*own, "--seed", "3", "--bandwidth", "5", "--output", "raw.mat")
+    slow = loadmat("raw.mat")
+    assert slow["x"].shape == (n, 1)
+    assert np.std(slow["x"][:, 0] - seen["x"]) > 100.0
+    flight.drop(columns="unit_C").assign(force_x=400.0).to_csv("flight.csv", index=False)
+    clipped = document_of(*own, "--output", "raw.csv")
+    assert clipped["told"] == ["no unit_C: 25 °C taken"]
+    assert clipped["clipped"] == n
+    assert "a name that ends in .csv" in refused(*own, "--output", "raw.xls")
+    assert "one of g, m/s^2" in refused(*own, "--units", "mg", "--output", "raw.csv")
+    assert "at most 40 Hz" in refused(*own, "--bandwidth", "70", "--output", "raw.csv")
 
 
 def test_a_wrong_force_is_told_by_the_innovations(run: Run, home: Path, rng: np.random.Generator) -> None:

@@ -1,0 +1,106 @@
+"""``tumbleline simulate``: a trajectory through a calibrated unit, as raw output with its errors, to test software with."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from pipelines.archive import Archive
+from pipelines.cli import options
+from pipelines.cli.printing import error_console, give, say, short
+
+if TYPE_CHECKING:
+    from inertial.dynamics.output_filter import OutputFilter
+    from pipelines.export.documents import SimulateDocument
+
+PART = "Results"
+ORDER = 346
+SUMMARY = "Pass a trajectory through a calibrated unit: its raw output with its errors."
+EXAMPLES = (
+    "tumbleline simulate flight.csv --calibration latest:SN1 --output raw.csv",
+    "tumbleline simulate flight.csv --calibration latest:SN1 --no-noise --output raw.mat",
+)
+
+
+def command(
+    file: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FILE", help="True specific force over time: time_s, force_x, force_y, force_z, unit_C."
+        ),
+    ],
+    output: Annotated[
+        Path, typer.Option("--output", "-o", metavar="FILE", help="Raw samples, as .csv, .parquet, .mat or .npy.")
+    ],
+    calibration: Annotated[
+        str, typer.Option("--calibration", metavar="RUN:UNIT", help="The calibration: a run and one of its units.")
+    ] = "latest",
+    units: Annotated[str, typer.Option("--units", metavar="g|m/s^2", help="Unit of the force.")] = "g",
+    time: options.TimeColumnOption = "",
+    rate: options.RateOption = None,
+    bandwidth: Annotated[
+        float | None,
+        typer.Option(
+            "--bandwidth", metavar="HZ", min=1e-9, help="Of the sensor, two poles; by default none is applied."
+        ),
+    ] = None,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Of the noise; the same seed gives the same samples.")] = 0,
+    archive: options.ArchiveOption = None,
+    *,
+    noise: Annotated[
+        bool, typer.Option("--noise/--no-noise", help="Add the noise of the unit's static record.")
+    ] = True,
+    failed: Annotated[bool, typer.Option("--failed", help="Also use a unit that failed its limits.")] = False,
+    as_json: options.JsonOption = False,
+) -> None:
+    """Pass a trajectory through a calibrated unit: bias, scale, misalignment, temperature, all effects of the model, and noise.
+
+    The columns of the quantities that the model needs stand beside the force; without unit_C it is 25 °C. 'tumbleline correct'
+    of the output gives the force back.
+    """
+    from inertial.quantities import FORCE_COLUMNS
+    from pipelines.export.corrected import fit_of_unit, rate_and_gaps
+    from pipelines.export.recording import read_recording
+    from pipelines.export.trajectory import simulated, simulation_document, write_output
+    from pipelines.jobs.model_files import use_formulas_of
+
+    name, _, unit = calibration.partition(":")
+    run = Archive(archive).run(name)
+    use_formulas_of(run)
+    fit = fit_of_unit(run, unit, failed=failed, revoked=False)
+    with error_console().status(f"reading {file.name}"):
+        recording = read_recording(file, FORCE_COLUMNS, time=time, rate_hz=rate)
+    low_pass = None if bandwidth is None else _low_pass(bandwidth, rate_and_gaps(recording.time)[0])
+    made = simulated(recording, units, fit, low_pass, seed if noise else None)
+    write_output(made, output)
+    give(simulation_document(made, fit, low_pass, seed if noise else None, output), _print, as_json=as_json)
+
+
+def _low_pass(bandwidth_hz: float, rate_hz: float) -> OutputFilter:
+    from inertial.dynamics.output_filter import designed
+    from schemas.errors import WrongUse
+
+    try:
+        return designed("butterworth", bandwidth_hz, rate_hz)
+    except ValueError as problem:
+        raise WrongUse(f"--bandwidth: {problem}; give another, or a trajectory of a higher rate") from None
+
+
+def _print(document: SimulateDocument) -> None:
+    say(
+    of_unit = f"unit {document['unit']} of run {document['run']}, in {document['out_unit']}"
+    say(f"{document['file']}: {document['samples']} samples of {of_unit}")
+    )
+    for text in document["told"]:
+        say(text)
+    for name, values in document["noise"].items():
+        say(f"noise {name}: {', '.join(short(value) for value in values)} (x, y, z)")
+    if not document["noise"]:
+        say("without noise")
+    if document["clipped"]:
+        say(f"{document['clipped']} samples are at the end of the range", style="yellow")
+    errors = ", ".join(f"{axis} {short(value)}" for axis, value in document["error_at_25_C_ug"].items())
+    say(f"error that bias and response at 25 °C leave, µg rms: {errors}")
+    say(f"written: {document['output']}")
