@@ -89,10 +89,8 @@ def _low_pass(bandwidth_hz: float, rate_hz: float) -> OutputFilter:
 
 
 def _print(document: SimulateDocument) -> None:
-    say(
     of_unit = f"unit {document['unit']} of run {document['run']}, in {document['out_unit']}"
     say(f"{document['file']}: {document['samples']} samples of {of_unit}")
-    )
     for text in document["told"]:
         say(text)
     for name, values in document["noise"].items():

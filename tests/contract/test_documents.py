@@ -28,7 +28,6 @@ IMPORTED += ["--blocks", "5", "--local-g", "9.81"]
 CORRECTED = ["--rate", "100", "--force", "0,0,1", "--turn-on", "100"]
 CASES = {
     "plan --json": ["plan"],
-    "choose --json": ["choose", "--range", "4g", "--error", "2mg"],
     "station status --json": ["station", "status"],
     "diagnose --json": ["diagnose", "latest", "--effects", MODEL],
     "improve --json": ["improve", "latest", "--effects", MODEL, "--out", "{folder}/new.toml", "--yes"],
@@ -133,6 +132,7 @@ ELSEWHERE = {
     "certify --json": "contract/test_documents.py",
     "program --json": "faults/test_programming.py",
     "fit --json (an import)": "e2e/test_imported_recording.py",
+    "choose --json": "unit/pipelines/planning/test_choice.py",
     "simulate --json": "e2e/test_correct.py",
     "demo --auto --json": "e2e/test_models.py",
     "demo --by-hand --json": "e2e/test_models.py",

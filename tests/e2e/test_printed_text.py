@@ -35,6 +35,7 @@ OUTPUTS = {
     "diagnose": ["diagnose", "latest", "--effects", "bias,scale,misalignment"],
     "history": ["history", "m.toml"],
     "extend": ["extend", "n.toml", "third_order"],
+    "choose": ["choose", "--range", "4g", "--temperature", "-40..85", "--error", "2mg", "--bandwidth", "100"],
     "plan": ["plan", "small.toml"],
     "run": ["run", "small.toml", "--direct"],
     "station": ["station", "log"],
@@ -71,6 +72,7 @@ ELSEWHERE = {
     "program": "moves a station",
     "certificate": "writes documents, prints one line each",
     "correct": "prints lines, tests/e2e/test_correct.py",
+    "simulate": "prints lines, tests/e2e/test_correct.py",
     "waveforms": "prints one line",
 }
 
