@@ -97,8 +97,10 @@ def again(request: Request, name: str) -> JSONResponse:
 
 
 def _slot(text: str, slots: int) -> int:
-    """The number of a slot of the station."""
-    number = int(text) if text.isascii() and text.isdecimal() and len(text) <= 4 else 0
-    if not 1 <= number <= slots or text != str(number):
-        raise WrongUse(f"lot: slot '{text[:20]}', a slot from 1 to {slots} of the station is needed; reload the page")
+    """The number of a slot of the station, counted from 0 as on the page."""
+    number = int(text) if text.isascii() and text.isdecimal() and len(text) <= 4 else -1
+    if not 0 <= number < slots or text != str(number):
+        raise WrongUse(
+            f"lot: slot '{text[:20]}', a slot from 0 to {slots - 1} of the station is needed; reload the page"
+        )
     return number

@@ -291,10 +291,10 @@ def test_a_figure_of_a_unit_without_data_is_a_sentence(figure: tuple[str, str], 
     assert re.search("; (choose|click) ", answer.json()["problem"])
 
 
-SLOTS = ("slot-x", "slot-", "slot-²", "slot-0", "slot--1", "slot-01", "slot-99999", "slot-" + "9" * 5000)
+SLOTS = ("slot-x", "slot-", "slot-²", "slot-8", "slot--1", "slot-01", "slot-99999", "slot-" + "9" * 5000)
 REFUSED_BODIES: list[tuple[str, object, str]] = [
     *(
-        ("/operator/start", {"recipe": "production", key: "A1"}, "a slot from 1 to 8 of the station is needed")
+        ("/operator/start", {"recipe": "production", key: "A1"}, "a slot from 0 to 7 of the station is needed")
         for key in SLOTS
     ),
     ("/operator/start", {"recipe": "production", "slot-1": "A\0"}, TO_DO),
