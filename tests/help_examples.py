@@ -105,6 +105,9 @@ def recordings(folder: Path) -> None:
     frame = pd.DataFrame(rest, columns=["x", "y", "z"])
     frame.to_csv(folder / "rest.csv", index=False)
     frame = frame.assign(time_s=0.01 * np.arange(len(frame)), unit_C=25.0)
+    turn = np.linspace(0.0, 6.0, 400)
+    forces = pd.DataFrame({"force_x": np.sin(turn), "force_y": np.cos(turn), "force_z": 0.0 * turn})
+    forces.assign(time_s=np.arange(400) / 100.0, unit_C=25.0).to_csv(folder / "trajectory.csv", index=False)
     for name in ("flight", "bench"):
         frame.to_csv(folder / f"{name}.csv", index=False)
 

@@ -19,8 +19,8 @@ PART = "Results"
 ORDER = 346
 SUMMARY = "Pass a trajectory through a calibrated unit: its raw output with its errors."
 EXAMPLES = (
-    "tumbleline simulate flight.csv --calibration latest:SN1 --output raw.csv",
-    "tumbleline simulate flight.csv --calibration latest:SN1 --no-noise --output raw.mat",
+    "tumbleline simulate trajectory.csv --calibration latest:SN1 --output raw.csv",
+    "tumbleline simulate trajectory.csv --calibration latest:SN1 --no-noise --output raw.mat",
 )
 
 
