@@ -8,6 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from hypothesis import settings
 from orchestrator import LOG, errors_in
 
 from inertial import effects
@@ -18,6 +19,8 @@ for _name in ("COLUMNS", "LINES"):
     os.environ.pop(_name, None)
 
 pytest_plugins = ("left_open",)
+settings.register_profile("busy", deadline=None)  # other work on the machine decides how long a case takes
+settings.load_profile("busy")
 
 FOLDERS = ("unit", "property", "contract", "reference", "faults", "e2e", "blind")
 
