@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, NotRequired
+from typing import Annotated, NotRequired
 
 from typing_extensions import TypedDict
 
@@ -159,7 +159,7 @@ class ChoiceRow(TypedDict):
     """A kind of device with a calibration."""
 
     device: str
-    calibration: Literal["none", "one temperature", "temperature", "temperature and centrifuge", "any"]
+    calibration: Annotated[str, "a key of `calibrations`"]
     reaches: Annotated[bool, "the error that is asked for, and range, bandwidth and temperatures"]
     error_ug: Annotated[float, "at the end of the range, with the coverage factor"]
     terms_ug: Annotated[dict[str, float], "standard uncertainties by term"]

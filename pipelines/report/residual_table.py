@@ -17,7 +17,15 @@ from inertial.estimation.model import Model
 from inertial.estimation.problem import Problem
 from inertial.estimation.refinement import terms_of
 from inertial.quantities import shown_factor
-from pipelines.report.residuals import LABELS, axes_of, direction, recorded_quantities, residuals_of_model
+from pipelines.report.residuals import (
+    FORCE_LABEL,
+    LABELS,
+    axes_of,
+    direction,
+    quantities_of_added,
+    recorded_quantities,
+    residuals_of_model,
+)
 from pipelines.tables.dwells import Measured, lot_of, measured
 from schemas.errors import DataRejected
 
@@ -29,7 +37,7 @@ class ResidualTable:
     """Residuals of units × axes × dwells, µg, NaN where a dwell is missing, and the quantities recorded with each dwell.
 
     force : (units, n, 3), g · turning : (units, n), 1 reached heating, −1 cooling, 0 neither
-    drivers : label, and values (units, n) or (units, n, 3), by name
+    drivers : label, and values (units, n) or (units, n, 3), by name · first : of the effect that is missing; empty for none
     """
 
     units: tuple[str, ...]
@@ -39,6 +47,7 @@ class ResidualTable:
     force: Array
     turning: Index
     drivers: dict[str, tuple[str, Array]] = field(default_factory=dict[str, tuple[str, Array]])
+    first: str = ""
 
     def pick(self, unit: int, dwell: int) -> str:
         """The selection by a click on a point."""
@@ -62,18 +71,21 @@ def residual_table(measurement: Measured, diagnosis: Diagnosis, units: tuple[str
     state = problem.lot.state
     drivers = {one.name: (one.label, one.values) for one in recorded_quantities(problem)}  # noqa: PD011 - no table of pandas
     shape = (len(units), problem.n)
-    drivers["force"] = ("specific force along the axis / g", np.asarray(state.force, dtype=float))
+    drivers["force"] = (FORCE_LABEL, np.asarray(state.force, dtype=float))
     drivers.setdefault("time_s", (LABELS["time_s"], state.time * shown_factor("time_s")))
     drivers["dwell"] = ("number of the dwell", np.broadcast_to(measurement.dwells.astype(float), shape).copy())
     if state.slot is not None:
         slot = np.asarray(state.slot, dtype=float)
         drivers["slot"] = ("slot", np.broadcast_to(slot.reshape(len(units), -1)[:, :1], shape).copy())
+    of_effect, named = quantities_of_added(diagnosis)
+    drivers = {one.name: (one.label, one.values) for one in of_effect if one.name != "force"} | drivers  # noqa: PD011
+    first = next((name for name in (*(one.name for one in of_effect), *named) if name in drivers), "")
     turning = np.zeros(shape, dtype=np.int64)
     if state.temperature is not None:
         turning = np.stack([direction(row) for row in state.temperature])
     return ResidualTable(
         units, measurement.dwells, axes_of(problem), residuals_of_model(diagnosis.base, len(units)),
-        np.asarray(state.force, dtype=float), turning, drivers,
+        np.asarray(state.force, dtype=float), turning, drivers, first,
     )  # fmt: skip
 
 

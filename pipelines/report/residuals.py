@@ -9,10 +9,13 @@ import numpy as np
 from inertial.arrays import Array, Index
 from inertial.criticism.diagnosis import Diagnosis
 from inertial.criticism.drivers import drivers_of
+from inertial.effects import StationEffect
+from inertial.estimation.alternative import Handling
 from inertial.estimation.comparison import fitted_residuals
 from inertial.estimation.model import Model
 from inertial.estimation.problem import Problem
-from inertial.quantities import axis_labels, shown_factor
+from inertial.planning.drivers import drivers_of as quantities_of
+from inertial.quantities import RECORDED, axis_labels, shown_factor
 from pipelines.report.smooth_curve import band
 from schemas.units import MICRO
 
@@ -86,6 +89,7 @@ def added(diagnosis: Diagnosis) -> list[str]:
     return [t.effect.id for t in diagnosis.final.terms if t.effect.id not in held]
 
 
+FORCE_LABEL = "specific force along the axis / g"
 LABELS = axis_labels() | {"approach": "change of force at the move before / g"}
 
 
@@ -103,11 +107,12 @@ def recorded_quantities(problem: Problem) -> list[DriverValues]:
 
 
 def drivers_shown(diagnosis: Diagnosis) -> list[DriverValues]:
-    """Drivers with a picture: those that the residual follows, then temperature, time, rate and wait if they vary."""
+    """Drivers with a picture: those of the added effects, those that the residual follows, then the usual ones if they vary."""
     known = {one.name: one for one in recorded_quantities(diagnosis.problem)}
+    forces, named = quantities_of_added(diagnosis)
     first = [] if diagnosis.unexplained is None else [diagnosis.unexplained.driver]
-    names = [*first, *(p.driver for p in diagnosis.where[:5])]
-    drivers: list[DriverValues] = []
+    names = [*first, *named, *(p.driver for p in diagnosis.where[:5])]
+    drivers = list(forces)
     for name in dict.fromkeys([*names, *ALWAYS]):
         series = known.get(name)
         if series is None or any(_alike(series.values, other.values) for other in drivers):
@@ -115,6 +120,34 @@ def drivers_shown(diagnosis: Diagnosis) -> list[DriverValues]:
         if name in names or float(np.ptp(series.values)) >= STILL.get(name, 0.0) * shown_factor(name):
             drivers.append(series)
     return drivers[:_MOST]
+
+
+def quantities_of_added(diagnosis: Diagnosis) -> tuple[list[DriverValues], list[str]]:
+    """The force, or the angles of the table, where an added effect depends on them; and names of its other quantities.
+
+    An effect of a device is seen over the force along its axis, one of the station over the angles.
+    """
+    problem = diagnosis.problem
+    state = problem.lot.state
+    held = {t.effect.id for t in diagnosis.base.terms}
+    added = [t.effect for t in diagnosis.final.terms if t.effect.id not in held and not isinstance(t.effect, Handling)]
+    drivers = [(effect, quantities_of(state, effect)) for effect in added]
+    series: list[DriverValues] = []
+    of_angles = state.outer is not None and state.inner is not None
+    if of_angles and any(isinstance(effect, StationEffect) and "force" in names for effect, names in drivers):
+        for name, values in (("outer_deg", state.outer), ("inner_deg", state.inner)):
+            if values is not None and float(np.ptp(values)) > 0.0:
+                whole = np.broadcast_to(np.degrees(values), (problem.lot.output.shape[0], problem.n))
+                series.append(DriverValues(name, LABELS.get(name, name), whole))
+    if not problem.lot.radial and any(
+        not isinstance(effect, StationEffect) and "force" in names for effect, names in drivers
+    ):
+        along = np.broadcast_to(
+            state.force[..., problem.axes], (problem.lot.output.shape[0], problem.n, len(problem.axes))
+        )
+        series.append(DriverValues("force", FORCE_LABEL, along))
+    columns = {row.attribute: row.column for row in RECORDED}
+    return series, [columns[name] for _, names in drivers for name in sorted(names) if name in columns]
 
 
 def _alike(one: Array, other: Array) -> bool:

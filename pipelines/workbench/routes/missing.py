@@ -149,9 +149,10 @@ def _chart(bench: Workbench, state: MissingPage, name: str) -> Chart | None:
 
 
 def _quantity(diagnosed: Diagnosed, state: MissingPage) -> str:
-    """The quantity of the address, else the one that the residual follows most, else force."""
+    """The quantity of the address, else that of the missing effect, else the one that the residual follows most, else force."""
     known = {} if diagnosed.table is None else diagnosed.table.drivers
-    followed = [str(one["driver"]) for one in diagnosed.document["where"]]
+    first = "" if diagnosed.table is None else diagnosed.table.first
+    followed = [first, *(str(one["driver"]) for one in diagnosed.document["where"])]
     return next((name for name in (state.against, *followed) if name in known), "force")
 
 

@@ -2,11 +2,18 @@
 
 from types import SimpleNamespace
 
+import numpy as np
+import pytest
+
+from pipelines.diagnosis.diagnose import examination
 from pipelines.procedures.wording import probability, signed, with_uncertainty
 from pipelines.report.context import UnitContext
 from pipelines.report.numbers import with_uncertainty as in_tables
 from pipelines.report.reasons import plain_reason
+from pipelines.report.residual_table import residual_table
+from pipelines.report.residuals import drivers_shown
 from pipelines.stages.figures import FIGURES
+from tumbleline import example
 
 
 def test_a_figure_has_its_label_and_other_reasons_stay() -> None:
@@ -36,3 +43,20 @@ def test_numbers_have_the_digits_of_their_uncertainty_a_sign_and_no_negative_zer
     assert {value: signed(value, 1) for value in differences} == differences
     assert in_tables(-0.0409, 1.0) == ("0.0", "1.0")
     assert [probability(p) for p in (0.68, 3.2e-12, 0.0)] == ["p = 0.68", "p < 0.001", "p < 0.001"]
+
+
+@pytest.mark.parametrize(
+    ("effect", "first"), [("cubic_transfer", "force"), ("encoder_harmonic", "outer_deg"), ("warm_up", "since_power_s")]
+)
+def test_the_first_picture_is_the_quantity_of_the_missing_effect(effect: str, first: str) -> None:
+    lot = example(effect, seed=5)
+    made = examination(lot.run.dwells, lot.run.history, lot.model)
+    assert made.diagnosis is not None
+    assert drivers_shown(made.diagnosis)[0].name == first
+    table = residual_table(made.measured, made.diagnosis, made.measured.units)
+    assert table.first == first
+    before = table.residual[0, 0]
+    along = table.drivers[first][1][0]
+    along = along[:, 0] if along.ndim > 1 else along
+    if first == "force":  # f = x + h·x³ less the line that bias and scale take: odd, and three zeros
+        assert abs(np.corrcoef(before, along**3 - np.polyval(np.polyfit(along, along**3, 1), along))[0, 1]) > 0.7
