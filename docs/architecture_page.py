@@ -67,7 +67,8 @@ Written by `python -m {MODULE}` from the layer contracts of `pyproject.toml`, wh
 
 ![Rooms of the product, a row for each layer; imports point down](../pictures/rooms.svg)
 
-Five packages: `tumbleline` (the same from Python) above `pipelines` (jobs, stages, archive, commands, pages) above `stations` (devices, links, the simulated plant) above
+Five packages: `tumbleline` (the same from Python) above `pipelines` (jobs, stages, archive, commands, pages) above
+`stations` (devices, links, the simulated plant) above
 `inertial` (the science: arrays in, arrays out) and `schemas` (what crosses a boundary). Why the layers are as they are:
 [layers](../decisions/layers.md).""".splitlines()
 DIAGNOSIS = """\
