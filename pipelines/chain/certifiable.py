@@ -16,10 +16,9 @@ from pipelines.certificates.measured import END, measured_span
 from pipelines.integrity import verify
 from pipelines.jobs.adequacy import adequacy_of
 from pipelines.jobs.references import contradiction, references_of
-from pipelines.jobs.terms import archived_terms
 from pipelines.stages.grade import BUDGET
 from pipelines.stages.judge import AdequacyDocument, told_by
-from pipelines.stages.uncertainty.budget_terms import BudgetTerms
+from pipelines.stages.uncertainty.budget_terms import BudgetTerms, archived_terms
 from schemas.errors import ArchiveUnusable, WrongUse
 from schemas.limits import ADEQUACY_P_MIN
 

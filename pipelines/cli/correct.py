@@ -125,7 +125,7 @@ def command(
     )
     from pipelines.export.recording import at_nominal_supply, read_recording
     from pipelines.jobs.model_files import use_formulas_of
-    from pipelines.jobs.terms import archived_terms
+    from pipelines.stages.uncertainty.budget_terms import archived_terms
 
     printed = is_standard_output(output, "correct", as_json=as_json)
     name, _, unit = calibration.partition(":")

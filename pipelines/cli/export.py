@@ -197,7 +197,7 @@ def _print_certificates(run: Run, chosen: Sequence[UnitCalibration], signers: Se
     from pipelines.certificates.coefficient_remarks import library_remarks
     from pipelines.certificates.days import today
     from pipelines.export import revoked_units
-    from pipelines.jobs.terms import archived_terms
+    from pipelines.stages.uncertainty.budget_terms import archived_terms
 
     given, day = {c.unit for c in chosen}, today()
     lines = [f"left out: {unit}, {one.sentence()}" for unit, one in revoked_units(run).items() if unit not in given]

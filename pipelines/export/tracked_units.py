@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from inertial.noise.gauss_markov import BiasModel, bias_model
 from pipelines.archive import Run
 from pipelines.export.corrected import fit_of_unit, steps_flicker, terms_of_unit
-from pipelines.jobs.terms import archived_terms
+from pipelines.stages.uncertainty.budget_terms import archived_terms
 from schemas.errors import WrongUse
 from schemas.units import MICRO
 

@@ -13,8 +13,7 @@ from inertial.uncertainty.contradiction import LEVEL, Size
 from inertial.uncertainty.rounding import equal
 from pipelines.archive import Run
 from pipelines.jobs.model_files import use_formulas_of
-from pipelines.jobs.terms import archived_terms
-from pipelines.stages.uncertainty.budget_terms import BudgetTables
+from pipelines.stages.uncertainty.budget_terms import BudgetTables, archived_terms
 from pipelines.stages.uncertainty.contradiction import JUDGED, LotReferences, lot_references
 from pipelines.stages.uncertainty.tables import LABELS
 from schemas.errors import DataRejected, RecipeInvalid

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -17,7 +16,6 @@ from schemas.recipe import Recipe
 from schemas.reference import Reference
 from schemas.station import Pace, StationConfig, refuse_untraced
 from schemas.uncertainty import Uncertainty
-from schemas.validity import CertificateTerms, Stability
 
 GRAVITY_SIGMAS = 3.0
 
@@ -75,30 +73,6 @@ def _supply_not_measured(terms: BudgetTerms) -> str:
     if supply is None or terms.stability is None or terms.stability.ratiometric == 0.0 or supply.ratio_measured:
         return ""
     return "; the output follows the supply: measure that of each slot, supply = { u_ppm = …, ratio_measured = true }"
-
-
-def archived_terms(about: Mapping[str, Any]) -> BudgetTerms | None:
-    """The terms of an archived run, from what is kept beside it; None for runs that state none."""
-    station, recipe = about.get("station") or {}, about.get("recipe") or {}
-    stated = merged(
-        *(
-            Uncertainty.model_validate(one["uncertainty"]) if one.get("uncertainty") else None
-            for one in (station, recipe)
-        )
-    )
-    if stated is None:
-        return None
-    months = (about.get("limits") or {}).get("validity_months") or VALIDITY_MONTHS
-    certificate, stability = recipe.get("certificate"), recipe.get("stability")
-    return BudgetTerms(
-        stated=stated,
-        stability=Stability.model_validate(stability) if stability else None,
-        certificate=CertificateTerms.model_validate(certificate or {"validity_months": months}),
-        references=tuple(Reference.model_validate(one) for one in station.get("reference", [])),
-        soak_min_s=float(recipe.get("soak_min_s", 0.0)),
-        dwell_s=float(recipe.get("dwell_s", 1.0)),
-        room_C=float((station.get("pace") or {}).get("room_C", Pace().room_C)),
-    )
 
 
 def with_stability(recipe: Recipe, station: StationConfig) -> Recipe:

@@ -19,7 +19,6 @@ from pipelines.importers.plane import axis_of_plane
 from pipelines.jobs.job import Job
 from pipelines.jobs.model_change import ModelChange
 from pipelines.jobs.model_files import refuse_unknown_effects, use_formulas
-from pipelines.jobs.terms import archived_terms
 from pipelines.rerun.import_steps import (
     ImportedData,
     StageCall,
@@ -35,6 +34,7 @@ from pipelines.rerun.import_steps import (
 )
 from pipelines.stages.figures import UNITS
 from pipelines.stages.grade import refuse_limits_without_figures
+from pipelines.stages.uncertainty.budget_terms import archived_terms
 from pipelines.tables.dwell_table import output_axes
 from pipelines.tables.leave_out import Dwells, leave_out
 from schemas.errors import DataRejected, WrongUse

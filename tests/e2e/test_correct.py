@@ -352,7 +352,7 @@ def test_refusals_say_what_is_missing(
     words: str, run: Run, tmp_path: Path, rng: np.random.Generator, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("pipelines.jobs.terms.archived_terms", lambda about: None)
+    monkeypatch.setattr("pipelines.stages.uncertainty.budget_terms.archived_terms", lambda about: None)
     table = still(run, rng, 500)
     for name, one in {"a": table, "cold": table.drop(columns="unit_C"), "back": table.iloc[::-1]}.items():
         one.to_csv(f"{name}.csv", index=False)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,8 +12,10 @@ from pipelines.stages.reduce import FollowedSupply
 from pipelines.stages.uncertainty.contributions import merged
 from pipelines.tables.calibration import Calibration, read_calibration
 from pipelines.tables.dwells import LotArrays, LotTables
+from schemas.limits import VALIDITY_MONTHS
 from schemas.recipe import Recipe
 from schemas.reference import Reference
+from schemas.station import Pace
 from schemas.uncertainty import Uncertainty
 from schemas.validity import CertificateTerms, Stability
 
@@ -119,4 +121,28 @@ def terms_of(
         soak_min_s=recipe.soak_min_s,
         dwell_s=recipe.dwell_s,
         room_C=room_c,
+    )
+
+
+def archived_terms(about: Mapping[str, Any]) -> BudgetTerms | None:
+    """The terms of an archived run, from what is kept beside it; None for runs that state none."""
+    station, recipe = about.get("station") or {}, about.get("recipe") or {}
+    stated = merged(
+        *(
+            Uncertainty.model_validate(one["uncertainty"]) if one.get("uncertainty") else None
+            for one in (station, recipe)
+        )
+    )
+    if stated is None:
+        return None
+    months = (about.get("limits") or {}).get("validity_months") or VALIDITY_MONTHS
+    certificate, stability = recipe.get("certificate"), recipe.get("stability")
+    return BudgetTerms(
+        stated=stated,
+        stability=Stability.model_validate(stability) if stability else None,
+        certificate=CertificateTerms.model_validate(certificate or {"validity_months": months}),
+        references=tuple(Reference.model_validate(one) for one in station.get("reference", [])),
+        soak_min_s=float(recipe.get("soak_min_s", 0.0)),
+        dwell_s=float(recipe.get("dwell_s", 1.0)),
+        room_C=float((station.get("pace") or {}).get("room_C", Pace().room_C)),
     )
