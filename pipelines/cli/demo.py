@@ -40,7 +40,14 @@ def command(
     folder: Annotated[
         Path, typer.Option("--folder", metavar="DIR", help="Folder for measurements, model and report.")
     ] = Path("demo"),
+    lots: Annotated[int, typer.Option("--lots", min=60, help="Lots of the archive of --archive.")] = 400,
     *,
+    archive: Annotated[
+        bool,
+        typer.Option(
+            "--archive", help="Hide something in a wafer of an archive of many lots, and find it with discover."
+        ),
+    ] = False,
     auto: Annotated[bool, typer.Option("--auto", help="Run without questions.")] = False,
     by_hand: Annotated[
         bool, typer.Option("--by-hand", help="Only measure and write the files; continue with the commands yourself.")
@@ -51,6 +58,9 @@ def command(
 
     The same lot is measured twice; the second run is fresh data that no fit sees.
     """
+    if archive:
+        _archive(folder, secrets.randbelow(100000) if seed is None else seed, lots, as_json=as_json)
+        return
     from pipelines.archive.files import ELSEWHERE, writing
     from pipelines.demo.measure import measure
     from pipelines.demo.scenes import scene
@@ -75,6 +85,23 @@ def command(
         print_json({"seed": drawn, **document})
 
 
+def _archive(folder: Path, seed: int, lots: int, *, as_json: bool) -> None:
+    """An archive with something hidden in a wafer: written, judged, explained, and judged again with the effect in the model."""
+    from pipelines.archive.files import ELSEWHERE, writing
+    from pipelines.cli.text.demo_text import print_discovery_demo
+    from pipelines.demo.discovery_demo import made, played
+    from pipelines.parallel import processors
+
+    with writing(folder, "demo", ELSEWHERE), _bar(f"measuring {lots} lots") as progress:
+        written, hidden = made(folder, seed, lots, lambda done: progress(done, lots, ""))
+    with error_console().status("judging the archive night by night"):
+        document = played(written, hidden, processors())
+    if as_json:
+        print_json({"seed": seed, **document})
+    else:
+        print_discovery_demo(document)
+
+
 def _put_aside(model: Path) -> Path | None:
     """Rename a model file to the first free name with a number; its new name, None where there is no file."""
     if not model.exists():
@@ -84,15 +111,15 @@ def _put_aside(model: Path) -> Path | None:
 
 
 @contextmanager
-def _bar() -> Generator[Progress]:
-    """Two bars on standard error, one for each run of the lot."""
+def _bar(what: str = "measuring the lot twice") -> Generator[Progress]:
+    """A bar on standard error."""
     from rich.progress import Progress as Bars
 
     with Bars(console=error_console(), transient=True) as bars:
-        bar = bars.add_task("measuring the lot twice", total=None)
+        bar = bars.add_task(what, total=None)
 
         def show(done: int, total: int, note: str) -> None:
-            bars.update(bar, completed=done, total=total, description=f"measuring  {note}")
+            bars.update(bar, completed=done, total=total, description=f"measuring  {note}" if note else what)
 
         yield show
 

@@ -47,3 +47,38 @@ def _print_class(document: dict[str, Any], named: str) -> None:
         print_next_measurement(rows)
     else:
         say(rows[0]["why"])
+
+
+def print_discovery_demo(document: dict[str, Any]) -> None:
+    """Print the story of an archive: which night something was found, what it is, and what adding it does."""
+    from pipelines.cli.next_commands import command_line, print_next
+    from pipelines.discovery.sentences import headline, scope_text
+
+    archive = f"{document['folder']}/archive"
+    say(
+        f"{document['lots']} lots were measured on three stations. Each lot passes its own check; something is hidden in one of "
+        "twelve wafers."
+    )
+    say("\n1. What do the lots show together?", style="bold cyan")
+    if not document["discoveries"]:
+        say("nothing beyond chance; more lots would show it", style="yellow")
+    for row in document["discoveries"]:
+        say(headline(row))
+        say(f"    {scope_text(row)}")
+    if document["compared"]:
+        say("\n2. The effect is added to the model of every lot.", style="bold cyan")
+    for one in document["compared"]:
+        confirmed = next(row["confirmed"] for row in document["discoveries"] if row["id"] == one["id"])
+        later = {True: "lots after that night confirm it", False: "lots after that night do not confirm it"}
+        say(
+            f"{one['id']}: {short(one['size_ug_before'])} → {short(one['size_ug_after'])} µg, evidence "
+            f"e^{short(one['log_e_before'])} → e^{short(one['log_e_after'])}; {later.get(confirmed, 'too few lots came since')}"
+        )
+    hidden = document["hidden"]
+    say("\n3. What was hidden?", style="bold cyan")
+    right = document["found"] and document["wafer_named"]
+    say(
+        f"{hidden['physics']} in wafer {hidden['wafer']} ({hidden['effect']}). {'Found.' if right else 'Not found.'}",
+        style="bold green" if right else "bold red",
+    )
+    print_next([command_line("discover", "--archive", archive, "--html", f"{document['folder']}/discoveries.html")])

@@ -1,0 +1,166 @@
+"""Discoveries in archives: ``python -m benchmarks.discovery [null|power|names|cost] [--archives N] [--seed S]``.
+
+Prints for each world how many archives without anything hidden showed a discovery in 100 nights; for hidden effects the lots
+after which 95 % of the archives had found them; how often effect and driver were named; and what a lot and a night cost.
+"""
+
+from __future__ import annotations
+
+import argparse
+import random
+import time
+from collections.abc import Callable
+from multiprocessing import get_context
+from typing import Any
+
+import numpy as np
+from scipy import stats
+
+from benchmarks.discovery.archives import ArchiveMaker, Hidden, Setting
+from benchmarks.discovery.lots import WORLDS, World, bank
+from inertial.discovery.naming import Pool
+
+NEEDED = 10.68
+BANK = 120
+SETTINGS = (
+    ("stations stay", Setting()),
+    ("one lot in 100 with noise × 20", Setting(bad=0.01)),
+    ("units come again", Setting(again=0.5)),
+    ("cubic of 0.01 floors wanders over 100 lots", Setting(wander=0.01)),
+    ("cubic of 0.03 floors wanders over 30 lots", Setting(wander=0.03, over=30.0)),
+    ("cubic of 0.03 floors wanders over 400 lots", Setting(wander=0.03, over=400.0)),
+    ("one station, cubic of 0.02 floors over 100 lots", Setting(stations=1, wander=0.02)),
+)
+POWER = (
+    Hidden("third_order", "mean", 0.01), Hidden("third_order", "wafer", 0.01), Hidden("third_order", "station", 0.01),
+    Hidden("cross_coupling", "slot", 0.01), Hidden("third_order", "radius", 0.01), Hidden("second_order", "firmware", 0.01),
+)  # fmt: skip
+NAMES = tuple(
+    Hidden(effect, driver, 0.03)
+    for effect in (
+        "third_order", "second_order", "cross_coupling", "bias_temperature_quadratic", "scale_temperature_quadratic",
+        "creep_after_move",
+    )
+    for driver in ("mean", "wafer", "station", "slot", "radius", "firmware")
+)  # fmt: skip
+_makers: dict[str, ArchiveMaker] = {}
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("what", choices=("null", "power", "names", "cost"))
+    parser.add_argument("--archives", type=int, default=20)
+    parser.add_argument("--seed", type=int, default=random.SystemRandom().randrange(10**6))
+    parser.add_argument("--jobs", type=int, default=2)
+    given = parser.parse_args()
+    print(f"seed {given.seed}")
+    {"null": null, "power": power, "names": names, "cost": cost}[given.what](given)
+
+
+def _maker(world: World, seed: int) -> ArchiveMaker:
+    if world.name not in _makers:
+        _makers[world.name] = ArchiveMaker(bank(world, BANK, seed))
+    return _makers[world.name]
+
+
+def _map(function: Callable[[Any], Any], parts: list[Any], jobs: int) -> list[Any]:
+    if jobs < 2:
+        return [function(part) for part in parts]
+    with get_context("fork").Pool(jobs) as pool:
+        return pool.map(function, parts, chunksize=1)
+
+
+def null(given: argparse.Namespace) -> None:
+    """Archives of 2000 lots without anything hidden, for each world and each setting."""
+    rows = [(world, SETTINGS[0]) for world in WORLDS] + [(WORLDS[1], setting) for setting in SETTINGS[1:]]
+    total, false = 0, 0
+    for world, (name, setting) in rows:
+        _maker(world, given.seed)
+        parts = [(world, given.seed, given.seed + k, setting) for k in range(given.archives)]
+        found = [drivers for drivers in _map(_null, parts, given.jobs) if drivers]
+        total, false = total + given.archives, false + len(found)
+        told = ", ".join(sorted({driver for drivers in found for driver in drivers}))
+        print(f"{world.name}; {name}: {len(found)} of {given.archives} {told}", flush=True)
+    print(f"all: {false} of {total} {_interval(false, total)}")
+
+
+def _null(part: tuple[World, int, int, Setting]) -> list[str]:
+    world, seed, own, setting = part
+    return list(_maker(world, seed).archive(own, 2000, Hidden(), setting, NEEDED).first)
+
+
+def power(given: argparse.Namespace) -> None:
+    """Lots after which 95 % of the archives had found the hidden effect."""
+    for world in WORLDS[:2]:
+        _maker(world, given.seed)
+        for hidden in POWER:
+            parts = [(world, given.seed, given.seed + k, hidden) for k in range(given.archives)]
+            lots = sorted(_map(_power, parts, given.jobs))
+            at = lots[min(int(np.ceil(0.95 * len(lots))) - 1, len(lots) - 1)]
+            text = f"{hidden.effect} by {hidden.driver}, {hidden.size:g} floors; {world.name}"
+            print(f"{text}: half at {lots[len(lots) // 2]}, 95 % at {at} lots", flush=True)
+
+
+def _power(part: tuple[World, int, int, Hidden]) -> float:
+    world, seed, own, hidden = part
+    count = 1200
+    first = _maker(world, seed).archive(own, count, hidden, Setting(), NEEDED).first
+    found = [lots for name, lots in first.items() if name.split(",")[0] == hidden.driver]
+    if not found:
+        return float("inf")
+    return min(found) - (count // 2 if hidden.driver == "firmware" else 0)
+
+
+def names(given: argparse.Namespace) -> None:
+    """Whether effect and driver are named, and what else."""
+    _maker(WORLDS[1], given.seed)
+    parts = [(given.seed, given.seed + k, NAMES[k % len(NAMES)]) for k in range(given.archives)]
+    told = _map(_names, parts, given.jobs)
+    for name, place in (
+        ("found", 0),
+        ("effect in class", 1),
+        ("effect first", 2),
+        ("driver in class", 3),
+        ("something else named", 4),
+    ):
+        hits = sum(one[place] for one in told)
+        print(f"{name}: {hits} of {len(told)} {_interval(hits, len(told))}")
+    for (_, _, hidden), one in zip(parts, told, strict=True):
+        if not one[1] or not one[3] or one[4]:
+            print(f"  {hidden.effect} by {hidden.driver}: {one[5]}")
+
+
+def _names(part: tuple[int, int, Hidden]) -> tuple[bool, bool, bool, bool, bool, str]:
+    seed, own, hidden = part
+    maker = _maker(WORLDS[1], seed)
+    result = maker.archive(own, 1000, hidden, Setting(), NEEDED, keep=True)
+    if not result.first:
+        return False, False, False, False, False, "nothing found"
+    pool = Pool(maker.columns, maker.size.reshape(-1), *maker.products)
+    alarms = [(name, maker.columns[place % len(maker.columns)][0]) for name, place in result.alarms]
+    found = pool.names(result.lots, alarms, NEEDED)
+    right = [one for one in found if hidden.effect in one.effects]
+    driver = any(hidden.driver in one.drivers for one in right)
+    text = "; ".join(f"{' | '.join(one.effects)} by {' | '.join(one.drivers)}" for one in found)
+    first = any(one.effects[0] == hidden.effect for one in right)
+    return True, bool(right), first, driver, len(found) > len(right[:1]), text
+
+
+def cost(given: argparse.Namespace) -> None:
+    """Seconds of the scores of a lot and of its evidence, as ratios to the fit of the same lot."""
+    begin = time.perf_counter()
+    maker = _maker(WORLDS[0], given.seed)
+    scored = (time.perf_counter() - begin) / BANK
+    begin = time.perf_counter()
+    maker.archive(given.seed, 1000, Hidden(), Setting(), NEEDED)
+    print(f"a lot made, read and scored {1e3 * scored:.0f} ms; evidence {time.perf_counter() - begin:.2f} ms a lot")
+
+
+def _interval(hits: int, n: int) -> str:
+    low, high = stats.binomtest(hits, n).proportion_ci(0.95, "exact")
+    return f"[{low:.3f}, {high:.3f}]"
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,178 @@
+"""Long archives from a bank of scored lots: signs are drawn again, effects and errors of references are added to the scores.
+
+What is hidden has a size in floors of noise: rms of what the model leaves of it, over the noise of a dwell.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial.discovery.evidence import Evidence, ScoredLot
+from inertial.discovery.scores import LotScores
+
+Array = NDArray[np.float64]
+UNITS, A_NIGHT = 8, 20
+
+
+@dataclass(frozen=True)
+class Hidden:
+    """An effect, its driver and its size in floors; ``driver`` empty: nothing."""
+
+    effect: str = "third_order"
+    driver: str = ""
+    size: float = 0.0
+
+
+@dataclass(frozen=True)
+class Setting:
+    """Stations and their errors outside the columns of the station.
+
+    wander : floors, of a cubic at each station · over : lots of it · bad : share of lots with twenty times the noise
+    again : share of units that come a second time
+    """
+
+    stations: int = 4
+    wander: float = 0.0
+    over: float = 100.0
+    bad: float = 0.0
+    again: float = 0.0
+
+
+@dataclass
+class Result:
+    """An archive's evidence, and the number of lots at the first alarm of each driver."""
+
+    evidence: Evidence
+    lots: list[ScoredLot] = field(default_factory=list[ScoredLot])
+    first: dict[str, int] = field(default_factory=dict[str, int])
+    alarms: set[tuple[str, int]] = field(default_factory=set[tuple[str, int]])
+
+
+class ArchiveMaker:
+    """Archives from one bank."""
+
+    def __init__(self, lots: Sequence[LotScores]) -> None:
+        self.bank, self.columns = lots, lots[0].columns
+        self.size = np.mean([one.size for one in lots], axis=0)
+        self.floor = float(np.mean([one.floor for one in lots]))
+        self.products = tuple(np.mean([getattr(one, name) for one in lots], axis=0) for name in ("lot", "inside"))
+
+    def archive(
+        self, seed: int, count: int, hidden: Hidden, setting: Setting, needed: float, *, keep: bool = False
+    ) -> Result:
+        """An archive night by night."""
+        rng = np.random.default_rng([seed, 4111])
+        result = Result(Evidence(3 * len(self.columns)))
+        state = _State(rng, setting.stations)
+        for number in range(count):
+            lot = self._lot(rng, state, number, count, hidden, setting)
+            result.evidence.add(lot)
+            if keep:
+                result.lots.append(lot)
+            if number % A_NIGHT == A_NIGHT - 1 and number >= 29:
+                for name, sums in result.evidence.drivers.items():
+                    places = self._alarmed(result.evidence, name, sums.log_e, needed)
+                    result.alarms |= {(name, place) for place in places}
+                    if places:
+                        result.first.setdefault(name, number + 1)
+        return result
+
+    @staticmethod
+    def _alarmed(evidence: Evidence, name: str, log_e: Array, needed: float) -> list[int]:
+        """Hypotheses of a driver with an alarm that is not held, as the product decides."""
+        from pipelines.discovery.nights import Alarm, Evidences, held
+
+        state = Evidences("", tuple(("", k) for k in range(evidence.count // 3)), (), evidence, Evidence(0))
+        return [int(p) for p in np.flatnonzero(log_e > needed) if not held(state, Alarm(name, int(p), 0, 0, 0.0))]
+
+    def _lot(
+        self, rng: np.random.Generator, state: _State, number: int, count: int, hidden: Hidden, setting: Setting
+    ) -> ScoredLot:
+        one = self.bank[int(rng.integers(len(self.bank)))]
+        score = rng.choice([-1.0, 1.0]) * one.score
+        if setting.bad and rng.random() < setting.bad:
+            score = 20.0 * score
+        station = int(rng.integers(setting.stations))
+        wafers = rng.integers(0, 12, UNITS) + 12 * (number // 200)
+        radius = rng.uniform(0.0, 1.0, UNITS)
+        firmware = int(number >= count // 2)
+        size = state.sizes(hidden.driver, station, wafers, radius, firmware) * hidden.size
+        added = [(hidden.effect, size)] if hidden.driver else []
+        if setting.wander:
+            added.append(("third_order", np.tile(setting.wander * state.walked(station, setting.over), (UNITS, 1))))
+        for effect, own in added:
+            score = score + self._change(one, effect, own)
+        units = state.units(rng, number, setting.again)
+        levels = {
+            "slot": tuple(map(str, range(UNITS))),
+            "wafer": tuple(f"W{w}" for w in wafers),
+            "batch": (f"B{number // 50}",) * UNITS,
+            "firmware": (str(firmware),) * UNITS,
+            "operator": (f"o{rng.integers(4)}",) * UNITS,
+            "supplier": tuple(f"s{k}" for k in rng.integers(0, 3, UNITS)),
+            "season": (f"month {(number // A_NIGHT // 30) % 12}",) * UNITS,
+        }
+        information = np.diagonal(one.lot, axis1=1, axis2=2).reshape(-1)
+        return ScoredLot(
+            f"{number}",
+            f"s{station}",
+            number / A_NIGHT,
+            units,
+            score.reshape(UNITS, -1),
+            one.own.reshape(UNITS, -1),
+            information,
+            levels,
+            {"radius": radius},
+        )
+
+    def _change(self, one: LotScores, effect: str, size: Array) -> Array:
+        """What coefficients (units, 3), in floors, add to the scores of a lot."""
+        k = next(at for at, (name, _) in enumerate(self.columns) if name == effect)
+        coefficient = size * self.floor / np.maximum(self.size[:, k], 1e-300)
+        mean = coefficient.mean(axis=0)
+        inside = np.einsum("ak,ua->uak", one.inside[:, :, k], coefficient - mean)
+        return inside + one.lot[:, :, k] * mean[:, None] / UNITS
+
+
+class _State:
+    """What stays from lot to lot: sizes of levels, wander of stations, units that come again."""
+
+    def __init__(self, rng: np.random.Generator, stations: int) -> None:
+        self._rng = np.random.default_rng(rng.integers(2**63))
+        fixed = rng.standard_normal(3)
+        self._fixed = fixed / np.sqrt(np.mean(fixed**2))
+        self._stations = rng.standard_normal((stations, 3))
+        slots = rng.standard_normal((UNITS, 3))
+        self._slots = slots - slots.mean(axis=0)
+        self._wafers: dict[int, Array] = {}
+        self._walk = rng.standard_normal((stations, 3))
+        self._seen: list[str] = []
+
+    def sizes(self, driver: str, station: int, wafers: NDArray[np.int64], radius: Array, firmware: int) -> Array:
+        """Coefficients (units, 3) of rms one."""
+        alike = {"mean": self._fixed, "station": self._stations[station], "firmware": firmware * self._fixed}
+        if driver in alike:
+            return np.tile(alike[driver], (UNITS, 1))
+        if driver == "wafer":
+            return np.array([self._wafers.setdefault(int(w), self._rng.standard_normal(3)) for w in wafers])
+        differ = {"slot": self._slots, "radius": self._fixed * (radius[:, None] - 0.5) * np.sqrt(12.0)}
+        return differ.get(driver, np.zeros((UNITS, 3)))
+
+    def walked(self, station: int, over: float) -> Array:
+        """The next value (3,) of a station's wander."""
+        kept = np.exp(-1.0 / over)
+        self._walk[station] = kept * self._walk[station] + np.sqrt(1.0 - kept**2) * self._rng.standard_normal(3)
+        return self._walk[station].copy()
+
+    def units(self, rng: np.random.Generator, number: int, again: float) -> tuple[str, ...]:
+        """Serials of a lot, some of which were measured before."""
+        out: list[str] = []
+        for k in range(UNITS):
+            old = self._seen[int(rng.integers(len(self._seen)))] if self._seen and rng.random() < again else ""
+            out.append(old if old and old not in out else f"{number}-{k}")
+        self._seen = [*self._seen, *out][-4000:]
+        return tuple(out)

@@ -1,0 +1,86 @@
+"""Lots dwell by dwell in several worlds of noise and of references, scored once each by the product's engine.
+
+The physics and the noise are written here and in :mod:`pipelines.demo.archive_lots`; neither knows a column of a fit.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
+
+from inertial.discovery.scores import LotScores, scores_of
+from pipelines.demo.archive_lots import WHITE_UG, Line
+from pipelines.demo.lot_archive import EFFECTS
+from pipelines.tables.sound_lot import sound_lot
+
+Array = NDArray[np.float64]
+WANDER_UG = 36.0  # with the white noise a floor of about 37 µg
+
+
+@dataclass(frozen=True)
+class World:
+    """How lots differ from what the estimator assumes; the names are printed.
+
+    rests : rad, how far the table rests off its targets, each time anew · walk : µg/√s · tails : degrees of freedom of
+        Student's t, 0 for normal · thermometer : K by soak, alike for all units · with_force : growth of the noise with the force
+    common : µg of a noise that all units of a lot share
+    """
+
+    name: str
+    rests: float = 0.0
+    walk: float = 0.0
+    tails: int = 0
+    louder: float = 1.0
+    thermometer: float = 0.0
+    with_force: float = 0.0
+    common: float = 0.0
+
+
+WORLDS = (
+    World("plain"),
+    World("table rests 20 µrad off", rests=20e-6),
+    World("walk 4 µg/√s", walk=4.0),
+    World("t3 tails", tails=3),
+    World("noise 1.5 × the stated", louder=1.5),
+    World("thermometer 0.1 K by soak", thermometer=0.1),
+    World("noise grows with force", with_force=2.0),
+    World("noise common to all units", common=15.0),
+)
+
+
+def bank(world: World, count: int, seed: int) -> list[LotScores]:
+    """Scores of lots of a world, with nothing hidden in them."""
+    line = Line(seed, hidden=None, rests=world.rests, wander=WANDER_UG)
+    rng = np.random.default_rng([seed, 977])
+    with threadpool_limits(1):
+        return [_scored(line, world, rng) for _ in range(count)]
+
+
+def _scored(line: Line, world: World, rng: np.random.Generator) -> LotScores:
+    dwells, _ = line.lot("s")
+    names = [f"out_{axis}" for axis in "xyz"]
+    units = dwells["unit"].unique()
+    n = len(dwells) // len(units)
+    out = dwells[names].to_numpy().reshape(len(units), n, 3)
+    time = dwells["time_s"].to_numpy()[:n]
+    steps = np.sqrt(np.diff(time, prepend=0.0))[:, None]
+    out = out + 1e-6 * world.walk * np.cumsum(steps * rng.standard_normal(out.shape), axis=1)
+    if world.tails:
+        out = out + 1e-6 * WHITE_UG * rng.standard_t(world.tails, out.shape)
+    if world.louder > 1.0:
+        out = out + 1e-6 * WHITE_UG * np.sqrt(world.louder**2 - 1.0) * rng.standard_normal(out.shape)
+    if world.with_force:
+        out = out + 1e-6 * WHITE_UG * world.with_force * np.abs(out) * rng.standard_normal(out.shape)
+    if world.common:
+        out = out + 1e-6 * world.common * rng.standard_normal((n, 3))
+    if world.thermometer:
+        wrong = world.thermometer * rng.standard_normal(3)[np.repeat(np.arange(3), n // 3)]
+        dwells["unit_C"] = dwells["unit_C"] + np.tile(wrong, len(units))
+    dwells[names] = out.reshape(-1, 3)
+    _, _, lot = sound_lot(dwells, None, EFFECTS)
+    if lot is None:
+        raise RuntimeError("a lot of the benchmark has a fault in every unit")
+    return scores_of(lot, EFFECTS)

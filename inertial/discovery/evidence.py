@@ -1,0 +1,397 @@
+"""Evidence over the lots of an archive, valid at any night: a supermartingale for every effect and driver.
+
+Each lot gives each hypothesis one number x that is symmetric about zero where there is nothing, given all earlier lots. Then
+exp(λS − λ²V/2) with S = Σx and V = Σx² is a supermartingale for any λ (de la Peña 1999; de la Peña, Klass, Lai 2004), and the
+probability that its mean over some λ ever exceeds m/α is at most α/m (Ville). Nothing is assumed of the size of the noise.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import logsumexp
+
+from inertial.discovery.station_wander import Innovation, Wander
+
+Array = NDArray[np.float64]
+
+FIRST = 30
+"""Lots that are held back: their medians bound what one of them can do. One lot multiplies evidence by 1.65 at most."""
+
+BOUND = 5.0
+"""Largest number of standard deviations that a lot counts for."""
+
+SHRUNK = 4.0
+"""Typical lots by whose information the predicted size of a level is drawn towards none."""
+
+MEAN, DATE, STATION, SLOT, UNIT = "mean", "date", "station", "slot", "unit"
+INSIDE = ", inside lots"
+"""Ending of the name of a driver that is judged by differences inside a lot: whatever the lot has in common cancels."""
+
+GUARDED = 2.0
+"""Log likelihood that a station's own walk gains, from which on what is constant in a lot may be that."""
+
+_MIXED = np.array([0.3, 0.03, 0.003])
+_RATES: Array = np.exp2(np.arange(1.0, -15.0, -1.0))
+
+
+@dataclass(frozen=True)
+class ScoredLot:
+    """Scores of a lot in the order of an archive's hypotheses.
+
+    score : (units, h), errors of the station taken out · own : (units, h), information before that
+    information : (h,), of the sums, errors of the station taken out
+    levels : driver → label of each unit, "" where it is not known · numbers : driver → (units,), nan where not known
+    day : since an epoch
+    """
+
+    run: str
+    station: str
+    day: float
+    units: tuple[str, ...]
+    score: Array
+    own: Array
+    information: Array
+    levels: Mapping[str, tuple[str, ...]] = field(default_factory=dict[str, tuple[str, ...]])
+    numbers: Mapping[str, Array] = field(default_factory=dict[str, Array])
+
+
+@dataclass
+class Sums:
+    """Evidence of one driver for every effect: Σx, Σx², number of lots that said anything."""
+
+    s: Array
+    v: Array
+    n: Array
+    two_sided: bool
+
+    @classmethod
+    def of(cls, count: int, *, two_sided: bool) -> "Sums":
+        """Sums without a lot."""
+        return cls(np.zeros(count), np.zeros(count), np.zeros(count), two_sided)
+
+    def add(self, x: Array) -> None:
+        """Add the increments (h,) of a lot."""
+        self.s += x
+        self.v += x**2
+        self.n += x != 0.0
+
+    @property
+    def log_e(self) -> Array:
+        """Logarithm of the evidence, (h,)."""
+        s, v = self.s, self.v
+        if self.two_sided:
+            grown = 1.0 + _MIXED[:, None] * v
+            return logsumexp(-0.5 * np.log(grown) + 0.5 * _MIXED[:, None] * s**2 / grown, axis=0) - np.log(_MIXED.size)
+        return logsumexp(_RATES[:, None] * s - 0.5 * _RATES[:, None] ** 2 * v, axis=0) - np.log(_RATES.size)
+
+
+class Levels:
+    """What earlier lots say of every level of a driver: sums of scores and of information, (levels, h)."""
+
+    def __init__(self, count: int) -> None:
+        self.place: dict[str, int] = {}
+        self.score, self.information = np.zeros((0, count)), np.zeros((0, count))
+
+    def predicted(self, labels: tuple[str, ...], prior: Array, without: "Levels | None" = None) -> Array:
+        """Predicted sizes (units, h), drawn towards zero by a prior information (h,); zero for levels without a past.
+
+        Parameters
+        ----------
+        without : a part of the lots that is left out
+        """
+        out = np.zeros((len(labels), self.score.shape[1]))
+        for unit, label in enumerate(labels):
+            at = self.place.get(label, -1)
+            if at < 0:
+                continue
+            score, information = self.score[at], self.information[at]
+            less = -1 if without is None else without.place.get(label, -1)
+            if without is not None and less >= 0:
+                score, information = score - without.score[less], information - without.information[less]
+            known = information + prior
+            out[unit] = np.where(known > 0.0, score / np.where(known > 0.0, known, 1.0), 0.0)
+        return out
+
+    def add(self, labels: tuple[str, ...], score: Array, information: Array) -> None:
+        """Add scores and information (units, h)."""
+        for unit, label in enumerate(labels):
+            if not label:
+                continue
+            at = self.place.setdefault(label, len(self.place))
+            if at >= len(self.score):
+                more = np.zeros((max(16, len(self.score)), self.score.shape[1]))
+                self.score, self.information = np.vstack([self.score, more]), np.vstack([self.information, more])
+            self.score[at] += score[unit]
+            self.information[at] += information[unit]
+
+
+class Scale:
+    """Root mean square of what came before, bounded at each step; a median of the first lots begins it."""
+
+    def __init__(self, start: Array, weight: float = 10.0) -> None:
+        self.squares, self.n = weight * start**2, np.full(start.size, weight)
+
+    @property
+    def rms(self) -> Array:
+        """(h,)."""
+        return np.sqrt(self.squares / self.n)
+
+    def bounded(self, value: Array) -> Array:
+        """A value (h,) that counts for five standard deviations at most."""
+        limit = BOUND * self.rms
+        return np.clip(value, -limit, limit)
+
+    def add(self, value: Array) -> None:
+        """Take a bounded value in; zero says nothing."""
+        self.squares += value**2
+        self.n += value != 0.0
+
+
+class Evidence:
+    """The evidence of an archive after some lots.
+
+    Parameters
+    ----------
+    count : number of effects' columns and axes, h
+    earlier : scores and information (h,) inside its lots of a unit's measurements among the first n lots; None without one
+    """
+
+    def __init__(self, count: int, earlier: Callable[[str, int], tuple[Array, Array] | None] | None = None) -> None:
+        self.count, self.lots, self._taken = count, 0, 0
+        self.drivers: dict[str, Sums] = {}
+        self.levels: dict[str, Levels] = {}
+        self.wander = Wander(count)
+        self.score, self.information = np.zeros(count), np.zeros(count)
+        self._units: dict[str, tuple[Array, Array]] = {}
+        self._earlier = earlier
+        self._held: list[ScoredLot] = []
+        self._scales: dict[str, Scale] = {}
+        self._numbers: dict[str, tuple[float, float, float]] = {}  # count, mean, sum of squares
+
+    def add(self, lot: ScoredLot) -> None:
+        """Add the next lot, in order of arrival."""
+        self.lots += 1
+        if self.lots <= FIRST:
+            self._held.append(lot)
+            if self.lots == FIRST:
+                self._begin()
+            return
+        self._add(lot)
+
+    @property
+    def guarded(self) -> NDArray[np.bool_]:
+        """Effects (h,) for which the stations wander by themselves: what is constant in a lot may be that."""
+        return self.wander.gained > GUARDED
+
+    def _begin(self) -> None:
+        """Scales from the medians of the first lots; then these lots as if they came now."""
+        seen = np.array([lot.information > 0.0 for lot in self._held])
+        info = np.array([np.where(lot.information > 0.0, lot.information, 1.0) for lot in self._held])
+        z = np.where(seen, np.array([lot.score.sum(axis=0) for lot in self._held]) / np.sqrt(info), np.nan)
+        with np.errstate(all="ignore"):
+            there = seen.any(axis=0)
+            centre = np.where(there, np.nanmedian(np.where(there, z, 0.0), axis=0), 0.0)
+            spread = 1.4826 * np.nanmedian(np.abs(np.where(there, z, 0.0) - centre), axis=0)
+        start = np.where(there & (spread > 0.0), spread, 1.0)
+        about_zero = np.where(there, np.hypot(spread, centre), 1.0)
+        self._scales = {"between": Scale(start), "mean": Scale(np.where(about_zero > 0.0, about_zero, 1.0))}
+        self._scales |= {"inside": Scale(np.ones(self.count))}
+        held, self._held = self._held, []
+        for lot in held:
+            self._add(lot)
+
+    def _sums(self, name: str, *, two_sided: bool) -> Sums:
+        return self.drivers.setdefault(name, Sums.of(self.count, two_sided=two_sided))
+
+    def _add(self, lot: ScoredLot) -> None:
+        total, info = lot.score.sum(axis=0), lot.information
+        seen = info > 0.0
+        safe = np.where(seen, info, 1.0)
+        size = np.where(seen, total / safe, 0.0)
+        found = self.wander.innovation(lot.station, size, info)
+        between = self._scales["between"]
+        rms = between.rms
+        self._mean(np.where(seen, total / np.sqrt(safe), 0.0))
+        self._stations(lot, size, safe, seen)
+        self._between(lot, found)
+        self._inside(lot)
+        self.wander.update(lot.station, size, info, found, rms)
+        between.add(between.bounded(found.value))
+        self.score += np.where(seen, total, 0.0)
+        self.information += info
+        self._taken += 1
+
+    def _mean(self, z: Array) -> None:
+        scale = self._scales["mean"]
+        bounded = scale.bounded(z)
+        self._sums(MEAN, two_sided=True).add(bounded / scale.rms)
+        scale.add(bounded)
+
+    @property
+    def _typical(self) -> Array:
+        """Information (h,) of a typical lot."""
+        return self.information / max(self._taken, 1)
+
+    def _centre(self) -> Array:
+        return self.score / np.maximum(self.information, 1e-300)
+
+    def _stations(self, lot: ScoredLot, size: Array, safe: Array, seen: NDArray[np.bool_]) -> None:
+        """Stations that differ for good: each lot against what its station's earlier ones predict."""
+        table = self.levels.setdefault(STATION, Levels(self.count))
+        predicted = table.predicted((lot.station,), SHRUNK * self._typical)[0]
+        scale = self._scales["between"]
+        left = scale.bounded(np.where(seen, (size - self._centre()) * np.sqrt(safe), 0.0))
+        x = left / scale.rms * np.clip(predicted * np.sqrt(safe) / scale.rms, -BOUND, BOUND)
+        self._sums(STATION, two_sided=False).add(np.where(seen, x, 0.0))
+        score = np.where(seen, left * np.sqrt(safe), 0.0)
+        table.add((lot.station,), score[None], np.where(seen, safe, 0.0)[None])
+
+    def _between(self, lot: ScoredLot, found: Innovation) -> None:
+        """Drivers whose value may be the same for a whole lot, against what the station's own past leaves.
+
+        A level is predicted by the lots of other stations, where there are some: what wanders with one station is no news there.
+        """
+        scale, prior = self._scales["between"], SHRUNK * self._typical
+        rms, own, total = scale.rms, lot.own, np.maximum(lot.own.sum(axis=0), 1e-300)
+        ratio = lot.information / total
+        raw = np.abs(found.value)
+        part = np.where(raw > 0.0, np.minimum(1.0, BOUND * rms / np.where(raw > 0.0, raw, 1.0)), 1.0)
+        for name, labels in lot.levels.items():
+            if name in {SLOT, UNIT} or not any(labels):
+                continue
+            here = self.levels.setdefault(f"{name} at {lot.station}", Levels(self.count))
+            table = self.levels.setdefault(name, Levels(self.count))
+            elsewhere = here if len(self.wander.stations) > 1 else None
+            each = table.predicted(labels, prior, elsewhere)
+            prediction = (each * own).sum(axis=0) / total
+            value, left = self.wander.beside_driver(name, lot.station, prediction, found, rms)
+            self._sums(name, two_sided=False).add(scale.bounded(value) / rms * np.clip(left / rms, -BOUND, BOUND))
+            score = (lot.score - own * ratio * self._centre()) * part
+            for each_table in (table, here):
+                each_table.add(labels, score, own * ratio)
+        for name, numbers in {DATE: np.array([lot.day]), **lot.numbers}.items():
+            known = numbers[np.isfinite(numbers)]
+            standing = self._standing(name, float(known.mean())) if known.size else None
+            if standing is None:
+                continue
+            value, left = self.wander.beside_driver(name, lot.station, np.full(self.count, standing), found, rms)
+            weight = np.clip(left / np.sqrt(np.maximum(self._typical, 1e-300)), -BOUND, BOUND)
+            self._sums(name, two_sided=True).add(scale.bounded(value) / rms * weight)
+
+    def _standing(self, name: str, value: float) -> float | None:
+        """A lot's value of a driver less the mean of earlier ones, over their standard deviation; None for the first ones."""
+        n, mean, squares = self._numbers.get(name, (0.0, 0.0, 0.0))
+        spread = np.sqrt(squares / n) if n else 0.0
+        step = value - mean
+        self._numbers[name] = n + 1.0, mean + step / (n + 1.0), squares + step * (value - mean - step / (n + 1.0))
+        return float(np.clip(step / spread, -BOUND, BOUND)) if n > 2.0 and spread > 0.0 else None
+
+    def _inside(self, lot: ScoredLot) -> None:
+        """Drivers that differ between the units of a lot: what the lot has in common cancels."""
+        own = lot.own
+        total = np.maximum(own.sum(axis=0), 1e-300)
+        mean = lot.score.sum(axis=0) / total
+        information = own * (1.0 - own / total)
+        root = np.sqrt(information)
+        scale, typical = self._scales["inside"], self._typical
+        limit = BOUND * scale.rms * root
+        left = np.clip(lot.score - own * mean, -limit, limit)
+        for name, labels in {**lot.levels, UNIT: lot.units}.items():
+            if not any(labels):
+                continue
+            inside = name if name in {SLOT, UNIT} else name + INSIDE
+            if name == UNIT:
+                predicted = self._of_units(labels)
+            else:
+                table = self.levels.setdefault(inside, Levels(self.count))
+                predicted = table.predicted(labels, SHRUNK / len(labels) * typical)
+            if len(set(labels)) > 1:
+                self._add_inside(inside, predicted, own, total, left, two_sided=False)
+            if name != UNIT:
+                alike = np.array([own[[other == label for other in labels]].sum(axis=0) for label in labels])
+                self.levels[inside].add(labels, left, own * (1.0 - alike / total))
+        for name, numbers in lot.numbers.items():
+            if np.isfinite(numbers).all() and float(np.ptp(numbers)) > 0.0:
+                predicted = np.broadcast_to(numbers[:, None], own.shape)
+                self._add_inside(name + INSIDE, predicted, own, total, left, two_sided=True)
+        scale.add(np.sqrt(np.mean(np.where(root > 0.0, left / np.where(root > 0.0, root, 1.0), 0.0) ** 2, axis=0)))
+        if self._earlier is None:
+            self._remember(lot, left, information)
+
+    def _add_inside(
+        self,
+        name: str,
+        predicted: Array,
+        own: Array,
+        total: Array,
+        left: Array,
+        *,
+        two_sided: bool,
+    ) -> None:
+        about = predicted - (predicted * own).sum(axis=0) / total
+        size = np.sqrt((own * about**2).sum(axis=0))
+        there = size > 0.0
+        value = np.where(there, (left * about).sum(axis=0) / np.where(there, size, 1.0), 0.0)
+        scale = self._scales["inside"]
+        bounded, rms = scale.bounded(value), scale.rms
+        x = bounded / rms if two_sided else bounded / rms * np.minimum(size / rms, BOUND)
+        self._sums(name, two_sided=two_sided).add(np.where(there, x, 0.0))
+
+    def _of_units(self, units: tuple[str, ...]) -> Array:
+        out = np.zeros((len(units), self.count))
+        for place, unit in enumerate(units):
+            before = self._units.get(unit) if self._earlier is None else self._earlier(unit, self._taken)
+            if before is not None:
+                out[place] = np.where(before[1] > 0.0, before[0] / np.where(before[1] > 0.0, before[1], 1.0), 0.0)
+        return out
+
+    def _remember(self, lot: ScoredLot, left: Array, information: Array) -> None:
+        for place, unit in enumerate(lot.units):
+            before = self._units.get(unit)
+            own = left[place], information[place]
+            self._units[unit] = own if before is None else (before[0] + own[0], before[1] + own[1])
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """The state as named arrays: what :meth:`restored` takes."""
+        out: dict[str, NDArray[Any]] = {"score": self.score, "information": self.information}
+        out["counts"] = np.array([self.lots, self._taken], dtype=np.float64)
+        for name, sums in self.drivers.items():
+            out[f"driver/{name}"] = np.stack([sums.s, sums.v, sums.n, np.full(self.count, float(sums.two_sided))])
+        for name, levels in self.levels.items():
+            n = len(levels.place)
+            out[f"levels/{name}"] = np.stack([levels.score[:n], levels.information[:n]])
+            out[f"labels/{name}"] = np.array(list(levels.place), dtype=np.str_)
+        for name, scale in self._scales.items():
+            out[f"scale/{name}"] = np.stack([scale.squares, scale.n])
+        for name, values in self._numbers.items():
+            out[f"number/{name}"] = np.array(values)
+        return out | {f"wander/{name}": value for name, value in self.wander.arrays().items()}
+
+    @classmethod
+    def restored(
+        cls, count: int, arrays: Mapping[str, NDArray[Any]], earlier: Callable[[str, int], tuple[Array, Array] | None]
+    ) -> "Evidence":
+        """The evidence of a state."""
+        new = cls(count, earlier)
+        new.score, new.information = arrays["score"].copy(), arrays["information"].copy()
+        new.lots, new._taken = (int(value) for value in arrays["counts"])
+        for key, value in arrays.items():
+            kind, _, name = key.partition("/")
+            if kind == "driver":
+                new.drivers[name] = Sums(*value[:3].copy(), two_sided=bool(value[3].any()))
+            elif kind == "levels":
+                levels = new.levels[name] = Levels(count)
+                levels.score, levels.information = value.copy()
+                levels.place = {str(label): at for at, label in enumerate(arrays[f"labels/{name}"])}
+            elif kind == "scale":
+                scale = new._scales[name] = Scale(np.ones(count))
+                scale.squares, scale.n = value.copy()
+            elif kind == "number":
+                new._numbers[name] = (float(value[0]), float(value[1]), float(value[2]))
+        new.wander.restore(
+            {key.removeprefix("wander/"): value for key, value in arrays.items() if key.startswith("wander/")}
+        )
+        return new

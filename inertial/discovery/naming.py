@@ -1,0 +1,462 @@
+"""Which effect, and which driver, an alarm of an archive stands for: all lots at once, after the evidence has raised it.
+
+Every driver's sums say for each effect by how much it lowers the misfit of all lots, D; with k coefficients its score is
+D − k(1 + ln(D/k)), as for a variance that is estimated. Effects within 15 of the best are one class. The best is taken out of all
+sums by the products of the columns, and what is left is looked at again.
+"""
+
+import warnings
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial.decisions import CLASS_WIDTH
+from inertial.discovery.evidence import DATE, INSIDE, MEAN, SLOT, STATION, UNIT, ScoredLot
+
+Array = NDArray[np.float64]
+
+_MOST = 6
+"""Largest number of names of one night."""
+
+_SEEN = 1e-3  # share of its information that a column keeps beside another one, below which it is the same
+
+_INSIDE_ONLY = {SLOT, UNIT}
+
+_REMAINDER = 0.03
+"""Part of a named effect's score that its column, taken at the middle of its parameters' range, can leave."""
+
+
+@dataclass
+class DriverSums:
+    """Sums of a driver by level: scores (g, h) and information (g, h), in units of the noise of the lots.
+
+    labels : of the levels; one, "slope" or "all", where the driver has none · weight : (g,), units of each level
+    about : what a number is counted from
+    lots, common : levels in lots, and those of a whole lot
+    """
+
+    labels: list[str] = field(default_factory=list[str])
+    score: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    information: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    weight: Array = field(default_factory=lambda: np.zeros(0))
+    about: float = 0.0
+    common: float = 0.0
+    lots: float = 0.0
+
+    @property
+    def mixed(self) -> bool:
+        """Whether most lots hold several levels: then the products of the columns are those inside lots."""
+        return self.lots > 0.0 and self.common < 0.5 * self.lots
+
+    def add(self, label: str, score: Array, information: Array, weight: float) -> None:
+        """Add to a level."""
+        if label not in self._place:
+            self._place[label] = len(self.labels)
+            self.labels.append(label)
+            if len(self.labels) > len(self.score):
+                more = np.zeros((max(16, len(self.score)), score.size))
+                self.score = np.vstack([self.score, more]) if self.score.size else more.copy()
+                self.information = np.vstack([self.information, more]) if self.information.size else more.copy()
+                self.weight = np.concatenate([self.weight, np.zeros(len(more))])
+        at = self._place[label]
+        self.score[at] += score
+        self.information[at] += information
+        self.weight[at] += weight
+
+    def __post_init__(self) -> None:
+        self._place: dict[str, int] = {}
+
+    def trimmed(self) -> "DriverSums":
+        """Without room for more levels."""
+        n = len(self.labels)
+        return DriverSums(
+            list(self.labels), self.score[:n].copy(), self.information[:n].copy(), self.weight[:n].copy(), self.about
+        )
+
+
+@dataclass(frozen=True)
+class Name:
+    """An effect that an archive holds, with its driver.
+
+    effects, drivers : classes, best first · sizes : (levels, axes), rms in a dwell, g; errors the same, one standard error
+    labels, weights : of the levels · score : of the best
+    """
+
+    effects: tuple[str, ...]
+    drivers: tuple[str, ...]
+    labels: tuple[str, ...]
+    weights: Array
+    sizes: Array
+    errors: Array
+    score: float
+
+
+class Pool:
+    """All lots of an archive, gathered for some drivers.
+
+    Parameters
+    ----------
+    columns : (k,) effect and number of its column; hypotheses are axes × columns
+    size : (h,), rms in a dwell of a coefficient of one, g
+    lot, inside : (m, k, k), correlations of the columns' information in sums of lots, and inside a lot
+    """
+
+    def __init__(self, columns: Sequence[tuple[str, int]], size: Array, lot: Array, inside: Array) -> None:
+        self.columns, self.size = tuple(columns), size
+        self.lot, self.inside = _correlation(lot), _correlation(inside)
+        self.axes = len(lot)
+
+    def names(self, lots: Sequence[ScoredLot], alarms: Iterable[tuple[str, str]], needed: float) -> list[Name]:
+        """The names of what the lots hold, the strongest first.
+
+        Parameters
+        ----------
+        alarms : driver and effect that have one
+        needed : score from which on something is named
+        """
+        alarmed = {(name.removesuffix(INSIDE), effect) for name, effect in alarms}
+        names = list(dict.fromkeys(name for name, _ in sorted(alarmed)))
+        found: list[Name] = []
+        while len(found) < _MOST:
+            sums = gathered(lots, names)
+            scores = {name: self.scores(name, of) for name, of in sums.items()}
+            again = self._again(lots, list(sums))
+            pairs = [
+                (score, name, effect)
+                for name, of in scores.items()
+                for effect, score in of.items()
+                if score > needed
+                and again[name][effect] > np.sqrt(2.0 * needed)
+                and not _told(found, name, effect, score)
+            ]
+            if not pairs:
+                break
+            top, best, effect = max(pairs)
+            # what differs by a level is not zero on average either: the driver says more
+            best = next(
+                (name for score, name, one in pairs if one == effect and name != MEAN and score > top - CLASS_WIDTH),
+                best,
+            )
+            found.append(self._name(best, sums[best], effect, scores))
+            lots = [self.without(lot, best, effect, sums[best]) for lot in lots]
+        return found
+
+    def _again(self, lots: Sequence[ScoredLot], drivers: Sequence[str]) -> dict[str, dict[str, float]]:
+        """By how many standard deviations one half of the lots predicts the other, for every driver and effect.
+
+        It is scaled by itself, lot by lot: an effect whose noise is larger than stated, as of slow ones, is not named for it.
+        """
+        total = {name: np.zeros((2, len(self.effects))) for name in drivers}
+        for name, x in self._crossed(lots, drivers):
+            total[name] += np.stack([x, x**2])
+        return {
+            name: dict(zip(self.effects, s / np.sqrt(np.maximum(v, 1e-300)), strict=True))
+            for name, (s, v) in total.items()
+        }
+
+    def _crossed(self, lots: Sequence[ScoredLot], drivers: Sequence[str]) -> Iterator[tuple[str, Array]]:
+        """For each lot and driver, what the lot shows times what the other half of the lots predicts of it, (effects,)."""
+        halves = gathered(lots[0::2], drivers), gathered(lots[1::2], drivers)
+        for number, lot in enumerate(lots):
+            for name, sums in halves[1 - number % 2].items():
+                yield name, self._of_effects(self._predicted(lot, name, sums))
+
+    def carried(self, lots: Sequence[ScoredLot], driver: str, effect: str) -> Array:
+        """Contribution (n,) of each lot to the evidence of an effect by a driver."""
+        place = self.effects.index(effect)
+        return np.array([x[place] for _, x in self._crossed(lots, [driver])])
+
+    def confirmed(
+        self, before: Sequence[ScoredLot], after: Sequence[ScoredLot], driver: str, effect: str
+    ) -> tuple[float, float]:
+        """How much of what earlier lots predict later ones show, with its standard error: one where it is confirmed."""
+        place, sums = self.effects.index(effect), gathered(before, [driver])
+        if driver not in sums:
+            return float("nan"), float("inf")
+        shown, expected = np.zeros(len(after)), np.zeros(len(after))
+        for number, lot in enumerate(after):
+            shown[number] = self._of_effects(self._predicted(lot, driver, sums[driver]))[place]
+            expected[number] = self._of_effects(self._expected(lot, driver, sums[driver]))[place]
+        total = max(float(expected.sum()), 1e-300)
+        factor = float(shown.sum()) / total
+        return factor, float(np.sqrt(np.sum((shown - factor * expected) ** 2))) / total
+
+    def _expected(self, lot: ScoredLot, driver: str, sums: DriverSums) -> Array:
+        """What :meth:`_predicted` is on average if the prediction holds, (h,)."""
+        weights = _weights(lot, driver, sums)
+        centred = _about(driver, sums)
+        of_units = weights @ (centred / np.where(sums.information > 0.0, sums.information, np.inf))
+        total = np.maximum(lot.own.sum(axis=0), 1e-300)
+        common = (of_units * lot.own).sum(axis=0) / total
+        inside = ((of_units - common) ** 2 * lot.own).sum(axis=0)
+        return inside if driver in _INSIDE_ONLY else inside + common**2 * lot.information
+
+    @cached_property
+    def effects(self) -> list[str]:
+        """Ids of the effects, in the order of their columns."""
+        return list(dict.fromkeys(one for one, _ in self.columns))
+
+    @cached_property
+    def _sum_over(self) -> Array:
+        """(h, effects): which axes and columns belong to an effect."""
+        one = np.array([[name == effect for effect in self.effects] for name, _ in self.columns], dtype=np.float64)
+        return np.tile(one, (self.axes, 1))
+
+    def _of_effects(self, x: Array) -> Array:
+        return x @ self._sum_over
+
+    def _predicted(self, lot: ScoredLot, driver: str, sums: DriverSums) -> Array:
+        """Product (h,) of what a lot shows and what other lots predict of it."""
+        weights = _weights(lot, driver, sums)
+        centred = _about(driver, sums)
+        size = centred / np.where(sums.information > 0.0, sums.information, np.inf)
+        of_units = weights @ size
+        if driver in _INSIDE_ONLY:
+            total = np.maximum(lot.own.sum(axis=0), 1e-300)
+            of_units = of_units - (of_units * lot.own).sum(axis=0) / total
+            return ((lot.score - lot.own * lot.score.sum(axis=0) / total) * of_units).sum(axis=0)
+        return (lot.score * of_units).sum(axis=0)
+
+    def without(self, lot: ScoredLot, driver: str, effect: str, sums: DriverSums) -> ScoredLot:
+        """A lot without what a driver's levels say of an effect: algebra on its sums, no dwell is read again."""
+        at, count, units = self.places(effect), len(self.columns), len(lot.units)
+        weights = _weights(lot, driver, sums)
+        if not weights.any():
+            return lot
+        score = lot.score.copy()
+        centred = _about(driver, sums)
+        for axis in range(self.axes):
+            here, every = axis * count + at, axis * count + np.arange(count)
+            info = sums.information[:, here]
+            size = centred[:, here] / np.where(info > 0.0, info, np.inf)
+            if len(sums.labels) > 1:
+                size *= _shrinkage(size, info)
+            of_units = weights @ size  # (units, p)
+            own = np.sqrt(np.maximum(lot.own[:, every], 0.0))
+            total = np.maximum(lot.own[:, here].sum(axis=0), 1e-300)
+            common = (of_units * lot.own[:, here]).sum(axis=0) / total
+            root = np.sqrt(np.maximum(lot.information[every], 0.0))
+            score[:, every] -= own * (((of_units - common) * own[:, at]) @ self.inside[axis][at])
+            score[:, every] -= root * ((common * root[at]) @ self.lot[axis][at]) / units
+        return replace(lot, score=score)
+
+    def with_effect(self, lot: ScoredLot, effect: str) -> ScoredLot:
+        """A lot whose model has an effect more, with coefficients of every unit and axis: U_j − I_jk U_k / I_kk, on its sums."""
+        at, count = self.places(effect), len(self.columns)
+        total = np.maximum(lot.own.sum(axis=0), 1e-300)
+        sums = lot.score.sum(axis=0)
+        share = lot.own / total
+        left, own, information = lot.score - share * sums, lot.own.copy(), lot.information.copy()
+        sums = sums.copy()
+        for axis in range(self.axes):
+            here, every = axis * count + at, axis * count + np.arange(count)
+            for products, values, info in ((self.inside, left, own), (self.lot, sums[None], information[None])):
+                inner = np.linalg.pinv(products[axis][np.ix_(at, at)], rcond=1e-6, hermitian=True)
+                root = np.sqrt(np.maximum(info[:, every], 0.0))
+                z = np.where(root > 0.0, values[:, every] / np.where(root > 0.0, root, 1.0), 0.0)[:, at]
+                values[:, every] -= root * (z @ inner @ products[axis][at])
+                covered = np.einsum("jp,pq,qj->j", products[axis][:, at], inner, products[axis][at])
+                info[:, every] *= np.where(covered > 1.0 - _SEEN, 0.0, np.clip(1.0 - covered, 0.0, 1.0))
+                values[:, here], info[:, here] = 0.0, 0.0
+        score = np.where(own > 0.0, left + share * sums, 0.0)
+        return replace(lot, score=score, own=own, information=information)
+
+    def places(self, effect: str) -> NDArray[np.intp]:
+        """Columns of an effect, (p,)."""
+        return np.array([k for k, (one, _) in enumerate(self.columns) if one == effect], dtype=np.intp)
+
+    def scores(self, name: str, sums: DriverSums) -> dict[str, float]:
+        """Score of every effect for a driver."""
+        out: dict[str, float] = {}
+        for effect in dict.fromkeys(one for one, _ in self.columns):
+            at = self.places(effect)
+            drop, rank = self._drop(name, sums, at)
+            k = float(np.sum(rank) - (np.count_nonzero(rank) if name in _INSIDE_ONLY else 0))
+            out[effect] = max(drop - k * (1.0 + np.log(drop / k)), 0.0) if k > 0.0 and drop > k else 0.0
+        return out
+
+    def _drop(self, name: str, sums: DriverSums, at: NDArray[np.intp]) -> tuple[float, Array]:
+        """Fall of the misfit by an effect's columns, and the number of coefficients of each axis and column."""
+        count = len(self.columns)
+        total, rank = 0.0, np.zeros((self.axes, at.size))
+        products = self.inside if name in _INSIDE_ONLY or sums.mixed else self.lot
+        centred = _about(name, sums)
+        for axis in range(self.axes):
+            here = axis * count + at
+            info = sums.information[:, here]
+            seen = info > 0.0
+            rank[axis] = seen.sum(axis=0)
+            z = np.where(seen, centred[:, here] / np.sqrt(np.where(seen, info, 1.0)), 0.0)
+            inner = np.linalg.pinv(products[axis][np.ix_(at, at)], rcond=1e-6, hermitian=True)
+            total += float(np.einsum("gp,pq,gq->", z, inner, z))
+        return total, rank
+
+    def _name(self, driver: str, sums: DriverSums, effect: str, scores: Mapping[str, Mapping[str, float]]) -> Name:
+        count, first, top = len(self.columns), self.places(effect)[0], scores[driver][effect]
+        here = np.arange(self.axes) * count + first
+        info = sums.information[:, here]
+        seen = info > 0.0
+        safe = np.where(seen, info, 1.0)
+        sizes = np.where(seen, _about(driver, sums)[:, here] / safe, 0.0) * self.size[here]
+        errors = np.where(seen, 1.0 / np.sqrt(safe), np.inf) * self.size[here]
+        effects = [one for one, score in scores[driver].items() if score > top - CLASS_WIDTH]
+        drivers = [name for name, of in scores.items() if of[effect] > top - CLASS_WIDTH]
+        effects.sort(key=lambda one: -scores[driver][one])
+        drivers.sort(key=lambda one: (one != driver, -scores[one][effect]))
+        return Name(tuple(effects), tuple(drivers), tuple(sums.labels), sums.weight, sizes, errors, top)
+
+
+def _told(found: Sequence[Name], driver: str, effect: str, score: float) -> bool:
+    """Whether an effect is named with this driver, or is what is left of one whose column is known to a few per cent."""
+    return any(
+        (driver in {MEAN, name.drivers[0]} and effect in name.effects)
+        or (driver == name.drivers[0] and score < _REMAINDER * name.score)
+        for name in found
+    )
+
+
+def gathered(lots: Sequence[ScoredLot], drivers: Sequence[str]) -> dict[str, DriverSums]:
+    """Sums of drivers over lots: between and inside lots together."""
+    means = _station_means(lots)
+    noise, within = _noise(lots, means)
+    out = {name: DriverSums() for name in drivers}
+    about = {name: _mean_number(lots, name) for name in drivers}
+    seen = Counter(unit for lot in lots for unit in lot.units) if UNIT in out else Counter[str]()
+    for lot in lots:
+        _gather(lot, out, means[lot.station], (noise, within), about, seen)
+    return {name: sums.trimmed() for name, sums in out.items() if sums.labels}
+
+
+def _mean_number(lots: Sequence[ScoredLot], name: str) -> float:
+    values = [
+        lot.day if name == DATE else float(lot.numbers[name].mean())
+        for lot in lots
+        if name == DATE or name in lot.numbers
+    ]
+    return float(np.nanmean(values)) if values else 0.0
+
+
+def _shrinkage(size: Array, information: Array) -> Array:
+    """Factors (p,) by which the sizes of levels are drawn to zero: the part of their variance that is not noise."""
+    seen = information > 0.0
+    noise = np.where(seen, 1.0 / np.where(seen, information, 1.0), 0.0).sum(axis=0)
+    return np.clip(1.0 - noise / np.maximum((size**2).sum(axis=0), 1e-300), 0.0, 1.0)
+
+
+def _weights(lot: ScoredLot, driver: str, sums: DriverSums) -> Array:
+    """How much of each level is in each unit, (units, levels)."""
+    units = len(lot.units)
+    out = np.zeros((units, len(sums.labels)))
+    if driver == MEAN:
+        out[:] = 1.0
+    elif driver == DATE or driver in lot.numbers:
+        numbers = np.full(units, lot.day) if driver == DATE else lot.numbers[driver]
+        out[:, 0] = np.where(np.isfinite(numbers), numbers - sums.about, 0.0)
+    else:
+        labels = (lot.station,) * units if driver == STATION else lot.levels.get(driver, ())
+        place = {label: k for k, label in enumerate(sums.labels)}
+        for unit, label in enumerate(labels):
+            if label in place:
+                out[unit, place[label]] = 1.0
+    return out
+
+
+def _correlation(products: Array) -> Array:
+    """Products (m, k, k) over the roots of their diagonals; zero where nothing is seen."""
+    root = np.sqrt(np.maximum(np.diagonal(products, axis1=1, axis2=2), 0.0))
+    both = root[:, :, None] * root[:, None, :]
+    return np.where(both > 0.0, products / np.where(both > 0.0, both, 1.0), 0.0)
+
+
+def _about(driver: str, sums: DriverSums) -> Array:
+    """Scores (g, h) of levels; of a driver that is seen inside lots only, about what all levels have in common."""
+    if driver not in _INSIDE_ONLY or len(sums.labels) < 2:
+        return sums.score
+    total = sums.information.sum(axis=0)
+    mean = sums.score.sum(axis=0) / np.where(total > 0.0, total, 1.0)
+    return sums.score - sums.information * mean
+
+
+def _station_means(lots: Sequence[ScoredLot]) -> dict[str, Array]:
+    """Mean size (h,) of each station's lots."""
+    score, info = dict[str, Array](), dict[str, Array]()
+    for lot in lots:
+        zero = np.zeros(lot.information.size)
+        score[lot.station] = score.get(lot.station, zero) + np.where(lot.information > 0.0, lot.score.sum(axis=0), 0.0)
+        info[lot.station] = info.get(lot.station, zero) + lot.information
+    return {station: score[station] / np.where(info[station] > 0.0, info[station], 1.0) for station in score}
+
+
+def _noise(lots: Sequence[ScoredLot], means: Mapping[str, Array]) -> tuple[float, float]:
+    """Variance of lots about their stations over the stated one, and of units inside lots: medians over effects and lots."""
+    between, within = list[Array](), list[Array]()
+    for lot in lots:
+        info = np.where(lot.information > 0.0, lot.information, np.nan)
+        between.append((lot.score.sum(axis=0) - lot.information * means[lot.station]) ** 2 / info)
+        total = np.maximum(lot.own.sum(axis=0), 1e-300)
+        free = lot.own * (1.0 - lot.own / total)
+        left = lot.score - lot.own * lot.score.sum(axis=0) / total
+        within.append(np.mean(left**2 / np.where(free > 0.0, free, np.nan), axis=0))
+    with np.errstate(all="ignore"), warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # an effect that no lot shows is nan for all of them
+        many = np.nanmedian(np.clip(np.array(between), 0.0, np.nanquantile(between, 0.99)), axis=0) / 0.455
+        few = np.nanmedian(np.array(within), axis=0)
+    return float(np.nanmedian(many[many > 0.0])), float(np.nanmedian(few[few > 0.0]))
+
+
+def _gather(
+    lot: ScoredLot,
+    out: Mapping[str, DriverSums],
+    mean: Array,
+    scale: tuple[float, float],
+    about: Mapping[str, float],
+    seen: Mapping[str, int],
+) -> None:
+    """Add a lot to the sums of drivers; a unit that was measured once says nothing of what stays with a unit."""
+    noise, within = scale
+    own, total = lot.own, np.maximum(lot.own.sum(axis=0), 1e-300)
+    info = lot.information
+    sums = np.where(info > 0.0, lot.score.sum(axis=0), 0.0)
+    units = len(lot.units)
+    left = lot.score - own * lot.score.sum(axis=0) / total
+    for name, of in out.items():
+        if name == MEAN:
+            of.add("all", sums / noise, info / noise, units)
+        elif name == STATION:
+            of.add(lot.station, sums / noise, info / noise, units)
+        elif name == DATE or name in lot.numbers:
+            numbers = np.full(units, lot.day) if name == DATE else lot.numbers[name]
+            of.about = about[name]
+            _gather_number(of, numbers - about[name], (lot, left, mean, noise, within))
+        elif name == UNIT or name in lot.levels:
+            labels = lot.units if name == UNIT else lot.levels[name]
+            for label in dict.fromkeys(labels):
+                here = np.array([one == label for one in labels])
+                mine = own[here].sum(axis=0)
+                score = left[here].sum(axis=0) / within
+                information = mine * (1.0 - mine / total) / within
+                if name not in _INSIDE_ONLY:  # and what the lot has in common
+                    share = mine / total
+                    score = score + share * sums / noise
+                    information = information + share**2 * info / noise
+                    of.common += float(here.sum() == units)
+                of.lots += 1.0
+                if label and (name != UNIT or seen[label] > 1):
+                    of.add(label, score, information, float(here.sum()))
+
+
+def _gather_number(of: DriverSums, numbers: Array, parts: tuple[ScoredLot, Array, Array, float, float]) -> None:
+    """Add a lot to the regression on a number; the offset and the slope of the number are taken out by its mean beforehand."""
+    lot, left, mean, noise, within = parts
+    if not np.isfinite(numbers).all():
+        return
+    own, total = lot.own, np.maximum(lot.own.sum(axis=0), 1e-300)
+    centre = float(numbers.mean())
+    about = numbers[:, None] - (numbers[:, None] * own).sum(axis=0) / total
+    score = (about * left).sum(axis=0) / within + centre * (lot.score.sum(axis=0) - lot.information * mean) / noise
+    information = (about**2 * own).sum(axis=0) / within + centre**2 * lot.information / noise
+    of.add("slope", score, information, float(len(lot.units)))

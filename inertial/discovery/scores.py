@@ -1,0 +1,161 @@
+"""What one lot leaves for an archive: scores and information of every effect that its model does not hold.
+
+With V the covariance of the noise, H the columns of the model and P = V⁻¹ − V⁻¹H(HᵀV⁻¹H)⁻¹HᵀV⁻¹, a column x of a unit and
+axis has the score U = xᵀPy and the information I = xᵀPx: U/I estimates its coefficient, with variance 1/I. Both add over units
+and lots. Errors of the station of that day are free: their coefficients are estimated from the lot and taken out of the scores
+(score statistics of meta-analysis; elimination of local parameters as in the alignment of detectors).
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial import effects as catalogue
+from inertial.design import starting_values
+from inertial.effects.base import AnyEffect
+from inertial.errors import MissingInput
+from inertial.estimation.bases import SEEN
+from inertial.estimation.candidate import Candidate
+from inertial.estimation.model import Model, refuse_without_freedom
+from inertial.estimation.problem import Lot, Problem
+from inertial.estimation.refinement import terms_of
+from inertial.estimation.term import with_turn_on
+from inertial.state import State
+
+Array = NDArray[np.float64]
+
+LEAST_LEFT = 0.05
+"""Share of its information that an effect keeps beside free errors of the station; below it, no lot can tell it from them."""
+
+_RIDGE = 1e-9
+
+
+@dataclass(frozen=True)
+class LotScores:
+    """Scores of a lot; coefficients in g per unit of the effect's column.
+
+    columns : (k,) effect and number of its column, of the sensor; station : (q,) the same of the station
+    axes : letters' places of the m axes
+    score : (units, m, k), errors of the station taken out · own : (units, m, k), information before that
+    lot : (m, k, k), information of the sums over the units, errors of the station taken out
+    inside : (m, k, k), mean information of a unit before that
+    station_score, station_information : (q,), of the columns of the station, each alone
+    floor : rms of the noise of a dwell, g · size : (m, k), rms over the dwells that a coefficient of one leaves of its column, g
+    """
+
+    columns: tuple[tuple[str, int], ...]
+    station: tuple[tuple[str, int], ...]
+    axes: tuple[int, ...]
+    score: Array
+    own: Array
+    lot: Array
+    inside: Array
+    station_score: Array
+    station_information: Array
+    floor: float
+    size: Array
+
+    @cached_property
+    def sums(self) -> Array:
+        """Scores of the lot, (m, k): sums over the units."""
+        return self.score.sum(axis=0)
+
+
+def scores_of(lot: Lot, effects: Sequence[str], tried: Iterable[AnyEffect] | None = None) -> LotScores:
+    """Scores of the effects that a model lacks.
+
+    Parameters
+    ----------
+    lot : dwells in g, of units without a fault of the data
+    effects : ids of the model
+    tried : effects to score; all of the catalogue by default
+
+    Raises
+    ------
+    InertialError
+        The lot cannot determine the model.
+    """
+    problem = Problem(lot)
+    model = Model(problem, with_turn_on(lot.state, terms_of(catalogue.get_all(effects), problem)))
+    refuse_without_freedom(model)
+    known = set(effects)
+    all_tried = [e for e in (catalogue.built_in().values() if tried is None else tried) if e.id not in known]
+    local, names = _columns(problem, [e for e in all_tried if e.scope == "sensor"])
+    shared, station = _columns(problem, [e for e in all_tried if e.scope == "station"])
+    return _scored(model, local, names, shared, station)
+
+
+def _columns(problem: Problem, effects: Sequence[AnyEffect]) -> tuple[Array, tuple[tuple[str, int], ...]]:
+    """Columns (blocks, n, k) of effects at the middle of their grids, with their names; without those that lack a quantity."""
+    made: list[Array] = []
+    names: list[tuple[str, int]] = []
+    for effect in effects:
+        try:
+            own = problem.columns(effect, _values(effect, problem.lot.state))
+        except MissingInput:
+            continue
+        own = own[..., : effect.primary]
+        if not own.shape[-1] or not np.isfinite(own).all():
+            continue
+        made.append(np.broadcast_to(own, (problem.blocks, problem.n, own.shape[-1])))
+        names += [(effect.id, column) for column in range(own.shape[-1])]
+    if not made:
+        return np.zeros((problem.blocks, problem.n, 0)), ()
+    return np.concatenate(made, axis=-1), tuple(names)
+
+
+def _values(effect: AnyEffect, state: State) -> dict[str, float]:
+    return starting_values([effect], state).get(effect.id, {})
+
+
+def _scored(
+    model: Model,
+    local: Array,
+    names: tuple[tuple[str, int], ...],
+    shared: Array,
+    station: tuple[tuple[str, int], ...],
+) -> LotScores:
+    """Scores from one pass of all columns through the whitened space of the model."""
+    problem, space = model.problem, model.space
+    k, m = len(names), problem.per_unit
+    columns = np.concatenate([local, shared], axis=-1)
+    found = space.products(Candidate(columns[:, :, None], shared=False))
+    left, whole, score = found.left[:, 0], found.squares[:, 0], found.inside[:, 0, :, 0]
+    visible = np.diagonal(left, axis1=1, axis2=2) > SEEN**2 * whole
+    left = left * (visible[:, :, None] & visible[:, None, :])
+    score = score * visible
+    cross, own = left[:, :k, k:], left[:, :k, :k]
+    of_station, station_score = left[:, k:, k:].sum(axis=0), score[:, k:].sum(axis=0)
+    inverse = _inverse(of_station)
+    free = score[:, :k] - cross @ (inverse @ station_score)
+    summed = cross.reshape(-1, m, *cross.shape[1:]).sum(axis=0)  # (m, k, q), over the units
+    lots = own.reshape(-1, m, k, k).sum(axis=0)
+    less = lots - summed @ inverse @ np.swapaxes(summed, -1, -2)
+    before, after = (np.diagonal(each, axis1=1, axis2=2) for each in (lots, less))
+    told = after > LEAST_LEFT * before
+    less = less * (told[:, :, None] & told[:, None, :])
+    scale = space.noise.scale * problem.covariance.level
+    rms = np.sqrt(np.diagonal(own, axis1=1, axis2=2) * scale[:, None] ** 2 / problem.n)
+    return LotScores(
+        columns=names,
+        station=station,
+        axes=tuple(problem.axes),
+        score=free.reshape(-1, m, k) * told,
+        own=np.diagonal(own, axis1=1, axis2=2).reshape(-1, m, k).copy(),
+        lot=less,
+        inside=own.reshape(-1, m, k, k).mean(axis=0),
+        station_score=station_score,
+        station_information=np.diagonal(of_station).copy(),
+        floor=model.floor(),
+        size=rms.reshape(-1, m, k).mean(axis=0),
+    )
+
+
+def _inverse(information: Array) -> Array:
+    """Pseudo-inverse of the station's information, in units of its diagonal: columns of a station may be the same."""
+    scale = np.sqrt(np.maximum(np.diagonal(information), 1e-300))
+    inner = np.linalg.pinv(information / np.outer(scale, scale), rcond=_RIDGE, hermitian=True)
+    return np.where(np.outer(scale, scale) > 1e-290, inner / np.outer(scale, scale), 0.0)

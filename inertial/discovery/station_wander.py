@@ -1,0 +1,172 @@
+"""What the past of a station predicts of its next lot: a level that may wander, for every effect.
+
+A reference that wanders slowly in a way that no column of the station holds looks like whatever changes slowly beside it: a
+wafer, a batch, a firmware. Each station therefore has a local level (random walk and noise, Kalman filter); the ratio of the walk
+to the noise is chosen by the likelihood of the past. Innovations are judged, against what the filter leaves of a driver's own
+prediction.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+WALKS: Array = np.array([0.0, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1, 3e-1, 1.0])
+"""Variance of the walk from one lot of a station to the next, over that of the noise of a lot."""
+
+WALK_FROM = 2.0
+"""Gain of the log likelihood from which on the filter of a walk is used."""
+
+_LARGEST = 5.0
+_BETWEEN = "\x1f"  # between the names of a driver and of a station, which may hold anything that is printed
+
+
+@dataclass
+class Level:
+    """State of a station for each walk and effect, (q, h): level, its variance over that of the noise, whether it is known."""
+
+    mean: Array
+    variance: Array
+    known: NDArray[np.bool_]
+    predictors: dict[str, Array] = field(default_factory=dict[str, Array])
+
+
+@dataclass(frozen=True)
+class Innovation:
+    """What a lot adds to the past of its station, at the walk that the past prefers.
+
+    value : (h,), of unit variance where the noise is as stated; zero where nothing is known
+    every : (q, h), the same at each walk · gain, roots : (q, h), of the filter, and standard deviations of the innovations
+    known : (h,), whether the station has a past
+    """
+
+    value: Array
+    every: Array
+    gain: Array
+    roots: Array
+    known: NDArray[np.bool_]
+
+
+class Wander:
+    """Filters of all stations.
+
+    Parameters
+    ----------
+    count : number of effects, h
+    """
+
+    def __init__(self, count: int) -> None:
+        self.stations: dict[str, Level] = {}
+        self.log_likelihood: Array = np.zeros((WALKS.size, count))
+        self.beside: dict[str, Array] = {}  # the same with a driver's prediction in it
+        self._scale, self._lots = np.zeros(count), np.zeros(count)
+
+    @property
+    def gained(self) -> Array:
+        """Log likelihood that a walk gains over none, (h,)."""
+        return _gained(self.log_likelihood)
+
+    def level(self, station: str) -> Level:
+        """The state of a station; a new one knows nothing."""
+        shape = self.log_likelihood.shape
+        if station not in self.stations:
+            self.stations[station] = Level(np.zeros(shape), np.zeros(shape), np.zeros(shape[1], dtype=bool))
+        return self.stations[station]
+
+    def innovation(self, station: str, size: Array, information: Array) -> Innovation:
+        """The innovation of a lot with sizes (h,) and information (h,); zero information: nothing is seen."""
+        level, seen = self.level(station), information > 0.0
+        safe = np.where(seen, information, 1.0)
+        # the walk is measured in the noise of a typical lot
+        typical = np.where(self._lots > 0.0, self._scale / np.maximum(self._lots, 1.0), 1.0 / safe)
+        variance = level.variance + WALKS[:, None] * typical
+        total = variance + 1.0 / safe
+        roots = np.sqrt(total)
+        known = level.known & seen
+        every = np.where(known, (size - level.mean) / roots, 0.0)
+        gain = np.where(level.known, variance / total, 1.0)
+        return Innovation(_chosen_of(every, self.log_likelihood), every, gain, roots, known)
+
+    def beside_driver(
+        self, name: str, station: str, prediction: Array, found: Innovation, rms: Array
+    ) -> tuple[Array, Array]:
+        """Innovation, and what the filter leaves of a driver's prediction over the noise of it, (h,) each.
+
+        The walk is that which the past prefers where the driver's predictions are in the model as well: a change that the driver
+        explains at all stations is no walk of each. The prediction is then taken into the past of the station.
+        """
+        level = self.level(station)
+        likelihood = self.beside.setdefault(name, np.zeros_like(self.log_likelihood))
+        before = level.predictors.get(name)
+        if before is None:
+            level.predictors[name] = np.broadcast_to(prediction, found.gain.shape).copy()
+            return np.zeros(prediction.size), np.zeros(prediction.size)
+        every = np.where(found.known, (prediction - before) / found.roots, 0.0)
+        value, left = _chosen_of(found.every, likelihood), _chosen_of(every, likelihood)
+        likelihood += _likelihood(found.every - every, found, rms)
+        before += found.gain * (prediction - before)
+        return value, left
+
+    def update(self, station: str, size: Array, information: Array, found: Innovation, rms: Array) -> None:
+        """Take a lot into the past of its station.
+
+        Parameters
+        ----------
+        rms : (h,), of earlier innovations: larger ones than five of it count as five
+        """
+        level, seen = self.level(station), information > 0.0
+        bounded = np.clip(found.every, -_LARGEST * rms, _LARGEST * rms)
+        self.log_likelihood += _likelihood(found.every, found, rms)
+        moved = np.where(level.known, level.mean + found.gain * bounded * found.roots, size)
+        safe = np.where(seen, information, 1.0)
+        level.mean = np.where(seen, moved, level.mean)
+        level.variance = np.where(seen, found.gain / safe, level.variance)
+        level.known = level.known | seen
+        self._scale += np.where(seen, 1.0 / safe, 0.0)
+        self._lots += seen
+
+    def arrays(self) -> dict[str, Array]:
+        """The state as named arrays."""
+        out: dict[str, Array] = {"likelihood": self.log_likelihood, "scale": np.stack([self._scale, self._lots])}
+        out |= {f"beside/{name}": value for name, value in self.beside.items()}
+        for station, level in self.stations.items():
+            out[f"station/{station}"] = np.stack([level.mean, level.variance])
+            out[f"known/{station}"] = level.known.astype(np.float64)
+            out |= {f"predictor/{name}{_BETWEEN}{station}": value for name, value in level.predictors.items()}
+        return out
+
+    def restore(self, arrays: Mapping[str, Array]) -> None:
+        """Take a state."""
+        self.log_likelihood = arrays["likelihood"].copy()
+        self._scale, self._lots = arrays["scale"].copy()
+        for key, value in arrays.items():
+            kind, _, name = key.partition("/")
+            if kind == "beside":
+                self.beside[name] = value.copy()
+            elif kind == "station":
+                self.stations[name] = Level(*value.copy(), known=arrays[f"known/{name}"] > 0.0)
+        for key, value in arrays.items():
+            kind, _, rest = key.partition("/")
+            if kind == "predictor":
+                driver, _, station = rest.partition(_BETWEEN)
+                self.stations[station].predictors[driver] = value.copy()
+
+
+def _likelihood(every: Array, found: Innovation, rms: Array) -> Array:
+    """Log likelihood (q, h) of innovations at each walk, over that without one; they count for five times their rms at most."""
+    bounded = np.clip(every, -_LARGEST * rms, _LARGEST * rms) / np.maximum(rms, 1e-300)
+    gained = -np.log(found.roots) - 0.5 * bounded**2
+    return np.where(found.known, gained - gained[0], 0.0)
+
+
+def _gained(likelihood: Array) -> Array:
+    return np.max(likelihood[1:], axis=0) - likelihood[0]
+
+
+def _chosen_of(every: Array, likelihood: Array) -> Array:
+    """Values (h,) at the walks that a likelihood (q, h) prefers; without one unless it is clearly better."""
+    best = np.where(_gained(likelihood) > WALK_FROM, 1 + np.argmax(likelihood[1:], axis=0), 0)
+    return every[best, np.arange(best.size)]

@@ -1,0 +1,65 @@
+"""``tumbleline attributes``: what is known of units and runs beside the measurement: wafer, supplier, batch, firmware."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from pipelines.archive import Archive
+from pipelines.cli import options
+from pipelines.cli.printing import give, give_lines, print_table, say
+
+PART = "Certificates, trace, audit"
+ORDER = 454
+SUMMARY = "Add what is known of units and runs, such as wafer or firmware, to the archive."
+EXAMPLES_OF = {
+    "add": ("tumbleline attributes add units.csv", "tumbleline attributes add shifts.csv --by run --json"),
+    "list": ("tumbleline attributes list", "tumbleline attributes list --json"),
+}
+
+app = typer.Typer(no_args_is_help=True, help=SUMMARY)
+
+
+@app.command(
+    "add",
+    epilog="\n\n".join(EXAMPLES_OF["add"]),
+    help="Add a table of attributes; a changed value is a new row, the old one is kept.",
+)
+def add(
+    table: Annotated[
+        Path, typer.Argument(metavar="FILE", help="A .csv or .parquet file with a column serial, or run.")
+    ],
+    by: Annotated[str, typer.Option("--by", metavar="serial|run", help="What a row is about.")] = "serial",
+    archive: options.ArchiveOption = None,
+    *,
+    as_json: options.JsonOption = False,
+) -> None:
+    """Add a table of attributes."""
+    from pipelines.discovery.attribute_files import added_from
+
+    added, lines = added_from(Archive(archive), table, by)
+    give_lines(added, lines, as_json=as_json)
+
+
+@app.command(
+    "list",
+    epilog="\n\n".join(EXAMPLES_OF["list"]),
+    help="List the attributes with their levels, and of how many units they are known.",
+)
+def list_(archive: options.ArchiveOption = None, *, as_json: options.JsonOption = False) -> None:
+    """List the attributes."""
+    from pipelines.discovery.attribute_files import listed
+
+    store = Archive(archive)
+    store.refuse_none()
+    give(listed(store), _print, as_json=as_json)
+
+
+def _print(document: dict[str, list[dict[str, object]]]) -> None:
+    rows = document["attributes"]
+    if not rows:
+        say("no attribute is known; add some with 'tumbleline attributes add FILE'")
+        return
+    print_table(["attribute", "of", "known", "levels", "such as"], [[str(row[key]) for key in row] for row in rows])

@@ -1,0 +1,115 @@
+"""``tumbleline discover``: what the lots of an archive show together that one lot cannot."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from pipelines.archive import Archive
+from pipelines.cli import options
+from pipelines.cli.printing import give, publish
+from schemas.errors import DONE, PART_FAILED, WrongUse
+
+PART = "Certificates, trace, audit"
+ORDER = 452
+SUMMARY = "Find effects, far smaller than the noise of a lot, that an archive of many lots shows."
+EXAMPLES = (
+    "tumbleline discover --html discoveries.html",
+    "tumbleline discover --driver station,slot --reach --json",
+)
+
+
+def command(
+    archive: options.ArchiveOption = None,
+    device: Annotated[
+        str, typer.Option("--device", metavar="KIND", help="Kind of device; that of most runs by default.")
+    ] = "",
+    since: Annotated[
+        str,
+        typer.Option(
+            "--since", metavar="DATE", help="Only lots from this day on; the nightly evidence stays as it is."
+        ),
+    ] = "",
+    driver: Annotated[
+        str, typer.Option("--driver", metavar="a,b", help="Only discoveries of these drivers, such as wafer,station.")
+    ] = "",
+    explain: Annotated[
+        str,
+        typer.Option(
+            "--explain", metavar="ID", help="One discovery with its levels, what carries it, and what to measure next."
+        ),
+    ] = "",
+    model: Annotated[
+        Path | None,
+        typer.Option(
+            "--model", metavar="FILE", help="A model file: what is left with its effects in the model of every lot."
+        ),
+    ] = None,
+    html: Annotated[
+        Path | None, typer.Option("--html", metavar="FILE", help="Write the findings with pictures as one page.")
+    ] = None,
+    workers: Annotated[
+        int | None, typer.Option("--workers", min=1, help="Processes that score new runs; as many as cores by default.")
+    ] = None,
+    *,
+    reach: Annotated[
+        bool, typer.Option("--reach", help="Print the smallest effects that this archive could have shown.")
+    ] = False,
+    looking_back: Annotated[
+        bool,
+        typer.Option(
+            "--looking-back", help="Judge all lots again with the attributes known now; the nightly evidence stays."
+        ),
+    ] = False,
+    as_json: options.JsonOption = False,
+) -> None:
+    """Pool the lots of an archive: effects that differ by wafer, station, slot, firmware or date, or that all lots have.
+
+    Evidence is valid every night. Exit status 1: there is a new discovery.
+    """
+    from pipelines.cli.text.discovery_text import print_discoveries, print_explained, print_reach
+    from pipelines.discovery.discover import Look, discovered, explained
+    from pipelines.parallel import processors
+
+    looked = discovered(
+        Archive(archive),
+        Look(
+            device=device,
+            since=_day(since),
+            drivers=tuple(part.strip() for part in driver.split(",") if part.strip()),
+            effects=_effects(model),
+            looking_back=looking_back,
+            workers=workers or processors(),
+        ),
+    )
+    document = looked.document
+    if html is not None:
+        from pipelines.discovery.page import render
+
+        publish(html, render(looked.findings, document, str(Archive(archive).root)), "discover")
+    if explain:
+        give(explained(document, explain), print_explained, as_json=as_json)
+        return
+    give(document, print_discoveries, as_json=as_json)
+    if reach and not as_json:
+        print_reach(document)
+    raise typer.Exit(PART_FAILED if document["new"] else DONE)
+
+
+def _day(since: str) -> str:
+    from datetime import date
+
+    try:
+        return date.fromisoformat(since).isoformat() if since else ""
+    except ValueError:
+        raise WrongUse(f"discover: --since is '{since}', a day as 2026-03-14 is needed") from None
+
+
+def _effects(model: Path | None) -> tuple[str, ...]:
+    if model is None:
+        return ()
+    from pipelines.jobs.model_files import chosen_effects
+
+    return tuple(chosen_effects("", model, "discover") or ())

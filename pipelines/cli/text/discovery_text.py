@@ -1,0 +1,104 @@
+"""Discoveries for people: what differs by what, how large it is, why it is beyond chance, and what to do next."""
+
+from __future__ import annotations
+
+from inertial.counts import number_of
+from pipelines.cli.printing import print_table, say, short
+from pipelines.discovery.documents import DiscoverDocument, DiscoveryRow
+from pipelines.discovery.sentences import headline, scope_text
+
+_SHOWN_HELD, _SHOWN_LEVELS, _SHOWN_OUT, _SHOWN_REACH = 3, 12, 3, 40
+
+
+def print_discoveries(document: DiscoverDocument) -> None:
+    """The screen of ``discover``."""
+    pooled, control = document["pooled"], document["error_control"]
+    period = f", {pooled['from']} to {pooled['until']}" if pooled["from"] else ""
+    say(
+        f"{number_of(pooled['lots'], 'lot')} of {document['device']}, {number_of(pooled['units'], 'unit calibration')}{period}"
+    )
+    say(f"model of each lot: {', '.join(document['model'])}", style="dim")
+    for row in pooled["left_out"][:_SHOWN_OUT]:
+        say(f"left out  {row['run']}: {row['reason']}", style="dim")
+    if len(pooled["left_out"]) > _SHOWN_OUT:
+        say(f"left out  {len(pooled['left_out']) - _SHOWN_OUT} more; --json has all", style="dim")
+    say()
+    if not document["discoveries"]:
+        say("no discovery")
+    for row in document["discoveries"]:
+        say(headline(row), style="yellow" if row["id"] in document["new"] else "")
+        say(f"    {scope_text(row)}")
+    _beside(document)
+    say(
+        f"a discovery needs evidence of e^{short(control['log_e_needed'])}: in an archive without anything hidden one ever "
+        f"comes with {short(100.0 * control['alpha'])} % at most, whenever it is looked at",
+        style="dim",
+    )
+    for text in document["warnings"]:
+        say(text, style="yellow")
+    if document["discoveries"] and not document["looking_back"]:
+        say(f"\nNext\n  tumbleline discover --explain {document['discoveries'][0]['id']}")
+
+
+def _beside(document: DiscoverDocument) -> None:
+    """What is no discovery: unexplained evidence, what a model leaves, what may be the station's own wander."""
+    for found in document["unexplained"]:
+        text = f"unexplained: something differs by {found['driver']}, and no effect of the catalogue accounts for it"
+        say(text, style="yellow")
+    for one in document["compared"]:
+        sizes = f"{short(one['size_ug_before'])} → {short(one['size_ug_after'])} µg"
+        evidence = f"evidence e^{short(one['log_e_before'])} → e^{short(one['log_e_after'])}"
+        say(f"{one['id']} with {one['recommended']} in every lot's model: {sizes}, {evidence}", style="green")
+    for row in document["held"][:_SHOWN_HELD]:
+        axis = f" {row['axis']}" if row["axis"] else ""
+        say(f"held back: {row['effect']}{axis} by {row['driver']}: {row['reason']}", style="dim")
+    if len(document["held"]) > _SHOWN_HELD:
+        say(f"held back: {len(document['held']) - _SHOWN_HELD} more; --json has all", style="dim")
+
+
+def print_explained(row: DiscoveryRow) -> None:
+    """The screen of ``discover --explain``."""
+    say(headline(row))
+    say(f"    {scope_text(row)}")
+    others = [name for name in row["effects"] if name != row["recommended"]]
+    if others:
+        say(f"    the lots do not tell it from {', '.join(others)}")
+    other_drivers = [name for name in row["drivers"] if name != row["driver"]]
+    if other_drivers:
+        say(f"    nor its driver from {', '.join(other_drivers)}")
+    carried = row["carried_by"]
+    if carried["lots_for"] == carried["lots_for"]:
+        less = short(carried["log_e_without_largest_2_percent"])
+        say(
+            f"    {short(100.0 * carried['lots_for'])} % of the lots speak for it; e^{less} without the 2 % that speak most"
+        )
+    if row["confirmed"] is None:
+        say("    fewer than 20 lots came since; later ones will confirm it or not")
+    else:
+        say(f"    later lots {'show' if row['confirmed'] else 'do not show'} what earlier ones predict")
+    if row["kind"] == "levels":
+        lines = [
+            [one["level"], short(one["size_ug"]), short(one["u_ug"]), str(one["units"] or "")] for one in row["levels"]
+        ]
+        print_table([row["driver"], "size\nµg", "u\nµg", "units"], lines[:_SHOWN_LEVELS])
+        if len(lines) > _SHOWN_LEVELS:
+            say(f"{len(lines) - _SHOWN_LEVELS} more; --json and --html have them")
+    say(f"next: {row['next']}")
+
+
+def print_reach(document: DiscoverDocument) -> None:
+    """What the archive could have shown, by effect."""
+    rows: dict[str, dict[str, str]] = {}
+    for row in document["reach"]:
+        own = rows.setdefault(row["effect"], {})
+        own[row["driver"]] = short(row["smallest_ug"])
+        own[f"{row['driver']} lots"] = str(row["lots_to_1_ug"] or "")
+    keys = ("mean", "mean lots", "inside lots", "inside lots lots")
+    lines = [[effect, *(own.get(key, "") for key in keys)] for effect, own in rows.items()][:_SHOWN_REACH]
+    print_table(
+        ["effect", "common\nto all\nµg", "lots\nto 1 µg", "inside\nlots\nµg", "lots\nto 1 µg"],
+        lines,
+        "smallest effect shown in 95 % of cases",
+    )
+    for row in document["unseen"]:
+        say(f"never: {row['effect']}, because {row['reason']}", style="dim")

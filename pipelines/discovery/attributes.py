@@ -1,0 +1,211 @@
+"""What is known of units and runs beside the measurement: wafer, supplier, batch, firmware, operator, date of assembly.
+
+Append-only, one file for each time that something was added, with its source, its author and its date; a changed value is a new
+row, and the newest one counts.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal
+
+import numpy as np
+import pandas as pd
+from typing_extensions import TypedDict
+
+from inertial.counts import number_of
+from pipelines.archive import Archive, files
+from pipelines.archive.provenance import provenance
+from schemas.errors import ArchiveUnusable, WrongUse, did_you_mean
+
+By = Literal["serial", "run"]
+
+FOLDER = "attributes"
+NOT_DRIVERS = {"grade", "outcome", "pass", "passed", "fail", "failed", "yield", "certificate"}
+"""Columns that follow from the result: units selected by them would show an effect where there is none."""
+
+_SHOWN = 5
+_DAY = re.compile(r"\d{4}-\d{2}-\d{2}")
+
+
+class AddedAttributes(TypedDict):
+    """``attributes add --json``: what was added."""
+
+    added: Annotated[int, "values that are new"]
+    changed: Annotated[int, "values that replace another one; the old one is kept"]
+    unchanged: int
+    by: Annotated[str, "serial or run"]
+    names: Annotated[list[str], "of the attributes"]
+    unknown: Annotated[list[str], "serials or runs that the archive does not have yet"]
+    refused: Annotated[list[str], "columns that follow from the result of a calibration, and were not taken"]
+    file: Annotated[str, "where they are kept, in the archive"]
+
+
+@dataclass(frozen=True)
+class Attributes:
+    """The newest values: by serial and by run, name → value as text."""
+
+    serial: Mapping[str, Mapping[str, str]]
+    run: Mapping[str, Mapping[str, str]]
+    entries: int
+
+    def names(self) -> list[str]:
+        """Names of all attributes, in order of appearance."""
+        every = (name for known in (self.serial, self.run) for values in known.values() for name in values)
+        return list(dict.fromkeys(every))
+
+    def of(self, serial: str, run: str, name: str) -> str:
+        """The value of a unit in a run: its own, or that of the run; empty where neither is known."""
+        own = self.serial.get(serial, {}).get(name, "")
+        return own or self.run.get(run, {}).get(name, "")
+
+
+def known_attributes(archive: Archive) -> Attributes:
+    """All attributes of an archive."""
+    known: dict[str, dict[str, dict[str, str]]] = {"serial": {}, "run": {}}
+    places = _places(archive)
+    for place in places:
+        content = files.read_json(place)
+        for key, values in content.get("values", {}).items():
+            known[content["by"]].setdefault(key, {}).update({name: str(value) for name, value in values.items()})
+    return Attributes(known["serial"], known["run"], len(places))
+
+
+def add_attributes(archive: Archive, table: pd.DataFrame, by: By, source: str) -> AddedAttributes:
+    """Add a table of attributes to an archive: a column ``serial`` (or ``unit``) or ``run``, and one for each attribute.
+
+    Raises
+    ------
+    WrongUse
+        The key is missing, empty or twice with different values, or no attribute is left.
+    """
+    archive.refuse_none()
+    key = _key_column(table, by, source)
+    named = [str(name) for name in table.columns if name != key]
+    refused = [name for name in named if name.lower() in NOT_DRIVERS]
+    names = [name for name in named if name not in refused]
+    if not names:
+        more = f"; {', '.join(refused)} follow from the result" if refused else ""
+        raise WrongUse(f"attributes: {source} has no column beside {key}, an attribute is needed{more}")
+    before = known_attributes(archive)
+    known = before.serial if by == "serial" else before.run
+    values = _values(table, key, names, source)
+    new, counts = dict[str, dict[str, str]](), {"added": 0, "changed": 0, "unchanged": 0}
+    for one, own in values.items():
+        for name, value in own.items():
+            old = known.get(one, {}).get(name)
+            kind = "added" if old is None else "unchanged" if old == value else "changed"
+            counts[kind] += 1
+            if kind != "unchanged":
+                new.setdefault(one, {})[name] = value
+    place = archive.root / FOLDER / "-"
+    if new:
+        place = _append(archive, {"by": by, "source": source, "values": new, **provenance()})
+    return {
+        **counts,  # type: ignore[typeddict-item]  # the three counts
+        "by": by,
+        "names": names,
+        "unknown": _unknown(archive, by, list(values)),
+        "refused": refused,
+        "file": place.name if new else "",
+    }
+
+
+def as_numbers(values: Sequence[str]) -> dict[str, float] | None:
+    """The values as numbers where they are a quantity: dates as days, or numbers of which some have a fraction; else None."""
+    present = {value for value in values if value}
+    if present and all(_DAY.fullmatch(value) for value in present):
+        return {value: float(np.datetime64(value, "D").astype(float)) for value in present}
+    try:
+        numbers = {value: float(value) for value in present}
+    except ValueError:
+        return None
+    finite = all(math.isfinite(number) for number in numbers.values())
+    return numbers if finite and any(not number.is_integer() for number in numbers.values()) else None
+
+
+def _places(archive: Archive) -> list[Any]:
+    folder = archive.root / FOLDER
+    if not folder.is_dir():
+        return []
+    return sorted((one for one in folder.iterdir() if one.name.endswith(".json")), key=lambda one: one.name)
+
+
+def _append(archive: Archive, content: Mapping[str, Any]) -> Any:
+    """Write the next file; of two processes each gets a number of its own."""
+    number = len(_places(archive)) + 1
+    for _ in range(1000):
+        place = archive.root / FOLDER / f"{number:06d}.json"
+        if files.publish_first(place, files.manifest_bytes(content)):
+            return place
+        number += 1
+    raise ArchiveUnusable(f"archive: {archive.root / FOLDER} takes no new file; see its permissions")
+
+
+def _key_column(table: pd.DataFrame, by: By, source: str) -> str:
+    wanted = ("serial", "unit") if by == "serial" else ("run",)
+    found = next((str(name) for name in table.columns if str(name).lower() in wanted), None)
+    if found is None:
+        names = [str(name) for name in table.columns]
+        raise WrongUse(
+            f"attributes: {source} has no column '{wanted[0]}', one is needed with --by {by}; "
+            f"{did_you_mean(wanted[0], names)}"
+        )
+    return found
+
+
+def _values(table: pd.DataFrame, key: str, names: list[str], source: str) -> dict[str, dict[str, str]]:
+    """The values by key, as text; empty cells say nothing."""
+    out: dict[str, dict[str, str]] = {}
+    for row in table.to_dict("records"):
+        one = _text(row[key])
+        if not one:
+            raise WrongUse(
+                f"attributes: {source} has a row without {key}, one is needed in each; fill it in or remove the row"
+            )
+        own = out.setdefault(one, {})
+        for name in names:
+            value = _text(row[name])
+            if not value:
+                continue
+            if own.get(name, value) != value:
+                raise WrongUse(
+                    f"attributes: {source} has two values of {name} for {one} ({own[name]}, {value}), one is needed; "
+                    "add the newer one in a file of its own"
+                )
+            own[name] = value
+    return out
+
+
+def _text(value: object) -> str:
+    """A cell as text: whole numbers without a point, nothing for an empty one."""
+    if value is None or value is pd.NaT or (isinstance(value, float) and math.isnan(value)):
+        return ""
+    if isinstance(value, (float, np.floating)) and float(value).is_integer():
+        return str(int(value))
+    return str(value).strip()
+
+
+def _unknown(archive: Archive, by: By, keys: list[str]) -> list[str]:
+    infos = archive.runs()
+    there = {info.id for info in infos} if by == "run" else {unit for info in infos for unit in info.units}
+    return [one for one in keys if one not in there]
+
+
+def sentences(added: AddedAttributes) -> list[str]:
+    """What was added, for people."""
+    what = ", ".join(added["names"])
+    lines = [
+        f"{what}: {number_of(added['added'], 'new value')}, {added['changed']} changed, {added['unchanged']} as before"
+    ]
+    if added["unknown"]:
+        shown = ", ".join(added["unknown"][:_SHOWN]) + (", …" if len(added["unknown"]) > _SHOWN else "")
+        lines.append(
+            f"not in the archive yet: {number_of(len(added['unknown']), str(added['by']))} ({shown}); they are kept"
+        )
+    if added["refused"]:
+        lines.append(f"not taken, because they follow from the result: {', '.join(added['refused'])}")
+    return lines

@@ -1,0 +1,160 @@
+"""One look at an archive: new runs are scored, the night's evidence is kept, and what is beyond chance is named."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+
+from threadpoolctl import threadpool_limits
+
+from inertial import effects as catalogue
+from inertial.discovery.evidence import INSIDE, ScoredLot
+from inertial.discovery.naming import Pool
+from pipelines.archive import Archive
+from pipelines.discovery.documents import ComparedAlarm, DiscoverDocument, DiscoveryRow
+from pipelines.discovery.findings import Findings, remembered, size_of
+from pipelines.discovery.nights import DiscoveryArchive, brought_up, fresh, grown_by_days
+from schemas.errors import WrongUse, did_you_mean
+from schemas.units import MICRO
+
+
+@dataclass(frozen=True)
+class Look:
+    """What is asked of an archive.
+
+    device : kind of device; that of most runs if empty · since : only lots from this day on; nothing is kept then
+    drivers : only discoveries of these; all if empty · effects : in the model of every lot beside its own
+    looking_back : judge all lots again with every attribute that is known now; nothing is kept then
+    """
+
+    device: str = ""
+    since: str = ""
+    drivers: tuple[str, ...] = ()
+    effects: tuple[str, ...] = ()
+    looking_back: bool = False
+    workers: int = 1
+
+
+@dataclass(frozen=True)
+class Looked:
+    """The findings with their document."""
+
+    findings: Findings
+    document: DiscoverDocument
+
+
+def discovered(archive: Archive, look: Look) -> Looked:
+    """The discoveries of an archive.
+
+    Raises
+    ------
+    WrongUse
+        An unknown device, driver or effect, or no lot from that day on.
+    """
+    with threadpool_limits(1):
+        source = DiscoveryArchive(archive, look.device)
+        source.device  # noqa: B018 - a wrong name is refused before anything is scored
+        source.score(look.workers)
+        state = brought_up(source)
+        findings = Findings(source, state)
+        document = remembered(source, state, findings.document())
+        if look.since or look.looking_back:
+            findings = _in_memory(source, look)
+            document = findings.document(looking_back=True)
+        if look.effects:
+            findings, document = _with_effects(source, findings, document, look.effects)
+    if look.drivers:
+        document = _of_drivers(document, look.drivers)
+    return Looked(findings, document)
+
+
+def _in_memory(source: DiscoveryArchive, look: Look) -> Findings:
+    runs = [run for run in source.pooled() if run not in source.revoked]
+    runs = [run for run in runs if str(source.store.head(run)["when"])[:10] >= look.since]
+    if not runs:
+        raise WrongUse(f"discover: no lot of {source.device} was measured since {look.since}; give an earlier --since")
+    return Findings(source, grown_by_days(source, fresh(source), runs))
+
+
+def _with_effects(
+    source: DiscoveryArchive, before: Findings, document: DiscoverDocument, effects: Sequence[str]
+) -> tuple[Findings, DiscoverDocument]:
+    """The same lots with effects in the model of each, and what is left of every discovery."""
+    catalogue.get_all(effects)
+    pool = before.pool
+    added = [one for one in effects if one in pool.effects]
+    if not added:
+        raise WrongUse(
+            f"discover: none of {', '.join(effects)} is beyond the model of the lots, one at least is needed; "
+            f"{did_you_mean(effects[0], pool.effects)}"
+        )
+    change = partial(_changed, pool, tuple(added))
+    changed = source.with_change(change)
+    after = Findings(changed, grown_by_days(changed, fresh(changed), before.state.order))
+    extended = after.document(looking_back=True)
+    extended["model"] = [*document["model"], *added]
+    extended["compared"] = [_compared(row, before, after) for row in document["discoveries"]]
+    return after, extended
+
+
+def _changed(pool: Pool, effects: tuple[str, ...], lot: ScoredLot) -> ScoredLot:
+    for effect in effects:
+        lot = pool.with_effect(lot, effect)
+    return lot
+
+
+def _compared(row: DiscoveryRow, before: Findings, after: Findings) -> ComparedAlarm:
+    return {
+        "id": row["id"],
+        "recommended": row["recommended"],
+        "driver": row["driver"],
+        "log_e_before": round(_largest(before, row), 2),
+        "log_e_after": round(_largest(after, row), 2),
+        "size_ug_before": row["size_ug"],
+        "size_ug_after": _size_left(after, row),
+    }
+
+
+def _largest(findings: Findings, row: DiscoveryRow) -> float:
+    """The largest evidence of a driver for any effect of a class, or its neighbours: of all effects."""
+    drivers = findings.state.sensor.drivers
+    values = [float(sums.log_e.max()) for name, sums in drivers.items() if name.removesuffix(INSIDE) == row["driver"]]
+    return max(values, default=0.0)
+
+
+def _size_left(findings: Findings, row: DiscoveryRow) -> float:
+    """Size of the largest effect that is still named for a driver, µg."""
+    sizes = [one.name for one in findings.discoveries if one.drivers[0] == row["driver"]]
+    if not sizes:
+        return 0.0
+    return MICRO * size_of(sizes[0])[0]
+
+
+def _of_drivers(document: DiscoverDocument, drivers: Sequence[str]) -> DiscoverDocument:
+    known = [row["name"] for row in document["drivers"]]
+    for one in drivers:
+        if one not in known:
+            raise WrongUse(f"discover: no driver is called '{one}'; {did_you_mean(one, known)}")
+    document["discoveries"] = [row for row in document["discoveries"] if set(row["drivers"]) & set(drivers)]
+    document["held"] = [row for row in document["held"] if row["driver"].removesuffix(INSIDE) in drivers]
+    document["drivers"] = [row for row in document["drivers"] if row["name"] in drivers]
+    return document
+
+
+def explained(document: DiscoverDocument, name: str) -> DiscoveryRow:
+    """One discovery by its id.
+
+    Raises
+    ------
+    WrongUse
+        There is none of that id.
+    """
+    found = next((row for row in document["discoveries"] if row["id"].lower() == name.lower()), None)
+    if found is None:
+        ids = [row["id"] for row in document["discoveries"]]
+        raise WrongUse(
+            f"discover: no discovery is called '{name}'; "
+            + (did_you_mean(name, ids) if ids else "there is none in this archive")
+        )
+    return found

@@ -1,0 +1,145 @@
+"""The JSON documents of discover: keys that other programs read. A NotRequired key may be missing."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, NotRequired
+
+from typing_extensions import TypedDict
+
+
+class LeftOutRun(TypedDict):
+    """A run that is not pooled."""
+
+    run: str
+    reason: str
+
+
+PooledLots = TypedDict(
+    "PooledLots",
+    {
+        "lots": int,
+        "units": Annotated[int, "measurements of units"],
+        "left_out": list[LeftOutRun],
+        "from": Annotated[str | None, "day of the first lot"],
+        "until": Annotated[str | None, "day of the last lot"],
+    },
+)
+
+
+class ErrorControl(TypedDict):
+    """What a discovery has to reach."""
+
+    alpha: Annotated[float, "probability that an archive without anything hidden ever shows one"]
+    hypotheses: int
+    log_e_needed: Annotated[float, "natural logarithm of the evidence"]
+    valid: Annotated[str, "when it may be looked at: every night"]
+
+
+class DiscoveredLevel(TypedDict):
+    """One level of a driver."""
+
+    level: str
+    size_ug: Annotated[float, "of the axis with the largest one, signed"]
+    u_ug: Annotated[float, "one standard error"]
+    units: int
+
+
+class CarriedBy(TypedDict):
+    """How the lots share the evidence."""
+
+    lots_for: Annotated[float, "share of the lots that speak for it"]
+    log_e_without_largest_2_percent: float
+
+
+class DiscoveryRow(TypedDict):
+    """One discovery."""
+
+    id: str
+    since: Annotated[str, "day of the first night on which it was beyond the threshold"]
+    lots_then: int
+    effects: Annotated[list[str], "class of effects that the lots do not tell apart, best first"]
+    recommended: str
+    axes: list[str]
+    driver: str
+    drivers: Annotated[list[str], "class of drivers, best first"]
+    kind: Literal["mean", "levels", "slope"]
+    size_ug: Annotated[float, "rms over levels and axes in a dwell"]
+    interval_ug: Annotated[list[float], "95 %"]
+    size_floors: Annotated[float, "the same over the noise of a dwell of one lot"]
+    log_e: float
+    scope: Literal["sensor", "station", "sensor_or_station", "thermometer"]
+    because: str
+    levels: list[DiscoveredLevel]
+    carried_by: CarriedBy
+    confirmed: Annotated[
+        bool | None, "whether later lots show what earlier ones predict; null: fewer than 20 later lots"
+    ]
+    confirmed_factor: NotRequired[Annotated[list[float], "later over predicted, and its standard error"]]
+    next: str
+
+
+class HeldAlarm(TypedDict):
+    """Evidence that may be the station's own wander: it is no discovery."""
+
+    effect: str
+    axis: str
+    driver: str
+    log_e: float
+    reason: str
+
+
+class ReachRow(TypedDict):
+    """What the archive could have seen."""
+
+    effect: str
+    driver: Annotated[str, "mean, or inside lots"]
+    smallest_ug: float
+    lots_to_1_ug: int | None
+
+
+class UntoldEffect(TypedDict):
+    """An effect that no lot tells from the station's own errors."""
+
+    effect: str
+    reason: str
+
+
+class DriverRow(TypedDict):
+    """A driver that was judged, or why it was not."""
+
+    name: str
+    status: str
+
+
+class ComparedAlarm(TypedDict):
+    """A discovery before and after an effect is in the model of every lot."""
+
+    id: str
+    recommended: str
+    driver: str
+    log_e_before: float
+    log_e_after: float
+    size_ug_before: float
+    size_ug_after: float
+
+
+class DiscoverDocument(TypedDict):
+    """``discover --json``: what the lots of an archive show together."""
+
+    pooled: PooledLots
+    model: list[str]
+    device: str
+    error_control: ErrorControl
+    discoveries: list[DiscoveryRow]
+    held: list[HeldAlarm]
+    unexplained: Annotated[list[dict[str, object]], "evidence that no effect of the catalogue accounts for"]
+    population: Annotated[list[dict[str, object]], "of coefficients; see `audit`"]
+    reach: list[ReachRow]
+    unseen: list[UntoldEffect]
+    drivers: list[DriverRow]
+    warnings: list[str]
+    compared: Annotated[
+        list[ComparedAlarm], "with --model: what is left of each discovery where its effects are in every lot's model"
+    ]
+    new: Annotated[list[str], "ids of discoveries that were not there the time before"]
+    looking_back: bool

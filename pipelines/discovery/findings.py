@@ -1,0 +1,527 @@
+"""What the evidence of an archive amounts to: named discoveries with size, scope and what carries them, and what is held back."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from functools import cached_property
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from inertial.discovery.evidence import DATE, FIRST, INSIDE, MEAN, SLOT, STATION, UNIT, ScoredLot, Sums
+from inertial.discovery.naming import Name, Pool
+from pipelines.archive import derived, files
+from pipelines.discovery.documents import (
+    DiscoverDocument,
+    DiscoveredLevel,
+    DiscoveryRow,
+    DriverRow,
+    HeldAlarm,
+    ReachRow,
+    UntoldEffect,
+)
+from pipelines.discovery.nights import ALPHA, AXES, SEASON, Alarm, DiscoveryArchive, Evidences, held, hypothesis
+from schemas.units import MICRO
+
+Array = NDArray[np.float64]
+Scope = Literal["sensor", "station", "sensor_or_station", "thermometer"]
+
+LATER = 20  # lots after an alarm from which on they confirm or do not
+MOST_NAMED = 20_000  # lots that the names are found with: evenly spread ones of a larger archive
+_CONFIRMED = 2.05  # standard errors beyond none (two sided 4 %), as for a fresh run
+_SURE = 0.999  # of Student's distribution over stations
+_GROWN = 1.05  # more lots than this factor: the names are found again
+_SHOWN_LEVELS = 40
+
+
+@dataclass(frozen=True)
+class Discovery:
+    """A name with what is said of it."""
+
+    name: Name
+    since: Alarm
+    drivers: tuple[str, ...]
+    carried: Array
+    confirmed: tuple[float, float] | None
+
+
+class Findings:
+    """The findings of the evidence of one kind of device."""
+
+    def __init__(self, source: DiscoveryArchive, state: Evidences) -> None:
+        self.source, self.state = source, state
+
+    @cached_property
+    def open_alarms(self) -> list[Alarm]:
+        """Alarms that are discoveries."""
+        return [alarm for alarm in self.state.alarms if not held(self.state, alarm)]
+
+    @cached_property
+    def lots(self) -> list[ScoredLot]:
+        """The lots that names are found with."""
+        order = self.state.order
+        pick = (
+            order
+            if len(order) <= MOST_NAMED
+            else [order[k] for k in np.linspace(0, len(order) - 1, MOST_NAMED).astype(int)]
+        )
+        return [sensor for sensor, _ in self.source.lots(pick)]
+
+    @cached_property
+    def pool(self) -> Pool:
+        """The columns and their products, means over the archive."""
+        columns, k = self.state.columns, len(self.state.columns)
+        place = {column: at for at, column in enumerate(columns)}
+        lot, inside, size = np.zeros((AXES, k, k)), np.zeros((AXES, k, k)), np.zeros((AXES, k))
+        weight = np.zeros(k)
+        for one in self.source.store.products():
+            at = np.array([place[column] for column in one.columns if column in place])
+            if at.size != len(one.columns):
+                continue
+            lot[:, at[:, None], at] += one.runs * one.lot
+            inside[:, at[:, None], at] += one.runs * one.inside
+            size[:, at] += one.runs * one.size.reshape(AXES, -1)
+            weight[at] += one.runs
+        return Pool(columns, (size / np.maximum(weight, 1.0)).reshape(-1), lot, inside)
+
+    @cached_property
+    def discoveries(self) -> list[Discovery]:
+        """Names of what is beyond the threshold, in the order of their first night."""
+        of_sensor = [alarm for alarm in self.open_alarms if alarm.place < self.state.sensor.count]
+        if not of_sensor:
+            return []
+        needed = max(self.state.needed(alarm.driver) for alarm in of_sensor)
+        names = self.pool.names(self.lots, [(alarm.driver, self._effect(alarm)) for alarm in of_sensor], needed)
+        out: list[Discovery] = []
+        for name in names:
+            alarms = [a for a in of_sensor if _plain(a.driver) in name.drivers and self._effect(a) in name.effects]
+            if not alarms:
+                continue
+            since = min(alarms, key=lambda a: (a.lots, -a.log_e))
+            raised = {_plain(a.driver) for a in alarms}
+            drivers = tuple(one for one in name.drivers if one in raised) or (name.drivers[0],)
+            out.append(Discovery(name, since, drivers, *self._carried(name, since)))
+        return sorted(out, key=lambda one: one.since.lots)
+
+    def _effect(self, alarm: Alarm) -> str:
+        return hypothesis(self.state, alarm.place)[0]
+
+    def _carried(self, name: Name, since: Alarm) -> tuple[Array, tuple[float, float] | None]:
+        driver, effect = name.drivers[0], name.effects[0]
+        carried = self.pool.carried(self.lots, driver, effect)
+        if len(self.lots) != len(self.state.order) or len(self.lots) - since.lots < LATER:
+            return carried, None
+        return carried, self.pool.confirmed(self.lots[: since.lots], self.lots[since.lots :], driver, effect)
+
+    def document(self, *, looking_back: bool = False) -> DiscoverDocument:
+        """The findings as a document."""
+        state, source = self.state, self.source
+        heads = [source.store.head(run) for run in state.order]
+        rows = self._rows()
+        largest = max((source.store.head(run)["model"] for run in state.order[-1:]), default="")
+        return {
+            "pooled": {
+                "lots": len(state.order),
+                "units": sum(len(head["units"]) for head in heads),
+                "left_out": [{"run": run, "reason": reason} for run, reason in source.left_out()],
+                "from": min((head["when"][:10] for head in heads), default=None),
+                "until": max((head["when"][:10] for head in heads), default=None),
+            },
+            "model": largest.split(",") if largest else [],
+            "device": source.device,
+            "error_control": {
+                "alpha": ALPHA,
+                "hypotheses": len(state.sensor.drivers) * state.sensor.count,
+                "log_e_needed": round(state.needed(MEAN), 2),
+                "valid": "every night",
+            },
+            "discoveries": rows,
+            "held": self._held(),
+            "unexplained": self._unexplained(rows),
+            "population": [],
+            "reach": self.reach(),
+            "unseen": self._unseen(),
+            "drivers": self._drivers(),
+            "warnings": self._warnings(),
+            "compared": [],
+            "new": [],
+            "looking_back": looking_back,
+        }
+
+    def _rows(self) -> list[DiscoveryRow]:
+        rows = [self._row(one) for one in self.discoveries] + [self._station_row(alarm) for alarm in self._of_station]
+        for number, row in enumerate(rows, start=1):
+            row["id"] = f"D{number}"
+        return rows
+
+    def _day_of(self, alarm: Alarm) -> str:
+        return str(self.source.store.head(self.state.order[min(alarm.lots, len(self.state.order)) - 1])["when"])[:10]
+
+    def _row(self, found: Discovery) -> DiscoveryRow:
+        name = found.name
+        size, low, high = size_of(name)
+        floor = float(np.median([self.source.store.head(run)["floor"] for run in self.state.order]))
+        scope, because = self._scope(found)
+        driver = found.drivers[0] if name.drivers[0] not in found.drivers else name.drivers[0]
+        log_e = max(float(s.log_e[p]) for s, p in self._evidence_of(name, found.drivers))
+        row: DiscoveryRow = {
+            "id": "",
+            "since": self._day_of(found.since),
+            "lots_then": found.since.lots,
+            "effects": list(name.effects),
+            "recommended": name.effects[0],
+            "axes": [
+                a for a, of_axis in zip("xyz", _by_axis(name), strict=True) if of_axis > 0.25 * max(_by_axis(name))
+            ],
+            "driver": driver,
+            "drivers": list(found.drivers),
+            "kind": "mean" if driver == MEAN else "slope" if name.labels == ("slope",) else "levels",
+            "size_ug": MICRO * size,
+            "interval_ug": [MICRO * low, MICRO * high],
+            "size_floors": size / floor if floor > 0.0 else float("nan"),
+            "log_e": round(log_e, 2),
+            "scope": scope,
+            "because": because,
+            "levels": _levels(name),
+            "carried_by": {
+                "lots_for": float(np.mean(found.carried > 0.0)),
+                "log_e_without_largest_2_percent": round(_without_largest(found.carried), 2),
+            },
+            "confirmed": None
+            if found.confirmed is None
+            else bool(found.confirmed[0] > _CONFIRMED * found.confirmed[1]),
+            "next": _next(driver, scope),
+        }
+        if found.confirmed is not None:
+            row["confirmed_factor"] = [round(value, 3) for value in found.confirmed]
+        return row
+
+    def _evidence_of(self, name: Name, drivers: Sequence[str]) -> list[tuple[Sums, int]]:
+        """Sums and places of the hypotheses of a name."""
+        state, k = self.state, len(self.state.columns)
+        at = [axis * k + int(p) for axis in range(AXES) for p in self.pool.places(name.effects[0])]
+        sums = [state.sensor.drivers[one] for one in state.sensor.drivers if _plain(one) in drivers]
+        return [(each, place) for each in sums for place in at]
+
+    def _scope(self, found: Discovery) -> tuple[Scope, str]:
+        """Whether the sensor or the station has it, and why that is said."""
+        driver, stations = found.drivers[0], self.state.sensor.wander.stations
+        inside = any(a.driver.endswith(INSIDE) for a in self.open_alarms if _plain(a.driver) == driver)
+        if driver == STATION:
+            return "station", "it differs from station to station for units of the same kind"
+        if driver == SLOT:
+            return "station", "it stays with the slot of the fixture while the units change"
+        if driver == UNIT:
+            return "sensor", "the same unit shows it again, beside other units of its lot"
+        if inside:
+            return "sensor", "units of one lot differ by it; whatever the station does to a lot cancels"
+        if driver in {MEAN, DATE, SEASON} or len(stations) < 2:
+            return self._mean_scope(found, len(stations))
+        return "sensor", "lots of other stations predict it; a station's own wander is no news there"
+
+    def _mean_scope(self, found: Discovery, count: int) -> tuple[Scope, str]:
+        if count < 2:
+            return (
+                "sensor_or_station",
+                "one station: permanent errors of its references look the same, or the station's own wander",
+            )
+        k, effect = len(self.state.columns), found.name.effects[0]
+        at = [axis * k + int(p) for axis in range(AXES) for p in self.pool.places(effect)]
+        table = self.state.sensor.levels[STATION]
+        centre = self.state.sensor.score / np.maximum(self.state.sensor.information, 1e-300)
+        sizes = [
+            table.score[place] / np.maximum(table.information[place], 1e-300) + centre for place in table.place.values()
+        ]
+        values = np.array(sizes)[:, at]
+        t = np.abs(values.mean(axis=0)) / np.maximum(values.std(axis=0, ddof=1) / np.sqrt(count), 1e-300)
+        if float(t.max()) > float(stats.t.ppf(1.0 - 0.5 * (1.0 - _SURE) / len(at), count - 1)):
+            return "sensor", f"all {count} stations show it, and they differ by less than it"
+        return (
+            "sensor_or_station",
+            f"the {count} stations differ by too much to exclude permanent errors of their references",
+        )
+
+    @cached_property
+    def _of_station(self) -> list[Alarm]:
+        """Alarms of the station's own columns, the strongest of each effect and driver."""
+        best: dict[tuple[str, str], Alarm] = {}
+        for alarm in self.open_alarms:
+            if alarm.place >= self.state.sensor.count:
+                key = self._effect(alarm), alarm.driver
+                if key not in best or alarm.log_e > best[key].log_e:
+                    best[key] = alarm
+        kept: dict[str, Alarm] = {}
+        for (_, driver), alarm in sorted(best.items(), key=lambda item: -self._log_e(item[1])):
+            kept.setdefault(
+                driver, alarm
+            )  # columns of one table are nearly the same: the strongest stands for its driver
+        return sorted(kept.values(), key=lambda alarm: alarm.lots)
+
+    def _log_e(self, alarm: Alarm) -> float:
+        of_station = alarm.place >= self.state.sensor.count
+        evidence = self.state.station if of_station else self.state.sensor
+        return float(evidence.drivers[alarm.driver].log_e[alarm.place - (self.state.sensor.count if of_station else 0)])
+
+    def _station_row(self, alarm: Alarm) -> DiscoveryRow:
+        effect, column, _ = hypothesis(self.state, alarm.place)
+        at = alarm.place - self.state.sensor.count
+        station = self.state.station
+        sizes = _station_sizes(station, at)
+        alike = [
+            self._effect(a) for a in self.open_alarms if a.place >= self.state.sensor.count and a.driver == alarm.driver
+        ]
+        scale = float(station._scales["between"].rms[at]) if station.lots >= FIRST else 1.0  # noqa: SLF001
+        values = np.array([value for value, _ in sizes.values()])
+        errors = np.array([scale * error for _, error in sizes.values()])
+        size = float(np.sqrt(np.mean(values**2)))
+        return {
+            "id": "",
+            "since": self._day_of(alarm),
+            "lots_then": alarm.lots,
+            "effects": list(dict.fromkeys([effect, *alike])),
+            "recommended": effect,
+            "axes": [],
+            "driver": alarm.driver,
+            "drivers": [alarm.driver],
+            "kind": "mean" if alarm.driver == MEAN else "slope" if alarm.driver == DATE else "levels",
+            "size_ug": MICRO * size,
+            "interval_ug": [
+                MICRO * max(size - 2.0 * float(errors.max()), 0.0),
+                MICRO * (size + 2.0 * float(errors.max())),
+            ],
+            "size_floors": size / float(np.median([self.source.store.head(run)["floor"] for run in self.state.order])),
+            "log_e": round(self._log_e(alarm), 2),
+            "scope": "station",
+            "because": f"the force itself is changed, for all units of a lot alike (column {column + 1} of {effect})",
+            "levels": [
+                {"level": label, "size_ug": MICRO * value, "u_ug": MICRO * error * scale, "units": 0}
+                for label, (value, error) in sizes.items()
+            ],
+            "carried_by": {"lots_for": float("nan"), "log_e_without_largest_2_percent": float("nan")},
+            "confirmed": None,
+            "next": "check the station's references (level, encoders, fixture), see 'tumbleline audit'",
+        }
+
+    def _held(self) -> list[HeldAlarm]:
+        rows: list[HeldAlarm] = []
+        for alarm in self.state.alarms:
+            if held(self.state, alarm):
+                effect, _, axis = hypothesis(self.state, alarm.place)
+                rows.append(
+                    {
+                        "effect": effect,
+                        "axis": axis,
+                        "driver": alarm.driver,
+                        "log_e": round(self._log_e(alarm), 2),
+                        "reason": "the stations wander in this effect by themselves, and it is the same for a whole lot",
+                    }
+                )
+        return sorted(rows, key=lambda row: -row["log_e"])
+
+    def _unexplained(self, rows: Sequence[DiscoveryRow]) -> list[dict[str, object]]:
+        """Drivers with an alarm that no name accounts for."""
+        told = {driver for row in rows for driver in row["drivers"]} | ({MEAN} if rows else set())
+        out: dict[str, dict[str, object]] = {}
+        for alarm in sorted(self.open_alarms, key=self._log_e, reverse=True):
+            if alarm.place < self.state.sensor.count and _plain(alarm.driver) not in told and not rows:
+                effect, _, axis = hypothesis(self.state, alarm.place)
+                out.setdefault(
+                    _plain(alarm.driver),
+                    {
+                        "driver": _plain(alarm.driver),
+                        "nearest": effect,
+                        "axes": [axis],
+                        "log_e": round(self._log_e(alarm), 2),
+                    },
+                )
+        return list(out.values())
+
+    def reach(self) -> list[ReachRow]:
+        """The smallest size of each effect that this archive would have shown in 95 % of cases."""
+        state, lots = self.state, len(self.state.order)
+        if lots < FIRST:
+            return []
+        between, within = state.sensor._scales["between"].rms, state.sensor._scales["inside"].rms  # noqa: SLF001
+        own = np.mean([lot.own.sum(axis=0) for lot in self.lots[:: max(1, lots // 50)]], axis=0) * lots
+        times = np.sqrt(2.0 * (state.needed(MEAN) + 0.5 * np.log1p(0.03 * lots))) + stats.norm.ppf(0.95)
+        rows: list[ReachRow] = []
+        for driver, information, noise in ((MEAN, state.sensor.information, between), ("inside lots", own, within)):
+            seen = information > 0.0
+            sizes = np.where(seen, times * noise / np.sqrt(np.where(seen, information, 1.0)) * self.pool.size, np.nan)
+            for effect in self.pool.effects:
+                at = np.concatenate([axis * len(state.columns) + self.pool.places(effect) for axis in range(AXES)])
+                there = sizes[at][np.isfinite(sizes[at]) & (sizes[at] > 0.0)]
+                if not there.size:
+                    continue
+                smallest = MICRO * float(np.median(there))
+                rows.append(
+                    {
+                        "effect": effect,
+                        "driver": driver,
+                        "smallest_ug": smallest,
+                        "lots_to_1_ug": max(FIRST, int(np.ceil(lots * smallest**2))),
+                    }
+                )
+        return rows
+
+    def _unseen(self) -> list[UntoldEffect]:
+        information = self.state.sensor.information.reshape(AXES, -1)
+        own = sum((lot.own.sum(axis=0) for lot in self.lots[:FIRST]), np.zeros(self.state.sensor.count)).reshape(
+            AXES, -1
+        )
+        rows: list[UntoldEffect] = []
+        if not self.state.order:
+            return rows
+        for effect in self.pool.effects:
+            at = self.pool.places(effect)
+            if not information[:, at].any():
+                alone = bool(own[:, at].any())
+                reason = "the errors of the station have the same columns" if alone else "no lot excites it"
+                rows.append({"effect": effect, "reason": reason})
+        return rows
+
+    def _drivers(self) -> list[DriverRow]:
+        rows = [{"name": name, "status": "judged"} for name in dict.fromkeys(map(_plain, self.state.sensor.drivers))]
+        known = {row["name"] for row in rows}
+        labels = {
+            name: {
+                value
+                for one in (self.source.attributes.serial, self.source.attributes.run)
+                for of in one.values()
+                if (value := of.get(name))
+            }
+            for name in self.source.attributes.names()
+        }
+        rows += [
+            {"name": name, "status": "one level" if len(of) < 2 else "no unit of a pooled lot has it"}
+            for name, of in labels.items()
+            if name not in known
+        ]
+        return [{"name": row["name"], "status": row["status"]} for row in rows]
+
+    def _warnings(self) -> list[str]:
+        out: list[str] = []
+        lots = len(self.state.order)
+        if lots < FIRST:
+            out.append(f"{lots} lots; the earliest discovery is possible at {FIRST}, of drivers at about 60")
+        for device, count in self.source.other_devices.items():
+            out.append(
+                f"{count} runs are of {device}, and are never pooled with {self.source.device}: --device {device}"
+            )
+        if self.state.taken_out:
+            out.append(f"{len(self.state.taken_out)} runs were taken out because a calibration of them was revoked")
+        if len(self.state.sensor.wander.stations) == 1 and lots:
+            out.append(
+                "one station: what is the same for whole lots may be its own wander; units measured on two stations would tell"
+            )
+        return out
+
+
+def _plain(driver: str) -> str:
+    return driver.removesuffix(INSIDE)
+
+
+def _by_axis(name: Name) -> list[float]:
+    """Rms of the sizes of each axis over the levels, its noise taken off, g."""
+    weight = name.weights / max(float(name.weights.sum()), 1e-300)
+    there = np.isfinite(name.errors)
+    squares = np.where(there, name.sizes**2 - name.errors**2, 0.0)
+    return [float(value) for value in np.sqrt(np.maximum((weight[:, None] * squares).sum(axis=0), 0.0))]
+
+
+def size_of(name: Name) -> tuple[float, float, float]:
+    """Rms over levels and axes with its 95 % interval, g."""
+    weight = name.weights / max(float(name.weights.sum()), 1e-300)
+    there = np.isfinite(name.errors)
+    errors = np.where(there, name.errors, 0.0)
+    squares = np.where(there, name.sizes**2 - errors**2, 0.0)
+    each = weight[:, None] / 3.0
+    mean = float((each * squares).sum())
+    spread = 2.0 * float(np.sqrt((each**2 * (4.0 * name.sizes**2 * errors**2 + 2.0 * errors**4)).sum()))
+    return tuple(float(np.sqrt(max(value, 0.0))) for value in (mean, mean - spread, mean + spread))  # type: ignore[return-value]
+
+
+def _levels(name: Name) -> list[DiscoveredLevel]:
+    """Levels in the order of their size, of the axis that differs most."""
+    axis = int(np.argmax(_by_axis(name)))
+    order = np.argsort(-np.abs(name.sizes[:, axis]))[:_SHOWN_LEVELS]
+    return [
+        {
+            "level": name.labels[at],
+            "size_ug": MICRO * float(name.sizes[at, axis]),
+            "u_ug": MICRO * float(name.errors[at, axis]),
+            "units": int(name.weights[at]),
+        }
+        for at in order
+        if np.isfinite(name.errors[at, axis])
+    ]
+
+
+def _station_sizes(station: Any, at: int) -> dict[str, tuple[float, float]]:
+    """Size of a column at each station and its standard error at the stated noise."""
+    table = station.levels[STATION]
+    centre = station.score[at] / max(station.information[at], 1e-300)
+    out: dict[str, tuple[float, float]] = {}
+    for label, place in table.place.items():
+        information = max(float(table.information[place, at]), 1e-300)
+        out[label] = float(table.score[place, at] / information + centre), float(1.0 / np.sqrt(information))
+    return out
+
+
+def _without_largest(carried: Array) -> float:
+    """Evidence of contributions without the two per cent that speak most."""
+    kept = np.sort(carried)[: max(1, int(0.98 * carried.size))]
+    sums = Sums.of(1, two_sided=False)
+    rms = float(np.sqrt(np.mean(kept**2))) or 1.0
+    for value in kept / rms:
+        sums.add(np.array([value]))
+    return float(sums.log_e[0])
+
+
+def _next(driver: str, scope: Scope) -> str:
+    if scope == "sensor_or_station":
+        return "measure some of the same units on another station: what stays with the units is theirs"
+    if driver == SLOT:
+        return "exchange units between slots, or check the fixture at this slot"
+    if driver == STATION:
+        return "measure the same units on two of these stations, and check their references"
+    return "add the effect to the model of the next lots: 'tumbleline extend', then 'tumbleline discover --model'"
+
+
+def remembered(source: DiscoveryArchive, state: Evidences, document: DiscoverDocument) -> DiscoverDocument:
+    """Keep a document beside the evidence, so that discoveries have the same ids the next time."""
+    place = source.folder() / "found"
+    before: list[dict[str, Any]] = []
+    if place.is_file():
+        data, standing = derived.unframed(place)
+        before = json.loads(data)["discoveries"] if standing == derived.SOUND else []
+    used = {row["id"] for row in before}
+    numbers = (f"D{n}" for n in range(1, 10_000))
+    renamed: dict[str, str] = {}
+    free = list(before)
+    for row in document["discoveries"]:
+        same = next(
+            (old for old in free if old["driver"] == row["driver"] and set(old["effects"]) & set(row["effects"])), None
+        )
+        if same is not None:
+            free.remove(same)
+            renamed[row["id"]] = same["id"]
+            row["since"], row["lots_then"] = same["since"], same["lots_then"]
+        else:
+            renamed[row["id"]] = next(one for one in numbers if one not in used)
+            used.add(renamed[row["id"]])
+        row["id"] = renamed[row["id"]]
+    known = {row["id"] for row in before}
+    document["new"] = [row["id"] for row in document["discoveries"] if row["id"] not in known]
+    kept = {
+        "discoveries": document["discoveries"],
+        "lots": len(state.order),
+        "when": datetime.now(UTC).isoformat(timespec="seconds"),
+    }
+    files.publish(place, derived.framed(json.dumps(kept, sort_keys=True).encode()))
+    return document

@@ -1,0 +1,134 @@
+"""Discoveries as one page that needs no network: levels with intervals, evidence over the lots, what could have been seen."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial.discovery.evidence import INSIDE, MEAN, STATION, Sums
+from inertial.uncertainty.rounding import short
+from pipelines.discovery.documents import DiscoverDocument, DiscoveryRow
+from pipelines.discovery.findings import Discovery, Findings
+from pipelines.discovery.sentences import headline, scope_text
+from pipelines.drawing import Chart, Plot, PlotAxis, Trace, svg_text
+from pipelines.drawing.chart import Role, level
+from pipelines.report.templates import template
+
+MOST_LEVELS = 30
+
+
+def render(findings: Findings, document: DiscoverDocument, archive: str) -> str:
+    """The page as one HTML text without other files."""
+    by_effect = {(one.name.effects[0], one.drivers[0]): one for one in findings.discoveries}
+    shown = [
+        {
+            "id": row["id"],
+            "headline": headline(row),
+            "scope": scope_text(row),
+            "row": row,
+            "levels": svg_text(levels_chart(row)) if row["kind"] == "levels" and row["levels"] else "",
+            "grown": _grown(by_effect.get((row["recommended"], row["driver"]))),
+        }
+        for row in document["discoveries"]
+    ]
+    return template("discoveries.html").render(
+        archive=archive,
+        document=document,
+        shown=shown,
+        strongest=svg_text(strongest_chart(findings)) if document["pooled"]["lots"] else "",
+        reach=svg_text(reach_chart(document, len(findings.state.order))) if document["reach"] else "",
+        short=short,
+    )
+
+
+def levels_chart(row: DiscoveryRow) -> Chart:
+    """The levels of a driver in order of size, with 95 % intervals."""
+    levels = sorted(row["levels"][:MOST_LEVELS], key=lambda one: one["size_ug"])
+    place = np.arange(len(levels), dtype=np.float64)
+    size, error = (np.array([one[key] for one in levels]) for key in ("size_ug", "u_ug"))
+    texts = tuple(
+        f"{one['level']}: {one['size_ug']:.2f} ± {2 * one['u_ug']:.2f} µg, {one['units']} units" for one in levels
+    )
+    traces = (level(place, 0.0), Trace("95 % interval", place, size, error=1.96 * error, size=7.0, texts=texts))
+    axis = PlotAxis(row["driver"], names=tuple(one["level"] for one in levels))
+    plot = Plot("", axis, PlotAxis(f"{row['recommended']} in a dwell / µg"), traces)
+    return Chart(f"{row['recommended']} by {row['driver']}", (plot,), height=280)
+
+
+def _grown(found: Discovery | None) -> str:
+    """Evidence of a discovery from lot to lot."""
+    if found is None or found.carried.size < 2:
+        return ""
+    x = found.carried / max(float(np.sqrt(np.mean(found.carried**2))), 1e-300)
+    s, v = np.cumsum(x), np.cumsum(x**2)
+    lots = np.arange(1, x.size + 1, dtype=np.float64)
+    evidence = np.array([float(_sums(a, b)) for a, b in zip(s, v, strict=True)])
+    traces = (
+        Trace("evidence", lots, evidence / np.log(10.0), "line", "accent", width=2.0),
+        level(lots, 0.0),
+    )
+    plot = Plot("", PlotAxis("lots"), PlotAxis("evidence / powers of ten"), traces)
+    note = "each lot against what the other half of the lots predicts of it"
+    return svg_text(Chart("How the evidence came together", (plot,), height=240, note=note))
+
+
+def _sums(s: float, v: float) -> float:
+    return float(Sums(np.array([s]), np.array([v]), np.ones(1), two_sided=False).log_e[0])
+
+
+def strongest_chart(findings: Findings) -> Chart:
+    """The largest evidence of each effect by each driver, as powers of ten."""
+    state, effects = findings.state, findings.pool.effects
+    drivers = list(dict.fromkeys(name.removesuffix(INSIDE) for name in state.sensor.drivers))
+    drivers.sort(key=lambda name: (name not in {MEAN, STATION}, name))
+    grid = np.zeros((len(effects), len(drivers)))
+    for name, sums in state.sensor.drivers.items():
+        log_e = sums.log_e.reshape(3, -1).max(axis=0)
+        column = drivers.index(name.removesuffix(INSIDE))
+        for k, (effect, _) in enumerate(state.columns):
+            row = effects.index(effect)
+            grid[row, column] = max(grid[row, column], log_e[k] / np.log(10.0))
+    needed = state.needed(MEAN) / np.log(10.0)
+    traces: list[Trace] = []
+    shown: tuple[tuple[str, Role, NDArray[np.bool_]], ...] = (
+        ("beyond the threshold", "before", grid >= needed),
+        ("below it", "muted", (grid < needed) & (grid > 0.5)),
+    )
+    for name, role, inside in shown:
+        rows, columns = np.nonzero(inside)
+        texts = tuple(f"{effects[r]} by {drivers[c]}: 10^{grid[r, c]:.1f}" for r, c in zip(rows, columns, strict=True))
+        at = columns.astype(float), rows.astype(float)
+        traces.append(Trace(name, *at, role=role, symbol="square", size=9.0, texts=texts))
+    plot = Plot("", PlotAxis("driver", names=tuple(drivers)), PlotAxis("", names=tuple(effects)), tuple(traces))
+    return Chart("Evidence by effect and driver", (plot,), height=max(260, 17 * len(effects)))
+
+
+def reach_chart(document: DiscoverDocument, lots: int) -> Chart:
+    """Smallest size against lots: what this archive has, how it falls, and the discoveries as points."""
+    grid = np.geomspace(30.0, max(4.0 * lots, 120.0), 40)
+    best: dict[str, list[float]] = {}
+    for row in document["reach"]:
+        best.setdefault(row["driver"], []).append(row["smallest_ug"])
+    traces: list[Trace] = []
+    roles: tuple[Role, ...] = ("x", "y")
+    for role, (driver, sizes) in zip(roles, best.items(), strict=False):
+        middle = float(np.median(sizes))
+        name = "common to all lots" if driver == MEAN else "between units of a lot"
+        traces.append(Trace(name, grid, middle * np.sqrt(max(lots, 1) / grid), "line", role, width=2.0))
+    rows = [row for row in document["discoveries"] if row["size_ug"] > 0.0]
+    if rows:
+        at = np.array([float(row["lots_then"]) for row in rows])
+        texts = tuple(f"{row['id']} {row['recommended']}" for row in rows)
+        traces.append(
+            Trace(
+                "discoveries",
+                at,
+                np.array([row["size_ug"] for row in rows]),
+                role="limit",
+                symbol="diamond",
+                size=9.0,
+                texts=texts,
+            )
+        )
+    axes = PlotAxis("lots", log=True), PlotAxis("smallest effect / µg", log=True)
+    return Chart("What an archive of so many lots shows", (Plot("", *axes, tuple(traces)),), height=280)

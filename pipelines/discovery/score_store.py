@@ -1,0 +1,244 @@
+"""Scores of an archive's runs on disk, a file for each time that new runs were scored.
+
+A derived cache with a seal: where it was edited, or made by another version of the program, it is made again from the runs.
+``discovery/scores/<number>.scores`` has a row for each run; columns of one plan are nearly the same for all its runs, so that the
+products of the columns are kept once a file, as means.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+
+from pipelines.archive import Archive, derived, files
+from pipelines.archive.keys import digest
+from pipelines.archive.store import Place
+from pipelines.discovery.scored_run import ScoredRun, scored_runs
+from pipelines.parallel import map_partitions
+
+Array = NDArray[np.float64]
+
+FOLDER = "discovery"
+VERSION = 1
+TEXTS = ("run", "when", "station", "device", "model", "who", "left_out")
+_STEPS = 63.0  # of information shares, an octave
+BATCH = 8  # runs that one process scores at a time
+
+
+@dataclass(frozen=True)
+class Products:
+    """Means over the runs of a file: correlations of columns, sums of lots and inside lots (m, k, k), and sizes (m·k,)."""
+
+    columns: tuple[tuple[str, int], ...]
+    of_station: tuple[tuple[str, int], ...]
+    lot: Array
+    inside: Array
+    size: Array
+    runs: int
+
+
+class ScoreFile:
+    """One file of scores: rows stay packed until they are asked for.
+
+    names : columns of the sensor and of the station by their mark
+    """
+
+    def __init__(self, rows: list[dict[str, Any]], names: dict[str, Any], products: list[Products]) -> None:
+        self.rows, self.names, self.products = rows, names, products
+
+    def run(self, place: int) -> ScoredRun:
+        """A run, unpacked."""
+        return _run_of(self.rows[place], self.names)
+
+
+class ScoreStore:
+    """The scores of an archive."""
+
+    def __init__(self, archive: Archive) -> None:
+        self.archive = archive
+        self.folder: Place = archive.root / FOLDER / "scores"
+
+    @cached_property
+    def files(self) -> list[ScoreFile]:
+        """Every file that is sound, in the order of their making."""
+        out = list[ScoreFile]()
+        for place in sorted(self._places(), key=lambda one: one.name):
+            data, state = derived.unframed(place)
+            if state == derived.EDITED:
+                derived.warn_of_edits(place)
+            if state == derived.SOUND and (read := _read(data)) is not None:
+                out.append(read)
+        return out
+
+    @cached_property
+    def place(self) -> dict[str, tuple[int, int]]:
+        """File and row of every run, in the order of arrival."""
+        found: dict[str, tuple[int, int]] = {}
+        for number, file in enumerate(self.files):
+            for row, content in enumerate(file.rows):
+                found.setdefault(content["run"], (number, row))
+        return found
+
+    def head(self, run: str) -> dict[str, Any]:
+        """The texts of a run: when, station, device, model, why it was left out."""
+        number, row = self.place[run]
+        return self.files[number].rows[row]
+
+    def run(self, run: str) -> ScoredRun:
+        """The scores of a run."""
+        number, row = self.place[run]
+        return self.files[number].run(row)
+
+    def products(self) -> list[Products]:
+        """Products of columns, of every file."""
+        return [one for file in self.files for one in file.products]
+
+    def add(self, ids: Sequence[str], workers: int) -> int:
+        """Score runs that are not scored yet, in processes; the number of new ones."""
+        new = [one for one in ids if one not in self.place]
+        if not new:
+            return 0
+        parts = [(self.archive.address, new[at : at + BATCH]) for at in range(0, len(new), BATCH)]
+        scored = [run for part in map_partitions(_of_part, parts, workers=workers) for run in part]
+        number = 1 + max((int(place.name.split(".")[0]) for place in self._places()), default=0)
+        files.publish(self.folder / f"{number:06d}.scores", derived.framed(_written(scored)))
+        self.__dict__.pop("files", None)
+        self.__dict__.pop("place", None)
+        return len(scored)
+
+    def _places(self) -> list[Place]:
+        return [one for one in self.folder.iterdir() if one.name.endswith(".scores")] if self.folder.is_dir() else []
+
+
+def _of_part(part: tuple[str, Sequence[str]]) -> list[ScoredRun]:
+    return scored_runs(*part)
+
+
+def _written(runs: Sequence[ScoredRun]) -> bytes:
+    """A file of scores: a table with a row for each run, and the products of each set of columns in its header."""
+    groups: dict[str, list[ScoredRun]] = {}
+    for run in runs:
+        groups.setdefault(_group(run), []).append(run)
+    products = {name: _products_of(own) for name, own in groups.items() if not own[0].left_out}
+    columns: dict[str, list[Any]] = {name: [getattr(run, name) for run in runs] for name in TEXTS}
+    columns |= {"units": [list(run.units) for run in runs], "slots": [list(run.slots) for run in runs]}
+    columns["columns"] = [_group(run) for run in runs]
+    columns["floor"] = [run.floor for run in runs]
+    for name in ("score", "own", "information", "station_scores"):
+        columns[name] = [_packed(name, run) for run in runs]
+    buffer = io.BytesIO()
+    np.savez_compressed(
+        buffer, allow_pickle=False, **{f"{name}/{key}": v for name, of in products.items() for key, v in of.items()}
+    )
+    about = {
+        "version": VERSION,
+        "columns": {name: [own[0].columns, own[0].of_station, len(own)] for name, own in groups.items()},
+    }
+    table = pa.table(columns).replace_schema_metadata({"about": json.dumps(about).encode()})
+    sink = pa.BufferOutputStream()
+    pq.write_table(table, sink, compression="zstd", compression_level=6, write_statistics=False)
+    data = sink.getvalue().to_pybytes()
+    return len(data).to_bytes(8, "big") + data + buffer.getvalue()
+
+
+def _group(run: ScoredRun) -> str:
+    return "" if run.left_out else digest([run.columns, run.of_station])[:12]
+
+
+def _packed(name: str, run: ScoredRun) -> bytes:
+    """Arrays in few bytes: scores over the root of their information have three digits, shares of information two."""
+    if run.left_out or run.score is None or run.own is None or run.information is None or run.station_scores is None:
+        return b""
+    if name == "score":
+        root = np.sqrt(np.where(run.own > 0.0, run.own, 1.0))
+        return (run.score / root).astype(np.float16).tobytes()
+    mean = run.own.mean(axis=0)
+    if name == "own":
+        return _coded(run.own / np.where(mean > 0.0, mean, 1.0)).tobytes()
+    if name == "information":
+        return np.stack([mean, run.information]).astype(np.float32).tobytes()
+    return run.station_scores.astype(np.float32).tobytes()
+
+
+def _coded(ratio: Array) -> NDArray[np.uint8]:
+    """Ratios between a quarter and four in steps of one per cent; zero is zero."""
+    steps = np.round(_STEPS * np.log2(np.clip(ratio, 1e-30, None))) + 128
+    return np.where(ratio > 0.0, np.clip(steps, 1, 255), 0).astype(np.uint8)
+
+
+def _decoded(code: NDArray[np.uint8]) -> Array:
+    return np.where(code > 0, 2.0 ** ((code.astype(np.float64) - 128.0) / _STEPS), 0.0)
+
+
+def _products_of(runs: Sequence[ScoredRun]) -> dict[str, Array]:
+    arrays = {name: np.mean([getattr(run, name) for run in runs], axis=0) for name in ("lot", "inside", "size")}
+    k = arrays["lot"].shape[-1]
+    upper = np.triu_indices(k)
+    out = {"size": arrays["size"].astype(np.float32)}
+    for name in ("lot", "inside"):
+        root = np.sqrt(np.maximum(np.diagonal(arrays[name], axis1=1, axis2=2), 1e-300))
+        out[name] = (arrays[name] / (root[:, :, None] * root[:, None, :]))[:, upper[0], upper[1]].astype(np.float16)
+    return out
+
+
+def _read(data: bytes) -> ScoreFile | None:
+    """The runs and products of a file; None where another version wrote it."""
+    length = int.from_bytes(data[:8], "big")
+    table = pq.read_table(pa.BufferReader(data[8 : 8 + length]))
+    about = json.loads((table.schema.metadata or {}).get(b"about", b"{}"))
+    if about.get("version") != VERSION:
+        return None
+    names = {name: (_pairs(of[0]), _pairs(of[1]), int(of[2])) for name, of in about["columns"].items()}
+    with np.load(io.BytesIO(data[8 + length :]), allow_pickle=False) as arrays:
+        products = [_unfolded(name, *names[name], arrays) for name in names if name]
+    return ScoreFile(table.to_pylist(), names, products)
+
+
+def _pairs(listed: Sequence[Sequence[Any]]) -> tuple[tuple[str, int], ...]:
+    return tuple((str(name), int(column)) for name, column in listed)
+
+
+def _unfolded(
+    name: str, columns: tuple[tuple[str, int], ...], station: tuple[tuple[str, int], ...], runs: int, arrays: Any
+) -> Products:
+    k = len(columns)
+    upper, both = np.triu_indices(k), dict[str, Array]()
+    for kind in ("lot", "inside"):
+        flat = arrays[f"{name}/{kind}"].astype(np.float64)
+        square = np.zeros((len(flat), k, k))
+        square[:, upper[0], upper[1]] = flat
+        square[:, upper[1], upper[0]] = flat
+        both[kind] = square
+    return Products(columns, station, both["lot"], both["inside"], arrays[f"{name}/size"].astype(np.float64), runs)
+
+
+def _run_of(row: dict[str, Any], names: dict[str, Any]) -> ScoredRun:
+    texts = {name: row[name] for name in TEXTS}
+    units = tuple(row["units"])
+    if row["left_out"]:
+        return ScoredRun(**texts, units=units)
+    columns, station, _ = names[row["columns"]]
+    mean, information = np.frombuffer(row["information"], dtype=np.float32).astype(np.float64).reshape(2, -1)
+    own = _decoded(np.frombuffer(row["own"], dtype=np.uint8)).reshape(len(units), -1) * mean
+    z = np.frombuffer(row["score"], dtype=np.float16).astype(np.float64).reshape(own.shape)
+    return ScoredRun(
+        **texts,
+        units=units,
+        slots=tuple(row["slots"]),
+        columns=columns,
+        of_station=station,
+        score=z * np.sqrt(own),
+        own=own,
+        information=information,
+        station_scores=np.frombuffer(row["station_scores"], dtype=np.float32).astype(np.float64).reshape(2, -1),
+        floor=float(row["floor"]),
+    )

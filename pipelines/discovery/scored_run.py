@@ -1,0 +1,124 @@
+"""The scores of one run of an archive, as they are kept: a few bytes a unit, so that no dwell is read again."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
+
+from inertial.discovery.scores import LotScores, scores_of
+from inertial.errors import InertialError
+from pipelines.archive import Archive, Run
+from pipelines.stages.judge import verdict_of
+from pipelines.tables.sound_lot import every_unit_faulty, sound_lot
+from schemas.errors import TumblelineError
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ScoredRun:
+    """What is kept of a run.
+
+    left_out : why it is not pooled; empty where it is · columns : of the sensor, then of the station
+    score, own : (units, m·k); information : (m·k,) · station : (2, q), scores and information
+    lot, inside : (m, k, k), correlations of the columns · size : (m·k,) · floor : g
+    """
+
+    run: str
+    when: str
+    station: str
+    device: str
+    model: str
+    who: str
+    left_out: str
+    units: tuple[str, ...] = ()
+    slots: tuple[str, ...] = ()
+    columns: tuple[tuple[str, int], ...] = ()
+    of_station: tuple[tuple[str, int], ...] = ()
+    score: Array | None = None
+    own: Array | None = None
+    information: Array | None = None
+    station_scores: Array | None = None
+    lot: Array | None = None
+    inside: Array | None = None
+    size: Array | None = None
+    floor: float = 0.0
+
+
+def scored_runs(address: str, ids: Sequence[str]) -> list[ScoredRun]:
+    """The scores of some runs; what cannot be scored is kept with the reason."""
+    archive = Archive(address)
+    with threadpool_limits(1):
+        return [_scored(Run(archive, one)) for one in ids]
+
+
+def _scored(run: Run) -> ScoredRun:
+    about = run.about
+    effects = list((about.get("recipe") or {}).get("effects") or [])
+    lot_of_run = about.get("lot") or {}
+    slots = {str(one["serial"]): str(one.get("slot", "")) for one in lot_of_run.get("units", [])}
+    head: dict[str, Any] = {
+        "run": run.id,
+        "when": str(about["when"]),
+        "station": str((about.get("station") or {}).get("name", "")),
+        "device": str(lot_of_run.get("device", "")),
+        "model": ",".join(effects),
+        "who": str(about.get("who", "")),
+    }
+    try:
+        reason = _reason(run, effects)
+        if reason:
+            return ScoredRun(**head, left_out=reason)
+        has_history = (run.path / "history.parquet").is_file()
+        measurement, faults, lot = sound_lot(
+            run.table("dwells"), run.table("history") if has_history else None, effects
+        )
+        if lot is None:
+            return ScoredRun(**head, left_out=every_unit_faulty(faults))
+        if lot.radial:
+            return ScoredRun(**head, left_out="its poses are not known")
+        if len(lot.state.axes) < 3:
+            return ScoredRun(**head, left_out="its devices have fewer than three axes")
+        faulty = {fault.unit for fault in faults}
+        units = tuple(one for place, one in enumerate(measurement.units) if place not in faulty)
+        return _kept(head, units, slots, scores_of(lot, effects))
+    except (InertialError, TumblelineError) as problem:
+        return ScoredRun(**head, left_out=str(problem).rstrip("."))
+
+
+def _reason(run: Run, effects: Sequence[str]) -> str:
+    """Why a run is not scored; empty where it is."""
+    if not effects:
+        return "it has no model"
+    if not (run.path / "dwells.parquet").is_file():
+        return "it has no dwells"
+    if (run.path / "verdict.parquet").is_file():
+        verdict = verdict_of(run.table("verdict"))
+        if verdict is not None and verdict["adequate"] is False:
+            return "its model is not adequate; see 'tumbleline diagnose'"
+    return ""
+
+
+def _kept(head: dict[str, Any], units: tuple[str, ...], slots: dict[str, str], scores: LotScores) -> ScoredRun:
+    count = len(units)
+    return ScoredRun(
+        **head,
+        left_out="",
+        units=units,
+        slots=tuple(slots.get(unit, "") for unit in units),
+        columns=scores.columns,
+        of_station=scores.station,
+        score=scores.score.reshape(count, -1),
+        own=scores.own.reshape(count, -1),
+        information=np.diagonal(scores.lot, axis1=1, axis2=2).reshape(-1).copy(),
+        station_scores=np.stack([scores.station_score, scores.station_information]),
+        lot=scores.lot,
+        inside=scores.inside,
+        size=scores.size.reshape(-1),
+        floor=scores.floor,
+    )
