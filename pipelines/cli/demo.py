@@ -89,7 +89,7 @@ def _archive(folder: Path, seed: int, lots: int, *, as_json: bool) -> None:
     """An archive with something hidden in a wafer: written, judged, explained, and judged again with the effect in the model."""
     from pipelines.archive.files import ELSEWHERE, writing
     from pipelines.cli.text.demo_text import print_discovery_demo
-    from pipelines.demo.discovery_demo import made, played
+    from pipelines.discovery.demonstration import made, played
     from pipelines.parallel import processors
 
     with writing(folder, "demo", ELSEWHERE), _bar(f"measuring {lots} lots") as progress:

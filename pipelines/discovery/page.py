@@ -19,7 +19,7 @@ MOST_LEVELS = 30
 
 def render(findings: Findings, document: DiscoverDocument, archive: str) -> str:
     """The page as one HTML text without other files."""
-    by_effect = {(one.name.effects[0], one.drivers[0]): one for one in findings.discoveries}
+    grown = growth_charts(findings, document)
     shown = [
         {
             "id": row["id"],
@@ -27,7 +27,7 @@ def render(findings: Findings, document: DiscoverDocument, archive: str) -> str:
             "scope": scope_text(row),
             "row": row,
             "levels": svg_text(levels_chart(row)) if row["kind"] == "levels" and row["levels"] else "",
-            "grown": _grown(by_effect.get((row["recommended"], row["driver"]))),
+            "grown": svg_text(grown[f"grown-{row['id']}"]) if f"grown-{row['id']}" in grown else "",
         }
         for row in document["discoveries"]
     ]
@@ -55,10 +55,15 @@ def levels_chart(row: DiscoveryRow) -> Chart:
     return Chart(f"{row['recommended']} by {row['driver']}", (plot,), height=280)
 
 
-def _grown(found: Discovery | None) -> str:
+def growth_charts(findings: Findings, document: DiscoverDocument) -> dict[str, Chart]:
+    """How the evidence of each discovery came together, by ``grown-<id>``."""
+    known = {(one.name.effects[0], one.drivers[0]): one for one in findings.discoveries}
+    found = {row["id"]: known.get((row["recommended"], row["driver"])) for row in document["discoveries"]}
+    return {f"grown-{name}": _growth(one) for name, one in found.items() if one is not None and one.carried.size > 1}
+
+
+def _growth(found: Discovery) -> Chart:
     """Evidence of a discovery from lot to lot."""
-    if found is None or found.carried.size < 2:
-        return ""
     x = found.carried / max(float(np.sqrt(np.mean(found.carried**2))), 1e-300)
     s, v = np.cumsum(x), np.cumsum(x**2)
     lots = np.arange(1, x.size + 1, dtype=np.float64)
@@ -69,7 +74,7 @@ def _grown(found: Discovery | None) -> str:
     )
     plot = Plot("", PlotAxis("lots"), PlotAxis("evidence / powers of ten"), traces)
     note = "each lot against what the other half of the lots predicts of it"
-    return svg_text(Chart("How the evidence came together", (plot,), height=240, note=note))
+    return Chart("How the evidence came together", (plot,), height=240, note=note)
 
 
 def _sums(s: float, v: float) -> float:

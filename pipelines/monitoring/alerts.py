@@ -1,4 +1,4 @@
-"""Alerts to a web hook: runs that crashed, failed, were missed or are late, stations not left safe, findings of the audit.
+"""Alerts to a web hook: runs crashed, failed, missed or late, stations not left safe, findings of the audit, discoveries.
 
 Each alert is posted until the receiver accepts it, and not after that: its id is then written to the state folder, atomically and
 synchronised to the disk. A process that is killed between these two steps posts the alert twice, with the same id.
@@ -42,7 +42,9 @@ def alerts_of(snapshot: Snapshot, audits: Path | None = None) -> list[Alert]:
     audits : folder of the documents of the audits (``pages`` of the deployment weekly-audit); none where None
     """
     alerts = [*_of_runs(snapshot), *_of_stations(snapshot)]
-    return [*alerts, *_of_audit(audits, snapshot.when)] if audits is not None else alerts
+    if audits is None:
+        return alerts
+    return [*alerts, *_of_audit(audits, snapshot.when), *_of_discoveries(audits, snapshot.when)]
 
 
 def _opener() -> urllib.request.OpenerDirector:
@@ -138,16 +140,29 @@ def _of_stations(snapshot: Snapshot) -> Iterator[Alert]:
         yield _alert("unsafe", f"{name} {run}", name, text, snapshot.when)
 
 
+def _of_discoveries(folder: Path, now: datetime) -> Iterator[Alert]:
+    """Discoveries of the newest night; each is posted once."""
+    for row in _newest(folder, "discover", "discoveries", now):
+        effects, drivers = (" | ".join(map(str, row.get(key, ()))) for key in ("effects", "drivers"))
+        size = float(row.get("size_ug") or 0.0)
+        text = f"discovery {row.get('id')}: {effects} by {drivers}, rms {size:.2g} µg; {row.get('because')}"
+        yield _alert("discovery", f"{row.get('id')} {row.get('since')}", str(row.get("driver", "")), text, now)
+
+
+def _newest(folder: Path, kind: str, key: str, now: datetime) -> list[dict[str, Any]]:
+    """A list of the newest document of a kind; empty where there is none, or an old one."""
+    newest = max(folder.glob(f"{kind}-*.json"), key=lambda path: path.name, default=None)
+    if newest is None or now - datetime.fromtimestamp(newest.stat().st_mtime, UTC) > AUDIT_AGE:
+        return []
+    try:
+        return list(json.loads(newest.read_text(encoding="utf-8"))[key])
+    except (OSError, ValueError, KeyError, TypeError):
+        return []
+
+
 def _of_audit(folder: Path, now: datetime) -> Iterator[Alert]:
     """Findings of the newest audit document; a finding that appears in several audits is posted once."""
-    newest = max(folder.glob("audit-*.json"), key=lambda path: path.name, default=None)
-    if newest is None or now - datetime.fromtimestamp(newest.stat().st_mtime, UTC) > AUDIT_AGE:
-        return
-    try:
-        findings: list[dict[str, Any]] = json.loads(newest.read_text(encoding="utf-8"))["findings"]
-    except (OSError, ValueError, KeyError):
-        return
-    for finding in findings:
+    for finding in _newest(folder, "audit", "findings", now):
         subject = str(finding.get("subject", ""))
         text = f"audit, {finding.get('whose', 'audit')}: {finding.get('message', '')}"
         yield _alert("audit", f"{finding.get('kind')} {subject} {finding.get('message')}", subject, text, now)

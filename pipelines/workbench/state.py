@@ -310,6 +310,21 @@ class AuditPage(PageState):
         return words
 
 
+class DiscoverPage(PageState):
+    """What the lots of the archive show together.
+
+    discovery : id of one that is shown with its levels; empty for the first
+    """
+
+    PATH: ClassVar[str] = "/discover"
+    device: Text = ""
+    discovery: Text = ""
+
+    def arguments(self) -> list[str]:
+        """The search."""
+        return ["discover", *(["--device", self.device] if self.device else [])]
+
+
 class OperatorPage(PageState):
     """Lots on the stations.
 

@@ -10,7 +10,7 @@ from typing import Any
 from pipelines.importers.limited import in_reader
 from pipelines.workbench.services import models, sources, uploads
 from pipelines.workbench.settings import WorkbenchSettings
-from pipelines.workbench.state import AuditPage, MissingPage, ModelsPage, PageState, PlanPage, UploadPage
+from pipelines.workbench.state import AuditPage, DiscoverPage, MissingPage, ModelsPage, PageState, PlanPage, UploadPage
 from schemas.errors import WrongUse, did_you_mean
 from schemas.foreign import is_file
 
@@ -120,6 +120,15 @@ def audit(settings: WorkbenchSettings, page: AuditPage) -> Request:
     }
 
 
+def discover(settings: WorkbenchSettings, page: DiscoverPage) -> Request:
+    """What the lots of the archive show together."""
+    return "discoveries in the archive", {
+        "archive": settings.archive,
+        "stamp": sources.archive_stamp(settings),
+        "device": page.device,
+    }
+
+
 def bring_in(settings: WorkbenchSettings, page: UploadPage) -> Request:
     """The import of a file."""
     place = uploads.resolve(settings, page.file)
@@ -146,6 +155,7 @@ KINDS: dict[str, tuple[type[PageState], Callable[[WorkbenchSettings, Any], Reque
     "ladder": (MissingPage, ladder),
     "plan": (PlanPage, plan),
     "audit": (AuditPage, audit),
+    "discover": (DiscoverPage, discover),
     "whatif": (ModelsPage, what_if),
     "import": (UploadPage, bring_in),
 }

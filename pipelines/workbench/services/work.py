@@ -252,6 +252,28 @@ def audited(request: Mapping[str, Any], report_progress: ReportProgress) -> dict
     }
 
 
+def discovered(request: Mapping[str, Any], report_progress: ReportProgress) -> dict[str, Any]:
+    """The document of a search over all lots, and its charts."""
+    report_progress(0, 2, "scoring new runs")
+    from pipelines.archive import Archive
+    from pipelines.discovery import page
+    from pipelines.discovery.discover import Look
+    from pipelines.discovery.discover import discovered as looked_at
+    from pipelines.discovery.sentences import headline, scope_text
+
+    looked = looked_at(Archive(request["archive"]), Look(device=str(request["device"])))
+    report_progress(1, 2, "drawing")
+    document = looked.document
+    charts = {f"levels-{row['id']}": page.levels_chart(row) for row in document["discoveries"] if row["levels"]}
+    charts |= page.growth_charts(looked.findings, document)
+    if document["pooled"]["lots"]:
+        charts["strongest"] = page.strongest_chart(looked.findings)
+    if document["reach"]:
+        charts["reach"] = page.reach_chart(document, document["pooled"]["lots"])
+    texts = {row["id"]: (headline(row), scope_text(row)) for row in document["discoveries"]}
+    return {"document": document, "charts": charts, "texts": texts}
+
+
 def address_of(finding: AuditFinding) -> str:
     """A name of a finding that stays the same as long as the finding does."""
     words = (finding.kind, finding.subject, str(finding.evidence.get("parameter", finding.evidence.get("figure", ""))))
@@ -272,6 +294,7 @@ WORK: dict[str, Any] = {
     "ladder": ladder,
     "plan": planned,
     "audit": audited,
+    "discover": discovered,
     "whatif": what_if,
     "import": bring_in,
 }

@@ -11,6 +11,8 @@ import numpy as np
 from pipelines.archive import Archive
 from pipelines.demo.archive_lots import Hidden, Line
 from pipelines.demo.lot_archive import DemoArchive, write_lots
+from pipelines.discovery.attribute_files import added_from
+from pipelines.discovery.discover import Look, discovered
 from schemas.errors import WrongUse
 
 LOTS = 400
@@ -35,9 +37,6 @@ def made(folder: Path, seed: int, lots: int, progress: Callable[[int], None]) ->
 
 def played(made_: DemoArchive, hidden: Hidden, workers: int) -> dict[str, Any]:
     """The story as one document: what was found on which night, and what adding it does to the archive."""
-    from pipelines.discovery.attribute_files import added_from
-    from pipelines.discovery.discover import Look, discovered
-
     archive = Archive(str(made_.folder))
     added_from(archive, made_.units, "serial")
     first = discovered(archive, Look(workers=workers)).document
