@@ -95,14 +95,14 @@ class Levels:
         self.place: dict[str, int] = {}
         self.score, self.information = np.zeros((0, count)), np.zeros((0, count))
 
-    def predicted(self, labels: tuple[str, ...], prior: Array, without: "Levels | None" = None) -> Array:
-        """Predicted sizes (units, h), drawn towards zero by a prior information (h,); zero for levels without a past.
+    def predicted(self, labels: tuple[str, ...], prior: Array, without: "Levels | None" = None) -> tuple[Array, Array]:
+        """Predicted sizes (units, h), drawn towards zero by a prior information (h,), and the information behind them.
 
         Parameters
         ----------
         without : a part of the lots that is left out
         """
-        out = np.zeros((len(labels), self.score.shape[1]))
+        sizes, behind = np.zeros((2, len(labels), self.score.shape[1]))
         for unit, label in enumerate(labels):
             at = self.place.get(label, -1)
             if at < 0:
@@ -112,8 +112,9 @@ class Levels:
             if without is not None and less >= 0:
                 score, information = score - without.score[less], information - without.information[less]
             known = information + prior
-            out[unit] = np.where(known > 0.0, score / np.where(known > 0.0, known, 1.0), 0.0)
-        return out
+            sizes[unit] = np.where(known > 0.0, score / np.where(known > 0.0, known, 1.0), 0.0)
+            behind[unit] = information
+        return sizes, behind
 
     def add(self, labels: tuple[str, ...], score: Array, information: Array) -> None:
         """Add scores and information (units, h)."""
@@ -199,6 +200,8 @@ class Evidence:
         about_zero = np.where(there, np.hypot(spread, centre), 1.0)
         self._scales = {"between": Scale(start), "mean": Scale(np.where(about_zero > 0.0, about_zero, 1.0))}
         self._scales |= {"inside": Scale(np.ones(self.count))}
+        known = np.where(there, np.mean(np.where(seen, info, 0.0), axis=0), 0.0)
+        self.score, self.information = known * centre / np.sqrt(np.where(known > 0.0, known, 1.0)), known.copy()
         held, self._held = self._held, []
         for lot in held:
             self._add(lot)
@@ -220,7 +223,10 @@ class Evidence:
         self._inside(lot)
         self.wander.update(lot.station, size, info, found, rms)
         between.add(between.bounded(found.value))
-        self.score += np.where(seen, total, 0.0)
+        # one centre and one bound: a bad lot moves what the others are held against by no more than it may say
+        centre = self._centre()
+        left = self._scales["between"].bounded(np.where(seen, (size - centre) * np.sqrt(safe), 0.0))
+        self.score += np.where(seen, centre * safe + left * np.sqrt(safe), 0.0)
         self.information += info
         self._taken += 1
 
@@ -233,7 +239,7 @@ class Evidence:
     @property
     def _typical(self) -> Array:
         """Information (h,) of a typical lot."""
-        return self.information / max(self._taken, 1)
+        return self.information / (self._taken + 1)
 
     def _centre(self) -> Array:
         return self.score / np.maximum(self.information, 1e-300)
@@ -241,7 +247,7 @@ class Evidence:
     def _stations(self, lot: ScoredLot, size: Array, safe: Array, seen: NDArray[np.bool_]) -> None:
         """Stations that differ for good: each lot against what its station's earlier ones predict."""
         table = self.levels.setdefault(STATION, Levels(self.count))
-        predicted = table.predicted((lot.station,), SHRUNK * self._typical)[0]
+        predicted = table.predicted((lot.station,), SHRUNK * self._typical)[0][0]
         scale = self._scales["between"]
         left = scale.bounded(np.where(seen, (size - self._centre()) * np.sqrt(safe), 0.0))
         x = left / scale.rms * np.clip(predicted * np.sqrt(safe) / scale.rms, -BOUND, BOUND)
@@ -265,9 +271,10 @@ class Evidence:
             here = self.levels.setdefault(f"{name} at {lot.station}", Levels(self.count))
             table = self.levels.setdefault(name, Levels(self.count))
             elsewhere = here if len(self.wander.stations) > 1 else None
-            each = table.predicted(labels, prior, elsewhere)
+            each, behind = table.predicted(labels, prior, elsewhere)
             prediction = (each * own).sum(axis=0) / total
-            value, left = self.wander.beside_driver(name, lot.station, prediction, found, rms)
+            told = (behind * own).sum(axis=0) / total >= prior
+            value, left = self.wander.beside_driver(name, lot.station, prediction, found, rms, told)
             self._sums(name, two_sided=False).add(scale.bounded(value) / rms * np.clip(left / rms, -BOUND, BOUND))
             score = (lot.score - own * ratio * self._centre()) * part
             for each_table in (table, here):
@@ -277,7 +284,8 @@ class Evidence:
             standing = self._standing(name, float(known.mean())) if known.size else None
             if standing is None:
                 continue
-            value, left = self.wander.beside_driver(name, lot.station, np.full(self.count, standing), found, rms)
+            prediction = np.full(self.count, standing)
+            value, left = self.wander.beside_driver(name, lot.station, prediction, found, rms, found.known)
             weight = np.clip(left / np.sqrt(np.maximum(self._typical, 1e-300)), -BOUND, BOUND)
             self._sums(name, two_sided=True).add(scale.bounded(value) / rms * weight)
 
@@ -307,7 +315,7 @@ class Evidence:
                 predicted = self._of_units(labels)
             else:
                 table = self.levels.setdefault(inside, Levels(self.count))
-                predicted = table.predicted(labels, SHRUNK / len(labels) * typical)
+                predicted = table.predicted(labels, SHRUNK / len(labels) * typical)[0]
             if len(set(labels)) > 1:
                 self._add_inside(inside, predicted, own, total, left, two_sided=False)
             if name != UNIT:

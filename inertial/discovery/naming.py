@@ -13,7 +13,10 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse import linalg
 
+from inertial import effects as effects_catalogue
 from inertial.decisions import CLASS_WIDTH
 from inertial.discovery.evidence import DATE, INSIDE, MEAN, SLOT, STATION, UNIT, ScoredLot
 
@@ -22,7 +25,14 @@ Array = NDArray[np.float64]
 _MOST = 6
 """Largest number of names of one night."""
 
+_TURNS = 5  # of a fit of levels that share lots
+
+_INEXACT = 0.02
+"""Part of a score that is not known: products of columns are means over lots, effects are at the middle of their range."""
+
 _SEEN = 1e-3  # share of its information that a column keeps beside another one, below which it is the same
+
+_ALIKE = 0.8  # cosine from which on columns are taken for each other where one of them is known to a few per cent
 
 _INSIDE_ONLY = {SLOT, UNIT}
 
@@ -131,19 +141,64 @@ class Pool:
                 for effect, score in of.items()
                 if score > needed
                 and again[name][effect] > np.sqrt(2.0 * needed)
-                and not _told(found, name, effect, score)
+                # what is left of others rises to a name only where it had an alarm of its own, and stands out
+                and (not found or ((name, effect) in alarmed and score > needed + CLASS_WIDTH))
             ]
-            if not pairs:
+            name = next((one for one in self._in_order(pairs, sums, scores) if not self._told(found, one)), None)
+            if name is None:
                 break
-            top, best, effect = max(pairs)
-            # what differs by a level is not zero on average either: the driver says more
-            best = next(
-                (name for score, name, one in pairs if one == effect and name != MEAN and score > top - CLASS_WIDTH),
-                best,
-            )
-            found.append(self._name(best, sums[best], effect, scores))
-            lots = [self.without(lot, best, effect, sums[best]) for lot in lots]
+            found.append(name)
+            lots = self._fitted_out(lots, name.drivers[0], name.effects[0])
         return found
+
+    def _in_order(
+        self,
+        pairs: Sequence[tuple[float, str, str]],
+        sums: Mapping[str, DriverSums],
+        scores: Mapping[str, Mapping[str, float]],
+    ) -> Iterator[Name]:
+        """Pairs of score, driver and effect as names, the best first."""
+        for top, best, effect in sorted(pairs, reverse=True):
+            # what differs by a level is not zero on average either: the driver says more
+            same = (n for score, n, one in pairs if one == effect and n != MEAN and score > top - CLASS_WIDTH)
+            driver = next(same, best)
+            yield self._name(driver, sums[driver], effect, scores)
+
+    def _told(self, found: Sequence[Name], new: Name) -> bool:
+        """Whether an effect is named with this driver, or is what is left of one whose column is known to a few per cent."""
+        effect, driver = new.effects[0], new.drivers[0]
+        for name in found:
+            little = new.score < _REMAINDER * name.score
+            alike = set(new.effects) & set(name.effects) or self._likeness(effect, name.effects[0]) > _ALIKE
+            if (alike and (little or driver in {MEAN, name.drivers[0]})) or (little and driver == name.drivers[0]):
+                return True
+        return False
+
+    def _likeness(self, one: str, other: str) -> float:
+        """Largest cosine between columns of two effects, in sums of lots."""
+        return float(np.abs(self.lot[:, self.places(one)][:, :, self.places(other)]).max())
+
+    def _fitted_out(self, lots: Sequence[ScoredLot], driver: str, effect: str) -> Sequence[ScoredLot]:
+        """The lots without an effect of a driver: columns of the effect are fitted in turns, levels that share lots together."""
+        for _ in range(_TURNS):
+            sums = gathered(lots, [driver])
+            if driver not in sums or self.scores(driver, sums[driver])[effect] < 1.0:
+                break
+            sizes = self._sizes(lots, driver, effect, sums[driver])
+            lots = [self.without(lot, driver, effect, sums[driver], sizes) for lot in lots]
+        return lots
+
+    def _sizes(self, lots: Sequence[ScoredLot], driver: str, effect: str, sums: DriverSums) -> Array:
+        """Sizes (axes, levels, p) of a driver's levels."""
+        at, count = self.places(effect), len(self.columns)
+        here = np.arange(self.axes)[:, None] * count + at
+        info = sums.information[:, here.reshape(-1)]
+        size = _about(driver, sums)[:, here.reshape(-1)] / np.where(info > 0.0, info, np.inf)
+        if sums.mixed and driver not in _INSIDE_ONLY and len(sums.labels) > 1:
+            size = np.stack([_together(lots, driver, sums, int(one)) for one in here.reshape(-1)], axis=1)
+        elif len(sums.labels) > 1:
+            size = size * _shrinkage(size, info)
+        return np.moveaxis(size.reshape(-1, self.axes, at.size), 1, 0)
 
     def _again(self, lots: Sequence[ScoredLot], drivers: Sequence[str]) -> dict[str, dict[str, float]]:
         """By how many standard deviations one half of the lots predicts the other, for every driver and effect.
@@ -221,21 +276,16 @@ class Pool:
             return ((lot.score - lot.own * lot.score.sum(axis=0) / total) * of_units).sum(axis=0)
         return (lot.score * of_units).sum(axis=0)
 
-    def without(self, lot: ScoredLot, driver: str, effect: str, sums: DriverSums) -> ScoredLot:
-        """A lot without what a driver's levels say of an effect: algebra on its sums, no dwell is read again."""
+    def without(self, lot: ScoredLot, driver: str, effect: str, sums: DriverSums, sizes: Array) -> ScoredLot:
+        """A lot without sizes (axes, levels, p) of an effect: algebra on its sums, no dwell is read again."""
         at, count, units = self.places(effect), len(self.columns), len(lot.units)
         weights = _weights(lot, driver, sums)
         if not weights.any():
             return lot
         score = lot.score.copy()
-        centred = _about(driver, sums)
         for axis in range(self.axes):
             here, every = axis * count + at, axis * count + np.arange(count)
-            info = sums.information[:, here]
-            size = centred[:, here] / np.where(info > 0.0, info, np.inf)
-            if len(sums.labels) > 1:
-                size *= _shrinkage(size, info)
-            of_units = weights @ size  # (units, p)
+            of_units = weights @ sizes[axis]  # (units, p)
             own = np.sqrt(np.maximum(lot.own[:, every], 0.0))
             total = np.maximum(lot.own[:, here].sum(axis=0), 1e-300)
             common = (of_units * lot.own[:, here]).sum(axis=0) / total
@@ -295,28 +345,25 @@ class Pool:
             total += float(np.einsum("gp,pq,gq->", z, inner, z))
         return total, rank
 
+    def _rank(self, effect: str, behind: float, top: float) -> tuple[bool, int, int, float]:
+        """Order in a class: of those that inexact columns do not tell apart the simplest is first."""
+        simplicity = effects_catalogue.get(effect).simplicity
+        return behind > _INEXACT * top, len(self.places(effect)), simplicity, behind
+
     def _name(self, driver: str, sums: DriverSums, effect: str, scores: Mapping[str, Mapping[str, float]]) -> Name:
-        count, first, top = len(self.columns), self.places(effect)[0], scores[driver][effect]
-        here = np.arange(self.axes) * count + first
+        count, top = len(self.columns), scores[driver][effect]
+        width = max(CLASS_WIDTH, _INEXACT * top)
+        effects = [one for one, score in scores[driver].items() if score > top - width]
+        drivers = [name for name, of in scores.items() if of[effect] > top - CLASS_WIDTH]
+        effects.sort(key=lambda one: self._rank(one, top - scores[driver][one], top))
+        drivers.sort(key=lambda one: (one != driver, -scores[one][effect]))
+        here = np.arange(self.axes) * count + self.places(effects[0])[0]
         info = sums.information[:, here]
         seen = info > 0.0
         safe = np.where(seen, info, 1.0)
         sizes = np.where(seen, _about(driver, sums)[:, here] / safe, 0.0) * self.size[here]
         errors = np.where(seen, 1.0 / np.sqrt(safe), np.inf) * self.size[here]
-        effects = [one for one, score in scores[driver].items() if score > top - CLASS_WIDTH]
-        drivers = [name for name, of in scores.items() if of[effect] > top - CLASS_WIDTH]
-        effects.sort(key=lambda one: -scores[driver][one])
-        drivers.sort(key=lambda one: (one != driver, -scores[one][effect]))
         return Name(tuple(effects), tuple(drivers), tuple(sums.labels), sums.weight, sizes, errors, top)
-
-
-def _told(found: Sequence[Name], driver: str, effect: str, score: float) -> bool:
-    """Whether an effect is named with this driver, or is what is left of one whose column is known to a few per cent."""
-    return any(
-        (driver in {MEAN, name.drivers[0]} and effect in name.effects)
-        or (driver == name.drivers[0] and score < _REMAINDER * name.score)
-        for name in found
-    )
 
 
 def gathered(lots: Sequence[ScoredLot], drivers: Sequence[str]) -> dict[str, DriverSums]:
@@ -345,6 +392,38 @@ def _shrinkage(size: Array, information: Array) -> Array:
     seen = information > 0.0
     noise = np.where(seen, 1.0 / np.where(seen, information, 1.0), 0.0).sum(axis=0)
     return np.clip(1.0 - noise / np.maximum((size**2).sum(axis=0), 1e-300), 0.0, 1.0)
+
+
+def _together(lots: Sequence[ScoredLot], driver: str, sums: DriverSums, h: int) -> Array:
+    """Sizes (levels,) of one hypothesis by least squares over all lots: what units differ by, and what each lot has in common."""
+    rows: list[Array] = []
+    columns: list[NDArray[np.intp]] = []
+    values: list[Array] = []
+    target: list[Array] = []
+    first = 0
+    for lot in lots:
+        weights, own, info = _weights(lot, driver, sums), lot.own[:, h], float(lot.information[h])
+        total = float(own.sum())
+        if total <= 0.0:
+            continue
+        share = own / total @ weights
+        score = lot.score[:, h]
+        root = np.sqrt(own)
+        inside = root[:, None] * (weights - share)
+        block = np.vstack([inside, np.sqrt(max(info, 0.0)) * share])
+        here = np.flatnonzero(block.any(axis=0))
+        left = (score - own * score.sum() / total) / np.where(root > 0.0, root, 1.0)
+        target.append(np.append(left, score.sum() / np.sqrt(info) if info > 0.0 else 0.0))
+        rows.append(np.repeat(np.arange(first, first + len(block)), here.size).astype(np.float64))
+        columns.append(np.tile(here, len(block)))
+        values.append(block[:, here].reshape(-1))
+        first += len(block)
+    if not rows:
+        return np.zeros(len(sums.labels))
+    shape = first, len(sums.labels)
+    places = np.concatenate(rows).astype(np.intp), np.concatenate(columns)
+    matrix = sparse.csr_matrix((np.concatenate(values), places), shape=shape)
+    return np.asarray(linalg.lsqr(matrix, np.concatenate(target), damp=1e-9)[0], dtype=np.float64)
 
 
 def _weights(lot: ScoredLot, driver: str, sums: DriverSums) -> Array:

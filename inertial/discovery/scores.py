@@ -131,8 +131,9 @@ def _scored(
     of_station, station_score = left[:, k:, k:].sum(axis=0), score[:, k:].sum(axis=0)
     inverse = _inverse(of_station)
     free = score[:, :k] - cross @ (inverse @ station_score)
-    summed = cross.reshape(-1, m, *cross.shape[1:]).sum(axis=0)  # (m, k, q), over the units
-    lots = own.reshape(-1, m, k, k).sum(axis=0)
+    units = len(left) // m
+    summed = cross.reshape(units, m, *cross.shape[1:]).sum(axis=0)  # (m, k, q), over the units
+    lots = own.reshape(units, m, k, k).sum(axis=0)
     less = lots - summed @ inverse @ np.swapaxes(summed, -1, -2)
     before, after = (np.diagonal(each, axis1=1, axis2=2) for each in (lots, less))
     told = after > LEAST_LEFT * before

@@ -91,12 +91,22 @@ class Wander:
         return Innovation(_chosen_of(every, self.log_likelihood), every, gain, roots, known)
 
     def beside_driver(
-        self, name: str, station: str, prediction: Array, found: Innovation, rms: Array
+        self,
+        name: str,
+        station: str,
+        prediction: Array,
+        found: Innovation,
+        rms: Array,
+        told: NDArray[np.bool_],
     ) -> tuple[Array, Array]:
         """Innovation, and what the filter leaves of a driver's prediction over the noise of it, (h,) each.
 
         The walk is that which the past prefers where the driver's predictions are in the model as well: a change that the driver
         explains at all stations is no walk of each. The prediction is then taken into the past of the station.
+
+        Parameters
+        ----------
+        told : (h,), whether the prediction rests on enough lots: where it does not, a step is no sign of a walk
         """
         level = self.level(station)
         likelihood = self.beside.setdefault(name, np.zeros_like(self.log_likelihood))
@@ -106,7 +116,7 @@ class Wander:
             return np.zeros(prediction.size), np.zeros(prediction.size)
         every = np.where(found.known, (prediction - before) / found.roots, 0.0)
         value, left = _chosen_of(found.every, likelihood), _chosen_of(every, likelihood)
-        likelihood += _likelihood(found.every - every, found, rms)
+        likelihood += np.where(told, _likelihood(found.every - every, found, rms), 0.0)
         before += found.gain * (prediction - before)
         return value, left
 

@@ -165,7 +165,8 @@ def _packed(name: str, run: ScoredRun) -> bytes:
     if name == "own":
         return _coded(run.own / np.where(mean > 0.0, mean, 1.0)).tobytes()
     if name == "information":
-        return np.stack([mean, run.information]).astype(np.float32).tobytes()
+        share = run.information / np.where(mean > 0.0, mean, 1.0)
+        return mean.astype(np.float32).tobytes() + share.astype(np.float16).tobytes()
     return run.station_scores.astype(np.float32).tobytes()
 
 
@@ -227,7 +228,9 @@ def _run_of(row: dict[str, Any], names: dict[str, Any]) -> ScoredRun:
     if row["left_out"]:
         return ScoredRun(**texts, units=units)
     columns, station, _ = names[row["columns"]]
-    mean, information = np.frombuffer(row["information"], dtype=np.float32).astype(np.float64).reshape(2, -1)
+    packed, count = row["information"], len(row["information"]) // 6
+    mean = np.frombuffer(packed[: 4 * count], dtype=np.float32).astype(np.float64)
+    information = mean * np.frombuffer(packed[4 * count :], dtype=np.float16).astype(np.float64)
     own = _decoded(np.frombuffer(row["own"], dtype=np.uint8)).reshape(len(units), -1) * mean
     z = np.frombuffer(row["score"], dtype=np.float16).astype(np.float64).reshape(own.shape)
     return ScoredRun(

@@ -1,0 +1,54 @@
+"""Names of what an archive holds, on lots that are scored from simulated dwells."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from benchmarks.discovery.archives import ArchiveMaker, Hidden, Setting
+from benchmarks.discovery.lots import WORLDS, bank
+from inertial.discovery.naming import Pool
+
+NEEDED = 10.7
+
+
+@cache
+def maker() -> ArchiveMaker:
+    """Archives of lots whose table rests 20 µrad off its targets."""
+    return ArchiveMaker(bank(WORLDS[1], 40, 77))
+
+
+def pool() -> Pool:
+    return Pool(maker().columns, maker().size.reshape(-1), *maker().products)
+
+
+@pytest.mark.parametrize(
+    ("effect", "driver"), [("third_order", "wafer"), ("second_order", "radius"), ("cross_coupling", "slot"), ("scale_asymmetry", "mean")]
+)
+def test_effect_and_driver_are_named_and_nothing_else(effect: str, driver: str) -> None:
+    result = maker().archive(31, 400, Hidden(effect, driver, 0.05), Setting(), NEEDED, keep=True)
+    columns = maker().columns
+    alarms = [(name, columns[place % len(columns)][0]) for name, place in result.alarms]
+    (name,) = pool().names(result.lots, alarms, NEEDED)
+    assert effect in name.effects
+    assert len(name.effects) <= 4
+    assert name.drivers[0] == driver
+    factor, error = pool().confirmed(result.lots[:200], result.lots[200:], driver, effect)
+    assert factor == pytest.approx(1.0, abs=max(5.0 * error, 0.2))
+    assert float(np.mean(pool().carried(result.lots, driver, effect) > 0.0)) > 0.6
+
+
+def test_an_effect_in_the_model_of_every_lot_leaves_nothing_of_it() -> None:
+    result = maker().archive(32, 200, Hidden("third_order", "wafer", 0.1), Setting(), NEEDED, keep=True)
+    assert result.alarms
+    own, count = pool(), len(maker().columns)
+    at = own.places("third_order")[0] + count * np.arange(3)
+    near = own.places("odd_quadratic")[0] + count * np.arange(3)
+    changed = [own.with_effect(lot, "third_order") for lot in result.lots]
+    assert all((lot.score[:, at] == 0.0).all() and (lot.information[at] == 0.0).all() for lot in changed)
+
+    def misfit(lots: list, places: np.ndarray) -> float:
+        return float(np.mean([lot.score[:, places] ** 2 / np.maximum(lot.own[:, places], 1e-300) for lot in lots]))
+
+    # a neighbour of 0.98 keeps a twentieth of its information, and is noise again
+    assert misfit(changed, near) < 0.7 * misfit(result.lots, near)

@@ -1,0 +1,86 @@
+"""Scores of a lot against a fit with the effect in it, and errors of the station that leave them as they are."""
+
+import numpy as np
+import pytest
+from threadpoolctl import threadpool_limits
+
+from inertial import effects as catalogue
+from inertial.discovery.scores import LotScores, scores_of
+from inertial.effects.base import SensorEffect
+from inertial.estimation.model import Model
+from inertial.estimation.problem import Lot, Problem
+from inertial.estimation.refinement import terms_of
+from inertial.estimation.term import Term
+from pipelines.demo.archive_lots import Hidden, Line
+from pipelines.demo.lot_archive import EFFECTS
+from pipelines.tables.sound_lot import sound_lot
+
+
+def lot_of(seed: int, hidden: Hidden | None = None, rests: float = 0.0) -> Lot:
+    """A lot of a simulated line."""
+    dwells, _ = Line(seed, hidden=hidden, rests=rests, wafers=1).lot("s")
+    lot = sound_lot(dwells, None, EFFECTS)[2]
+    assert lot is not None
+    return lot
+
+
+@pytest.fixture(autouse=True)
+def one_thread() -> None:
+    threadpool_limits(1)
+
+
+@pytest.mark.parametrize("name", ["third_order", "bias_temperature_quadratic", "second_order"])
+def test_score_over_information_is_the_coefficient_of_a_fit(name: str) -> None:
+    lot, effect = lot_of(11), catalogue.get(name)
+    scores = scores_of(lot, EFFECTS, [effect])
+    problem = Problem(lot)
+    model = Model(problem, terms_of(catalogue.get_all(EFFECTS), problem))
+    fall = model.space.gain(Term(effect).candidate(problem)).by_block[:, 0].reshape(8, 3)
+    assert scores.score[..., 0] ** 2 / scores.own[..., 0] == pytest.approx(fall, rel=1e-8)
+    # a second way: generalised least squares with the covariance written out
+    space, block = model.space, 4
+    white = space.covariance.whiten(
+        np.concatenate([problem.y[..., None], model.local, problem.columns(effect, {})], axis=-1), model.noise.shares
+    )
+    fitted = np.linalg.lstsq(white[block][:, 1:], white[block][:, 0], rcond=None)[0][-1]
+    unit, axis = divmod(block, 3)
+    assert scores.score[unit, axis, 0] / scores.own[unit, axis, 0] == pytest.approx(fitted, rel=1e-6)
+
+
+def test_an_error_of_the_table_leaves_the_scores_beside_free_errors_of_the_station() -> None:
+    lot = lot_of(12)
+    level = catalogue.get("level_error")
+    problem = Problem(lot)
+    change = 50e-6 * problem.columns(level, {})[..., 0].reshape(8, 3, -1)
+    tilted = Lot(**{**lot.__dict__, "output": lot.output + np.swapaxes(change, -1, -2)})
+    names = {"third_order", "second_order", "magnetic"}
+    tried = [one for one in catalogue.built_in().values() if one.id in {*names, "level_error"}]
+    before, after = (scores_of(one, EFFECTS, tried) for one in (lot, tilted))
+    alone = [scores_of(one, EFFECTS, [e for e in tried if e.id in names]) for one in (lot, tilted)]
+    free, bound = (_moved(*pair) for pair in ((before, after), alone))
+    assert free < 1.0 < 5.0 < bound  # the noise that is estimated beside the error is another one
+    assert np.abs(after.station_score - before.station_score).max() / np.sqrt(before.station_information.max()) > 5.0
+
+
+def _moved(before: LotScores, after: LotScores) -> float:
+    """Largest change of a lot's sums, in standard deviations."""
+    sigma = np.sqrt(np.diagonal(before.lot, axis1=1, axis2=2))
+    return float((np.abs(after.sums - before.sums) / np.where(sigma > 0.0, sigma, np.inf)).max())
+
+
+def test_a_hardening_spring_is_a_cubic_of_all_units_and_falls_behind() -> None:
+    scores = scores_of(lot_of(13, Hidden("W01", 300e-6)), EFFECTS)
+    at = scores.columns.index(("third_order", 0))
+    z = scores.sums[:, at] / np.sqrt(scores.lot[:, at, at])
+    assert (z < -20.0).all()
+
+
+def test_what_no_lot_can_tell_has_no_information() -> None:
+    scores = scores_of(lot_of(14), EFFECTS)
+    names = [name for name, _ in scores.columns]
+    assert all(issubclass(type(catalogue.get(name)), SensorEffect) for name in names)
+    assert not set(names) & set(EFFECTS)
+    at = names.index("bias_temperature_cubic")  # three temperatures: the cubic is the quadratic and the line
+    assert scores.lot[:, at, at] == pytest.approx(0.0, abs=1e-6 * scores.lot[0, names.index("third_order")].max())
+    again = scores_of(lot_of(14), EFFECTS)
+    assert again.score == pytest.approx(scores.score)

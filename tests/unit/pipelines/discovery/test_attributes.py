@@ -1,0 +1,79 @@
+"""Attributes of units and runs: appended, never rewritten; what follows from a result is no driver."""
+
+from pathlib import Path
+
+import pandas as pd
+import pytest
+from each import each
+
+from pipelines.archive import Archive
+from pipelines.discovery.attributes import add_attributes, as_numbers, known_attributes, sentences
+from schemas.errors import WrongUse
+
+
+@pytest.fixture
+def archive(tmp_path: Path) -> Archive:
+    made = Archive(str(tmp_path / "archive"))
+    made.prepare()
+    return made
+
+
+def table(text: str) -> pd.DataFrame:
+    """A table from rows of words; the first row has the names."""
+    rows = [row.split(",") for row in text.split()]
+    return pd.DataFrame(rows[1:], columns=rows[0])
+
+
+def test_a_changed_value_is_a_new_row_and_the_newest_counts(archive: Archive) -> None:
+    first = add_attributes(archive, table("serial,wafer,firmware A1,W1,2.0 A2,W2,2.0"), "serial", "first.csv")
+    assert (first["added"], first["changed"], first["file"]) == (4, 0, "000001.json")
+    assert first["unknown"] == ["A1", "A2"]
+    again = add_attributes(archive, table("unit,wafer A1,W1 A2,W3 A3,"), "serial", "second.csv")
+    assert (again["added"], again["changed"], again["unchanged"]) == (0, 1, 1)
+    known = known_attributes(archive)
+    assert (known.of("A2", "r", "wafer"), known.of("A2", "r", "firmware"), known.of("A3", "r", "wafer")) == ("W3", "2.0", "")
+    kept = sorted(place.name for place in (Path(str(archive.root)) / "attributes").iterdir())
+    assert kept == ["000001.json", "000002.json"]
+    assert "first.csv" in (Path(str(archive.root)) / "attributes" / "000001.json").read_text("utf-8")
+    assert "0 new values, 1 changed, 1 as before" in sentences(again)[0]
+
+
+def test_a_value_of_a_run_holds_for_its_units_unless_they_have_their_own(archive: Archive) -> None:
+    add_attributes(archive, table("run,fixture r1,F1"), "run", "runs.csv")
+    add_attributes(archive, table("serial,fixture A1,F2"), "serial", "units.csv")
+    known = known_attributes(archive)
+    assert (known.of("A1", "r1", "fixture"), known.of("B1", "r1", "fixture"), known.of("B1", "r2", "fixture")) == ("F2", "F1", "")
+
+
+def test_what_follows_from_a_result_is_not_taken(archive: Archive) -> None:
+    added = add_attributes(archive, table("serial,grade,wafer A1,pass,W1"), "serial", "a.csv")
+    assert added["refused"] == ["grade"]
+    assert known_attributes(archive).names() == ["wafer"]
+
+
+REFUSED = {
+    "lot,wafer A1,W1": "no column 'serial', one is needed",
+    "serial A1": "no column beside serial",
+    "serial,grade A1,pass": "grade follow from the result",
+    "serial,wafer ,W1": "a row without serial",
+    "serial,wafer A1,W1 A1,W2": "two values of wafer for A1 (W1, W2)",
+}
+
+
+@each(REFUSED)
+def test_tables_that_cannot_be_taken_leave_nothing(words: str, tmp_path: Path) -> None:
+    made = Archive(str(tmp_path / "archive"))
+    made.prepare()
+    with pytest.raises(WrongUse) as refusal:
+        add_attributes(made, table(words), "serial", "a.csv")
+    assert REFUSED[words] in str(refusal.value)
+    assert not (tmp_path / "archive" / "attributes").exists()
+
+
+def test_numbers_are_quantities_where_they_have_fractions_or_are_dates() -> None:
+    assert as_numbers(["1", "2", "13"]) is None  # numbers of wafers
+    assert as_numbers(["0.5", "2", ""]) == {"0.5": 0.5, "2": 2.0}
+    dates = as_numbers(["2026-03-01", "2026-03-04"])
+    assert dates is not None
+    assert dates["2026-03-04"] - dates["2026-03-01"] == 3.0
+    assert as_numbers(["W1", "0.5"]) is None

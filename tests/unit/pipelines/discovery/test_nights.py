@@ -1,0 +1,160 @@
+"""The evidence of an archive from night to night: a ledger that is not rewritten, caches that are made again."""
+
+import json
+import logging
+import shutil
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from pipelines.archive import Archive
+from pipelines.demo.archive_lots import Hidden, Line
+from pipelines.demo.lot_archive import write_lots
+from pipelines.discovery.attributes import add_attributes
+from pipelines.discovery.discover import Look, discovered
+from pipelines.discovery.nights import DiscoveryArchive, brought_up
+from pipelines.discovery.score_store import ScoreStore
+
+LOTS = 64
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An archive of a line with a hard spring in one wafer, scored."""
+    folder = tmp_path_factory.mktemp("line")
+    made = write_lots(folder, Line(5, hidden=Hidden("W03", 40e-6), wafers=6), LOTS)
+    archive = Archive(str(made.folder))
+    add_attributes(archive, pd.read_csv(made.units, dtype=str), "serial", "units.csv")
+    DiscoveryArchive(archive).score(1)
+    return made.folder
+
+
+@pytest.fixture
+def archive(written: Path, tmp_path: Path) -> Archive:
+    shutil.copytree(written, tmp_path / "archive")
+    return Archive(str(tmp_path / "archive"))
+
+
+def nights(archive: Archive) -> list[Path]:
+    return sorted((Path(str(archive.root)) / "discovery" / "DEMO" / "nights").iterdir())
+
+
+def largest(archive: Archive) -> dict[str, float]:
+    state = brought_up(DiscoveryArchive(archive))
+    return {name: float(sums.log_e.max()) for name, sums in state.sensor.drivers.items()}
+
+
+def test_scores_on_disk_are_few_bytes_and_three_digits(archive: Archive) -> None:
+    source = DiscoveryArchive(archive)
+    files = list((Path(str(archive.root)) / "discovery" / "scores").iterdir())
+    assert len(source.pooled()) == LOTS
+    assert sum(file.stat().st_size for file in files) / LOTS < 3000
+    kept = source.store.run(source.pooled()[3])
+    shutil.rmtree(Path(str(archive.root)) / "discovery")
+    again = ScoreStore(archive)
+    again.add([kept.run], 1)
+    once = again.run(kept.run)
+    assert once.score is not None
+    assert kept.score == pytest.approx(once.score, rel=1e-12)  # the same bytes from the same dwells
+    assert kept.units == once.units
+
+
+def test_a_second_night_adds_an_entry_and_rewrites_none(archive: Archive) -> None:
+    source = DiscoveryArchive(archive)
+    every = source.pooled()
+    early = DiscoveryArchive(archive)
+    early.pooled = lambda: every[:40]  # type: ignore[method-assign]  # the lots of the first night
+    brought_up(early)
+    (first,) = nights(archive)
+    before = first.read_bytes()
+    assert json.loads(before)["lots"] == 40
+    one_go = largest(archive)
+    assert [json.loads(place.read_bytes())["lots"] for place in nights(archive)] == [40, LOTS]
+    assert first.read_bytes() == before
+    assert largest(archive) == one_go  # nothing new: nothing is written
+    assert len(nights(archive)) == 2
+    shutil.rmtree(Path(str(archive.root)) / "discovery" / "DEMO")
+    assert largest(archive) == pytest.approx(one_go, rel=1e-9)  # in one go or night by night
+
+
+def test_a_state_that_is_gone_or_edited_is_made_again(archive: Archive, caplog: pytest.LogCaptureFixture) -> None:
+    before = largest(archive)
+    state = Path(str(archive.root)) / "discovery" / "DEMO" / "state"
+    state.unlink()
+    assert largest(archive) == pytest.approx(before, rel=1e-12)
+    brought_up(DiscoveryArchive(archive))
+    data = bytearray(state.read_bytes()) if state.exists() else bytearray()
+    if data:
+        data[-40] ^= 1
+        state.write_bytes(bytes(data))
+        with caplog.at_level(logging.WARNING):
+            assert largest(archive) == pytest.approx(before, rel=1e-12)
+        assert "was edited" in caplog.text
+
+
+def test_scores_that_were_edited_are_made_again(archive: Archive, caplog: pytest.LogCaptureFixture) -> None:
+    (file,) = (Path(str(archive.root)) / "discovery" / "scores").iterdir()
+    data = bytearray(file.read_bytes())
+    data[-100] ^= 255
+    file.write_bytes(bytes(data))
+    source = DiscoveryArchive(archive)
+    with caplog.at_level(logging.WARNING):
+        assert source.pooled() == []
+    assert "was edited" in caplog.text
+    assert source.score(1) == LOTS
+    assert len(DiscoveryArchive(archive).pooled()) == LOTS
+
+
+def test_a_revoked_run_is_taken_out_from_that_night_on(archive: Archive) -> None:
+    brought_up(DiscoveryArchive(archive))
+    later = DiscoveryArchive(archive)
+    gone = later.pooled()[10]
+    later.__dict__["revoked"] = {gone}
+    state = brought_up(later)
+    assert gone not in state.order
+    assert state.taken_out == [gone]
+    entries = [json.loads(place.read_bytes()) for place in nights(archive)]
+    assert gone in entries[0]["runs"]
+    assert entries[1]["taken_out"] == [gone]
+    assert entries[1]["lots"] == LOTS - 1
+    # read by the next night, by the state or without it
+    again = DiscoveryArchive(archive)
+    again.__dict__["revoked"] = {gone}
+    (Path(str(archive.root)) / "discovery" / "DEMO" / "state").unlink()
+    assert brought_up(again).order == state.order
+
+
+def test_the_wafer_is_found_and_keeps_its_id(archive: Archive) -> None:
+    first = discovered(archive, Look()).document
+    (row,) = first["discoveries"]
+    assert first["new"] == ["D1"]
+    assert (row["recommended"], row["driver"], row["scope"]) == ("third_order", "wafer", "sensor")
+    assert row["levels"][0]["level"] == "W03"
+    assert row["levels"][0]["size_ug"] < 0.0
+    assert row["size_ug"] < 0.25 * 16.0  # µg, of a dwell's noise
+    assert row["carried_by"]["lots_for"] > 0.7
+    assert row["since"] <= "2026-01-08"
+    second = discovered(archive, Look()).document
+    assert second["new"] == []
+    assert second["discoveries"] == first["discoveries"]
+
+
+def test_the_effect_in_every_model_takes_the_evidence_away(archive: Archive) -> None:
+    (compared,) = discovered(archive, Look(effects=("third_order",))).document["compared"]
+    assert compared["log_e_before"] > 15.0
+    assert compared["log_e_after"] < 8.0
+    assert compared["size_ug_after"] < 0.3 * compared["size_ug_before"]
+
+
+def test_attributes_that_come_later_start_with_the_lots_after_them(archive: Archive) -> None:
+    brought_up(DiscoveryArchive(archive))
+    units = [unit for info in archive.runs() for unit in info.units]
+    values = pd.DataFrame({"serial": units, "supplier": ["s" + unit[-1] for unit in units]})
+    add_attributes(archive, values, "serial", "late.csv")
+    ordinary = discovered(archive, Look()).document
+    assert {"name": "supplier", "status": "no unit of a pooled lot has it"} in ordinary["drivers"]
+    looked_back = discovered(archive, Look(looking_back=True)).document
+    assert {"name": "supplier", "status": "judged"} in looked_back["drivers"]
+    assert looked_back["looking_back"]
+    assert len(nights(archive)) == 1
