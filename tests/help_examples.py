@@ -78,6 +78,8 @@ def _line(folder: Path) -> None:
     station = (ROOT / "deploy" / "stations" / "simulated.toml").read_text(encoding="utf-8")
     (folder / "line-1.toml").write_text(re.sub('name = ".*"', 'name = "line-1"', station, count=1), encoding="utf-8")
     (folder / "lot-17.csv").write_text("slot,serial\n0,SN1\n1,SN2\n2,SN3\n", encoding="utf-8")
+    (folder / "units.csv").write_text("serial,wafer\nSN1,W1\nSN2,W2\n", encoding="utf-8")
+    (folder / "shifts.csv").write_text("run,shift\nmy-1,late\n", encoding="utf-8")
     model = '[model]\nname = "m"\nversion = 1\neffects = ["bias", "scale", "misalignment"]\n'
     (folder / "model.toml").write_text(model, encoding="utf-8")
 

@@ -3,8 +3,8 @@
 Files of an archive are written once, so a repeated copy adds only new files. The chain is read first and copied last: every file
 that an entry of the copy names was copied before it. Files that the chain does not name yet (a lot that is being measured) are
 copied in their present state and completed by the next copy; the seal of a run that ends during the copy is left to the next one
-like the entry that it names. Derived files (``index/``) are left out; they are made again. What is packed is copied as single
-files; the copy may be compacted by itself.
+like the entry that it names. Derived files (``index/``, scores of runs) are left out; they are made again. What is packed is
+copied as single files; the copy may be compacted by itself.
 
 A file of the copy is never replaced by a damaged one. Files are written once, so one that differs from its copy is copied only
 where the chain or its manifest states that it is sound; a capture's samples and records are stated by their record and by the
@@ -31,6 +31,7 @@ STATE = "state"  # of a capture: its one file is replaced with every record
 REMADE = re.compile(r"runs/[^/]+/(report\.(json|html)|sealed\.json)|captures/[^/]+/state/.*|.*/lock|orchestrator/.*")
 _NEWEST, _WRITTEN_S = 4, 2.0
 """Entries whose runs may be without their seal, and the time in which their writers write it."""
+DERIVED = re.compile(r"discovery/(lock|scores/.*|[^/]+/(lock|state|found))")
 SEAL = re.compile(r"runs/[^/]+/sealed\.json")
 WRITTEN_ONCE = ".parquet"  # such a file is there or not; others are compared byte for byte
 PAGE = ".html"
@@ -94,7 +95,7 @@ def copy_archive(source: Archive, target: Archive) -> Copied:
     names = [
         name
         for name in _names(source.root, "", links)
-        if name not in entries and not name.startswith(f"{CHAIN}/") and name != MARK
+        if name not in entries and not name.startswith(f"{CHAIN}/") and name != MARK and not DERIVED.fullmatch(name)
     ]
     names += _late_seals(source.root, entries, set(names))
     kept = [name for name in (*names, *sorted(entries)) if not _copy(source.root, target.root, name, chain, copied)]

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from pipelines.archive import Archive
 from pipelines.cli import options
 from pipelines.cli.printing import give, give_lines, print_table, say
+
+if TYPE_CHECKING:
+    from pipelines.discovery.documents import ListedAttributes
 
 PART = "Certificates, trace, audit"
 ORDER = 454
@@ -57,9 +60,10 @@ def list_(archive: options.ArchiveOption = None, *, as_json: options.JsonOption 
     give(listed(store), _print, as_json=as_json)
 
 
-def _print(document: dict[str, list[dict[str, object]]]) -> None:
+def _print(document: ListedAttributes) -> None:
     rows = document["attributes"]
     if not rows:
         say("no attribute is known; add some with 'tumbleline attributes add FILE'")
         return
-    print_table(["attribute", "of", "known", "levels", "such as"], [[str(row[key]) for key in row] for row in rows])
+    lines = [[row["attribute"], row["of"], str(row["known"]), str(row["levels"]), row["such_as"]] for row in rows]
+    print_table(["attribute", "of", "known", "levels", "such as"], lines)

@@ -95,9 +95,9 @@ def _archive(folder: Path, seed: int, lots: int, *, as_json: bool) -> None:
     with writing(folder, "demo", ELSEWHERE), _bar(f"measuring {lots} lots") as progress:
         written, hidden = made(folder, seed, lots, lambda done: progress(done, lots, ""))
     with error_console().status("judging the archive night by night"):
-        document = played(written, hidden, processors())
+        document = played(written, hidden, processors(), seed)
     if as_json:
-        print_json({"seed": seed, **document})
+        print_json(document)
     else:
         print_discovery_demo(document)
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, cast
+from typing import cast
 
 import pandas as pd
 
 from pipelines.archive import Archive
-from pipelines.discovery.attributes import AddedAttributes, By, add_attributes, known_attributes, sentences
+from pipelines.discovery.attributes import By, add_attributes, known_attributes, sentences
+from pipelines.discovery.documents import AddedAttributes, KnownAttribute, ListedAttributes
 from schemas.errors import WrongUse
 
 _SHOWN = 4
@@ -43,10 +44,10 @@ def added_from(archive: Archive, path: Path, by: str) -> tuple[AddedAttributes, 
     return added, sentences(added)
 
 
-def listed(archive: Archive) -> dict[str, list[dict[str, Any]]]:
+def listed(archive: Archive) -> ListedAttributes:
     """Every attribute: of units or runs, for how many it is known, how many levels it has, some of them."""
     known = known_attributes(archive)
-    rows: list[dict[str, Any]] = []
+    rows: list[KnownAttribute] = []
     for kind, of in (("units", known.serial), ("runs", known.run)):
         names = dict.fromkeys(name for values in of.values() for name in values)
         for name in names:

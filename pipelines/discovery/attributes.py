@@ -10,15 +10,15 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
-from typing_extensions import TypedDict
 
 from inertial.counts import number_of
 from pipelines.archive import Archive, files
 from pipelines.archive.provenance import provenance
+from pipelines.discovery.documents import AddedAttributes
 from schemas.errors import ArchiveUnusable, WrongUse, did_you_mean
 
 By = Literal["serial", "run"]
@@ -29,19 +29,6 @@ NOT_DRIVERS = {"grade", "outcome", "pass", "passed", "fail", "failed", "yield", 
 
 _SHOWN = 5
 _DAY = re.compile(r"\d{4}-\d{2}-\d{2}")
-
-
-class AddedAttributes(TypedDict):
-    """``attributes add --json``: what was added."""
-
-    added: Annotated[int, "values that are new"]
-    changed: Annotated[int, "values that replace another one; the old one is kept"]
-    unchanged: int
-    by: Annotated[str, "serial or run"]
-    names: Annotated[list[str], "of the attributes"]
-    unknown: Annotated[list[str], "serials or runs that the archive does not have yet"]
-    refused: Annotated[list[str], "columns that follow from the result of a calibration, and were not taken"]
-    file: Annotated[str, "where they are kept, in the archive"]
 
 
 @dataclass(frozen=True)

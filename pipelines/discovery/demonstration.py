@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -13,6 +12,7 @@ from pipelines.demo.archive_lots import Hidden, Line
 from pipelines.demo.lot_archive import DemoArchive, write_lots
 from pipelines.discovery.attribute_files import added_from
 from pipelines.discovery.discover import Look, discovered
+from pipelines.discovery.documents import DiscoveryDemo
 from schemas.errors import WrongUse
 
 LOTS = 400
@@ -35,7 +35,7 @@ def made(folder: Path, seed: int, lots: int, progress: Callable[[int], None]) ->
     return write_lots(folder, Line(seed, hidden=hidden), lots, progress), hidden
 
 
-def played(made_: DemoArchive, hidden: Hidden, workers: int) -> dict[str, Any]:
+def played(made_: DemoArchive, hidden: Hidden, workers: int, seed: int) -> DiscoveryDemo:
     """The story as one document: what was found on which night, and what adding it does to the archive."""
     archive = Archive(str(made_.folder))
     added_from(archive, made_.units, "serial")
@@ -44,6 +44,7 @@ def played(made_: DemoArchive, hidden: Hidden, workers: int) -> dict[str, Any]:
     found = next((row for row in rows if row["driver"] == "wafer"), None)
     after = discovered(archive, Look(effects=(found["recommended"],))).document if found is not None else None
     return {
+        "seed": seed,
         "hidden": {
             "wafer": hidden.wafer,
             "physics": "a spring that hardens" if hidden.hardening > 0 else "a spring that softens",

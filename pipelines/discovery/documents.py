@@ -1,4 +1,4 @@
-"""The JSON documents of discover: keys that other programs read. A NotRequired key may be missing."""
+"""The JSON documents of discover and attributes: keys that other programs read. A NotRequired key may be missing."""
 
 from __future__ import annotations
 
@@ -143,3 +143,58 @@ class DiscoverDocument(TypedDict):
     ]
     new: Annotated[list[str], "ids of discoveries that were not there the time before"]
     looking_back: bool
+
+
+class ExplainedDiscovery(DiscoveryRow):
+    """``discover --explain ID --json``: one discovery."""
+
+
+class AddedAttributes(TypedDict):
+    """``attributes add --json``: what was added."""
+
+    added: Annotated[int, "values that are new"]
+    changed: Annotated[int, "values that replace another one; the old one is kept"]
+    unchanged: int
+    by: Annotated[str, "serial or run"]
+    names: Annotated[list[str], "of the attributes"]
+    unknown: Annotated[list[str], "serials or runs that the archive does not have yet"]
+    refused: Annotated[list[str], "columns that follow from the result of a calibration, and were not taken"]
+    file: Annotated[str, "where they are kept, in the archive"]
+
+
+class KnownAttribute(TypedDict):
+    """One attribute."""
+
+    attribute: str
+    of: Annotated[str, "units or runs"]
+    known: Annotated[int, "of how many"]
+    levels: int
+    such_as: str
+
+
+class ListedAttributes(TypedDict):
+    """``attributes list --json``: what is known of units and runs."""
+
+    attributes: list[KnownAttribute]
+
+
+class HiddenInWafer(TypedDict):
+    """What a demonstration hid."""
+
+    wafer: str
+    physics: str
+    effect: str
+
+
+class DiscoveryDemo(TypedDict):
+    """``demo --archive --json``: what was hidden in an archive of many lots, and what was found of it."""
+
+    seed: int
+    hidden: HiddenInWafer
+    discoveries: list[DiscoveryRow]
+    found: bool
+    wafer_named: Annotated[bool, "whether the wafer that differs most is the hidden one"]
+    compared: list[ComparedAlarm]
+    left: Annotated[list[str], "discoveries that are left with the effect in the model of every lot"]
+    folder: str
+    lots: int

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
+from inertial.counts import number_of
 from inertial.discovery.evidence import DATE, FIRST, INSIDE, MEAN, SLOT, STATION, UNIT, ScoredLot, Sums
 from inertial.discovery.naming import Name, Pool
 from pipelines.archive import derived, files
@@ -375,7 +376,7 @@ class Findings:
             AXES, -1
         )
         rows: list[UntoldEffect] = []
-        if not self.state.order:
+        if len(self.state.order) < FIRST:
             return rows
         for effect in self.pool.effects:
             at = self.pool.places(effect)
@@ -408,7 +409,9 @@ class Findings:
         out: list[str] = []
         lots = len(self.state.order)
         if lots < FIRST:
-            out.append(f"{lots} lots; the earliest discovery is possible at {FIRST}, of drivers at about 60")
+            out.append(
+                f"{number_of(lots, 'lot')}; the earliest discovery is possible at {FIRST}, of drivers at about 60"
+            )
         for device, count in self.source.other_devices.items():
             out.append(
                 f"{count} runs are of {device}, and are never pooled with {self.source.device}: --device {device}"

@@ -72,6 +72,9 @@ CASES = {
     "archive clean --json": ["archive", "clean", "--dry-run"],
     "archive key --json": ["archive", "key", "--output", "{folder}/key.pem"],
     "archive compact --json": ["archive", "compact"],
+    "discover --json": ["discover"],
+    "attributes add --json": ["attributes", "add", "{folder}/units.csv"],
+    "attributes list --json": ["attributes", "list"],
     "archive backup --json": ["archive", "backup", "{folder}/copy"],
 }
 WITHOUT_ARCHIVE = {"plan", "inspect FILE", "keys [SUBJECT]", "extend", "archive key"}
@@ -92,6 +95,7 @@ def kept(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "model.toml").write_text(model, encoding="utf-8")
     rows = [f"{k / 10},{k % 3},{k % 2},16{k % 10}" for k in range(200)]
     (folder / "record.csv").write_text("\n".join(["t,ax,ay,az", *rows, ""]), encoding="utf-8")
+    (folder / "units.csv").write_text("serial,wafer\nA1,W1\n", encoding="utf-8")
     rng = np.random.default_rng(1)
     np.savetxt(folder / "rest.csv", rng.normal(size=(2000, 3)), delimiter=",", header="x,y,z", comments="")
     time = np.arange(1000) / 50e3 - 0.003
@@ -127,6 +131,8 @@ ELSEWHERE = {
     "show RUN --json (no grades)": "e2e/test_inquiry.py",
     "investigate --json": "e2e/test_inquiry.py",
     "operator --json": "e2e/test_operator.py",
+    "discover --explain ID --json": "e2e/test_discover.py",
+    "demo --archive --json": "e2e/test_discover.py",
     "certificate --json": "unit/pipelines/certificates/document/test_compose.py",
     "verify FILE… --json": "unit/pipelines/certificates/document/test_file_check.py",
     "certify --json": "contract/test_documents.py",

@@ -46,6 +46,8 @@ OUTPUTS = {
     "psd": ["psd", "rest.csv", "--rate", "100", "--columns", "x,y,z"],
     "monitor": ["monitor"],
     "archive": ["archive", "clean", "--dry-run"],
+    "attributes": ["attributes", "list"],
+    "discover": ["discover", "--reach"],
 }
 """The main output of each command, in a folder with one run."""
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from pipelines.cli.printing import print_table, say, short
+from pipelines.discovery.documents import DiscoveryDemo
 
 
 def print_ending(document: dict[str, Any]) -> None:
@@ -49,7 +50,7 @@ def _print_class(document: dict[str, Any], named: str) -> None:
         say(rows[0]["why"])
 
 
-def print_discovery_demo(document: dict[str, Any]) -> None:
+def print_discovery_demo(document: DiscoveryDemo) -> None:
     """Print the story of an archive: which night something was found, what it is, and what adding it does."""
     from pipelines.cli.next_commands import command_line, print_next
     from pipelines.discovery.sentences import headline, scope_text

@@ -88,6 +88,8 @@ def print_explained(row: DiscoveryRow) -> None:
 
 def print_reach(document: DiscoverDocument) -> None:
     """What the archive could have shown, by effect."""
+    if not document["reach"]:
+        return  # the warnings say how many lots are needed
     rows: dict[str, dict[str, str]] = {}
     for row in document["reach"]:
         own = rows.setdefault(row["effect"], {})

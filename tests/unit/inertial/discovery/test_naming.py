@@ -22,9 +22,10 @@ def pool() -> Pool:
     return Pool(maker().columns, maker().size.reshape(-1), *maker().products)
 
 
-@pytest.mark.parametrize(
-    ("effect", "driver"), [("third_order", "wafer"), ("second_order", "radius"), ("cross_coupling", "slot"), ("scale_asymmetry", "mean")]
-)
+HIDDEN = [("third_order", "wafer"), ("second_order", "radius"), ("cross_coupling", "slot"), ("scale_asymmetry", "mean")]
+
+
+@pytest.mark.parametrize(("effect", "driver"), HIDDEN)
 def test_effect_and_driver_are_named_and_nothing_else(effect: str, driver: str) -> None:
     result = maker().archive(31, 400, Hidden(effect, driver, 0.05), Setting(), NEEDED, keep=True)
     columns = maker().columns

@@ -31,7 +31,11 @@ def test_a_changed_value_is_a_new_row_and_the_newest_counts(archive: Archive) ->
     again = add_attributes(archive, table("unit,wafer A1,W1 A2,W3 A3,"), "serial", "second.csv")
     assert (again["added"], again["changed"], again["unchanged"]) == (0, 1, 1)
     known = known_attributes(archive)
-    assert (known.of("A2", "r", "wafer"), known.of("A2", "r", "firmware"), known.of("A3", "r", "wafer")) == ("W3", "2.0", "")
+    assert (known.of("A2", "r", "wafer"), known.of("A2", "r", "firmware"), known.of("A3", "r", "wafer")) == (
+        "W3",
+        "2.0",
+        "",
+    )
     kept = sorted(place.name for place in (Path(str(archive.root)) / "attributes").iterdir())
     assert kept == ["000001.json", "000002.json"]
     assert "first.csv" in (Path(str(archive.root)) / "attributes" / "000001.json").read_text("utf-8")
@@ -42,7 +46,11 @@ def test_a_value_of_a_run_holds_for_its_units_unless_they_have_their_own(archive
     add_attributes(archive, table("run,fixture r1,F1"), "run", "runs.csv")
     add_attributes(archive, table("serial,fixture A1,F2"), "serial", "units.csv")
     known = known_attributes(archive)
-    assert (known.of("A1", "r1", "fixture"), known.of("B1", "r1", "fixture"), known.of("B1", "r2", "fixture")) == ("F2", "F1", "")
+    assert (known.of("A1", "r1", "fixture"), known.of("B1", "r1", "fixture"), known.of("B1", "r2", "fixture")) == (
+        "F2",
+        "F1",
+        "",
+    )
 
 
 def test_what_follows_from_a_result_is_not_taken(archive: Archive) -> None:

@@ -1,0 +1,122 @@
+"""Discoveries as a user makes them: a demonstration, an archive with attributes, one explained, refusals."""
+
+import json
+from pathlib import Path
+
+import pytest
+from each import each
+from in_process import document_of, given, refused, text_of
+
+from pipelines.archive import Archive
+from pipelines.discovery.nights import DiscoveryArchive
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A demonstration of few lots: its archive, and what it said."""
+    place = tmp_path_factory.mktemp("demo") / "line"
+    status, out, err = given("demo", "--archive", "--lots", "110", "--seed", "4", "--folder", place, "--json")
+    assert status == 0, err
+    place.with_name("said.json").write_text(out, encoding="utf-8")
+    return place
+
+
+def test_the_demonstration_finds_the_wafer_and_its_evidence_goes_with_the_effect(folder: Path) -> None:
+    from in_process import typed_document  # of its type, as every document
+
+    said = typed_document("demo", folder.with_name("said.json").read_text("utf-8"))
+    assert said["found"]
+    assert said["wafer_named"]
+    (row,) = said["discoveries"]
+    assert row["size_floors"] < 0.05  # no single lot could show it
+    (compared,) = said["compared"]
+    assert compared["log_e_after"] < 0.5 * compared["log_e_before"]
+    assert compared["size_ug_after"] < 0.3 * compared["size_ug_before"]
+
+
+def test_a_discovery_is_new_once_and_is_explained(folder: Path, tmp_path: Path) -> None:
+    archive = folder / "archive"
+    page = tmp_path / "d.html"
+    assert document_of("discover", "--archive", archive, "--html", page)["new"] == []
+    html = page.read_text("utf-8")
+    assert "third_order" in html
+    assert "<svg" in html
+    assert "http" not in html.replace("http://www.w3.org", "")
+    text = text_of("discover", "--archive", archive)
+    assert "differs by wafer" in text
+    assert "tumbleline discover --explain D1" in text
+    explained = document_of("discover", "--explain", "D1", "--archive", archive, status=0)
+    assert explained["levels"][0]["units"] > 10
+    assert "of the sensors" in text_of("discover", "--explain", "d1", "--archive", archive, status=0)
+    assert "smallest effect" in text_of("discover", "--reach", "--archive", archive)
+    only = document_of("discover", "--driver", "slot", "--archive", archive)
+    assert (only["discoveries"], [one["name"] for one in only["drivers"]]) == ([], ["slot"])
+
+
+def test_an_effect_of_a_model_file_takes_its_discovery_away(folder: Path, tmp_path: Path) -> None:
+    model = tmp_path / "m.toml"
+    effects = '["bias", "scale", "misalignment", "bias_temperature", "scale_temperature", "third_order"]'
+    model.write_text(f'[model]\nname = "m"\nversion = 1\neffects = {effects}\n', encoding="utf-8")
+    found = document_of("discover", "--model", model, "--archive", folder / "archive")
+    assert "third_order" in found["model"]
+    assert found["discoveries"] == []
+    assert found["compared"][0]["log_e_after"] < found["compared"][0]["log_e_before"]
+    nights = folder / "archive" / "discovery" / "DEMO" / "nights"
+    assert len(list(nights.iterdir())) == 1  # what is in memory only is not kept
+
+
+def test_the_same_archive_is_verified_and_its_attributes_are_listed(folder: Path) -> None:
+    listed = document_of("attributes", "list", "--archive", folder / "archive")
+    (wafer,) = listed["attributes"]
+    assert (wafer["attribute"], wafer["known"], wafer["levels"]) == ("wafer", 880, 12)
+    status, out, err = given("verify", "--archive", folder / "archive")
+    assert status in {0, 1}, err
+    assert "discovery" not in out
+
+
+REFUSED = {
+    "--device ADXL355": "--device 'ADXL355' has no run",
+    "--driver wafr": "no driver is called 'wafr'; did you mean wafer?",
+    "--since 2026-3-1": "--since is '2026-3-1', a day as 2026-03-14 is needed",
+    "--since 2030-01-01": "no lot of DEMO was measured since 2030-01-01",
+    "--explain D9": "no discovery is called 'D9'",
+}
+
+
+@each(REFUSED)
+def test_refusals_say_what_is_there(words: str, folder: Path) -> None:
+    assert REFUSED[words] in refused("discover", *words.split(), "--archive", folder / "archive")
+
+
+def test_what_cannot_be_judged_is_said(tmp_path: Path) -> None:
+    made = Archive(str(tmp_path / "archive"))
+    made.prepare()
+    assert "no run with dwells, thirty at least" in refused("discover", "--archive", tmp_path / "archive")
+    assert "holds no archive" in refused("discover", "--archive", tmp_path / "nothing")
+    assert "there is no file" in refused("attributes", "add", tmp_path / "u.csv", "--archive", tmp_path / "archive")
+    (tmp_path / "u.csv").write_text("wafer\nW1\n", encoding="utf-8")
+    assert "no column 'serial'" in refused("attributes", "add", tmp_path / "u.csv", "--archive", tmp_path / "archive")
+    assert "--by is 'lot'" in refused(
+        "attributes", "add", tmp_path / "u.csv", "--by", "lot", "--archive", tmp_path / "archive"
+    )
+
+
+def test_few_lots_are_told_and_a_full_folder_is_refused(tmp_path: Path, folder: Path) -> None:
+    from pipelines.demo.archive_lots import Line
+    from pipelines.demo.lot_archive import write_lots
+
+    made = write_lots(tmp_path, Line(6), 3)
+    status, out, err = given("discover", "--archive", made.folder)
+    assert status == 0, err
+    assert "3 lots; the earliest discovery is possible at 30" in " ".join(out.split())
+    document = document_of("discover", "--archive", made.folder)
+    assert document["pooled"]["lots"] == 3
+    assert document["reach"] == []
+    assert "has files already" in refused("demo", "--archive", "--folder", folder)
+
+
+def test_the_evidence_is_in_order_of_arrival(folder: Path) -> None:
+    nights = folder / "archive" / "discovery" / "DEMO" / "nights"
+    (entry,) = [json.loads(place.read_bytes()) for place in nights.iterdir()]
+    assert entry["runs"] == DiscoveryArchive(Archive(str(folder / "archive"))).pooled()
+    assert entry["alarms"]
