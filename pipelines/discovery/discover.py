@@ -13,7 +13,7 @@ from inertial.discovery.evidence import INSIDE, ScoredLot
 from inertial.discovery.naming import Pool
 from pipelines.archive import Archive
 from pipelines.discovery.documents import ComparedAlarm, DiscoverDocument, DiscoveryRow
-from pipelines.discovery.findings import Findings, remembered, size_of
+from pipelines.discovery.findings import Findings, remembered, rows_of_before, size_of
 from pipelines.discovery.nights import DiscoveryArchive, brought_up, fresh, grown_by_days
 from schemas.errors import WrongUse, did_you_mean
 from schemas.units import MICRO
@@ -58,7 +58,7 @@ def discovered(archive: Archive, look: Look) -> Looked:
         source.score(look.workers)
         state = brought_up(source)
         findings = Findings(source, state)
-        document = remembered(source, state, findings.document())
+        document = remembered(source, state, findings.document(rows=rows_of_before(source, state)))
         if look.since or look.looking_back:
             findings = _in_memory(source, look)
             document = findings.document(looking_back=True)

@@ -47,8 +47,8 @@ class DiscoveredLevel(TypedDict):
 class CarriedBy(TypedDict):
     """How the lots share the evidence."""
 
-    lots_for: Annotated[float, "share of the lots that speak for it"]
-    log_e_without_largest_2_percent: float
+    lots_for: Annotated[float | None, "share of the lots that speak for it; null: of a column of the station"]
+    log_e_without_largest_2_percent: float | None
 
 
 class DiscoveryRow(TypedDict):
@@ -65,7 +65,7 @@ class DiscoveryRow(TypedDict):
     kind: Literal["mean", "levels", "slope"]
     size_ug: Annotated[float, "rms over levels and axes in a dwell"]
     interval_ug: Annotated[list[float], "95 %"]
-    size_floors: Annotated[float, "the same over the noise of a dwell of one lot"]
+    size_floors: Annotated[float | None, "the same over the noise of a dwell of one lot"]
     log_e: float
     scope: Literal["sensor", "station", "sensor_or_station", "thermometer"]
     because: str

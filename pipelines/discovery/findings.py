@@ -27,17 +27,19 @@ from pipelines.discovery.documents import (
     UntoldEffect,
 )
 from pipelines.discovery.nights import ALPHA, AXES, SEASON, Alarm, DiscoveryArchive, Evidences, held, hypothesis
+from pipelines.tables.json_values import json_value
 from schemas.units import MICRO
 
 Array = NDArray[np.float64]
 Scope = Literal["sensor", "station", "sensor_or_station", "thermometer"]
 
 LATER = 20  # lots after an alarm from which on they confirm or do not
-MOST_NAMED = 20_000  # lots that the names are found with: evenly spread ones of a larger archive
+MOST_NAMED = 3000  # lots that the names are found with: evenly spread ones of a larger archive
 _CONFIRMED = 2.05  # standard errors beyond none (two sided 4 %), as for a fresh run
 _SURE = 0.999  # of Student's distribution over stations
 _GROWN = 1.05  # more lots than this factor: the names are found again
 _SHOWN_LEVELS = 40
+_SOME = 50
 
 
 @dataclass(frozen=True)
@@ -63,14 +65,26 @@ class Findings:
         return [alarm for alarm in self.state.alarms if not held(self.state, alarm)]
 
     @cached_property
+    def _picked(self) -> NDArray[np.intp]:
+        """Places of the lots that names are found with, in the order of arrival."""
+        count = len(self.state.order)
+        return (
+            np.unique(np.linspace(0, count - 1, min(count, MOST_NAMED)).round().astype(np.intp))
+            if count
+            else np.zeros(0, dtype=np.intp)
+        )
+
+    @cached_property
+    def some(self) -> list[ScoredLot]:
+        """Some dozen lots, evenly spread: what all have in common is seen in them."""
+        order = self.state.order
+        pick = np.unique(np.linspace(0, len(order) - 1, min(len(order), _SOME)).round().astype(int)) if order else []
+        return [sensor for sensor, _ in self.source.lots([order[k] for k in pick])]
+
+    @cached_property
     def lots(self) -> list[ScoredLot]:
         """The lots that names are found with."""
-        order = self.state.order
-        pick = (
-            order
-            if len(order) <= MOST_NAMED
-            else [order[k] for k in np.linspace(0, len(order) - 1, MOST_NAMED).astype(int)]
-        )
+        pick = [self.state.order[k] for k in self._picked]
         return [sensor for sensor, _ in self.source.lots(pick)]
 
     @cached_property
@@ -115,15 +129,21 @@ class Findings:
     def _carried(self, name: Name, since: Alarm) -> tuple[Array, tuple[float, float] | None]:
         driver, effect = name.drivers[0], name.effects[0]
         carried = self.pool.carried(self.lots, driver, effect)
-        if len(self.lots) != len(self.state.order) or len(self.lots) - since.lots < LATER:
+        first = int(np.searchsorted(self._picked, since.lots))
+        if len(self.lots) - first < LATER or first < LATER:
             return carried, None
-        return carried, self.pool.confirmed(self.lots[: since.lots], self.lots[since.lots :], driver, effect)
+        return carried, self.pool.confirmed(self.lots[:first], self.lots[first:], driver, effect)
 
-    def document(self, *, looking_back: bool = False) -> DiscoverDocument:
-        """The findings as a document."""
+    def document(self, *, looking_back: bool = False, rows: list[DiscoveryRow] | None = None) -> DiscoverDocument:
+        """The findings as a document.
+
+        Parameters
+        ----------
+        rows : discoveries of an earlier night with the same alarms; their names are not found again
+        """
         state, source = self.state, self.source
         heads = [source.store.head(run) for run in state.order]
-        rows = self._rows()
+        rows = self._rows() if rows is None else rows
         largest = max((source.store.head(run)["model"] for run in state.order[-1:]), default="")
         return {
             "pooled": {
@@ -184,7 +204,7 @@ class Findings:
             "kind": "mean" if driver == MEAN else "slope" if name.labels == ("slope",) else "levels",
             "size_ug": MICRO * size,
             "interval_ug": [MICRO * low, MICRO * high],
-            "size_floors": size / floor if floor > 0.0 else float("nan"),
+            "size_floors": size / floor if floor > 0.0 else None,
             "log_e": round(log_e, 2),
             "scope": scope,
             "because": because,
@@ -303,7 +323,7 @@ class Findings:
                 {"level": label, "size_ug": MICRO * value, "u_ug": MICRO * error * scale, "units": 0}
                 for label, (value, error) in sizes.items()
             ],
-            "carried_by": {"lots_for": float("nan"), "log_e_without_largest_2_percent": float("nan")},
+            "carried_by": {"lots_for": None, "log_e_without_largest_2_percent": None},
             "confirmed": None,
             "next": "check the station's references (level, encoders, fixture), see 'tumbleline audit'",
         }
@@ -348,7 +368,7 @@ class Findings:
         if lots < FIRST:
             return []
         between, within = state.sensor._scales["between"].rms, state.sensor._scales["inside"].rms  # noqa: SLF001
-        own = np.mean([lot.own.sum(axis=0) for lot in self.lots[:: max(1, lots // 50)]], axis=0) * lots
+        own = np.mean([lot.own.sum(axis=0) for lot in self.some], axis=0) * lots
         times = np.sqrt(2.0 * (state.needed(MEAN) + 0.5 * np.log1p(0.03 * lots))) + stats.norm.ppf(0.95)
         rows: list[ReachRow] = []
         for driver, information, noise in ((MEAN, state.sensor.information, between), ("inside lots", own, within)):
@@ -372,9 +392,7 @@ class Findings:
 
     def _unseen(self) -> list[UntoldEffect]:
         information = self.state.sensor.information.reshape(AXES, -1)
-        own = sum((lot.own.sum(axis=0) for lot in self.lots[:FIRST]), np.zeros(self.state.sensor.count)).reshape(
-            AXES, -1
-        )
+        own = sum((lot.own.sum(axis=0) for lot in self.some), np.zeros(self.state.sensor.count)).reshape(AXES, -1)
         rows: list[UntoldEffect] = []
         if len(self.state.order) < FIRST:
             return rows
@@ -496,35 +514,51 @@ def _next(driver: str, scope: Scope) -> str:
     return "add the effect to the model of the next lots: 'tumbleline extend', then 'tumbleline discover --model'"
 
 
+def alarm_key(state: Evidences) -> list[str]:
+    """The alarms of a state as text: while they are the same, so are the names."""
+    return sorted(f"{alarm.driver} {alarm.place}" for alarm in state.alarms if not held(state, alarm))
+
+
+def rows_of_before(source: DiscoveryArchive, state: Evidences) -> list[DiscoveryRow] | None:
+    """The discoveries of the last night, where no alarm is new and few lots came in since; None where they are found again."""
+    before = _stored(source)
+    if before is None or before["alarms"] != alarm_key(state) or len(state.order) > _GROWN * before["lots"]:
+        return None
+    return before["discoveries"]
+
+
+def _stored(source: DiscoveryArchive) -> dict[str, Any] | None:
+    place = source.folder() / "found"
+    if not place.is_file():
+        return None
+    data, standing = derived.unframed(place)
+    return json.loads(data) if standing == derived.SOUND else None
+
+
 def remembered(source: DiscoveryArchive, state: Evidences, document: DiscoverDocument) -> DiscoverDocument:
     """Keep a document beside the evidence, so that discoveries have the same ids the next time."""
-    place = source.folder() / "found"
-    before: list[dict[str, Any]] = []
-    if place.is_file():
-        data, standing = derived.unframed(place)
-        before = json.loads(data)["discoveries"] if standing == derived.SOUND else []
-    used = {row["id"] for row in before}
+    stored = _stored(source) or {"discoveries": [], "lots": 0}
+    before: list[dict[str, Any]] = stored["discoveries"]
+    used, free = {row["id"] for row in before}, list(before)
     numbers = (f"D{n}" for n in range(1, 10_000))
-    renamed: dict[str, str] = {}
-    free = list(before)
     for row in document["discoveries"]:
         same = next(
             (old for old in free if old["driver"] == row["driver"] and set(old["effects"]) & set(row["effects"])), None
         )
         if same is not None:
             free.remove(same)
-            renamed[row["id"]] = same["id"]
-            row["since"], row["lots_then"] = same["since"], same["lots_then"]
+            row["id"], row["since"], row["lots_then"] = same["id"], same["since"], same["lots_then"]
         else:
-            renamed[row["id"]] = next(one for one in numbers if one not in used)
-            used.add(renamed[row["id"]])
-        row["id"] = renamed[row["id"]]
+            row["id"] = next(one for one in numbers if one not in used)
+            used.add(row["id"])
     known = {row["id"] for row in before}
     document["new"] = [row["id"] for row in document["discoveries"] if row["id"] not in known]
     kept = {
         "discoveries": document["discoveries"],
         "lots": len(state.order),
+        "alarms": alarm_key(state),
         "when": datetime.now(UTC).isoformat(timespec="seconds"),
     }
-    files.publish(place, derived.framed(json.dumps(kept, sort_keys=True).encode()))
+    if stored.get("alarms") != kept["alarms"] or len(state.order) > _GROWN * stored["lots"]:
+        files.publish(source.folder() / "found", derived.framed(json.dumps(json_value(kept), sort_keys=True).encode()))
     return document

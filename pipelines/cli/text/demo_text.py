@@ -70,10 +70,12 @@ def print_discovery_demo(document: DiscoveryDemo) -> None:
         say("\n2. The effect is added to the model of every lot.", style="bold cyan")
     for one in document["compared"]:
         confirmed = next(row["confirmed"] for row in document["discoveries"] if row["id"] == one["id"])
-        later = {True: "lots after that night confirm it", False: "lots after that night do not confirm it"}
+        later = "too few lots came since"
+        if confirmed is not None:
+            later = f"lots after that night {'confirm' if confirmed else 'do not confirm'} it"
         say(
             f"{one['id']}: {short(one['size_ug_before'])} → {short(one['size_ug_after'])} µg, evidence "
-            f"e^{short(one['log_e_before'])} → e^{short(one['log_e_after'])}; {later.get(confirmed, 'too few lots came since')}"
+            f"e^{short(one['log_e_before'])} → e^{short(one['log_e_after'])}; {later}"
         )
     hidden = document["hidden"]
     say("\n3. What was hidden?", style="bold cyan")

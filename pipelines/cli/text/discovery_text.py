@@ -67,7 +67,7 @@ def print_explained(row: DiscoveryRow) -> None:
     if other_drivers:
         say(f"    nor its driver from {', '.join(other_drivers)}")
     carried = row["carried_by"]
-    if carried["lots_for"] == carried["lots_for"]:
+    if carried["lots_for"] is not None:
         less = short(carried["log_e_without_largest_2_percent"])
         say(
             f"    {short(100.0 * carried['lots_for'])} % of the lots speak for it; e^{less} without the 2 % that speak most"

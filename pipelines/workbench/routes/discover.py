@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from fastapi import APIRouter, Request
 from starlette.responses import Response
 
@@ -48,10 +50,10 @@ def levels(request: Request, name: str) -> Response:
     return table_csv(rows[0]["levels"], f"levels-{name}")
 
 
-def _finished(request: Request) -> dict[str, dict[str, list[dict[str, list[dict[str, object]]]]]]:
+def _finished(request: Request) -> dict[str, Any]:
     state, _ = state_of(request, DiscoverPage)
     bench = workbench_of(request)
-    found = bench.jobs.result("discover", requests.discover(bench.settings, state)[1])
+    found: dict[str, Any] | None = bench.jobs.result("discover", requests.discover(bench.settings, state)[1])
     if found is None:
         raise WrongUse("discover: not finished; wait until it is done")
     return found

@@ -1,5 +1,7 @@
 """Scores of a lot against a fit with the effect in it, and errors of the station that leave them as they are."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from threadpoolctl import threadpool_limits
@@ -52,7 +54,7 @@ def test_an_error_of_the_table_leaves_the_scores_beside_free_errors_of_the_stati
     level = catalogue.get("level_error")
     problem = Problem(lot)
     change = 50e-6 * problem.columns(level, {})[..., 0].reshape(8, 3, -1)
-    tilted = Lot(**{**lot.__dict__, "output": lot.output + np.swapaxes(change, -1, -2)})
+    tilted = replace(lot, output=lot.output + np.swapaxes(change, -1, -2))
     names = {"third_order", "second_order", "magnetic"}
     tried = [one for one in catalogue.built_in().values() if one.id in {*names, "level_error"}]
     before, after = (scores_of(one, EFFECTS, tried) for one in (lot, tilted))
