@@ -72,9 +72,7 @@ CODE = {
     "import": _READ,
     "import of waveforms": (*_PROCEDURES, "pipelines.archive", "pipelines.importers"),
     "import of a transfer function": _READ,
-    "report": (
-        *(*_DRAWN, "stations", "pipelines.capture", "pipelines.importers", "pipelines.jobs", "pipelines.schedule"),
-    ),
+    "report": (*(*_DRAWN, "stations", "pipelines.capture", "pipelines.importers", "pipelines.jobs"),),
     "report of an import": (*_DRAWN, "pipelines.diagnosis", "pipelines.jobs.model_files", "pipelines.parallel"),
     "inquiry": (
         *(

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 PART = "Certificates, trace, audit"
 ORDER = 454
 SUMMARY = "Add what is known of units and runs, such as wafer or firmware, to the archive."
+EXAMPLES = ("tumbleline attributes add units.csv", "tumbleline attributes list")
 EXAMPLES_OF = {
     "add": ("tumbleline attributes add units.csv", "tumbleline attributes add shifts.csv --by run --json"),
     "list": ("tumbleline attributes list", "tumbleline attributes list --json"),

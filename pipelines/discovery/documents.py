@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, NotRequired
+from typing import Annotated, Any, Literal, NotRequired
 
 from typing_extensions import TypedDict
 
@@ -88,6 +88,27 @@ class HeldAlarm(TypedDict):
     reason: str
 
 
+class UnexplainedRow(TypedDict):
+    """Evidence by a driver that no effect of the catalogue accounts for."""
+
+    driver: str
+    axes: list[str]
+    map: Annotated[
+        list[list[float]], "outer and inner angle in degrees, residual and its standard error in µg; empty: not known"
+    ]
+    log_e: float
+    nearest: Annotated[str, "the effect with the largest evidence"]
+
+
+class PopulationRow(TypedDict):
+    """A finding on coefficients of many units."""
+
+    figure: str
+    kind: Literal["two_populations", "correlation", "spread", "drift"]
+    log_e: float
+    detail: dict[str, Any]
+
+
 class ReachRow(TypedDict):
     """What the archive could have seen."""
 
@@ -132,8 +153,8 @@ class DiscoverDocument(TypedDict):
     error_control: ErrorControl
     discoveries: list[DiscoveryRow]
     held: list[HeldAlarm]
-    unexplained: Annotated[list[dict[str, object]], "evidence that no effect of the catalogue accounts for"]
-    population: Annotated[list[dict[str, object]], "of coefficients; see `audit`"]
+    unexplained: Annotated[list[UnexplainedRow], "evidence that no effect of the catalogue accounts for"]
+    population: Annotated[list[PopulationRow], "of coefficients: empty in this version, see `audit`"]
     reach: list[ReachRow]
     unseen: list[UntoldEffect]
     drivers: list[DriverRow]

@@ -24,6 +24,7 @@ from pipelines.discovery.documents import (
     DriverRow,
     HeldAlarm,
     ReachRow,
+    UnexplainedRow,
     UntoldEffect,
 )
 from pipelines.discovery.nights import ALPHA, AXES, SEASON, Alarm, DiscoveryArchive, Evidences, held, hypothesis
@@ -344,10 +345,10 @@ class Findings:
                 )
         return sorted(rows, key=lambda row: -row["log_e"])
 
-    def _unexplained(self, rows: Sequence[DiscoveryRow]) -> list[dict[str, object]]:
+    def _unexplained(self, rows: Sequence[DiscoveryRow]) -> list[UnexplainedRow]:
         """Drivers with an alarm that no name accounts for."""
         told = {driver for row in rows for driver in row["drivers"]} | ({MEAN} if rows else set())
-        out: dict[str, dict[str, object]] = {}
+        out: dict[str, UnexplainedRow] = {}
         for alarm in sorted(self.open_alarms, key=self._log_e, reverse=True):
             if alarm.place < self.state.sensor.count and _plain(alarm.driver) not in told and not rows:
                 effect, _, axis = hypothesis(self.state, alarm.place)
@@ -357,6 +358,7 @@ class Findings:
                         "driver": _plain(alarm.driver),
                         "nearest": effect,
                         "axes": [axis],
+                        "map": [],
                         "log_e": round(self._log_e(alarm), 2),
                     },
                 )
