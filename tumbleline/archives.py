@@ -72,6 +72,31 @@ class ArchiveView:
         rows = pd.DataFrame(coefficients_of(self.store.run(valid.run), valid))
         return rows.assign(U=K * rows["standard_error"].astype(float), certificate=valid.certificate, run=valid.run)
 
+    def discoveries(self, device: str = "") -> pd.DataFrame:
+        """What the lots of the archive show together, one row per discovery: as ``tumbleline discover`` of the same archive.
+
+        Parameters
+        ----------
+        device : kind of device; that of most runs if empty
+        """
+        from pipelines.discovery.discover import Look, discovered
+
+        rows = discovered(self.store, Look(device=device)).document["discoveries"]
+        kept = (
+            "id",
+            "since",
+            "recommended",
+            "driver",
+            "size_ug",
+            "size_floors",
+            "log_e",
+            "scope",
+            "confirmed",
+            "effects",
+            "drivers",
+        )
+        return pd.DataFrame([{name: row[name] for name in kept} for row in rows], columns=list(kept))
+
     def plot(self, unit: str, effect: str = "bias") -> Picture:
         """Change of a unit's coefficients of an effect since they were measured first, with U (k = 2) as bars, by day."""
         from pipelines.drawing.chart import SEVERAL, Chart, Plot, PlotAxis, Trace

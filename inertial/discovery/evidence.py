@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import stats
 from scipy.special import logsumexp
 
 from inertial.discovery.station_wander import Innovation, Wander
@@ -32,6 +33,11 @@ INSIDE = ", inside lots"
 
 GUARDED = 2.0
 """Log likelihood that a station's own walk gains, from which on what is constant in a lot may be that."""
+
+DIFFER = 0.05
+"""Probability by chance below which stations are taken to differ: a mean that they do not share is no discovery."""
+
+_UNSURE = 1e-3
 
 _MIXED = np.array([0.3, 0.03, 0.003])
 _RATES: Array = np.exp2(np.arange(1.0, -15.0, -1.0))
@@ -186,6 +192,25 @@ class Evidence:
     def guarded(self) -> NDArray[np.bool_]:
         """Effects (h,) for which the stations wander by themselves: what is constant in a lot may be that."""
         return self.wander.gained > GUARDED
+
+    def over_stations(self) -> tuple[Array, Array]:
+        """Of every effect (h,): whether its mean is beyond what stations differ by, and whether they differ at all.
+
+        Stations are few, and each has errors of its own for good: the mean counts against their scatter, by Student's t.
+        """
+        table, count = self.levels.get(STATION), len(self.wander.stations)
+        no = np.zeros(self.count, dtype=bool)
+        if table is None or count < 2 or "between" not in self._scales:
+            return no, ~no
+        n, noise = len(table.place), self._scales["between"].rms ** 2
+        information = table.information[:n]
+        seen = information > 0.0
+        size = np.where(seen, table.score[:n] / np.where(seen, information, 1.0), 0.0) + self._centre()
+        weighted = (information * size).sum(axis=0) / np.maximum(information.sum(axis=0), 1e-300)
+        scatter = (information * (size - weighted) ** 2).sum(axis=0) / noise
+        error = np.maximum(size.std(axis=0, ddof=1), 1e-300) / np.sqrt(n)
+        sure = np.abs(size.mean(axis=0)) > stats.t.ppf(1.0 - 0.5 * _UNSURE, n - 1) * error
+        return sure & seen.all(axis=0), scatter > stats.chi2.ppf(1.0 - DIFFER, n - 1)
 
     def _begin(self) -> None:
         """Scales from the medians of the first lots; then these lots as if they came now."""

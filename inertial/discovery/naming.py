@@ -227,18 +227,24 @@ class Pool:
 
     def confirmed(
         self, before: Sequence[ScoredLot], after: Sequence[ScoredLot], driver: str, effect: str
-    ) -> tuple[float, float]:
-        """How much of what earlier lots predict later ones show, with its standard error: one where it is confirmed."""
+    ) -> tuple[float, float, int]:
+        """How much of what earlier lots predict later ones show, with its standard error, and the lots that can show it.
+
+        It is one where the effect is confirmed; lots with levels that were not there before show nothing.
+        """
         place, sums = self.effects.index(effect), gathered(before, [driver])
         if driver not in sums:
-            return float("nan"), float("inf")
-        shown, expected = np.zeros(len(after)), np.zeros(len(after))
+            return float("nan"), float("inf"), 0
+        shown, expected = np.zeros((2, len(after)))
         for number, lot in enumerate(after):
             shown[number] = self._of_effects(self._predicted(lot, driver, sums[driver]))[place]
             expected[number] = self._of_effects(self._expected(lot, driver, sums[driver]))[place]
-        total = max(float(expected.sum()), 1e-300)
+        able = int(np.count_nonzero(expected > 0.0))
+        total = float(expected.sum())
+        if not able or total <= 0.0:
+            return float("nan"), float("inf"), 0
         factor = float(shown.sum()) / total
-        return factor, float(np.sqrt(np.sum((shown - factor * expected) ** 2))) / total
+        return factor, float(np.sqrt(np.sum((shown - factor * expected) ** 2))) / total, able
 
     def _expected(self, lot: ScoredLot, driver: str, sums: DriverSums) -> Array:
         """What :meth:`_predicted` is on average if the prediction holds, (h,)."""

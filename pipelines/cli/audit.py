@@ -78,7 +78,7 @@ def command(
     if as_json:
         print_json(document(audited, audit_findings, str(store.root)))
     else:
-        _show(audited, audit_findings)
+        _show(audited, audit_findings, str(store.root))
         if page is not None:
             remark(f"page    {page}")
     raise typer.Exit(PART_FAILED if audit_findings else DONE)
@@ -101,11 +101,12 @@ def _refuse_nothing(audited: Audit, root: str) -> None:
         )
 
 
-def _show(audited: Audit, audit_findings: list[AuditFinding]) -> None:
+def _show(audited: Audit, audit_findings: list[AuditFinding], root: str) -> None:
     from inertial.counts import number_of
     from pipelines.audit.calibrations import date_of
     from pipelines.audit.document import counts
     from pipelines.audit.finding import WHO
+    from pipelines.discovery.findings import discovered_before
 
     number, until = counts(audited), date_of(audited.scope.until - 1)
     everything = audited.scope.since <= BEGINNING
@@ -128,6 +129,11 @@ def _show(audited: Audit, audit_findings: list[AuditFinding]) -> None:
                 say(f"  · … {len(messages) - SHOWN} more of this kind; --json and --page list all", style="dim")
     if not audit_findings:
         say("no action is needed")
+    for device, count in discovered_before(Archive(root)):
+        say(
+            f"{number_of(count, 'discovery', 'discoveries')} of many lots of {device}: 'tumbleline discover'",
+            style="dim",
+        )
 
 
 def _certificates(audited: Audit) -> str:

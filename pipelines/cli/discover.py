@@ -53,6 +53,7 @@ def command(
     workers: Annotated[
         int | None, typer.Option("--workers", min=1, help="Processes that score new runs; as many as cores by default.")
     ] = None,
+    dask: Annotated[str, typer.Option("--dask", metavar="ADDRESS|local", help="Score runs on Dask workers.")] = "",
     *,
     reach: Annotated[
         bool, typer.Option("--reach", help="Print the smallest effects that this archive could have shown.")
@@ -71,8 +72,10 @@ def command(
     """
     from pipelines.cli.text.discovery_text import print_discoveries, print_explained, print_reach
     from pipelines.discovery.discover import Look, discovered, explained
+    from pipelines.flows.dask_cluster import on_dask
     from pipelines.parallel import processors
 
+    count = workers or processors()
     looked = discovered(
         Archive(archive),
         Look(
@@ -81,7 +84,8 @@ def command(
             drivers=tuple(part.strip() for part in driver.split(",") if part.strip()),
             effects=_effects(model),
             looking_back=looking_back,
-            workers=workers or processors(),
+            workers=count,
+            distribute=on_dask(dask, count),
         ),
     )
     document = looked.document

@@ -15,6 +15,7 @@ from pipelines.archive import Archive
 from pipelines.discovery.documents import ComparedAlarm, DiscoverDocument, DiscoveryRow
 from pipelines.discovery.findings import Findings, remembered, rows_of_before, size_of
 from pipelines.discovery.nights import DiscoveryArchive, brought_up, fresh, grown_by_days
+from pipelines.parallel import Distributor
 from schemas.errors import WrongUse, did_you_mean
 from schemas.units import MICRO
 
@@ -26,6 +27,7 @@ class Look:
     device : kind of device; that of most runs if empty · since : only lots from this day on; nothing is kept then
     drivers : only discoveries of these; all if empty · effects : in the model of every lot beside its own
     looking_back : judge all lots again with every attribute that is known now; nothing is kept then
+    workers, distribute : processes, or other machines, that score new runs
     """
 
     device: str = ""
@@ -34,6 +36,7 @@ class Look:
     effects: tuple[str, ...] = ()
     looking_back: bool = False
     workers: int = 1
+    distribute: Distributor | None = None
 
 
 @dataclass(frozen=True)
@@ -55,7 +58,7 @@ def discovered(archive: Archive, look: Look) -> Looked:
     with threadpool_limits(1):
         source = DiscoveryArchive(archive, look.device)
         source.device  # noqa: B018 - a wrong name is refused before anything is scored
-        source.score(look.workers)
+        source.score(look.workers, look.distribute)
         state = brought_up(source)
         findings = Findings(source, state)
         document = remembered(source, state, findings.document(rows=rows_of_before(source, state)))

@@ -16,7 +16,8 @@ from scipy import stats
 from inertial.counts import number_of
 from inertial.discovery.evidence import DATE, FIRST, INSIDE, MEAN, SLOT, STATION, UNIT, ScoredLot, Sums
 from inertial.discovery.naming import Name, Pool
-from pipelines.archive import derived, files
+from pipelines.archive import Archive, derived, files
+from pipelines.archive.store import Place
 from pipelines.discovery.documents import (
     DiscoverDocument,
     DiscoveredLevel,
@@ -28,6 +29,7 @@ from pipelines.discovery.documents import (
     UntoldEffect,
 )
 from pipelines.discovery.nights import ALPHA, AXES, SEASON, Alarm, DiscoveryArchive, Evidences, held, hypothesis
+from pipelines.discovery.score_store import FOLDER
 from pipelines.tables.json_values import json_value
 from schemas.units import MICRO
 
@@ -37,7 +39,6 @@ Scope = Literal["sensor", "station", "sensor_or_station", "thermometer"]
 LATER = 20  # lots after an alarm from which on they confirm or do not
 MOST_NAMED = 3000  # lots that the names are found with: evenly spread ones of a larger archive
 _CONFIRMED = 2.05  # standard errors beyond none (two sided 4 %), as for a fresh run
-_SURE = 0.999  # of Student's distribution over stations
 _GROWN = 1.05  # more lots than this factor: the names are found again
 _SHOWN_LEVELS = 40
 _SOME = 50
@@ -133,7 +134,8 @@ class Findings:
         first = int(np.searchsorted(self._picked, since.lots))
         if len(self.lots) - first < LATER or first < LATER:
             return carried, None
-        return carried, self.pool.confirmed(self.lots[:first], self.lots[first:], driver, effect)
+        factor, error, able = self.pool.confirmed(self.lots[:first], self.lots[first:], driver, effect)
+        return carried, (factor, error) if able >= LATER else None
 
     def document(self, *, looking_back: bool = False, rows: list[DiscoveryRow] | None = None) -> DiscoverDocument:
         """The findings as a document.
@@ -235,7 +237,10 @@ class Findings:
         driver, stations = found.drivers[0], self.state.sensor.wander.stations
         inside = any(a.driver.endswith(INSIDE) for a in self.open_alarms if _plain(a.driver) == driver)
         if driver == STATION:
-            return "station", "it differs from station to station for units of the same kind"
+            return (
+                "station",
+                "it differs from station to station for units of the same kind, for good or by slow wander",
+            )
         if driver == SLOT:
             return "station", "it stays with the slot of the fixture while the units change"
         if driver == UNIT:
@@ -250,23 +255,13 @@ class Findings:
         if count < 2:
             return (
                 "sensor_or_station",
-                "one station: permanent errors of its references look the same, or the station's own wander",
+                "one station: permanent errors of its references look the same, or its own wander",
             )
         k, effect = len(self.state.columns), found.name.effects[0]
         at = [axis * k + int(p) for axis in range(AXES) for p in self.pool.places(effect)]
-        table = self.state.sensor.levels[STATION]
-        centre = self.state.sensor.score / np.maximum(self.state.sensor.information, 1e-300)
-        sizes = [
-            table.score[place] / np.maximum(table.information[place], 1e-300) + centre for place in table.place.values()
-        ]
-        values = np.array(sizes)[:, at]
-        t = np.abs(values.mean(axis=0)) / np.maximum(values.std(axis=0, ddof=1) / np.sqrt(count), 1e-300)
-        if float(t.max()) > float(stats.t.ppf(1.0 - 0.5 * (1.0 - _SURE) / len(at), count - 1)):
+        if self.state.sensor.over_stations()[0][at].any():
             return "sensor", f"all {count} stations show it, and they differ by less than it"
-        return (
-            "sensor_or_station",
-            f"the {count} stations differ by too much to exclude permanent errors of their references",
-        )
+        return "sensor_or_station", f"{count} stations are too few to exclude permanent errors of their references"
 
     @cached_property
     def _of_station(self) -> list[Alarm]:
@@ -340,7 +335,9 @@ class Findings:
                         "axis": axis,
                         "driver": alarm.driver,
                         "log_e": round(self._log_e(alarm), 2),
-                        "reason": "the stations wander in this effect by themselves, and it is the same for a whole lot",
+                        "reason": "one station: its references may be it"
+                        if len(self.state.sensor.wander.stations) < 2
+                        else "the stations differ or wander in this effect by themselves, and it is the same for a whole lot",
                     }
                 )
         return sorted(rows, key=lambda row: -row["log_e"])
@@ -529,8 +526,23 @@ def rows_of_before(source: DiscoveryArchive, state: Evidences) -> list[Discovery
     return before["discoveries"]
 
 
+def discovered_before(archive: Archive) -> list[tuple[str, int]]:
+    """Kinds of devices with discoveries of an earlier look, and their number; nothing is judged."""
+    top = archive.root / FOLDER
+    names = (
+        sorted(place.name for place in top.iterdir() if place.name not in {"scores", "lock"}) if top.is_dir() else []
+    )
+    found = ((name, _read_found(top / name / "found")) for name in names)
+    return [
+        (name, len(stored["discoveries"])) for name, stored in found if stored is not None and stored["discoveries"]
+    ]
+
+
 def _stored(source: DiscoveryArchive) -> dict[str, Any] | None:
-    place = source.folder() / "found"
+    return _read_found(source.folder() / "found")
+
+
+def _read_found(place: Place) -> dict[str, Any] | None:
     if not place.is_file():
         return None
     data, standing = derived.unframed(place)

@@ -28,6 +28,7 @@ from pipelines.certificates.ledger import Ledger
 from pipelines.discovery.attributes import Attributes, as_numbers, known_attributes
 from pipelines.discovery.score_store import FOLDER, ScoreStore
 from pipelines.discovery.scored_run import ScoredRun
+from pipelines.parallel import Distributor
 from schemas.errors import WrongUse, did_you_mean
 
 Array = NDArray[np.float64]
@@ -133,10 +134,10 @@ class DiscoveryArchive:
         counts = Counter(info.device for info in self.infos)
         return {one: count for one, count in counts.items() if one != self.device}
 
-    def score(self, workers: int) -> int:
+    def score(self, workers: int, distribute: Distributor | None = None) -> int:
         """Score what is new; the number of runs."""
         with alone(self.archive.root / FOLDER, wait=True):
-            return self.store.add([info.id for info in self.infos], workers)
+            return self.store.add([info.id for info in self.infos], workers, distribute)
 
     @cached_property
     def attributes(self) -> Attributes:
@@ -324,12 +325,15 @@ def _beyond(state: Evidences) -> list[Alarm]:
 
 
 def held(state: Evidences, alarm: Alarm) -> bool:
-    """Whether an alarm may be the station's own wander: the same for a whole lot, of an effect that wanders with stations."""
+    """Whether an alarm may be the station's own: the same for a whole lot, of an effect that wanders or differs with stations."""
     if alarm.place >= state.sensor.count or alarm.driver.endswith(INSIDE) or alarm.driver in {SLOT, UNIT}:
         return False
+    if alarm.driver == MEAN:
+        sure, differ = (bool(each[alarm.place]) for each in state.sensor.over_stations())
+        return not sure and (differ or bool(state.sensor.guarded[alarm.place]))
     several = len(state.sensor.wander.stations) > 1
-    if several and alarm.driver not in {*_STATION_DRIVERS, SEASON}:
-        return False  # predicted by other stations
+    if alarm.driver == STATION or (several and alarm.driver not in {"date", SEASON}):
+        return False  # stations differ in any case; the others are predicted by other stations
     return bool(state.sensor.guarded[alarm.place])
 
 

@@ -23,7 +23,7 @@ from pipelines.archive import Archive, derived, files
 from pipelines.archive.keys import digest
 from pipelines.archive.store import Place
 from pipelines.discovery.scored_run import ScoredRun, scored_runs
-from pipelines.parallel import map_partitions
+from pipelines.parallel import Distributor, map_partitions
 
 Array = NDArray[np.float64]
 
@@ -102,13 +102,15 @@ class ScoreStore:
         """Products of columns, of every file."""
         return [one for file in self.files for one in file.products]
 
-    def add(self, ids: Sequence[str], workers: int) -> int:
+    def add(self, ids: Sequence[str], workers: int, distribute: Distributor | None = None) -> int:
         """Score runs that are not scored yet, in processes; the number of new ones."""
         new = [one for one in ids if one not in self.place]
         if not new:
             return 0
         parts = [(self.archive.address, new[at : at + BATCH]) for at in range(0, len(new), BATCH)]
-        scored = [run for part in map_partitions(_of_part, parts, workers=workers) for run in part]
+        scored = [
+            run for part in map_partitions(_of_part, parts, distribute, workers=workers, name="scores") for run in part
+        ]
         number = 1 + max((int(place.name.split(".")[0]) for place in self._places()), default=0)
         files.publish(self.folder / f"{number:06d}.scores", derived.framed(_written(scored)))
         self.__dict__.pop("files", None)

@@ -8,6 +8,7 @@ from each import each
 from in_process import document_of, given, refused, text_of
 
 from pipelines.archive import Archive
+from pipelines.discovery.findings import discovered_before
 from pipelines.discovery.nights import DiscoveryArchive
 
 
@@ -120,3 +121,19 @@ def test_the_evidence_is_in_order_of_arrival(folder: Path) -> None:
     (entry,) = [json.loads(place.read_bytes()) for place in nights.iterdir()]
     assert entry["runs"] == DiscoveryArchive(Archive(str(folder / "archive"))).pooled()
     assert entry["alarms"]
+
+
+def test_python_and_the_audit_tell_the_same(folder: Path) -> None:
+    import tumbleline
+
+    (row,) = tumbleline.archive(folder / "archive").discoveries().to_dict("records")
+    assert (row["id"], row["driver"]) == ("D1", "wafer")
+    assert discovered_before(Archive(str(folder / "archive"))) == [("DEMO", 1)]
+
+
+def test_scores_on_dask_are_those_of_this_machine(folder: Path, tmp_path: Path) -> None:
+    from pipelines.demo.archive_lots import Line
+    from pipelines.demo.lot_archive import write_lots
+
+    made = write_lots(tmp_path, Line(8), 3)
+    assert document_of("discover", "--archive", made.folder, "--dask", "local", "--workers", "1")["pooled"]["lots"] == 3

@@ -34,7 +34,8 @@ def test_effect_and_driver_are_named_and_nothing_else(effect: str, driver: str) 
     assert effect in name.effects
     assert len(name.effects) <= 4
     assert name.drivers[0] == driver
-    factor, error = pool().confirmed(result.lots[:200], result.lots[200:], driver, effect)
+    factor, error, able = pool().confirmed(result.lots[:100], result.lots[100:200], driver, effect)
+    assert able == 100
     assert factor == pytest.approx(1.0, abs=max(5.0 * error, 0.2))
     assert float(np.mean(pool().carried(result.lots, driver, effect) > 0.0)) > 0.6
 
