@@ -48,6 +48,7 @@ SHORT: dict[str, str] = {
     "procedures": "naming 10",
     "sweep_parameters": "12 1",
     "shock_and_spin": "centrifuge 9",
+    "discovery": "names --archives 6",
 }
 
 

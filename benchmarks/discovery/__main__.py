@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import argparse
 import random
-import time
 from collections.abc import Callable
 from multiprocessing import get_context
 from typing import Any
@@ -17,6 +16,7 @@ import numpy as np
 from scipy import stats
 
 from benchmarks.discovery.archives import ArchiveMaker, Hidden, Setting
+from benchmarks.discovery.cost import cost
 from benchmarks.discovery.lots import WORLDS, World, bank
 from inertial.discovery.naming import Pool
 
@@ -52,10 +52,14 @@ def main() -> None:
     parser.add_argument("what", choices=("null", "power", "names", "cost"))
     parser.add_argument("--archives", type=int, default=20)
     parser.add_argument("--seed", type=int, default=random.SystemRandom().randrange(10**6))
+    parser.add_argument("--lots", type=int, default=10_000, help="of the archive whose cost is measured")
     parser.add_argument("--jobs", type=int, default=2)
     given = parser.parse_args()
     print(f"seed {given.seed}")
-    {"null": null, "power": power, "names": names, "cost": cost}[given.what](given)
+    if given.what == "cost":
+        cost(given.lots, given.seed)
+        return
+    {"null": null, "power": power, "names": names}[given.what](given)
 
 
 def _maker(world: World, seed: int) -> ArchiveMaker:
@@ -147,16 +151,6 @@ def _names(part: tuple[int, int, Hidden]) -> tuple[bool, bool, bool, bool, bool,
     text = "; ".join(f"{' | '.join(one.effects)} by {' | '.join(one.drivers)}" for one in found)
     first = any(one.effects[0] == hidden.effect for one in right)
     return True, bool(right), first, driver, len(found) > len(right[:1]), text
-
-
-def cost(given: argparse.Namespace) -> None:
-    """Seconds of the scores of a lot and of its evidence, as ratios to the fit of the same lot."""
-    begin = time.perf_counter()
-    maker = _maker(WORLDS[0], given.seed)
-    scored = (time.perf_counter() - begin) / BANK
-    begin = time.perf_counter()
-    maker.archive(given.seed, 1000, Hidden(), Setting(), NEEDED)
-    print(f"a lot made, read and scored {1e3 * scored:.0f} ms; evidence {time.perf_counter() - begin:.2f} ms a lot")
 
 
 def _interval(hits: int, n: int) -> str:

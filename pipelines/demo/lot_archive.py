@@ -42,14 +42,14 @@ def write_lots(folder: Path, line: Line, lots: int, progress: Callable[[int], No
         station = STATIONS[number % len(STATIONS)]
         dwells, about = line.lot(station)
         known.append(about[["unit", "wafer"]].rename(columns={"unit": "serial"}))
-        _write_run(archive, number, station, dwells, about)
+        write_run(archive, number, station, dwells, about)
         progress(number + 1)
     units = folder / "units.csv"
     pd.concat(known, ignore_index=True).to_csv(units, index=False)
     return DemoArchive(folder / "archive", units, lots)
 
 
-def _write_run(archive: Archive, number: int, station: str, dwells: pd.DataFrame, about: pd.DataFrame) -> None:
+def write_run(archive: Archive, number: int, station: str, dwells: pd.DataFrame, about: pd.DataFrame) -> None:
     """One run: its dwells, as an import of a simulated lot."""
     when = BEGIN + timedelta(days=number // A_NIGHT, minutes=40 * (number % A_NIGHT))
     units = [{"serial": str(s), "slot": int(k)} for s, k in zip(about["unit"], about["slot"], strict=True)]

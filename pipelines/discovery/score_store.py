@@ -112,7 +112,7 @@ class ScoreStore:
             run for part in map_partitions(_of_part, parts, distribute, workers=workers, name="scores") for run in part
         ]
         number = 1 + max((int(place.name.split(".")[0]) for place in self._places()), default=0)
-        files.publish(self.folder / f"{number:06d}.scores", derived.framed(_written(scored)))
+        files.publish(self.folder / f"{number:06d}.scores", derived.framed(written(scored)))
         self.__dict__.pop("files", None)
         self.__dict__.pop("place", None)
         return len(scored)
@@ -125,7 +125,7 @@ def _of_part(part: tuple[str, Sequence[str]]) -> list[ScoredRun]:
     return scored_runs(*part)
 
 
-def _written(runs: Sequence[ScoredRun]) -> bytes:
+def written(runs: Sequence[ScoredRun]) -> bytes:
     """A file of scores: a table with a row for each run, and the products of each set of columns in its header."""
     groups: dict[str, list[ScoredRun]] = {}
     for run in runs:
