@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import random
+from collections import Counter
 from collections.abc import Callable
 from multiprocessing import get_context
 from typing import Any
@@ -84,7 +85,8 @@ def null(given: argparse.Namespace) -> None:
         parts = [(world, given.seed, given.seed + k, setting) for k in range(given.archives)]
         found = [drivers for drivers in _map(_null, parts, given.jobs) if drivers]
         total, false = total + given.archives, false + len(found)
-        told = ", ".join(sorted({driver for drivers in found for driver in drivers}))
+        counts = Counter(driver for drivers in found for driver in drivers)
+        told = ", ".join(f"{driver} {count}" for driver, count in counts.most_common())
         print(f"{world.name}; {name}: {len(found)} of {given.archives} {told}", flush=True)
     print(f"all: {false} of {total} {_interval(false, total)}")
 

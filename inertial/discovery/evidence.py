@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
 from scipy.special import logsumexp
 
 from inertial.discovery.station_wander import Innovation, Wander
@@ -34,10 +33,8 @@ INSIDE = ", inside lots"
 GUARDED = 2.0
 """Log likelihood that a station's own walk gains, from which on what is constant in a lot may be that."""
 
-DIFFER = 0.05
-"""Probability by chance below which stations are taken to differ: a mean that they do not share is no discovery."""
-
-_UNSURE = 1e-3
+SHARED: float = float(np.log(100.0))
+"""Logarithm of the odds from which on a mean is taken to be of the sensors, and not of the stations' references."""
 
 _MIXED = np.array([0.3, 0.03, 0.003])
 _RATES: Array = np.exp2(np.arange(1.0, -15.0, -1.0))
@@ -193,24 +190,23 @@ class Evidence:
         """Effects (h,) for which the stations wander by themselves: what is constant in a lot may be that."""
         return self.wander.gained > GUARDED
 
-    def over_stations(self) -> tuple[Array, Array]:
-        """Of every effect (h,): whether its mean is beyond what stations differ by, and whether they differ at all.
+    def shared_by_stations(self) -> NDArray[np.bool_]:
+        """Effects (h,) that stations share, by a hundred to one, rather than differ in.
 
-        Stations are few, and each has errors of its own for good: the mean counts against their scatter, by Student's t.
+        The references of each station may have an error of their own for good. Stations about a common mean are compared with
+        stations about zero, at the same scatter: k/2·ln(1 + mean²/s²), where s is their scatter, or the noise if that is larger.
         """
         table, count = self.levels.get(STATION), len(self.wander.stations)
-        no = np.zeros(self.count, dtype=bool)
         if table is None or count < 2 or "between" not in self._scales:
-            return no, ~no
-        n, noise = len(table.place), self._scales["between"].rms ** 2
+            return np.zeros(self.count, dtype=bool)
+        n = len(table.place)
         information = table.information[:n]
         seen = information > 0.0
-        size = np.where(seen, table.score[:n] / np.where(seen, information, 1.0), 0.0) + self._centre()
-        weighted = (information * size).sum(axis=0) / np.maximum(information.sum(axis=0), 1e-300)
-        scatter = (information * (size - weighted) ** 2).sum(axis=0) / noise
-        error = np.maximum(size.std(axis=0, ddof=1), 1e-300) / np.sqrt(n)
-        sure = np.abs(size.mean(axis=0)) > stats.t.ppf(1.0 - 0.5 * _UNSURE, n - 1) * error
-        return sure & seen.all(axis=0), scatter > stats.chi2.ppf(1.0 - DIFFER, n - 1)
+        safe = np.where(seen, information, 1.0)
+        size = np.where(seen, table.score[:n] / safe, 0.0) + self._centre()
+        noise = self._scales["between"].rms ** 2 * np.mean(1.0 / safe, axis=0)
+        odds = 0.5 * n * np.log1p(size.mean(axis=0) ** 2 / np.maximum(size.var(axis=0), noise))
+        return seen.all(axis=0) & (odds > SHARED)
 
     def _begin(self) -> None:
         """Scales from the medians of the first lots; then these lots as if they came now."""

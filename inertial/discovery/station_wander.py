@@ -69,6 +69,11 @@ class Wander:
         """Log likelihood that a walk gains over none, (h,)."""
         return _gained(self.log_likelihood)
 
+    def gained_beside(self, name: str) -> Array:
+        """The same with a driver's predictions in the model, (h,): what the driver does not explain."""
+        known = self.beside.get(name)
+        return np.zeros(self.log_likelihood.shape[1]) if known is None else _gained(known)
+
     def level(self, station: str) -> Level:
         """The state of a station; a new one knows nothing."""
         shape = self.log_likelihood.shape

@@ -58,6 +58,10 @@ def command(
     reach: Annotated[
         bool, typer.Option("--reach", help="Print the smallest effects that this archive could have shown.")
     ] = False,
+    populations: Annotated[
+        bool,
+        typer.Option("--populations", help="Look for two populations in each coefficient, too: a second for each."),
+    ] = False,
     looking_back: Annotated[
         bool,
         typer.Option(
@@ -84,6 +88,7 @@ def command(
             drivers=tuple(part.strip() for part in driver.split(",") if part.strip()),
             effects=_effects(model),
             looking_back=looking_back,
+            populations=populations,
             workers=count,
             distribute=on_dask(dask, count),
         ),

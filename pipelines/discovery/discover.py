@@ -15,6 +15,7 @@ from pipelines.archive import Archive
 from pipelines.discovery.documents import ComparedAlarm, DiscoverDocument, DiscoveryRow
 from pipelines.discovery.findings import Findings, remembered, rows_of_before, size_of
 from pipelines.discovery.nights import DiscoveryArchive, brought_up, fresh, grown_by_days
+from pipelines.discovery.population import populations
 from pipelines.parallel import Distributor
 from schemas.errors import WrongUse, did_you_mean
 from schemas.units import MICRO
@@ -27,6 +28,7 @@ class Look:
     device : kind of device; that of most runs if empty · since : only lots from this day on; nothing is kept then
     drivers : only discoveries of these; all if empty · effects : in the model of every lot beside its own
     looking_back : judge all lots again with every attribute that is known now; nothing is kept then
+    populations : look for two populations in each coefficient
     workers, distribute : processes, or other machines, that score new runs
     """
 
@@ -35,6 +37,7 @@ class Look:
     drivers: tuple[str, ...] = ()
     effects: tuple[str, ...] = ()
     looking_back: bool = False
+    populations: bool = False
     workers: int = 1
     distribute: Distributor | None = None
 
@@ -67,6 +70,8 @@ def discovered(archive: Archive, look: Look) -> Looked:
             document = findings.document(looking_back=True)
         if look.effects:
             findings, document = _with_effects(source, findings, document, look.effects)
+        if look.populations:
+            document["population"] = populations(archive, source.device, look.workers)
     if look.drivers:
         document = _of_drivers(document, look.drivers)
     return Looked(findings, document)

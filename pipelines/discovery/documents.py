@@ -104,7 +104,7 @@ class PopulationRow(TypedDict):
     """A finding on coefficients of many units."""
 
     figure: str
-    kind: Literal["two_populations", "correlation", "spread", "drift"]
+    kind: Literal["two_populations"]
     log_e: float
     detail: dict[str, Any]
 
@@ -154,7 +154,7 @@ class DiscoverDocument(TypedDict):
     discoveries: list[DiscoveryRow]
     held: list[HeldAlarm]
     unexplained: Annotated[list[UnexplainedRow], "evidence that no effect of the catalogue accounts for"]
-    population: Annotated[list[PopulationRow], "of coefficients: empty in this version, see `audit`"]
+    population: Annotated[list[PopulationRow], "with --populations: coefficients whose units are two populations"]
     reach: list[ReachRow]
     unseen: list[UntoldEffect]
     drivers: list[DriverRow]

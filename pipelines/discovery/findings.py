@@ -259,7 +259,7 @@ class Findings:
             )
         k, effect = len(self.state.columns), found.name.effects[0]
         at = [axis * k + int(p) for axis in range(AXES) for p in self.pool.places(effect)]
-        if self.state.sensor.over_stations()[0][at].any():
+        if self.state.sensor.shared_by_stations()[at].any():
             return "sensor", f"all {count} stations show it, and they differ by less than it"
         return "sensor_or_station", f"{count} stations are too few to exclude permanent errors of their references"
 

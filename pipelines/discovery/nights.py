@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.discovery.evidence import INSIDE, MEAN, SLOT, STATION, UNIT, Evidence, ScoredLot
+from inertial.discovery.evidence import GUARDED, INSIDE, MEAN, SLOT, STATION, UNIT, Evidence, ScoredLot
 from pipelines.archive import Archive, derived, files
 from pipelines.archive.locks import alone
 from pipelines.archive.store import Place
@@ -329,12 +329,13 @@ def held(state: Evidences, alarm: Alarm) -> bool:
     if alarm.place >= state.sensor.count or alarm.driver.endswith(INSIDE) or alarm.driver in {SLOT, UNIT}:
         return False
     if alarm.driver == MEAN:
-        sure, differ = (bool(each[alarm.place]) for each in state.sensor.over_stations())
-        return not sure and (differ or bool(state.sensor.guarded[alarm.place]))
-    several = len(state.sensor.wander.stations) > 1
-    if alarm.driver == STATION or (several and alarm.driver not in {"date", SEASON}):
-        return False  # stations differ in any case; the others are predicted by other stations
-    return bool(state.sensor.guarded[alarm.place])
+        shared = bool(state.sensor.shared_by_stations()[alarm.place])
+        return not shared or bool(state.sensor.guarded[alarm.place])
+    if alarm.driver == STATION:
+        return False  # for good or by wander: stations differ
+    wander = state.sensor.wander
+    walk = wander.gained if len(wander.stations) < 2 else wander.gained_beside(alarm.driver)
+    return bool(walk[alarm.place] > GUARDED)
 
 
 def brought_up(source: DiscoveryArchive) -> Evidences:

@@ -49,6 +49,15 @@ def _beside(document: DiscoverDocument) -> None:
         sizes = f"{short(one['size_ug_before'])} → {short(one['size_ug_after'])} µg"
         evidence = f"evidence e^{short(one['log_e_before'])} → e^{short(one['log_e_after'])}"
         say(f"{one['id']} with {one['recommended']} in every lot's model: {sizes}, {evidence}", style="green")
+    for kind in document["population"]:
+        detail = kind["detail"]
+        both = zip(detail["means"], detail["widths"], strict=True)
+        means = " and ".join(f"{short(value)} ± {short(width)}" for value, width in both)
+        share = f"{short(100.0 * detail['share'])} % are the first"
+        say(
+            f"two populations in {kind['figure']} of {detail['units']} units: {means} {detail['unit']}; {share}",
+            style="yellow",
+        )
     for row in document["held"][:_SHOWN_HELD]:
         axis = f" {row['axis']}" if row["axis"] else ""
         say(f"held back: {row['effect']}{axis} by {row['driver']}: {row['reason']}", style="dim")

@@ -5,10 +5,12 @@ import logging
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 
 from pipelines.archive import Archive
+from pipelines.audit.calibrations import Calibrations
 from pipelines.demo.archive_lots import Hidden, Line
 from pipelines.demo.lot_archive import write_lots
 from pipelines.discovery.attributes import add_attributes
@@ -158,3 +160,29 @@ def test_attributes_that_come_later_start_with_the_lots_after_them(archive: Arch
     assert {"name": "supplier", "status": "judged"} in looked_back["drivers"]
     assert looked_back["looking_back"]
     assert len(nights(archive)) == 1
+
+
+def test_two_populations_in_a_coefficient_are_told_with_their_means(
+    archive: Archive, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from pipelines.audit.parameters import NAMES
+    from pipelines.discovery import population
+
+    units = 400
+    rng = np.random.default_rng(3)
+    values = rng.standard_normal((units, len(NAMES)))
+    values[:60, NAMES.index("bias_y")] += 5.0
+    every = Calibrations(
+        *(np.array([f"{name}{k}" for k in range(units)], dtype=object) for name in ("run", "U")),
+        *(np.full(units, name, dtype=object) for name in ("DEMO", "line-1")),
+        np.zeros(units, dtype=np.int64),
+        np.full(units, "pass", dtype=object),
+        np.arange(units, dtype=float),
+        values,
+        np.ones_like(values),
+    )
+    monkeypatch.setattr(population, "load", lambda *_: every)
+    (row,) = discovered(archive, Look(populations=True)).document["population"]
+    assert (row["figure"], row["kind"], row["detail"]["units"]) == ("bias_y", "two_populations", units)
+    assert row["detail"]["share"] == pytest.approx(0.15, abs=0.02)
+    assert row["detail"]["means"][0] == pytest.approx(5.0, abs=0.5)

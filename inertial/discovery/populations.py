@@ -1,0 +1,152 @@
+"""Two populations in a coefficient of many units, against one population of any usual form.
+
+One half of the units fits a mixture of two normal laws; the other half compares it with the best one-peaked law fitted to itself
+(Student's t, a sinh-arcsinh law, or one with a flat top). The ratio of the likelihoods, averaged over both ways, is evidence: its
+mean is one at most where there is one population (Wasserman, Ramdas, Balakrishnan 2020; Jones and Pewsey 2009).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+from scipy import optimize, special
+
+Array = NDArray[np.float64]
+
+FEWEST = 200
+"""Units from which on two populations are looked for."""
+
+MOST = 4000
+"""Units that are used, drawn at random from more."""
+
+_STARTS = (0.02, 0.1, 0.5, 0.9, 0.98)  # shares of the lower population at which the mixture begins
+_STEPS = 300
+_LEAST = -2.5  # of the logarithm of a law's width over the quartiles'
+_NARROW = 0.05  # smallest width of a population over that of all
+
+
+@dataclass(frozen=True)
+class TwoPopulations:
+    """Evidence, and the mixture of all units: means, standard deviations, share of the smaller one."""
+
+    log_e: float
+    means: tuple[float, float]
+    widths: tuple[float, float]
+    share: float
+
+
+def two_populations(values: Array, rng: Generator) -> TwoPopulations | None:
+    """The evidence for two populations; None where there are too few values, or all are alike.
+
+    Parameters
+    ----------
+    values : (n,), a coefficient of each unit once; values that are not finite are left out
+    """
+    known = values[np.isfinite(values)]
+    if known.size < FEWEST:
+        return None
+    if known.size > MOST:
+        known = rng.choice(known, MOST, replace=False)
+    centre = float(np.median(known))
+    scale = float(np.subtract(*np.percentile(known, [75.0, 25.0]))) / 1.349
+    if scale <= 0.0:
+        return None
+    z = rng.permutation((known - centre) / scale)
+    halves = z[0::2], z[1::2]
+    ways = [_mixture_log(other, *_fitted(own)) - _one_peak(other) for own, other in (halves, halves[::-1])]
+    log_e = float(special.logsumexp(ways) - np.log(2.0))
+    weights, means, widths = _fitted(z)
+    small = int(np.argmin(weights))
+    order = (small, 1 - small)
+    return TwoPopulations(
+        log_e,
+        (centre + scale * float(means[order[0]]), centre + scale * float(means[order[1]])),
+        (scale * float(widths[order[0]]), scale * float(widths[order[1]])),
+        float(weights[small]),
+    )
+
+
+def _mixture_log(z: Array, weights: Array, means: Array, widths: Array) -> float:
+    """Log likelihood of values under a mixture."""
+    return float(np.sum(_total(_parts(z, weights, means, widths))))
+
+
+def _total(parts: Array) -> Array:
+    """Log of the sums (n,) of the exponentials of parts (2, n)."""
+    return np.logaddexp(parts[0], parts[1])
+
+
+def _parts(z: Array, weights: Array, means: Array, widths: Array) -> Array:
+    about = (z - means[:, None]) / widths[:, None]
+    return np.log(weights / widths)[:, None] - 0.5 * about**2 - 0.5 * np.log(2.0 * np.pi)
+
+
+def _fitted(z: Array) -> tuple[Array, Array, Array]:
+    """Weights, means and widths of two normal laws by expectation and maximisation, the best of several beginnings."""
+    best: tuple[float, tuple[Array, Array, Array]] | None = None
+    least = _NARROW * float(z.std())
+    for share in _STARTS:
+        edge = np.quantile(z, share)
+        low, high = z[z <= edge], z[z > edge]
+        weights, means = np.array([share, 1.0 - share]), np.array([low.mean(), high.mean()])
+        widths = np.maximum(np.array([low.std(), high.std()]), least)
+        before = -np.inf
+        for _ in range(_STEPS):
+            parts = _parts(z, weights, means, widths)
+            total = _total(parts)
+            mine = np.exp(parts - total)
+            counts = np.maximum(mine.sum(axis=1), 2.0)
+            weights, means = counts / counts.sum(), mine @ z / counts
+            # a floor that is added would widen both at each step
+            widths = np.maximum(np.sqrt((mine * (z - means[:, None]) ** 2).sum(axis=1) / counts), least)
+            now = float(np.sum(total))
+            if now - before < 1e-4:
+                break
+            before = now
+        if best is None or before > best[0]:
+            best = before, (weights, means, widths)
+    if best is None:
+        raise ArithmeticError("no beginning of a mixture")
+    return best[1]
+
+
+def _one_peak(z: Array) -> float:
+    """Largest log likelihood of values under one law: Student's t, sinh-arcsinh, generalised normal."""
+
+    def student(theta: Array) -> float:
+        scale = float(np.clip(theta[1], _LEAST, 5.0))
+        width, nu = np.exp(scale), 1.0 + np.exp(min(float(theta[2]), 8.0))
+        about = (z - theta[0]) / width
+        constant = special.gammaln(0.5 * (nu + 1.0)) - special.gammaln(0.5 * nu) - 0.5 * np.log(nu * np.pi) - scale
+        return -float(constant * z.size - 0.5 * (nu + 1.0) * np.log1p(about**2 / nu).sum())
+
+    def sinh_arcsinh(theta: Array) -> float:
+        # a narrow law with wide tails has a peak of any height at a single value
+        scale = float(np.clip(theta[1], _LEAST, 5.0))
+        width, tails = np.exp(scale), np.exp(np.clip(theta[3], -1.5, 3.0))
+        about = (z - theta[0]) / width
+        inner = np.clip(tails * np.arcsinh(about) - theta[2], -50.0, 50.0)
+        log = np.log(tails) + np.log(np.cosh(inner)) - 0.5 * np.log1p(about**2) - 0.5 * np.sinh(inner) ** 2
+        return -float((log - scale - 0.5 * np.log(2.0 * np.pi)).sum())
+
+    def flat(theta: Array) -> float:
+        scale, power = float(np.clip(theta[1], _LEAST, 5.0)), np.exp(float(np.clip(theta[2], 0.0, 4.0)))
+        about = np.abs(z - theta[0]) / np.exp(scale)
+        constant = np.log(0.5 * power) - scale - special.gammaln(1.0 / power)
+        return -float(constant * z.size - np.minimum(about**power, 1e6).sum())
+
+    fits = [
+        optimize.minimize(flat, [0.0, 0.5, 1.0], method="Nelder-Mead", options={"xatol": 1e-3, "fatol": 1e-2}),
+        optimize.minimize(student, [0.0, 0.0, 2.0], method="Nelder-Mead", options={"xatol": 1e-3, "fatol": 1e-2}),
+        *(
+            optimize.minimize(
+                sinh_arcsinh,
+                [0.0, 0.0, skew, 0.0],
+                method="Nelder-Mead",
+                options={"xatol": 1e-3, "fatol": 1e-2, "maxiter": 800},
+            )
+            for skew in (-0.5, 0.0, 0.5)
+        ),
+    ]
+    return -min(float(fit.fun) for fit in fits)
