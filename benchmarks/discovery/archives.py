@@ -84,7 +84,8 @@ class ArchiveMaker:
     @staticmethod
     def _alarmed(evidence: Evidence, name: str, log_e: Array, needed: float) -> list[int]:
         """Hypotheses of a driver with an alarm that is not held, as the product decides."""
-        from pipelines.discovery.nights import Alarm, Evidences, held
+        from pipelines.discovery.evidence_state import Alarm, Evidences
+        from pipelines.discovery.nights import held
 
         state = Evidences("", tuple(("", k) for k in range(evidence.count // 3)), (), evidence, Evidence(0))
         return [int(p) for p in np.flatnonzero(log_e > needed) if not held(state, Alarm(name, int(p), 0, 0, 0.0))]

@@ -16,7 +16,7 @@ from pipelines.archive import Archive, derived, files
 from pipelines.demo.archive_lots import Line
 from pipelines.demo.lot_archive import write_lots, write_run
 from pipelines.discovery.discover import Look, discovered
-from pipelines.discovery.nights import DiscoveryArchive
+from pipelines.discovery.lot_source import DiscoveryArchive
 from pipelines.discovery.score_store import written
 
 REAL, A_FILE, NIGHT = 60, 500, 20

@@ -33,7 +33,7 @@ INSIDE = ", inside lots"
 GUARDED = 2.0
 """Log likelihood that a station's own walk gains, from which on what is constant in a lot may be that."""
 
-SHARED: float = float(np.log(100.0))
+SHARED: float = float(np.log(300.0))
 """Logarithm of the odds from which on a mean is taken to be of the sensors, and not of the stations' references."""
 
 _MIXED = np.array([0.3, 0.03, 0.003])
@@ -190,8 +190,15 @@ class Evidence:
         """Effects (h,) for which the stations wander by themselves: what is constant in a lot may be that."""
         return self.wander.gained > GUARDED
 
+    @property
+    def noise(self) -> tuple[Array, Array]:
+        """Standard deviations (h,) over the stated ones: of lots about their stations, of units inside lots; one at first."""
+        one = np.ones(self.count)
+        both = (self._scales[name].rms if name in self._scales else one for name in ("between", "inside"))
+        return next(both), next(both)
+
     def shared_by_stations(self) -> NDArray[np.bool_]:
-        """Effects (h,) that stations share, by a hundred to one, rather than differ in.
+        """Effects (h,) that stations share, by three hundred to one, rather than differ in.
 
         The references of each station may have an error of their own for good. Stations about a common mean are compared with
         stations about zero, at the same scatter: k/2·ln(1 + mean²/s²), where s is their scatter, or the noise if that is larger.

@@ -5,20 +5,25 @@ D − k(1 + ln(D/k)), as for a variance that is estimated. Effects within 15 of 
 sums by the products of the columns, and what is left is looked at again.
 """
 
-import warnings
-from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
-from scipy.sparse import linalg
 
 from inertial import effects as effects_catalogue
 from inertial.decisions import CLASS_WIDTH
-from inertial.discovery.evidence import DATE, INSIDE, MEAN, SLOT, STATION, UNIT, ScoredLot
+from inertial.discovery.driver_sums import (
+    INSIDE_ONLY,
+    DriverSums,
+    about_common,
+    fitted_together,
+    gathered,
+    shrinkage,
+    weights_of,
+)
+from inertial.discovery.evidence import INSIDE, MEAN, ScoredLot
 
 Array = NDArray[np.float64]
 
@@ -34,58 +39,8 @@ _SEEN = 1e-3  # share of its information that a column keeps beside another one,
 
 _ALIKE = 0.8  # cosine from which on columns are taken for each other where one of them is known to a few per cent
 
-_INSIDE_ONLY = {SLOT, UNIT}
-
 _REMAINDER = 0.03
 """Part of a named effect's score that its column, taken at the middle of its parameters' range, can leave."""
-
-
-@dataclass
-class DriverSums:
-    """Sums of a driver by level: scores (g, h) and information (g, h), in units of the noise of the lots.
-
-    labels : of the levels; one, "slope" or "all", where the driver has none · weight : (g,), units of each level
-    about : what a number is counted from
-    lots, common : levels in lots, and those of a whole lot
-    """
-
-    labels: list[str] = field(default_factory=list[str])
-    score: Array = field(default_factory=lambda: np.zeros((0, 0)))
-    information: Array = field(default_factory=lambda: np.zeros((0, 0)))
-    weight: Array = field(default_factory=lambda: np.zeros(0))
-    about: float = 0.0
-    common: float = 0.0
-    lots: float = 0.0
-
-    @property
-    def mixed(self) -> bool:
-        """Whether most lots hold several levels: then the products of the columns are those inside lots."""
-        return self.lots > 0.0 and self.common < 0.5 * self.lots
-
-    def add(self, label: str, score: Array, information: Array, weight: float) -> None:
-        """Add to a level."""
-        if label not in self._place:
-            self._place[label] = len(self.labels)
-            self.labels.append(label)
-            if len(self.labels) > len(self.score):
-                more = np.zeros((max(16, len(self.score)), score.size))
-                self.score = np.vstack([self.score, more]) if self.score.size else more.copy()
-                self.information = np.vstack([self.information, more]) if self.information.size else more.copy()
-                self.weight = np.concatenate([self.weight, np.zeros(len(more))])
-        at = self._place[label]
-        self.score[at] += score
-        self.information[at] += information
-        self.weight[at] += weight
-
-    def __post_init__(self) -> None:
-        self._place: dict[str, int] = {}
-
-    def trimmed(self) -> "DriverSums":
-        """Without room for more levels."""
-        n = len(self.labels)
-        return DriverSums(
-            list(self.labels), self.score[:n].copy(), self.information[:n].copy(), self.weight[:n].copy(), self.about
-        )
 
 
 @dataclass(frozen=True)
@@ -193,11 +148,11 @@ class Pool:
         at, count = self.places(effect), len(self.columns)
         here = np.arange(self.axes)[:, None] * count + at
         info = sums.information[:, here.reshape(-1)]
-        size = _about(driver, sums)[:, here.reshape(-1)] / np.where(info > 0.0, info, np.inf)
-        if sums.mixed and driver not in _INSIDE_ONLY and len(sums.labels) > 1:
-            size = np.stack([_together(lots, driver, sums, int(one)) for one in here.reshape(-1)], axis=1)
+        size = about_common(driver, sums)[:, here.reshape(-1)] / np.where(info > 0.0, info, np.inf)
+        if sums.mixed and driver not in INSIDE_ONLY and len(sums.labels) > 1:
+            size = np.stack([fitted_together(lots, driver, sums, int(one)) for one in here.reshape(-1)], axis=1)
         elif len(sums.labels) > 1:
-            size = size * _shrinkage(size, info)
+            size = size * shrinkage(size, info)
         return np.moveaxis(size.reshape(-1, self.axes, at.size), 1, 0)
 
     def _again(self, lots: Sequence[ScoredLot], drivers: Sequence[str]) -> dict[str, dict[str, float]]:
@@ -248,13 +203,13 @@ class Pool:
 
     def _expected(self, lot: ScoredLot, driver: str, sums: DriverSums) -> Array:
         """What :meth:`_predicted` is on average if the prediction holds, (h,)."""
-        weights = _weights(lot, driver, sums)
-        centred = _about(driver, sums)
+        weights = weights_of(lot, driver, sums)
+        centred = about_common(driver, sums)
         of_units = weights @ (centred / np.where(sums.information > 0.0, sums.information, np.inf))
         total = np.maximum(lot.own.sum(axis=0), 1e-300)
         common = (of_units * lot.own).sum(axis=0) / total
         inside = ((of_units - common) ** 2 * lot.own).sum(axis=0)
-        return inside if driver in _INSIDE_ONLY else inside + common**2 * lot.information
+        return inside if driver in INSIDE_ONLY else inside + common**2 * lot.information
 
     @cached_property
     def effects(self) -> list[str]:
@@ -272,11 +227,11 @@ class Pool:
 
     def _predicted(self, lot: ScoredLot, driver: str, sums: DriverSums) -> Array:
         """Product (h,) of what a lot shows and what other lots predict of it."""
-        weights = _weights(lot, driver, sums)
-        centred = _about(driver, sums)
+        weights = weights_of(lot, driver, sums)
+        centred = about_common(driver, sums)
         size = centred / np.where(sums.information > 0.0, sums.information, np.inf)
         of_units = weights @ size
-        if driver in _INSIDE_ONLY:
+        if driver in INSIDE_ONLY:
             total = np.maximum(lot.own.sum(axis=0), 1e-300)
             of_units = of_units - (of_units * lot.own).sum(axis=0) / total
             return ((lot.score - lot.own * lot.score.sum(axis=0) / total) * of_units).sum(axis=0)
@@ -285,7 +240,7 @@ class Pool:
     def without(self, lot: ScoredLot, driver: str, effect: str, sums: DriverSums, sizes: Array) -> ScoredLot:
         """A lot without sizes (axes, levels, p) of an effect: algebra on its sums, no dwell is read again."""
         at, count, units = self.places(effect), len(self.columns), len(lot.units)
-        weights = _weights(lot, driver, sums)
+        weights = weights_of(lot, driver, sums)
         if not weights.any():
             return lot
         score = lot.score.copy()
@@ -331,7 +286,7 @@ class Pool:
         for effect in dict.fromkeys(one for one, _ in self.columns):
             at = self.places(effect)
             drop, rank = self._drop(name, sums, at)
-            k = float(np.sum(rank) - (np.count_nonzero(rank) if name in _INSIDE_ONLY else 0))
+            k = float(np.sum(rank) - (np.count_nonzero(rank) if name in INSIDE_ONLY else 0))
             out[effect] = max(drop - k * (1.0 + np.log(drop / k)), 0.0) if k > 0.0 and drop > k else 0.0
         return out
 
@@ -339,8 +294,8 @@ class Pool:
         """Fall of the misfit by an effect's columns, and the number of coefficients of each axis and column."""
         count = len(self.columns)
         total, rank = 0.0, np.zeros((self.axes, at.size))
-        products = self.inside if name in _INSIDE_ONLY or sums.mixed else self.lot
-        centred = _about(name, sums)
+        products = self.inside if name in INSIDE_ONLY or sums.mixed else self.lot
+        centred = about_common(name, sums)
         for axis in range(self.axes):
             here = axis * count + at
             info = sums.information[:, here]
@@ -367,87 +322,9 @@ class Pool:
         info = sums.information[:, here]
         seen = info > 0.0
         safe = np.where(seen, info, 1.0)
-        sizes = np.where(seen, _about(driver, sums)[:, here] / safe, 0.0) * self.size[here]
+        sizes = np.where(seen, about_common(driver, sums)[:, here] / safe, 0.0) * self.size[here]
         errors = np.where(seen, 1.0 / np.sqrt(safe), np.inf) * self.size[here]
         return Name(tuple(effects), tuple(drivers), tuple(sums.labels), sums.weight, sizes, errors, top)
-
-
-def gathered(lots: Sequence[ScoredLot], drivers: Sequence[str]) -> dict[str, DriverSums]:
-    """Sums of drivers over lots: between and inside lots together."""
-    means = _station_means(lots)
-    noise, within = _noise(lots, means)
-    out = {name: DriverSums() for name in drivers}
-    about = {name: _mean_number(lots, name) for name in drivers}
-    seen = Counter(unit for lot in lots for unit in lot.units) if UNIT in out else Counter[str]()
-    for lot in lots:
-        _gather(lot, out, means[lot.station], (noise, within), about, seen)
-    return {name: sums.trimmed() for name, sums in out.items() if sums.labels}
-
-
-def _mean_number(lots: Sequence[ScoredLot], name: str) -> float:
-    values = [
-        lot.day if name == DATE else float(lot.numbers[name].mean())
-        for lot in lots
-        if name == DATE or name in lot.numbers
-    ]
-    return float(np.nanmean(values)) if values else 0.0
-
-
-def _shrinkage(size: Array, information: Array) -> Array:
-    """Factors (p,) by which the sizes of levels are drawn to zero: the part of their variance that is not noise."""
-    seen = information > 0.0
-    noise = np.where(seen, 1.0 / np.where(seen, information, 1.0), 0.0).sum(axis=0)
-    return np.clip(1.0 - noise / np.maximum((size**2).sum(axis=0), 1e-300), 0.0, 1.0)
-
-
-def _together(lots: Sequence[ScoredLot], driver: str, sums: DriverSums, h: int) -> Array:
-    """Sizes (levels,) of one hypothesis by least squares over all lots: what units differ by, and what each lot has in common."""
-    rows: list[Array] = []
-    columns: list[NDArray[np.intp]] = []
-    values: list[Array] = []
-    target: list[Array] = []
-    first = 0
-    for lot in lots:
-        weights, own, info = _weights(lot, driver, sums), lot.own[:, h], float(lot.information[h])
-        total = float(own.sum())
-        if total <= 0.0:
-            continue
-        share = own / total @ weights
-        score = lot.score[:, h]
-        root = np.sqrt(own)
-        inside = root[:, None] * (weights - share)
-        block = np.vstack([inside, np.sqrt(max(info, 0.0)) * share])
-        here = np.flatnonzero(block.any(axis=0))
-        left = (score - own * score.sum() / total) / np.where(root > 0.0, root, 1.0)
-        target.append(np.append(left, score.sum() / np.sqrt(info) if info > 0.0 else 0.0))
-        rows.append(np.repeat(np.arange(first, first + len(block)), here.size).astype(np.float64))
-        columns.append(np.tile(here, len(block)))
-        values.append(block[:, here].reshape(-1))
-        first += len(block)
-    if not rows:
-        return np.zeros(len(sums.labels))
-    shape = first, len(sums.labels)
-    places = np.concatenate(rows).astype(np.intp), np.concatenate(columns)
-    matrix = sparse.csr_matrix((np.concatenate(values), places), shape=shape)
-    return np.asarray(linalg.lsqr(matrix, np.concatenate(target), damp=1e-9)[0], dtype=np.float64)
-
-
-def _weights(lot: ScoredLot, driver: str, sums: DriverSums) -> Array:
-    """How much of each level is in each unit, (units, levels)."""
-    units = len(lot.units)
-    out = np.zeros((units, len(sums.labels)))
-    if driver == MEAN:
-        out[:] = 1.0
-    elif driver == DATE or driver in lot.numbers:
-        numbers = np.full(units, lot.day) if driver == DATE else lot.numbers[driver]
-        out[:, 0] = np.where(np.isfinite(numbers), numbers - sums.about, 0.0)
-    else:
-        labels = (lot.station,) * units if driver == STATION else lot.levels.get(driver, ())
-        place = {label: k for k, label in enumerate(sums.labels)}
-        for unit, label in enumerate(labels):
-            if label in place:
-                out[unit, place[label]] = 1.0
-    return out
 
 
 def _correlation(products: Array) -> Array:
@@ -455,93 +332,3 @@ def _correlation(products: Array) -> Array:
     root = np.sqrt(np.maximum(np.diagonal(products, axis1=1, axis2=2), 0.0))
     both = root[:, :, None] * root[:, None, :]
     return np.where(both > 0.0, products / np.where(both > 0.0, both, 1.0), 0.0)
-
-
-def _about(driver: str, sums: DriverSums) -> Array:
-    """Scores (g, h) of levels; of a driver that is seen inside lots only, about what all levels have in common."""
-    if driver not in _INSIDE_ONLY or len(sums.labels) < 2:
-        return sums.score
-    total = sums.information.sum(axis=0)
-    mean = sums.score.sum(axis=0) / np.where(total > 0.0, total, 1.0)
-    return sums.score - sums.information * mean
-
-
-def _station_means(lots: Sequence[ScoredLot]) -> dict[str, Array]:
-    """Mean size (h,) of each station's lots."""
-    score, info = dict[str, Array](), dict[str, Array]()
-    for lot in lots:
-        zero = np.zeros(lot.information.size)
-        score[lot.station] = score.get(lot.station, zero) + np.where(lot.information > 0.0, lot.score.sum(axis=0), 0.0)
-        info[lot.station] = info.get(lot.station, zero) + lot.information
-    return {station: score[station] / np.where(info[station] > 0.0, info[station], 1.0) for station in score}
-
-
-def _noise(lots: Sequence[ScoredLot], means: Mapping[str, Array]) -> tuple[float, float]:
-    """Variance of lots about their stations over the stated one, and of units inside lots: medians over effects and lots."""
-    between, within = list[Array](), list[Array]()
-    for lot in lots:
-        info = np.where(lot.information > 0.0, lot.information, np.nan)
-        between.append((lot.score.sum(axis=0) - lot.information * means[lot.station]) ** 2 / info)
-        total = np.maximum(lot.own.sum(axis=0), 1e-300)
-        free = lot.own * (1.0 - lot.own / total)
-        left = lot.score - lot.own * lot.score.sum(axis=0) / total
-        within.append(np.mean(left**2 / np.where(free > 0.0, free, np.nan), axis=0))
-    with np.errstate(all="ignore"), warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)  # an effect that no lot shows is nan for all of them
-        many = np.nanmedian(np.clip(np.array(between), 0.0, np.nanquantile(between, 0.99)), axis=0) / 0.455
-        few = np.nanmedian(np.array(within), axis=0)
-    return float(np.nanmedian(many[many > 0.0])), float(np.nanmedian(few[few > 0.0]))
-
-
-def _gather(
-    lot: ScoredLot,
-    out: Mapping[str, DriverSums],
-    mean: Array,
-    scale: tuple[float, float],
-    about: Mapping[str, float],
-    seen: Mapping[str, int],
-) -> None:
-    """Add a lot to the sums of drivers; a unit that was measured once says nothing of what stays with a unit."""
-    noise, within = scale
-    own, total = lot.own, np.maximum(lot.own.sum(axis=0), 1e-300)
-    info = lot.information
-    sums = np.where(info > 0.0, lot.score.sum(axis=0), 0.0)
-    units = len(lot.units)
-    left = lot.score - own * lot.score.sum(axis=0) / total
-    for name, of in out.items():
-        if name == MEAN:
-            of.add("all", sums / noise, info / noise, units)
-        elif name == STATION:
-            of.add(lot.station, sums / noise, info / noise, units)
-        elif name == DATE or name in lot.numbers:
-            numbers = np.full(units, lot.day) if name == DATE else lot.numbers[name]
-            of.about = about[name]
-            _gather_number(of, numbers - about[name], (lot, left, mean, noise, within))
-        elif name == UNIT or name in lot.levels:
-            labels = lot.units if name == UNIT else lot.levels[name]
-            for label in dict.fromkeys(labels):
-                here = np.array([one == label for one in labels])
-                mine = own[here].sum(axis=0)
-                score = left[here].sum(axis=0) / within
-                information = mine * (1.0 - mine / total) / within
-                if name not in _INSIDE_ONLY:  # and what the lot has in common
-                    share = mine / total
-                    score = score + share * sums / noise
-                    information = information + share**2 * info / noise
-                    of.common += float(here.sum() == units)
-                of.lots += 1.0
-                if label and (name != UNIT or seen[label] > 1):
-                    of.add(label, score, information, float(here.sum()))
-
-
-def _gather_number(of: DriverSums, numbers: Array, parts: tuple[ScoredLot, Array, Array, float, float]) -> None:
-    """Add a lot to the regression on a number; the offset and the slope of the number are taken out by its mean beforehand."""
-    lot, left, mean, noise, within = parts
-    if not np.isfinite(numbers).all():
-        return
-    own, total = lot.own, np.maximum(lot.own.sum(axis=0), 1e-300)
-    centre = float(numbers.mean())
-    about = numbers[:, None] - (numbers[:, None] * own).sum(axis=0) / total
-    score = (about * left).sum(axis=0) / within + centre * (lot.score.sum(axis=0) - lot.information * mean) / noise
-    information = (about**2 * own).sum(axis=0) / within + centre**2 * lot.information / noise
-    of.add("slope", score, information, float(len(lot.units)))

@@ -13,8 +13,11 @@ from inertial.discovery.evidence import INSIDE, ScoredLot
 from inertial.discovery.naming import Pool
 from pipelines.archive import Archive
 from pipelines.discovery.documents import ComparedAlarm, DiscoverDocument, DiscoveryRow
-from pipelines.discovery.findings import Findings, remembered, rows_of_before, size_of
-from pipelines.discovery.nights import DiscoveryArchive, brought_up, fresh, grown_by_days
+from pipelines.discovery.figures_of_name import size_of
+from pipelines.discovery.findings import Findings
+from pipelines.discovery.kept_findings import remembered, rows_of_before
+from pipelines.discovery.lot_source import DiscoveryArchive
+from pipelines.discovery.nights import brought_up, fresh, grown_by_days
 from pipelines.discovery.population import populations
 from pipelines.parallel import Distributor
 from schemas.errors import WrongUse, did_you_mean

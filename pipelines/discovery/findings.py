@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from functools import cached_property
-from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,11 +13,8 @@ from scipy import stats
 from inertial.counts import number_of
 from inertial.discovery.evidence import DATE, FIRST, INSIDE, MEAN, SLOT, STATION, UNIT, ScoredLot, Sums
 from inertial.discovery.naming import Name, Pool
-from pipelines.archive import Archive, derived, files
-from pipelines.archive.store import Place
 from pipelines.discovery.documents import (
     DiscoverDocument,
-    DiscoveredLevel,
     DiscoveryRow,
     DriverRow,
     HeldAlarm,
@@ -28,19 +22,26 @@ from pipelines.discovery.documents import (
     UnexplainedRow,
     UntoldEffect,
 )
-from pipelines.discovery.nights import ALPHA, AXES, SEASON, Alarm, DiscoveryArchive, Evidences, held, hypothesis
-from pipelines.discovery.score_store import FOLDER
-from pipelines.tables.json_values import json_value
+from pipelines.discovery.evidence_state import ALPHA, Alarm, Evidences, hypothesis
+from pipelines.discovery.figures_of_name import (
+    Scope,
+    by_axis,
+    levels_of,
+    next_of,
+    plain,
+    size_of,
+    station_sizes,
+    without_largest,
+)
+from pipelines.discovery.lot_source import AXES, SEASON, DiscoveryArchive
+from pipelines.discovery.nights import held
 from schemas.units import MICRO
 
 Array = NDArray[np.float64]
-Scope = Literal["sensor", "station", "sensor_or_station", "thermometer"]
 
 LATER = 20  # lots after an alarm from which on they confirm or do not
 MOST_NAMED = 3000  # lots that the names are found with: evenly spread ones of a larger archive
 _CONFIRMED = 2.05  # standard errors beyond none (two sided 4 %), as for a fresh run
-_GROWN = 1.05  # more lots than this factor: the names are found again
-_SHOWN_LEVELS = 40
 _SOME = 50
 
 
@@ -116,11 +117,11 @@ class Findings:
         names = self.pool.names(self.lots, [(alarm.driver, self._effect(alarm)) for alarm in of_sensor], needed)
         out: list[Discovery] = []
         for name in names:
-            alarms = [a for a in of_sensor if _plain(a.driver) in name.drivers and self._effect(a) in name.effects]
+            alarms = [a for a in of_sensor if plain(a.driver) in name.drivers and self._effect(a) in name.effects]
             if not alarms:
                 continue
             since = min(alarms, key=lambda a: (a.lots, -a.log_e))
-            raised = {_plain(a.driver) for a in alarms}
+            raised = {plain(a.driver) for a in alarms}
             drivers = tuple(one for one in name.drivers if one in raised) or (name.drivers[0],)
             out.append(Discovery(name, since, drivers, *self._carried(name, since)))
         return sorted(out, key=lambda one: one.since.lots)
@@ -199,9 +200,7 @@ class Findings:
             "lots_then": found.since.lots,
             "effects": list(name.effects),
             "recommended": name.effects[0],
-            "axes": [
-                a for a, of_axis in zip("xyz", _by_axis(name), strict=True) if of_axis > 0.25 * max(_by_axis(name))
-            ],
+            "axes": [a for a, of_axis in zip("xyz", by_axis(name), strict=True) if of_axis > 0.25 * max(by_axis(name))],
             "driver": driver,
             "drivers": list(found.drivers),
             "kind": "mean" if driver == MEAN else "slope" if name.labels == ("slope",) else "levels",
@@ -211,15 +210,15 @@ class Findings:
             "log_e": round(log_e, 2),
             "scope": scope,
             "because": because,
-            "levels": _levels(name),
+            "levels": levels_of(name),
             "carried_by": {
                 "lots_for": float(np.mean(found.carried > 0.0)),
-                "log_e_without_largest_2_percent": round(_without_largest(found.carried), 2),
+                "log_e_without_largest_2_percent": round(without_largest(found.carried), 2),
             },
             "confirmed": None
             if found.confirmed is None
             else bool(found.confirmed[0] > _CONFIRMED * found.confirmed[1]),
-            "next": _next(driver, scope),
+            "next": next_of(driver, scope),
         }
         if found.confirmed is not None:
             row["confirmed_factor"] = [round(value, 3) for value in found.confirmed]
@@ -229,13 +228,13 @@ class Findings:
         """Sums and places of the hypotheses of a name."""
         state, k = self.state, len(self.state.columns)
         at = [axis * k + int(p) for axis in range(AXES) for p in self.pool.places(name.effects[0])]
-        sums = [state.sensor.drivers[one] for one in state.sensor.drivers if _plain(one) in drivers]
+        sums = [state.sensor.drivers[one] for one in state.sensor.drivers if plain(one) in drivers]
         return [(each, place) for each in sums for place in at]
 
     def _scope(self, found: Discovery) -> tuple[Scope, str]:
         """Whether the sensor or the station has it, and why that is said."""
         driver, stations = found.drivers[0], self.state.sensor.wander.stations
-        inside = any(a.driver.endswith(INSIDE) for a in self.open_alarms if _plain(a.driver) == driver)
+        inside = any(a.driver.endswith(INSIDE) for a in self.open_alarms if plain(a.driver) == driver)
         if driver == STATION:
             return (
                 "station",
@@ -288,11 +287,11 @@ class Findings:
         effect, column, _ = hypothesis(self.state, alarm.place)
         at = alarm.place - self.state.sensor.count
         station = self.state.station
-        sizes = _station_sizes(station, at)
+        sizes = station_sizes(station, at)
         alike = [
             self._effect(a) for a in self.open_alarms if a.place >= self.state.sensor.count and a.driver == alarm.driver
         ]
-        scale = float(station._scales["between"].rms[at]) if station.lots >= FIRST else 1.0  # noqa: SLF001
+        scale = float(station.noise[0][at])
         values = np.array([value for value, _ in sizes.values()])
         errors = np.array([scale * error for _, error in sizes.values()])
         size = float(np.sqrt(np.mean(values**2)))
@@ -347,12 +346,12 @@ class Findings:
         told = {driver for row in rows for driver in row["drivers"]} | ({MEAN} if rows else set())
         out: dict[str, UnexplainedRow] = {}
         for alarm in sorted(self.open_alarms, key=self._log_e, reverse=True):
-            if alarm.place < self.state.sensor.count and _plain(alarm.driver) not in told and not rows:
+            if alarm.place < self.state.sensor.count and plain(alarm.driver) not in told and not rows:
                 effect, _, axis = hypothesis(self.state, alarm.place)
                 out.setdefault(
-                    _plain(alarm.driver),
+                    plain(alarm.driver),
                     {
-                        "driver": _plain(alarm.driver),
+                        "driver": plain(alarm.driver),
                         "nearest": effect,
                         "axes": [axis],
                         "map": [],
@@ -366,7 +365,7 @@ class Findings:
         state, lots = self.state, len(self.state.order)
         if lots < FIRST:
             return []
-        between, within = state.sensor._scales["between"].rms, state.sensor._scales["inside"].rms  # noqa: SLF001
+        between, within = state.sensor.noise
         own = np.mean([lot.own.sum(axis=0) for lot in self.some], axis=0) * lots
         times = np.sqrt(2.0 * (state.needed(MEAN) + 0.5 * np.log1p(0.03 * lots))) + stats.norm.ppf(0.95)
         rows: list[ReachRow] = []
@@ -404,7 +403,7 @@ class Findings:
         return rows
 
     def _drivers(self) -> list[DriverRow]:
-        rows = [{"name": name, "status": "judged"} for name in dict.fromkeys(map(_plain, self.state.sensor.drivers))]
+        rows = [{"name": name, "status": "judged"} for name in dict.fromkeys(map(plain, self.state.sensor.drivers))]
         known = {row["name"] for row in rows}
         labels = {
             name: {
@@ -440,139 +439,3 @@ class Findings:
                 "one station: what is the same for whole lots may be its own wander; units measured on two stations would tell"
             )
         return out
-
-
-def _plain(driver: str) -> str:
-    return driver.removesuffix(INSIDE)
-
-
-def _by_axis(name: Name) -> list[float]:
-    """Rms of the sizes of each axis over the levels, its noise taken off, g."""
-    weight = name.weights / max(float(name.weights.sum()), 1e-300)
-    there = np.isfinite(name.errors)
-    squares = np.where(there, name.sizes**2 - name.errors**2, 0.0)
-    return [float(value) for value in np.sqrt(np.maximum((weight[:, None] * squares).sum(axis=0), 0.0))]
-
-
-def size_of(name: Name) -> tuple[float, float, float]:
-    """Rms over levels and axes with its 95 % interval, g."""
-    weight = name.weights / max(float(name.weights.sum()), 1e-300)
-    there = np.isfinite(name.errors)
-    errors = np.where(there, name.errors, 0.0)
-    squares = np.where(there, name.sizes**2 - errors**2, 0.0)
-    each = weight[:, None] / 3.0
-    mean = float((each * squares).sum())
-    spread = 2.0 * float(np.sqrt((each**2 * (4.0 * name.sizes**2 * errors**2 + 2.0 * errors**4)).sum()))
-    return tuple(float(np.sqrt(max(value, 0.0))) for value in (mean, mean - spread, mean + spread))  # type: ignore[return-value]
-
-
-def _levels(name: Name) -> list[DiscoveredLevel]:
-    """Levels in the order of their size, of the axis that differs most."""
-    axis = int(np.argmax(_by_axis(name)))
-    order = np.argsort(-np.abs(name.sizes[:, axis]))[:_SHOWN_LEVELS]
-    return [
-        {
-            "level": name.labels[at],
-            "size_ug": MICRO * float(name.sizes[at, axis]),
-            "u_ug": MICRO * float(name.errors[at, axis]),
-            "units": int(name.weights[at]),
-        }
-        for at in order
-        if np.isfinite(name.errors[at, axis])
-    ]
-
-
-def _station_sizes(station: Any, at: int) -> dict[str, tuple[float, float]]:
-    """Size of a column at each station and its standard error at the stated noise."""
-    table = station.levels[STATION]
-    centre = station.score[at] / max(station.information[at], 1e-300)
-    out: dict[str, tuple[float, float]] = {}
-    for label, place in table.place.items():
-        information = max(float(table.information[place, at]), 1e-300)
-        out[label] = float(table.score[place, at] / information + centre), float(1.0 / np.sqrt(information))
-    return out
-
-
-def _without_largest(carried: Array) -> float:
-    """Evidence of contributions without the two per cent that speak most."""
-    kept = np.sort(carried)[: max(1, int(0.98 * carried.size))]
-    sums = Sums.of(1, two_sided=False)
-    rms = float(np.sqrt(np.mean(kept**2))) or 1.0
-    for value in kept / rms:
-        sums.add(np.array([value]))
-    return float(sums.log_e[0])
-
-
-def _next(driver: str, scope: Scope) -> str:
-    if scope == "sensor_or_station":
-        return "measure some of the same units on another station: what stays with the units is theirs"
-    if driver == SLOT:
-        return "exchange units between slots, or check the fixture at this slot"
-    if driver == STATION:
-        return "measure the same units on two of these stations, and check their references"
-    return "add the effect to the model of the next lots: 'tumbleline extend', then 'tumbleline discover --model'"
-
-
-def alarm_key(state: Evidences) -> list[str]:
-    """The alarms of a state as text: while they are the same, so are the names."""
-    return sorted(f"{alarm.driver} {alarm.place}" for alarm in state.alarms if not held(state, alarm))
-
-
-def rows_of_before(source: DiscoveryArchive, state: Evidences) -> list[DiscoveryRow] | None:
-    """The discoveries of the last night, where no alarm is new and few lots came in since; None where they are found again."""
-    before = _stored(source)
-    if before is None or before["alarms"] != alarm_key(state) or len(state.order) > _GROWN * before["lots"]:
-        return None
-    return before["discoveries"]
-
-
-def discovered_before(archive: Archive) -> list[tuple[str, int]]:
-    """Kinds of devices with discoveries of an earlier look, and their number; nothing is judged."""
-    top = archive.root / FOLDER
-    names = (
-        sorted(place.name for place in top.iterdir() if place.name not in {"scores", "lock"}) if top.is_dir() else []
-    )
-    found = ((name, _read_found(top / name / "found")) for name in names)
-    return [
-        (name, len(stored["discoveries"])) for name, stored in found if stored is not None and stored["discoveries"]
-    ]
-
-
-def _stored(source: DiscoveryArchive) -> dict[str, Any] | None:
-    return _read_found(source.folder() / "found")
-
-
-def _read_found(place: Place) -> dict[str, Any] | None:
-    if not place.is_file():
-        return None
-    data, standing = derived.unframed(place)
-    return json.loads(data) if standing == derived.SOUND else None
-
-
-def remembered(source: DiscoveryArchive, state: Evidences, document: DiscoverDocument) -> DiscoverDocument:
-    """Keep a document beside the evidence, so that discoveries have the same ids the next time."""
-    stored = _stored(source) or {"discoveries": [], "lots": 0}
-    before: list[dict[str, Any]] = stored["discoveries"]
-    used, free = {row["id"] for row in before}, list(before)
-    numbers = (f"D{n}" for n in range(1, 10_000))
-    for row in document["discoveries"]:
-        same = next(
-            (old for old in free if old["driver"] == row["driver"] and set(old["effects"]) & set(row["effects"])), None
-        )
-        if same is not None:
-            free.remove(same)
-            row["id"], row["since"], row["lots_then"] = same["id"], same["since"], same["lots_then"]
-        else:
-            row["id"] = next(one for one in numbers if one not in used)
-            used.add(row["id"])
-    known = {row["id"] for row in before}
-    document["new"] = [row["id"] for row in document["discoveries"] if row["id"] not in known]
-    kept = {
-        "discoveries": document["discoveries"],
-        "lots": len(state.order),
-        "alarms": alarm_key(state),
-        "when": datetime.now(UTC).isoformat(timespec="seconds"),
-    }
-    if stored.get("alarms") != kept["alarms"] or len(state.order) > _GROWN * stored["lots"]:
-        files.publish(source.folder() / "found", derived.framed(json.dumps(json_value(kept), sort_keys=True).encode()))
-    return document

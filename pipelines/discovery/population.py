@@ -10,7 +10,7 @@ from pipelines.audit.calibrations import dated_runs, first_runs, load
 from pipelines.audit.index import up_to_date
 from pipelines.audit.parameters import FAMILIES, FAMILY_OF, NAMES, unit_text
 from pipelines.discovery.documents import PopulationRow
-from pipelines.discovery.nights import ALPHA
+from pipelines.discovery.evidence_state import ALPHA
 
 _SEED = 20
 

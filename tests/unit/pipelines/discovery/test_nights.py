@@ -15,7 +15,8 @@ from pipelines.demo.archive_lots import Hidden, Line
 from pipelines.demo.lot_archive import write_lots
 from pipelines.discovery.attributes import add_attributes
 from pipelines.discovery.discover import Look, discovered
-from pipelines.discovery.nights import DiscoveryArchive, brought_up
+from pipelines.discovery.lot_source import DiscoveryArchive
+from pipelines.discovery.nights import brought_up
 from pipelines.discovery.score_store import ScoreStore
 
 LOTS = 64
@@ -173,13 +174,15 @@ def test_two_populations_in_a_coefficient_are_told_with_their_means(
     values = rng.standard_normal((units, len(NAMES)))
     values[:60, NAMES.index("bias_y")] += 5.0
     every = Calibrations(
-        *(np.array([f"{name}{k}" for k in range(units)], dtype=object) for name in ("run", "U")),
-        *(np.full(units, name, dtype=object) for name in ("DEMO", "line-1")),
-        np.zeros(units, dtype=np.int64),
-        np.full(units, "pass", dtype=object),
-        np.arange(units, dtype=float),
-        values,
-        np.ones_like(values),
+        run=np.array([f"r{k}" for k in range(units)], dtype=object),
+        unit=np.array([f"U{k}" for k in range(units)], dtype=object),
+        device=np.full(units, "DEMO", dtype=object),
+        station=np.full(units, "line-1", dtype=object),
+        slot=np.zeros(units, dtype=np.int64),
+        outcome=np.full(units, "pass", dtype=object),
+        day=np.arange(units, dtype=float),
+        values=values,
+        errors=np.ones_like(values),
     )
     monkeypatch.setattr(population, "load", lambda *_: every)
     (row,) = discovered(archive, Look(populations=True)).document["population"]

@@ -1,0 +1,234 @@
+"""Sums of a driver over all lots, level by level, and how much of each level is in a lot: what names are found with."""
+
+import warnings
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse import linalg
+
+from inertial.discovery.evidence import DATE, MEAN, SLOT, STATION, UNIT, ScoredLot
+
+Array = NDArray[np.float64]
+
+INSIDE_ONLY = {SLOT, UNIT}
+"""Drivers that are judged by differences inside a lot alone."""
+
+
+@dataclass
+class DriverSums:
+    """Sums of a driver by level: scores (g, h) and information (g, h), in units of the noise of the lots.
+
+    labels : of the levels; one, "slope" or "all", where the driver has none · weight : (g,), units of each level
+    about : what a number is counted from
+    lots, common : levels in lots, and those of a whole lot
+    """
+
+    labels: list[str] = field(default_factory=list[str])
+    score: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    information: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    weight: Array = field(default_factory=lambda: np.zeros(0))
+    about: float = 0.0
+    common: float = 0.0
+    lots: float = 0.0
+
+    @property
+    def mixed(self) -> bool:
+        """Whether most lots hold several levels: then the products of the columns are those inside lots."""
+        return self.lots > 0.0 and self.common < 0.5 * self.lots
+
+    def add(self, label: str, score: Array, information: Array, weight: float) -> None:
+        """Add to a level."""
+        if label not in self._place:
+            self._place[label] = len(self.labels)
+            self.labels.append(label)
+            if len(self.labels) > len(self.score):
+                more = np.zeros((max(16, len(self.score)), score.size))
+                self.score = np.vstack([self.score, more]) if self.score.size else more.copy()
+                self.information = np.vstack([self.information, more]) if self.information.size else more.copy()
+                self.weight = np.concatenate([self.weight, np.zeros(len(more))])
+        at = self._place[label]
+        self.score[at] += score
+        self.information[at] += information
+        self.weight[at] += weight
+
+    def __post_init__(self) -> None:
+        self._place: dict[str, int] = {}
+
+    def trimmed(self) -> "DriverSums":
+        """Without room for more levels."""
+        n = len(self.labels)
+        return DriverSums(
+            list(self.labels), self.score[:n].copy(), self.information[:n].copy(), self.weight[:n].copy(), self.about
+        )
+
+
+def gathered(lots: Sequence[ScoredLot], drivers: Sequence[str]) -> dict[str, DriverSums]:
+    """Sums of drivers over lots: between and inside lots together."""
+    means = _station_means(lots)
+    noise, within = _noise(lots, means)
+    out = {name: DriverSums() for name in drivers}
+    about = {name: _mean_number(lots, name) for name in drivers}
+    seen = Counter(unit for lot in lots for unit in lot.units) if UNIT in out else Counter[str]()
+    for lot in lots:
+        _gather(lot, out, means[lot.station], (noise, within), about, seen)
+    return {name: sums.trimmed() for name, sums in out.items() if sums.labels}
+
+
+def _mean_number(lots: Sequence[ScoredLot], name: str) -> float:
+    values = [
+        lot.day if name == DATE else float(lot.numbers[name].mean())
+        for lot in lots
+        if name == DATE or name in lot.numbers
+    ]
+    return float(np.nanmean(values)) if values else 0.0
+
+
+def shrinkage(size: Array, information: Array) -> Array:
+    """Factors (p,) by which the sizes of levels are drawn to zero: the part of their variance that is not noise."""
+    seen = information > 0.0
+    noise = np.where(seen, 1.0 / np.where(seen, information, 1.0), 0.0).sum(axis=0)
+    return np.clip(1.0 - noise / np.maximum((size**2).sum(axis=0), 1e-300), 0.0, 1.0)
+
+
+def fitted_together(lots: Sequence[ScoredLot], driver: str, sums: DriverSums, h: int) -> Array:
+    """Sizes (levels,) of one hypothesis by least squares over all lots: what units differ by, and what each lot has in common."""
+    rows: list[Array] = []
+    columns: list[NDArray[np.intp]] = []
+    values: list[Array] = []
+    target: list[Array] = []
+    first = 0
+    for lot in lots:
+        weights, own, info = weights_of(lot, driver, sums), lot.own[:, h], float(lot.information[h])
+        total = float(own.sum())
+        if total <= 0.0:
+            continue
+        share = own / total @ weights
+        score = lot.score[:, h]
+        root = np.sqrt(own)
+        inside = root[:, None] * (weights - share)
+        block = np.vstack([inside, np.sqrt(max(info, 0.0)) * share])
+        here = np.flatnonzero(block.any(axis=0))
+        left = (score - own * score.sum() / total) / np.where(root > 0.0, root, 1.0)
+        target.append(np.append(left, score.sum() / np.sqrt(info) if info > 0.0 else 0.0))
+        rows.append(np.repeat(np.arange(first, first + len(block)), here.size).astype(np.float64))
+        columns.append(np.tile(here, len(block)))
+        values.append(block[:, here].reshape(-1))
+        first += len(block)
+    if not rows:
+        return np.zeros(len(sums.labels))
+    shape = first, len(sums.labels)
+    places = np.concatenate(rows).astype(np.intp), np.concatenate(columns)
+    matrix = sparse.csr_matrix((np.concatenate(values), places), shape=shape)
+    return np.asarray(linalg.lsqr(matrix, np.concatenate(target), damp=1e-9)[0], dtype=np.float64)
+
+
+def weights_of(lot: ScoredLot, driver: str, sums: DriverSums) -> Array:
+    """How much of each level is in each unit, (units, levels)."""
+    units = len(lot.units)
+    out = np.zeros((units, len(sums.labels)))
+    if driver == MEAN:
+        out[:] = 1.0
+    elif driver == DATE or driver in lot.numbers:
+        numbers = np.full(units, lot.day) if driver == DATE else lot.numbers[driver]
+        out[:, 0] = np.where(np.isfinite(numbers), numbers - sums.about, 0.0)
+    else:
+        labels = (lot.station,) * units if driver == STATION else lot.levels.get(driver, ())
+        place = {label: k for k, label in enumerate(sums.labels)}
+        for unit, label in enumerate(labels):
+            if label in place:
+                out[unit, place[label]] = 1.0
+    return out
+
+
+def about_common(driver: str, sums: DriverSums) -> Array:
+    """Scores (g, h) of levels; of a driver that is seen inside lots only, about what all levels have in common."""
+    if driver not in INSIDE_ONLY or len(sums.labels) < 2:
+        return sums.score
+    total = sums.information.sum(axis=0)
+    mean = sums.score.sum(axis=0) / np.where(total > 0.0, total, 1.0)
+    return sums.score - sums.information * mean
+
+
+def _station_means(lots: Sequence[ScoredLot]) -> dict[str, Array]:
+    """Mean size (h,) of each station's lots."""
+    score, info = dict[str, Array](), dict[str, Array]()
+    for lot in lots:
+        zero = np.zeros(lot.information.size)
+        score[lot.station] = score.get(lot.station, zero) + np.where(lot.information > 0.0, lot.score.sum(axis=0), 0.0)
+        info[lot.station] = info.get(lot.station, zero) + lot.information
+    return {station: score[station] / np.where(info[station] > 0.0, info[station], 1.0) for station in score}
+
+
+def _noise(lots: Sequence[ScoredLot], means: Mapping[str, Array]) -> tuple[float, float]:
+    """Variance of lots about their stations over the stated one, and of units inside lots: medians over effects and lots."""
+    between, within = list[Array](), list[Array]()
+    for lot in lots:
+        info = np.where(lot.information > 0.0, lot.information, np.nan)
+        between.append((lot.score.sum(axis=0) - lot.information * means[lot.station]) ** 2 / info)
+        total = np.maximum(lot.own.sum(axis=0), 1e-300)
+        free = lot.own * (1.0 - lot.own / total)
+        left = lot.score - lot.own * lot.score.sum(axis=0) / total
+        within.append(np.mean(left**2 / np.where(free > 0.0, free, np.nan), axis=0))
+    with np.errstate(all="ignore"), warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # an effect that no lot shows is nan for all of them
+        many = np.nanmedian(np.clip(np.array(between), 0.0, np.nanquantile(between, 0.99)), axis=0) / 0.455
+        few = np.nanmedian(np.array(within), axis=0)
+    return float(np.nanmedian(many[many > 0.0])), float(np.nanmedian(few[few > 0.0]))
+
+
+def _gather(
+    lot: ScoredLot,
+    out: Mapping[str, DriverSums],
+    mean: Array,
+    scale: tuple[float, float],
+    about: Mapping[str, float],
+    seen: Mapping[str, int],
+) -> None:
+    """Add a lot to the sums of drivers; a unit that was measured once says nothing of what stays with a unit."""
+    noise, within = scale
+    own, total = lot.own, np.maximum(lot.own.sum(axis=0), 1e-300)
+    info = lot.information
+    sums = np.where(info > 0.0, lot.score.sum(axis=0), 0.0)
+    units = len(lot.units)
+    left = lot.score - own * lot.score.sum(axis=0) / total
+    for name, of in out.items():
+        if name == MEAN:
+            of.add("all", sums / noise, info / noise, units)
+        elif name == STATION:
+            of.add(lot.station, sums / noise, info / noise, units)
+        elif name == DATE or name in lot.numbers:
+            numbers = np.full(units, lot.day) if name == DATE else lot.numbers[name]
+            of.about = about[name]
+            _gather_number(of, numbers - about[name], (lot, left, mean, noise, within))
+        elif name == UNIT or name in lot.levels:
+            labels = lot.units if name == UNIT else lot.levels[name]
+            for label in dict.fromkeys(labels):
+                here = np.array([one == label for one in labels])
+                mine = own[here].sum(axis=0)
+                score = left[here].sum(axis=0) / within
+                information = mine * (1.0 - mine / total) / within
+                if name not in INSIDE_ONLY:  # and what the lot has in common
+                    share = mine / total
+                    score = score + share * sums / noise
+                    information = information + share**2 * info / noise
+                    of.common += float(here.sum() == units)
+                of.lots += 1.0
+                if label and (name != UNIT or seen[label] > 1):
+                    of.add(label, score, information, float(here.sum()))
+
+
+def _gather_number(of: DriverSums, numbers: Array, parts: tuple[ScoredLot, Array, Array, float, float]) -> None:
+    """Add a lot to the regression on a number; the offset and the slope of the number are taken out by its mean beforehand."""
+    lot, left, mean, noise, within = parts
+    if not np.isfinite(numbers).all():
+        return
+    own, total = lot.own, np.maximum(lot.own.sum(axis=0), 1e-300)
+    centre = float(numbers.mean())
+    about = numbers[:, None] - (numbers[:, None] * own).sum(axis=0) / total
+    score = (about * left).sum(axis=0) / within + centre * (lot.score.sum(axis=0) - lot.information * mean) / noise
+    information = (about**2 * own).sum(axis=0) / within + centre**2 * lot.information / noise
+    of.add("slope", score, information, float(len(lot.units)))

@@ -1,0 +1,139 @@
+"""The evidence of a kind of device after some nights, its alarms, and its file."""
+
+from __future__ import annotations
+
+import io
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from inertial.discovery.evidence import MEAN, STATION, Evidence
+from pipelines.archive import derived, files
+from pipelines.archive.store import Place
+from pipelines.discovery.lot_source import AXES, Column, DiscoveryArchive
+
+ALPHA = 0.05
+"""Probability that an archive without anything hidden ever shows a discovery, over its whole life."""
+
+STATION_DRIVERS = {MEAN, STATION, "date"}
+"""Drivers of the station's own columns."""
+
+
+@dataclass(frozen=True)
+class Alarm:
+    """Evidence beyond the threshold: driver, place of the hypothesis, night of the first time."""
+
+    driver: str
+    place: int
+    night: int
+    lots: int
+    log_e: float
+
+
+@dataclass
+class Evidences:
+    """Evidence of a kind of device after some nights.
+
+    columns : of the sensor, in the order of the hypotheses of one axis · of_station : of the station
+    sensor, station : evidence · order : runs in the order of arrival · taken_out : runs that no longer count
+    generations : when each driver came in: later ones have less of the probability of an error
+    """
+
+    device: str
+    columns: tuple[Column, ...]
+    of_station: tuple[Column, ...]
+    sensor: Evidence
+    station: Evidence
+    order: list[str] = field(default_factory=list[str])
+    taken_out: list[str] = field(default_factory=list[str])
+    generations: dict[str, int] = field(default_factory=dict[str, int])
+    alarms: list[Alarm] = field(default_factory=list[Alarm])
+    night: int = 0
+
+    def needed(self, driver: str, *, of_station: bool = False) -> float:
+        """Logarithm of the evidence from which on a hypothesis of a driver counts."""
+        generation = self.generations.get(driver, 0)
+        drivers = Counter(self.generations.values())[generation] or 1
+        hypotheses = drivers * AXES * len(self.columns) + (
+            len(STATION_DRIVERS) * len(self.of_station) if of_station or generation == 0 else 0
+        )
+        return float(np.log(hypotheses / (ALPHA * 0.5 ** (generation + 1))))
+
+
+def hypothesis(state: Evidences, place: int) -> tuple[str, int, str]:
+    """Effect, column and axis of a hypothesis; no axis for one of the station."""
+    if place >= state.sensor.count:
+        effect, column = state.of_station[place - state.sensor.count]
+        return effect, column, ""
+    axis, at = divmod(place, len(state.columns))
+    effect, column = state.columns[at]
+    return effect, column, "xyz"[axis]
+
+
+def state_bytes(state: Evidences) -> bytes:
+    """The state as the content of a file."""
+    about = {
+        "columns": np.array([f"{name} {column}" for name, column in state.columns], dtype=np.str_),
+        "of_station": np.array([f"{name} {column}" for name, column in state.of_station], dtype=np.str_),
+        "order": np.array(state.order, dtype=np.str_),
+        "taken_out": np.array(state.taken_out, dtype=np.str_),
+        "drivers": np.array(list(state.generations), dtype=np.str_),
+        "generations": np.array(list(state.generations.values()), dtype=np.int64),
+        "alarm_drivers": np.array([a.driver for a in state.alarms], dtype=np.str_),
+        "alarms": np.array([(a.place, a.night, a.lots, a.log_e) for a in state.alarms], dtype=np.float64).reshape(
+            -1, 4
+        ),
+        "night": np.array(state.night),
+    }
+    parts = {f"about/{name}": value for name, value in about.items()}
+    for kind, evidence in (("sensor", state.sensor), ("station", state.station)):
+        parts |= {f"{kind}/{name}": value for name, value in evidence.arrays().items()}
+    buffer = io.BytesIO()
+    # names of drivers and stations are anything: they stand in a list, and the arrays have numbers
+    np.savez(
+        buffer, allow_pickle=False, names=np.array(list(parts)), **{str(n): v for n, v in enumerate(parts.values())}
+    )
+    return buffer.getvalue()
+
+
+def stored_state(source: DiscoveryArchive, folder: Place, nights: Sequence[Mapping[str, Any]]) -> Evidences | None:
+    """The state on disk; None where it is not that of the last night, or of other hypotheses."""
+    place = folder / "state"
+    if not nights or not place.is_file():
+        return None
+    data, standing = derived.unframed(place)
+    if standing == derived.EDITED:
+        derived.warn_of_edits(place)
+    if standing != derived.SOUND or files.hash_of(data) != nights[-1]["state"] or nights[-1]["lots"] < 31:
+        return None
+    with np.load(io.BytesIO(data), allow_pickle=False) as loaded:
+        parts = {str(name): loaded[str(n)] for n, name in enumerate(loaded["names"])}
+    about = {name.removeprefix("about/"): value for name, value in parts.items() if name.startswith("about/")}
+    sensor, station = source.columns
+    if [f"{name} {column}" for name, column in (*sensor, *station)] != [*about["columns"], *about["of_station"]]:
+        return None
+    if any(str(run) not in source.store.place for run in about["order"]):
+        return None
+    order = [str(run) for run in about["order"]]
+    of = {
+        kind: {n.removeprefix(f"{kind}/"): v for n, v in parts.items() if n.startswith(f"{kind}/")}
+        for kind in ("sensor", "station")
+    }
+    return Evidences(
+        device=source.device,
+        columns=sensor,
+        of_station=station,
+        sensor=Evidence.restored(AXES * len(sensor), of["sensor"], source.earlier(order)),
+        station=Evidence.restored(len(station), of["station"], lambda _, __: None),
+        order=order,
+        taken_out=[str(run) for run in about["taken_out"]],
+        generations={str(name): int(n) for name, n in zip(about["drivers"], about["generations"], strict=True)},
+        alarms=[
+            Alarm(str(driver), int(place), int(night), int(lots), float(log_e))
+            for driver, (place, night, lots, log_e) in zip(about["alarm_drivers"], about["alarms"], strict=True)
+        ],
+        night=int(about["night"]),
+    )

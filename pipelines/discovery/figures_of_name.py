@@ -1,0 +1,91 @@
+"""Figures of a named discovery: its size, its levels, what carries it, what to do next."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial.discovery.evidence import INSIDE, SLOT, STATION, Sums
+from inertial.discovery.naming import Name
+from pipelines.discovery.documents import DiscoveredLevel
+from schemas.units import MICRO
+
+Array = NDArray[np.float64]
+Scope = Literal["sensor", "station", "sensor_or_station", "thermometer"]
+
+_SHOWN_LEVELS = 40
+
+
+def plain(driver: str) -> str:
+    """A driver without the mark that it was judged inside lots."""
+    return driver.removesuffix(INSIDE)
+
+
+def by_axis(name: Name) -> list[float]:
+    """Rms of the sizes of each axis over the levels, its noise taken off, g."""
+    weight = name.weights / max(float(name.weights.sum()), 1e-300)
+    there = np.isfinite(name.errors)
+    squares = np.where(there, name.sizes**2 - name.errors**2, 0.0)
+    return [float(value) for value in np.sqrt(np.maximum((weight[:, None] * squares).sum(axis=0), 0.0))]
+
+
+def size_of(name: Name) -> tuple[float, float, float]:
+    """Rms over levels and axes with its 95 % interval, g."""
+    weight = name.weights / max(float(name.weights.sum()), 1e-300)
+    there = np.isfinite(name.errors)
+    errors = np.where(there, name.errors, 0.0)
+    squares = np.where(there, name.sizes**2 - errors**2, 0.0)
+    each = weight[:, None] / 3.0
+    mean = float((each * squares).sum())
+    spread = 2.0 * float(np.sqrt((each**2 * (4.0 * name.sizes**2 * errors**2 + 2.0 * errors**4)).sum()))
+    return tuple(float(np.sqrt(max(value, 0.0))) for value in (mean, mean - spread, mean + spread))  # type: ignore[return-value]
+
+
+def levels_of(name: Name) -> list[DiscoveredLevel]:
+    """Levels in the order of their size, of the axis that differs most."""
+    axis = int(np.argmax(by_axis(name)))
+    order = np.argsort(-np.abs(name.sizes[:, axis]))[:_SHOWN_LEVELS]
+    return [
+        {
+            "level": name.labels[at],
+            "size_ug": MICRO * float(name.sizes[at, axis]),
+            "u_ug": MICRO * float(name.errors[at, axis]),
+            "units": int(name.weights[at]),
+        }
+        for at in order
+        if np.isfinite(name.errors[at, axis])
+    ]
+
+
+def station_sizes(station: Any, at: int) -> dict[str, tuple[float, float]]:
+    """Size of a column at each station and its standard error at the stated noise."""
+    table = station.levels[STATION]
+    centre = station.score[at] / max(station.information[at], 1e-300)
+    out: dict[str, tuple[float, float]] = {}
+    for label, place in table.place.items():
+        information = max(float(table.information[place, at]), 1e-300)
+        out[label] = float(table.score[place, at] / information + centre), float(1.0 / np.sqrt(information))
+    return out
+
+
+def without_largest(carried: Array) -> float:
+    """Evidence of contributions without the two per cent that speak most."""
+    kept = np.sort(carried)[: max(1, int(0.98 * carried.size))]
+    sums = Sums.of(1, two_sided=False)
+    rms = float(np.sqrt(np.mean(kept**2))) or 1.0
+    for value in kept / rms:
+        sums.add(np.array([value]))
+    return float(sums.log_e[0])
+
+
+def next_of(driver: str, scope: Scope) -> str:
+    """What to measure or do next."""
+    if scope == "sensor_or_station":
+        return "measure some of the same units on another station: what stays with the units is theirs"
+    if driver == SLOT:
+        return "exchange units between slots, or check the fixture at this slot"
+    if driver == STATION:
+        return "measure the same units on two of these stations, and check their references"
+    return "add the effect to the model of the next lots: 'tumbleline extend', then 'tumbleline discover --model'"

@@ -1,0 +1,226 @@
+"""The lots of an archive as the evidence takes them: scores of runs with what is known of units and runs."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+from datetime import datetime
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial.discovery.evidence import MEAN, SLOT, STATION, UNIT, ScoredLot
+from pipelines.archive import Archive
+from pipelines.archive.locks import alone
+from pipelines.archive.store import Place
+from pipelines.certificates.ledger import Ledger
+from pipelines.discovery.attributes import Attributes, as_numbers, known_attributes
+from pipelines.discovery.score_store import FOLDER, ScoreStore
+from pipelines.discovery.scored_run import ScoredRun
+from pipelines.parallel import Distributor
+from schemas.errors import WrongUse, did_you_mean
+
+Array = NDArray[np.float64]
+Column = tuple[str, int]
+
+AXES = 3
+SEASON, OPERATOR = "season", "operator"
+
+
+class DiscoveryArchive:
+    """What the discovery of an archive works on.
+
+    Parameters
+    ----------
+    device : kind of device; that of most runs if empty
+    change : what is done to every lot before it is judged
+    """
+
+    def __init__(
+        self, archive: Archive, device: str = "", change: Callable[[ScoredLot], ScoredLot] = lambda lot: lot
+    ) -> None:
+        archive.refuse_none()
+        self.archive, self.store, self._change = archive, ScoreStore(archive), change
+        self._device = device
+
+    def with_change(self, change: Callable[[ScoredLot], ScoredLot]) -> DiscoveryArchive:
+        """The same archive with other lots."""
+        other = DiscoveryArchive(self.archive, self.device, change)
+        other.store = self.store
+        return other
+
+    @cached_property
+    def infos(self) -> list[Any]:
+        """Finished or complete runs that are no re-run, in the order of their start."""
+        return [info for info in self.archive.runs() if not info.rerun_of and {"reduce", "import"} & set(info.stages)]
+
+    @cached_property
+    def device(self) -> str:
+        """The kind of device that is judged: the one asked for, else that of most runs."""
+        counts = Counter(info.device for info in self.infos)
+        if self._device:
+            wanted = next((one for one in counts if one.lower() == self._device.lower()), None)
+            if wanted is None:
+                raise WrongUse(
+                    f"discover: --device '{self._device}' has no run in {self.archive.root}; {did_you_mean(self._device, counts)}"
+                )
+            return wanted
+        if not counts:
+            raise WrongUse(
+                f"discover: {self.archive.root} has no run with dwells, thirty at least are needed; see 'tumbleline demo "
+                "--archive'"
+            )
+        return counts.most_common(1)[0][0]
+
+    @property
+    def other_devices(self) -> dict[str, int]:
+        """Runs of other kinds of devices, which are never pooled with it."""
+        counts = Counter(info.device for info in self.infos)
+        return {one: count for one, count in counts.items() if one != self.device}
+
+    def score(self, workers: int, distribute: Distributor | None = None) -> int:
+        """Score what is new; the number of runs."""
+        with alone(self.archive.root / FOLDER, wait=True):
+            return self.store.add([info.id for info in self.infos], workers, distribute)
+
+    @cached_property
+    def attributes(self) -> Attributes:
+        """What is known of units and runs."""
+        return known_attributes(self.archive)
+
+    @cached_property
+    def revoked(self) -> set[str]:
+        """Runs of which a calibration was revoked."""
+        return {one.run for one in Ledger(self.archive).all() if one.state == "revoked"}
+
+    def pooled(self) -> list[str]:
+        """Runs of the device that have scores, in the order of arrival."""
+        heads = ((run, self.store.head(run)) for run in self.store.place)
+        return [run for run, head in heads if head["device"] == self.device and not head["left_out"]]
+
+    def left_out(self) -> list[tuple[str, str]]:
+        """Runs of the device that are not pooled, with the reason."""
+        heads = ((run, self.store.head(run)) for run in self.store.place)
+        return [
+            (run, str(head["left_out"])) for run, head in heads if head["device"] == self.device and head["left_out"]
+        ]
+
+    @cached_property
+    def columns(self) -> tuple[tuple[Column, ...], tuple[Column, ...]]:
+        """Columns of the sensor and of the station that any run of the archive has."""
+        sensor = dict.fromkeys(one for products in self.store.products() for one in products.columns)
+        station = dict.fromkeys(one for products in self.store.products() for one in products.of_station)
+        return tuple(sensor), tuple(station)
+
+    def lots(self, runs: Iterable[str]) -> Iterable[tuple[ScoredLot, ScoredLot]]:
+        """Each run as a lot of its sensors, and of its station."""
+        for run in runs:
+            scored = self.store.run(run)
+            yield self.lot_of(scored), self._of_station(scored)
+
+    def lot_of(self, run: ScoredRun) -> ScoredLot:
+        """A run as a lot, in the order of the archive's hypotheses."""
+        if run.score is None or run.own is None or run.information is None:
+            raise LookupError(run.run)
+        place = {column: at for at, column in enumerate(self.columns[0])}
+        at = np.array([place[column] for column in run.columns])
+        k, own_k = len(self.columns[0]), len(run.columns)
+        here = (np.arange(AXES)[:, None] * k + at).reshape(-1)
+
+        def spread(values: Array) -> Array:
+            out = np.zeros((*values.shape[:-1], AXES * k))
+            out[..., here] = values.reshape(*values.shape[:-1], AXES * own_k)
+            return out
+
+        levels, numbers = self._drivers(run)
+        lot = ScoredLot(
+            run=run.run,
+            station=run.station,
+            day=_day(run.when),
+            units=run.units,
+            score=spread(run.score),
+            own=spread(run.own),
+            information=spread(run.information),
+            levels=levels,
+            numbers=numbers,
+        )
+        return self._change(lot)
+
+    def _of_station(self, run: ScoredRun) -> ScoredLot:
+        place = {column: at for at, column in enumerate(self.columns[1])}
+        both = np.zeros((2, len(place)))
+        if run.station_scores is not None:
+            both[:, [place[column] for column in run.of_station]] = run.station_scores
+        score, information = both
+        return ScoredLot(run.run, run.station, _day(run.when), ("",), score[None], information[None], information)
+
+    def _drivers(self, run: ScoredRun) -> tuple[dict[str, tuple[str, ...]], dict[str, Array]]:
+        levels: dict[str, tuple[str, ...]] = {SLOT: run.slots} if any(run.slots) else {}
+        if run.who:
+            levels[OPERATOR] = (run.who,) * len(run.units)
+        levels[SEASON] = (f"month {int(run.when[5:7])}",) * len(run.units)
+        numbers: dict[str, Array] = {}
+        for name, known in self._quantities.items():
+            values = tuple(self.attributes.of(unit, run.run, name) for unit in run.units)
+            if not any(values):
+                continue
+            if known is None:
+                levels[name] = values
+            else:
+                numbers[name] = np.array([known.get(value, np.nan) for value in values])
+        return levels, numbers
+
+    @cached_property
+    def _quantities(self) -> dict[str, dict[str, float] | None]:
+        """For each attribute that is a driver its numbers; None for labels."""
+        out: dict[str, dict[str, float] | None] = {}
+        for name in self.attributes.names():
+            if name in {MEAN, STATION, SLOT, UNIT, "date"}:
+                continue
+            every = (of.values() for of in (self.attributes.serial, self.attributes.run))
+            out[name] = as_numbers([one.get(name, "") for values in every for one in values])
+        return out
+
+    def earlier(self, order: Sequence[str]) -> Callable[[str, int], tuple[Array, Array] | None]:
+        """What earlier measurements of a unit say, inside their lots.
+
+        Parameters
+        ----------
+        order : the lots of the evidence, which grows while they are added
+        """
+        index: dict[str, list[tuple[int, str]]] = {}
+        known = 0
+
+        def of(unit: str, taken: int) -> tuple[Array, Array] | None:
+            nonlocal known
+            for number in range(known, len(order)):
+                file, row = self.store.place[order[number]]
+                for one in self.store.files[file].rows[row]["units"]:
+                    index.setdefault(one, []).append((number, order[number]))
+            known = len(order)
+            before = [run for number, run in index.get(unit, ()) if number < taken]
+            found = [inside_of(self.lot_of(self.store.run(run)), unit) for run in before]
+            if not found:
+                return None
+            return np.sum([score for score, _ in found], axis=0), np.sum([own for _, own in found], axis=0)
+
+        return of
+
+    def folder(self) -> Place:
+        """Where the evidence of the device is kept."""
+        return self.archive.root / FOLDER / re.sub(r"[^A-Za-z0-9._-]", "_", self.device)
+
+
+def inside_of(lot: ScoredLot, unit: str) -> tuple[Array, Array]:
+    """Score and information (h,) of a unit about the mean of its lot."""
+    place = lot.units.index(unit)
+    total = np.maximum(lot.own.sum(axis=0), 1e-300)
+    own = lot.own[place]
+    return lot.score[place] - own * lot.score.sum(axis=0) / total, own * (1.0 - own / total)
+
+
+def _day(when: str) -> float:
+    return datetime.fromisoformat(when).timestamp() / 86400.0
