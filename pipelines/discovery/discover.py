@@ -145,7 +145,7 @@ def _size_left(findings: Findings, row: DiscoveryRow) -> float:
 def _of_drivers(document: DiscoverDocument, drivers: Sequence[str]) -> DiscoverDocument:
     known = [row["name"] for row in document["drivers"]]
     for one in drivers:
-        if one not in known:
+        if known and one not in known:
             raise WrongUse(f"discover: no driver is called '{one}'; {did_you_mean(one, known)}")
     document["discoveries"] = [row for row in document["discoveries"] if set(row["drivers"]) & set(drivers)]
     document["held"] = [row for row in document["held"] if row["driver"].removesuffix(INSIDE) in drivers]

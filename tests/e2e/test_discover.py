@@ -137,3 +137,13 @@ def test_scores_on_dask_are_those_of_this_machine(folder: Path, tmp_path: Path) 
 
     made = write_lots(tmp_path, Line(8), 3)
     assert document_of("discover", "--archive", made.folder, "--dask", "local", "--workers", "1")["pooled"]["lots"] == 3
+
+
+def test_the_demonstration_for_people_ends_with_a_command_that_runs(tmp_path: Path) -> None:
+    status, out, err = given("demo", "--archive", "--lots", "60", "--seed", "4", "--folder", tmp_path / "few")
+    assert status == 0, err
+    assert "What was hidden?" in out
+    words = out.strip().splitlines()[-1].split()
+    assert words[:2] == ["tumbleline", "discover"]
+    assert given(*words[1:])[0] in {0, 1}
+    assert (tmp_path / "few" / "discoveries.html").is_file()

@@ -29,6 +29,7 @@ from schemas.errors import LinkLost
 
 EVIL = "http://evil.example"
 DEPLOYMENTS = ["calibrate_lot/production-line", "calibrate_lot/on-demand", "audit_archive/weekly-audit"]
+DEPLOYMENTS += ["discover_in_archive/nightly-discover"]
 
 
 @pytest.fixture(scope="module")
@@ -127,6 +128,7 @@ def test_deployments_have_their_queue_and_are_found_by_their_module(line: Orches
         "production-line": ("line-1", calibrate),
         "on-demand": ("line-1", calibrate),
         "weekly-audit": ("audits", audit),
+        "nightly-discover": ("audits", "pipelines.flows.discover.discover_in_archive"),
     }
     # a folder of flows on the path would hide modules of Python
     assert {one["job_variables"]["working_dir"] for one in deployments} == {str(ROOT)}
