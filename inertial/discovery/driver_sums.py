@@ -3,7 +3,7 @@
 import warnings
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,8 +61,12 @@ class DriverSums:
     def trimmed(self) -> "DriverSums":
         """Without room for more levels."""
         n = len(self.labels)
-        return DriverSums(
-            list(self.labels), self.score[:n].copy(), self.information[:n].copy(), self.weight[:n].copy(), self.about
+        return replace(
+            self,
+            labels=list(self.labels),
+            score=self.score[:n].copy(),
+            information=self.information[:n].copy(),
+            weight=self.weight[:n].copy(),
         )
 
 
@@ -169,9 +173,7 @@ def _noise(lots: Sequence[ScoredLot], means: Mapping[str, Array]) -> tuple[float
     for lot in lots:
         info = np.where(lot.information > 0.0, lot.information, np.nan)
         between.append((lot.score.sum(axis=0) - lot.information * means[lot.station]) ** 2 / info)
-        total = np.maximum(lot.own.sum(axis=0), 1e-300)
-        free = lot.own * (1.0 - lot.own / total)
-        left = lot.score - lot.own * lot.score.sum(axis=0) / total
+        left, free = lot.inside
         within.append(np.mean(left**2 / np.where(free > 0.0, free, np.nan), axis=0))
     with np.errstate(all="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # an effect that no lot shows is nan for all of them
@@ -190,11 +192,9 @@ def _gather(
 ) -> None:
     """Add a lot to the sums of drivers; a unit that was measured once says nothing of what stays with a unit."""
     noise, within = scale
-    own, total = lot.own, np.maximum(lot.own.sum(axis=0), 1e-300)
-    info = lot.information
+    own, total, info, left = lot.own, lot.total, lot.information, lot.inside[0]
     sums = np.where(info > 0.0, lot.score.sum(axis=0), 0.0)
     units = len(lot.units)
-    left = lot.score - own * lot.score.sum(axis=0) / total
     for name, of in out.items():
         if name == MEAN:
             of.add("all", sums / noise, info / noise, units)
@@ -226,9 +226,8 @@ def _gather_number(of: DriverSums, numbers: Array, parts: tuple[ScoredLot, Array
     lot, left, mean, noise, within = parts
     if not np.isfinite(numbers).all():
         return
-    own, total = lot.own, np.maximum(lot.own.sum(axis=0), 1e-300)
-    centre = float(numbers.mean())
-    about = numbers[:, None] - (numbers[:, None] * own).sum(axis=0) / total
+    own, centre = lot.own, float(numbers.mean())
+    about = numbers[:, None] - lot.averaged(numbers[:, None])
     score = (about * left).sum(axis=0) / within + centre * (lot.score.sum(axis=0) - lot.information * mean) / noise
     information = (about**2 * own).sum(axis=0) / within + centre**2 * lot.information / noise
     of.add("slope", score, information, float(len(lot.units)))

@@ -7,13 +7,14 @@ probability that its mean over some λ ever exceeds m/α is at most α/m (Ville)
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
-from inertial.discovery.station_wander import Innovation, Wander
+from inertial.discovery.station_wander import WALK_FROM, Innovation, Wander
 
 Array = NDArray[np.float64]
 
@@ -29,9 +30,6 @@ SHRUNK = 4.0
 MEAN, DATE, STATION, SLOT, UNIT = "mean", "date", "station", "slot", "unit"
 INSIDE = ", inside lots"
 """Ending of the name of a driver that is judged by differences inside a lot: whatever the lot has in common cancels."""
-
-GUARDED = 2.0
-"""Log likelihood that a station's own walk gains, from which on what is constant in a lot may be that."""
 
 SHARED: float = float(np.log(300.0))
 """Logarithm of the odds from which on a mean is taken to be of the sensors, and not of the stations' references."""
@@ -59,6 +57,20 @@ class ScoredLot:
     information: Array
     levels: Mapping[str, tuple[str, ...]] = field(default_factory=dict[str, tuple[str, ...]])
     numbers: Mapping[str, Array] = field(default_factory=dict[str, Array])
+
+    @cached_property
+    def total(self) -> Array:
+        """Information of all units, (h,), errors of the station not taken out; never zero."""
+        return np.maximum(self.own.sum(axis=0), 1e-300)
+
+    @cached_property
+    def inside(self) -> tuple[Array, Array]:
+        """Scores of the units about their mean, and the information in them, (units, h)."""
+        return self.score - self.own * self.score.sum(axis=0) / self.total, self.own * (1.0 - self.own / self.total)
+
+    def averaged(self, of_units: Array) -> Array:
+        """The mean (h,) of a size (units, h) over the units, by their information."""
+        return (of_units * self.own).sum(axis=0) / self.total
 
 
 @dataclass
@@ -188,7 +200,7 @@ class Evidence:
     @property
     def guarded(self) -> NDArray[np.bool_]:
         """Effects (h,) for which the stations wander by themselves: what is constant in a lot may be that."""
-        return self.wander.gained > GUARDED
+        return self.wander.gained > WALK_FROM
 
     @property
     def noise(self) -> tuple[Array, Array]:
@@ -289,8 +301,7 @@ class Evidence:
         A level is predicted by the lots of other stations, where there are some: what wanders with one station is no news there.
         """
         scale, prior = self._scales["between"], SHRUNK * self._typical
-        rms, own, total = scale.rms, lot.own, np.maximum(lot.own.sum(axis=0), 1e-300)
-        ratio = lot.information / total
+        rms, own, ratio = scale.rms, lot.own, lot.information / lot.total
         raw = np.abs(found.value)
         part = np.where(raw > 0.0, np.minimum(1.0, BOUND * rms / np.where(raw > 0.0, raw, 1.0)), 1.0)
         for name, labels in lot.levels.items():
@@ -300,8 +311,7 @@ class Evidence:
             table = self.levels.setdefault(name, Levels(self.count))
             elsewhere = here if len(self.wander.stations) > 1 else None
             each, behind = table.predicted(labels, prior, elsewhere)
-            prediction = (each * own).sum(axis=0) / total
-            told = (behind * own).sum(axis=0) / total >= prior
+            prediction, told = lot.averaged(each), lot.averaged(behind) >= prior
             value, left = self.wander.beside_driver(name, lot.station, prediction, found, rms, told)
             self._sums(name, two_sided=False).add(scale.bounded(value) / rms * np.clip(left / rms, -BOUND, BOUND))
             score = (lot.score - own * ratio * self._centre()) * part
@@ -328,13 +338,11 @@ class Evidence:
     def _inside(self, lot: ScoredLot) -> None:
         """Drivers that differ between the units of a lot: what the lot has in common cancels."""
         own = lot.own
-        total = np.maximum(own.sum(axis=0), 1e-300)
-        mean = lot.score.sum(axis=0) / total
-        information = own * (1.0 - own / total)
+        free, information = lot.inside
         root = np.sqrt(information)
         scale, typical = self._scales["inside"], self._typical
         limit = BOUND * scale.rms * root
-        left = np.clip(lot.score - own * mean, -limit, limit)
+        left = np.clip(free, -limit, limit)
         for name, labels in {**lot.levels, UNIT: lot.units}.items():
             if not any(labels):
                 continue
@@ -345,14 +353,14 @@ class Evidence:
                 table = self.levels.setdefault(inside, Levels(self.count))
                 predicted = table.predicted(labels, SHRUNK / len(labels) * typical)[0]
             if len(set(labels)) > 1:
-                self._add_inside(inside, predicted, own, total, left, two_sided=False)
+                self._add_inside(inside, lot, predicted, left, two_sided=False)
             if name != UNIT:
                 alike = np.array([own[[other == label for other in labels]].sum(axis=0) for label in labels])
-                self.levels[inside].add(labels, left, own * (1.0 - alike / total))
+                self.levels[inside].add(labels, left, own * (1.0 - alike / lot.total))
         for name, numbers in lot.numbers.items():
             if np.isfinite(numbers).all() and float(np.ptp(numbers)) > 0.0:
                 predicted = np.broadcast_to(numbers[:, None], own.shape)
-                self._add_inside(name + INSIDE, predicted, own, total, left, two_sided=True)
+                self._add_inside(name + INSIDE, lot, predicted, left, two_sided=True)
         scale.add(np.sqrt(np.mean(np.where(root > 0.0, left / np.where(root > 0.0, root, 1.0), 0.0) ** 2, axis=0)))
         if self._earlier is None:
             self._remember(lot, left, information)
@@ -360,15 +368,14 @@ class Evidence:
     def _add_inside(
         self,
         name: str,
+        lot: ScoredLot,
         predicted: Array,
-        own: Array,
-        total: Array,
         left: Array,
         *,
         two_sided: bool,
     ) -> None:
-        about = predicted - (predicted * own).sum(axis=0) / total
-        size = np.sqrt((own * about**2).sum(axis=0))
+        about = predicted - lot.averaged(predicted)
+        size = np.sqrt((lot.own * about**2).sum(axis=0))
         there = size > 0.0
         value = np.where(there, (left * about).sum(axis=0) / np.where(there, size, 1.0), 0.0)
         scale = self._scales["inside"]

@@ -203,11 +203,8 @@ class Pool:
 
     def _expected(self, lot: ScoredLot, driver: str, sums: DriverSums) -> Array:
         """What :meth:`_predicted` is on average if the prediction holds, (h,)."""
-        weights = weights_of(lot, driver, sums)
-        centred = about_common(driver, sums)
-        of_units = weights @ (centred / np.where(sums.information > 0.0, sums.information, np.inf))
-        total = np.maximum(lot.own.sum(axis=0), 1e-300)
-        common = (of_units * lot.own).sum(axis=0) / total
+        of_units = _of_units(lot, driver, sums)
+        common = lot.averaged(of_units)
         inside = ((of_units - common) ** 2 * lot.own).sum(axis=0)
         return inside if driver in INSIDE_ONLY else inside + common**2 * lot.information
 
@@ -227,14 +224,9 @@ class Pool:
 
     def _predicted(self, lot: ScoredLot, driver: str, sums: DriverSums) -> Array:
         """Product (h,) of what a lot shows and what other lots predict of it."""
-        weights = weights_of(lot, driver, sums)
-        centred = about_common(driver, sums)
-        size = centred / np.where(sums.information > 0.0, sums.information, np.inf)
-        of_units = weights @ size
+        of_units = _of_units(lot, driver, sums)
         if driver in INSIDE_ONLY:
-            total = np.maximum(lot.own.sum(axis=0), 1e-300)
-            of_units = of_units - (of_units * lot.own).sum(axis=0) / total
-            return ((lot.score - lot.own * lot.score.sum(axis=0) / total) * of_units).sum(axis=0)
+            return (lot.inside[0] * of_units).sum(axis=0)
         return (lot.score * of_units).sum(axis=0)
 
     def without(self, lot: ScoredLot, driver: str, effect: str, sums: DriverSums, sizes: Array) -> ScoredLot:
@@ -258,11 +250,8 @@ class Pool:
     def with_effect(self, lot: ScoredLot, effect: str) -> ScoredLot:
         """A lot whose model has an effect more, with coefficients of every unit and axis: U_j − I_jk U_k / I_kk, on its sums."""
         at, count = self.places(effect), len(self.columns)
-        total = np.maximum(lot.own.sum(axis=0), 1e-300)
-        sums = lot.score.sum(axis=0)
-        share = lot.own / total
-        left, own, information = lot.score - share * sums, lot.own.copy(), lot.information.copy()
-        sums = sums.copy()
+        sums, share = lot.score.sum(axis=0), lot.own / lot.total
+        left, own, information = lot.inside[0].copy(), lot.own.copy(), lot.information.copy()
         for axis in range(self.axes):
             here, every = axis * count + at, axis * count + np.arange(count)
             for products, values, info in ((self.inside, left, own), (self.lot, sums[None], information[None])):
@@ -325,6 +314,12 @@ class Pool:
         sizes = np.where(seen, about_common(driver, sums)[:, here] / safe, 0.0) * self.size[here]
         errors = np.where(seen, 1.0 / np.sqrt(safe), np.inf) * self.size[here]
         return Name(tuple(effects), tuple(drivers), tuple(sums.labels), sums.weight, sizes, errors, top)
+
+
+def _of_units(lot: ScoredLot, driver: str, sums: DriverSums) -> Array:
+    """Sizes (units, h) that the sums of a driver predict for the units of a lot."""
+    size = about_common(driver, sums) / np.where(sums.information > 0.0, sums.information, np.inf)
+    return weights_of(lot, driver, sums) @ size
 
 
 def _correlation(products: Array) -> Array:

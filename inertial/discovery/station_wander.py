@@ -18,7 +18,7 @@ WALKS: Array = np.array([0.0, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1, 3e-1, 1.
 """Variance of the walk from one lot of a station to the next, over that of the noise of a lot."""
 
 WALK_FROM = 2.0
-"""Gain of the log likelihood from which on the filter of a walk is used."""
+"""Gain of the log likelihood from which on a station has a walk: its filter is used, and what is constant in a lot may be it."""
 
 _LARGEST = 5.0
 _BETWEEN = "\x1f"  # between the names of a driver and of a station, which may hold anything that is printed

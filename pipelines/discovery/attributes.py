@@ -17,9 +17,10 @@ import pandas as pd
 
 from inertial.counts import number_of
 from pipelines.archive import Archive, files
+from pipelines.archive.locks import alone
 from pipelines.archive.provenance import provenance
 from pipelines.discovery.documents import AddedAttributes
-from schemas.errors import ArchiveUnusable, WrongUse, did_you_mean
+from schemas.errors import WrongUse, did_you_mean
 
 By = Literal["serial", "run"]
 
@@ -122,14 +123,11 @@ def _places(archive: Archive) -> list[Any]:
 
 
 def _append(archive: Archive, content: Mapping[str, Any]) -> Any:
-    """Write the next file; of two processes each gets a number of its own."""
-    number = len(_places(archive)) + 1
-    for _ in range(1000):
-        place = archive.root / FOLDER / f"{number:06d}.json"
-        if files.publish_first(place, files.manifest_bytes(content)):
-            return place
-        number += 1
-    raise ArchiveUnusable(f"archive: {archive.root / FOLDER} takes no new file; see its permissions")
+    """Write the next file; of two processes one waits."""
+    with alone(archive.root / FOLDER, wait=True):
+        place = archive.root / FOLDER / f"{len(_places(archive)) + 1:06d}.json"
+        files.publish(place, files.manifest_bytes(content))
+    return place
 
 
 def _key_column(table: pd.DataFrame, by: By, source: str) -> str:

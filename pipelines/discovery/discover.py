@@ -105,7 +105,7 @@ def _with_effects(
     after = Findings(changed, grown_by_days(changed, fresh(changed), before.state.order))
     extended = after.document(looking_back=True)
     extended["model"] = [*document["model"], *added]
-    extended["compared"] = [_compared(row, before, after) for row in document["discoveries"]]
+    extended["compared"] = [_compared(row, before, after) for row in document["discoveries"] if row["axes"]]
     return after, extended
 
 
@@ -128,7 +128,7 @@ def _compared(row: DiscoveryRow, before: Findings, after: Findings) -> ComparedA
 
 
 def _largest(findings: Findings, row: DiscoveryRow) -> float:
-    """The largest evidence of a driver for any effect of a class, or its neighbours: of all effects."""
+    """The largest evidence of a driver for any effect."""
     drivers = findings.state.sensor.drivers
     values = [float(sums.log_e.max()) for name, sums in drivers.items() if name.removesuffix(INSIDE) == row["driver"]]
     return max(values, default=0.0)

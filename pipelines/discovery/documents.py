@@ -160,7 +160,8 @@ class DiscoverDocument(TypedDict):
     drivers: list[DriverRow]
     warnings: list[str]
     compared: Annotated[
-        list[ComparedAlarm], "with --model: what is left of each discovery where its effects are in every lot's model"
+        list[ComparedAlarm],
+        "with --model: discoveries of the sensors before and after its effects are in every lot's model",
     ]
     new: Annotated[list[str], "ids of discoveries that were not there the time before"]
     looking_back: bool

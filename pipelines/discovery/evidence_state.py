@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from inertial.discovery.evidence import MEAN, STATION, Evidence
+from inertial.discovery.evidence import FIRST, MEAN, STATION, Evidence
 from pipelines.archive import derived, files
 from pipelines.archive.store import Place
 from pipelines.discovery.lot_source import AXES, Column, DiscoveryArchive
@@ -53,13 +53,12 @@ class Evidences:
     alarms: list[Alarm] = field(default_factory=list[Alarm])
     night: int = 0
 
-    def needed(self, driver: str, *, of_station: bool = False) -> float:
+    def needed(self, driver: str) -> float:
         """Logarithm of the evidence from which on a hypothesis of a driver counts."""
         generation = self.generations.get(driver, 0)
         drivers = Counter(self.generations.values())[generation] or 1
-        hypotheses = drivers * AXES * len(self.columns) + (
-            len(STATION_DRIVERS) * len(self.of_station) if of_station or generation == 0 else 0
-        )
+        of_station = len(STATION_DRIVERS) * len(self.of_station) if generation == 0 else 0
+        hypotheses = drivers * AXES * len(self.columns) + of_station
         return float(np.log(hypotheses / (ALPHA * 0.5 ** (generation + 1))))
 
 
@@ -107,7 +106,7 @@ def stored_state(source: DiscoveryArchive, folder: Place, nights: Sequence[Mappi
     data, standing = derived.unframed(place)
     if standing == derived.EDITED:
         derived.warn_of_edits(place)
-    if standing != derived.SOUND or files.hash_of(data) != nights[-1]["state"] or nights[-1]["lots"] < 31:
+    if standing != derived.SOUND or files.hash_of(data) != nights[-1]["state"] or nights[-1]["lots"] < FIRST:
         return None
     with np.load(io.BytesIO(data), allow_pickle=False) as loaded:
         parts = {str(name): loaded[str(n)] for n, name in enumerate(loaded["names"])}

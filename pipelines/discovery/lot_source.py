@@ -54,8 +54,12 @@ class DiscoveryArchive:
 
     @cached_property
     def infos(self) -> list[Any]:
-        """Finished or complete runs that are no re-run, in the order of their start."""
-        return [info for info in self.archive.runs() if not info.rerun_of and {"reduce", "import"} & set(info.stages)]
+        """Finished runs with dwells that are no re-run, in the order of their start; one that goes on is not judged yet."""
+        return [
+            info
+            for info in self.archive.runs()
+            if info.finished and not info.rerun_of and {"reduce", "import"} & set(info.stages)
+        ]
 
     @cached_property
     def device(self) -> str:
@@ -202,24 +206,18 @@ class DiscoveryArchive:
                     index.setdefault(one, []).append((number, order[number]))
             known = len(order)
             before = [run for number, run in index.get(unit, ()) if number < taken]
-            found = [inside_of(self.lot_of(self.store.run(run)), unit) for run in before]
-            if not found:
+            if not before:
                 return None
-            return np.sum([score for score, _ in found], axis=0), np.sum([own for _, own in found], axis=0)
+            lots = [self.lot_of(self.store.run(run)) for run in before]
+            parts = [np.stack(lot.inside)[:, lot.units.index(unit)] for lot in lots]
+            score, information = np.sum(parts, axis=0)
+            return score, information
 
         return of
 
     def folder(self) -> Place:
         """Where the evidence of the device is kept."""
         return self.archive.root / FOLDER / re.sub(r"[^A-Za-z0-9._-]", "_", self.device)
-
-
-def inside_of(lot: ScoredLot, unit: str) -> tuple[Array, Array]:
-    """Score and information (h,) of a unit about the mean of its lot."""
-    place = lot.units.index(unit)
-    total = np.maximum(lot.own.sum(axis=0), 1e-300)
-    own = lot.own[place]
-    return lot.score[place] - own * lot.score.sum(axis=0) / total, own * (1.0 - own / total)
 
 
 def _day(when: str) -> float:

@@ -14,7 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from inertial.discovery.evidence import GUARDED, INSIDE, MEAN, SLOT, STATION, UNIT, Evidence
+from inertial.discovery.evidence import INSIDE, MEAN, SLOT, STATION, UNIT, Evidence
+from inertial.discovery.station_wander import WALK_FROM
 from pipelines.archive import derived, files
 from pipelines.archive.locks import alone
 from pipelines.archive.store import Place
@@ -78,7 +79,7 @@ def held(state: Evidences, alarm: Alarm) -> bool:
         return False  # for good or by wander: stations differ
     wander = state.sensor.wander
     walk = wander.gained if len(wander.stations) < 2 else wander.gained_beside(alarm.driver)
-    return bool(walk[alarm.place] > GUARDED)
+    return bool(walk[alarm.place] > WALK_FROM)
 
 
 def brought_up(source: DiscoveryArchive) -> Evidences:

@@ -1,6 +1,6 @@
 """Scores of an archive's runs on disk, a file for each time that new runs were scored.
 
-A derived cache with a seal: where it was edited, or made by another version of the program, it is made again from the runs.
+A derived cache with a seal: where it was edited, or has another layout, it is made again from the runs.
 ``discovery/scores/<number>.scores`` has a row for each run; columns of one plan are nearly the same for all its runs, so that the
 products of the columns are kept once a file, as means.
 """
@@ -111,6 +111,8 @@ class ScoreStore:
         scored = [
             run for part in map_partitions(_of_part, parts, distribute, workers=workers, name="scores") for run in part
         ]
+        if not scored:
+            return 0
         number = 1 + max((int(place.name.split(".")[0]) for place in self._places()), default=0)
         files.publish(self.folder / f"{number:06d}.scores", derived.framed(written(scored)))
         self.__dict__.pop("files", None)

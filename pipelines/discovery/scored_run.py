@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -15,9 +16,10 @@ from inertial.errors import InertialError
 from pipelines.archive import Archive, Run
 from pipelines.stages.judge import verdict_of
 from pipelines.tables.sound_lot import every_unit_faulty, sound_lot
-from schemas.errors import TumblelineError
+from schemas.errors import ArchiveUnusable, DataRejected, RecipeInvalid
 
 Array = NDArray[np.float64]
+LOGGER = logging.getLogger("tumbleline.discovery")
 
 
 @dataclass(frozen=True)
@@ -51,10 +53,15 @@ class ScoredRun:
 
 
 def scored_runs(address: str, ids: Sequence[str]) -> list[ScoredRun]:
-    """The scores of some runs; what cannot be scored is kept with the reason."""
-    archive = Archive(address)
+    """The scores of some runs, with the reason for what is not pooled; a damaged run has none, and is tried again."""
+    archive, out = Archive(address), list[ScoredRun]()
     with threadpool_limits(1):
-        return [_scored(Run(archive, one)) for one in ids]
+        for one in ids:
+            try:
+                out.append(_scored(Run(archive, one)))
+            except ArchiveUnusable as problem:
+                LOGGER.warning("discover: run %s is not pooled: %s", one, problem)
+    return out
 
 
 def _scored(run: Run) -> ScoredRun:
@@ -87,7 +94,7 @@ def _scored(run: Run) -> ScoredRun:
         faulty = {fault.unit for fault in faults}
         units = tuple(one for place, one in enumerate(measurement.units) if place not in faulty)
         return _kept(head, units, slots, scores_of(lot, effects))
-    except (InertialError, TumblelineError) as problem:
+    except (InertialError, DataRejected, RecipeInvalid) as problem:
         return ScoredRun(**head, left_out=str(problem).rstrip("."))
 
 

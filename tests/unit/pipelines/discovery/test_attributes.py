@@ -36,7 +36,7 @@ def test_a_changed_value_is_a_new_row_and_the_newest_counts(archive: Archive) ->
         "2.0",
         "",
     )
-    kept = sorted(place.name for place in (Path(str(archive.root)) / "attributes").iterdir())
+    kept = sorted(place.name for place in (Path(str(archive.root)) / "attributes").glob("*.json"))
     assert kept == ["000001.json", "000002.json"]
     assert "first.csv" in (Path(str(archive.root)) / "attributes" / "000001.json").read_text("utf-8")
     assert "0 new values, 1 changed, 1 as before" in sentences(again)[0]

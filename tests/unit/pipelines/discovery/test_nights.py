@@ -189,3 +189,24 @@ def test_two_populations_in_a_coefficient_are_told_with_their_means(
     assert (row["figure"], row["kind"], row["detail"]["units"]) == ("bias_y", "two_populations", units)
     assert row["detail"]["share"] == pytest.approx(0.15, abs=0.02)
     assert row["detail"]["means"][0] == pytest.approx(5.0, abs=0.5)
+
+
+def test_a_damaged_run_is_told_and_pooled_once_it_is_restored(
+    archive: Archive, caplog: pytest.LogCaptureFixture
+) -> None:
+    shutil.rmtree(Path(str(archive.root)) / "discovery")
+    table = next((Path(str(archive.root)) / "runs").iterdir()) / "dwells.parquet"
+    sound = table.read_bytes()
+    table.write_bytes(sound[:-50])
+    source = DiscoveryArchive(archive)
+    with caplog.at_level(logging.WARNING):
+        assert source.score(1) == LOTS - 1
+    assert table.parent.name in caplog.text
+    table.write_bytes(sound)
+    assert DiscoveryArchive(archive).score(1) == 1
+
+
+def test_a_run_that_goes_on_is_not_judged_yet(archive: Archive) -> None:
+    run = next((Path(str(archive.root)) / "runs").iterdir())
+    (run / "sealed.json").unlink()
+    assert run.name not in {info.id for info in DiscoveryArchive(archive).infos}
