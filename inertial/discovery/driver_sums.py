@@ -7,8 +7,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
-from scipy.sparse import linalg
 
 from inertial.discovery.evidence import DATE, MEAN, SLOT, STATION, UNIT, ScoredLot
 
@@ -24,7 +22,7 @@ class DriverSums:
 
     labels : of the levels; one, "slope" or "all", where the driver has none · weight : (g,), units of each level
     about : what a number is counted from
-    lots, common : levels in lots, and those of a whole lot
+    inside, between : information of differences inside lots, and of what lots have in common
     """
 
     labels: list[str] = field(default_factory=list[str])
@@ -32,13 +30,13 @@ class DriverSums:
     information: Array = field(default_factory=lambda: np.zeros((0, 0)))
     weight: Array = field(default_factory=lambda: np.zeros(0))
     about: float = 0.0
-    common: float = 0.0
-    lots: float = 0.0
+    inside: float = 0.0
+    between: float = 0.0
 
     @property
     def mixed(self) -> bool:
-        """Whether most lots hold several levels: then the products of the columns are those inside lots."""
-        return self.lots > 0.0 and self.common < 0.5 * self.lots
+        """Whether most is known from differences inside lots: then the products of the columns are those inside lots."""
+        return self.inside > self.between
 
     def add(self, label: str, score: Array, information: Array, weight: float) -> None:
         """Add to a level."""
@@ -96,38 +94,6 @@ def shrinkage(size: Array, information: Array) -> Array:
     seen = information > 0.0
     noise = np.where(seen, 1.0 / np.where(seen, information, 1.0), 0.0).sum(axis=0)
     return np.clip(1.0 - noise / np.maximum((size**2).sum(axis=0), 1e-300), 0.0, 1.0)
-
-
-def fitted_together(lots: Sequence[ScoredLot], driver: str, sums: DriverSums, h: int) -> Array:
-    """Sizes (levels,) of one hypothesis by least squares over all lots: what units differ by, and what each lot has in common."""
-    rows: list[Array] = []
-    columns: list[NDArray[np.intp]] = []
-    values: list[Array] = []
-    target: list[Array] = []
-    first = 0
-    for lot in lots:
-        weights, own, info = weights_of(lot, driver, sums), lot.own[:, h], float(lot.information[h])
-        total = float(own.sum())
-        if total <= 0.0:
-            continue
-        share = own / total @ weights
-        score = lot.score[:, h]
-        root = np.sqrt(own)
-        inside = root[:, None] * (weights - share)
-        block = np.vstack([inside, np.sqrt(max(info, 0.0)) * share])
-        here = np.flatnonzero(block.any(axis=0))
-        left = (score - own * score.sum() / total) / np.where(root > 0.0, root, 1.0)
-        target.append(np.append(left, score.sum() / np.sqrt(info) if info > 0.0 else 0.0))
-        rows.append(np.repeat(np.arange(first, first + len(block)), here.size).astype(np.float64))
-        columns.append(np.tile(here, len(block)))
-        values.append(block[:, here].reshape(-1))
-        first += len(block)
-    if not rows:
-        return np.zeros(len(sums.labels))
-    shape = first, len(sums.labels)
-    places = np.concatenate(rows).astype(np.intp), np.concatenate(columns)
-    matrix = sparse.csr_matrix((np.concatenate(values), places), shape=shape)
-    return np.asarray(linalg.lsqr(matrix, np.concatenate(target), damp=1e-9)[0], dtype=np.float64)
 
 
 def weights_of(lot: ScoredLot, driver: str, sums: DriverSums) -> Array:
@@ -211,12 +177,13 @@ def _gather(
                 mine = own[here].sum(axis=0)
                 score = left[here].sum(axis=0) / within
                 information = mine * (1.0 - mine / total) / within
+                of.inside += float(information.sum())
                 if name not in INSIDE_ONLY:  # and what the lot has in common
                     share = mine / total
                     score = score + share * sums / noise
-                    information = information + share**2 * info / noise
-                    of.common += float(here.sum() == units)
-                of.lots += 1.0
+                    common = share**2 * info / noise
+                    information = information + common
+                    of.between += float(common.sum())
                 if label and (name != UNIT or seen[label] > 1):
                     of.add(label, score, information, float(here.sum()))
 
@@ -229,5 +196,6 @@ def _gather_number(of: DriverSums, numbers: Array, parts: tuple[ScoredLot, Array
     own, centre = lot.own, float(numbers.mean())
     about = numbers[:, None] - lot.averaged(numbers[:, None])
     score = (about * left).sum(axis=0) / within + centre * (lot.score.sum(axis=0) - lot.information * mean) / noise
-    information = (about**2 * own).sum(axis=0) / within + centre**2 * lot.information / noise
-    of.add("slope", score, information, float(len(lot.units)))
+    inside, between = (about**2 * own).sum(axis=0) / within, centre**2 * lot.information / noise
+    of.inside, of.between = of.inside + float(inside.sum()), of.between + float(between.sum())
+    of.add("slope", score, inside + between, float(len(lot.units)))

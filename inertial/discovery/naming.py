@@ -18,7 +18,6 @@ from inertial.discovery.driver_sums import (
     INSIDE_ONLY,
     DriverSums,
     about_common,
-    fitted_together,
     gathered,
     shrinkage,
     weights_of,
@@ -30,7 +29,7 @@ Array = NDArray[np.float64]
 _MOST = 6
 """Largest number of names of one night."""
 
-_TURNS = 5  # of a fit of levels that share lots
+_TURNS = 5  # of a fit of columns, and of levels, that share lots
 
 _INEXACT = 0.02
 """Part of a score that is not known: products of columns are means over lots, effects are at the middle of their range."""
@@ -134,24 +133,22 @@ class Pool:
         return float(np.abs(self.lot[:, self.places(one)][:, :, self.places(other)]).max())
 
     def _fitted_out(self, lots: Sequence[ScoredLot], driver: str, effect: str) -> Sequence[ScoredLot]:
-        """The lots without an effect of a driver: columns of the effect are fitted in turns, levels that share lots together."""
+        """The lots without an effect of a driver: columns of the effect, and levels that share lots, are fitted in turns."""
         for _ in range(_TURNS):
             sums = gathered(lots, [driver])
             if driver not in sums or self.scores(driver, sums[driver])[effect] < 1.0:
                 break
-            sizes = self._sizes(lots, driver, effect, sums[driver])
+            sizes = self._sizes(driver, effect, sums[driver])
             lots = [self.without(lot, driver, effect, sums[driver], sizes) for lot in lots]
         return lots
 
-    def _sizes(self, lots: Sequence[ScoredLot], driver: str, effect: str, sums: DriverSums) -> Array:
+    def _sizes(self, driver: str, effect: str, sums: DriverSums) -> Array:
         """Sizes (axes, levels, p) of a driver's levels."""
         at, count = self.places(effect), len(self.columns)
         here = np.arange(self.axes)[:, None] * count + at
         info = sums.information[:, here.reshape(-1)]
         size = about_common(driver, sums)[:, here.reshape(-1)] / np.where(info > 0.0, info, np.inf)
-        if sums.mixed and driver not in INSIDE_ONLY and len(sums.labels) > 1:
-            size = np.stack([fitted_together(lots, driver, sums, int(one)) for one in here.reshape(-1)], axis=1)
-        elif len(sums.labels) > 1:
+        if len(sums.labels) > 1:
             size = size * shrinkage(size, info)
         return np.moveaxis(size.reshape(-1, self.axes, at.size), 1, 0)
 
@@ -283,7 +280,7 @@ class Pool:
         """Fall of the misfit by an effect's columns, and the number of coefficients of each axis and column."""
         count = len(self.columns)
         total, rank = 0.0, np.zeros((self.axes, at.size))
-        products = self.inside if name in INSIDE_ONLY or sums.mixed else self.lot
+        products = self.inside if sums.mixed else self.lot
         centred = about_common(name, sums)
         for axis in range(self.axes):
             here = axis * count + at
