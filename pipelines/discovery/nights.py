@@ -124,6 +124,14 @@ def _replayed(source: DiscoveryArchive, nights: Sequence[Mapping[str, Any]]) -> 
         runs = [run for run in night["runs"] if run in source.store.place and run not in out]
         state = grown_by_days(source, state, runs)
     state.taken_out = [run for night in nights for run in night["taken_out"]]
+    # an alarm that was raised stays, also where a run that carried it was taken out since
+    place = {_text_of(state, at): at for at in range(state.sensor.count + state.station.count)}
+    known = {(alarm.driver, alarm.place) for alarm in state.alarms}
+    for night in nights:
+        for told in night["alarms"]:
+            at = place.get(told["column"])
+            if at is not None and (told["driver"], at) not in known:
+                state.alarms.append(Alarm(told["driver"], at, night["night"], told["lots"], told["log_e"]))
     return state
 
 

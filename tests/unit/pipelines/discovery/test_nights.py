@@ -125,7 +125,10 @@ def test_a_revoked_run_is_taken_out_from_that_night_on(archive: Archive) -> None
     again = DiscoveryArchive(archive)
     again.__dict__["revoked"] = {gone}
     (Path(str(archive.root)) / "discovery" / "DEMO" / "state").unlink()
-    assert brought_up(again).order == state.order
+    replayed = brought_up(again)
+    assert replayed.order == state.order
+    assert {(a.driver, a.place) for a in replayed.alarms} == {(a.driver, a.place) for a in state.alarms}
+    assert state.alarms
 
 
 def test_the_wafer_is_found_and_keeps_its_id(archive: Archive) -> None:
