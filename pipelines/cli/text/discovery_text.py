@@ -30,8 +30,8 @@ def print_discoveries(document: DiscoverDocument) -> None:
         say(f"    {scope_text(row)}")
     _beside(document)
     say(
-        f"a discovery needs evidence of e^{short(control['log_e_needed'])}: in an archive without anything hidden one ever "
-        f"comes with {short(100.0 * control['alpha'])} % at most, whenever it is looked at",
+        f"a discovery needs evidence of e^{short(control['log_e_needed'])}: where nothing is hidden, the probability that one "
+        f"ever appears is at most {100.0 * control['alpha']:g} %, however often it is looked at",
         style="dim",
     )
     for text in document["warnings"]:
