@@ -23,7 +23,8 @@ Space = Literal["holding", "input", "coil", "discrete"]
 Kind = Literal[
     "axis", "chamber", "reader", "slot", "exciter", "shock_machine", "centrifuge", "power_supply", "step_generator"
 ]
-Carrier = Literal["tcp", "rtu", "tls", "ascii"]
+Carrier = Literal["tcp", "rtu", "tls", "ascii", "visa"]
+TEXT_CARRIERS: frozenset[Carrier] = frozenset({"ascii", "visa"})
 Adapter = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")]  # the family, a module in stations/devices/families
 
 WORDS: dict[str, int] = {"uint16": 1, "int16": 1, "uint32": 2, "int32": 2, "float32": 2, "string": 1, "bit": 1}
@@ -164,11 +165,11 @@ class Profile(Strict):
 
     @model_validator(mode="after")
     def _consistent(self) -> "Profile":
-        spoken = self.links == ["ascii"]
+        spoken = set(self.links) <= TEXT_CARRIERS
         if not (self.commands if spoken else self.registers) or (self.registers if spoken else self.commands):
             carriers = ", ".join(self.links)
             raise ValueError(
-                f"links {carriers}: a device on ascii has commands alone, any other registers alone; correct it"
+                f"links {carriers}: a device on ascii or visa has commands alone, any other registers alone; correct it"
             )
         _refuse_overlaps(self)
         for register in self.registers:

@@ -21,7 +21,7 @@ SECURE = ("ca_file", "certificate_file", "key_file", "server_name")
 class Carried(Strict):
     """A profile at an address; a simulated station leaves the address empty and gets its own.
 
-    ``link`` is ``tcp``, ``tls``, ``ascii`` (lines over TCP), each to host and port, or ``rtu`` on the line ``serial``. With
+    ``link`` is ``tcp``, ``tls``, ``ascii`` (lines over TCP), each to host and port, ``rtu`` on the line ``serial``, or ``visa``. With
     ``tls`` the device's certificate must be signed by the authority in ``ca_file`` and bear ``server_name``, or the host's name;
     ``certificate_file`` and ``key_file`` are shown to the device where it asks for them. ``word_order`` is that of a device
     which is set to another than its profile's.
@@ -68,13 +68,27 @@ class Device(Carried, Grown):
 
     ``maximum`` bounds what may be ordered, by the names of the profile's orders, below the profile's own largest values; for an
     exciter also ``displacement_mm``, ``velocity_m_s`` and ``acceleration_g``, all peak values. The absolute maximum of the
-    devices' supply is ``maximum.voltage`` of the power supply.
+    devices' supply is ``maximum.voltage`` of the power supply. ``resource`` is the VISA name of an instrument with link ``visa``,
+    such as ``USB0::0x0957::0x17A6::MY1::INSTR`` or ``GPIB0::9::INSTR``.
     """
 
-    later: ClassVar[frozenset[str]] = frozenset({"maximum"})
+    later: ClassVar[frozenset[str]] = frozenset({"maximum", "resource"})
 
     device_id: Annotated[int, Field(ge=1, le=247)]
     maximum: dict[str, Positive] = Field(default_factory=dict[str, float])
+    resource: str = ""
+
+    @model_validator(mode="after")
+    def _visa_alone_has_a_resource(self) -> "Device":
+        if self.resource and self.link != "visa":
+            raise ValueError(f"resource: for link visa, the link is {self.link}; leave it out, or set link")
+        return self
+
+    def missing(self) -> str:
+        """The key that a real device at this address still needs; empty when it has all."""
+        if self.link == "visa":
+            return "" if self.resource else "resource"
+        return super().missing()
 
 
 class Slots(Carried):

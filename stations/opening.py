@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from schemas.errors import RecipeInvalid, StationError
 from schemas.lot import Lot
-from schemas.profile import Carrier, Profile
+from schemas.profile import TEXT_CARRIERS, Carrier, Profile
 from schemas.station import Limits, StationConfig
 from schemas.station_devices import Device
 from stations.clock import Clock, WallClock
@@ -27,8 +27,10 @@ from stations.devices.table import TiltTable
 from stations.devices.values import Values
 from stations.links.gate import Permit
 from stations.links.making import Links
+from stations.links.recorder import RecordedClock
 from stations.plant.hidden import HiddenEffect
 from stations.profile_files import profile_of
+from stations.recordings.held import HeldClock, active_replay
 from stations.safety.guarded import Protection, guarded
 from stations.safety.safe_state import equipment_steps, safe_steps
 from stations.station import Station, nobody_else
@@ -62,6 +64,11 @@ def open_station(
     run : purpose of the leases, as messages to other runs state it
     roles : equipment that the run needs besides table, chamber and reader
     """
+    held = active_replay()
+    if held is not None:
+        slots, links = [unit.slot for unit in lot.units], Links(config, instead=held)
+        yield _assemble(config, slots, links, HeldClock(held), roles)
+        return
     if config.kind == "simulated":
         plant = make_plant(config, lot, resume, hidden)
         with serve_plant(config, lot, plant, roles) as station:
@@ -146,6 +153,8 @@ def _assemble(
     config: StationConfig, slots: Sequence[int], links: Links, clock: Clock, roles: Sequence[str] = ()
 ) -> Station:
     """The station's adapters on their links, each with the tighter of its profile's and the station's limits."""
+    if links.recorder is not None:
+        clock = RecordedClock(clock, links.recorder)
     devices, limits = config.devices, config.limits
     axes = {
         "outer": _axis(_registers("outer axis", "outer", devices.outer, links), limits.outer_deg, limits),
@@ -176,8 +185,8 @@ def _assemble(
 
 
 def _values(name: str, place: str, device: Device, links: Links) -> Values:
-    """Values of a device: text commands on an ascii link, registers on any other."""
-    if device.link == "ascii":
+    """Values of a device: text commands on a link for lines, registers on any other."""
+    if device.link in TEXT_CARRIERS:
         return Commands(name, links.lines(place), profile_of(device))
     return _registers(name, place, device, links)
 

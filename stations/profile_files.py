@@ -38,11 +38,17 @@ def recorded_columns(reader: Carried) -> list[str]:
 def load_profile(name: str) -> Profile:
     """The profile with a name; an unknown name is refused with the most similar names."""
     path = own_file("profiles", name, built_in_profiles())
+    return _parsed(profile_text(name), f"stations/profiles/{name}.toml" if path is None else str(path))
+
+
+def profile_text(name: str) -> str:
+    """The file of the profile with a name; an unknown name is refused with the most similar names."""
+    path = own_file("profiles", name, built_in_profiles())
     if path is not None:
-        return _parsed(read_text(path, "profile"), str(path))
+        return read_text(path, "profile")
     if name not in built_in_profiles():
         raise RecipeInvalid(f"profile: no '{name}'; {did_you_mean(name, profile_names())}", key="profile")
-    return _parsed(profile_folder().joinpath(f"{name}.toml").read_text("utf-8"), f"stations/profiles/{name}.toml")
+    return profile_folder().joinpath(f"{name}.toml").read_text("utf-8")
 
 
 def built_in_profiles() -> list[str]:

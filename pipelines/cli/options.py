@@ -16,6 +16,10 @@ ArchiveOption = Annotated[
     ),
 ]
 AllOption = Annotated[bool, typer.Option("--all", help="Print the long tables, too.")]
+RecordOption = Annotated[
+    Path | None,
+    typer.Option("--record", metavar="FILE", help="Record every frame on the links into this new file."),
+]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")]
 RecipeArgument = Annotated[str, typer.Argument(metavar="[RECIPE]", help="A recipe file or a built-in recipe.")]
 StationOption = Annotated[

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator
 from contextlib import AbstractContextManager, contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -11,6 +12,7 @@ import typer
 from pipelines.archive import Archive, Run
 from pipelines.cli import options
 from pipelines.cli.printing import error_console, print_json, remark
+from schemas.errors import WrongUse
 from schemas.progress import Progress
 
 if TYPE_CHECKING:
@@ -51,6 +53,13 @@ def command(
             "--prompts/--no-prompts", help="Ask the operator to load and unload; default: on hardware, at a terminal."
         ),
     ] = None,
+    record: options.RecordOption = None,
+    replay: Annotated[
+        Path | None,
+        typer.Option(
+            "--replay", metavar="FILE", help="Answer from this recording of the same run; no station is opened."
+        ),
+    ] = None,
     direct: Annotated[bool, typer.Option("--direct", help="Run the same chain without the orchestrator.")] = False,
     as_json: options.JsonOption = False,
 ) -> None:
@@ -69,6 +78,8 @@ def command(
     from pipelines.jobs.job import OF_RUN, Request
     from pipelines.jobs.seating import SCAN, read_seating
     from schemas.station import load_station
+    from stations.links.recorder import recorded
+    from stations.recordings.held import held_to
 
     slots = 0 if recipe.startswith(OF_RUN) else load_station(station).devices.slots.count
     seating = scanned(slots) if units == SCAN else read_seating(units)
@@ -77,10 +88,16 @@ def command(
     requests = request_of_lot.fillings(slots) if asks else [request_of_lot]
     jobs = [request.job(Archive(archive)) for request in requests]
     asks = asks and (bool(prompts) or len(requests) > 1 or jobs[0].station.kind == "modbus")
-    runs = [
-        measured(job, Archive(archive), None if direct else request, asks=asks)
-        for request, job in zip(requests, jobs, strict=True)
-    ]
+    if record is not None or replay is not None:
+        refuse_recorded(jobs, Archive(archive), replays=replay is not None)
+        direct, asks = True, asks and replay is None
+    with recorded(record, f"run of {jobs[0].recipe.name}"), held_to(replay) as held:
+        runs = [
+            measured(job, Archive(archive), None if direct else request, asks=asks)
+            for request, job in zip(requests, jobs, strict=True)
+        ]
+    if held is not None and held.left:
+        remark(f"replay: {held.left} recorded exchanges were not asked for: the recorded run went on")
     for line in (line for run in runs for line in library_remarks(run)):
         remark(f"run: {line}")
     documents = [judged(summary(run), run) for run in runs]
@@ -93,6 +110,24 @@ def command(
             [line for run, document in zip(runs, documents, strict=True) for line in _next(run, document, archive)],
         )
     raise typer.Exit(max(exit_status(document) for document in documents))
+
+
+def refuse_recorded(jobs: list[Job], store: Archive, *, replays: bool) -> None:
+    """Refuse to record or replay a lot that the archive has already: nothing would be measured.
+
+    Raises
+    ------
+    WrongUse
+        Its capture is there, whole or in part.
+    """
+    for job in jobs:
+        capture = store.capture(job.capture_id)
+        if capture.is_complete() or capture.last_state():
+            word = "replay" if replays else "record"
+            raise WrongUse(
+                f"run: --{word}, the archive {store.root} has measurements of this lot already ({job.capture_id}), a fresh one "
+                "is needed; name another --archive, or count it with --repeat"
+            )
 
 
 def _next(run: Run, document: dict[str, Any], archive: str | None) -> list[str]:

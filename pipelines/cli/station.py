@@ -1,4 +1,4 @@
-"""``tumbleline station``: state, self-test, log and charts of a station, profiles, and the server of a simulated station."""
+"""``tumbleline station``: bring-up, recordings, state, self-test, log and charts of a station, profiles, simulated station."""
 
 from __future__ import annotations
 
@@ -9,7 +9,9 @@ import typer
 
 from pipelines.cli import options
 from pipelines.cli.printing import give, print_json, print_table, say
+from pipelines.cli.station_bring_up import bring_up
 from pipelines.cli.station_check import check
+from pipelines.cli.station_frames import frames, replay
 from pipelines.cli.station_log import log
 from pipelines.cli.station_lot import DeviceOption, UnitsOption, made_up
 from pipelines.cli.station_status import status
@@ -20,12 +22,24 @@ if TYPE_CHECKING:
 
 PART = "Measure"
 ORDER = 150
-SUMMARY = "Show, check, serve and describe stations."
+SUMMARY = "Connect, show, check, serve and describe stations."
 EXAMPLES = (
     "tumbleline station status --station line-1.toml",
     "tumbleline station check --station line-1.toml",
 )
 EXAMPLES_OF = {
+    "bring-up": (
+        "tumbleline station bring-up watlow_f4t --link tcp://192.168.0.20 --readings",
+        "tumbleline station bring-up oriental_az --link serial:/dev/ttyUSB0 --device-id 1",
+    ),
+    "frames": (
+        "tumbleline station frames frames.jsonl",
+        "tumbleline station frames frames.jsonl --as-test test_slow_chamber.py",
+    ),
+    "replay": (
+        "tumbleline station replay frames.jsonl",
+        "tumbleline station replay capture.pcapng --port 1502 --speed 10",
+    ),
     "status": (
         "tumbleline station status --station line-1.toml",
         "tumbleline station status --station line-1.toml --watch",
@@ -56,12 +70,15 @@ EXAMPLES_OF = {
 SHORT = {"read": "r", "write": "w", "read_write": "rw"}
 
 app = typer.Typer(
-    help="Show, check, serve and describe stations.",
+    help=SUMMARY,
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
 )
 
+app.command("bring-up")(bring_up)
+app.command()(frames)
+app.command()(replay)
 app.command()(status)
 app.command()(check)
 app.command()(log)

@@ -25,6 +25,7 @@ def check(
     units: UnitsOption = 8,
     *,
     registers: Annotated[bool, typer.Option("--registers", help="Only read every register once; no motion.")] = False,
+    record: options.RecordOption = None,
     as_json: options.JsonOption = False,
 ) -> None:
     """Test a station before a shift: registers, instruments, moves, noise of every slot, a check standard.
@@ -34,12 +35,14 @@ def check(
     from dataclasses import asdict
 
     from schemas.station import load_station
+    from stations.links.recorder import recorded
     from stations.serving import look
 
     config = load_station(station)
-    readings = look(config, made_up(device, units, 1))
-    silent = [reading.fault for reading in readings if reading.fault]
-    findings = [] if registers or silent else _tested(config, device, units)
+    with recorded(record, f"station check of {config.name}"):
+        readings = look(config, made_up(device, units, 1))
+        silent = [reading.fault for reading in readings if reading.fault]
+        findings = [] if registers or silent else _tested(config, device, units)
     failed = [*silent, *(finding.message for finding in findings if not finding.ok)]
     if as_json:
         document: dict[str, Any] = {"ok": not failed, "failed": failed, "registers": [asdict(r) for r in readings]}

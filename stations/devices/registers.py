@@ -41,6 +41,11 @@ class Registers:
         words = self._read_words(register.address, register.words, name, register.space)
         return decode(register, self.profile.order(register), words)
 
+    def raw(self, name: str) -> list[int]:
+        """The words, or bits, of a register as they are on the wire."""
+        register = self.profile.register(name)
+        return self._read_words(register.address, register.words, name, register.space)
+
     def number(self, name: str) -> float:
         """The value of a numeric register."""
         return float(self.number_in(name, self.read(name)))

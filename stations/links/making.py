@@ -3,20 +3,35 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Protocol
 
 from schemas.errors import RecipeInvalid
-from schemas.profile import Carrier, Profile
+from schemas.profile import TEXT_CARRIERS, Carrier, Profile
 from schemas.station import StationConfig
-from schemas.station_devices import Carried, Devices
+from schemas.station_devices import Carried, Device, Devices
 from stations.links.gate import GatedLines, GatedLink, Permit
-from stations.links.lines import LineLink
+from stations.links.lines import LineLink, TcpLines
 from stations.links.modbus import WireLink
+from stations.links.recorder import FrameRecorder, RecordedLines, RecordedWire, active_recorder
 from stations.links.serial_wire import SerialWire
-from stations.links.wires import TcpWire, Wire, tls_context
+from stations.links.visa_lines import VisaLines
+from stations.links.wires import LineWire, TcpWire, Wire, tls_context
 from stations.profile_files import load_profile
 
 Address = tuple[str, int]
 Key = tuple[str, str, int]
+
+
+class WireSource(Protocol):
+    """Wires in place of those to devices, such as those of a replayed recording."""
+
+    def wire(self, link: str) -> Wire:
+        """The Modbus wire of a link, which has the name of its first device."""
+        ...
+
+    def lines(self, link: str) -> LineWire:
+        """The text connection of a link."""
+        ...
 
 
 @dataclass
@@ -24,6 +39,7 @@ class Links:
     """Links by address, each made once; a simulated station's are ``simulated_at``, by what carries them.
 
     ``permit`` is what the gates ask before anything is sent; None where nothing is driven, or where no other process can drive.
+    ``recorder`` records every exchange; ``instead`` gives wires in place of those to devices.
     """
 
     config: StationConfig
@@ -31,20 +47,33 @@ class Links:
     permit: Permit | None = None
     lines_at: Mapping[int, Address] = field(default_factory=dict[int, "Address"])
     made: dict[Key, GatedLink | GatedLines] = field(default_factory=dict["Key", "GatedLink | GatedLines"])
+    recorder: FrameRecorder | None = field(default_factory=active_recorder)
+    instead: WireSource | None = None
 
     def registers(self, place: str) -> GatedLink:
         """The link to the registers of the device at a place of the station, such as ``outer`` or ``slots``."""
         device, profile = self._at(place)
-        if device.link == "ascii":
+        if device.link in TEXT_CARRIERS:
             raise RecipeInvalid(
-                f"devices.{place}.link: ascii, registers need tcp, rtu or tls; correct the station's file",
+                f"devices.{place}.link: {device.link}, registers need tcp, rtu or tls; correct the station's file",
                 key=f"devices.{place}.link",
             )
         key = self._key(device)
         if key not in self.made:
-            wire = self._wire(device, key)
+            behind = self._behind(key)
+            name = next(iter(behind.values()))[0]
+            wire = (
+                wire_to(device, *key[1:], self.config.link.timeout_s)
+                if self.instead is None
+                else self.instead.wire(name)
+            )
+            if self.recorder is not None:
+                for device_id, (at, own) in behind.items():
+                    self.recorder.device(name, device_id, at, own)
+                wire = RecordedWire(wire, self.recorder, name)
             link = WireLink(wire, read_attempts=self.config.link.read_attempts)
-            self.made[key] = GatedLink(link, wire.where, self._profiles(key), self.permit)
+            profiles = {device_id: own for device_id, (_, own) in behind.items()}
+            self.made[key] = GatedLink(link, wire.where, profiles, self.permit)
         made = self.made[key]
         if isinstance(made, GatedLines):
             raise self._shared(place, profile)
@@ -55,10 +84,16 @@ class Links:
         device, profile = self._at(place)
         key = self._key(device)
         if key not in self.made:
-            _, host, port = key
-            patience = self.config.link
-            line = LineLink(host, port, timeout_s=patience.timeout_s, read_attempts=patience.read_attempts)
-            self.made[key] = GatedLines(line, f"{host}:{port}", profile, self.permit)
+            wire = (
+                lines_to(device, *key[1:], self.config.link.timeout_s)
+                if self.instead is None
+                else self.instead.lines(place)
+            )
+            if self.recorder is not None:
+                self.recorder.device(place, 0, place, profile)
+                wire = RecordedLines(wire, self.recorder, place)
+            link = LineLink(wire, read_attempts=self.config.link.read_attempts)
+            self.made[key] = GatedLines(link, wire.where, profile, self.permit)
         made = self.made[key]
         if isinstance(made, GatedLink):
             raise self._shared(place, profile)
@@ -87,9 +122,11 @@ class Links:
         return getattr(self.config.devices, place) if equipment is None else equipment
 
     def _key(self, device: Carried) -> Key:
+        if self.config.kind == "simulated" and self.instead is not None:
+            return (device.link, "", getattr(device, "device_id", 0) if device.link in TEXT_CARRIERS else 0)
         if self.config.kind == "simulated":
             own = self.lines_at.get(getattr(device, "device_id", 0))
-            if device.link == "ascii" and own is not None:
+            if device.link in TEXT_CARRIERS and own is not None:
                 return (device.link, *own)
             if device.link not in self.simulated_at:
                 carriers = " or ".join(self.simulated_at)
@@ -98,41 +135,93 @@ class Links:
                     key="link",
                 )
             return (device.link, *self.simulated_at[device.link])
+        if device.link == "visa":
+            return (device.link, getattr(device, "resource", ""), 0)
         return ("rtu", device.serial, 0) if device.link == "rtu" else (device.link, device.host, device.port)
 
-    def _profiles(self, key: Key) -> dict[int, Profile]:
-        """The profiles of all devices behind one address, by device id."""
-        profiles: dict[int, Profile] = {}
+    def _behind(self, key: Key) -> dict[int, tuple[str, Profile]]:
+        """Name and profile of every device behind one address, by device id; the first one names the link."""
+        behind: dict[int, tuple[str, Profile]] = {}
         for place in Devices.model_fields:
             device = getattr(self.config.devices, place)
             if self._key(device) == key:
-                ids = range(device.device_id, device.device_id + getattr(device, "count", 1))
-                profiles.update(dict.fromkeys(ids, load_profile(device.profile)))
-        for equipment in self.config.fitted().values():
-            if equipment.link != "ascii" and self._key(equipment) == key:
-                profiles[equipment.device_id] = load_profile(equipment.profile)
-        return profiles
-
-    def _wire(self, device: Carried, key: Key) -> Wire:
-        _, host, port = key
-        patience = self.config.link.timeout_s
-        if device.link == "rtu":
-            return SerialWire(
-                device.serial, patience, baud=device.baud, parity=device.parity, stop_bits=device.stop_bits
-            )
-        if device.link == "tcp":
-            return TcpWire(host, port, patience)
-        files = [Path(name) if name else None for name in (device.ca_file, device.certificate_file, device.key_file)]
-        try:
-            context = tls_context(Path(device.ca_file), files[1], files[2])
-        except OSError as problem:
-            named = ", ".join(str(name) for name in files if name is not None)
-            raise RecipeInvalid(
-                f"station {self.config.name}: {named}: {problem}, readable PEM files are needed; correct the paths",
-                key="ca_file",
-            ) from None
-        return TcpWire(host, port, patience, tls=context, server_name=device.server_name)
+                count = getattr(device, "count", 0)
+                names = [f"slot {n}" for n in range(count)] if count else [place]
+                profile = load_profile(device.profile)
+                behind |= {device.device_id + n: (name, profile) for n, name in enumerate(names)}
+        for role, equipment in self.config.fitted().items():
+            if equipment.link not in TEXT_CARRIERS and self._key(equipment) == key:
+                behind[equipment.device_id] = role, load_profile(equipment.profile)
+        return behind
 
     def _shared(self, place: str, profile: Profile) -> RecipeInvalid:
         message = f"devices.{place}: profile {profile.name} at the address of a device that speaks otherwise; correct the file"
         return RecipeInvalid(message, key=f"devices.{place}")
+
+
+def wire_to(device: Carried, host: str, port: int, timeout_s: float) -> Wire:
+    """The Modbus wire to a device; ``host`` and ``port`` are where it is, which a simulated station decides."""
+    if device.link == "rtu":
+        return SerialWire(device.serial, timeout_s, baud=device.baud, parity=device.parity, stop_bits=device.stop_bits)
+    if device.link == "tcp":
+        return TcpWire(host, port, timeout_s)
+    files = [Path(name) if name else None for name in (device.ca_file, device.certificate_file, device.key_file)]
+    try:
+        context = tls_context(Path(device.ca_file), files[1], files[2])
+    except OSError as problem:
+        named = ", ".join(str(name) for name in files if name is not None)
+        raise RecipeInvalid(
+            f"link tls to {host}: {named}: {problem}, readable PEM files are needed; correct the paths", key="ca_file"
+        ) from None
+    return TcpWire(host, port, timeout_s, tls=context, server_name=device.server_name)
+
+
+def lines_to(device: Carried, host: str, port: int, timeout_s: float) -> LineWire:
+    """The connection for lines of text to a device."""
+    if device.link == "visa":
+        return VisaLines(getattr(device, "resource", ""), timeout_s)
+    return TcpLines(host, port, timeout_s)
+
+
+@dataclass
+class SingleLink:
+    """The link to one device without a station around it, behind the same gate: for its bring-up.
+
+    ``device`` may be replaced while nothing is open, to look for it elsewhere. ``lease`` is asked before each write.
+    """
+
+    device: Device
+    profile: Profile
+    timeout_s: float
+    permit: Permit | None = None
+    recorder: FrameRecorder | None = field(default_factory=active_recorder)
+    place: str = "device"
+    _made: GatedLink | GatedLines | None = None
+
+    def registers(self, attempts: int = 1) -> GatedLink:
+        """The link to its registers, on a new connection."""
+        self.close()
+        device = self.device
+        wire = wire_to(device, device.host, device.port, self.timeout_s)
+        if self.recorder is not None:
+            self.recorder.device(self.place, device.device_id, self.place, self.profile)
+            wire = RecordedWire(wire, self.recorder, self.place)
+        link = WireLink(wire, read_attempts=attempts)
+        self._made = made = GatedLink(link, wire.where, {device.device_id: self.profile}, self.permit)
+        return made
+
+    def lines(self, attempts: int = 1) -> GatedLines:
+        """The connection for its lines, anew."""
+        self.close()
+        wire = lines_to(self.device, self.device.host, self.device.port, self.timeout_s)
+        if self.recorder is not None:
+            self.recorder.device(self.place, 0, self.place, self.profile)
+            wire = RecordedLines(wire, self.recorder, self.place)
+        self._made = made = GatedLines(LineLink(wire, read_attempts=attempts), wire.where, self.profile, self.permit)
+        return made
+
+    def close(self) -> None:
+        """Ends the connection."""
+        if self._made is not None:
+            self._made.close()
+            self._made = None

@@ -53,6 +53,21 @@ class Wire(Protocol):
         ...
 
 
+class LineWire(Protocol):
+    """A connection to a device that answers lines of text."""
+
+    where: str
+    timeout_s: float
+
+    def exchange(self, line: str, what: str, before: Callable[[], None] | None = None) -> str:
+        """The answer to a line, which is sent once; :class:`Silence` or :class:`Broken`. ``what`` is its name in a recording."""
+        ...
+
+    def close(self) -> None:
+        """Ends the connection; the next line makes a new one."""
+        ...
+
+
 class TcpWire:
     """Modbus TCP, over TLS with a context; it connects at the first request and again after a lost connection."""
 

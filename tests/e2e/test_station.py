@@ -31,7 +31,7 @@ from schemas.recipe import Recipe
 from schemas.station import StationConfig, load_station, with_faults
 from schemas.table_check import check as check_table
 from stations import serving
-from stations.links.lines import LineLink
+from stations.links.lines import LineLink, TcpLines
 from stations.opening import make_plant, one_processor, open_station, serve_plant, tighter
 from stations.profile_files import load_profile
 from stations.serving import look, serve
@@ -302,7 +302,7 @@ def test_a_served_station_speaks_in_lines_one_port_behind_its_registers() -> Non
     thread.start()
     try:
         assert ready.wait(20.0)
-        link = LineLink(where[0], where[1] + 1, timeout_s=5.0, read_attempts=1)
+        link = LineLink(TcpLines(where[0], where[1] + 1, 5.0), read_attempts=1)
         assert link.tell("TEMP, S40.0", "set point") == "OK:TEMP, S40.0"
         air, target, high, low = (float(part) for part in link.ask("TEMP?", "air").split(","))
         assert (target, high, low) == (40.0, 180.0, -70.0)

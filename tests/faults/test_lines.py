@@ -23,7 +23,7 @@ def linked(*answers: bytes | None, attempts: int = 2, timeout_s: float = PATIENC
     """A link to a device that gives these answers in turn, None hangs up; and what the device hears."""
     left = list(answers)
     with answering(lambda _: left.pop(0) if left else b"") as (address, heard):
-        link = LineLink(*address, timeout_s=timeout_s, read_attempts=attempts)
+        link = LineLink(lines.TcpLines(*address, timeout_s), read_attempts=attempts)
         try:
             yield link, heard
         finally:
@@ -70,4 +70,4 @@ def test_nobody_there_is_told():
     with socket.create_server(("127.0.0.1", 0)) as free:
         port = free.getsockname()[1]
     with pytest.raises(LinkLost, match="connection lost"):
-        LineLink("127.0.0.1", port, timeout_s=0.2, read_attempts=1).ask("TEMP?", "air")
+        LineLink(lines.TcpLines("127.0.0.1", port, 0.2), read_attempts=1).ask("TEMP?", "air")
