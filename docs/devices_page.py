@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from docs.generated_page import write_or_check
+from pipelines.commissioning.conformance import read_conformance
 from schemas.profile import Command, Profile, Register
 from stations.devices.adapters import adapters
 from stations.devices.axis import TableAxis
@@ -32,9 +33,12 @@ HEAD = """\
 
 Written by `python -m docs.devices_page` from the profiles in `stations/profiles/`; change a profile, not this page. A
 station's file names a device by its profile (`profile = "…"`) and its link (`link = "…"`, the usual link first
-below). No profile of a real device has been checked against hardware yet: see **verified**; **disputed** counts the
-values on which sources disagree. Addresses are those on the wire, from 0.
+below). **Verified on** says where a bring-up has compared the profile: every one has a simulated device; hardware and replays
+are named with who did it, when, and the file in `stations/conformance/`. **Disputed** counts the values on which sources
+disagree. Addresses are those on the wire, from 0. [Your device in an hour](../how-to/your-device-in-an-hour.md) compares a
+profile with your device.
 """
+CONFORMANCE = Path(__file__).resolve().parent.parent / "stations" / "conformance"
 
 
 def page() -> str:
@@ -52,11 +56,22 @@ def page() -> str:
 def _table(profiles: list[Profile]) -> str:
     rows = [
         f"| [`{p.name}`](#{p.name}) | {_cell(f'{p.maker} {p.model}')} | {p.kind} | `{p.adapter}` | {', '.join(p.links)} | "
-        f"{'yes' if p.verified else 'no'} | {sum(bool(entry.disputed) for entry in _entries(p)) or ''} |"
+        f"{_verified(p)} | {sum(bool(entry.disputed) for entry in _entries(p)) or ''} |"
         for p in profiles
     ]
-    head = "| profile | device | kind | adapter | links | verified | disputed |"
+    head = "| profile | device | kind | adapter | links | verified on | disputed |"
     return "\n".join([head, "|---|---|---|---|---|---|---|", *rows, ""])
+
+
+def _verified(profile: Profile) -> str:
+    """Where a profile has been compared: the simulator, and the conformance files of others."""
+    seen = ["simulator"]
+    for path in sorted(CONFORMANCE.glob("*.json")):
+        found = read_conformance(path)
+        if found["profile"] == profile.name and found["verified_on"] in {"hardware", "replay"}:
+            who = f"{found['by'] or 'not named'}, {found['made'][:10]}"
+            seen.append(f"{found['verified_on']} ({who}, [{path.name}](../../stations/conformance/{path.name}))")
+    return ", ".join(seen)
 
 
 def _families() -> str:

@@ -21,9 +21,9 @@ SECURE = ("ca_file", "certificate_file", "key_file", "server_name")
 class Carried(Strict):
     """A profile at an address; a simulated station leaves the address empty and gets its own.
 
-    ``link`` is ``tcp``, ``tls``, ``ascii`` (lines over TCP), each to host and port, ``rtu`` on the line ``serial``, or ``visa``. With
-    ``tls`` the device's certificate must be signed by the authority in ``ca_file`` and bear ``server_name``, or the host's name;
-    ``certificate_file`` and ``key_file`` are shown to the device where it asks for them. ``word_order`` is that of a device
+    ``link`` is ``tcp``, ``tls``, ``ascii`` (lines over TCP), each to host and port, ``rtu`` on the line ``serial``, or ``visa``.
+    With ``tls`` the device's certificate must be signed by the authority in ``ca_file`` and bear ``server_name``, or the host's
+    name; ``certificate_file`` and ``key_file`` are shown to the device where it asks for them. ``word_order`` is that of a device
     which is set to another than its profile's.
     """
 

@@ -65,7 +65,9 @@ def served_device(name, silence_s=1.0, jog_deg=12.0):
     how = {"host": "127.0.0.1", "port": 0, "speed": 1.0, "stop": stop, "ready": listening, "silence_s": silence_s}
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(opening, "make_plant", noted)
-        thread = threading.Thread(target=serving.serve, args=(station_with(**{profile.kind: name}), lot_of()), kwargs=how)
+        thread = threading.Thread(
+            target=serving.serve, args=(station_with(**{profile.kind: name}), lot_of()), kwargs=how
+        )
         thread.start()
         try:
             assert ready.wait(60.0)

@@ -27,7 +27,9 @@ def words_of(profile, values=VALUES):
     for register in profile.registers:
         value = values.get(register.name, 0)
         value = register.enumeration.get(value, value) if isinstance(value, str) and register.enumeration else value
-        for k, word in enumerate(encode(register.model_copy(update={"minimum": None, "maximum": None}), profile.order(register), value)):
+        for k, word in enumerate(
+            encode(register.model_copy(update={"minimum": None, "maximum": None}), profile.order(register), value)
+        ):
             content[register.address + k] = word
     return content
 

@@ -14,7 +14,7 @@ from pipelines.cli.printing import print_json, print_table, publish, remark, say
 from schemas.errors import STATION, StationError, WrongUse
 
 if TYPE_CHECKING:
-    from stations.bringup.conformance import ConformanceDocument, Platform
+    from pipelines.commissioning.documents import ConformanceDocument, Platform
     from stations.bringup.session import BringUp
 
 ON = "What is at the other end: hardware, simulator or replay? (Enter: not stated)"
@@ -103,8 +103,8 @@ def _written(session: BringUp, folder: Path, person: _Typed, by: str, *, as_json
     """Writes page, document and corrected profile, and prints the result."""
     import json
 
+    from pipelines.commissioning.conformance import document_of
     from pipelines.commissioning.conformance_page import conformance_page
-    from stations.bringup.conformance import document_of
     from stations.bringup.corrected import corrected_name, corrected_text
 
     corrected = corrected_text(session.profile, session.findings, session.made)
@@ -123,7 +123,7 @@ def _written(session: BringUp, folder: Path, person: _Typed, by: str, *, as_json
 
 
 def _platform(person: _Typed) -> Platform:
-    from stations.bringup.conformance import Platform as Known
+    from pipelines.commissioning.documents import Platform as Known
 
     typed = person.ask(ON).strip().lower()
     return next((known for known in get_args(Known) if known == typed), "not stated")

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from pipelines.commissioning.documents import ConformanceDocument, ConformancePoint
 from pipelines.commissioning.frame_pictures import timeline
 from pipelines.drawing import svg_text
 from pipelines.report.templates import template
-from stations.bringup.conformance import ConformanceDocument, ConformancePoint
 from stations.recordings.frame_file import read_frames
 
 SECTIONS = (

@@ -1,10 +1,14 @@
-"""The JSON documents of recordings: keys that other programs read."""
+"""The JSON documents of bring-ups and recordings: keys that other programs read."""
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from typing_extensions import TypedDict
+
+from stations.bringup.person import Verdict
+
+Platform = Literal["hardware", "simulator", "replay", "not stated"]
 
 
 class RecordedDeviceRow(TypedDict):
@@ -32,7 +36,7 @@ class FrameRow(TypedDict):
 
 
 class FramesDocument(TypedDict):
-    """A recording."""
+    """``station frames --json``: a recording with all its frames."""
 
     recording: str
     made: str
@@ -43,9 +47,52 @@ class FramesDocument(TypedDict):
 
 
 class ReplayDocument(TypedDict):
-    """Where a recording is served."""
+    """``station replay --json``: where a recording is served, printed when it is ready."""
 
     host: str
     port: Annotated[int, "of all devices with registers"]
     lines: Annotated[dict[str, int], "port of each device with lines of text"]
     devices: list[RecordedDeviceRow]
+
+
+class ConformancePoint(TypedDict):
+    """One register, or one promise."""
+
+    part: Annotated[str, "reach, register, panel, order or link"]
+    what: str
+    verdict: Verdict
+    found: str
+    expected: str
+    remedy: str
+
+
+class AnswerTimes(TypedDict):
+    """How long answers took."""
+
+    usual_ms: float
+    slowest_ms: float
+    timeout_s: Annotated[float, "time-out that the bring-up used"]
+
+
+class ConformanceDocument(TypedDict):
+    """``station bring-up --json``: what a bring-up has found, per register and per promise of the device's family."""
+
+    format: str
+    profile: str
+    maker: str
+    model: str
+    verified_on: Annotated[Platform, "what the person said is at the other end"]
+    by: Annotated[str, "who did it; empty if not stated"]
+    made: str
+    link: Annotated[str, "tcp, tls, rtu, ascii or visa"]
+    device_id: int
+    complete: Annotated[bool, "false: it ended before its last step"]
+    ended: Annotated[str, "why it ended early"]
+    held: int
+    differs: int
+    not_tried: int
+    points: list[ConformancePoint]
+    answers: AnswerTimes
+    left: Annotated[list[str], "what was done to leave the device as it was found"]
+    recording: Annotated[str, "name of the file with every frame"]
+    corrected_profile: Annotated[str, "name of the profile with corrected rows; empty if none is needed"]

@@ -19,6 +19,7 @@ OURS = re.compile(
     r"|calibrations/lock|calibrations/[0-9a-f]{2}/[0-9a-f]{16}/\d+\.json|chain/\d+/\d+\.json"
     r"|packed/(lock|\d{6}-[0-9a-z-]+\.(zip|toc))"
     r"|(releases|whatif)/(lock|[0-9a-f-]+\.json)|attributes/(lock|\d{6}\.json)"
+    r"|recordings/[^/]+\.jsonl"
     r"|discovery/(lock|scores/\d{6}\.scores|[^/]+/(lock|found|state|nights/\d{6}\.json))"
 )
 KEY_MARK, KEY_BYTES = b"PRIVATE KEY-----", 16_384

@@ -286,6 +286,7 @@ class StationPage(PageState):
 
     PATH: ClassVar[str] = "/station"
     run: Text = "latest"
+    recording: Text = ""
 
     def arguments(self) -> list[str]:
         """The station's log."""

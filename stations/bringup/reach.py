@@ -18,6 +18,8 @@ PROBES = 6
 SHIFTS = (0, -1, 1)
 OTHER_SPACE = {"holding": "input", "input": "holding"}
 MISSING = "bring-up: nothing answers"
+NOWHERE = ("refused", "route", "not known", "No such file", "Permission denied", "could not open")
+"""Words of the system for an address at which no device can be, whatever its id."""
 
 
 @dataclass
@@ -85,7 +87,12 @@ def reach(target: Target, findings: Findings, person: Person, *, given_id: int, 
                 findings.change(register.name, "space", best.space)
     else:
         findings.add(
-            Point("reach", "addresses", "held", f"{len(best.words)} of {len(best.words) + len(best.refused)} answer")
+            Point(
+                "reach",
+                "addresses",
+                "held",
+                f"{len(best.words)} of {len(best.words) + len(best.refused)} identity registers answer",
+            )
         )
     _order_of_words(target, findings, best.words)
     for point in findings.points:
@@ -189,7 +196,7 @@ def _read(link: GatedLink, profile: Profile, device_id: int, registers: Sequence
         except LinkLost as problem:
             if answer.words or answer.refused:
                 return answer
-            if "refused" in str(problem) or "route" in str(problem) or "not known" in str(problem):
+            if any(word in str(problem) for word in NOWHERE):
                 raise
             return None
     good, bad = 0, 0

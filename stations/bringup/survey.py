@@ -188,7 +188,12 @@ def _against_panel(findings: Findings, entry: Register | Command, read: float, s
         return Point("panel", entry.name + ON_PANEL, "held", text, expected)
     if unit == "degC" and abs((read - 32.0) / 1.8 - shown) <= tolerance:
         return Point(
-            "panel", entry.name, "differs", f"{text}: degrees Fahrenheit", expected, "set the controller to °C"
+            "panel",
+            entry.name + ON_PANEL,
+            "differs",
+            f"{text}: degrees Fahrenheit",
+            expected,
+            "set the controller to °C",
         )
     ratio = shown / read if read else math.inf
     for factor in (*FACTORS, *(1.0 / f for f in FACTORS)):

@@ -25,11 +25,11 @@ Key = tuple[str, str, int]
 class WireSource(Protocol):
     """Wires in place of those to devices, such as those of a replayed recording."""
 
-    def wire(self, link: str) -> Wire:
-        """The Modbus wire of a link, which has the name of its first device."""
+    def wire(self, link: str, where: str) -> Wire:
+        """The Modbus wire of a link, which has the name of its first device; ``where`` is its address in messages."""
         ...
 
-    def lines(self, link: str) -> LineWire:
+    def lines(self, link: str, where: str) -> LineWire:
         """The text connection of a link."""
         ...
 
@@ -65,7 +65,7 @@ class Links:
             wire = (
                 wire_to(device, *key[1:], self.config.link.timeout_s)
                 if self.instead is None
-                else self.instead.wire(name)
+                else self.instead.wire(name, _where(key))
             )
             if self.recorder is not None:
                 for device_id, (at, own) in behind.items():
@@ -87,7 +87,7 @@ class Links:
             wire = (
                 lines_to(device, *key[1:], self.config.link.timeout_s)
                 if self.instead is None
-                else self.instead.lines(place)
+                else self.instead.lines(place, _where(key))
             )
             if self.recorder is not None:
                 self.recorder.device(place, 0, place, profile)
@@ -157,6 +157,12 @@ class Links:
     def _shared(self, place: str, profile: Profile) -> RecipeInvalid:
         message = f"devices.{place}: profile {profile.name} at the address of a device that speaks otherwise; correct the file"
         return RecipeInvalid(message, key=f"devices.{place}")
+
+
+def _where(key: Key) -> str:
+    """The address of a link, as messages name it."""
+    _, host, port = key
+    return f"{host}:{port}" if port else host
 
 
 def wire_to(device: Carried, host: str, port: int, timeout_s: float) -> Wire:

@@ -30,13 +30,13 @@ class Held:
         """Remarks answer nothing."""
         self._left.extend(item for item in self.recording.items if not isinstance(item, Remark))
 
-    def wire(self, link: str) -> "HeldWire":
+    def wire(self, link: str, where: str) -> "HeldWire":
         """The Modbus wire of a link."""
-        return HeldWire(self, link)
+        return HeldWire(self, link, where)
 
-    def lines(self, link: str) -> "HeldLines":
+    def lines(self, link: str, where: str) -> "HeldLines":
         """The text connection of a link."""
-        return HeldLines(self, link)
+        return HeldLines(self, link, where)
 
     def exchange(self, link: str, device_id: int, request: bytes) -> bytes:
         """The recorded answer to the next request, which must be the recorded one."""
@@ -85,7 +85,7 @@ class HeldWire:
 
     held: Held
     link: str
-    where: str = "replay"
+    where: str
     timeout_s: float = 0.0
 
     def exchange(self, device_id: int, request: bytes, before: Callable[[], None] | None = None) -> bytes:
@@ -102,7 +102,7 @@ class HeldLines:
 
     held: Held
     link: str
-    where: str = "replay"
+    where: str
     timeout_s: float = 0.0
 
     def exchange(self, line: str, what: str, before: Callable[[], None] | None = None) -> str:

@@ -213,11 +213,12 @@ def _logged(at: float, device_id: int, data: bytes, *, seconds: float, reply: by
 def _frame_in(line: str) -> tuple[int, bytes] | None:
     """Device id and request or answer of the frame in a line; None without a valid one."""
     for match in BYTES.finditer(line):
-        data = bytes.fromhex(re.sub(r"0x|[^0-9A-Fa-f]", "", match[1]))
-        if len(data) >= FEWEST_BYTES and crc16(data[:-2]) == data[-2:] and (data[1] & ~EXCEPTION) in KNOWN:
-            return data[0], data[1:-2]
-        if len(data) > HEADER and data[2:4] == b"\0\0" and int.from_bytes(data[4:6], "big") == len(data) - 6:
-            return data[6], data[HEADER:]
+        run = bytes.fromhex(re.sub(r"0x|[^0-9A-Fa-f]", "", match[1]))
+        for data in (run[k:] for k in range(len(run) - FEWEST_BYTES + 1)):  # a number may stand before the frame
+            if crc16(data[:-2]) == data[-2:] and (data[1] & ~EXCEPTION) in KNOWN:
+                return data[0], data[1:-2]
+            if len(data) > HEADER and data[2:4] == b"\0\0" and int.from_bytes(data[4:6], "big") == len(data) - 6:
+                return data[6], data[HEADER:]
     return None
 
 

@@ -69,6 +69,7 @@ CASES = {
     "correct --json": ["correct", "{folder}/corrected.csv", "--calibration", "latest:A1", *CORRECTED],
     "station watch --json": ["station", "watch", "latest"],
     "station profiles --json": ["station", "profiles"],
+    "station frames --json": ["station", "frames", str(ROOT / "tests" / "data" / "frames" / "mbpoll-tcpdump.pcap")],
     "archive clean --json": ["archive", "clean", "--dry-run"],
     "archive key --json": ["archive", "key", "--output", "{folder}/key.pem"],
     "archive compact --json": ["archive", "compact"],
@@ -143,6 +144,8 @@ ELSEWHERE = {
     "demo --auto --json": "e2e/test_models.py",
     "demo --by-hand --json": "e2e/test_models.py",
     "station serve --json": "e2e/test_station.py",
+    "station bring-up --json": "e2e/test_bring_up.py",
+    "station replay --json": "e2e/test_recordings.py",
     "archive restore --json": "e2e/test_backup.py",
 }
 """Documents that other tests hold against their types."""

@@ -13,9 +13,11 @@ from brought_up import FAMILIES, Middle, Scripted, brought_up, id_of, served_dev
 from each import each
 from modbus_devices import VALUES, libmodbus_server, pymodbus_server, words_of
 
+from pipelines.commissioning.conformance import document_of, read_conformance
 from schemas.errors import LinkLost, OperatorNeeded, StationError
-from stations.bringup.conformance import document_of, read_conformance
 from stations.bringup.corrected import corrected_text
+from stations.bringup.session import BringUp
+from stations.bringup.target import device_at
 from stations.links.recorder import recorded
 from stations.profile_files import load_profile, profile_text
 from stations.recordings.frame_file import read_frames
@@ -40,13 +42,21 @@ def test_the_simulated_device_of_every_family_passes(name, tmp_path):
         said = verdicts(found)
         if profile.kind == "axis":
             wanted = [
-                "turns by a degree and reads it back", "turns as seen by a person", "the same order again moves nothing", "comes back",
-                "stops on its way and forgets the rest", "stops by itself within 2 s without a link",
-            ]  # fmt: skip
+                *(
+                    "turns by a degree and reads it back",
+                    "turns as seen by a person",
+                    "the same order again moves nothing",
+                ),
+                *("comes back", "stops on its way and forgets the rest", "stops by itself within 2 s without a link"),
+            ]
             assert not plant.outer.moving(plant.now)
             assert plant.outer.encoder(plant.now) == pytest.approx(12.0, abs=0.02)
         else:
-            wanted = ["takes a set point and reads it back", "takes the old set point again", "keeps its set point for 2 s without a link"]
+            wanted = [
+                "takes a set point and reads it back",
+                "takes the old set point again",
+                "keeps its set point for 2 s without a link",
+            ]
             assert plant.fixture.chamber.set_point == 23.0
         assert {said[what] for what in wanted} == {"held"}, said
         assert "word order" not in said or said["word order"] == "held" or name == "watlow_f4s"
@@ -63,7 +73,9 @@ def test_servers_that_are_not_ours_are_reached_read_and_known_by_their_id(server
         person = Scripted(panel={"temperature": 22.4, "set_point": 25})
         found = brought_up("watlow_f4t", port, person, given_id=0, orders=False, timeout_s=0.5)
     said = verdicts(found)
-    assert found.target.link.device.device_id == (1 if server is libmodbus_server else 5)  # libmodbus answers under any id
+    assert found.target.link.device.device_id == (
+        1 if server is libmodbus_server else 5
+    )  # libmodbus answers under any id
     assert [p for p in found.findings.points if p.verdict == "differs"] == []
     assert (said["word order"], said["temperature"], said["part_number"]) == ("held", "held", "held")
     values = {p.what: p.found for p in found.findings.points if p.part == "register"}
@@ -116,9 +128,9 @@ def test_a_wrong_profile_is_named_and_the_corrected_one_has_nothing_against_it(k
         differs = [p for p in found.findings.points if p.verdict == "differs"]
         assert what in {p.what for p in differs}, differs
         assert {p.what for p in differs} <= {what, "temperature on the panel", "working_set_point"}
-        assert {k: {a: pytest.approx(b) if isinstance(b, float) else b for a, b in v.items()} for k, v in changes.items()} == (
-            found.findings.changes
-        )
+        assert {
+            k: {a: pytest.approx(b) if isinstance(b, float) else b for a, b in v.items()} for k, v in changes.items()
+        } == (found.findings.changes)
         before = Path("profiles/my_chamber.toml").read_bytes()
         text = corrected_text(found.profile, found.findings, found.made)
         Path("profiles/my_chamber_corrected.toml").write_text(text, encoding="utf-8")
@@ -168,7 +180,9 @@ def test_nothing_is_ordered_without_its_word_and_nobody_there_is_told():
     with served_device("oriental_az") as (port, plant):
         found = brought_up("oriental_az", port, Scripted())
         assert [e for e in plant.journal.events() if getattr(e, "device_id", 0) == 1] == []
-        assert {p.found for p in found.findings.points if p.part == "order" and p.what != "state of the drive"} == {"no consent"}
+        assert {p.found for p in found.findings.points if p.part == "order" and p.what != "state of the drive"} == {
+            "no consent"
+        }
         with pytest.raises(OperatorNeeded, match="devices 1, 2 answer alike"):
             brought_up("oriental_az", port, Scripted(), given_id=0)
     with pytest.raises(LinkLost, match="Connection refused"):
@@ -230,7 +244,10 @@ def test_a_kill_in_any_step_leaves_a_safe_device_and_a_whole_recording(case, tmp
             *("--device-id", str(id_of(profile)), "--out", "out", "--silence", "20", "--watch", "20"),
         ]
         words = STEPS[name]
-        answers = [*([""] * (1 if profile.kind == "axis" else 2)), *(w if w == word else "" for w in words[: words.index(word) + 1])]
+        answers = [
+            *([""] * (1 if profile.kind == "axis" else 2)),
+            *(w if w == word else "" for w in words[: words.index(word) + 1]),
+        ]
         root = Path(__file__).resolve().parents[2]
         process = subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, cwd=tmp_path,
@@ -241,7 +258,12 @@ def test_a_kill_in_any_step_leaves_a_safe_device_and_a_whole_recording(case, tmp
         process.stdin.write("\n".join(answers) + "\n")
         process.stdin.flush()
         frames = tmp_path / "out" / "frames.jsonl"
-        moved = lambda: plant.outer.moving(plant.now) if profile.kind == "axis" else plant.fixture.chamber.set_point != 23.0  # noqa: E731
+
+        def moved():
+            if profile.kind == "axis":
+                return plant.outer.moving(plant.now)
+            return plant.fixture.chamber.set_point != 23.0
+
         deadline = time.monotonic() + 60.0
         done = f"consent to {word}: typed"
         while time.monotonic() < deadline and not (frames.is_file() and done in frames.read_text(encoding="utf-8")):
@@ -254,7 +276,9 @@ def test_a_kill_in_any_step_leaves_a_safe_device_and_a_whole_recording(case, tmp
         process.wait(10.0)
         process.stdin.close()
         process.stderr.close()
-        while time.monotonic() < deadline and (moved() or (profile.kind == "chamber" and not plant.fixture.chamber.running)):
+        while time.monotonic() < deadline and (
+            moved() or (profile.kind == "chamber" and not plant.fixture.chamber.running)
+        ):
             time.sleep(0.1)
         assert not moved()
         if profile.kind == "chamber":
@@ -267,7 +291,16 @@ def test_a_kill_in_any_step_leaves_a_safe_device_and_a_whole_recording(case, tmp
 def test_the_command_writes_page_document_and_recording(tmp_path):
     with served_device("watlow_f4t") as (port, _):
         command = [
-            *(sys.executable, "-m", "pipelines", "station", "bring-up", "watlow_f4t", "--link", f"tcp://127.0.0.1:{port}"),
+            *(
+                sys.executable,
+                "-m",
+                "pipelines",
+                "station",
+                "bring-up",
+                "watlow_f4t",
+                "--link",
+                f"tcp://127.0.0.1:{port}",
+            ),
             *("--device-id", "3", "--readings", "--out", "out", "--by", "A. Person", "--json"),
         ]
         root = Path(__file__).resolve().parents[2]
@@ -284,3 +317,73 @@ def test_the_command_writes_page_document_and_recording(tmp_path):
     page = (tmp_path / "out" / "conformance.html").read_text(encoding="utf-8")
     assert "Conformance of watlow_f4t" in page
     assert "http" not in page.replace("http://www.w3.org", "")
+
+
+def test_speed_and_parity_of_a_serial_line_are_looked_for_and_a_missing_line_is_told():
+    from other_devices import station_with
+    from plant_wires import SerialPlantServer, serial_line
+    from small_station import lot_of, plant_of
+
+    profile = load_profile("eurotherm_3200")
+    plant = plant_of(station_with(chamber="eurotherm_3200"), lot_of(1))
+    with serial_line() as line, SerialPlantServer(plant, line.device):
+        found = serial_bring_up(profile, line.host)
+        assert found.findings.count("differs") == 0
+        assert found.target.link.device.link == "rtu"
+        assert verdicts(found)["temperature"] == "held"
+    with pytest.raises(LinkLost, match="No such file"):
+        serial_bring_up(profile, "/dev/there-is-none")
+
+
+def serial_bring_up(profile, path):
+    bring_up = BringUp(
+        profile, device_at(f"serial:{path}", profile, 3), Scripted(), 3, search_line=True, orders=False, timeout_s=0.3
+    )
+    bring_up.run()
+    return bring_up
+
+
+SIMULATED = """\
+spec: "1.1"
+devices:
+  supply:
+    eom:
+      USB INSTR: {q: "\\n", r: "\\n"}
+    dialogues:
+      - {q: "*IDN?", r: "MAKER,SUPPLY,0,1"}
+      - {q: "*OPC?", r: "1"}
+      - {q: "SYST:ERR?", r: "0,No error"}
+    properties:
+      voltage: {default: 3.3, getter: {q: "VOLT?", r: "{:.3f}"}, setter: {q: "VOLT {}"}, specs: {min: 0, max: 36, type: float}}
+      measured: {default: 3.29, getter: {q: "MEAS:VOLT?", r: "{:.3f}"}}
+      output: {default: 1, getter: {q: "OUTP?", r: "{:d}"}, setter: {q: "OUTP {}"}, specs: {type: int}}
+resources:
+  USB0::0x1111::0x2222::0x2468::INSTR: {device: supply}
+"""
+SUPPLY = "USB0::0x1111::0x2222::0x2468::INSTR"
+
+
+def test_an_instrument_on_visa_is_read_and_ordered_by_its_profile(tmp_path, monkeypatch):
+    (tmp_path / "instruments.yaml").write_text(SIMULATED, encoding="utf-8")
+    monkeypatch.setenv("TUMBLELINE_VISA", f"{tmp_path / 'instruments.yaml'}@sim")
+    profile = load_profile("scpi_supply")
+    person = Scripted()
+    with recorded(tmp_path / "frames.jsonl", "a test"):
+        bring_up = BringUp(profile, device_at(f"visa:{SUPPLY}", profile, 1), person, timeout_s=0.5)
+        bring_up.run()
+    values = {p.what: (p.verdict, p.found) for p in bring_up.findings.points}
+    assert values["voltage"] == ("held", "3.3 V")
+    assert values["orders"][0] == "not tried"
+    target = bring_up.target
+    try:
+        supply = target.values()
+        supply.write("voltage", 5.0)
+        assert supply.number("voltage") == 5.0
+        with pytest.raises(StationError, match="36"):
+            supply.write("voltage", 40.0)
+    finally:
+        target.link.close()
+    assert any(e.text and e.what == "device voltage" for e in read_frames(tmp_path / "frames.jsonl").exchanges)
+    nowhere = BringUp(profile, device_at("visa:USB0::1::2::3::INSTR", profile, 1), person, timeout_s=0.5)
+    with pytest.raises(StationError):
+        nowhere.run()

@@ -24,8 +24,11 @@ from pipelines.cli import INTERRUPTED
 from schemas.errors import DONE, PART_FAILED, UNUSABLE
 
 ROOT = Path(__file__).resolve().parents[2]
-SERVE = ("workbench", "monitor --serve", "station serve", "station watch", "--watch")
+SERVE = ("workbench", "monitor --serve", "station serve", "station replay", "station watch", "--watch")
 """Examples that go on until Ctrl-C: they are started and ended in a process of their own."""
+
+WITH_A_DEVICE = ("station bring-up",)
+"""Examples for which a device must be there: tests/e2e/test_bring_up.py."""
 
 LONG = ("demo",)
 """Examples that take minutes."""
@@ -69,7 +72,7 @@ def slow(example: str) -> bool:
 
 
 ALL = list(examples())
-SHORT = [one for one in ALL if not kept(one) and not any(word in one for word in LONG)]
+SHORT = [one for one in ALL if not kept(one) and not any(word in one for word in (*LONG, *WITH_A_DEVICE))]
 
 
 @pytest.fixture(scope="module")

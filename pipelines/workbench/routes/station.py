@@ -2,18 +2,34 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from fastapi import APIRouter, Request
 from starlette.responses import Response
 
+from pipelines.commissioning.frame_pictures import timeline
 from pipelines.report.run_pictures import station_chart
 from pipelines.tables.frames import rows_of
-from pipelines.workbench.pages import figure, page, run_table, state_of, workbench_of
+from pipelines.workbench.pages import Workbench, figure, page, run_table, state_of, workbench_of
 from pipelines.workbench.state import StationPage
 from schemas.errors import WrongUse
+from stations.recordings.frame_file import read_frames
 
 router = APIRouter()
 HEADING, ORDER, ADDRESS = "Station", 60, "/station"
 NEEDED = {"history", "readings", "events"}
+FOLDER = "recordings"
+LARGEST = 64_000_000
+"""Bytes of a recording that a page draws; 'tumbleline station frames' shows larger ones."""
+
+
+def recordings_of(bench: Workbench) -> dict[str, Path]:
+    """The recordings of links in the folder ``recordings`` of a local archive, by name, newest first."""
+    root = bench.archive.root
+    if not isinstance(root, Path):
+        return {}
+    found = [path for path in (root / FOLDER).glob("*.jsonl") if path.is_file() and path.stat().st_size <= LARGEST]
+    return {path.name: path for path in sorted(found, key=lambda path: -path.stat().st_mtime)}
 
 
 @router.get("/station")
@@ -34,8 +50,13 @@ def station(request: Request) -> Response:
                 *problems,
                 f"run {run.id} was not measured on a station of this archive: it has no temperatures over time",
             ]
+    recordings = recordings_of(bench)
+    if state.recording and state.recording not in recordings:
+        problems = [*problems, f"recording: the archive has none called '{state.recording[:40]}'"]
+        state = state.model_copy(update={"recording": ""})
     return page(
-        request, "station.html", state, problems, run=run, events=events[::-1], soaks=soaks, infos=infos[:50],
+        request, "station.html", state, problems, recordings=list(recordings), run=run,
+        events=events[::-1], soaks=soaks, infos=infos[:50],
         drawable=run is not None and set(run.tables()) >= NEEDED,
     )  # fmt: skip
 
@@ -45,6 +66,11 @@ def drawn(request: Request, name: str, ending: str) -> Response:
     """A figure of the page."""
     bench = workbench_of(request)
     state, _ = state_of(request, StationPage)
+    if name == "frames":
+        path = recordings_of(bench).get(state.recording)
+        if path is None:
+            raise WrongUse(f"recording: the archive has none called '{state.recording[:40]}'; choose one of the page")
+        return figure(timeline(read_frames(path)), ending, path.stem)
     if name != "station":
         raise WrongUse(f"figure: none of this page is called '{name[:40]}'")
     history, readings, events = (run_table(bench, state.run, table) for table in ("history", "readings", "events"))
