@@ -87,9 +87,16 @@ class Keeper:
             _left.append(self._process)
 
     def _send(self, message: dict[str, Any]) -> None:
-        if self._process is not None and self._process.stdin is not None:
+        if self._process is None or self._process.stdin is None:
+            return
+        try:
             self._process.stdin.write(json.dumps(message).encode() + b"\n")
             self._process.stdin.flush()
+        except OSError:
+            if "done" not in message:
+                raise StationTimeout(
+                    "bring-up: its keeper has ended, one is needed before anything is ordered"
+                ) from None
 
 
 _left: list[subprocess.Popen[bytes]] = []  # they end by themselves; the reference avoids a ResourceWarning

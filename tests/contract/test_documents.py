@@ -78,7 +78,7 @@ CASES = {
     "attributes list --json": ["attributes", "list"],
     "archive backup --json": ["archive", "backup", "{folder}/copy"],
 }
-WITHOUT_ARCHIVE = {"plan", "inspect FILE", "keys [SUBJECT]", "extend", "archive key"}
+WITHOUT_ARCHIVE = {"station frames", "plan", "inspect FILE", "keys [SUBJECT]", "extend", "archive key"}
 WITHOUT_ARCHIVE |= {f"station {one}" for one in ("status", "check", "profiles")}
 
 

@@ -327,7 +327,7 @@ def test_the_station_page_draws_the_recordings_of_the_archive(tmp_path):
     made(recipe, archive, "--record", str(tmp_path / "run-1.jsonl"))
     (archive / "recordings").mkdir()
     shutil.copy(tmp_path / "run-1.jsonl", archive / "recordings")
-    settings = WorkbenchSettings(archive=str(archive))
+    settings = WorkbenchSettings(archive=str(archive), folder=tmp_path / "bench")
     client, key = AsgiClient(create_app(settings), settings.address), {"authorization": f"Bearer {settings.token}"}
     page = client.get("/station", headers=key).text
     assert "run-1.jsonl" in page
