@@ -29,7 +29,8 @@ def command(
         list[Path],
         typer.Argument(
             metavar="FILE…",
-            help="Text, Parquet, MATLAB, NumPy, WAV, LVM; with an extra HDF5, UFF58, TDMS, IDE, R. Also .gz.",
+            help="Text, Parquet, MATLAB, NumPy, WAV, LVM; with an extra spreadsheets, HDF5, UFF58, TDMS, IDE, R, ULog, "
+            "DataFlash, MCAP, ROS bags, MDF, miniSEED. Also .gz.",
         ),
     ],
     columns: Annotated[

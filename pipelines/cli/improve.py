@@ -63,6 +63,7 @@ def command(
     leave_out: options.LeaveOutOption = "",
     by: options.ByOption = "",
     effect_file: options.EffectFileOption = None,
+    group: options.GroupOption = "",
     archive: options.ArchiveOption = None,
     *,
     yes: Annotated[
@@ -97,7 +98,7 @@ def command(
     from pipelines.importers.files import is_file
 
     add_effects(effect_file)
-    recording = _brought_in(data, archive) if is_file(data) else None
+    recording = _brought_in(data, archive, group) if is_file(data) else None
     data = data if recording is None else recording["run"]
     yes = yes or (recording is not None and not attended())
     judged = judged_effects(data, archive, effects, model, "improve")
@@ -120,13 +121,13 @@ def command(
     raise typer.Exit(DONE if document["adequate"] and not document["refuted"] else PART_FAILED)
 
 
-def _brought_in(data: str, archive: str | None) -> RecordingDocument | None:
+def _brought_in(data: str, archive: str | None, group: str) -> RecordingDocument | None:
     """The import of a recording of another system; None for a table of dwells."""
     from pipelines.importers import limited
     from pipelines.improvement.recording import bring_in
 
     limited.start()
-    return bring_in([Path(data)], archive, error_console().status)
+    return bring_in([Path(data)], archive, error_console().status, group)
 
 
 class _Terminal:

@@ -49,6 +49,10 @@ def unit_in(name: str) -> str:
     return match[1] if match else ""
 
 
+INERTIAL = ("acc", "imu")
+"""Words of the groups that are listed first: they may hold an accelerometer."""
+
+
 def chosen(groups: Sequence[tuple[str, int]], group: str, where: str) -> str:
     """The group of channels to read: the one given, or the only one.
 
@@ -69,7 +73,8 @@ def chosen(groups: Sequence[tuple[str, int]], group: str, where: str) -> str:
         return group
     if len(names) == 1:
         return names[0]
-    listed = ", ".join(f"'{shown(name)}' ({count} samples)" for name, count in groups[:_MOST_LISTED])
+    likely = sorted(groups, key=lambda one: not any(word in one[0].lower() for word in INERTIAL))
+    listed = ", ".join(f"'{shown(name)}' ({count} samples)" for name, count in likely[:_MOST_LISTED])
     more = "" if len(groups) <= _MOST_LISTED else f" and {len(groups) - _MOST_LISTED} more"
     raise WrongUse(
         f"{where}: {len(names)} groups of channels with clocks of their own, one is needed: {listed}{more}; "

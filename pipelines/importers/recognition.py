@@ -56,6 +56,7 @@ class Recognition:
         if self.keys is None or self.output is None or any(text != _NO_CLOCK for text in self.open):
             return None
         means, stops, keys, duration = None, self.stops, self.keys, None
+        found: stretches.Stretches | None = None
         time = np.arange(len(self.output)) / ASSUMED_HZ if self.time is None else self.time
         if self.guessed.dwells:
             means = self.output
@@ -73,7 +74,8 @@ class Recognition:
         named = self.guessed.column("dwell")
         count = 0 if means is None else len(means)
         whole = bool(named) and len(self.content.table) == count
-        labels = self.content.table[named].astype(str).tolist() if whole else [f"dwell {k}" for k in range(count)]
+        own = [f"dwell {k}" for k in range(count)] if found is None else [*found.labels]
+        labels = self.content.table[named].astype(str).tolist() if whole else own
         proposal = for_fit(keys, self.guessed, means, labels, duration, heat)
         handled = "" if stops is None or duration is None or not proposal.fit else _handling(stops, time)
         return replace(proposal, remarks=(*proposal.remarks, handled)) if handled else proposal

@@ -228,9 +228,15 @@ def _shows_gravity(sphere: Sphere, columns: Mapping[str, Array], names: Sequence
 
 
 def _lettered(names: Sequence[str]) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """Three names that differ in one letter, x, y, z, with what they share: ``acc_?`` and acc_x, acc_y, acc_z."""
+    """Three names that differ in one letter, x, y, z, with what they share: ``acc_?`` and acc_x, acc_y, acc_z.
+
+    The elements 0, 1, 2 of an array of three are such names, too.
+    """
     known = set(names)
     for name in names:
+        stem = name.removesuffix("[0]")
+        if stem != name and known.issuperset({f"{stem}[1]", f"{stem}[2]"}) and f"{stem}[3]" not in known:
+            yield f"{stem}[?]", (name, f"{stem}[1]", f"{stem}[2]")
         for place in (k for k, letter in enumerate(name) if letter in "xX"):
             letters = "xyz" if name[place] == "x" else "XYZ"
             three = tuple(name[:place] + letter + name[place + 1 :] for letter in letters)

@@ -18,12 +18,13 @@ if TYPE_CHECKING:
 Working = Callable[[str], AbstractContextManager[Any]]
 
 
-def bring_in(paths: list[Path], archive: str | None, working: Working) -> RecordingDocument | None:
+def bring_in(paths: list[Path], archive: str | None, working: Working, group: str = "") -> RecordingDocument | None:
     """The import of a recording as it is recognised; None for a table of dwells, which needs none.
 
     Parameters
     ----------
     working : shows what is done, until it is
+    group : the group of channels, if a file has several
 
     Raises
     ------
@@ -35,7 +36,7 @@ def bring_in(paths: list[Path], archive: str | None, working: Working) -> Record
     from pipelines.diagnosis.import_document import import_document
 
     with working(f"recognising {paths[0].name}"):
-        seen = recognise(paths)
+        seen = recognise(paths, group=group)
         proposal = None if seen.is_exchange else seen.for_fit()
     if seen.is_exchange:
         return None

@@ -1,6 +1,7 @@
 """Every reader of recordings that is found: the first bytes are its own, it reads its sample, and it is in the guide."""
 
 import io
+import struct
 import tomllib
 from pathlib import Path
 
@@ -96,7 +97,94 @@ def numpy(path: Path) -> None:
         np.save(file, records)
 
 
+def spreadsheet(path: Path) -> None:
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    book.active.append(list(frame()))
+    for row in frame().to_numpy():
+        book.active.append([float(value) for value in row])
+    book.save(path)
+
+
+def ulog(path: Path) -> None:
+    """By the format's description, docs.px4.io: header, flags, format, subscription, data."""
+
+    def message(kind: str, content: bytes) -> bytes:
+        return struct.pack("<HB", len(content), ord(kind)) + content
+
+    definition = b"sensor_accel:uint64_t timestamp;float ax;float ay;float az;"
+    parts = [b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 5_000_000), message("B", bytes(40)), message("F", definition)]
+    parts.append(message("A", struct.pack("<BH", 0, 1) + b"sensor_accel"))
+    for time, *values in frame().to_numpy():
+        parts.append(message("D", struct.pack("<HQ3f", 1, 5_000_000 + round(1e6 * time), *values)))
+    path.write_bytes(b"".join(parts))
+
+
+def dataflash(path: Path) -> None:
+    """By ArduPilot's LogStructure.h: formats, then messages."""
+
+    def form(kind: int, length: int, name: bytes, types: bytes, columns: bytes) -> bytes:
+        return b"\xa3\x95\x80" + struct.pack("<BB4s16s64s", kind, length, name, types, columns)
+
+    parts = [form(128, 89, b"FMT", b"BBnNZ", b"Type,Length,Name,Format,Columns")]
+    parts.append(form(131, 24, b"IMU", b"QBfff", b"TimeUS,I,ax,ay,az"))
+    for time, *values in frame().to_numpy():
+        parts.append(b"\xa3\x95\x83" + struct.pack("<QB3f", round(1e6 * time), 0, *values))
+    path.write_bytes(b"".join(parts))
+
+
+IMU = """float64 ax
+float64 ay
+float64 az"""
+
+
+def mcap(path: Path) -> None:
+    writer = pytest.importorskip("mcap_ros2.writer")
+    with path.open("wb") as file, writer.Writer(file) as out:
+        kind = out.register_msgdef("own_msgs/msg/Acceleration", IMU)
+        for time, *values in frame().to_numpy():
+            stamp = round(1e9 * (1e9 + time))
+            out.write_message("/imu", kind, dict(zip(AXES, map(float, values), strict=True)), stamp, stamp)
+
+
+def rosbag(path: Path) -> None:
+    pytest.importorskip("rosbags")
+    from rosbags.rosbag1 import Writer
+    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+    store = get_typestore(Stores.ROS1_NOETIC)
+    store.register(get_types_from_msg(IMU, "own_msgs/msg/Acceleration"))
+    bag = path.with_suffix(".bag")
+    with Writer(bag) as out:
+        connection = out.add_connection("/imu", "own_msgs/msg/Acceleration", typestore=store)
+        for time, *values in frame().to_numpy():
+            own = store.types["own_msgs/msg/Acceleration"](*map(float, values))
+            out.write(connection, round(1e9 * (1e9 + time)), store.serialize_ros1(own, connection.msgtype))
+    bag.rename(path)
+
+
+def mdf4(path: Path) -> None:
+    asammdf = pytest.importorskip("asammdf")
+    with asammdf.MDF() as file:
+        file.append([asammdf.Signal(values, TIME, name=name, unit="g") for name, values in AXES.items()])
+        made = file.save(path.with_suffix(".mf4"))
+    Path(made).rename(path)
+
+
+def miniseed(path: Path) -> None:
+    pymseed = pytest.importorskip("pymseed")
+    traces = pymseed.MS3TraceList()
+    for letter, values in zip("xyz", AXES.values(), strict=True):
+        traces.add_data(
+            sourceid=f"FDSN:XX_TEST__H_N_{letter.upper()}", data_samples=[*map(float, values)], sample_type="d",
+            sample_rate=100.0, starttime_str="2026-01-01T00:00:00Z",
+        )  # fmt: skip
+    traces.to_file(str(path))
+
+
 SAMPLES = {
+    "spreadsheet": spreadsheet, "ulog": ulog, "dataflash": dataflash, "mcap": mcap, "rosbag": rosbag, "mdf4": mdf4,
+    "miniseed": miniseed,
     "numpy": numpy, "parquet": parquet, "matlab": matlab, "text": text, "hdf5": hdf5, "uff58": uff58, "tdms": tdms,
     "rdata": rdata, "wav": wav, "lvm": lvm,
 }  # fmt: skip
