@@ -157,6 +157,7 @@ SOURCES: dict[tuple[str, str], Callable[[Context], Iterable[str]]] = {
     ("see", ""): _effects,
     ("part", ""): _effects,
     ("name", "PROFILE"): _of("stations.profile_files", "profile_names"),
+    ("profile", "PROFILE"): _of("stations.profile_files", "profile_names"),
     ("device", "PRESET"): _of("stations.plant.preset", "preset_names"),
     ("fault", "KIND"): _of("stations.plant.faults.catalogue", "kinds"),
     ("form", ""): _of("pipelines.export", "FORMATS"),

@@ -47,7 +47,12 @@ def cheapest_recipe(
     with error_console().status("searching for the recipe with the least station time") as status:
         tolerance = 1.0 if options.errors_named else TOLERANCE
         best = optimise(
-            base, against, requirement, lambda note: status.update(f"searching: {note}"), tolerance=tolerance
+            base,
+            against,
+            requirement,
+            lambda note: status.update(f"searching: {note}"),
+            tolerance=tolerance,
+            ramp=options.ramp,
         )
     return best, optimum_document(best, base, name)
 

@@ -30,6 +30,7 @@ class OptimiseOptions:
     part: str = ""
     size: float | None = None
     separation: float | None = None
+    ramp: bool = False
 
     @property
     def errors_named(self) -> bool:

@@ -250,6 +250,12 @@ def optimise(
     page: PageOption = None,
     archive: options.ArchiveOption = None,
     *,
+    ramp: Annotated[
+        bool,
+        typer.Option(
+            "--ramp", help="Measure while the chamber ramps, without soaks; the device's temperature is read."
+        ),
+    ] = False,
     as_json: options.JsonOption = False,
 ) -> None:
     """Write the recipe with the least station time that reaches the required errors.
@@ -268,7 +274,17 @@ def optimise(
     config = load_station(station)
     base = with_model(recipe, effects, model, archive, config.name)
     options = OptimiseOptions(
-        see, tuple(required_errors or ()), factor, temperatures, poses, criterion, verification, part, size, separation
+        see,
+        tuple(required_errors or ()),
+        factor,
+        temperatures,
+        poses,
+        criterion,
+        verification,
+        part,
+        size,
+        separation,
+        ramp,
     )
     optimum, document = cheapest_recipe(
         base, Path(recipe).name, config, noise_of(base, device or base.device, noise, wander), options

@@ -19,7 +19,7 @@ from pipelines.planning.context import PlanContext, plan_context
 from pipelines.planning.lower_bound import lower_bound
 from pipelines.planning.plan import identified
 from pipelines.planning.requirement import Requirement
-from pipelines.planning.soak_orders import mirrored, orders
+from pipelines.planning.soak_orders import mirrored, orders, ramp_orders
 from pipelines.planning.textbook import PART_SEEN
 from pipelines.planning.timed_design import FEWEST, MOST, PlanDesign, TimedDesign, fewest_dwells, spanned
 from pipelines.planning.verification_poses import apart, numbered, turns
@@ -82,7 +82,13 @@ def measuring_minutes(context: PlanContext) -> float:
 
 
 def optimise(
-    recipe: Recipe, against: PlanContext, requirement: Requirement, progress: Progress, *, tolerance: float = 1.0
+    recipe: Recipe,
+    against: PlanContext,
+    requirement: Requirement,
+    progress: Progress,
+    *,
+    tolerance: float = 1.0,
+    ramp: bool = False,
 ) -> Optimum:
     """The recipe with the least station time that meets a requirement.
 
@@ -94,18 +100,19 @@ def optimise(
     ----------
     tolerance : ratio to the requirement up to which the nearest recipe is returned where none meets it, provided that it is
         quicker than the textbook plan
+    ramp : whether the devices are measured while the chamber ramps, in place of soaks
 
     Raises
     ------
     RecipeInvalid
         No recipe that was tried meets the requirement; the message gives the smallest ratio reached.
     """
-    search = RecipeSearch(recipe, against, requirement)
+    search = RecipeSearch(recipe, against, requirement, ramp=ramp)
     best: PlanContext | None = None
     ranked = search.ranked()
     for number, (plan, _) in enumerate(ranked, start=1):
         soaks = ", ".join(f"{t:g}" for t in plan.order)
-        progress(f"soaks at {soaks} °C (order {number} of {len(ranked)})")
+        progress(f"{'ramps to' if ramp else 'soaks at'} {soaks} °C (order {number} of {len(ranked)})")
         best = search.best(plan, best)
     best = best or search.nearest_within(tolerance)
     if best is None:
@@ -136,8 +143,8 @@ def _refusal(search: RecipeSearch) -> str:
 class RecipeSearch:
     """Search over plan designs for one recipe, station and requirement."""
 
-    def __init__(self, recipe: Recipe, against: PlanContext, requirement: Requirement) -> None:
-        self.recipe, self.against, self.requirement = recipe, against, requirement
+    def __init__(self, recipe: Recipe, against: PlanContext, requirement: Requirement, *, ramp: bool = False) -> None:
+        self.recipe, self.against, self.requirement, self.ramp = recipe, against, requirement, ramp
         self.timed = TimedDesign(
             recipe, against.station, against.noise, requirement, slowest=float(against.state.time[-1])
         )
@@ -149,8 +156,11 @@ class RecipeSearch:
         """Designs with the fewest dwells in the best orders of soaks, and their station times in s, the quickest first."""
         requirement, recipe = self.requirement, self.recipe
         back = requirement.discrimination is None
-        soak_orders = orders(
-            requirement.levels, self.against.station, recipe.soak_min_s, optional=requirement.optional_levels, back=back
+        optional, station = requirement.optional_levels, self.against.station
+        soak_orders = (
+            ramp_orders(requirement.levels)
+            if self.ramp
+            else orders(requirement.levels, station, recipe.soak_min_s, optional=optional, back=back)
         )
         dwell_s = self.timed.dwell_lengths()[0]
         likely = sorted((self.estimated_seconds(order, dwell_s), order) for order in soak_orders)[:LIKELY]
@@ -158,7 +168,8 @@ class RecipeSearch:
         for seconds, order in likely:
             if math.isfinite(seconds):
                 tried += [
-                    self.with_fewest_dwells(PlanDesign(order, (), length)) for length in self.timed.dwell_lengths()
+                    self.with_fewest_dwells(PlanDesign(order, (), length, self.ramp))
+                    for length in self.timed.dwell_lengths()
                 ]
         chosen: list[tuple[PlanDesign, float]] = []
         for seconds, plan in sorted(tried, key=lambda one: one[0]):
@@ -179,7 +190,7 @@ class RecipeSearch:
         worst: list[float] = []
         ends: list[float] = []
         for count in (few, many):
-            ratio, seconds = self.timed.ratio_and_seconds(PlanDesign(order, (count,) * len(order), dwell_s))
+            ratio, seconds = self.timed.ratio_and_seconds(PlanDesign(order, (count,) * len(order), dwell_s, self.ramp))
             worst.append(float(np.max(ratio / self.allowed(ratio))))
             ends.append(seconds)
         self.nearest = min(self.nearest, worst[1])
@@ -263,13 +274,15 @@ class RecipeSearch:
                 temperature_C=t,
                 poses=[number[int(c)] for c in choice[plan.group == soak]],
                 verification=turns(len(verification), self.requirement.verification, soak, len(plan.order)),
+                settled=not plan.ramp,
             )
             for soak, t in enumerate(plan.order)
         ]
+        where = f"on {len(soaks)} ramps" if plan.ramp else f"at {len(soaks)} soaks"
         return self.recipe.model_copy(
             update={
-                "name": f"{self.recipe.name}-optimal",
-                "description": f"{len(chosen)} poses at {len(soaks)} soaks, by 'tumbleline plan optimise'",
+                "name": f"{self.recipe.name}-{'quick' if plan.ramp else 'optimal'}",
+                "description": f"{len(chosen)} poses {where}, by 'tumbleline plan optimise'",
                 "poses": numbered("p", chosen),
                 "verification": verification,
                 "temperatures_C": [float(t) for t in plan.order],

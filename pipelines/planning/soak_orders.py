@@ -12,6 +12,9 @@ FEWEST, MOST = 3, 6
 MANY = 250
 """Number of orders of each length to consider, the quickest ones."""
 
+RAMPS = (2, 3, 4, 5)
+"""Numbers of ramps in turn that are tried."""
+
 PRODUCTS = 20000
 """Maximum number of arrangements of a given number of soaks to enumerate."""
 
@@ -50,6 +53,15 @@ def orders(
         ]
         candidates += sorted(own, key=lambda order: soak_seconds(order, station, shortest_s))[:MANY]
     return sorted(candidates, key=lambda order: soak_seconds(order, station, shortest_s))
+
+
+def ramp_orders(levels: Sequence[float]) -> list[tuple[float, ...]]:
+    """The ends of a ramp in turn, °C: the chamber climbs and falls between the ends of the required temperatures."""
+    low, high = min(levels), max(levels)
+    if low == high:
+        return [(low,)]
+    turns = [[(high, low)[(first + k) % 2] for k in range(RAMPS[-1])] for first in (0, 1)]
+    return [tuple(turn[:count]) for count in RAMPS for turn in turns]
 
 
 def mirrored(order: Sequence[float]) -> tuple[float, ...]:

@@ -11,7 +11,7 @@ from itertools import permutations
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial import design
+from inertial import design, timing
 from inertial.arrays import Array, Flags
 from inertial.frames import force_from_angles
 from inertial.noise.dwells import DwellNoise, dwell_covariance
@@ -20,7 +20,7 @@ from inertial.planning.pose_exchange import PlanSlots
 from pipelines.planning.requirement import Requirement
 from pipelines.planning.verification_poses import numbered, turns
 from pipelines.schedule.planned_state import settled_state
-from pipelines.schedule.timing import StationPose, move_seconds, soaked
+from pipelines.schedule.timing import StationPose, air_of, move_seconds, soaked
 from schemas.recipe import FEWEST_SAMPLES, Recipe
 from schemas.station import StationConfig
 from schemas.units import STANDARD_GRAVITY_M_S2
@@ -40,17 +40,24 @@ FEWEST = 4
 MOST = 420
 """Maximum number of dwells of a recipe: above it the search time grows faster than the gain."""
 
+REACHED = 0.04
+"""Distance from the ends of the required temperatures that a ramp may leave, in parts of their range."""
+
 _FIRST = 3
 """The first reduction removes one part in this many of a soak's dwells."""
 
 
 @dataclass(frozen=True)
 class PlanDesign:
-    """Soak temperatures in order, °C; the number of dwells at each; the length of a dwell, s."""
+    """Soak temperatures in order, °C; the number of dwells at each; the length of a dwell, s.
+
+    In a ``ramp`` nothing soaks: the chamber is on its way to each temperature in turn while the table goes on through poses.
+    """
 
     order: tuple[float, ...]
     counts: tuple[int, ...]
     dwell_s: float
+    ramp: bool = False
 
     @property
     def group(self) -> Choice:
@@ -116,13 +123,24 @@ class TimedDesign:
     def ratio_and_seconds(self, plan: PlanDesign) -> tuple[Array, float]:
         """Ratios to the requirement (met at ≤ 1) of a design's starting arrangement, and its station time in s."""
         choice = self.start(plan)
-        time, seconds = self._times(plan, choice)
-        rows = self._columns(time, np.asarray(plan.order)[plan.group], self.force[choice], choice)
+        time, heat, seconds = self._times(plan, choice)
+        rows = self._columns(time, heat, self.force[choice], choice)
         flat = np.moveaxis(rows, 0, 1).reshape(time.size, -1)
         solved = np.linalg.solve(self.covariance(time, plan.dwell_s), flat)
         n, width = time.size, rows.shape[-1]
         left, right = (np.moveaxis(x.reshape(n, 3, width), 1, 0) for x in (flat, solved))
-        return self.requirement.ratio_to_required(np.swapaxes(left, -1, -2) @ right), seconds
+        ratio = self.requirement.ratio_to_required(np.swapaxes(left, -1, -2) @ right)
+        return (1.0 + self.short_of(heat)) * ratio, seconds
+
+    def short_of(self, heat: Array) -> float:
+        """By how much a ramp (n,) misses the ends of the required range, in parts of the missed distance that is allowed.
+
+        A model is not to be extrapolated: the devices must get within :data:`REACHED` of the range.
+        """
+        low, high = min(self.requirement.levels), max(self.requirement.levels)
+        allowed = REACHED * (high - low)
+        missed = max(float(heat.min()) - low, high - float(heat.max()), 0.0)
+        return 0.0 if missed <= allowed else missed / allowed - 1.0
 
     def pose_independent(self) -> Flags:
         """Columns (3, p) that do not depend on the pose: bias and its dependence on temperature and time."""
@@ -135,11 +153,10 @@ class TimedDesign:
     def slots(self, plan: PlanDesign) -> tuple[PlanSlots, Choice]:
         """Every candidate in every slot of a design, and its starting arrangement."""
         choice = self.start(plan)
-        time, seconds = self._times(plan, choice)
+        time, heat, seconds = self._times(plan, choice)
         n, c = time.size, len(self.force)
         every = np.tile(np.arange(c), n)
-        heat = np.repeat(np.asarray(plan.order)[plan.group], c)
-        rows = self._columns(np.repeat(time, c), heat, self.force[every], every).reshape(3, n, c, -1)
+        rows = self._columns(np.repeat(time, c), np.repeat(heat, c), self.force[every], every).reshape(3, n, c, -1)
         weight = np.asarray(np.linalg.inv(self.covariance(time, plan.dwell_s)), dtype=np.float64)
         without_travel = seconds - float(np.sum(self.travel[choice[:-1], choice[1:]]))
         return PlanSlots(np.moveaxis(rows, 0, 2), weight, self.travel, without_travel, plan.group, plan.fixed), choice
@@ -156,22 +173,36 @@ class TimedDesign:
             covariance += self.noise.instability**2 * flicker
         return covariance
 
-    def _times(self, plan: PlanDesign, choice: Choice) -> tuple[Array, float]:
-        """Middle of every dwell and end of the last, s."""
+    def _times(self, plan: PlanDesign, choice: Choice) -> tuple[Array, Array, float]:
+        """Middle of every dwell, s, the device's temperature there, °C, and the end of the last, s."""
         recipe, order = self.recipe, plan.order
         typical = float(np.median(self.travel))
         beside = recipe.settle_s + self.station.pace.record_s + plan.dwell_s
         moves = np.concatenate([[typical], self.travel[choice[:-1], choice[1:]]])
         each = moves + beside
         first = np.concatenate([[0], np.cumsum(plan.counts)[:-1]])
-        each[first] += soak_waits(order, self.station, recipe.soak_min_s)
+        each[first] += 0.0 if plan.ramp else soak_waits(order, self.station, recipe.soak_min_s)
         verified = [
             len(turns(self._verification, self.requirement.verification, k, len(order))) for k in range(len(order))
         ]
         checks = np.array(verified, dtype=np.float64) * (typical + beside)
         each[first[1:]] += checks[:-1]
         end = np.cumsum(each)
-        return end - 0.5 * plan.dwell_s, float(end[-1] + checks[-1]) + self._static_soak(order[-1])
+        heat = self._followed(plan, end) if plan.ramp else np.asarray(order)[plan.group]
+        return end - 0.5 * plan.dwell_s, heat, float(end[-1] + checks[-1]) + self._static_soak(order[-1])
+
+    def _followed(self, plan: PlanDesign, end: Array) -> Array:
+        """The device's temperature (n,) at the middle of the dwells of a ramp that end at these times, °C."""
+        pace = air_of(self.station)
+        room = self.station.simulation.room_C if self.station.simulation else self.station.pace.room_C
+        air, device, clock = room, room, 0.0
+        heat = np.empty(end.size)
+        for k, (stop, leg) in enumerate(zip(end, plan.group, strict=True)):
+            target = plan.order[leg]
+            air, begun = timing.followed(air, device, target, float(stop) - plan.dwell_s - clock, pace)
+            air, device = timing.followed(air, begun, target, plan.dwell_s, pace)
+            heat[k], clock = 0.5 * (begun + device), float(stop)
+        return heat
 
     def _static_soak(self, last: float) -> float:
         """Soak before the static record, s; 0 where that is at the last temperature, or is not taken."""

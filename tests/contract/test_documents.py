@@ -145,7 +145,7 @@ ELSEWHERE = {
     "demo --by-hand --json": "e2e/test_models.py",
     "station serve --json": "e2e/test_station.py",
     "station bring-up --json": "e2e/test_bring_up.py",
-    "station replay --json": "e2e/test_recordings.py",
+    "station replay --json": "e2e/test_frame_recordings.py",
     "archive restore --json": "e2e/test_backup.py",
 }
 """Documents that other tests hold against their types."""
