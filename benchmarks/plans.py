@@ -2,8 +2,9 @@
 
 200 units drawn from the physics of the plant (transfer, temperature, flicker, random walk, converter) are measured with both
 recipes, at the time of each dwell on the station; dwells are averaged and fitted as in the chain. The benchmark compares the
-RMS errors (estimate − truth) of every coefficient, and the station time. Registers and chamber are not simulated: a test
-compares the planned station time with the clock of the simulated station.
+RMS errors (estimate − truth) of every coefficient, the share of truths within U, and the station time. The air is that of the
+plant's chamber, each unit follows it with its own lag and place in the air stream, and its thermometer has noise. Registers are
+not simulated: a test compares the planned station time with the clock of the simulated station.
 """
 
 from __future__ import annotations
@@ -35,7 +36,9 @@ from pipelines.planning.requirement import Requirement, candidates, temperature_
 from pipelines.planning.textbook import seen_by, textbook  # noqa: E402
 from pipelines.schedule.timing import spent  # noqa: E402
 from schemas.errors import TumblelineError  # noqa: E402
+from schemas.simulation import Simulation  # noqa: E402
 from schemas.station import load_station  # noqa: E402
+from stations.plant.chamber import STEP_S, Chamber  # noqa: E402
 from stations.plant.device import PlantDevices, Truth, draw_truth, rotation, stream  # noqa: E402
 from stations.plant.noise import UnitNoise  # noqa: E402
 from stations.plant.preset import Preset, load_preset  # noqa: E402
@@ -43,6 +46,9 @@ from stations.plant.preset import Preset, load_preset  # noqa: E402
 Array = np.ndarray
 Names = tuple[tuple[tuple[str, str], ...], ...]
 CHUNK = 25
+PARTS = 4
+"""Parts of a dwell with temperatures of their own."""
+THERMOMETER_K = 0.005
 
 
 @dataclass(frozen=True)
@@ -51,7 +57,7 @@ class Course:
 
     outer: Array
     inner: Array
-    heat: Array
+    air: Array
     start: Array
     duration: float
     rate: float
@@ -63,11 +69,39 @@ def course_of(planned: PlanContext) -> Course:
     return Course(
         outer=np.array([s.step.pose.outer_deg for s in dwells]),
         inner=np.array([s.step.pose.inner_deg for s in dwells]),
-        heat=np.array([s.step.temperature for s in dwells]),
+        air=air_of(planned),
         start=np.array([s.start for s in dwells]),
         duration=planned.recipe.dwell_s,
         rate=planned.recipe.rate_hz,
     )
+
+
+def air_of(planned: PlanContext) -> Array:
+    """The air of the plant's chamber, °C, second by second, as its set point follows the activities of a station."""
+    whole, room = planned.activities, planned.station.simulation.room_C
+    chamber = Chamber(room=room, ramp_K_min=3.0, air=room, wall=room, working=room)
+    ends = np.array([s.start + s.seconds for s in whole])
+    air = [room]
+    for second in range(int(ends[-1]) + 2):
+        chamber.set_point = whole[
+            min(int(np.searchsorted(ends, second, side="right")), len(whole) - 1)
+        ].step.temperature
+        chamber.step()
+        air.append(chamber.air)
+    return np.array(air)
+
+
+def heat_of(course: Course, units: int, seed: int, place: int) -> Array:
+    """Temperatures of units (units, n, parts) in the parts of every dwell, °C: each follows the air with a lag of its own."""
+    low, high = Simulation().slot_lag_s
+    rng = np.random.default_rng([seed, place])
+    keep = np.exp(-STEP_S / rng.uniform(low, high, units))
+    around = Simulation().slot_gradient_K * rng.standard_normal(units)
+    elements = np.full((course.air.size, units), course.air[0])
+    for k in range(1, course.air.size):
+        elements[k] = course.air[k] + around + (elements[k - 1] - course.air[k] - around) * keep
+    middle = course.start[:, None] + course.duration * (np.arange(PARTS) + 0.5) / PARTS
+    return np.stack([np.interp(middle, np.arange(course.air.size), own) for own in elements.T])
 
 
 def truths_of(preset: Preset, units: int, seed: int) -> list[Truth]:
@@ -89,30 +123,36 @@ def truths_of(preset: Preset, units: int, seed: int) -> list[Truth]:
 
 def measured(course: Course, preset: Preset, truths: list[Truth], seed: int) -> tuple[State, Array, Array]:
     """State, means and their white errors (units, n, 3) in g, of units measured with a plan."""
-    parts = [_chunk(course, preset, truths[k : k + CHUNK], seed) for k in range(0, len(truths), CHUNK)]
+    parts = [_chunk(course, preset, truths[k : k + CHUNK], seed, k) for k in range(0, len(truths), CHUNK)]
     mean, sd = (np.concatenate([part[k] for part in parts]) / preset.scale for k in (0, 1))
+    heat = np.concatenate([part[2] for part in parts])
     lsb = preset.lsb / preset.scale
     n = round(course.rate * course.duration)
     error = np.sqrt(sd**2 / n + np.where(sd < lsb, lsb**2 / 12.0, 0.0))
     force = force_from_angles(np.radians(course.outer), np.radians(course.inner))
-    return State(force=force, time=course.start + course.duration / 2.0, temperature=course.heat), mean, error
+    time = np.broadcast_to(course.start + course.duration / 2.0, heat.shape)
+    return State(force=np.broadcast_to(force, (*heat.shape, 3)), time=time, temperature=heat), mean, error
 
 
-def _chunk(course: Course, preset: Preset, truths: list[Truth], seed: int) -> tuple[Array, Array]:
+def _chunk(course: Course, preset: Preset, truths: list[Truth], seed: int, place: int) -> tuple[Array, Array, Array]:
+    """Means and standard deviations (units, n, 3), and what the thermometers say (units, n)."""
     devices = PlantDevices(preset, truths)
     noise = UnitNoise(preset, [stream(seed, t.serial, "noise") for t in truths])
     n, before, means, sds = round(course.rate * course.duration), 0.0, [], []
+    heat = heat_of(course, len(truths), seed, place)
+    part = np.minimum(np.arange(n) * PARTS // n, PARTS - 1)
     lsb = float(np.float32(preset.lsb))
     force = force_from_angles(np.radians(course.outer), np.radians(course.inner))
-    for f, heat, start in zip(force, course.heat, course.start, strict=True):
-        turned = np.stack([t.slot_rotation @ f for t in truths])[None]
-        clean = devices.output(turned, np.full((1, len(truths)), heat))
+    for f, own, start in zip(force, np.moveaxis(heat, 1, 0), course.start, strict=True):
+        turned = np.repeat(np.stack([t.slot_rotation @ f for t in truths])[None], PARTS, axis=0)
+        clean = devices.output(turned, own.T)[part]
         noise.jump(start - before)
         counts = devices.counts(clean + noise.sample(n, course.rate)) * lsb
         before = start + course.duration
         means.append(counts.mean(axis=0) - preset.zero_level)
         sds.append(counts.std(axis=0, ddof=1))
-    return np.stack(means, axis=1), np.stack(sds, axis=1)
+    shown = heat.mean(axis=2) + THERMOMETER_K * np.random.default_rng([seed, place, 1]).standard_normal(heat.shape[:2])
+    return np.stack(means, axis=1), np.stack(sds, axis=1), shown
 
 
 def truth_of(truths: list[Truth], names: Names) -> Array:
@@ -147,6 +187,8 @@ def compared(name: str, options: argparse.Namespace) -> None:
     required = identified(against).errors * options.factor
     if options.bias_factor != 1.0:
         required[:, 0] *= options.bias_factor
+    if options.ramp:
+        levels = (min(levels), max(levels))
     begun = time.perf_counter()
     requirement = Requirement(
         required,
@@ -157,7 +199,7 @@ def compared(name: str, options: argparse.Namespace) -> None:
         verification=options.verification,
     )
     try:
-        best = optimise(base, against, requirement, lambda _: None)
+        best = optimise(base, against, requirement, lambda _: None, ramp=options.ramp)
     except TumblelineError as refusal:
         print(f"{name}: {refusal}")
         return
@@ -165,28 +207,32 @@ def compared(name: str, options: argparse.Namespace) -> None:
     recipe = best.planned.recipe
     heat = ", ".join(f"{t:g}" for t in recipe.temperatures_C)
     print(
-        f"{name}: soaks at {heat} °C, {best.planned.state.time.size} dwells of {recipe.dwell_s:g} s in {len(recipe.poses)} poses "
-        f"and {len(recipe.verification)} for verification; search time {took:.0f} s"
+        f"{name}: {'ramps to' if options.ramp else 'soaks at'} {heat} °C, {best.planned.state.time.size} dwells of "
+        f"{recipe.dwell_s:g} s in {len(recipe.poses)} poses and {len(recipe.verification)} for verification; "
+        f"search time {took:.0f} s"
     )
     for title, course in (("textbook", against), ("optimal", best.planned)):
         parts = spent(course.activities).document()
         spread = ", ".join(f"{part} {parts[part]:.0f}" for part in ("soaks", "moves", "dwells"))
         print(f"  {title:<9}{parts['total']:6.0f} min: {spread}")
-    bound = lower_bound(base, against, requirement)
+    bound = lower_bound(base, against, requirement, ramp=options.ramp)
     if bound is not None:
         print(f"  uninterrupted measurement needs {100.0 * bound.share:.0f} %, for {bound.effect}")
     print(f"  station time {100.0 * best.share:.1f} %; expected errors at most {best.worst:.3f} of the required ones")
-    names, before = squared_errors(against, preset, options)
-    _, after = squared_errors(best.planned, preset, options)
+    names, before, inside_before = squared_errors(against, preset, options)
+    _, after, inside = squared_errors(best.planned, preset, options)
     table(names, before, after, best.expected.errors / identified(against).errors)
+    print(f"  truth within U (k = 2): textbook {100.0 * inside_before:.1f} %, optimal {100.0 * inside:.1f} %")
 
 
-def squared_errors(course: PlanContext, preset: Preset, options: argparse.Namespace) -> tuple[Names, Array]:
-    """Names, and squared errors (units, 3, p) in g, of fits to measurements of units drawn from the physics of the plant."""
+def squared_errors(course: PlanContext, preset: Preset, options: argparse.Namespace) -> tuple[Names, Array, float]:
+    """Names, squared errors (units, 3, p) in g of fits to units drawn from the physics of the plant, share within 2 σ."""
     truths = truths_of(preset, options.units, options.seed)
     state, mean, error = measured(course_of(course), preset, truths, options.seed)
     fit = fit_lot_with_wander(course.recipe.effects, state, mean, error).fit
-    return fit.names, (fit.coefficients - truth_of(truths, fit.names)) ** 2
+    off = fit.coefficients - truth_of(truths, fit.names)
+    inside = np.abs(off) <= 2.0 * np.sqrt(np.diagonal(fit.covariance, axis1=-2, axis2=-1))
+    return fit.names, off**2, float(inside.mean())
 
 
 def table(names: Names, before: Array, after: Array, expected: Array) -> None:
@@ -214,6 +260,7 @@ def main() -> None:
     parser.add_argument(
         "--verification", type=int, default=1, help="dwells of each verification pose; the textbook plan has none"
     )
+    parser.add_argument("--ramp", action="store_true", help="measure while the chamber ramps, without soaks")
     options = parser.parse_args()
     print(f"python benchmarks/plans.py --units {options.units} --seed {options.seed} --factor {options.factor:g}")
     for name in options.device or ("adxl355", "analogue"):

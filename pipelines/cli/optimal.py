@@ -104,7 +104,7 @@ def print_optimum(document: dict[str, Any]) -> None:
     temperatures = ", ".join(f"{t:g}" for t in document["temperatures_C"])
     say(
         f"{document['recipe']}: {document['dwells']} dwells of {document['dwell_s']:g} s "
-        f"in {document['poses']} poses, soaks at {temperatures} °C"
+        f"in {document['poses']} poses, {'ramps to' if document['ramp'] else 'soaks at'} {temperatures} °C"
     )
     minutes, own, textbook = document["minutes"], document["own_minutes"], document["textbook_minutes"]
     parts = [
@@ -142,6 +142,11 @@ def _comparison(document: dict[str, Any]) -> list[str]:
         f"static record; {document['verification_dwells']} dwells are for verification (textbook plan: none)."
     )
     lines = [first]
+    if document["bound"] is not None:
+        lines.append(
+            f"Measuring without a pause on ramps would need {100.0 * document['bound']['share']:.0f} %, for "
+            f"{document['bound']['effect']}: lag, ramp and wander allow no less."
+        )
     worst = document["own_worst"]
     if worst is not None:
         meets = "meets the required errors" if worst <= 1.0 else f"has up to {worst:.2f} times the required errors"

@@ -1,8 +1,9 @@
 """Lower bound of the station time for the coefficients that do not depend on the pose.
 
 The bias and its dependence on temperature and time have the same column in every pose; their errors follow from the wander of the
-device over the run. The bound assumes uninterrupted measurement between soaks, and that all other coefficients are known. A real
-recipe also needs moves, settling and the other coefficients, so its station time cannot be shorter.
+device over the run. The bound assumes uninterrupted measurement between soaks, or along ramps of the chamber, and that all
+other coefficients are known. A real recipe also needs moves, settling and the other coefficients, so that its station time cannot
+be shorter.
 """
 
 from __future__ import annotations
@@ -18,8 +19,8 @@ from inertial.arrays import Array
 from inertial.noise.dwells import dwell_covariance
 from pipelines.planning.context import PlanContext
 from pipelines.planning.requirement import Requirement
-from pipelines.planning.soak_orders import orders
-from pipelines.planning.timed_design import soak_waits
+from pipelines.planning.soak_orders import orders, ramp_orders
+from pipelines.planning.timed_design import followed_along, short_of, soak_waits
 from pipelines.schedule.planned_state import settled_state
 from pipelines.schedule.timing import spent
 from schemas.recipe import Recipe
@@ -28,7 +29,13 @@ RESTED_S = 1e4  # s at rest before a dwell: nothing of the last move is left
 PIECE_S = 120.0
 """Length of the dwells that fill the time between soaks, s."""
 
-LOWEST, STEP = 0.3, 0.01
+RAMP_PIECE_S = 30.0
+"""Likewise along a ramp, in which the temperature changes."""
+
+FIRST_LEGS = (0.5, 0.75, 1.0, 1.25)
+"""Times of the first ramp, which begins in the room, over those of the others."""
+
+LOWEST, STEP = 0.05, 0.01
 """Smallest share of the textbook plan's station time to try, and the step."""
 
 LIKELY = 20
@@ -44,17 +51,24 @@ class LowerBound:
     effect: str
 
 
-def lower_bound(recipe: Recipe, against: PlanContext, requirement: Requirement) -> LowerBound | None:
-    """The shortest run that reaches the required errors of the pose-independent coefficients.
+def lower_bound(
+    recipe: Recipe, against: PlanContext, requirement: Requirement, *, ramp: bool = False
+) -> LowerBound | None:
+    """The shortest run with soaks, or along ramps, that reaches the required errors of the pose-independent coefficients.
 
     None where a run as long as the textbook plan is too short, or the model has no pose-independent coefficient.
     """
     search = _BoundSearch(recipe, against, requirement)
-    soak_orders = orders(requirement.levels, against.station, recipe.soak_min_s, optional=requirement.optional_levels)
+    optional = requirement.optional_levels
+    soak_orders = (
+        ramp_orders(requirement.levels)
+        if ramp
+        else orders(requirement.levels, against.station, recipe.soak_min_s, optional=optional)
+    )
     low, high, best = round(LOWEST / STEP), round(1.0 / STEP), None
     while low <= high and search.columns.size:
         middle = (low + high) // 2
-        reached = search.reached(soak_orders, middle * STEP)
+        reached = (search.on_ramps if ramp else search.reached)(soak_orders, middle * STEP)
         if reached is None:
             low = middle + 1
         else:
@@ -89,6 +103,23 @@ class _BoundSearch:
                 return order, effect
         return None
 
+    def on_ramps(self, ramps: Sequence[tuple[float, ...]], share: float) -> tuple[tuple[float, ...], str] | None:
+        """Ramps that reach the required errors in a share of the time, and the effect nearest to its limit."""
+        station = self.against.station
+        room = station.simulation.room_C if station.simulation else station.pace.room_C
+        pieces = int(share * self.total // RAMP_PIECE_S)
+        when = RAMP_PIECE_S * np.arange(0.5, pieces)
+        rated: list[tuple[float, str, tuple[float, ...]]] = []
+        for order in ramps:
+            for first in FIRST_LEGS:
+                ends = np.cumsum([first, *[1.0] * (len(order) - 1)]) / (first + len(order) - 1) * share * self.total
+                leg = np.minimum(np.searchsorted(ends, when), len(order) - 1)
+                heat = followed_along([order[k] for k in leg], RAMP_PIECE_S, room, station)
+                if pieces > self.columns.size and not short_of(heat, self.requirement.levels):
+                    rated.append((*self._rated_at(when, heat, RAMP_PIECE_S), order))
+        passing = [(worst, effect, order) for worst, effect, order in rated if worst <= 1.0]
+        return (passing[0][2], passing[0][1]) if (passing := sorted(passing)) else None
+
     def _divided(self, order: tuple[float, ...], counts: tuple[int, ...]) -> tuple[float, str]:
         """The smallest worst ratio to the required errors over divisions of the time among the soaks, and the effect."""
         best = self._worst(order, counts)
@@ -119,9 +150,12 @@ class _BoundSearch:
         for waited, count in zip(self._waits(order), counts, strict=True):
             time.append(clock + waited + PIECE_S * np.arange(0.5, count))
             clock += waited + PIECE_S * count
-        when = np.concatenate(time)
+        return self._rated_at(np.concatenate(time), heat, PIECE_S)
+
+    def _rated_at(self, when: Array, heat: Array, piece_s: float) -> tuple[float, str]:
+        """The worst ratio to the required errors and its effect, of pieces of measurement at times and temperatures (n,)."""
         rows = self._rows(when, heat)[..., self.columns]
-        covariance = dwell_covariance(when, PIECE_S, self.against.noise, slowest=self.slowest)
+        covariance = dwell_covariance(when, piece_s, self.against.noise, slowest=self.slowest)
         flat = np.moveaxis(rows, 0, 1).reshape(when.size, -1)
         solved = np.moveaxis(np.linalg.solve(covariance, flat).reshape(when.size, 3, -1), 1, 0)
         errors = self.requirement.ratio_to_required(np.swapaxes(rows, -1, -2) @ solved)

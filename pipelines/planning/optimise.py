@@ -21,7 +21,7 @@ from pipelines.planning.plan import identified
 from pipelines.planning.requirement import Requirement
 from pipelines.planning.soak_orders import mirrored, orders, ramp_orders
 from pipelines.planning.textbook import PART_SEEN
-from pipelines.planning.timed_design import FEWEST, MOST, PlanDesign, TimedDesign, fewest_dwells, spanned
+from pipelines.planning.timed_design import FEWEST, MOST, MOST_OF_RAMPS, PlanDesign, TimedDesign, fewest_dwells, spanned
 from pipelines.planning.verification_poses import apart, numbered, turns
 from pipelines.schedule.timing import spent
 from schemas.errors import RecipeInvalid
@@ -61,6 +61,7 @@ class Optimum:
     against : the textbook plan
     requirement : what it had to meet
     worst : its largest ratio to the requirement; met at ≤ 1
+    ramp : whether it measures while the chamber ramps
     """
 
     planned: PlanContext
@@ -68,6 +69,7 @@ class Optimum:
     against: PlanContext
     requirement: Requirement
     worst: float
+    ramp: bool = False
 
     @property
     def share(self) -> float:
@@ -117,13 +119,13 @@ def optimise(
     best = best or search.nearest_within(tolerance)
     if best is None:
         raise RecipeInvalid(_refusal(search))
-    return Optimum(best, identified(best), against, requirement, float(np.max(search.reached(best))))
+    return Optimum(best, identified(best), against, requirement, float(np.max(search.reached(best))), ramp)
 
 
 def _refusal(search: RecipeSearch) -> str:
     """Why there is no recipe, the smallest ratio reached, and the lower bound of the station time."""
     requirement, near = search.requirement, search.nearest
-    start = f"plan optimise: no recipe of up to {MOST} dwells "
+    start = f"plan optimise: no recipe of up to {MOST_OF_RAMPS if search.ramp else MOST} dwells "
     if search.unseen:
         unseen = ", ".join(search.unseen)
         return f"{start}makes {unseen} visible; require fewer effects (--see) or more temperatures (--temperatures)"
@@ -131,7 +133,7 @@ def _refusal(search: RecipeSearch) -> str:
         needed = requirement.discrimination.chi_square
         reached = f"χ² {needed / near**2:.2g}, {needed:g} is needed"
         return f"{start}discriminates between these effects: the best reaches {reached}; use {near:.1f} times the size (--size)"
-    lower = lower_bound(search.recipe, search.against, requirement)
+    lower = lower_bound(search.recipe, search.against, requirement, ramp=search.ramp)
     if lower is None:
         bound = "; uninterrupted measurement for the textbook plan's time does not reach them either: wander limits the bias"
     else:
@@ -163,7 +165,13 @@ class RecipeSearch:
             else orders(requirement.levels, station, recipe.soak_min_s, optional=optional, back=back)
         )
         dwell_s = self.timed.dwell_lengths()[0]
-        likely = sorted((self.estimated_seconds(order, dwell_s), order) for order in soak_orders)[:LIKELY]
+        likely = (
+            [
+                (0.0, order) for order in soak_orders
+            ]  # few, and a ramp that does not get far enough says nothing of a longer one
+            if self.ramp
+            else sorted((self.estimated_seconds(order, dwell_s), order) for order in soak_orders)[:LIKELY]
+        )
         tried: list[tuple[float, PlanDesign]] = []
         for seconds, order in likely:
             if math.isfinite(seconds):

@@ -10,11 +10,20 @@ from inertial.errors import NotIdentified
 from inertial.planning.visibility import visibilities
 from pipelines.planning.context import plan_context
 from pipelines.planning.discrimination import rival_separations
+from pipelines.planning.lower_bound import lower_bound
 from pipelines.planning.optimise import Optimum
 from pipelines.planning.plan import identified, plan
 from pipelines.schedule.timing import spent
 from schemas.recipe import Recipe
 from schemas.units import AXES, MICRO
+
+
+def _bound(best: Optimum, base: Recipe) -> dict[str, Any] | None:
+    """The least share of the textbook plan's station time on ramps, and what determines it; None for soaks and discrimination."""
+    if not best.ramp or best.requirement.discrimination is not None:
+        return None
+    lower = lower_bound(base, best.against, best.requirement, ramp=True)
+    return None if lower is None else {"share": lower.share, "effect": lower.effect}
 
 
 def optimum_document(best: Optimum, base: Recipe, name: str) -> dict[str, Any]:
@@ -51,6 +60,8 @@ def optimum_document(best: Optimum, base: Recipe, name: str) -> dict[str, Any]:
         "own_worst": _own_worst(best, own_errors),
         "textbook_minutes": spent(textbook.activities).document(),
         "share": best.share,
+        "ramp": best.ramp,
+        "bound": _bound(best, base),
         "verification_dwells": _verification(best.planned.recipe),
         "worst": best.worst,
         "coefficients": _coefficient_rows(best, document["coefficients"], own_errors),

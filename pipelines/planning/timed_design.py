@@ -37,8 +37,9 @@ _GRAIN_S, _LONG_S = 2.0, 600.0
 FEWEST = 4
 """Minimum number of dwells of a soak: the reference pose at both ends, and two other poses between."""
 
-MOST = 420
-"""Maximum number of dwells of a recipe: above it the search time grows faster than the gain."""
+MOST, MOST_OF_RAMPS = 420, 600
+"""Maximum number of dwells of a recipe, and of one on ramps, whose dwells are short: above it the search time grows faster than
+the gain."""
 
 REACHED = 0.04
 """Distance from the ends of the required temperatures that a ramp may leave, in parts of their range."""
@@ -130,17 +131,8 @@ class TimedDesign:
         n, width = time.size, rows.shape[-1]
         left, right = (np.moveaxis(x.reshape(n, 3, width), 1, 0) for x in (flat, solved))
         ratio = self.requirement.ratio_to_required(np.swapaxes(left, -1, -2) @ right)
-        return (1.0 + self.short_of(heat)) * ratio, seconds
-
-    def short_of(self, heat: Array) -> float:
-        """By how much a ramp (n,) misses the ends of the required range, in parts of the missed distance that is allowed.
-
-        A model is not to be extrapolated: the devices must get within :data:`REACHED` of the range.
-        """
-        low, high = min(self.requirement.levels), max(self.requirement.levels)
-        allowed = REACHED * (high - low)
-        missed = max(float(heat.min()) - low, high - float(heat.max()), 0.0)
-        return 0.0 if missed <= allowed else missed / allowed - 1.0
+        missed = short_of(heat, self.requirement.levels) if plan.ramp else 0.0
+        return (1.0 + missed) * ratio, seconds
 
     def pose_independent(self) -> Flags:
         """Columns (3, p) that do not depend on the pose: bias and its dependence on temperature and time."""
@@ -220,6 +212,28 @@ class TimedDesign:
         return columns * self.requirement.errors[:, None, :]
 
 
+def short_of(heat: Array, levels: Sequence[float]) -> float:
+    """By how much a ramp (n,), °C, misses the ends of the required range, in parts of the missed distance that is allowed.
+
+    A model is not to be extrapolated: the devices must get within :data:`REACHED` of the range.
+    """
+    low, high = min(levels), max(levels)
+    allowed = REACHED * (high - low)
+    missed = max(float(heat.min()) - low, high - float(heat.max()), 0.0)
+    return 0.0 if missed <= allowed else missed / allowed - 1.0
+
+
+def followed_along(targets: Sequence[float], piece_s: float, start: float, station: StationConfig) -> Array:
+    """The slowest device's temperature (n,) in the middle of pieces of equal length, each with its set point, °C."""
+    pace, air, device = air_of(station), start, start
+    heat = np.empty(len(targets))
+    for k, target in enumerate(targets):
+        before = device
+        air, device = timing.followed(air, device, target, piece_s, pace)
+        heat[k] = 0.5 * (before + device)
+    return heat
+
+
 def soak_waits(order: Sequence[float], station: StationConfig, shortest_s: float) -> list[float]:
     """Station time of each soak, s, from room temperature."""
     room = station.simulation.room_C if station.simulation else station.pace.room_C
@@ -282,7 +296,8 @@ def fewest_dwells(timed: TimedDesign, design: PlanDesign, allowed: Array) -> Pla
         return float(np.max(timed.ratio_and_seconds(replace(design, counts=counts))[0] / allowed))
 
     soaks = len(design.order)
-    uniform = smallest_passing(lambda n: worst_ratio((n,) * soaks) <= 1.0, FEWEST, MOST // soaks)
+    most = MOST_OF_RAMPS if design.ramp else MOST
+    uniform = smallest_passing(lambda n: worst_ratio((n,) * soaks) <= 1.0, FEWEST, most // soaks)
     if uniform is None:
         return None
     counts, step = (uniform,) * soaks, max(1, uniform // _FIRST)

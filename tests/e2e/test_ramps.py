@@ -1,0 +1,153 @@
+"""Calibrations on ramps of the chamber: what the search promises, and what a station measures."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from capture_double import recipe_file
+from each import each
+from in_process import command
+
+from inertial.noise.dwells import DwellNoise
+from pipelines.archive import Archive
+from pipelines.jobs.recipes import load_recipe
+from pipelines.planning.context import plan_context
+from pipelines.planning.lower_bound import lower_bound
+from pipelines.planning.optimise import optimise
+from pipelines.planning.plan import identified
+from pipelines.planning.requirement import Requirement, candidates
+from pipelines.planning.soak_orders import ramp_orders
+from pipelines.planning.textbook import seen_by, textbook
+from pipelines.planning.timed_design import REACHED, followed_along, short_of
+from schemas.station import load_station
+
+LEVELS = (-10.0, 60.0)
+THERMAL = ["bias", "scale", "misalignment", "bias_temperature", "scale_temperature"]
+ANALOGUE = DwellNoise(1e-5, 5e-6, 1e-7)
+
+RAMP = """
+[[soaks]]
+temperature_C = 0.0
+poses = {poses}
+settled = false
+
+[[soaks]]
+temperature_C = 50.0
+poses = {poses}
+settled = false
+"""
+
+
+@pytest.fixture(scope="module")
+def found():
+    """The quickest recipe on ramps for a quiet analogue device, and its bound."""
+    station = load_station()
+    base = load_recipe().model_copy(update={"device": "analogue", "effects": THERMAL, "static_record_s": 0.0})
+    against = plan_context(textbook(base, LEVELS), station, ANALOGUE)
+    errors = 1.04 * identified(against).errors
+    requirement = Requirement(errors, seen_by(against, LEVELS), LEVELS, candidates(station))
+    best = optimise(base, against, requirement, lambda _: None, ramp=True)
+    return best, lower_bound(base, against, requirement, ramp=True)
+
+
+def test_the_search_needs_a_third_of_the_time_and_is_no_quicker_than_its_bound(found):
+    best, bound = found
+    assert best.ramp
+    assert best.share <= 0.30
+    assert best.worst <= 1.0
+    assert np.max(best.expected.errors / best.requirement.errors) <= 1.0
+    assert bound.share <= best.share
+    recipe = best.planned.recipe
+    assert [soak.settled for soak in recipe.soaks] == [False] * len(recipe.soaks)
+    assert set(recipe.temperatures_C) == set(LEVELS)
+    assert recipe.name.endswith("-quick")
+
+
+def test_the_devices_reach_both_ends_and_every_effect_of_the_textbook_plan_stays_visible(found):
+    best, _ = found
+    heat = best.planned.state.temperature
+    assert heat.min() <= LEVELS[0] + REACHED * 70.0 + 0.5
+    assert heat.max() >= LEVELS[1] - REACHED * 70.0 - 0.5
+    rises = np.diff(heat)
+    assert (rises > 0.0).any()
+    assert (rises < 0.0).any()
+
+
+def test_ramps_go_from_end_to_end_and_a_ramp_that_stays_short_counts_as_worse():
+    assert ramp_orders((-10.0, 25.0, 60.0))[:2] == [(60.0, -10.0), (-10.0, 60.0)]
+    assert ramp_orders((25.0,)) == [(25.0,)]
+    assert short_of(np.array([-9.0, 58.0]), LEVELS) == 0.0
+    assert short_of(np.array([10.0, 58.0]), LEVELS) > 1.0
+    heat = followed_along([60.0] * 200, 30.0, 23.0, load_station())
+    assert np.all(np.diff(heat) >= 0.0)
+    assert heat[-1] == pytest.approx(60.0, abs=1e-3)
+    assert heat[10] < 23.0 + 3.0 * 5.25  # 3 K/min for five and a quarter minutes, and the lag
+
+
+def ramp_recipe(folder: Path, name: str = "ramp") -> str:
+    """The small recipe on two ramps."""
+    base = Path(recipe_file(folder, ("temperatures_C = [0.0, 50.0]\n", "")))
+    text = base.read_text(encoding="utf-8").replace('poses = "nine"', 'poses = "fibonacci24"')
+    poses = [*range(1, 25), *range(24, 0, -1)]
+    path = folder / f"{name}.toml"
+    path.write_text(text + RAMP.format(poses=poses), encoding="utf-8")
+    return str(path)
+
+
+def coefficients(archive: Path):
+    run = Archive(archive).run("latest")
+    table = run.table("coefficients")
+    keys = ["unit", "axis", "effect", "name"]
+    return run, table.set_index([key for key in keys if key in table])["value"]
+
+
+@each([(), ("--fault", "door:at_s=600:for_s=60"), ("--fault", "time_out:at_s=700")])
+def test_a_station_measures_on_ramps_through_a_door_and_a_lost_answer(faults, tmp_path):
+    recipe = ramp_recipe(tmp_path)
+    done = command(["run", recipe, "--archive", str(tmp_path / "archive"), "--direct", "--json", *faults])
+    assert done.returncode in {0, 1}, done.stderr
+    document = json.loads(done.stdout)
+    assert all(unit["outcome"] != "refused" for unit in document["units"])
+    run, _ = coefficients(tmp_path / "archive")
+    dwells = run.table("dwells")
+    own = dwells[dwells["unit"] == dwells["unit"].iloc[0]]
+    assert own["unit_C"].nunique() > 40  # every dwell at a temperature of its own
+    if any("door" in fault for fault in faults):
+        assert "suspended" in set(run.table("events")["kind"]) or "spoilt" in set(run.table("events")["kind"])
+
+
+def test_a_run_on_ramps_that_was_stopped_goes_on_to_the_same_tables(tmp_path, monkeypatch):
+    from pipelines.capture import capture as capturing
+    from schemas.errors import OperatorNeeded
+
+    recipe = ramp_recipe(tmp_path)
+    whole = command(["run", recipe, "--archive", str(tmp_path / "whole"), "--direct"])
+    assert whole.returncode in {0, 1}, whole.stderr
+    taken, measure = [], capturing.CaptureRun.measure_and_store
+
+    def stops(self, step):
+        if len(taken) == 30:
+            raise OperatorNeeded("a stop in the middle of a ramp")
+        taken.append(step)
+        measure(self, step)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(capturing.CaptureRun, "measure_and_store", stops)
+        stopped = command(["run", recipe, "--archive", str(tmp_path / "stopped"), "--direct"])
+        assert stopped.returncode == 3
+    again = command(["run", recipe, "--archive", str(tmp_path / "stopped"), "--direct"])
+    assert again.returncode in {0, 1}, again.stderr
+    first, second = coefficients(tmp_path / "whole")[1], coefficients(tmp_path / "stopped")[1]
+    assert first.equals(second)
+
+
+def test_the_command_writes_a_recipe_on_ramps_with_its_bound(tmp_path):
+    target = tmp_path / "quick.toml"
+    words = ["plan", "optimise", "--ramp", "--effects", ",".join(THERMAL), "--device", "analogue", "--factor", "3"]
+    done = command([*words, "--verification", "1", "-o", str(target), "--json"])
+    assert done.returncode == 0, done.stderr
+    document = json.loads(done.stdout)
+    assert document["ramp"] is True
+    assert 0.0 < document["bound"]["share"] <= document["share"] < 0.35
+    assert {soak.settled for soak in load_recipe(str(target)).soaks} == {False}
