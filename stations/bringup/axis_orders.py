@@ -140,9 +140,13 @@ class AxisOrders:
         """What the drive says while a person holds its emergency stop."""
         what = "reports its emergency stop"
         text = "press the emergency stop of the drive, then type the word; nothing is ordered"
+        before = axis_of(self.orders.target).state()
         if not self.orders.consent("PRESSED", text, what):
             return
         state = axis_of(self.orders.target).state()
+        if not state.alarm and not before.ready:
+            self.orders.add(what, "not tried", "no alarm, and the drive was not ready before either; allow MOVE first")
+            return
         stopped = bool(state.alarm) or not state.ready
         found = state.alarm or ("not ready" if not state.ready else "ready, no alarm")
         self.orders.add(

@@ -387,3 +387,81 @@ def test_an_instrument_on_visa_is_read_and_ordered_by_its_profile(tmp_path, monk
     nowhere = BringUp(profile, device_at("visa:USB0::1::2::3::INSTR", profile, 1), person, timeout_s=0.5)
     with pytest.raises(StationError):
         nowhere.run()
+
+
+def test_an_emergency_stop_that_a_person_holds_is_seen():
+    with served_device("smc_lecp6") as (port, plant):
+
+        def pressed():
+            plant.emergency_stop = True
+
+        found = brought_up("smc_lecp6", port, Scripted("PRESSED", then={"PRESSED": pressed}))
+        points = {p.what: p for p in found.findings.points}
+        assert points["reports its emergency stop"].verdict == "held"
+        assert "emergency stop" in points["reports its emergency stop"].found
+        plant.emergency_stop = False
+        unable = brought_up("smc_lecp6", port, Scripted("PRESSED"))
+        assert verdicts(unable)["reports its emergency stop"] == "not tried"  # the servo is off: it is never ready
+        ignored = brought_up("smc_lecp6", port, Scripted("MOVE", "PRESSED"))
+        assert verdicts(ignored)["reports its emergency stop"] == "differs"
+
+
+@each(["oriental_az", "watlow_f4t"])
+def test_ctrl_c_leaves_the_device_as_it_was_and_a_page_that_says_so(name, tmp_path):
+    axis = load_profile(name).kind == "axis"
+    with served_device(name, silence_s=0.0) as (port, plant):
+        command = [
+            *(sys.executable, "-m", "pipelines", "station", "bring-up", name, "--link", f"tcp://127.0.0.1:{port}"),
+            *("--device-id", str(id_of(load_profile(name))), "--out", "out", "--watch", "20"),
+        ]
+        root = Path(__file__).resolve().parents[2]
+        process = subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=tmp_path,
+            env={**os.environ, "PYTHONPATH": str(root)},
+        )  # fmt: skip
+        process.stdin.write("\n\nSTOP\n" if axis else "\n\nSET\n")
+        process.stdin.flush()
+
+        def changed():
+            return plant.outer.moving(plant.now) if axis else plant.fixture.chamber.set_point != 23.0
+
+        deadline = time.monotonic() + 60.0
+        while time.monotonic() < deadline and not changed():
+            time.sleep(0.02)
+        assert changed()
+        process.send_signal(signal.SIGINT)
+        out, errors = process.communicate(timeout=30)
+        assert process.returncode == 130, errors
+        assert not changed()
+    document = read_conformance(tmp_path / "out" / "conformance.json")
+    assert document["complete"] is False
+    assert document["ended"] == "interrupted"
+    assert "ended before its last step" in out
+
+
+ANSWERS = {"*OPC?": "1", "SYST:ERR?": "0,No error"}
+
+
+def instrument(profile):
+    """The dialogue of an instrument as PyVISA-sim has it, from the lines of a profile alone."""
+    queries = {c.ask for c in profile.commands}
+    lines = ["devices:", "  own:", "    eom:", '      USB INSTR: {q: "\\n", r: "\\n"}', "    dialogues:"]
+    for query in sorted(queries | ANSWERS.keys()):
+        texts = [c.values[0] for c in profile.commands if c.ask == query and c.type == "text" and c.values]
+        low = [str(c.minimum or 1.0) for c in profile.commands if c.ask == query and c.type == "number"]
+        fields = max((c.field for c in profile.commands if c.ask == query), default=0)
+        own = ANSWERS.get(query) or ",".join(["1"] * fields + [*texts, *low][:1])
+        lines.append(f"      - {{q: {json.dumps(query)}, r: {json.dumps(own)}}}")
+    return "\n".join(['spec: "1.1"', *lines, "resources:", f"  {SUPPLY}: {{device: own}}", ""])
+
+
+@each(["scpi_supply", "scpi_exciter", "scpi_step_generator"])
+def test_every_scpi_profile_is_read_from_a_second_simulator(name, tmp_path, monkeypatch):
+    profile = load_profile(name)
+    (tmp_path / "instruments.yaml").write_text(instrument(profile), encoding="utf-8")
+    monkeypatch.setenv("TUMBLELINE_VISA", f"{tmp_path / 'instruments.yaml'}@sim")
+    bring_up = BringUp(profile, device_at(f"visa:{SUPPLY}", profile, 1), Scripted(), timeout_s=0.5)
+    bring_up.run()
+    read = [p for p in bring_up.findings.points if p.part == "register"]
+    assert len(read) == len(profile.commands)
+    assert [p for p in read if p.verdict == "differs" and "no answer" in p.found] == []
