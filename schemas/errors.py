@@ -68,6 +68,10 @@ class LinkLost(StationError):
     """A lost connection; the attempt may be repeated on a new connection."""
 
 
+class NoConnection(LinkLost):
+    """A connection that could not be made: nothing listens at the address, or there is no such line."""
+
+
 class OperatorNeeded(StationError):
     """A condition that only a person at the station can correct (door, interlock, power, a missing unit)."""
 

@@ -146,6 +146,10 @@ class Covariance:
         """Place of the profile of each block, and its steps."""
         return {int(block): (place, steps) for place, steps, blocks in self._groups for block in blocks}
 
+    def like_of(self, block: int, noise: Noise) -> tuple[object, ...]:
+        """What blocks have in common whose noise differs by a factor alone."""
+        return (*self._group_of[block], noise.shares.of_block(block))
+
     def whitener_of_block(self, block: int, shares: Shares) -> Whitener:
         """What makes the noise of a block at shares white."""
         return self._whitener(*self._group_of[block], shares)

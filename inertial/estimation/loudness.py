@@ -33,6 +33,10 @@ _DRIFTS = 16
 _FEWEST = 4
 """Dwells of a soak from which on it has a scatter."""
 
+_DRAWN = 40_000
+"""Values of noise drawn for the mean of a soak's scatter: the logarithm of a few dwells' variance lies far below that of its
+mean, and by less where there are more, so that soaks of unequal length would differ without a reason."""
+
 
 def loudness_of(model: Model, soak: NDArray[np.intp] | None = None) -> Array | None:
     """Standard deviation of the noise of each dwell over the lot's, (n,), mean square one; None where soaks do not differ.
@@ -71,15 +75,17 @@ def loudness_of(model: Model, soak: NDArray[np.intp] | None = None) -> Array | N
 
 
 def _of_soak(model: Model, series: Array, places: NDArray[np.intp]) -> Array:
-    """Logarithm (blocks,) of the robust variance of a soak's residuals over that of the model's noise; NaN if none."""
+    """Logarithm (blocks,) of the robust variance of a soak's residuals, less its mean for the model's noise; NaN if none."""
     problem, covariance = model.problem, model.problem.covariance
     there = covariance.there[:, places]
     force = np.broadcast_to(problem.lot.state.force, (*problem.lot.state.time.shape, 3))[:, places]
     time = problem.lot.state.time[:, places]
     left = np.full((problem.blocks, places.size), np.nan)
     expected = np.full(problem.blocks, np.nan)
+    drawn = np.random.default_rng(places.size).standard_normal((places.size, np.clip(_DRAWN // places.size, 50, 1000)))
     before: tuple[Array, Array] | None = None
     q: Array | None = None
+    known: dict[tuple[object, ...], float] = {}
     for block in range(problem.blocks):
         own = there[block]
         if np.count_nonzero(own) < _FEWEST:
@@ -89,28 +95,37 @@ def _of_soak(model: Model, series: Array, places: NDArray[np.intp]) -> Array:
             # the axes of a unit, and units in the same poses at the same times, have the same columns
             before, x = here, _columns(*here)
             q = None if x is None else np.linalg.qr(x)[0]
+            known.clear()
         if q is None:
             continue
         y = series[block, places[own]]
         left[block, own] = y - q @ (q.T @ y)
-        v = covariance.of_dwells(block, model.noise, places[own])
-        expected[block] = (np.trace(v) - np.trace(q.T @ v @ q)) / np.count_nonzero(own)
+        like = covariance.like_of(block, model.noise)
+        if like not in known:
+            root = np.linalg.cholesky(covariance.of_dwells(block, model.noise, places[own]))
+            noise = root @ drawn[: len(root)]
+            noise -= q @ (q.T @ noise)
+            size = float(covariance.level[block] * model.noise.scale[block])
+            known[like] = float(np.mean(np.log(_inner_mean(noise.T / size))))
+        expected[block] = known[like] + 2.0 * np.log(float(covariance.level[block] * model.noise.scale[block]))
     units = problem.blocks // problem.per_unit
     if units >= _TOGETHER:
         by_axis = left.reshape(units, problem.per_unit, -1)
-        known = np.isfinite(by_axis).sum(axis=0) >= _TOGETHER
+        measured = np.isfinite(by_axis).sum(axis=0) >= _TOGETHER
         together = np.zeros(by_axis.shape[1:])
-        together[known] = np.nanmedian(by_axis[:, known], axis=0)
+        together[measured] = np.nanmedian(by_axis[:, measured], axis=0)
         left = (by_axis - together).reshape(left.shape)
-    size = np.sort(np.where(np.isfinite(left), left, np.inf) ** 2, axis=1)
-    count = np.isfinite(left).sum(axis=1)
-    # the mean of the smaller three quarters: single bad dwells are not in it
-    kept = np.maximum((3 * count) // 4, 1)
-    inner = np.arange(size.shape[1]) < kept[:, None]
-    mean = np.where(inner, size, 0.0).sum(axis=1) / kept
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ratio = np.log(mean / expected)
-    return np.where((count >= _FEWEST) & (expected > 0.0), ratio, np.nan)
+    with np.errstate(divide="ignore"):
+        ratio = np.log(_inner_mean(left)) - expected
+    return np.where(np.isfinite(left).sum(axis=1) >= _FEWEST, ratio, np.nan)
+
+
+def _inner_mean(left: Array) -> Array:
+    """Mean of the smaller three quarters of the squares of each row (..., n), NaN where missing: no single bad dwell is in it."""
+    size = np.sort(np.where(np.isfinite(left), left, np.inf) ** 2, axis=-1)
+    kept = np.maximum((3 * np.isfinite(left).sum(axis=-1)) // 4, 1)
+    inner = np.arange(size.shape[-1]) < kept[..., None]
+    return np.where(inner, size, 0.0).sum(axis=-1) / kept
 
 
 def _columns(force: Array, time: Array) -> Array | None:

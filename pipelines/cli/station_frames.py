@@ -72,7 +72,7 @@ def replay(
     *,
     as_json: options.JsonOption = False,
 ) -> None:
-    """Be the recorded devices until interrupted: same answers, delays, exceptions and silences, over Modbus TCP.
+    """Answer as the recorded devices did, over Modbus TCP, until interrupted: same values, delays, exceptions and silences.
 
     What was never asked while it was recorded is refused and named. Exit status 3: something new was asked.
     """

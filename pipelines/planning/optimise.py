@@ -21,7 +21,7 @@ from pipelines.planning.plan import identified
 from pipelines.planning.requirement import Requirement
 from pipelines.planning.soak_orders import mirrored, orders, ramp_orders
 from pipelines.planning.textbook import PART_SEEN
-from pipelines.planning.timed_design import FEWEST, MOST, MOST_OF_RAMPS, PlanDesign, TimedDesign, fewest_dwells, spanned
+from pipelines.planning.timed_design import FEWEST, MOST, PlanDesign, TimedDesign, fewest_dwells, short_of, spanned
 from pipelines.planning.verification_poses import apart, numbered, turns
 from pipelines.schedule.timing import spent
 from schemas.errors import RecipeInvalid
@@ -77,6 +77,12 @@ class Optimum:
         return measuring_minutes(self.planned) / measuring_minutes(self.against)
 
 
+def heat_of(context: PlanContext) -> Array:
+    """The device's temperature at the dwells of the fit (n,), °C."""
+    heat = context.state.temperature
+    return np.zeros(0) if heat is None else heat
+
+
 def measuring_minutes(context: PlanContext) -> float:
     """Station time without the static record, min."""
     own = spent(context.activities)
@@ -125,7 +131,7 @@ def optimise(
 def _refusal(search: RecipeSearch) -> str:
     """Why there is no recipe, the smallest ratio reached, and the lower bound of the station time."""
     requirement, near = search.requirement, search.nearest
-    start = f"plan optimise: no recipe of up to {MOST_OF_RAMPS if search.ramp else MOST} dwells "
+    start = f"plan optimise: no recipe of up to {MOST} dwells "
     if search.unseen:
         unseen = ", ".join(search.unseen)
         return f"{start}makes {unseen} visible; require fewer effects (--see) or more temperatures (--temperatures)"
@@ -259,14 +265,39 @@ class RecipeSearch:
         slots, start = self.timed.slots(plan)
         choice = exchanged(slots, start, self.requirement.objective)
         choice = spanned(self.timed.force, choice, plan.fixed, self.recipe.span_min_g)
-        recipe = self._recipe(plan, choice)
+        context = self._context(self._recipe(plan, choice))
+        return self.reaching(context) if plan.ramp else context
+
+    def _context(self, recipe: Recipe) -> PlanContext:
         return plan_context(recipe, self.against.station, self.against.noise, slowest=self.timed.slowest)
+
+    def reaching(self, context: PlanContext) -> PlanContext:
+        """A recipe on ramps that gets to both ends of the range: short moves after an exchange of poses also end a ramp sooner.
+
+        The ramp that gets nearest to an end goes on through its own poses, in their order, until the device is there.
+        """
+        low, high = min(self.requirement.levels), max(self.requirement.levels)
+        own = [part.poses or [] for part in context.recipe.soaks]
+        for added in range(MOST):
+            heat = heat_of(context)
+            if not short_of(heat, self.requirement.levels):
+                break
+            end = low if heat.min() - low >= high - heat.max() else high
+            step = [activity.step for activity in context.activities if activity.kind == "dwell"]
+            towards = [k for k, one in enumerate(step) if one.temperature == end]
+            leg = step[min(towards, key=lambda k: abs(heat[k] - end))].soak
+            soaks = list(context.recipe.soaks)
+            more = own[leg][1 + added % (len(own[leg]) - 1)]  # a ramp begins and ends with the same pose
+            soaks[leg] = soaks[leg].model_copy(update={"poses": [*(soaks[leg].poses or []), more]})
+            context = self._context(context.recipe.model_copy(update={"soaks": soaks}))
+        return context
 
     def reached(self, context: PlanContext) -> Array:
         """Ratios of a recipe to the requirement, with every dwell at its planned time; met at ≤ 1."""
         expected = identified(context)
         if self.requirement.discrimination is None:
-            return expected.errors / self.requirement.errors
+            ratio = expected.errors / self.requirement.errors
+            return self.timed.within(ratio, heat_of(context)) if self.ramp else ratio
         sensor, _ = design.split(self.requirement.effects)
         rows = design.local_columns(sensor, context.state, design.starting_values(sensor, context.state))
         rows = rows * self.requirement.errors[:, None, :]

@@ -37,9 +37,8 @@ _GRAIN_S, _LONG_S = 2.0, 600.0
 FEWEST = 4
 """Minimum number of dwells of a soak: the reference pose at both ends, and two other poses between."""
 
-MOST, MOST_OF_RAMPS = 420, 600
-"""Maximum number of dwells of a recipe, and of one on ramps, whose dwells are short: above it the search time grows faster than
-the gain."""
+MOST = 420
+"""Maximum number of dwells of a recipe: above it the search time grows faster than the gain."""
 
 REACHED = 0.04
 """Distance from the ends of the required temperatures that a ramp may leave, in parts of their range."""
@@ -131,8 +130,12 @@ class TimedDesign:
         n, width = time.size, rows.shape[-1]
         left, right = (np.moveaxis(x.reshape(n, 3, width), 1, 0) for x in (flat, solved))
         ratio = self.requirement.ratio_to_required(np.swapaxes(left, -1, -2) @ right)
-        missed = short_of(heat, self.requirement.levels) if plan.ramp else 0.0
-        return (1.0 + missed) * ratio, seconds
+        return self.within(ratio, heat) if plan.ramp else ratio, seconds
+
+    def within(self, ratio: Array, heat: Array) -> Array:
+        """Ratios to the requirement that are met only where a ramp (n,), °C, gets to the ends of the range, however small."""
+        missed = short_of(heat, self.requirement.levels)
+        return np.maximum(ratio, 1.0 + missed) if missed > 0.0 else ratio
 
     def pose_independent(self) -> Flags:
         """Columns (3, p) that do not depend on the pose: bias and its dependence on temperature and time."""
@@ -296,8 +299,7 @@ def fewest_dwells(timed: TimedDesign, design: PlanDesign, allowed: Array) -> Pla
         return float(np.max(timed.ratio_and_seconds(replace(design, counts=counts))[0] / allowed))
 
     soaks = len(design.order)
-    most = MOST_OF_RAMPS if design.ramp else MOST
-    uniform = smallest_passing(lambda n: worst_ratio((n,) * soaks) <= 1.0, FEWEST, most // soaks)
+    uniform = smallest_passing(lambda n: worst_ratio((n,) * soaks) <= 1.0, FEWEST, MOST // soaks)
     if uniform is None:
         return None
     counts, step = (uniform,) * soaks, max(1, uniform // _FIRST)

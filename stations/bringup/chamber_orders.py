@@ -4,11 +4,13 @@ import time
 from dataclasses import dataclass
 
 from stations.bringup.orders import Orders
+from stations.bringup.person import Verdict
 from stations.bringup.safe import bounds_of, chamber_of
 
 STEP_K = 1.0
 SAME_K = 0.1
-RESPONSE_K = 0.05
+RESPONSE_K, AWAY_K = 0.05, 0.5
+"""Change of the air towards the set point that shows that it follows, and away from it that shows that it does not."""
 
 
 @dataclass
@@ -59,9 +61,11 @@ class ChamberOrders:
         self.orders.add(what, "held", f"{chamber.set_point():g} °C", f"{goal:g} °C")
         time.sleep(self.watch_s)
         moved = chamber.temperature() - air
-        right = moved * (goal - before) > 0.0 and abs(moved) >= RESPONSE_K
+        towards = moved if goal > before else -moved
+        verdict: Verdict = "held" if towards >= RESPONSE_K else "differs" if towards <= -AWAY_K else "not tried"
         found = f"air changed by {moved:+.2f} K in {self.watch_s:g} s"
-        self.orders.add("air follows the set point", "held" if right else "not tried", found, f"towards {goal:g} °C")
+        remedy = "check that sensor, heating and cooling belong to this loop; --watch looks longer"
+        self.orders.add("air follows the set point", verdict, found, f"towards {goal:g} °C", remedy)
         chamber.set_temperature(before)
         self.orders.add("takes the old set point again", "held", f"{chamber.set_point():g} °C", f"{before:g} °C")
 

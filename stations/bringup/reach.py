@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-from schemas.errors import LinkLost, OperatorNeeded, StationError, StationRefused, StationTimeout
+from schemas.errors import LinkLost, NoConnection, OperatorNeeded, StationError, StationRefused, StationTimeout
 from schemas.profile import Profile, Register
 from schemas.station_devices import Device
 from stations.bringup.person import Findings, Person, Point
@@ -18,8 +18,6 @@ PROBES = 6
 SHIFTS = (0, -1, 1)
 OTHER_SPACE = {"holding": "input", "input": "holding"}
 MISSING = "bring-up: nothing answers"
-NOWHERE = ("refused", "route", "not known", "No such file", "Permission denied", "could not open")
-"""Words of the system for an address at which no device can be, whatever its id."""
 
 
 @dataclass
@@ -193,12 +191,10 @@ def _read(link: GatedLink, profile: Profile, device_id: int, registers: Sequence
             return None
         except StationRefused as problem:
             answer.refused[register.name] = str(problem)
-        except LinkLost as problem:
-            if answer.words or answer.refused:
-                return answer
-            if any(word in str(problem) for word in NOWHERE):
-                raise
-            return None
+        except NoConnection:
+            raise  # no device can be there, whatever its id
+        except LinkLost:
+            return answer if answer.words or answer.refused else None
     good, bad = 0, 0
     if answer.words:
         order, counted = best_order(profile, answer.words)

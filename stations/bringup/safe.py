@@ -3,7 +3,6 @@
 Both the bring-up and its keeper, which outlives a killed bring-up, send the same absolute orders; a device may get them twice.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from schemas.profile import Profile
@@ -15,6 +14,7 @@ from stations.devices.axis import TableAxis
 from stations.devices.chamber import ThermalChamber
 from stations.devices.registers import Registers
 from stations.devices.values import Values
+from stations.recordings.decoding import told
 
 SPEED_DEG_S = 1.0
 ACCELERATION_DEG_S2 = 10.0
@@ -99,7 +99,7 @@ def leave_as_found(target: Target, found: AsFound) -> list[str]:
     for name, wanted in found.values.items():
         if _value(values, name) != wanted:
             values.write(name, wanted)
-            done.append(f"{name} back to {_named(target.profile, name, wanted)}")
+            done.append(f"{name} back to {told(target.profile.entry(name), wanted)}")
     return done
 
 
@@ -108,9 +108,3 @@ def _value(values: Values, name: str) -> Value:
     if isinstance(values, Registers):
         return values.read(name)
     return values.number(name) if values.profile.command(name).type == "number" else values.text(name)
-
-
-def _named(profile: Profile, name: str, value: Value) -> str:
-    entry = profile.entry(name)
-    names: Mapping[str, int] = getattr(entry, "enumeration", {})
-    return next((known for known, number in names.items() if number == value), f"{value}")

@@ -5,10 +5,10 @@ After a failed write it is unknown whether the device acted: the adapter reads b
 
 from collections.abc import Callable, Sequence
 
-from schemas.errors import LinkLost, StationRefused, StationTimeout
+from schemas.errors import LinkLost, NoConnection, StationRefused, StationTimeout
 from schemas.profile import Space
 from stations.links.frames import Malformed, Refused, read_request, values_in, write_request
-from stations.links.wires import Broken, Silence, Wire
+from stations.links.wires import Broken, Silence, Unreachable, Wire
 
 GATEWAY = {10, 11}
 REASONS = {
@@ -76,7 +76,8 @@ class WireLink:
             ) from None
         except Broken as problem:
             message = f"{where}: connection lost at '{purpose}' ({problem}), a listening device is needed"
-            raise LinkLost(f"{message}; check power, network and port") from None
+            kind = NoConnection if isinstance(problem, Unreachable) else LinkLost
+            raise kind(f"{message}; check power, network and port") from None
         except Malformed as problem:
             self._wire.close()
             raise LinkLost(f"{where}: no valid answer to '{purpose}' ({problem}); check gateway and cable") from None

@@ -32,7 +32,10 @@ SPACE_OF = {
     WRITE_COILS: "coil",
     WRITE_REGISTERS: "holding",
 }
-SECRET = re.compile(r"pass(word|phrase|code)?|secret|pin(_code)?|credential|token", re.IGNORECASE)
+SECRET = re.compile(
+    r"(?<![a-z])(pass(word|phrase|code)?|secret|pin(_?code)?|credentials?|token)(?![a-z])", re.IGNORECASE
+)
+"""Whole words: "damping" and "spin" are no secrets."""
 WITHHELD = "withheld"
 
 

@@ -17,7 +17,7 @@ from stations.links.frames import (
     read_of_other_size,
     reply_size,
 )
-from stations.links.wires import CHUNK, Broken, Silence, reason_of
+from stations.links.wires import CHUNK, Broken, Silence, Unreachable, reason_of
 
 PARITIES = {"none": PARITY_NONE, "even": PARITY_EVEN, "odd": PARITY_ODD}
 EXCEPTION_FRAME = 5  # device, function, code, check
@@ -64,8 +64,9 @@ class SerialWire:
             self._unsure.setdefault(device_id, 0)
             raise
         except (serial.SerialException, OSError, termios.error) as problem:  # settings that the line does not support
+            kind = Unreachable if self._port is None else Broken
             self.close()
-            raise Broken(reason_of(problem)) from None
+            raise kind(reason_of(problem)) from None
 
     def close(self) -> None:
         """Closes the line."""

@@ -33,6 +33,10 @@ class Broken(Exception):
     """The connection could not be made, or ended."""
 
 
+class Unreachable(Broken):
+    """No connection could be made."""
+
+
 class Wire(Protocol):
     """A connection to devices; ``where`` is its name in messages, ``timeout_s`` the longest answer time."""
 
@@ -103,8 +107,9 @@ class TcpWire:
                 self._abort()
             raise Silence from None
         except OSError as problem:
+            kind = Unreachable if self._socket is None else Broken
             self._abort()
-            raise Broken(reason_of(problem)) from None
+            raise kind(reason_of(problem)) from None
         except Malformed:
             self._abort()
             raise

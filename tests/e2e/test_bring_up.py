@@ -262,29 +262,35 @@ def lost(what, name, word, tmp_path):
     assert read_frames(path).remark == ""
 
 
+def started(name, port, folder, answers, *more):
+    """The command in a process of its own, with what a person types."""
+    command = [sys.executable, "-m", "pipelines", "station", "bring-up", name, "--link", f"tcp://127.0.0.1:{port}"]
+    command += ["--device-id", str(id_of(load_profile(name))), "--out", "out", *more]
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).resolve().parents[2])}
+    process = subprocess.Popen(command, cwd=folder, env=environment, **pipes)
+    process.stdin.write("\n".join(answers) + "\n")
+    process.stdin.flush()
+    return process
+
+
+GOALS_DEG = {"MOVE": 13.0, "STOP": 15.0, "LINK": 15.0}
+"""Where an axis at 12° would get to by itself: one that stands short of it was stopped."""
+
+
 @each([(name, word) for name, words in STEPS.items() for word in words])
 def test_a_kill_in_any_step_leaves_a_safe_device_and_a_whole_recording(case, tmp_path):
     name, word = case
     profile = load_profile(name)
     with served_device(name, silence_s=0.0) as (port, plant):
-        command = [
-            *(sys.executable, "-m", "pipelines", "station", "bring-up", name, "--link", f"tcp://127.0.0.1:{port}"),
-            *("--device-id", str(id_of(profile)), "--out", "out", "--silence", "20", "--watch", "20"),
-        ]
         words = STEPS[name]
         answers = [
             *([""] * (1 if profile.kind == "axis" else 2)),
             *(w if w == word else "" for w in words[: words.index(word) + 1]),
         ]
-        root = Path(__file__).resolve().parents[2]
-        process = subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, cwd=tmp_path,
-            env={**os.environ, "PYTHONPATH": str(root)},
-        )  # fmt: skip
         if word == "LINK" and profile.kind == "axis":
             answers.insert(-1, "")  # the emergency stop
-        process.stdin.write("\n".join(answers) + "\n")
-        process.stdin.flush()
+        process = started(name, port, tmp_path, answers, "--silence", "20", "--watch", "20")
         frames = tmp_path / "out" / "frames.jsonl"
 
         def moved():
@@ -302,8 +308,8 @@ def test_a_kill_in_any_step_leaves_a_safe_device_and_a_whole_recording(case, tmp
             assert moved()
         os.kill(process.pid, signal.SIGKILL)
         process.wait(10.0)
-        process.stdin.close()
-        process.stderr.close()
+        for pipe in (process.stdin, process.stdout, process.stderr):
+            pipe.close()
         while time.monotonic() < deadline and (
             moved() or (profile.kind == "chamber" and not plant.fixture.chamber.running)
         ):
@@ -311,33 +317,20 @@ def test_a_kill_in_any_step_leaves_a_safe_device_and_a_whole_recording(case, tmp
         assert not moved()
         if profile.kind == "chamber":
             assert plant.fixture.chamber.running
+        else:
+            assert plant.outer.encoder(plant.now) < GOALS_DEG[word] - 0.1
     recording = read_frames(frames)
     assert recording.remark == ""
     assert len(recording.exchanges) > 10
 
 
 def test_the_command_writes_page_document_and_recording(tmp_path):
-    with served_device("watlow_f4t") as (port, _):
-        command = [
-            *(
-                sys.executable,
-                "-m",
-                "pipelines",
-                "station",
-                "bring-up",
-                "watlow_f4t",
-                "--link",
-                f"tcp://127.0.0.1:{port}",
-            ),
-            *("--device-id", "3", "--readings", "--out", "out", "--by", "A. Person", "--json"),
-        ]
-        root = Path(__file__).resolve().parents[2]
-        done = subprocess.run(
-            command, input="23\n23\nsimulator\n", capture_output=True, text=True, timeout=60, check=False, cwd=tmp_path,
-            env={**os.environ, "PYTHONPATH": str(root)},
-        )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    document = json.loads(done.stdout)
+    name = "watlow_f4t"
+    with served_device(name) as (port, _):
+        process = started(name, port, tmp_path, ["23", "23"], "--readings", "--by", "A. Person", "--json")
+        out, errors = process.communicate("simulator\n", timeout=60)
+    assert process.returncode == 0, errors
+    document = json.loads(out)
     assert document == read_conformance(tmp_path / "out" / "conformance.json")
     assert (document["verified_on"], document["by"], document["complete"]) == ("simulator", "A. Person", True)
     assert "127.0.0.1" not in (tmp_path / "out" / "conformance.json").read_text(encoding="utf-8")
@@ -438,17 +431,7 @@ def test_an_emergency_stop_that_a_person_holds_is_seen():
 def test_ctrl_c_leaves_the_device_as_it_was_and_a_page_that_says_so(name, tmp_path):
     axis = load_profile(name).kind == "axis"
     with served_device(name, silence_s=0.0) as (port, plant):
-        command = [
-            *(sys.executable, "-m", "pipelines", "station", "bring-up", name, "--link", f"tcp://127.0.0.1:{port}"),
-            *("--device-id", str(id_of(load_profile(name))), "--out", "out", "--watch", "20"),
-        ]
-        root = Path(__file__).resolve().parents[2]
-        process = subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=tmp_path,
-            env={**os.environ, "PYTHONPATH": str(root)},
-        )  # fmt: skip
-        process.stdin.write("\n\nSTOP\n" if axis else "\n\nSET\n")
-        process.stdin.flush()
+        process = started(name, port, tmp_path, ["", "", "STOP" if axis else "SET"], "--watch", "20")
 
         def changed():
             return plant.outer.moving(plant.now) if axis else plant.fixture.chamber.set_point != 23.0
@@ -461,6 +444,7 @@ def test_ctrl_c_leaves_the_device_as_it_was_and_a_page_that_says_so(name, tmp_pa
         out, errors = process.communicate(timeout=30)
         assert process.returncode == 130, errors
         assert not changed()
+        assert not axis or plant.outer.encoder(plant.now) < GOALS_DEG["STOP"] - 0.1
     document = read_conformance(tmp_path / "out" / "conformance.json")
     assert document["complete"] is False
     assert document["ended"] == "interrupted"

@@ -289,6 +289,10 @@ def test_a_password_is_withheld(tmp_path):
     recorder.close()
     assert "sesame" not in path.read_text(encoding="utf-8")
     assert [e.request for e in read_frames(path).exchanges] == [b"VOLT?"]
+    for harmless in ("damping", "spin", "passband", "clipping"):
+        assert not recording_module.SECRET.search(f"device {harmless}")
+    for secret in ("password", "pin_code", "SYST:PASS:CEN", "access_token"):
+        assert recording_module.SECRET.search(f"device {secret}")
 
 
 def test_a_station_check_is_recorded_with_every_device_and_drawn(tmp_path):

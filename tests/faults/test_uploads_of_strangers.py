@@ -46,8 +46,8 @@ class Memory(threading.Thread):
         while not self.ended.wait(0.02):
             total = process.memory_info().rss - self.before
             for child in process.children():
-                try:
-                    total += child.memory_info().rss
+                try:  # servers and browsers of other tests are children too
+                    total += child.memory_info().rss if limited.PROGRAM in child.cmdline() else 0
                 except psutil.Error:
                     continue
             self.most = max(self.most, total)

@@ -7,7 +7,9 @@ from made_worlds import BASE, NOISES, NULLS, Noise, World, make, problem_in, run
 from inertial import effects as catalogue
 from inertial.criticism.examination import ExaminedRun
 from inertial.data_errors.handling.gain_step import GainStep
+from inertial.estimation.comparison import estimate
 from inertial.estimation.likelihood import scatter_of_poses
+from inertial.estimation.loudness import _of_soak as scatter_of_soak
 from inertial.estimation.loudness import loudness_of
 from inertial.estimation.model import Model
 from inertial.estimation.noise_shares import Shares
@@ -103,6 +105,21 @@ def test_noise_that_grows_with_temperature_is_known_for_each_soak() -> None:
 @pytest.mark.parametrize("name", ["B30", "K4", "t3", "lengths", "units_spread", "one_unit", "B300"])
 def test_soaks_of_equal_noise_are_not_told_apart(name: str) -> None:
     assert [loudness_of(run_of(NULLS[name], SEED_OF_SHARES + seed).model()) for seed in range(4)] == [None] * 4
+
+
+@pytest.mark.parametrize("name", ["B30", "white", "B300"])
+def test_the_scatter_of_a_few_dwells_is_on_average_as_large_as_that_of_many(name: str) -> None:
+    """The logarithm of a scatter with few degrees of freedom lies far below that of its mean."""
+    soaks = [np.arange(9), np.arange(9, 17), np.arange(17, 57)]
+    ratios: list[np.ndarray] = []
+    for seed in range(10):
+        model = run_of(NULLS[name], SEED_OF_SHARES + 40 + seed).model()
+        fitted = estimate(model)
+        series = model.problem.y - np.einsum("bnp,bp->bn", model.local, fitted.local)
+        ratios.append(np.stack([scatter_of_soak(model, series, places) for places in soaks], axis=1))
+    every = np.concatenate(ratios)
+    each = every.mean(axis=0)
+    assert np.all(np.abs(each - each.mean()) < 0.2)  # the means themselves differ by half, of 7 % each
 
 
 SEED = 5_500_000
