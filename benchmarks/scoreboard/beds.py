@@ -78,7 +78,7 @@ def _worlds() -> dict[str, tuple[tuple[str, ...], int]]:
     from part import SCENES  # type: ignore[import-not-found]
     from tables import LOOP, TABLES  # type: ignore[import-not-found]
 
-    runs = {"nulls": 6, "noises": 6, "faults": 5, "hidden": 4, "outside": 3}
+    runs = {"nulls": 6, "noises": 6, "faults": 5, "hidden": 4, "outside": 3, "ramp_nulls": 10, "ramp_hidden": 10}
     tables = {name: (tuple(TABLES[name]), count) for name, count in runs.items()}
     return tables | {"scenes": (tuple(SCENES), 2), "loop": (tuple(LOOP), 2)}
 

@@ -75,7 +75,7 @@ def worlds(product: Path, lots: Path) -> Callable[[str, str, int], Outcome]:
             return {"broken": True}
         outcome = {
             "broken": False,
-            "not adequate": row["adequate"] is False if bed in {"nulls", "noises"} else None,
+            "not adequate": row["adequate"] is False if bed in {"nulls", "noises", "ramp_nulls"} else None,
             "physics beside the truth": bool(row["stray"]),
             "fault told": row["found"],
             "in class": row["held"],

@@ -102,6 +102,35 @@ def thermal_hysteresis(rng: np.random.Generator, units: int, scene: Any) -> Effe
     return effect
 
 
+def thermal_lag(rng: np.random.Generator, units: int, scene: Any) -> Effect:
+    """A bias of an element that has not yet the temperature of its thermometer; time constants within 3 % from unit to unit."""
+    size = _sizes(rng, units)[..., 0]
+    tau = float(np.exp(rng.uniform(np.log(60.0), np.log(300.0)))) * (1.0 + 0.03 * rng.standard_normal(units))
+
+    def effect(s: Any) -> Floats:
+        body, behind = s.fine_temperature, np.zeros_like(s.fine_temperature)
+        keep, held = np.exp(-(s.fine[1] - s.fine[0]) / tau), body[:, 0].copy()
+        for k in range(1, body.shape[1]):
+            held = body[:, k] + (held - body[:, k]) * keep
+            behind[:, k] = held - body[:, k]
+        own = np.stack([np.interp(s.start + 0.5 * s.duration, s.fine, one) for one in behind])
+        return size[:, None] * own[..., None]
+
+    return effect
+
+
+def thermal_rate(rng: np.random.Generator, units: int, scene: Any) -> Effect:
+    """Bias of a gradient across the device, which is as large as its temperature changes fast."""
+    size = _sizes(rng, units)[..., 0]
+
+    def effect(s: Any) -> Floats:
+        rate = np.gradient(s.fine_temperature, s.fine, axis=1)
+        own = np.stack([np.interp(s.start + 0.5 * s.duration, s.fine, one) for one in rate])
+        return size[:, None] * own[..., None]
+
+    return effect
+
+
 def level_error(rng: np.random.Generator, units: int, scene: Any) -> Effect:
     """The outer axis is not level: up leans in the laboratory, alike for all units."""
     lean = rng.standard_normal(2)
@@ -248,6 +277,8 @@ PHYSICS: dict[str, Callable[..., Effect]] = {
     "step_change": step_change,
     "thermal_kink": thermal_kink,
     "thermal_hysteresis": thermal_hysteresis,
+    "thermal_lag": thermal_lag,
+    "thermal_rate": thermal_rate,
     "creep_after_move": creep_after_move,
     "level_error": level_error,
     "adc_nonlinearity": converter,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import physics
 from noise import Noise
 from world import World
@@ -114,7 +116,25 @@ HIDDEN |= {
 OUTSIDE = {f"{name}_{size:g}": World(hidden=((name, size),)) for size in (1.0, 2.0, 5.0) for name in physics.OUTSIDE}
 OUTSIDE |= {f"{name}_2_two_units": World(units=2, hidden=((name, 2.0),)) for name in physics.OUTSIDE}
 """Physics outside the catalogue: to be told unexplained, with what it follows, and no effect or fault in its place."""
+_RAMPS = World(soaks=(-10.0, 60.0, -10.0), repeats=3, durations=(6.0, 6.0), ramps=True)
+RAMP_NULLS: dict[str, World] = {
+    f"ramps_{name}": replace(_RAMPS, noise=noise, units=units)
+    for name, noise, units in (
+        ("B30", PLAIN, 8), ("K4", Noise(walk=4.0), 8), ("B300", Noise(flicker=300.0), 8), ("white", Noise(flicker=0.0), 8),
+        ("t3", Noise(white=100.0, tails=3), 8), ("one_unit", PLAIN, 1),
+    )
+}  # fmt: skip
+RAMP_HIDDEN: dict[str, World] = {
+    f"ramps_{name}": replace(_RAMPS, hidden=((name, 2.0),))
+    for name in (
+        "third_order", "cross_coupling", "bias_temperature_quadratic", "scale_temperature_quadratic", "thermal_kink",
+        "thermal_hysteresis", "thermal_lag", "thermal_rate", "misalignment_temperature", "level_error",
+    )
+}  # fmt: skip
+"""Without soaks: dwells at three ramps of the chamber, from a room."""
+
 TABLES = {"outside": OUTSIDE, "nulls": NULLS, "noises": NOISES, "faults": FAULTS, "small": SMALL, "hidden": HIDDEN}
+TABLES |= {"ramp_nulls": RAMP_NULLS, "ramp_hidden": RAMP_HIDDEN}
 WRONG = (
     "bias_temperature_quadratic", "scale_temperature_quadratic", "aging_linear", "aging_log", "step_change", "warm_up",
     "thermal_hysteresis", "third_order", "cross_coupling",

@@ -28,6 +28,7 @@ class World:
     rest : RMS of the table's rest position, µrad, alike for all; lsb : resolution over the noise of a dwell's samples
     differ : factor on what the units differ by in bias and response
     turn_on : RMS of the bias shift between the run and the fresh one, µg; unsoaked : dwells begin when the chamber arrives
+    ramps : nothing soaks: from a room at 23 °C the chamber goes to each temperature in turn while the table goes on
     """
 
     units: int = 8
@@ -47,6 +48,7 @@ class World:
     turn_on: float = 0.0
     repeats: int = 1
     hours: float = 2.5
+    ramps: bool = False
 
 
 @dataclass(frozen=True)
@@ -189,7 +191,7 @@ def _scene(world: World, rng: np.random.Generator, heat: np.random.Generator) ->
         np.exp(rng.uniform(np.log(low), np.log(high), count * soaks)) if high > low else np.full(count * soaks, low)
     )
     span = float(np.sum(duration) + moves * count * soaks)
-    rest = max((3600.0 * world.hours - span) / max(soaks - 1, 1), 600.0) if soaks > 1 else 0.0
+    rest = max((3600.0 * world.hours - span) / max(soaks - 1, 1), 600.0) if soaks > 1 and not world.ramps else 0.0
     start, outer, inner, place, wait = [], [], [], [], []
     now, k = 60.0, 0
     for soak in range(soaks):
@@ -218,8 +220,8 @@ def _with_heat(scene: Scene, world: World, rng: np.random.Generator) -> Scene:
     fine = np.arange(0.0, scene.start[-1] + scene.duration[-1] + 10.0, 5.0)
     arrives = [scene.start[scene.soak == s][0] for s in range(len(world.soaks))]
     ends = [(scene.start + scene.duration)[scene.soak == s][-1] for s in range(len(world.soaks))]
-    air = np.full(fine.size, world.soaks[0])
-    for s in range(1, len(world.soaks)):
+    air = _ramped(fine, ends, world.soaks) if world.ramps else np.full(fine.size, world.soaks[0])
+    for s in range(1, 0 if world.ramps else len(world.soaks)):
         ramp = 60.0 * abs(world.soaks[s] - world.soaks[s - 1]) / 3.0  # 3 K/min
         begin = (
             arrives[s] - ramp - 30.0 if world.fault.endswith("unsoaked") else min(ends[s - 1] + 5.0, arrives[s] - 30.0)
@@ -237,6 +239,17 @@ def _with_heat(scene: Scene, world: World, rng: np.random.Generator) -> Scene:
     own = np.stack([np.interp(middle, fine, b) for b in body])
     around = np.broadcast_to(np.interp(middle, fine, air), own.shape)
     return replace(scene, temperature=own, chamber=around, fine=fine, fine_temperature=body, fine_air=air)
+
+
+def _ramped(fine: Floats, ends: list[float], goals: tuple[float, ...]) -> Floats:
+    """The air of a chamber that goes from a room at 23 °C to each goal in turn, at 3 K/min, after the dwells before."""
+    air, now = np.empty(fine.size), 23.0
+    step = 3.0 / 60.0 * (fine[1] - fine[0])
+    for k, time in enumerate(fine):
+        goal = goals[min(int(np.searchsorted(ends, time)), len(goals) - 1)]
+        now += float(np.clip(goal - now, -step, step))
+        air[k] = now
+    return air
 
 
 def _hidden(world: World, scene: Scene, again: Scene, floor: float, rng: np.random.Generator) -> tuple[Floats, Floats]:
