@@ -130,9 +130,11 @@ class ExaminedRun:
         return base if not self.beside else Model(problem, [*base.terms, *self.beside], near=base.noise)
 
 
-def examined(lot: Lot, effects: Sequence[str]) -> "tuple[ExaminedRun, EffectSearch]":
-    """A run without bad dwells and handling errors, and the search for effects in it."""
-    run = ExaminedRun(lot, tuple(effects))
+def examined(
+    lot: Lot, effects: Sequence[str], barred: frozenset[str] = frozenset()
+) -> "tuple[ExaminedRun, EffectSearch]":
+    """A run without bad dwells and handling errors, those of some ids excepted, and the search for effects in it."""
+    run = ExaminedRun(lot, tuple(effects), barred=set(barred))
     run.estimate_loudness()
     run.removed = bad_beside_effects(run.model(), run.effects)
     searched = mended(run)

@@ -18,12 +18,13 @@ from inertial.criticism.unknown import Suspect, Unexplained, better_curve, unexp
 from inertial.data_errors.removed_dwells import BadDwell
 from inertial.data_errors.tails import with_tails
 from inertial.decisions import ADEQUATE_ABOVE, NAMED_BELOW
+from inertial.estimation.alternative import Handling
 from inertial.estimation.bases import SEEN
 from inertial.estimation.comparison import fitted_residuals
 from inertial.estimation.comparison import rms as rms_of
 from inertial.estimation.likelihood import shared_noise
 from inertial.estimation.model import Model
-from inertial.estimation.penalty import PER_COEFFICIENT, log_p_value
+from inertial.estimation.penalty import PER_COEFFICIENT, cost_of_model, log_p_value
 from inertial.estimation.problem import Lot
 from inertial.planning.drivers import drivers_of
 from inertial.probability import passes
@@ -82,7 +83,38 @@ def judged(lot: Lot, effects: Sequence[str], rng: Generator) -> Verdict:
     effects : ids of the model to judge
     rng : draws the noise that adequacy is measured against
     """
-    run, search = examined(_about_its_temperature(lot, effects), effects)
+    verdict = _judged(lot, effects, rng)
+    told = {
+        m.term.effect.id
+        for one in verdict.run.handled
+        for m in one.effects.members
+        if isinstance(m.term.effect, Handling)
+    }
+    if verdict.unexplained is None or not told:
+        return verdict
+    # found before the driver was: what it left over may have looked like an error of handling
+    without = _judged(lot, effects, rng, frozenset(told))
+    return without if _as_good(without, verdict) else verdict
+
+
+def _as_good(other: Verdict, verdict: Verdict) -> bool:
+    """Whether a driver explains a lot as well without the errors of handling that were told beside it."""
+    if (
+        other.unexplained is None
+        or verdict.unexplained is None
+        or other.unexplained.driver != verdict.unexplained.driver
+    ):
+        return False
+    counts = [each.search.part.field.problem.covariance.count for each in (other, verdict)]
+    if not np.array_equal(*counts):  # dwells were taken out for the error: the deviances are of other data
+        return False
+    worth = len(verdict.run.handled) * float(np.log(max(verdict.search.base.problem.count, 1)))
+    return other.unexplained.cost < verdict.unexplained.cost + worth
+
+
+def _judged(lot: Lot, effects: Sequence[str], rng: Generator, barred: frozenset[str] = frozenset()) -> Verdict:
+    """The verdict with all errors of handling but some as candidates."""
+    run, search = examined(_about_its_temperature(lot, effects), effects, barred)
     base, searched = search.base, search.result
     drivers = looks_of(base.problem)
     log_p = adequacy(search.field, drivers, base, rng)
@@ -170,10 +202,10 @@ def _with_curves(
             return by_curve
     best = max(convincing, key=lambda d: _worth(final, d))
     columns = best.candidate.of_blocks[:, :, 0, :]
-    shape, floor = "line" if columns.shape[-1] == 1 else "curve", final.with_curves(columns).floor()
-    return final, Unexplained(
-        best.name, shape, _driver_log_p(final, best) + float(np.log(len(drivers))), best.part, floor
-    )
+    curved = final.with_curves(columns)
+    log_p = _driver_log_p(final, best) + float(np.log(len(drivers)))
+    shape = "line" if columns.shape[-1] == 1 else "curve"
+    return final, Unexplained(best.name, shape, log_p, best.part, curved.floor(), cost_of_model(curved))
 
 
 def _curve_in_place_of(
