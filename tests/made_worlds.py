@@ -11,7 +11,7 @@ from pipelines.tables.dwells import lot_of, measured
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "benchmarks" / "worlds"))
 
 from noise import Noise
-from tables import HIDDEN, NOISES, NULLS
+from tables import HIDDEN, NOISES, NULLS, RAMP_HIDDEN, RAMP_NULLS
 from world import Made, World, force_of, make
 
 __all__ = [
@@ -19,6 +19,8 @@ __all__ = [
     "HIDDEN",
     "NOISES",
     "NULLS",
+    "RAMP_HIDDEN",
+    "RAMP_NULLS",
     "Made",
     "Noise",
     "World",

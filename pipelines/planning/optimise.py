@@ -30,8 +30,8 @@ from schemas.recipe import Recipe
 
 Progress = Callable[[str], None]
 
-TRIED = 3
-"""Number of orders of soaks in which poses are exchanged."""
+TRIED, TRIED_RAMPS = 3, 6
+"""Numbers of orders of soaks, and of ramps with a length of their dwells, in which poses are exchanged."""
 
 LIKELY = 12
 """Number of orders whose dwell counts are optimised, the best by the estimate from two sizes of a starting arrangement."""
@@ -188,9 +188,11 @@ class RecipeSearch:
         chosen: list[tuple[PlanDesign, float]] = []
         for seconds, plan in sorted(tried, key=lambda one: one[0]):
             used = {other.order for other, _ in chosen}
-            if math.isfinite(seconds) and plan.order not in used and mirrored(plan.order) not in used:
+            # the starting arrangement says little of a ramp: other lengths of its dwells are tried beside it
+            again = not self.ramp and bool({plan.order, mirrored(plan.order)} & used)
+            if math.isfinite(seconds) and not again:
                 chosen.append((plan, seconds))
-        return chosen[:TRIED]
+        return chosen[: TRIED_RAMPS if self.ramp else TRIED]
 
     def allowed(self, ratio: Array) -> Array:
         """Ratios to the requirement that a starting arrangement may have; an exchange cannot improve pose-independent columns."""
@@ -226,7 +228,7 @@ class RecipeSearch:
         """The quicker of the best recipe so far and the one found by exchanges in the soaks of a design."""
         now: PlanDesign | None = plan
         for _ in range(ROUNDS):
-            if now is None or self.slower(now, best):
+            if now is None or sum(now.counts) > MOST or self.slower(now, best):
                 break
             designed = self.designed(now)
             try:
@@ -242,7 +244,11 @@ class RecipeSearch:
                 best = best if self.unseen else designed
             if NEAR < worst <= 1.0 or self.unseen:
                 break
+            before = now
             now = fewest_dwells(self.timed, plan, (1.0 - SPARE) * self.timed.ratio_and_seconds(now)[0] / reached)
+            if self.ramp and worst > 1.0 and (now is None or sum(now.counts) <= sum(before.counts)):
+                # more dwells on ramps are no longer version of fewer: the devices are elsewhere at each of them
+                now = replace(before, counts=tuple(math.ceil(worst * count) for count in before.counts))
         return best
 
     def nearest_within(self, tolerance: float) -> PlanContext | None:
@@ -324,6 +330,8 @@ class RecipeSearch:
                 "description": f"{len(chosen)} poses {where}, by 'tumbleline plan optimise'",
                 "poses": numbered("p", chosen),
                 "verification": verification,
+                # a ramp is long, and what wanders slowly is to be averaged
+                "verification_order": "interleaved" if plan.ramp else self.recipe.verification_order,
                 "temperatures_C": [float(t) for t in plan.order],
                 "soaks": soaks,
                 "dwell_s": plan.dwell_s,

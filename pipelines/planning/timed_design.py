@@ -181,10 +181,14 @@ class TimedDesign:
             len(turns(self._verification, self.requirement.verification, k, len(order))) for k in range(len(order))
         ]
         checks = np.array(verified, dtype=np.float64) * (typical + beside)
-        each[first[1:]] += checks[:-1]
+        if plan.ramp:  # spread among the others
+            each += np.repeat(checks / np.asarray(plan.counts), plan.counts)
+        else:
+            each[first[1:]] += checks[:-1]
         end = np.cumsum(each)
         heat = self._followed(plan, end) if plan.ramp else np.asarray(order)[plan.group]
-        return end - 0.5 * plan.dwell_s, heat, float(end[-1] + checks[-1]) + self._static_soak(order[-1])
+        last = float(end[-1]) if plan.ramp else float(end[-1] + checks[-1])
+        return end - 0.5 * plan.dwell_s, heat, last + self._static_soak(order[-1])
 
     def _followed(self, plan: PlanDesign, end: Array) -> Array:
         """The device's temperature (n,) at the middle of the dwells of a ramp that end at these times, °C."""

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import world_changes as changes
-from made_worlds import HIDDEN, NOISES, NULLS, Noise, World
+from made_worlds import HIDDEN, NOISES, NULLS, RAMP_HIDDEN, RAMP_NULLS, Noise, World
 from world_row import Case, Hand, Recording, Row, Strange
 
 # found by way of the worlds
@@ -248,6 +248,11 @@ def rows_of_physics() -> Iterator[Row]:
             physics=True,
             unexplained=frozenset({"humidity_pct"}),
         )
+    # groups of neighbouring temperatures are of unequal size on a ramp
+    for name in ("ramps_B300", "ramps_K4"):
+        yield Row(RAMP_NULLS[name], SEED, name, first=(), adequate=(True,))
+    for name in ("thermal_lag", "thermal_hysteresis", "third_order"):
+        yield Row(RAMP_HIDDEN[f"ramps_{name}"], SEED, f"ramps_{name}", named=(name,), physics=True)
     # each unit and axis is pushed by its own amount: the mean of the lot looks like two wrong angles
     yield Row(Case("withheld", 4), 8080, "brownout", first=(), unexplained=frozenset({"supply_V"}))
     for name in ("misalignment_and_moved", "misalignment_and_slip"):

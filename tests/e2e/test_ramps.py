@@ -167,3 +167,15 @@ def test_the_command_writes_a_recipe_on_ramps_with_its_bound(tmp_path):
     heat = planned_state(recipe, load_station()).temperature
     assert short_of(heat, LEVELS) == 0.0
     assert "<svg" in page.read_text(encoding="utf-8")
+
+
+@pytest.mark.slow
+def test_the_quick_recipe_takes_two_thirds_of_the_main_jobs_time_and_its_model_is_adequate(tmp_path):
+    minutes = {
+        name: json.loads(command(["plan", name, "--json"]).stdout)["minutes"]["total"]
+        for name in ("quick", "production")
+    }
+    assert minutes["quick"] < 0.65 * minutes["production"]
+    done = command(["run", "quick", "--archive", str(tmp_path / "archive"), "--direct", "--json"])
+    verdict = json.loads(done.stdout)["adequacy"]
+    assert (verdict["adequate"], verdict["named"]) == (True, False)
