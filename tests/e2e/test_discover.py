@@ -131,6 +131,7 @@ def test_python_and_the_audit_tell_the_same(folder: Path) -> None:
     assert discovered_before(Archive(str(folder / "archive"))) == [("DEMO", 1)]
 
 
+@pytest.mark.slow
 def test_scores_on_dask_are_those_of_this_machine(folder: Path, tmp_path: Path) -> None:
     from pipelines.demo.archive_lots import Line
     from pipelines.demo.lot_archive import write_lots

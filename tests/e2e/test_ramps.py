@@ -52,6 +52,7 @@ def found():
     return best, lower_bound(base, against, requirement, ramp=True)
 
 
+@pytest.mark.slow
 def test_the_search_needs_a_third_of_the_time_reaches_both_ends_and_is_no_quicker_than_its_bound(found):
     best, bound = found
     assert best.ramp
@@ -127,6 +128,7 @@ def on_ramps(faults, tmp_path):
         assert "suspended" in set(run.table("events")["kind"]) or "spoilt" in set(run.table("events")["kind"])
 
 
+@pytest.mark.slow
 def test_a_run_on_ramps_that_was_stopped_goes_on_to_the_same_tables(tmp_path, monkeypatch):
     from pipelines.capture import capture as capturing
     from schemas.errors import OperatorNeeded
