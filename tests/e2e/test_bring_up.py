@@ -271,7 +271,9 @@ def lost(what, name, word, tmp_path):
 
 def started(name, port, folder, answers, *more):
     """The command in a process of its own, with what a person types."""
-    command = [sys.executable, "-m", "pipelines", "station", "bring-up", name, "--link", f"tcp://127.0.0.1:{port}"]
+    # a suite in the background of a shell inherits an interrupt that is ignored
+    program = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); from pipelines.cli import main; main()"
+    command = [sys.executable, "-c", program, "station", "bring-up", name, "--link", f"tcp://127.0.0.1:{port}"]
     command += ["--device-id", str(id_of(load_profile(name))), "--out", "out", *more]
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
     environment = {**os.environ, "PYTHONPATH": str(Path(__file__).resolve().parents[2])}
