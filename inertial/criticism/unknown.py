@@ -43,6 +43,7 @@ class Unexplained:
     log_p : natural logarithm of the probability that noise follows it as much
     floor : noise of the measurement with the dependence in the model, g
     cost : penalised deviance of that model, on the scale of the search
+    there : (blocks, n), the measurements that it is of; None where it is not known
     """
 
     driver: str
@@ -51,6 +52,7 @@ class Unexplained:
     part: Part = "bias"
     floor: float = float("inf")
     cost: float = float("inf")
+    there: NDArray[np.bool_] | None = None
 
 
 @dataclass(frozen=True)
@@ -159,7 +161,7 @@ def unexplained_by(base: Model, fit: CurveFit, looks: int) -> Unexplained:
     before = base.at(fit.model.noise)
     drop = max(before.rss - fit.model.space.rss, 0.0)
     log_p = log_p_value(before, drop, fit.rank) + float(np.log(looks))
-    return Unexplained(fit.driver, "curve", log_p, fit.part, fit.model.floor(), fit.cost)
+    return Unexplained(fit.driver, "curve", log_p, fit.part, fit.model.floor(), fit.cost, base.problem.covariance.there)
 
 
 def _promising(base: Model, field: Sequence[Suspect]) -> list[Suspect]:

@@ -99,17 +99,13 @@ def judged(lot: Lot, effects: Sequence[str], rng: Generator) -> Verdict:
 
 def _as_good(other: Verdict, verdict: Verdict) -> bool:
     """Whether a driver explains a lot as well without the errors of handling that were told beside it."""
-    if (
-        other.unexplained is None
-        or verdict.unexplained is None
-        or other.unexplained.driver != verdict.unexplained.driver
-    ):
+    alone, beside = other.unexplained, verdict.unexplained
+    if alone is None or beside is None or alone.driver != beside.driver or alone.there is None or beside.there is None:
         return False
-    counts = [each.search.part.field.problem.covariance.count for each in (other, verdict)]
-    if not np.array_equal(*counts):  # dwells were taken out for the error: the deviances are of other data
+    if not np.array_equal(alone.there, beside.there):  # deviances of other measurements are not compared
         return False
-    worth = len(verdict.run.handled) * float(np.log(max(verdict.search.base.problem.count, 1)))
-    return other.unexplained.cost < verdict.unexplained.cost + worth
+    worth = len(verdict.run.handled) * float(np.log(max(int(alone.there.sum()), 1)))  # as in the search
+    return alone.cost < beside.cost + worth
 
 
 def _judged(lot: Lot, effects: Sequence[str], rng: Generator, barred: frozenset[str] = frozenset()) -> Verdict:
@@ -205,7 +201,9 @@ def _with_curves(
     curved = final.with_curves(columns)
     log_p = _driver_log_p(final, best) + float(np.log(len(drivers)))
     shape = "line" if columns.shape[-1] == 1 else "curve"
-    return final, Unexplained(best.name, shape, log_p, best.part, curved.floor(), cost_of_model(curved))
+    return final, Unexplained(
+        best.name, shape, log_p, best.part, curved.floor(), cost_of_model(curved), base.problem.covariance.there
+    )
 
 
 def _curve_in_place_of(
