@@ -90,7 +90,8 @@ def class_of(field: Candidates, model: Model, term: Term) -> EffectClass:
     judged = ranked([own, *judged])
     if isinstance(term.effect, Handling):
         # an effect that explains far more than an error of handling is beside it, and no rival of it
-        judged = [rival for rival in judged if rival is own or rival.cost > own.cost - CLASS_WIDTH]
+        held = next(rival for rival in judged if rival.term is own.term)  # ranked: at the noise of the best of them
+        judged = [rival for rival in judged if rival is held or rival.cost > held.cost - CLASS_WIDTH]
     jumps = jumps_in_place_of(field, rest, judged[0])
     if jumps is not None:
         judged = _with_jumps(judged, jumps)

@@ -255,6 +255,10 @@ def rows_of_physics() -> Iterator[Row]:
         yield Row(RAMP_HIDDEN[f"ramps_{name}"], SEED, f"ramps_{name}", named=(name,), physics=True)
     # each unit and axis is pushed by its own amount: the mean of the lot looks like two wrong angles
     yield Row(Case("withheld", 4), 8080, "brownout", first=(), unexplained=frozenset({"supply_V"}))
+    # a fault is no less told for an effect outside the catalogue; the second had ended with an IndexError
+    for fault, seed in (("unit_moved", 930_004), ("wrong_pose", 930_008)):
+        world = World(hidden=(("scale_warms_up", 2.0),), fault=fault, amount=0.5)
+        yield Row(world, seed, f"{fault} and unknown", told="names", physics=True, adequate=(False,))
     for name in ("misalignment_and_moved", "misalignment_and_slip"):
         yield Row(
             HIDDEN[name], SEED, name, named=("misalignment_temperature",), told="names", physics=True,
