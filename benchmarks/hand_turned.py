@@ -1,8 +1,8 @@
 """One unit turned by hand with a physical effect of ten times the noise: `python benchmarks/hand_turned.py --runs 8`.
 
 39 dwells in directions that nobody knows, so that the magnitude of gravity is the only reference. The effects are made by
-physics: two heated masses, a band-gap reference, an element behind its case, Preisach's operator over the temperature, a
-transfer curve that saturates. Prints for each effect how often it is in a class, recommended by dwells left out, and named
+physics: two heated masses, a band-gap reference, an element behind its case, a die attach that sticks and slips, Preisach's
+operator over the temperature, a transfer curve that saturates. Prints for each effect how often it is in a class, recommended by dwells left out, and named
 beside another one.
 """
 
@@ -96,6 +96,17 @@ def element_lags(hand: Hand) -> Floats:
     return hand.at(lagged(hand.case, hand.rng.uniform(60.0, 180.0)))[:, None] * hand.gains()
 
 
+def sticks_and_slips(hand: Hand) -> Floats:
+    """A die attach with dry friction (Jenkin's element): it holds its strain until the mismatch slips it, since yesterday."""
+    slips = hand.rng.uniform(4.0, 14.0)
+    held = 25.0 + hand.rng.uniform(-30.0, 30.0)
+    strain = np.empty(len(hand.t))
+    for k, warm in enumerate(hand.case):
+        held = min(max(held, warm - slips), warm + slips)
+        strain[k] = warm - held
+    return hand.at(strain)[:, None] * hand.gains()
+
+
 def switched_domains(hand: Hand) -> Floats:
     """Many small domains that switch at temperatures of their own, up and down: Preisach's operator."""
     up = hand.rng.normal(27.0, 18.0, 200)
@@ -124,6 +135,7 @@ EFFECTS: dict[str, tuple[Effect, float, float, frozenset[str]]] = {
         curved_reference, 40.0, 22.0, frozenset({"bias_temperature_quadratic", "bias_temperature_cubic"}),
     ),
     "lag": (element_lags, 40.0, 22.0, frozenset({"thermal_lag", "thermal_rate"})),
+    "friction": (sticks_and_slips, 40.0, 22.0, frozenset({"thermal_hysteresis"})),
     "hysteresis": (switched_domains, 40.0, 22.0, frozenset({"thermal_hysteresis"})),
     "cubic": (saturates, 6.0, 0.0, frozenset({"third_order"})),
     "nothing_4min": (nothing, 4.0, 0.0, frozenset()),

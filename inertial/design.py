@@ -47,6 +47,12 @@ def starting_values(effects: Sequence[AnyEffect], state: State) -> dict[str, dic
     return values
 
 
+def carried_over(values: Values) -> dict[str, dict[str, Any]]:
+    """The values that hold in another run, too: without the state in which a run began, which is taken as at rest there."""
+    of_run = {name: {p.name for p in catalogue.get(name).nonlinear if p.of_run} for name in values}
+    return {name: {k: v for k, v in own.items() if k not in of_run[name]} for name, own in values.items()}
+
+
 def local_columns(effects: Sequence[SensorEffect], state: State, values: Values) -> Array:
     """Columns of the sensor's effects, (..., m, n, p), g per unit of the coefficient; p counts the same on each of the m axes."""
     axes = [[e.columns(state, axis, **on_axis(values, e.id, axis)) for e in effects] for axis in state.axes]

@@ -23,6 +23,7 @@ class Nonlinear:
     points : size of the starting grid
     choices : for a discrete parameter, its values (bounds and points are then theirs)
     every : where ``choices`` are only some of its values, all of them in order; a search begins at the choices and ends at these
+    of_run : whether it is the state in which a run began, and no property of the device; zero is at rest
     """
 
     name: str
@@ -33,6 +34,7 @@ class Nonlinear:
     points: int = 10
     choices: tuple[float, ...] = ()
     every: tuple[float, ...] = ()
+    of_run: bool = False
 
     def between(self, value: float) -> Array:
         """All values between the neighbours of a value among the choices, in order; none where the choices are all."""

@@ -13,7 +13,7 @@ class ThermalHysteresis(SensorEffect):
 
     id: ClassVar[str] = "thermal_hysteresis"
     symbol: ClassVar[str] = "kH"
-    equation: ClassVar[str] = "kH·h(T; w) + kH2·h(T; 0.35·w), h the play operator of half width w"
+    equation: ClassVar[str] = "kH·h(T; w) + kH2·h(T; 0.35·w), h the play operator of half width w that begins at s, −1 … 1"
     coefficients: ClassVar[tuple[str, ...]] = ("kH", "kH2")
     source: ClassVar[str] = "Visintin, Differential Models of Hysteresis; mechanism: friction in the die attach"
     typical_ug: ClassVar[tuple[float, float]] = (100.0, 10000.0)
@@ -24,16 +24,19 @@ class ThermalHysteresis(SensorEffect):
     simplicity: ClassVar[int] = 24
     memory: ClassVar[bool] = True
     primary: ClassVar[int | None] = 1
-    nonlinear: ClassVar[tuple[Nonlinear, ...]] = (Nonlinear("half_width", "K", 1.0, 60.0, "log", 10),)
+    nonlinear: ClassVar[tuple[Nonlinear, ...]] = (
+        Nonlinear("half_width", "K", 1.0, 60.0, "log", 10),
+        Nonlinear("start", "1", -1.0, 1.0, "linear", 3, of_run=True),
+    )
 
-    def columns(self, state: State, axis: int, *, half_width: float, **nonlinear: float) -> Array:
-        return stack(state, [self._inside(state, half_width), self._inside(state, _NARROW * half_width)])
+    def columns(self, state: State, axis: int, *, half_width: float, start: float = 0.0, **nonlinear: float) -> Array:
+        return stack(state, [self._inside(state, half_width, start), self._inside(state, _NARROW * half_width, start)])
 
-    def _inside(self, state: State, half_width: float) -> Array:
+    def _inside(self, state: State, half_width: float, start: float) -> Array:
         def hysteresis(time: Array, temperature: Array) -> Array:
-            return operators.play(temperature, half_width)
+            return operators.play(temperature, half_width, start)
 
-        return state.temperature_operator((self.id, half_width), hysteresis)
+        return state.temperature_operator((self.id, half_width, start), hysteresis)
 
     def start_columns(self, state: State, axis: int, *, half_width: float, **nonlinear: float) -> Array:
 

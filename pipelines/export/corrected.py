@@ -13,6 +13,7 @@ from scipy.linalg import block_diag
 
 from inertial import static_intervals
 from inertial.correction import correct, output_covariance, remaining_step
+from inertial.design import carried_over
 from inertial.noise.bias_filter import BiasState, Track, track
 from inertial.noise.gauss_markov import FlickerTerms, bias_model, flicker_of_steps
 from inertial.noise.likely_terms import LikelyTerms, likely_terms
@@ -139,7 +140,7 @@ def fit_of_unit(run: Run, unit: str, *, failed: bool, revoked: bool) -> FitOfUni
         calibration.effects,
         calibration.coefficients[u],
         covariance if budget is None else budget,
-        calibration.nonlinear,
+        carried_over(calibration.nonlinear),
         budget is not None,
         curve_of_unit(run, serial),
     )

@@ -301,7 +301,7 @@ def rows_of_other_generators() -> Iterator[Row]:
         yield Row(Strange("null"), seed, "one temperature that wanders", physics=True, also=also)
     also = changes.may_be_of_the_station
     yield Row(Strange("encoder_slips", 20.0), 95_001, "encoder slips", physics=True, also=also)
-    for effect in ("warm_up", "temperature_curve", "lag", "cubic"):
+    for effect in ("warm_up", "temperature_curve", "lag", "friction", "cubic"):
         yield Row(Hand(effect), 77, f"{effect} by hand", physics=True, also=changes.right_of(effect))
     warm = Recording(40, "white 280, B 30", warm_up=2000.0)
     for seed in (5_150_006, 5_150_012):

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial.correction import correct
+from inertial.design import carried_over
 from pipelines.archive import Run
 from pipelines.certificates import Calibration
 from pipelines.certificates.document.content import Adjustment
@@ -67,7 +68,7 @@ def _errors(run: Run, source: Run, unit: str) -> NDArray[np.float64]:
     past = None if history is None else history[history["unit"] == unit]
     lot = lot_arrays(own, past)
     calibration = read_calibration(*(table[table["unit"] == unit] for table in (coefficients, covariance)))
-    corrected = correct(calibration.effects, lot.state, lot.output, calibration.coefficients, calibration.nonlinear)
+    corrected = correct(calibration.effects, lot.state, lot.output, calibration.coefficients, carried_over(calibration.nonlinear))
     error = MICRO * (np.linalg.norm(corrected, axis=-1) - np.linalg.norm(lot.state.force, axis=-1))
     unseen = lot.of_kind("verification")
     return error.reshape(-1)[unseen] if unseen.any() else error.reshape(-1)
