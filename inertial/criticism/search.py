@@ -71,6 +71,11 @@ def search(
         if jumps is not None and jumps.ahead > 0.0:
             return SearchResult(model, tuple(chosen), ladder, jumps.terms)
         best = _parent_first(field, model, best)
+        widened = _widened(field, model, best, chosen)
+        if widened is not None:
+            chosen = widened
+            model = Model(field.problem, [*base.terms, *chosen], near=model.noise)
+            continue
         chosen.append(best.term)
         model = model.with_term(best.term)
         if len(chosen) > 1:
@@ -91,6 +96,24 @@ def _parent_first(field: Candidates, model: Model, rival: Rival) -> Rival:
             if convincing(field, model, parent):
                 return parent
     return rival
+
+
+def _widened(field: Candidates, model: Model, rival: Rival, chosen: Sequence[Term]) -> list[Term] | None:
+    """The chosen effects with one of them in its complete form, where that explains as much as a further effect; else None.
+
+    The simpler form of an effect with memory leaves a remainder, which would be found as another effect.
+    """
+    least = cost_of_model(model.with_term(rival.term))
+    found: list[Term] | None = None
+    for term in chosen:
+        if not term.memory or term.first is None:
+            continue
+        wider = judge_refined(field, model.without_term(term), replace(term, first=None)).term
+        terms = [wider if each is term else each for each in chosen]
+        cost = cost_of_model(model.without_term(term).with_term(wider))
+        if cost <= least:
+            found, least = terms, cost
+    return found
 
 
 def anything(field: Candidates, model: Model) -> bool:

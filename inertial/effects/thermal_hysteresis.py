@@ -13,7 +13,9 @@ class ThermalHysteresis(SensorEffect):
 
     id: ClassVar[str] = "thermal_hysteresis"
     symbol: ClassVar[str] = "kH"
-    equation: ClassVar[str] = "kH·h(T; w) + kH2·h(T; 0.35·w), h the play operator of half width w that begins at s, −1 … 1"
+    equation: ClassVar[str] = (
+        "kH·h(T; w) + kH2·h(T; 0.35·w), h the play operator of half width w that begins at s, −1 … 1"
+    )
     coefficients: ClassVar[tuple[str, ...]] = ("kH", "kH2")
     source: ClassVar[str] = "Visintin, Differential Models of Hysteresis; mechanism: friction in the die attach"
     typical_ug: ClassVar[tuple[float, float]] = (100.0, 10000.0)
