@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from pipelines.demo.measure import DemoLot
     from pipelines.demo.scenes import Scene
 
-PART = "Is the model good enough, and what is missing?"
-ORDER = 210
+PART = "Start here"
+ORDER = 50
 SUMMARY = "Hide an effect in the simulated station, find it, add it and see the error fall."
 EXAMPLES = (
     "tumbleline demo",

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from pipelines.improvement.documents import RecordingDocument
     from pipelines.jobs.job import Job
 
-PART = "Is the model good enough, and what is missing?"
-ORDER = 215
+PART = "Start here"
+ORDER = 20
 SUMMARY = "Diagnose a model, add what is missing, and judge it by a fresh run, in one command."
 EXAMPLES = (
     "tumbleline improve latest",

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from pipelines.importers.documents import InspectDocument
     from pipelines.importers.inspection import Inspection
 
-PART = "Measure"
-ORDER = 155
+PART = "Start here"
+ORDER = 30
 SUMMARY = "Look at recordings of other systems and propose how to import them."
 EXAMPLES = (
     "tumbleline inspect recording.csv",

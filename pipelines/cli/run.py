@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from pipelines.chain.runner import Done
     from pipelines.jobs.job import Job, Request
 
-PART = "Measure"
-ORDER = 110
+PART = "Start here"
+ORDER = 10
 SUMMARY = "Measure and calibrate a lot, from recipe to report: the main job."
 EXAMPLES = (
     "tumbleline run my.toml --units SN1,SN2,SN3",

@@ -12,8 +12,8 @@ from pipelines.archive import Archive
 from pipelines.cli.printing import remark, say
 from schemas.errors import WrongUse
 
-PART = "Is the model good enough, and what is missing?"
-ORDER = 205
+PART = "Start here"
+ORDER = 40
 SUMMARY = "Show archive, models and missing effects in a browser."
 EXAMPLES = (
     "tumbleline workbench",
