@@ -6,7 +6,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from docs.generated_page import write_or_check
+from docs.generated_page import cell, write_or_check
 from pipelines.commissioning.conformance import read_conformance
 from schemas.profile import Command, Profile, Register
 from stations.devices.adapters import adapters
@@ -38,7 +38,7 @@ are named with who did it, when, and the file in `stations/conformance/`. **Disp
 disagree. Addresses are those on the wire, from 0. [Your device in an hour](../how-to/your-device-in-an-hour.md) compares a
 profile with your device.
 """
-CONFORMANCE = Path(__file__).resolve().parent.parent / "stations" / "conformance"
+CONFORMANCE = PAGE.parents[2] / "stations" / "conformance"
 
 
 def page() -> str:
@@ -55,7 +55,7 @@ def page() -> str:
 
 def _table(profiles: list[Profile]) -> str:
     rows = [
-        f"| [`{p.name}`](#{p.name}) | {_cell(f'{p.maker} {p.model}')} | {p.kind} | `{p.adapter}` | {', '.join(p.links)} | "
+        f"| [`{p.name}`](#{p.name}) | {cell(f'{p.maker} {p.model}')} | {p.kind} | `{p.adapter}` | {', '.join(p.links)} | "
         f"{_verified(p)} | {sum(bool(entry.disputed) for entry in _entries(p)) or ''} |"
         for p in profiles
     ]
@@ -99,7 +99,7 @@ def _kind(name: str, adapter: type) -> str:
 def _disputes(profiles: list[Profile]) -> str:
     """What to check first at the device."""
     rows = [
-        f"| `{p.name}` | `{entry.name}` | {entry.manual} | {_cell(entry.disputed)} |"
+        f"| `{p.name}` | `{entry.name}` | {entry.manual} | {cell(entry.disputed)} |"
         for p in profiles
         for entry in _entries(p)
         if entry.disputed
@@ -152,7 +152,7 @@ def _register(profile: Profile, register: Register) -> str:
     where = f"0x{register.address:04X} ({register.address})"
     where += f", {space}" if space else ""
     return (
-        f"| `{register.name}` | {where} | {_cell(register.manual)} | {register.type}{count}{scale} | {order} | "
+        f"| `{register.name}` | {where} | {cell(register.manual)} | {register.type}{count}{scale} | {order} | "
         f"{register.unit} | {limits or _limits(register)} | {register.access.replace('_', ', ')} |"
     )
 
@@ -167,11 +167,6 @@ def _limits(entry: Register | Command) -> str:
 def _entries(profile: Profile) -> Iterator[Register | Command]:
     yield from profile.registers
     yield from profile.commands
-
-
-def _cell(text: str) -> str:
-    """Text for a table cell, with | escaped."""
-    return text.replace("|", "\\|")
 
 
 if __name__ == "__main__":

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
+from dataclasses import is_dataclass
 from importlib import import_module
 from pathlib import Path
 from types import NoneType, UnionType
@@ -107,19 +108,24 @@ def _unwrapped(hint: Any) -> tuple[Any, str, bool]:
 
 def _parts(hint: Any) -> list[tuple[type, str]]:
     """The documents inside a type, with the mark of their container: ``[]`` for a list, ``{}`` for values by name."""
-    if is_typeddict(hint):
+    if _is_object(hint):
         return [] if command_of(hint) else [(hint, "")]
-    marks = {list: "[]", dict: "{}"}
+    marks = {list: "[]", tuple: "[]", dict: "{}"}
     mark = marks.get(get_origin(hint), "")
     return [(kind, mark + below) for one in get_args(hint) for kind, below in _parts(_unwrapped(one)[0])]
+
+
+def _is_object(hint: Any) -> bool:
+    """Whether a type is an object in JSON: a TypedDict, or the dataclass that it is made from."""
+    return is_typeddict(hint) or is_dataclass(hint)
 
 
 def _text(hint: Any) -> str:
     """The description of a type."""
     origin, arguments = get_origin(hint), get_args(hint)
-    if is_typeddict(hint):
+    if _is_object(hint):
         return f"document of `{head_of(hint)}`" if command_of(hint) else "object"
-    if origin is list:
+    if origin in (list, tuple):
         return f"list of {_text(arguments[0])}"
     if origin is dict:
         return f"{_text(arguments[1])} by name"

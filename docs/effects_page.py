@@ -6,7 +6,7 @@ import inspect
 import sys
 from pathlib import Path
 
-from docs.generated_page import write_or_check
+from docs.generated_page import cell, write_or_check
 from inertial import effects
 from inertial.effects.base import AnyEffect
 from inertial.effects.covariate import Covariate
@@ -40,13 +40,8 @@ def page() -> str:
 
 
 def _table(catalogue: list[AnyEffect]) -> str:
-    rows = [f"| [`{e.id}`](#{e.id}) | {_cell(e.symbol)} | {_cell(e.equation)} | {e.scope} |" for e in catalogue]
+    rows = [f"| [`{e.id}`](#{e.id}) | {cell(e.symbol)} | {cell(e.equation)} | {e.scope} |" for e in catalogue]
     return "\n".join(["| id | symbol | term | scope |", "|---|---|---|---|", *rows, ""])
-
-
-def _cell(text: str) -> str:
-    """Text for a cell of a table, with escaped strokes."""
-    return text.replace("|", "\\|")
 
 
 def _section(effect: AnyEffect) -> str:
@@ -70,7 +65,7 @@ def _section(effect: AnyEffect) -> str:
     return "\n".join(lines)
 
 
-def first_line(effect: AnyEffect) -> str:
+def first_line(effect: AnyEffect | type) -> str:
     """The first line of the docstring of an effect."""
     return (inspect.getdoc(effect) or "").partition("\n")[0]
 
@@ -78,16 +73,12 @@ def first_line(effect: AnyEffect) -> str:
 def _covariates() -> str:
     lines = [
         "## covariate:&lt;column&gt;\n",
-        f"{_summary(Covariate)}\n",
+        f"{first_line(Covariate)}\n",
         "Every numeric column of the dwells without another meaning is a covariate.\n",
         f"- term: {Covariate.equation}",
         f"- becomes visible with: {Covariate.breaker}\n",
     ]
     return "\n".join(lines)
-
-
-def _summary(kind: type) -> str:
-    return (inspect.getdoc(kind) or "").partition("\n")[0]
 
 
 def _formulas() -> str:
@@ -96,7 +87,7 @@ def _formulas() -> str:
     functions = ", ".join(f"`{name}`" for name in FUNCTIONS)
     lines = [
         "## Formulas of a model file\n",
-        f"{_summary(Formula)}\n",
+        f"{first_line(Formula)}\n",
         f"Allowed are numbers, `+ - * / **`, the functions {functions}, and these names:\n",
         "| name | meaning |",
         "|---|---|",

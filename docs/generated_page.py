@@ -20,3 +20,8 @@ def write_or_check(page: Path, text: str, module: str) -> int:
         return 0 if same else 1
     page.write_text(text, encoding="utf-8")
     return 0
+
+
+def cell(text: str) -> str:
+    """Text for a cell of a table, with escaped strokes."""
+    return text.replace("|", "\\|")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+from docs.generated_page import cell, write_or_check
 from pipelines.cli.keys import SUBJECTS
 
 PAGE = Path(__file__).resolve().parent / "reference" / "keys.md"
@@ -58,26 +59,13 @@ def _section(subject: str) -> str:
         lines += [f"| {' | '.join(heads)} |", f"|{'---|' * len(heads)}"]
         lines += [f"| {' | '.join(_cell(head, row[head]) for head in heads)} |" for row in own]
         lines.append("")
-    return "\n".join(line for line in lines if line is not None)
+    return "\n".join(lines)
 
 
 def _cell(head: str, text: str) -> str:
-    text = text.replace("|", "\\|")
-    return f"`{text}`" if text and head in {"key", "fault", "target", "keys", "default", "hidden effect"} else text
-
-
-def main(arguments: list[str]) -> int:
-    """Write the page, or check it; 1 where it is out of date."""
-    text = page()
-    if "--check" in arguments:
-        same = PAGE.is_file() and PAGE.read_text(encoding="utf-8") == text
-        sys.stdout.write(
-            "" if same else f"{PAGE.name} is out of date; write it again with 'python -m docs.keys_page'\n"
-        )
-        return 0 if same else 1
-    PAGE.write_text(text, encoding="utf-8")
-    return 0
+    quoted = text and head in {"key", "fault", "target", "keys", "default", "hidden effect"}
+    return f"`{cell(text)}`" if quoted else cell(text)
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    sys.exit(write_or_check(PAGE, page(), "docs.keys_page"))

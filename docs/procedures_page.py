@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from docs.generated_page import write_or_check
+from docs.generated_page import cell, write_or_check
 from inertial.dynamics.centrifuge_effects import EFFECTS as CENTRIFUGE_EFFECTS
 from inertial.dynamics.shock_effects import EFFECTS as SHOCK_EFFECTS
 from inertial.dynamics.transfer_effects import EFFECTS
@@ -55,30 +55,22 @@ def _default(field: Any) -> Any:
 
 
 def _effects() -> str:
-    lines = ["## Effects on a transfer function", ""]
-    lines += [
-        "The model of a sweep is a sensitivity times effects; the diagnosis names those that are missing, and those that"
-    ]
-    lines += ["the points do not separate.", ""]
-    lines += ["| effect | factor | meaning | measurement that separates it from others |", "|---|---|---|---|"]
-    lines += [
-        f"| `{one.id}` | {one.equation} | {(type(one).__doc__ or '').strip()} | {one.breaker} |"
-        for one in EFFECTS.values()
-    ]
-    lines += ["", "## Effects on a shock comparison", ""]
-    lines += [_row_head(), *(_effect_row(name, one) for name, one in SHOCK_EFFECTS.items())]
-    lines += ["", "## Effects on a centrifuge test", ""]
-    lines += [_row_head(), *(_effect_row(name, one) for name, one in CENTRIFUGE_EFFECTS.items())]
-    return "\n".join([*lines, ""])
-
-
-def _row_head() -> str:
-    return "| effect | term | meaning | measurement that separates it from others |\n|---|---|---|---|"
-
-
-def _effect_row(name: str, one: Any) -> str:
-    term, meaning = one.equation.replace("|", "\\|"), (type(one).__doc__ or "").strip()
-    return f"| `{name}` | {term} | {meaning} | {one.breaker} |"
+    model = """\
+The model of a sweep is a sensitivity times effects; the diagnosis names those that are missing, and those that
+the points do not separate."""
+    lines: list[str] = []
+    for title, what, effects in (
+        ("transfer function", "factor", EFFECTS),
+        ("shock comparison", "term", SHOCK_EFFECTS),
+        ("centrifuge test", "term", CENTRIFUGE_EFFECTS),
+    ):
+        lines += [f"## Effects on a {title}", "", *([model, ""] if what == "factor" else [])]
+        lines += [f"| effect | {what} | meaning | measurement that separates it from others |", "|---|---|---|---|"]
+        named: dict[str, Any] = dict(effects)
+        for name, one in named.items():
+            lines.append(f"| `{name}` | {cell(one.equation)} | {(type(one).__doc__ or '').strip()} | {one.breaker} |")
+        lines.append("")
+    return "\n".join(lines)
 
 
 if __name__ == "__main__":

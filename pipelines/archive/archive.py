@@ -14,10 +14,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pipelines.archive import files
-from pipelines.archive.keys import digest
-from pipelines.archive.listing import RunInfo
+from pipelines.archive.keys import digest, provenance
+from pipelines.archive.listing import RunInfo, infos_of
 from pipelines.archive.packed_path import with_packs
-from pipelines.archive.provenance import provenance
 from pipelines.archive.records import Records
 from pipelines.archive.run import START, Run
 from pipelines.archive.signatures import key_place
@@ -57,7 +56,7 @@ class Archive:
         self._refuse_key_within()
         mark = self.root / "archive.json"
         if mark.is_file():
-            self._refuse_other_format(files.read_json(mark))
+            self._refuse_other_format()
             with files.writing(self.root):
                 probe = self.root / f"{files.TEMPORARY}probe-{os.getpid()}"
                 probe.write_bytes(b"")
@@ -70,12 +69,11 @@ class Archive:
 
     def refuse_none(self) -> None:
         """Refuse a place that holds no archive, or one of another format."""
-        mark = self.root / "archive.json"
-        if not mark.is_file():
+        if not (self.root / "archive.json").is_file():
             raise ArchiveUnusable(
                 f"archive: {self.root} holds no archive, one is needed; name it with --archive or TUMBLELINE_ARCHIVE"
             )
-        self._refuse_other_format(files.read_json(mark))
+        self._refuse_other_format()
 
     def open_run(self, name: str, about: Mapping[str, Any], decisive: object) -> Run:
         """The run of this name and of the hash of what decides its result; it is created where it does not exist.
@@ -107,7 +105,7 @@ class Archive:
 
     def run(self, name: str) -> Run:
         """The run of this id, of this unambiguous beginning, or ``latest``."""
-        self._refuse_newer_format()
+        self._refuse_other_format()
         if PLAIN.fullmatch(name) and (self.root / "runs" / name / START).is_file():
             return Run(self, name)
         if name == "latest" and (infos := self.runs()):
@@ -133,21 +131,14 @@ class Archive:
 
     def runs(self) -> list[RunInfo]:
         """Every run, in the order of their start."""
-        from pipelines.archive.listing import infos_of
-
         infos = infos_of(self.root, [Run(self, run_id) for run_id in self.run_ids()])
         return sorted(infos, key=lambda info: (info.started, info.id))
 
     def run_ids(self) -> list[str]:
         """Names of the runs in alphabetical order; a run that is being created at the moment may be among them."""
-        self._refuse_newer_format()
+        self._refuse_other_format()
         folder = self.root / "runs"
         return sorted(place.name for place in folder.iterdir()) if folder.is_dir() else []
-
-    def _refuse_newer_format(self) -> None:
-        mark = self.root / "archive.json"
-        if mark.is_file():
-            self._refuse_other_format(files.read_json(mark))
 
     def _refuse_key_within(self) -> None:
         """Refuse a signing key inside the archive: who can edit the archive could sign with it."""
@@ -157,9 +148,10 @@ class Archive:
                 f"archive: signing key {key} lies in archive {self.root}, one outside is needed; move it elsewhere"
             )
 
-    def _refuse_other_format(self, mark: Mapping[str, Any]) -> None:
-        if mark.get("format") != FORMAT:
+    def _refuse_other_format(self) -> None:
+        mark = self.root / "archive.json"
+        if mark.is_file() and (found := files.read_json(mark).get("format")) != FORMAT:
             raise ArchiveUnusable(
-                f"archive: {self.root} has format {mark.get('format')}, this version writes {FORMAT}; "
+                f"archive: {self.root} has format {found}, this version writes {FORMAT}; "
                 "use the version that wrote it, or another folder"
             )

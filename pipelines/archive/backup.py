@@ -19,6 +19,7 @@ import time
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
+from typing import Any
 
 from pipelines.archive import Archive, files, packs
 from pipelines.archive.files import TEMPORARY
@@ -90,8 +91,10 @@ def copy_archive(source: Archive, target: Archive) -> Copied:
     entries = _names(source.root / CHAIN, CHAIN)
     target.prepare()
     _refuse_another(source, target, entries)
-    copied, chain = Copied(), _chain_of(source.root, entries)
-    links: list[str] = []
+    copied, hashes, links = Copied(), dict[str, str](), list[str]()
+    for name in sorted(entries):
+        hashes |= _manifest(source.root / name).get("files", {})
+    chain = _ChainAtStart(frozenset(entries), hashes)
     names = [
         name
         for name in _names(source.root, "", links)
@@ -118,12 +121,9 @@ def _late_seals(root: Place, entries: set[str], names: set[str]) -> list[str]:
     """Seals of runs that the newest entries of the chain state and which their writer had not written at the listing."""
     late: list[str] = []
     for name in sorted(entries)[-_NEWEST:]:
-        try:
-            seal = f"runs/{files.read_json(root / name)['run']}/sealed.json"
-        except (ArchiveUnusable, KeyError, TypeError):  # of no run, or 'tumbleline verify' reports it
-            continue
-        until = time.monotonic() + _WRITTEN_S
-        while seal not in names and time.monotonic() < until:
+        run, until = _manifest(root / name).get("run"), time.monotonic() + _WRITTEN_S
+        seal = f"runs/{run}/sealed.json"
+        while run and seal not in names and time.monotonic() < until:
             if (root / seal).is_file():
                 late.append(seal)
                 break
@@ -131,14 +131,12 @@ def _late_seals(root: Place, entries: set[str], names: set[str]) -> list[str]:
     return late
 
 
-def _chain_of(root: Place, entries: set[str]) -> _ChainAtStart:
-    hashes: dict[str, str] = {}
-    for name in sorted(entries):
-        try:
-            hashes.update(files.read_json(root / name).get("files", {}))
-        except ArchiveUnusable:  # 'tumbleline verify' reports it
-            continue
-    return _ChainAtStart(frozenset(entries), hashes)
+def _manifest(place: Place) -> dict[str, Any]:
+    """The content of a manifest; empty where it is not written yet, or damaged, which 'tumbleline verify' reports."""
+    try:
+        return files.read_json(place)
+    except ArchiveUnusable:
+        return {}
 
 
 def _as_stated(root: Place, name: str, chain: _ChainAtStart) -> bool | None:
@@ -153,29 +151,15 @@ def _stated(root: Place, name: str) -> str:
     record = name.startswith("captures/") and own.endswith(WRITTEN_ONCE)
     if not record and not own.endswith((WRITTEN_ONCE, PAGE)):
         return ""
-    try:
-        manifest = files.read_json(root / folder / ("record.json" if record else f"{own.rpartition('.')[0]}.json"))
-    except ArchiveUnusable:  # not written yet, or damaged itself
-        return ""
-    stated = manifest.get("content", {}).get(own, "") if record else manifest.get("sha256", "")
-    return str(stated)
+    manifest = _manifest(root / folder / ("record.json" if record else f"{own.rpartition('.')[0]}.json"))
+    return str(manifest.get("content", {}).get(own, "") if record else manifest.get("sha256", ""))
 
 
 def _is_damaged(source: Place, target: Place, name: str, chain: _ChainAtStart) -> bool:
     """Whether a file of the source that differs from its copy must not replace it."""
-    sound = _as_stated(source, name, chain)
     if REMADE.fullmatch(name):
-        return name.endswith(".json") and not _is_readable(source / name)
-    if sound is not None:
-        return not sound and _as_stated(target, name, chain) is not False
-    return _as_stated(target, name, chain) is not False
-
-
-def _is_readable(place: Place) -> bool:
-    try:
-        return bool(files.read_json(place))
-    except ArchiveUnusable:
-        return False
+        return name.endswith(".json") and not _manifest(source / name)
+    return not _as_stated(source, name, chain) and _as_stated(target, name, chain) is not False
 
 
 def _names(folder: Place, prefix: str, links: list[str] | None = None) -> set[str]:

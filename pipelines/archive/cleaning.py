@@ -11,8 +11,8 @@ from pathlib import Path
 
 from pipelines.archive import files, hash_chain, packs
 from pipelines.archive.archive import Archive
+from pipelines.archive.keys import provenance
 from pipelines.archive.locks import CLAIM, LEASE_S, alone
-from pipelines.archive.provenance import provenance
 from pipelines.archive.run import Run
 from pipelines.archive.store import ObjectPath, Place
 from schemas import host
@@ -116,10 +116,9 @@ def _seal(archive: Archive, done: Cleaned) -> None:
         try:
             with alone(run.path):
                 run.seal()
+            done.sealed.append(name)
         except OperatorNeeded:
             done.busy.append(str(run.path))
-            continue
-        done.sealed.append(name)
 
 
 def _anchor(archive: Archive, done: Cleaned) -> None:

@@ -75,14 +75,8 @@ CODE = {
     "report": (*(*_DRAWN, "stations", "pipelines.capture", "pipelines.importers", "pipelines.jobs"),),
     "report of an import": (*_DRAWN, "pipelines.diagnosis", "pipelines.jobs.model_files", "pipelines.parallel"),
     "inquiry": (
-        *(
-            "schemas",
-            "inertial",
-            "pipelines.diagnosis",
-            "pipelines.parallel",
-            "pipelines.procedures",
-            "pipelines.tables",
-        ),
+        *("schemas", "inertial", "pipelines.diagnosis", "pipelines.parallel"),
+        *("pipelines.procedures", "pipelines.tables"),
     ),
 }
 """Modules and packages by the name of the stage, or of what else is stored under a key."""

@@ -71,7 +71,9 @@ def compact(archive: Archive, before: str = "") -> Compacted:
         _refuse_open(root)
         files.sweep(root / packs.FOLDER)
         remove_replaced(root)
-        _drop_incomplete(root)
+        for place in (root / packs.FOLDER).glob(f"*{packs.CONTAINER}"):
+            if not place.with_suffix(packs.CONTENTS).is_file():  # a compaction was killed before it was there
+                place.unlink()
         known = packs.Packs(root)
         months = _runs_by_month(archive, root, before, done)
         for month, folders in sorted(months.items()):
@@ -113,13 +115,6 @@ def _refuse_open(root: Path) -> None:
                     f"archive compact: {kind}/{lock.parent.name} is being written, an archive without open runs is needed; give "
                     "the command again after its end (nothing was changed)"
                 ) from None
-
-
-def _drop_incomplete(root: Path) -> None:
-    """Remove the zip of a compaction that was killed before its table of contents was there."""
-    for place in (root / packs.FOLDER).glob(f"*{packs.CONTAINER}"):
-        if not place.with_suffix(packs.CONTENTS).is_file():
-            place.unlink()
 
 
 def _runs_by_month(archive: Archive, root: Path, before: str, done: Compacted) -> dict[str, list[str]]:
@@ -168,14 +163,10 @@ def _new(root: Path, known: packs.Packs, names: Iterable[str]) -> Iterator[Folde
         single = dict(_single(root / name))
         if name.startswith(f"{LEDGER}/"):
             single = {one: at for one, at in single.items() if at[1] < latest and is_number(one.removesuffix(".json"))}
-        new = {one: at for one, at in single.items() if there is None or not _is_packed(there, one, at)}
+        packed = {} if there is None else {one: (at.size, at.mtime_ns) for one, at in there.files.items()}
+        new = {one: at for one, at in single.items() if packed.get(one) != at}
         if new:
             yield FolderToPack(name, (root / name).stat().st_mtime_ns, new)
-
-
-def _is_packed(folder: packs.PackedFolder, name: str, at: tuple[int, int]) -> bool:
-    member = folder.files.get(name)
-    return member is not None and (member.size, member.mtime_ns) == at
 
 
 def _single(folder: Path, prefix: str = "") -> Iterator[tuple[str, tuple[int, int]]]:

@@ -65,7 +65,7 @@ def read_json(path: Place) -> dict[str, Any]:
     except LinkInArchive:
         raise
     except OSError:
-        raise ArchiveUnusable(_no_manifest(path)) from None
+        data = b""  # no manifest
     return parsed(data, path)
 
 
@@ -74,15 +74,11 @@ def parsed(data: bytes, path: Place) -> dict[str, Any]:
     try:
         content = json.loads(data)
     except (ValueError, RecursionError):
-        raise ArchiveUnusable(_no_manifest(path)) from None
+        content = None
     if not isinstance(content, dict):
-        raise ArchiveUnusable(_no_manifest(path))
+        raise ArchiveUnusable(f"archive: {path} is not a manifest that can be read; restore it from a copy")
     refuse_leading_out(content, path)
     return content
-
-
-def _no_manifest(path: Place) -> str:
-    return f"archive: {path} is not a manifest that can be read; restore it from a copy"
 
 
 def json_bytes(content: Mapping[str, Any]) -> bytes:

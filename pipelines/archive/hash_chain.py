@@ -32,15 +32,9 @@ def append(root: Place, kind: str, sealed: Mapping[str, str], about: Mapping[str
         number = last_number(root) + 1
         while True:
             previous = files.sha256(place_of_entry(root, number - 1)) if number > 1 else ""
-            content = {
-                **about,
-                "number": number,
-                "kind": kind,
-                "files": dict(sealed),
-                "previous": previous,
-                "schema": 1,
-            }
-            if files.publish_first(place_of_entry(root, number), files.manifest_bytes(content)):
+            place = {"number": number, "kind": kind, "previous": previous, "schema": 1}
+            content = files.manifest_bytes({**about, **place, "files": dict(sealed)})
+            if files.publish_first(place_of_entry(root, number), content):
                 return number
             number += 1
 

@@ -1,10 +1,16 @@
-"""Keys of stages: a hash of inputs, parameters and code. They do not contain what has no effect on a result."""
+"""Keys of stages: a hash of inputs, parameters and code. They do not contain what has no effect on a result.
+
+That is the provenance: user, host, time and versions, which are stored in manifests, never in results or keys.
+"""
 
 from __future__ import annotations
 
+import getpass
 import hashlib
 import json
+import platform
 from collections.abc import Iterable, Mapping
+from datetime import UTC, datetime
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
@@ -30,14 +36,7 @@ def stage_key(stage: str, inputs: Mapping[str, str], parameters: Mapping[str, An
     parameters : JSON-able values that the stage is called with.
     code : hash of the stage's code, from :func:`code_hash`.
     """
-    return digest(
-        {
-            "stage": stage,
-            "inputs": dict(inputs),
-            "parameters": dict(parameters),
-            "code": code,
-        }
-    )
+    return digest({"stage": stage, "inputs": dict(inputs), "parameters": dict(parameters), "code": code})
 
 
 @cache
@@ -52,11 +51,29 @@ def code_hash(result: str) -> str:
 @cache
 def libraries() -> dict[str, str]:
     """Versions of the libraries that a number may depend on."""
-    from importlib.metadata import (
-        version,
-    )  # with the parser of mail that it imports, a tenth of the time of a short command
+    # with the parser of mail that it imports, a tenth of the time of a short command
+    from importlib.metadata import version
 
     return {name: version(name) for name in LIBRARIES}
+
+
+def provenance() -> dict[str, Any]:
+    """The user, the host, the moment, and the versions of the product and of the libraries that a number may depend on."""
+    return {
+        "who": getpass.getuser(),
+        "where": platform.node(),
+        "when": datetime.now(UTC).isoformat(timespec="milliseconds"),
+        "software": _software(),
+        "libraries": libraries(),
+    }
+
+
+@cache
+def _software() -> dict[str, str]:
+    """Versions of the product and of what runs it; read from the installed packages."""
+    from importlib.metadata import version  # see libraries()
+
+    return {"tumbleline": version("tumbleline"), "python": platform.python_version()}
 
 
 EXTENDED = {"inertial.effects": "tumbleline.effects"}
@@ -76,11 +93,9 @@ def sources(modules: Iterable[str]) -> dict[str, Path]:
         spec = find_spec(top)
         path = Path(spec.origin).parent.joinpath(*parts) if spec is not None and spec.origin else Path(module)
         if path.is_dir():
-            below = {each.relative_to(path).with_suffix("").parts: each for each in path.rglob("*.py")}
-            found |= {
-                ".".join((module, *(part for part in parts if part != "__init__"))): each
-                for parts, each in below.items()
-            }
+            for each in path.rglob("*.py"):
+                below = each.relative_to(path).with_suffix("").parts
+                found[".".join((module, *(part for part in below if part != "__init__")))] = each
         elif path.with_suffix(".py").is_file():
             found[module] = path.with_suffix(".py")
         else:

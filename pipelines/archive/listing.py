@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections import Counter
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import astuple, dataclass, fields
@@ -46,7 +45,7 @@ def info_of(run: Run) -> RunInfo | None:
         return None
     about = run.about
     lot = about.get("lot", {})
-    outcomes = _outcomes(run, names)
+    outcomes = _texts(run, names, GRADES, "outcome")
     return RunInfo(
         id=run.id,
         recipe=about.get("recipe", {}).get("name", about.get("name", "")),
@@ -57,16 +56,10 @@ def info_of(run: Run) -> RunInfo | None:
         stages=tuple(_sealed_stages(run, names) or stages_of(run.path, names)),
         station=(about.get("station") or {}).get("name", ""),
         rerun_of=about.get("rerun_of") or "",
-        passed=None if outcomes is None else outcomes["pass"],
-        graded=None if outcomes is None else outcomes.total(),
+        passed=None if outcomes is None else outcomes.count("pass"),
+        graded=None if outcomes is None else len(outcomes),
         verdict=next(iter(_texts(run, names, VERDICT, "verdict") or ()), None),
     )
-
-
-def _outcomes(run: Run, names: set[str]) -> Counter[str] | None:
-    """How many units passed, failed and were refused; None where there are no grades, or they cannot be read."""
-    outcomes = _texts(run, names, GRADES, "outcome")
-    return None if outcomes is None else Counter(outcomes)
 
 
 def _texts(run: Run, names: set[str], table: str, column: str) -> list[str] | None:

@@ -154,9 +154,8 @@ def _merged_pack(root: Path, what: str, own: Sequence[Path]) -> str:
         inside = {} if current is None else {file: one for file, one in current.files.items() if one.pack in own}
         held |= {(name, file): one for file, one in inside.items()}
         if inside:
-            portion.append(
-                FolderToPack(name, mtime_ns, {file: (one.size, one.mtime_ns) for file, one in inside.items()})
-            )
+            sizes = {file: (one.size, one.mtime_ns) for file, one in inside.items()}
+            portion.append(FolderToPack(name, mtime_ns, sizes))
     if not portion:
         return ""
     replaced = [place.name for place in own]

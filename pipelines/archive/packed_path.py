@@ -14,7 +14,6 @@ import io
 import os
 from collections.abc import Generator
 from errno import EBADF, ELOOP, ENOENT, ENOTDIR
-from fnmatch import fnmatchcase
 from functools import cache
 from pathlib import Path
 from stat import S_IFDIR, S_IFREG, S_ISDIR, S_ISREG
@@ -22,14 +21,12 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from pipelines.archive import packs
 from pipelines.archive.names import LinkInArchive
-from pipelines.archive.store import Place
+from pipelines.archive.store import Place, globbed
 
 if TYPE_CHECKING:
     Base = Path
 else:
     Base = type(Path())  # before Python 3.12 only the class of the system can be derived from
-
-MARKS = "*?["
 
 
 class PackedPath(Base):
@@ -116,18 +113,8 @@ class PackedPath(Base):
         pattern = str(pattern)  # from Python 3.13 on rglob gives a path
         if "**" in pattern or not self.known.contents():
             yield from super().glob(pattern, **options)
-            return
-        first, _, rest = pattern.partition("/")
-        if not any(mark in first for mark in MARKS):
-            matches = [self / first]
         else:
-            inside = self.iterdir() if self.is_dir() else ()
-            matches = sorted(one for one in inside if fnmatchcase(one.name, first))
-        for one in matches:
-            if rest:
-                yield from one.glob(rest)
-            elif one.exists():
-                yield one
+            yield from globbed(self, pattern)
 
     def _below_root(self) -> str:
         """The name below the root of the archive, with slashes; empty for the root and outside."""
@@ -158,13 +145,9 @@ class PackedPath(Base):
             return 0 if self.known.below(name) else None
         folder, rest = parts
         packed = self.known.folder(folder)
-        if packed is None:
-            return None
-        if not rest:
-            return packed.mtime_ns
-        if rest in packed.files:
-            return packed.files[rest]
-        return packed.mtime_ns if any(one.startswith(f"{rest}/") for one in packed.files) else None
+        if packed is None or rest in packed.files:
+            return None if packed is None else packed.files[rest]
+        return packed.mtime_ns if not rest or any(one.startswith(f"{rest}/") for one in packed.files) else None
 
     def _member(self) -> packs.Member | None:
         """The packed file of this name; None where no pack has it."""

@@ -6,10 +6,9 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Protocol
 
 from pipelines.archive import files, hash_chain
+from pipelines.archive.keys import provenance
 from pipelines.archive.parquet import columns_of, encoded, read_table
-from pipelines.archive.provenance import provenance
 from pipelines.archive.records import COMPLETE, PARTS, Records
-from pipelines.archive.signatures import ENTRY
 from pipelines.archive.store import Place
 from schemas.errors import ArchiveUnusable, WrongUse, did_you_mean
 from schemas.version import refuse_newer
@@ -100,12 +99,7 @@ class Run:
         for name, frame in outputs.items():
             checked = table_check.check(name, frame, where=f"{stage} → {name}")
             data = self._put_table(name, columns_of(name, checked, tables.VERSION))
-            content = {
-                "stage": stage,
-                "key": key,
-                "sha256": files.hash_of(data),
-                "rows": len(frame),
-            }
+            content = {"stage": stage, "key": key, "sha256": files.hash_of(data), "rows": len(frame)}
             manifest = {**by, **content, **about, "schema": tables.VERSION, "manifests": follows}
             self._put(f"{name}.json", files.manifest_bytes(manifest))
 
@@ -121,10 +115,8 @@ class Run:
                 )
             self._put(f"{name}.parquet", data)
             follows = self._manifests(manifest.get("inputs", {}))
-            kept = {
-                key: value for key, value in manifest.items() if key != ENTRY
-            }  # the new manifest gets a new signature
-            content = {**kept, "taken_from": manifest.get("taken_from", other.id), "manifests": follows}
+            # signed anew
+            content = {**manifest, "taken_from": manifest.get("taken_from", other.id), "manifests": follows}
             self._put(f"{name}.json", files.manifest_bytes(content))
 
     def save_report(self, key: str, html: str, about: Mapping[str, Any]) -> None:

@@ -152,16 +152,7 @@ class ObjectPath:
 
     def glob(self, pattern: str) -> Iterator[ObjectPath]:
         """What lies below and has such a name; every part of the pattern is one level."""
-        first, _, rest = pattern.partition("/")
-        if not any(mark in first for mark in "*?["):
-            matches = [self / first]
-        else:
-            matches = [one for one in self.iterdir() if fnmatchcase(one.name, first)]
-        for one in matches:
-            if rest:
-                yield from one.glob(rest)
-            elif one.exists():
-                yield one
+        return globbed(self, pattern)
 
     def _at(self, pure: PurePosixPath) -> ObjectPath:
         return ObjectPath(self.system, str(pure), self.scheme, self.address)
@@ -188,6 +179,22 @@ class ObjectPath:
             raise ArchiveUnusable(
                 f"archive: {self} cannot be reached ({first_line(problem)}), a store that answers is needed; {REMEDY}"
             ) from None
+
+
+def globbed(place: Any, pattern: str) -> Iterator[Any]:
+    """What lies below a place and has such a name; every part of the pattern is one level."""
+    first, _, rest = pattern.partition("/")
+    matches = [place / first]
+    if any(mark in first for mark in "*?["):
+        try:
+            matches = sorted(one for one in place.iterdir() if fnmatchcase(one.name, first))
+        except (FileNotFoundError, NotADirectoryError):
+            return
+    for one in matches:
+        if rest:
+            yield from one.glob(rest)
+        elif one.exists():
+            yield one
 
 
 Place: TypeAlias = Path | ObjectPath

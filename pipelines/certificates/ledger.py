@@ -15,8 +15,8 @@ from datetime import datetime, timedelta
 from pathlib import Path
 
 from pipelines.archive import Archive, files, hash_chain
+from pipelines.archive.keys import provenance
 from pipelines.archive.locks import alone
-from pipelines.archive.provenance import provenance
 from pipelines.archive.store import ObjectPath, Place
 from pipelines.certificates.days import LAST, today
 from pipelines.certificates.entries import LedgerEntry, event_of, folder_of

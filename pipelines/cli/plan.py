@@ -125,9 +125,8 @@ def command(
     equipment, and the figures that they determine.
     """
     from pipelines.jobs.moved_poses import moves_of, with_moved_poses
-    from pipelines.jobs.range_of_station import refused_by_run
     from pipelines.jobs.recipes import folder_of
-    from pipelines.jobs.terms import planned_terms
+    from pipelines.jobs.terms import planned_terms, refused_by_run
     from pipelines.planning.context import noise_of, plan_context
     from pipelines.planning.plan import plan
     from pipelines.planning.procedure_plan import plan_of_procedures, procedure_rows

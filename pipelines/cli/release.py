@@ -55,7 +55,7 @@ def command(
     )
     lines = [
         f"release {record.number}: {_name(record)} for {_where(record)} from {record.since:%Y-%m-%d %H:%M} UTC",
-        f"  {', '.join(record.effects)}",
+        f"  {', '.join(record.effects or ())}",
         f"  evidence: {record.evidence or 'none'}{', forced' if record.forced else ''}",
     ]
     give_lines({"archive": str(store.root), **record.document()}, lines, as_json=as_json)

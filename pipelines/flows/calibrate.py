@@ -6,15 +6,16 @@ import time
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from prefect import flow, task
 from prefect.cache_policies import NO_CACHE
-from prefect.client.orchestration import SyncPrefectClient, get_client
-from prefect.client.schemas.filters import FlowRunFilter, FlowRunFilterId, FlowRunFilterName
-from prefect.client.schemas.objects import FlowRun, State, StateType
-from prefect.client.schemas.sorting import FlowRunSort, TaskRunSort
+from prefect.client.orchestration import get_client
+from prefect.client.schemas.filters import FlowRunFilter, FlowRunFilterId
+from prefect.client.schemas.objects import State, StateType
+from prefect.client.schemas.sorting import TaskRunSort
 from prefect.runtime import flow_run
 from prefect.states import Cancelled
 
@@ -25,6 +26,7 @@ from pipelines.chain.runner import Done, Runner
 from pipelines.flows.operator import Paused
 from pipelines.jobs.job import Request
 from pipelines.orchestrator.archive_address import archive_of
+from pipelines.orchestrator.dead_runs import MANY, runs_of_name
 from pipelines.orchestrator.policy import policy_of_tags
 from pipelines.orchestrator.queue_rules import newer_run
 from schemas.errors import LinkLost, NotReached, StationTimeout
@@ -32,7 +34,6 @@ from schemas.progress import Progress, silent
 
 HISTORY_S = 20.0
 AUTO = "auto-scheduled"  # tag of Prefect on the runs of a schedule
-MANY = 200  # largest page of the server
 FINAL = {StateType.COMPLETED, StateType.FAILED, StateType.CRASHED, StateType.CANCELLED}
 
 Listener = tuple["Progress", "Callable[[Done], None]", "Operator | None"]
@@ -56,12 +57,9 @@ def _worth_repeating(task_: Any, task_run: Any, state: Any) -> bool:
     """Whether a stage failed because of a link or device that may recover; finished records are not measured again."""
     try:
         state.result()
-    except NotReached:  # the stage has already run for hours
-        return False
-    except (LinkLost, StationTimeout):
-        return True
-    except Exception:  # noqa: BLE001 - all other errors would occur again
-        return False
+    except Exception as problem:  # noqa: BLE001 - all other errors would occur again
+        # a stage that has not reached its condition has already run for hours
+        return isinstance(problem, LinkLost | StationTimeout) and not isinstance(problem, NotReached)
     return False
 
 
@@ -105,7 +103,8 @@ def calibrate_lot(  # noqa: PLR0913 - the parameters of a flow are the form on t
     runner = Runner(job, store, progress)
     person = operator or (Paused() if prompts else None)
     beside = None if person is None else Attendance(person, job, runner.run.id)
-    report_stage(_capture(runner, beside))
+    measure = partial(stage, "capture", runner)
+    report_stage(measure() if beside is None else beside.capture(runner, measure))
     for name in ORDER[1:]:
         report_stage(stage(name, runner))
         if beside is not None and name == JUDGED:
@@ -152,18 +151,11 @@ def late_start() -> str:
     )
 
 
-def _capture(runner: Runner, beside: Attendance | None) -> Done:
-    """The capture, with or without an operator."""
-    if beside is None:
-        return stage("capture", runner)
-    return beside.capture(runner, lambda: stage("capture", runner))
-
-
 def settle_history(name: str, stages: int) -> None:
     """Wait until the server has the final state of the newest flow run of this name and of all its tasks."""
     end = time.monotonic() + HISTORY_S
     with get_client(sync_client=True) as client:
-        runs = _flow_runs(client, name)[:1]
+        runs = runs_of_name(client, name)[:1]
         while runs and time.monotonic() < end:
             flow_filter = FlowRunFilter(id=FlowRunFilterId(any_=[runs[0].id]))
             tasks = client.read_task_runs(
@@ -172,9 +164,3 @@ def settle_history(name: str, stages: int) -> None:
             if len(tasks) >= stages and all(one.state_type in FINAL for one in tasks):
                 return
             time.sleep(0.1)
-
-
-def _flow_runs(client: SyncPrefectClient, name: str) -> list[FlowRun]:
-    """Flow runs of a name, the newest first."""
-    flow_filter = FlowRunFilter(name=FlowRunFilterName(any_=[name]))
-    return client.read_flow_runs(flow_run_filter=flow_filter, sort=FlowRunSort.START_TIME_DESC, limit=MANY)

@@ -19,8 +19,7 @@ import yaml
 
 from pipelines.orchestrator.credentials import refuse_credentials
 from pipelines.orchestrator.policy import policy_of
-from pipelines.orchestrator.server_check import check_server
-from pipelines.orchestrator.settings import CLIENT_KEY, use_key
+from pipelines.orchestrator.settings import CLIENT_KEY, check_server, use_key
 from schemas.errors import TumblelineError
 
 NOT_HERE = "deployments are registered from code that is not asynchronous"
@@ -48,7 +47,7 @@ def register(path: Path) -> list[str]:
     for item in content["deployments"]:
         _have_queue(item["work_pool"]["name"], item["work_pool"]["work_queue_name"])
     names = [_register(item) for item in content["deployments"]]
-    from pipelines.orchestrator.heartbeat import have_automation
+    from pipelines.orchestrator.dead_runs import have_automation
 
     have_automation()
     return names

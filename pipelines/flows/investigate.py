@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Generator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from prefect import flow
@@ -21,7 +21,7 @@ from pipelines.flows.local import flow_run
 from pipelines.flows.operator import Paused
 from pipelines.inquiry.inquiry import FollowUp, Inquiry
 from pipelines.inquiry.lineage import JointDiagnosis
-from pipelines.inquiry.loop import Consent, InquirySettings, Participants, always, run_inquiry
+from pipelines.inquiry.loop import Consent, InquirySettings, Participants, run_inquiry
 from pipelines.jobs.job import Request
 from pipelines.orchestrator.archive_address import archive_of
 
@@ -39,11 +39,6 @@ class PausedApproval:
         why = "; ".join(follow_up.why)
         text = f"measure {follow_up.minutes:.1f} min more ({inquiry.budget - inquiry.spent:.1f} min are left): {why}"
         return self.paused.ask(Prompt("approve", inquiry.lineage.ids[0], text))
-
-
-def _stage(name: str, runner: Runner) -> Done:
-    """A stage as a task."""
-    return stage.with_options(task_run_name=f"{runner.job.recipe.name} {name}")(name, runner)
 
 
 @contextmanager
@@ -79,9 +74,13 @@ def investigate(  # noqa: PLR0913 - the parameters of a flow are the form on the
     """
     store = archive_of(archive)
     job = requested(recipe, station, units, slots, seed, repeat, faults).job(store)
+
+    def as_task(name: str, runner: Runner) -> Done:
+        return stage.with_options(task_run_name=f"{runner.job.recipe.name} {name}")(name, runner)
+
     participants = _participants[-1] if _participants else Participants()
-    approve = PausedApproval(Paused()) if ask else (participants.approve if _participants else always)
-    at = Participants(_stage, approve, participants.progress, participants.stage_done, participants.diagnosed)
+    approve = PausedApproval(Paused()) if ask else participants.approve
+    at = replace(participants, stage=as_task, approve=approve)
     return run_inquiry(job, store, InquirySettings(tuple(effects or ()), budget_min, unseen), at)
 
 

@@ -26,8 +26,16 @@ from pipelines.chain.runner import Done
 from pipelines.jobs.job import Job, Request
 from pipelines.orchestrator.credentials import without_credentials
 from pipelines.orchestrator.server import ADDRESS, CLIENTS, START_LOCK, private_folder, quick_imports
-from pipelines.orchestrator.server_check import check_server
-from pipelines.orchestrator.settings import CLIENT_KEY, KEY_FILE, STARTUP_S, cache_folder, new_key, settings, use_key
+from pipelines.orchestrator.settings import (
+    CLIENT_KEY,
+    KEY_FILE,
+    STARTUP_S,
+    cache_folder,
+    check_server,
+    new_key,
+    settings,
+    use_key,
+)
 from pipelines.parallel import with_environment
 from pipelines.schedule.steps import steps
 from schemas import host

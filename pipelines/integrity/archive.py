@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,12 +20,10 @@ from pipelines.archive.signatures import GOOD, UNKNOWN, UNSIGNED
 from pipelines.archive.store import ObjectPath, Place
 from pipelines.certificates.entries import FOLDER as LEDGER
 from pipelines.certificates.ledger_index import DIGITS, INDEX_FOLDER, all_read, indexed_events, stamps_of
-from pipelines.integrity.captures import check_capture, check_strangers
 from pipelines.integrity.causes import by_cause
-from pipelines.integrity.chain import check_chain
 from pipelines.integrity.findings import CHANGED, MISSING, SIGNATURE, UNREADABLE, IntegrityFinding, VerifiedPart
-from pipelines.integrity.runs import check_run
-from pipelines.integrity.seals import check_seals, check_shard
+from pipelines.integrity.runs import check_capture, check_run, check_strangers
+from pipelines.integrity.seals import check_chain, check_seals, check_shard
 from pipelines.integrity.surroundings import SHOWN, check_links, check_mark, check_surroundings
 from schemas.errors import ArchiveUnusable
 
@@ -108,25 +107,24 @@ def verify(
     also : further checks of the whole archive, of tables that this package does not know.
     """
     open_still = _being_written(archive, runs)
-
-    def looked() -> Report:
-        return _verified(archive, runs, keys, demanded=demanded, head=head, also=also, progress=progress)
-
+    looked = partial(_verified, archive, runs, keys, demanded=demanded, head=head, also=also, progress=progress)
     report = looked()
-    if not (report.checked.findings and open_still):
-        return report
-    first, report = {(one.kind, one.path) for one in report.checked.findings}, looked()
-    report.checked.findings = [one for one in report.checked.findings if (one.kind, one.path) in first]
+    if report.checked.findings and open_still:
+        first, report = {(one.kind, one.path) for one in report.checked.findings}, looked()
+        report.checked.findings = [one for one in report.checked.findings if (one.kind, one.path) in first]
     return report
 
 
 def _being_written(archive: Archive, runs: Sequence[str]) -> bool:
     """Whether a capture is not finished or a run not sealed: their writers may be at work."""
-    chosen = [archive.run(name) for name in runs] or [Run(archive, one.name) for one in _below(archive.root / "runs")]
     captures = _below(archive.root / "captures") if not runs else []
-    return any(not (one.path / SEALED).is_file() for one in chosen) or any(
-        not (path / COMPLETE).is_file() for path in captures
-    )
+    ends = [*(run.path / SEALED for run in _chosen(archive, runs)), *(path / COMPLETE for path in captures)]
+    return not all(end.is_file() for end in ends)
+
+
+def _chosen(archive: Archive, runs: Sequence[str]) -> list[Run]:
+    """The runs of these names; all where none is named."""
+    return [archive.run(name) for name in runs] or [Run(archive, one.name) for one in _below(archive.root / "runs")]
 
 
 def _verified(
@@ -144,7 +142,7 @@ def _verified(
 
     start, total = time.perf_counter(), VerifiedPart(archive.root, keys)
     there = _below(archive.root / "captures")  # before the runs: each run is there before its capture
-    chosen = [archive.run(name) for name in runs] or [Run(archive, one.name) for one in _below(archive.root / "runs")]
+    chosen = _chosen(archive, runs)
     captures = _captures(archive, chosen) if runs else there
     check_links(archive, [run.path for run in chosen] + captures if runs else _below(archive.root), total)
     if total.findings:
@@ -195,11 +193,10 @@ def _check_owners(runs: Sequence[Run], captures: Sequence[Place], total: Verifie
             named.add(str(run.about.get("capture") or ""))
         except ArchiveUnusable:  # the check of the run reports it
             return
+    what = "has no run in this archive: the run was removed, or the capture was copied here"
     for path in captures:
         if path.name not in named:
-            total.wrong(
-                MISSING, path, "has no run in this archive: the run was removed, or the capture was copied here"
-            )
+            total.wrong(MISSING, path, what)
 
 
 def _below(folder: Place) -> list[Place]:
@@ -229,18 +226,12 @@ def _trust(total: VerifiedPart) -> str:
     count, signatures = total.manifests, total.signatures
     if signatures[UNSIGNED] == count:
         return "UNSIGNED: nothing shows who wrote this archive; make a key with 'tumbleline archive key'"
-    signed = (
-        [f"{signatures[GOOD]} of {count} manifests signed by {', '.join(sorted(total.keys))}"]
-        if signatures[GOOD]
-        else []
-    )
-    unknown = (
-        [f"{signatures[UNKNOWN]} signed by a key that is not known here (give it with --key)"]
-        if signatures[UNKNOWN]
-        else []
-    )
-    unsigned = [f"{signatures[UNSIGNED]} unsigned"] if signatures[UNSIGNED] else []
-    return ", ".join([*signed, *unknown, *unsigned])
+    parts = {
+        GOOD: f"{signatures[GOOD]} of {count} manifests signed by {', '.join(sorted(total.keys))}",
+        UNKNOWN: f"{signatures[UNKNOWN]} signed by a key that is not known here (give it with --key)",
+        UNSIGNED: f"{signatures[UNSIGNED]} unsigned",
+    }
+    return ", ".join(text for state, text in parts.items() if signatures[state])
 
 
 def check_list(archive: Archive, checked: VerifiedPart) -> None:
@@ -281,7 +272,9 @@ def check_packs(archive: Archive, checked: VerifiedPart) -> None:
         return
     known = set[str]()
     top = archive.root / PACKS
-    for place in sorted(top.glob(f"*{CONTENTS}")) if top.is_dir() else ():
+    if not top.is_dir():
+        return
+    for place in sorted(top.glob(f"*{CONTENTS}")):
         pack = place.with_suffix(CONTAINER)
         known.add(pack.name)
         if not pack.is_file():
@@ -297,7 +290,7 @@ def check_packs(archive: Archive, checked: VerifiedPart) -> None:
             checked.wrong(CHANGED, place, f"was edited since the pack was made: {FROM_A_COPY}")
         if changed:
             checked.wrong(CHANGED, pack, f"has changed since it was made: {FROM_A_COPY}")
-    for place in sorted(top.glob(f"*{CONTAINER}")) if top.is_dir() else ():
+    for place in sorted(top.glob(f"*{CONTAINER}")):
         if place.name not in known:
             checked.remarks.append(
                 f"{checked.name(place)} has no table of contents: a compaction was killed; the next one removes it"

@@ -83,13 +83,10 @@ def _by_folder(
             paths.sort(key=rank)
             names = [PurePosixPath(path).name for path in paths[1:]]
             more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
-            _merge(causes, paths, f"; the same run or capture: {', '.join(names[:NAMED])}{more}")
-
-
-def _merge(causes: dict[str, IntegrityFinding], paths: Sequence[str], also: str) -> None:
-    """Put the findings of all paths under the first."""
-    first = causes[paths[0]]
-    causes[paths[0]] = _with(replace(first, message=first.message + also), [causes.pop(path) for path in paths[1:]])
+            first = causes[paths[0]]
+            also = f"; the same run or capture: {', '.join(names[:NAMED])}{more}"
+            others = [causes.pop(path) for path in paths[1:]]
+            causes[paths[0]] = _with(replace(first, message=first.message + also), others)
 
 
 def _one(findings: list[IntegrityFinding]) -> IntegrityFinding:

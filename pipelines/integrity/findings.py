@@ -138,28 +138,33 @@ class VerifiedPart:
         self.rows += count or 0
         self.bytes += size
         if actual != expected:
-            self.wrong(
-                CHANGED,
-                place,
-                f"has changed since it was written: hash {actual[:12]}…, its manifest says {str(expected)[:12]}…",
-            )
+            hashes = f"hash {actual[:12]}…, its manifest says {str(expected)[:12]}…"
+            self.wrong(CHANGED, place, f"has changed since it was written: {hashes}")
         elif rows is not None and count != rows:
             self.wrong(EDITED, place, f"has {count} rows, its manifest says {rows}")
 
 
 def _read(place: Place) -> tuple[str, int | None, int]:
     """Hash, rows (of a complete Parquet file) and size of a file."""
+    inside = _is_inside(place)
+    data = place.read_bytes() if inside else b""
+    actual = files.hash_of(data) if inside else files.sha256(place)
+    metadata = parquet_metadata(place, data) if place.suffix == ".parquet" else None
+    return actual, None if metadata is None else metadata.num_rows, len(data) if inside else place.stat().st_size
+
+
+def _is_inside(place: Place) -> bool:
+    """Whether a file is one of a store or of a pack, which Arrow does not find by its name."""
+    return isinstance(place, ObjectPath) or member_of(place) is not None
+
+
+def parquet_metadata(place: Place, data: bytes = b"") -> Any:
+    """The metadata of a Parquet file, from its bytes where they are known; None for a foreign or damaged file."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    inside = isinstance(place, ObjectPath) or member_of(place) is not None  # of a store or of a pack
-    data = place.read_bytes() if inside else b""
-    actual = files.hash_of(data) if inside else files.sha256(place)
-    size = len(data) if inside else place.stat().st_size
-    if place.suffix != ".parquet":
-        return actual, None, size
-    source = pa.BufferReader(data) if inside else str(place)
+    source = pa.BufferReader(data or place.read_bytes()) if _is_inside(place) else str(place)
     try:
-        return actual, pq.read_metadata(source).num_rows, size
-    except (pa.ArrowInvalid, OSError):  # the hash shows it
-        return actual, None, size
+        return pq.read_metadata(source)
+    except (pa.ArrowInvalid, OSError):
+        return None

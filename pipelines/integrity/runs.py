@@ -1,20 +1,24 @@
-"""Checks of one run: its tables, their manifests, and the links between the manifests."""
+"""Checks of one run (its tables, their manifests, the links between these) and of one capture (its records, their chain)."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 from pipelines.archive import Run, files, parquet, stage_key
+from pipelines.archive.hash_chain import is_number
 from pipelines.archive.listing import SEALED
-from pipelines.archive.packed_path import member_of
-from pipelines.archive.records import COMPLETE
+from pipelines.archive.records import COMPLETE, EVENTS, Events
 from pipelines.archive.run import START
-from pipelines.archive.store import ObjectPath, Place
+from pipelines.archive.store import Place
 from pipelines.certificates.coefficient_remarks import differing_libraries
-from pipelines.integrity.findings import EDITED, FOREIGN, MISSING, VerifiedPart
+from pipelines.integrity.findings import CHANGED, EDITED, FOREIGN, MISSING, VerifiedPart, parquet_metadata
 
 OURS = ("run.json", SEALED, "lock")
 KEYED = ("stage", "inputs", "parameters", "code", "key")
+REMOVE_FOREIGN = "remove it; import foreign files with 'tumbleline import'"
+Record = tuple[dict[str, Any], str, Place]
+"""Manifest of a record, hash of the manifest, and folder."""
 
 
 def check_run(run: Run, checked: VerifiedPart, schema: int) -> VerifiedPart:
@@ -47,9 +51,8 @@ def check_run(run: Run, checked: VerifiedPart, schema: int) -> VerifiedPart:
     _check_others(run, names, manifests, checked)
     checked.remarks += differing_libraries(run.id, manifests)
     if not names.keys() & {"report.json", SEALED} and capture:
-        command = (
-            "'tumbleline rerun'" if "because" in about else "its command"
-        )  # a fit states its origin, but no reasons
+        # a fit states its origin, but no reasons
+        command = "'tumbleline rerun'" if "because" in about else "its command"
         checked.remarks.append(f"run {run.id} is not finished: give {command} again to continue it")
     return checked
 
@@ -62,14 +65,11 @@ def _check_links(
     checked: VerifiedPart,
 ) -> None:
     """Compare a manifest with its own key, and with the manifests that it names."""
-    if all(name in content for name in KEYED) and all(
-        isinstance(content[name], dict) for name in ("inputs", "parameters")
-    ):
-        key = stage_key(*(content[name] for name in KEYED[:4]))
-        if key != content["key"]:
-            checked.wrong(
-                EDITED, place, "was edited: its key does not agree with its stage, inputs, parameters and code"
-            )
+    tables = all(isinstance(content.get(name), dict) for name in ("inputs", "parameters"))
+    if tables and all(name in content for name in KEYED):
+        if stage_key(*(content[name] for name in KEYED[:4])) != content["key"]:
+            text = "was edited: its key does not agree with its stage, inputs, parameters and code"
+            checked.wrong(EDITED, place, text)
     elif not isinstance(content.get("parameters", {}), dict):
         checked.wrong(EDITED, place, "was edited: its parameters are not a table of names and values")
     for name, expected in checked.named(content, "inputs", place).items():
@@ -78,13 +78,8 @@ def _check_links(
             checked.wrong(EDITED, place, f"names another table {name} than the one in the run", table)
     for name, expected in checked.named(content, "manifests", place).items():
         if name in hashes and hashes[name] != expected:
-            edited = place.parent / f"{name}.json"
-            checked.wrong(
-                EDITED,
-                edited,
-                f"is not the manifest that {place.stem} was made from: it was edited or written again",
-                place,
-            )
+            text = f"is not the manifest that {place.stem} was made from: it was edited or written again"
+            checked.wrong(EDITED, place.parent / f"{name}.json", text, place)
         elif name not in hashes and name != "records":
             checked.wrong(MISSING, place.parent / f"{name}.json", f"is missing, {place.stem} was made from it")
 
@@ -110,32 +105,116 @@ def _check_capture_link(run: Run, capture: str, manifests: dict[str, dict[str, A
 def _check_others(run: Run, names: dict[str, Place], manifests: dict[str, Any], checked: VerifiedPart) -> None:
     """Files in the folder of a run that no manifest names."""
     for name, place in sorted(names.items()):
+        manifest = run.path / f"{place.stem}.json"
         if name.startswith(files.TEMPORARY):
             checked.remarks.append(
                 f"{checked.name(place)} is a temporary file of a killed or active writer; see 'archive clean'"
             )
-        elif (
-            place.suffix == ".parquet"
-            and place.stem not in manifests
-            and not (run.path / f"{place.stem}.json").is_file()
-        ):
+        elif place.suffix == ".parquet" and place.stem not in manifests and not manifest.is_file():
             mark = table_mark(place)
             if mark != place.stem:
                 what = f"holds table '{mark}'" if mark else "was not written by this archive"
-                checked.wrong(FOREIGN, place, f"{what}: remove it; import foreign files with 'tumbleline import'")
+                checked.wrong(FOREIGN, place, f"{what}: {REMOVE_FOREIGN}")
             elif "report.json" in names:
-                checked.wrong(MISSING, run.path / f"{place.stem}.json", "is missing, its table exists")
+                checked.wrong(MISSING, manifest, "is missing, its table exists")
 
 
 def table_mark(place: Place) -> str:
     """Name of the table in the metadata of a Parquet file; empty for a foreign or damaged file."""
-    import pyarrow as pa
-    import pyarrow.parquet as pq
+    file = parquet_metadata(place)
+    return "" if file is None else (file.metadata or {}).get(parquet.TABLE_MARK, b"").decode(errors="replace")
 
-    inside = isinstance(place, ObjectPath) or member_of(place) is not None
-    source = pa.BufferReader(place.read_bytes()) if inside else str(place)
-    try:
-        metadata = pq.read_metadata(source).metadata or {}
-    except (pa.ArrowInvalid, OSError):
-        return ""
-    return metadata.get(parquet.TABLE_MARK, b"").decode(errors="replace")
+
+def check_capture(path: Place, checked: VerifiedPart, schema: int) -> VerifiedPart:
+    """Check a capture."""
+    records: list[Record] = []
+    unusable: Place | None = None
+    for folder in sorted(path.iterdir(), key=lambda place: place.name):
+        if not is_number(folder.name):
+            continue
+        manifest = checked.manifest(folder / "record.json", schema)
+        if manifest is None:
+            unusable = unusable or folder / "record.json"
+            continue
+        content = checked.named(manifest[0], "content", folder / "record.json")
+        for name, expected in sorted(content.items()):
+            checked.table(folder / name, str(expected))
+        if manifest[0].get("record") != int(folder.name):
+            found = f"holds record {manifest[0].get('record')!r}"
+            checked.wrong(EDITED, folder, f"{found}: two folders were exchanged, or this one was renamed")
+        check_strangers(folder, {*content, "record.json"}, checked)
+        records.append((*manifest, folder))
+    records.sort(key=lambda one: (str(type(one[0].get("order"))), one[0].get("order", 0)))
+    part = checked.blank()
+    _check_order(records, part)
+    _check_end(path, records, part, schema)
+    if unusable is not None:  # the gap that it leaves in the order
+        part.findings = [replace(one, because=checked.name(unusable)) for one in part.findings]
+    checked.add(part)
+    if records:
+        _check_state(path, records[-1], checked)
+    return checked
+
+
+def check_strangers(folder: Place, known: set[str], checked: VerifiedPart) -> None:
+    """Tables in a folder that the archive did not write."""
+    what = f"was not written by the archive: {REMOVE_FOREIGN}"
+    for place in sorted(folder.iterdir(), key=lambda one: one.name) if folder.is_dir() else ():
+        if place.suffix == ".parquet" and place.name not in known and place.is_file():
+            checked.wrong(FOREIGN, place, what)
+
+
+def _check_order(records: list[Record], checked: VerifiedPart) -> None:
+    """Every record names the record before it; the first record in an archive of an older version names none."""
+    before = ""
+    for count, (content, own, folder) in enumerate(records):
+        if content.get("order") != count:
+            order = content.get("order")
+            checked.wrong(MISSING, folder, f"was stored as number {order}, {count} records exist before it")
+            return
+        if content.get("previous", before) != before:
+            earlier = records[count - 1][2] if count else folder
+            checked.wrong(EDITED, earlier / "record.json", f"is not the manifest that record {folder.name} refers to")
+        before = own
+
+
+def _check_end(path: Place, records: list[Record], checked: VerifiedPart, schema: int) -> None:
+    end = path / COMPLETE
+    if not end.is_file():
+        checked.remarks.append(f"{checked.name(path)} is not finished: {len(records)} records are stored")
+        return
+    manifest = checked.manifest(end, schema)
+    if manifest is None:
+        return
+    content, stored = manifest[0], manifest[0].get("records")
+    if stored != len(records):
+        checked.wrong(MISSING, path, f"holds {len(records)} records, {stored} were stored")
+    if "events" in content:  # older versions did not store them
+        _check_events(path, checked.named(content, "events", end), checked)
+    if stored == len(records) and records and content.get("previous", records[-1][1]) != records[-1][1]:
+        checked.wrong(EDITED, records[-1][2] / "record.json", "is not the last manifest of the finished capture")
+
+
+def _check_events(path: Place, expected: dict[str, str], checked: VerifiedPart) -> None:
+    """Compare the journal with its hashes in the last file of the capture."""
+    actual = Events(path).hashes()
+    for name in sorted({*expected, *actual}):
+        place = path / EVENTS / name
+        if name not in actual:
+            checked.wrong(MISSING, place, "is missing, the finished capture had this event in its journal")
+        elif name not in expected:
+            checked.wrong(FOREIGN, place, "was added to the journal after the end of the capture")
+        elif actual[name] != expected[name]:
+            checked.wrong(CHANGED, place, "differs from the event in the journal of the finished capture")
+
+
+def _check_state(path: Place, last: Record, checked: VerifiedPart) -> None:
+    """Compare the state of the station, from which the capture continues, with the hash in its record."""
+    expected = last[0].get("state")
+    if expected is None:  # older versions did not store it
+        return
+    place = path / "state" / f"{last[2].name}.bin"
+    if not place.is_file():
+        checked.wrong(MISSING, place, f"is missing, record {last[2].name} refers to this state of the station")
+    elif files.sha256(place) != expected:
+        checked.wrong(CHANGED, place, f"differs from the state of the station in record {last[2].name}")

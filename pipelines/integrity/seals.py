@@ -1,4 +1,6 @@
-"""Checks of the ledger, and that everything finished is in the chain of the archive: runs, calibrations and releases.
+"""Checks of the chain, of the ledger, and that everything finished is in the chain: runs, calibrations and releases.
+
+No entry of the chain may be missing or edited, and the files that it seals must be unchanged.
 
 A run without an entry was copied here, or its entry was removed, or its writer was killed before it wrote the entry. A run whose
 writer may still be active gives a remark and no finding.
@@ -6,20 +8,20 @@ writer may still be active gives a remark and no finding.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 from pipelines.archive import Run, files, hash_chain
 from pipelines.archive.hash_chain import is_number
-from pipelines.archive.keys import digest
+from pipelines.archive.keys import digest, provenance
 from pipelines.archive.listing import stages_of
-from pipelines.archive.provenance import provenance
 from pipelines.archive.signatures import ENTRY
 from pipelines.archive.store import Place
 from pipelines.certificates.entries import SCHEMA, folder_of
-from pipelines.integrity.chain import Chain
 from pipelines.integrity.findings import CHANGED, EDITED, MISSING, UNCHAINED, UNREADABLE, VerifiedPart
 from schemas.errors import ArchiveUnusable
 
@@ -29,13 +31,96 @@ OF_ANOTHER = "is the seal of another run"
 REMEDY = "it was copied here, its entry was removed, or its writer was killed: see 'tumbleline archive clean'"
 
 
+@dataclass
+class Chain:
+    """Content of the chain.
+
+    Parameters
+    ----------
+    head : hash of its last entry.
+    sealed : the files that it names, with the hash that the last entry to name them gives.
+    entries : what each entry seals, by its number.
+    differing : the files that differ from what it sealed.
+    """
+
+    head: str = ""
+    sealed: dict[str, str] = field(default_factory=dict[str, str])
+    entries: dict[int, dict[str, str]] = field(default_factory=dict[int, "dict[str, str]"])
+    differing: set[str] = field(default_factory=set[str])
+
+
+def check_chain(root: Place, checked: VerifiedPart, *, only: set[str] | None = None, head: str = "") -> Chain:
+    """Read and check the chain; findings go into ``checked``.
+
+    Parameters
+    ----------
+    only : runs whose sealed files are checked; all where None.
+    head : hash of an entry from a copy kept elsewhere; it must exist.
+    """
+    before, seen, chain, latest = "", set[str](), Chain(), ""
+    for number, place in hash_chain.entries(root):
+        part = checked.blank()
+        manifest = part.manifest(place, 1)
+        if only is not None and (manifest is None or manifest[0].get("run") not in only):
+            part.untrusted = {
+                state: [] for state in part.untrusted
+            }  # signatures of other runs' entries are not checked
+        checked.add(part)
+        if manifest is None:
+            before = ""
+            continue
+        content, own = manifest
+        if content.get("number") != number:
+            checked.wrong(EDITED, place, f"says that it is entry {content.get('number')!r}")
+        if before and content.get("previous") != before:
+            earlier = hash_chain.place_of_entry(root, number - 1)
+            checked.wrong(EDITED, earlier, f"is not the entry that number {number} refers to")
+        named = checked.named(content, "files", place)
+        # names that lead out of the archive are ignored
+        chain.entries[number] = {
+            k: v for k, v in named.items() if ".." not in PurePosixPath(k).parts and not k.startswith("/")
+        }
+        if only is None or content.get("run") in only:
+            chain.sealed |= chain.entries[number]
+        when = str(content.get("when", ""))
+        if when < latest:
+            checked.remarks.append(
+                f"entry {number} of the chain says {when}, one before it {latest}: a clock was set back"
+            )
+        before, latest = own, max(when, latest)
+        seen.add(own)
+    if head and head not in seen:
+        checked.wrong(
+            MISSING, root / hash_chain.FOLDER, f"has no entry with hash {head}: entries were removed or written again"
+        )
+    chain.differing = {name for name, hashed in chain.sealed.items() if not _is_sealed(root, name, hashed, checked)}
+    chain.head = before
+    return chain
+
+
+def _is_sealed(root: Place, name: str, expected: str, checked: VerifiedPart) -> bool:
+    """Whether a file is there as it was sealed."""
+    place = root / name
+    try:
+        actual = files.sha256(place)
+    except OSError:
+        checked.wrong(MISSING, place, "is missing, the chain of the archive names it")
+        return False
+    if actual != expected:
+        checked.wrong(EDITED, place, "differs from what the chain of the archive sealed")
+    return actual == expected
+
+
 def check_seals(root: Place, runs: Sequence[Run], chain: Chain, checked: VerifiedPart, *, everything: bool) -> None:
     """Compare finished runs with the chain, and in a check of the whole archive also calibrations and releases."""
     for run in runs:
         _check_run(run, chain, checked)
     if everything:
         for top, pattern in (("calibrations", "*/*/*.json"), ("programming", "*/*/*.json"), ("releases", "*.json")):
-            _check_named((root / top).glob(pattern) if (root / top).is_dir() else (), chain, checked)
+            for place in sorted((root / top).glob(pattern), key=str) if (root / top).is_dir() else ():
+                if is_number(place.stem) and checked.name(place).replace("\\", "/") not in chain.sealed:
+                    with suppress(ArchiveUnusable):  # the check of the ledger reports it
+                        _report(place, files.read_json(place), checked)
         for place in sorted((root / "whatif").glob("*.json"), key=str) if (root / "whatif").is_dir() else ():
             _check_evidence(place, checked)
 
@@ -46,66 +131,50 @@ def _check_run(run: Run, chain: Chain, checked: VerifiedPart) -> None:
         _check_unsealed(run, chain, checked)
         return
     try:
-        content = files.read_json(mark)
+        fault = _fault_of_seal(run, files.read_json(mark), chain, checked)
     except ArchiveUnusable:
-        checked.wrong(EDITED, mark, "is not a readable seal; restore it from a copy")
-        return
-    number = content.get("entry")
+        fault = "is not a readable seal; restore it from a copy"
+    if fault:
+        checked.wrong(EDITED, mark, fault)
+
+
+def _fault_of_seal(run: Run, content: dict[str, Any], chain: Chain, checked: VerifiedPart) -> str:
+    """What is wrong with a seal; empty where nothing is, or where a finding about another file says it."""
+    number, mark = content.get("entry"), run.path / MARK
     if not isinstance(number, int) or number < 1:
-        checked.wrong(EDITED, mark, f"names entry {number!r} of the chain, a number is needed; restore it from a copy")
-    elif number not in chain.entries:
+        return f"names entry {number!r} of the chain, a number is needed; restore it from a copy"
+    if number not in chain.entries:
         entry = hash_chain.place_of_entry(run.archive.root, number)
         checked.wrong(MISSING, entry, f"is missing, it sealed run {run.id}")
-    elif f"runs/{run.id}/run.json" not in checked.named(content, "files", mark):
-        checked.wrong(
-            EDITED, mark, f"{OF_ANOTHER}: the folder was exchanged with another or renamed; restore it from a copy"
-        )
-    elif chain.entries[number] != content["files"]:
-        checked.wrong(
-            EDITED,
-            mark,
-            f"differs from what entry {number} of the chain sealed: run and chain are not from one archive",
-        )
-    elif not set(content) <= {"entry", "files", "stages"} or files.json_bytes(content) != mark.read_bytes():
-        checked.wrong(EDITED, mark, "was changed since it was written; restore it from a copy")
-    else:
-        _check_stages(run, content, checked)
+        return ""
+    if f"runs/{run.id}/run.json" not in checked.named(content, "files", mark):
+        return f"{OF_ANOTHER}: the folder was exchanged with another or renamed; restore it from a copy"
+    if chain.entries[number] != content["files"]:
+        return f"differs from what entry {number} of the chain sealed: run and chain are not from one archive"
+    if not set(content) <= {"entry", "files", "stages"} or files.json_bytes(content) != mark.read_bytes():
+        return "was changed since it was written; restore it from a copy"
+    return "" if _has_its_stages(run, content) else "names other stages than those that made the tables"
 
 
-def _check_stages(run: Run, content: dict[str, Any], checked: VerifiedPart) -> None:
-    """The stages in a seal, which lists show, must be the stages that made the tables."""
+def _has_its_stages(run: Run, content: dict[str, Any]) -> bool:
+    """Whether the stages in a seal, which lists show, are the stages that made the tables."""
     named = {name.rpartition("/")[2] for name in content["files"] if name.startswith("runs/")}
     there = {place.name for place in run.path.glob("*.json") if place.name != MARK}
-    try:
-        if named == there and "stages" in content and content["stages"] != stages_of(run.path):
-            checked.wrong(EDITED, run.path / MARK, "names other stages than those that made the tables")
-    except ArchiveUnusable:  # the check of the run reports it
-        return
+    with suppress(ArchiveUnusable):  # the check of the run reports it
+        return named != there or "stages" not in content or content["stages"] == stages_of(run.path)
+    return True
 
 
 def _check_unsealed(run: Run, chain: Chain, checked: VerifiedPart) -> None:
     """A run without a seal: unfinished, made by a version without a chain, or a finding."""
-    own = f"runs/{run.id}/"
+    own, report = f"runs/{run.id}/", run.path / REPORT
     if any(name.startswith(own) for name in chain.sealed):
         checked.wrong(MISSING, run.path / MARK, "is missing, the chain of the archive has an entry for the run")
-        return
-    if not (run.path / REPORT).is_file():
-        return
-    try:
-        content = files.read_json(run.path / REPORT)
-    except ArchiveUnusable:  # the check of the run reports it
-        return
-    if "manifests" in content:  # versions without a chain did not write this
-        _report(run.path / REPORT, content, checked)
-
-
-def _check_named(places: Iterable[Place], chain: Chain, checked: VerifiedPart) -> None:
-    for place in sorted(places, key=str):
-        if is_number(place.stem) and checked.name(place).replace("\\", "/") not in chain.sealed:
-            try:
-                _report(place, files.read_json(place), checked)
-            except ArchiveUnusable:  # the check of the ledger reports it
-                continue
+    elif report.is_file():
+        with suppress(ArchiveUnusable):  # the check of the run reports it
+            content = files.read_json(report)
+            if "manifests" in content:  # versions without a chain did not write this
+                _report(report, content, checked)
 
 
 def _check_evidence(place: Place, checked: VerifiedPart) -> None:
@@ -121,20 +190,14 @@ def _check_evidence(place: Place, checked: VerifiedPart) -> None:
 
 
 def _report(place: Place, content: dict[str, Any], checked: VerifiedPart) -> None:
-    if _is_recent(str(content.get("when", ""))):
-        checked.remarks.append(
-            f"{checked.name(place)} is not in the chain yet: its writer is still active, or was killed a moment ago"
-        )
-    else:
-        checked.wrong(UNCHAINED, place, f"is in no entry of the archive's chain: {REMEDY}")
-
-
-def _is_recent(when: str) -> bool:
-    try:
-        age = datetime.now(UTC) - datetime.fromisoformat(when)
-    except (ValueError, TypeError):
-        return False
-    return -JUST_NOW < age < JUST_NOW
+    """A finding, or a remark where the file was written just now."""
+    with suppress(ValueError, TypeError):
+        if abs(datetime.now(UTC) - datetime.fromisoformat(str(content.get("when", "")))) < JUST_NOW:
+            checked.remarks.append(
+                f"{checked.name(place)} is not in the chain yet: its writer is still active, or was killed a moment ago"
+            )
+            return
+    checked.wrong(UNCHAINED, place, f"is in no entry of the archive's chain: {REMEDY}")
 
 
 def check_shard(shard: Place, checked: VerifiedPart) -> VerifiedPart:
@@ -170,18 +233,14 @@ def _check_certified(place: Place, content: dict[str, Any], known: dict[Place, s
     run = checked.root / "runs" / Path(str(content.get("run"))).name
     for name, expected in checked.named(content, "evidence", place).items():
         manifest = run / f"{name}.json"
-        actual = _hash(manifest, known)
-        if not actual:
+        if not (actual := _hash(manifest, known)):
             checked.wrong(MISSING, manifest, f"is missing, certificate {checked.name(place)} is based on it")
         elif actual != expected:
             checked.wrong(EDITED, manifest, f"is not the manifest that certificate {checked.name(place)} is based on")
     table = run / "coefficients.json"
-    try:
-        there = files.read_json(table).get("sha256") if _hash(table, known) else content.get("coefficients")
-    except ArchiveUnusable:  # the check of the run reports it
-        return
-    if there != content.get("coefficients"):
-        checked.wrong(CHANGED, table, f"names other coefficients than certificate {checked.name(place)}")
+    with suppress(ArchiveUnusable):  # the check of the run reports it
+        if _hash(table, known) and files.read_json(table).get("sha256") != content.get("coefficients"):
+            checked.wrong(CHANGED, table, f"names other coefficients than certificate {checked.name(place)}")
 
 
 def _hash(place: Place, known: dict[Place, str]) -> str:

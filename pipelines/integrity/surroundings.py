@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from pathlib import Path
 
 from pipelines.archive import Archive, files
@@ -30,15 +31,12 @@ def check_mark(archive: Archive, checked: VerifiedPart) -> None:
     """The file ``archive.json``, which the chain does not name, must have its constant content."""
     place, expected = archive.root / "archive.json", archive.mark
     try:
-        content = place.read_bytes()
+        if place.read_bytes() != expected:
+            checked.wrong(CHANGED, place, f"is not the content of every archive, which is {expected.decode().split()}")
     except FileNotFoundError:
         checked.wrong(MISSING, place, "is missing, every archive has it")
-        return
     except OSError:
         checked.wrong(UNREADABLE, place, "cannot be read")
-        return
-    if content != expected:
-        checked.wrong(CHANGED, place, f"is not the content of every archive, which is {expected.decode().split()}")
 
 
 def check_surroundings(archive: Archive, checked: VerifiedPart) -> None:
@@ -48,10 +46,10 @@ def check_surroundings(archive: Archive, checked: VerifiedPart) -> None:
     strangers: list[str] = []
     for name, place in _all(archive.root):
         if not place.is_symlink() and not OURS.fullmatch(name) and files.TEMPORARY not in name:
-            if _is_key(place):
-                checked.wrong(
-                    SIGNATURE, place, "is a private key: who can edit the archive could sign with it; move it out"
-                )
+            with suppress(OSError):
+                if place.stat().st_size <= KEY_BYTES and KEY_MARK in place.read_bytes():
+                    what = "is a private key: who can edit the archive could sign with it; move it out"
+                    checked.wrong(SIGNATURE, place, what)
             strangers.append(name)
     if strangers:
         more = f" and {len(strangers) - SHOWN} more" if len(strangers) > SHOWN else ""
@@ -89,10 +87,3 @@ def _all(root: Path) -> Iterator[tuple[str, Path]]:
         for name in sorted(names):
             place = Path(folder) / name
             yield place.relative_to(root).as_posix(), place
-
-
-def _is_key(place: Path) -> bool:
-    try:
-        return place.stat().st_size <= KEY_BYTES and KEY_MARK in place.read_bytes()
-    except OSError:
-        return False

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import Any
 
 from pipelines.archive import Archive, Run
@@ -16,16 +17,12 @@ def fresh_run_of(archive: Archive, run: Run) -> Run | None:
     about = run.about
     units = tuple(unit["serial"] for unit in about["lot"]["units"])
     wanted = _measurement(about)
-    for info in reversed(archive.runs()):
-        if not info.finished or info.rerun_of or info.units != units:
-            continue
-        other = archive.run(info.id)
-        try:
+    infos = (info for info in reversed(archive.runs()) if info.finished and not info.rerun_of and info.units == units)
+    for other in (archive.run(info.id) for info in infos):
+        with suppress(ArchiveUnusable, KeyError):  # 'tumbleline verify' says what is wrong with it
             same = _measurement(other.about) == wanted
-        except (ArchiveUnusable, KeyError):  # 'tumbleline verify' says what is wrong with it
-            continue
-        if same and other.about["capture"] != about["capture"] and not other.about.get("parents"):
-            return other
+            if same and other.about["capture"] != about["capture"] and not other.about.get("parents"):
+                return other
     return None
 
 

@@ -12,9 +12,14 @@ from inertial.errors import InertialError
 from pipelines.archive import Archive, Run
 from pipelines.archive.keys import digest
 from pipelines.jobs.model_files import read_model, refuse_unknown_effects, use_formulas
-from pipelines.jobs.range_of_station import refuse_beyond_station
 from pipelines.jobs.recipes import MAIN_JOB, folder_of, load_limits, load_recipe, lot_of, units_of
-from pipelines.jobs.terms import budget_terms, refuse_contradictions, refuse_unreachable, with_stability
+from pipelines.jobs.terms import (
+    budget_terms,
+    refuse_beyond_station,
+    refuse_contradictions,
+    refuse_unreachable,
+    with_stability,
+)
 from pipelines.procedures import refuse_unusable
 from pipelines.schedule.planned_state import refuse_unidentified
 from pipelines.stages.figures import UNITS

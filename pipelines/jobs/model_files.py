@@ -9,7 +9,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 import tomlkit
-from tomlkit.items import Array, Table
+from tomlkit.items import Table
 
 from inertial import effects
 from inertial.effects.formula import Formula
@@ -49,9 +49,7 @@ class Version:
 
 def read_model(path: Path) -> ModelFile:
     """The model of a file; its formulas become effects, and all its effects are checked against the catalogue."""
-    model = load_model(path)
-    _use(model, f"model {path.name}")
-    return model
+    return _used(load_model(path), f"model {path.name}")
 
 
 def use_formulas(formulas: Iterable[FormulaSpec], where: str) -> None:
@@ -137,7 +135,9 @@ def new_model(path: Path, names: Sequence[str], by: str, at: datetime) -> str:
     head = tomlkit.table()
     head.add("name", re.sub(r"[^a-z0-9._-]+", "-", path.stem.lower()).strip("-._") or "model")
     head.add("version", 1)
-    head.add("effects", _listed(names))
+    effects_item = tomlkit.array()
+    effects_item.extend(names)
+    head.add("effects", effects_item.multiline(multiline=True))
     document.add("model", head)
     document.add("change", tomlkit.aot())
     first = {"version": 1, "by": by, "at": at, "why": "starting model"}
@@ -153,8 +153,7 @@ def extended(text: str, step: ModelStep, source: str) -> tuple[str, ModelFile]:
     RecipeInvalid
         The text is no model, the effect is already in it, or its name is unknown.
     """
-    model = parse_model(text, source)
-    _use(model, source)
+    model = _used(parse_model(text, source), source)
     if step.effect in model.model.effects:
         raise RecipeInvalid(
             f"{source}: '{step.effect}' is in version {model.model.version} already; "
@@ -173,8 +172,7 @@ def reduced(text: str, step: ModelStep, source: str) -> tuple[str, ModelFile]:
     RecipeInvalid
         The text is no model, the effect is not in it, or it is the only one.
     """
-    model = parse_model(text, source)
-    _use(model, source)
+    model = _used(parse_model(text, source), source)
     present = model.model.effects
     if step.effect not in present:
         raise RecipeInvalid(
@@ -204,13 +202,8 @@ def _next_version(text: str, model: ModelFile, step: ModelStep, source: str) -> 
     change(step.effect)
     changes = document.setdefault("change", tomlkit.aot())
     if not model.change:
-        known = {
-            "version": model.model.version,
-            "by": step.by,
-            "at": step.at,
-            "why": "file without a history",
-        }
-        changes.append(_table(known))
+        first = {"version": model.model.version, "by": step.by, "at": step.at, "why": "file without a history"}
+        changes.append(_table(first))
     change = {"version": version, "effect": step.effect, "by": step.by, "at": step.at, "why": step.why}
     changes.append(_table(change | ({"run": step.run} if step.run else {})))
     new = tomlkit.dumps(document)
@@ -227,15 +220,11 @@ def model_text(path: Path) -> str:
     return read_text(path, "model")
 
 
-def _use(model: ModelFile, source: str) -> None:
+def _used(model: ModelFile, source: str) -> ModelFile:
+    """The model; its formulas are effects now, and all its effects are known."""
     use_formulas(model.formula, source)
     refuse_unknown_effects(model.model.effects, f"{source}: key 'effects'")
-
-
-def _listed(names: Sequence[str]) -> Array:
-    listed = tomlkit.array()
-    listed.extend(names)
-    return listed.multiline(multiline=True)
+    return model
 
 
 def _table(content: Mapping[str, object]) -> Table:

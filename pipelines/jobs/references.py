@@ -85,18 +85,15 @@ def _document(judged: LotReferences | str, stated: Uncertainty) -> ReferencesDoc
         return {"worse": None, "reason": judged, "p_value": None, "along_p": None, "seen": [], "not_seen": []}
     found = {one.name for one in judged.found}
     every = [*judged.found, *(one for one in judged.looked if one.name not in found)]
+    told_from = {one.name: one.seen_from for one in (*judged.found, *judged.looked)}
     return {
         "worse": bool(found),
         "reason": None,
         "p_value": judged.p_value,
         "along_p": judged.along_p,
-        "seen": [_seen(one, stated, told_from=_told_from(one, judged), worse=one.name in found) for one in every],
+        "seen": [_seen(one, stated, told_from=told_from[one.name], worse=one.name in found) for one in every],
         "not_seen": [name for name in IMITATED if name in stated.entries and not stated.entries[name].exact],
     }
-
-
-def _told_from(one: Size, judged: LotReferences) -> float:
-    return next((own.seen_from for own in judged.looked if own.name == one.name), one.seen_from)
 
 
 def _seen(one: Size, stated: Uncertainty, *, told_from: float, worse: bool) -> SeenReference:

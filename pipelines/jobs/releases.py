@@ -13,9 +13,8 @@ from datetime import UTC, datetime
 from typing import Any
 
 from pipelines.archive import Archive, files, hash_chain
-from pipelines.archive.keys import digest
+from pipelines.archive.keys import digest, provenance
 from pipelines.archive.locks import alone
-from pipelines.archive.provenance import provenance
 from pipelines.jobs.documents import ReleaseRecord
 from pipelines.jobs.model_change import ModelChange
 from schemas.errors import RecipeInvalid, WrongUse
@@ -25,15 +24,11 @@ FOLDER, EVIDENCE = "releases", "whatif"
 SCHEMA = 1
 
 
-@dataclass(frozen=True)
-class Release:
+@dataclass(frozen=True, kw_only=True)
+class Release(ModelChange):
     """One record: model, first day of use, device and station (empty: all), reason, and evidence."""
 
     number: int
-    effects: tuple[str, ...]
-    formulas: tuple[FormulaSpec, ...]
-    model_name: str
-    model_version: int
     since: datetime
     device: str
     station: str
@@ -58,7 +53,7 @@ class Release:
             "release": self.number,
             "model": self.model_name,
             "version": self.model_version,
-            "effects": list(self.effects),
+            "effects": list(self.effects or ()),
             "from": self.since.isoformat(),
             "device": self.device,
             "station": self.station,
@@ -67,15 +62,6 @@ class Release:
             "forced": self.forced,
             "by": self.who,
             "at": self.when,
-        }
-
-    def of_model(self) -> dict[str, Any]:
-        """The keys of a recipe for the model."""
-        return {
-            "effects": list(self.effects),
-            "formulas": list(self.formulas),
-            "model_name": self.model_name,
-            "model_version": self.model_version,
         }
 
 
@@ -149,18 +135,13 @@ def release(
         "evidence": evidence["name"] if evidence else "",
         "forced": force,
     }
-    return _read(archive, _published(archive, content))
-
-
-def _published(archive: Archive, content: dict[str, Any]) -> int:
-    """Write a record and add it to the chain of the archive; return its number."""
     with alone(archive.root / FOLDER, wait=True):
         number = max((one.number for one in releases(archive)), default=0) + 1  # a record may have been removed
         place = _place(archive, number)
         files.publish_first(place, files.manifest_bytes({**provenance(), **content, "number": number}))
         sealed = {f"{FOLDER}/{place.name}": files.sha256(place)}
         hash_chain.append(archive.root, "release", sealed, {**provenance(), "release": number})
-    return number
+    return _read(archive, number)
 
 
 def _refuse_without(evidence: dict[str, Any] | None, change: ModelChange, device: str, station: str) -> None:
@@ -218,18 +199,13 @@ def _place(archive: Archive, number: int) -> Any:
 def _read(archive: Archive, number: int) -> Release:
     content = files.read_json(_place(archive, number))
     model = content["model"]
+    as_written = ("device", "station", "reason", "evidence", "forced", "who", "when")
     return Release(
+        tuple(model["effects"]),
+        tuple(FormulaSpec.model_validate(one) for one in model["formulas"]),
+        model["model_name"],
+        model["model_version"],
         number=number,
-        effects=tuple(model["effects"]),
-        formulas=tuple(FormulaSpec.model_validate(one) for one in model["formulas"]),
-        model_name=model["model_name"],
-        model_version=model["model_version"],
         since=datetime.fromisoformat(content["from"]),
-        device=content["device"],
-        station=content["station"],
-        reason=content["reason"],
-        evidence=content["evidence"],
-        forced=content["forced"],
-        who=content["who"],
-        when=content["when"],
+        **{key: content[key] for key in as_written},
     )

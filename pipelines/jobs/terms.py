@@ -1,16 +1,19 @@
-"""What a job states of its uncertainty, and what is refused before anything moves."""
+"""What a job states of its uncertainty, and what is refused before anything moves, such as poses out of the station's range."""
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from pipelines.jobs.recipes import load_limits
+from pipelines.procedures import refuse_unusable
 from pipelines.schedule.planned_state import planned_dwells
 from pipelines.stages.uncertainty.budget_terms import BudgetTerms, terms_of
 from pipelines.stages.uncertainty.contributions import merged
 from pipelines.stages.uncertainty.reachable import PlannedDwells, reachable, unreachable
-from schemas.errors import RecipeInvalid
+from schemas.errors import RecipeInvalid, TumblelineError
 from schemas.limits import VALIDITY_MONTHS, Limits
 from schemas.recipe import Recipe
 from schemas.reference import Reference
@@ -22,14 +25,10 @@ GRAVITY_SIGMAS = 3.0
 
 def budget_terms(recipe: Recipe, station: Any, limits: Limits) -> BudgetTerms:
     """The terms of a job's budget; the station of an archived job may be its document, as it was written."""
-    stated, pace = getattr(station, "uncertainty", None), getattr(station, "pace", None)
-    if isinstance(stated, dict):
-        stated = Uncertainty.model_validate(stated)
-    if isinstance(pace, dict):
-        pace = Pace.model_validate(pace)
-    given = getattr(station, "reference", None) or []
-    references = [Reference.model_validate(one) if isinstance(one, dict) else one for one in given]
-    room = Pace().room_C if pace is None else pace.room_C
+    stated, pace, given = (getattr(station, name, None) for name in ("uncertainty", "pace", "reference"))
+    stated = None if stated is None else Uncertainty.model_validate(stated)
+    references = [Reference.model_validate(one) for one in given or []]
+    room = Pace.model_validate(pace or {}).room_C
     return terms_of(recipe, stated, references, room, limits.longest_validity_months)
 
 
@@ -121,3 +120,48 @@ def refuse_contradictions(recipe: Recipe, station: StationConfig) -> None:
             f"{value:.8g} m/s² ± {2e6 * u:.2g} ppm (k = 2), they differ by {1e6 * apart:.0f} ppm; use the station's value",
             key="local_gravity_m_s2",
         )
+
+
+def refuse_beyond_station(recipe: Recipe, station: StationConfig) -> None:
+    """Refuse temperatures, °C, angles, degrees, and rates, Hz, outside of the limits of the station.
+
+    Raises
+    ------
+    RecipeInvalid : names the key, the first value outside, and the range
+    """
+    limits = station.limits
+    temperatures = [*recipe.temperatures_C, *([recipe.static_temperature_C] if recipe.static_record_s > 0.0 else [])]
+    chosen = [*recipe.poses, *recipe.verification, recipe.static_pose]
+    for key, values, (low, high), unit, owner in (
+        ("temperatures_C", temperatures, limits.temperature_C, "°C", "chamber"),
+        ("poses (outer)", [p.outer_deg for p in chosen], limits.outer_deg[:2], "°", "table"),
+        ("poses (inner)", [p.inner_deg for p in chosen], limits.inner_deg[:2], "°", "table"),
+        ("rate_hz", [recipe.rate_hz], (0.0, limits.rate_hz), "Hz", "reader"),
+    ):
+        outside = [value for value in values if not low <= value <= high]
+        if outside:
+            raise RecipeInvalid(
+                f"recipe: key '{key}': {outside[0]:g} {unit}, the {owner} of station {station.name} reaches {low:g} to "
+                f"{high:g} {unit}; change the recipe, or measure on another station",
+                key=key.split(" ", 1)[0],
+            )
+
+
+def refused_by_run(recipe: Recipe, station: StationConfig, folder: Path) -> list[str]:
+    """What 'tumbleline run' refuses in a recipe that can be planned: limits that cannot be read, ranges of the station.
+
+    Parameters
+    ----------
+    folder : where a limits file that the recipe names is looked for
+    """
+    messages: list[str] = []
+    for check in (
+        lambda: load_limits(recipe, folder),
+        lambda: refuse_beyond_station(recipe, station),
+        lambda: refuse_unusable(recipe, station),
+    ):
+        try:
+            check()
+        except TumblelineError as problem:
+            messages.append(str(problem))
+    return messages

@@ -117,24 +117,18 @@ class Gatherer:
         }
         steps: dict[str, list[str]] = {}
         for name, content in manifests.items():
-            ending = "report.html" if name == "report" else f"{name}.parquet"
-            place = f"runs/{run.id}/{ending}"
-            kind = "report" if name == "report" else "table"
-            about = {
-                "rows": content.get("rows"),
-                "schema": content.get("schema"),
-                "manifest": f"runs/{run.id}/{name}.json",
-            }
+            kind, ending = ("report", "html") if name == "report" else ("table", "parquet")
+            place = f"runs/{run.id}/{name}.{ending}"
+            about = {key: content.get(key) for key in ("rows", "schema")} | {"manifest": f"runs/{run.id}/{name}.json"}
             self.graph.add(Node(place, kind, name, place, str(content.get("sha256", "")), about))
-            steps.setdefault(f"{content.get('stage')} {content.get('key')} of {run.id}", []).append(name)
-        for step, names in steps.items():
-            content = manifests[names[0]]
+            steps.setdefault(f"{content.get('stage')} {content.get('key')} of {run.id}", []).append(place)
+        for step, made in steps.items():
+            content = manifests[made[0].rpartition("/")[2].rpartition(".")[0]]
             used = [start]
             for name, value in content.get("inputs", {}).items():
                 used += raw if name == RAW else [self._input(run, name, str(value), manifests)]
-            made = tuple(f"runs/{run.id}/{'report.html' if n == 'report' else f'{n}.parquet'}" for n in names)
             about = {key: content[key] for key in MADE if key in content}
-            self.graph.put(ProvActivity(step, str(content.get("stage")), tuple(used), made, about))
+            self.graph.put(ProvActivity(step, str(content.get("stage")), tuple(used), tuple(made), about))
 
     def _input(self, run: Run, name: str, value: str, manifests: dict[str, Any]) -> str:
         if name in manifests:
@@ -150,18 +144,10 @@ class Gatherer:
         rests = tuple(f"runs/{event.run}/{table}.parquet" for table, _ in event.evidence)
         used = tuple(node for node in (*rests, f"runs/{event.run}") if node in self.graph.nodes)
         self.graph.put(ProvActivity(f"{event.action} {event.certificate}", event.action, used, (name,), _by(event)))
-        if one.ended_by is not None and one.ended_by.action == "revoke":
-            ended = one.ended_by
-            revocation = f"{folder_of(ended.serial)}/{ended.sequence:06d}.json"
-            self.graph.add(
-                Node(
-                    revocation,
-                    "revocation",
-                    f"revocation {ended.certificate}",
-                    revocation,
-                    about={"reason": ended.reason},
-                )
-            )
+        ended = one.ended_by
+        if ended is not None and ended.action == "revoke":
+            file, label = f"{folder_of(ended.serial)}/{ended.sequence:06d}.json", f"revocation {ended.certificate}"
+            revocation = self.graph.add(Node(file, "revocation", label, file, about={"reason": ended.reason}))
             self.graph.put(ProvActivity(f"revoke {ended.certificate}", "revoke", (name,), (revocation,), _by(ended)))
         return name
 

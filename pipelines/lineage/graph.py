@@ -4,48 +4,38 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Annotated, Any
 
 
 @dataclass(frozen=True)
 class Node:
-    """A node of the graph.
+    """A node of the graph, also in the JSON document.
 
-    Parameters
-    ----------
-    id : unique; for a file of the archive its place below the root.
+    id : unique; for a file of the archive its place below the root
     kind : ``certificate``, ``table``, ``report``, ``samples``, ``source``, ``run``, ``recipe``, ``limits``, ``station`` or
-        ``reference``.
-    label : the name in trees and pages.
-    file : place of its file below the archive's root; empty for a node without a file.
-    sha256 : hash of the file.
-    about : further properties.
+    ``reference``; label : the name in trees and pages; sha256 : hash of the file; about : further properties
     """
 
     id: str
     kind: str
     label: str
-    file: str = ""
+    file: Annotated[str, "below the archive's folder; empty: none"] = ""
     sha256: str = ""
     about: dict[str, Any] = field(default_factory=dict[str, Any])
 
 
 @dataclass(frozen=True)
 class ProvActivity:
-    """A step that made nodes from other nodes.
+    """A step that made nodes from other nodes, also in the JSON document.
 
-    Parameters
-    ----------
-    id : unique.
-    name : the stage, or ``certify``, ``revoke``.
-    used, made : ids of nodes.
-    about : who, where and when, code, libraries, parameters: the manifest without hashes of inputs.
+    name : the stage, or ``certify``, ``revoke``
+    about : who, where and when, code, libraries, parameters: the manifest without hashes of inputs
     """
 
     id: str
     name: str
-    used: tuple[str, ...]
-    made: tuple[str, ...]
+    used: Annotated[tuple[str, ...], "ids"]
+    made: Annotated[tuple[str, ...], "ids"]
     about: dict[str, Any] = field(default_factory=dict[str, Any])
 
     @property
@@ -72,52 +62,45 @@ class Graph:
 
     def made_by(self) -> dict[str, list[ProvActivity]]:
         """The steps that made a node, by its id; a calibration that another step ended has several."""
-        return _by_node((node, step) for step in self.steps.values() for node in step.made)
+        return self._steps_of("made")
 
     def used_by(self) -> dict[str, list[ProvActivity]]:
         """The steps that used a node, by its id."""
-        return _by_node((node, step) for step in self.steps.values() for node in step.used)
+        return self._steps_of("used")
+
+    def _steps_of(self, end: str) -> dict[str, list[ProvActivity]]:
+        steps_of: dict[str, list[ProvActivity]] = {}
+        for step in self.steps.values():
+            for node in getattr(step, end):
+                steps_of.setdefault(node, []).append(step)
+        return steps_of
 
     def around(self, start: Iterable[str]) -> Graph:
         """The part of the graph with the origin of these nodes and the results made from them."""
         start = list(start)
-        made, used = self.made_by(), self.used_by()
-        up, steps_up = self._reached(start, made, forward=False)
-        down, steps_down = self._reached(start, used, forward=True)
-        steps = steps_up | steps_down
+        up, steps_up = self._reached(start, forward=False)
+        down, steps_down = self._reached(start, forward=True)
         beside = {node for name in steps_down for node in self.steps[name].used} & self.nodes.keys()
         kept = up | down | {node for node in beside if self.nodes[node].kind in {"recipe", "limits", "station"}}
-        return Graph(
-            {name: node for name, node in self.nodes.items() if name in kept},
-            {name: _within(step, kept) for name, step in self.steps.items() if name in steps},
-        )
+        part = Graph({name: node for name, node in self.nodes.items() if name in kept})
+        for step in (step for name, step in self.steps.items() if name in steps_up | steps_down):
+            used, made = (tuple(node for node in nodes if node in kept) for nodes in (step.used, step.made))
+            part.put(replace(step, used=used, made=made))
+        return part
 
     def results(self, start: Iterable[str]) -> set[str]:
         """Ids of all nodes made from these nodes, without these nodes themselves."""
         start = list(start)
-        return self._reached(start, self.used_by(), forward=True)[0] - set(start)
+        return self._reached(start, forward=True)[0] - set(start)
 
-    def _reached(
-        self, start: list[str], links: dict[str, list[ProvActivity]], *, forward: bool
-    ) -> tuple[set[str], set[str]]:
+    def _reached(self, start: list[str], *, forward: bool) -> tuple[set[str], set[str]]:
+        """Ids of the nodes, and of the steps to them, from these nodes on towards results or origin."""
+        links = self.used_by() if forward else self.made_by()
         nodes, steps, open_ids = set(start), set[str](), list(start)
         while open_ids:
             for step in links.get(open_ids.pop(), []):
                 steps.add(step.id)
-                for other in step.made if forward else step.used:
-                    if other not in nodes and other in self.nodes:
-                        nodes.add(other)
-                        open_ids.append(other)
+                new = {one for one in (step.made if forward else step.used) if one in self.nodes} - nodes
+                nodes |= new
+                open_ids += new
         return nodes, steps
-
-
-def _by_node(pairs: Iterable[tuple[str, ProvActivity]]) -> dict[str, list[ProvActivity]]:
-    steps_of: dict[str, list[ProvActivity]] = {}
-    for node, step in pairs:
-        steps_of.setdefault(node, []).append(step)
-    return steps_of
-
-
-def _within(step: ProvActivity, kept: set[str]) -> ProvActivity:
-    used, made = (tuple(node for node in nodes if node in kept) for nodes in (step.used, step.made))
-    return replace(step, used=used, made=made)

@@ -49,27 +49,28 @@ def lineage(archive: Archive, target: str) -> Lineage:
     """
     if Path(target).is_file() or (archive.root / target).is_file():
         return _of_file(archive, target)
+    gatherer = Gatherer(archive)
+    graph = gatherer.graph
+
+    def traced(kind: str, names: list[str]) -> Lineage:
+        return Lineage(target, kind, tuple(names), graph.around(names))
+
     if Ledger(archive).events(target):
-        gatherer = Gatherer(archive)
-        names = gatherer.calibrations(target)
-        return Lineage(target, "unit", tuple(names), gatherer.graph.around(names))
+        return traced("unit", gatherer.calibrations(target))
     serial, _, number = target.rpartition("/")
     if number.isdecimal() and Ledger(archive).events(serial):
-        gatherer = Gatherer(archive)
         names = [name for name in gatherer.calibrations(serial) if name.endswith(f"/{int(number):06d}.json")]
         if names:
-            return Lineage(target, "certificate", tuple(names), gatherer.graph.around(names))
+            return traced("certificate", names)
     ids = archive.run_ids()
     if target == "latest" or any(target and name.startswith(target) for name in ids):
         return _of_run(archive, archive.run(target))
     runs = [info.id for info in archive.runs() if target in info.units]
     if runs:
-        gatherer = Gatherer(archive)
         for name in runs:
             gatherer.run(archive.run(name))
-        names = [name for name in gatherer.graph.nodes if name in {f"runs/{run}/grades.parquet" for run in runs}]
-        names = names or [f"runs/{run}" for run in runs]
-        return Lineage(target, "unit", tuple(names), gatherer.graph.around(names))
+        names = [name for name in graph.nodes if name in {f"runs/{run}/grades.parquet" for run in runs}]
+        return traced("unit", names or [f"runs/{run}" for run in runs])
     message = f"lineage: '{target}' is neither a unit, a certificate, a run nor a file of archive {archive.root}"
     message += f"; {did_you_mean(target, ids)}"
     raise WrongUse(message if ids else f"archive {archive.root}: no run exists; make one with 'tumbleline run'")
@@ -119,16 +120,15 @@ def _below(archive: Archive, target: str) -> str:
 
 def _runs_of(archive: Archive, place: str) -> list[str]:
     """The runs of a file of the archive: its own run, or all runs of its capture."""
-    parts = place.split("/")
-    if len(parts) < 3:
-        return []
-    if parts[0] == "runs":
-        return [parts[1]]
-    if parts[0] == "captures":
-        return _runs_where(archive, lambda about: about.get("capture") == parts[1])
-    if parts[0] == "calibrations":
-        return [str(files.read_json(archive.root / place).get("run"))]
-    return []
+    match place.split("/"):
+        case ["runs", run, _, *_]:
+            return [run]
+        case ["captures", capture, _, *_]:
+            return _runs_where(archive, lambda about: about.get("capture") == capture)
+        case ["calibrations", _, _, *_]:
+            return [str(files.read_json(archive.root / place).get("run"))]
+        case _:
+            return []
 
 
 def _runs_where(archive: Archive, condition: Callable[[dict[str, Any]], bool]) -> list[str]:

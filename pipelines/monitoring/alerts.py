@@ -131,12 +131,9 @@ def _of_runs(snapshot: Snapshot) -> Iterator[Alert]:
 
 
 def _of_stations(snapshot: Snapshot) -> Iterator[Alert]:
-    if snapshot.stations is None:
-        return
-    for name, run in sorted(snapshot.stations.unsafe.items()):
-        text = (
-            f"station {name} was not reported safe after {run}; check axes and chamber, see 'tumbleline station status'"
-        )
+    remedy = "check axes and chamber, see 'tumbleline station status'"
+    for name, run in sorted(snapshot.stations.unsafe.items()) if snapshot.stations else ():
+        text = f"station {name} was not reported safe after {run}; {remedy}"
         yield _alert("unsafe", f"{name} {run}", name, text, snapshot.when)
 
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import shutil
+from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any
 
 from pipelines.archive import Archive, files
 from pipelines.archive.listing import RunInfo
@@ -24,30 +25,19 @@ DUE_DAYS = (0, 30)
 IMPORTED = "(import)"  # station label of an imported run
 
 
-class RunTime(NamedTuple):
-    """A finished run: time on the station's clock, s; pauses and their duration, s; repeated dwells; door openings."""
-
-    station_s: float = 0.0
-    pauses: int = 0
-    paused_s: float = 0.0
-    repeated: int = 0
-    door: int = 0
-
-
 @dataclass
 class LineNumbers:
-    """Sums over the runs of one station and recipe inside the window; ``last`` is the newest start of a finished run."""
+    """Sums over the runs of one station and recipe inside the window; ``last`` is the newest start of a finished run.
+
+    times : by name, time on the station's clock, s; pauses and their duration, s; repeated dwells; door openings
+    """
 
     finished: int = 0
     unfinished: int = 0
     passed: int = 0
     failed: int = 0
     last: datetime | None = None
-    station_s: float = 0.0
-    pauses: int = 0
-    paused_s: float = 0.0
-    repeated: int = 0
-    door: int = 0
+    times: Counter[str] = field(default_factory=Counter[str])
 
 
 @dataclass
@@ -72,7 +62,7 @@ class ArchiveReader:
 
     def __init__(self, archive: Archive, window_d: int) -> None:
         self.archive, self.window_d = archive, window_d
-        self._times: dict[str, RunTime] = {}
+        self._times: dict[str, Counter[str]] = {}
         self._sealed: set[str] = set()
 
     def read(self, now: datetime | None = None) -> ArchiveNumbers:
@@ -104,21 +94,22 @@ class ArchiveReader:
         line.last = started if line.last is None else max(line.last, started)
         if info.id not in self._times:
             self._times[info.id] = self._time_of(info.id)
-        for name, value in self._times[info.id]._asdict().items():
-            setattr(line, name, getattr(line, name) + value)
+        line.times.update(self._times[info.id])
 
-    def _time_of(self, run_id: str) -> RunTime:
+    def _time_of(self, run_id: str) -> Counter[str]:
+        """The times and counts of a finished run, see :class:`LineNumbers`."""
         run = self.archive.run(run_id)
         try:
-            dwells = run.table("dwells") if "dwells" in run.tables() else None
+            dwells: Any = run.table("dwells") if "dwells" in run.tables() else ()
             interrupted = interruptions(run)
         except TumblelineError:  # 'tumbleline verify' reports the faults of its files
-            return RunTime()
-        station_s = float(dwells["time_s"].max()) if dwells is not None and len(dwells) else 0.0
-        if interrupted is None:
-            return RunTime(station_s)
-        repeated = sum(one["times"] for one in interrupted["repeated_dwells"])
-        return RunTime(station_s, interrupted["pauses"], interrupted["paused_s"], repeated, interrupted["door_opened"])
+            return Counter()
+        times: dict[str, Any] = {"station_s": float(dwells["time_s"].max())} if len(dwells) else {}
+        if interrupted is not None:
+            times |= {"pauses": interrupted["pauses"], "paused_s": interrupted["paused_s"]}
+            times["repeated"] = sum(one["times"] for one in interrupted["repeated_dwells"])
+            times["door"] = interrupted["door_opened"]
+        return Counter(times)
 
     def _lag(self, finished: Iterable[RunInfo], numbers: ArchiveNumbers, at: datetime) -> None:
         for info in finished:
@@ -134,7 +125,9 @@ class ArchiveReader:
         for calibration in Ledger(self.archive).all():
             last[calibration.serial] = max(last.get(calibration.serial, ""), calibration.until)
         numbers.certified = len(last)
-        numbers.due = {days: sum(until <= _day_after(days) for until in last.values()) for days in DUE_DAYS}
+        day = datetime.fromisoformat(today())  # by the calendar of certificates
+        ends = {days: (day + timedelta(days=days)).date().isoformat() for days in DUE_DAYS}
+        numbers.due = {days: sum(until <= end for until in last.values()) for days, end in ends.items()}
 
 
 def _finished(path: Place, info: RunInfo) -> datetime:
@@ -143,8 +136,3 @@ def _finished(path: Place, info: RunInfo) -> datetime:
         return datetime.fromisoformat(str(files.read_json(path / "report.json")["when"]))
     except (ArchiveUnusable, KeyError, ValueError):
         return datetime.fromisoformat(info.started)
-
-
-def _day_after(days: int) -> str:
-    """The date ``days`` after today, by the calendar of certificates."""
-    return (datetime.fromisoformat(today()) + timedelta(days=days)).date().isoformat()

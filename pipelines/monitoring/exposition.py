@@ -2,19 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from datetime import datetime
 from importlib.metadata import version
 
 from prometheus_client import CollectorRegistry, generate_latest
 from prometheus_client.core import GaugeMetricFamily
 
+from pipelines.monitoring.alerts import KINDS
 from pipelines.monitoring.archive_numbers import ArchiveNumbers
 from pipelines.monitoring.queue_numbers import QueueNumbers
-from pipelines.monitoring.snapshot import Snapshot
-from pipelines.monitoring.station_numbers import StationNumbers
+from pipelines.monitoring.snapshot import Snapshot, StationNumbers
 
 LINE = ("station", "recipe")
+OPEN = ("SCHEDULED", "PENDING", "RUNNING", "PAUSED")
+TIMES = {
+    "station_s": ("station_seconds", "Time on the clock of the station"),
+    "pauses": ("pauses", "Pauses for a condition of the station"),
+    "paused_s": ("paused_seconds", "Duration of the pauses"),
+    "repeated": ("repeated_dwells", "Dwells that were discarded and measured again"),
+    "door": ("door_openings", "Openings of the chamber door during runs"),
+}
+"""Name and meaning of each sum over runs."""
 
 
 class _Collector:
@@ -26,12 +36,10 @@ class _Collector:
     def collect(self) -> Iterator[GaugeMetricFamily]:
         """All families."""
         snapshot = self._snapshot
-        yield _one("info", "Version of Tumbleline", 1.0, ("version",), (version("tumbleline"),))
-        yield _one("healthy", "1 where /healthz answers 200", float(snapshot.ok))
-        up = _family("source_up", "1 where the numbers of this source could be read", ("source",))
-        for source, fault in snapshot.faults.items():
-            up.add_metric([source], float(not fault))
-        yield up
+        yield _family("info", "Version of Tumbleline", ("version",), {(version("tumbleline"),): 1.0})
+        yield _family("healthy", "1 where /healthz answers 200", (), {(): snapshot.ok})
+        read = {(source,): not fault for source, fault in snapshot.faults.items()}
+        yield _family("source_up", "1 where the numbers of this source could be read", ("source",), read)
         if snapshot.archive is not None:
             yield from _archive(snapshot.archive, snapshot.window_d)
         if snapshot.queues is not None:
@@ -48,84 +56,62 @@ def text(snapshot: Snapshot) -> bytes:
 
 
 def _archive(numbers: ArchiveNumbers, window_d: int) -> Iterator[GaugeMetricFamily]:
-    yield _one("window_days", "Number of days whose runs are counted", float(window_d))
-    runs = _family("runs", "Measurement runs", (*LINE, "state"))
-    units = _family("units", "Graded units", (*LINE, "outcome"))
-    share = _family("yield_ratio", "Share of the graded units that passed", LINE)
-    last = _family("last_run_timestamp_seconds", "Start of the newest finished run", LINE)
-    sums = {
-        "station_s": _family("station_seconds", "Time on the clock of the station", LINE),
-        "pauses": _family("pauses", "Pauses for a condition of the station", LINE),
-        "paused_s": _family("paused_seconds", "Duration of the pauses", LINE),
-        "repeated": _family("repeated_dwells", "Dwells that were discarded and measured again", LINE),
-        "door": _family("door_openings", "Openings of the chamber door during runs", LINE),
-    }
-    for key, line in sorted(numbers.lines.items()):
-        runs.add_metric([*key, "finished"], line.finished)
-        runs.add_metric([*key, "unfinished"], line.unfinished)
-        units.add_metric([*key, "passed"], line.passed)
-        units.add_metric([*key, "failed"], line.failed)
-        if line.passed + line.failed:
-            share.add_metric(key, line.passed / (line.passed + line.failed))
-        if line.last is not None:
-            last.add_metric(key, line.last.timestamp())
-        for name, family in sums.items():
-            family.add_metric(key, float(getattr(line, name)))
-    yield from (runs, units, share, last, *sums.values())
-    yield _one("archive_unsealed_runs", "Finished runs that are not in the hash chain", float(numbers.unsealed))
-    yield _one("archive_lag_seconds", "Age of the oldest finished run that is not in the hash chain", numbers.lag_s)
+    yield _family("window_days", "Number of days whose runs are counted", (), {(): window_d})
+    lines = sorted(numbers.lines.items())
+    runs = {(*key, state): getattr(line, state) for key, line in lines for state in ("finished", "unfinished")}
+    yield _family("runs", "Measurement runs", (*LINE, "state"), runs)
+    units = {(*key, outcome): getattr(line, outcome) for key, line in lines for outcome in ("passed", "failed")}
+    yield _family("units", "Graded units", (*LINE, "outcome"), units)
+    share = {key: line.passed / graded for key, line in lines if (graded := line.passed + line.failed)}
+    yield _family("yield_ratio", "Share of the graded units that passed", LINE, share)
+    last = {key: line.last.timestamp() for key, line in lines if line.last is not None}
+    yield _family("last_run_timestamp_seconds", "Start of the newest finished run", LINE, last)
+    for count, (name, text) in TIMES.items():
+        yield _family(name, text, LINE, {key: line.times[count] for key, line in lines})
+    yield _family("archive_unsealed_runs", "Finished runs that are not in the hash chain", (), {(): numbers.unsealed})
+    lag = "Age of the oldest finished run that is not in the hash chain"
+    yield _family("archive_lag_seconds", lag, (), {(): numbers.lag_s})
     if numbers.free_bytes is not None:
-        yield _one("archive_free_bytes", "Free space on the disk of the archive", float(numbers.free_bytes))
-    yield _one("units_certified", "Units with at least one certificate, valid or not", float(numbers.certified))
-    due = _family("units_due", "Units whose last certificate ends within the stated days", ("within_days",))
-    for within, count in numbers.due.items():
-        due.add_metric([str(within)], count)
-    yield due
+        yield _family("archive_free_bytes", "Free space on the disk of the archive", (), {(): numbers.free_bytes})
+    certified = "Units with at least one certificate, valid or not"
+    yield _family("units_certified", certified, (), {(): numbers.certified})
+    due = {(str(within),): count for within, count in numbers.due.items()}
+    yield _family("units_due", "Units whose last certificate ends within the stated days", ("within_days",), due)
 
 
 def _queues(numbers: QueueNumbers, now: datetime) -> Iterator[GaugeMetricFamily]:
-    runs = _family("queue_runs", "Flow runs that are due, running or paused", ("queue", "state"))
-    late = _family("queue_late_seconds", "Time since the oldest late run of a free queue was due", ("queue",))
-    paused = _family("queue_paused", "1 where the queue is paused", ("queue",))
-    ended = _family(
-        "queue_ended_runs", "Flow runs of the last day that crashed, failed or were missed", ("queue", "state")
-    )
-    online = _family("worker_online", "1 where the worker has sent a heartbeat", ("worker",))
-    late_runs = numbers.late(now)
-    for queue, is_paused in sorted(numbers.queues.items()):
-        own = [run.state for run in numbers.open if run.queue == queue]
-        for state in ("SCHEDULED", "PENDING", "RUNNING", "PAUSED"):
-            runs.add_metric([queue, state.lower()], own.count(state))
-        since = [run.since for run in late_runs if run.queue == queue]
-        late.add_metric([queue], (now - min(since)).total_seconds() if since else 0.0)
-        paused.add_metric([queue], float(is_paused))
-        bad = [run.state for run in numbers.ended if run.queue == queue]
-        for state in ("CRASHED", "FAILED", "CANCELLED"):
-            ended.add_metric([queue, "missed" if state == "CANCELLED" else state.lower()], bad.count(state))
-    for worker, is_online in sorted(numbers.workers.items()):
-        online.add_metric([worker], float(is_online))
-    yield from (runs, late, paused, ended, online)
+    queues = sorted(numbers.queues)
+    opened, ended = (Counter((run.queue, run.state) for run in runs) for runs in (numbers.open, numbers.ended))
+    states = {(queue, one.lower()): opened[queue, one] for queue in queues for one in OPEN}
+    yield _family("queue_runs", "Flow runs that are due, running or paused", ("queue", "state"), states)
+    since: dict[str, datetime] = {}
+    for run in numbers.late(now):
+        since[run.queue] = min(run.since, since.get(run.queue, run.since))
+    late = {(queue,): (now - since.get(queue, now)).total_seconds() for queue in queues}
+    yield _family("queue_late_seconds", "Time since the oldest late run of a free queue was due", ("queue",), late)
+    paused = {(queue,): numbers.queues[queue] for queue in queues}
+    yield _family("queue_paused", "1 where the queue is paused", ("queue",), paused)
+    bad = {(queue, name): ended[queue, state] for queue in queues for state, name in KINDS.items()}
+    text = "Flow runs of the last day that crashed, failed or were missed"
+    yield _family("queue_ended_runs", text, ("queue", "state"), bad)
+    online = {(worker,): is_online for worker, is_online in sorted(numbers.workers.items())}
+    yield _family("worker_online", "1 where the worker has sent a heartbeat", ("worker",), online)
 
 
 def _stations(numbers: StationNumbers) -> Iterator[GaugeMetricFamily]:
-    driven = _family("station_driven", "1 while a run drives the station", ("station",))
-    unsafe = _family("station_unsafe", "1 where the station was not reported safe after its last run", ("station",))
-    events = _family("station_events", "Events in the log of the state folder", ("station", "event"))
-    for name in sorted({*numbers.driven, *numbers.unsafe, *(station for station, _ in numbers.events)}):
-        driven.add_metric([name], float(name in numbers.driven))
-        unsafe.add_metric([name], float(name in numbers.unsafe))
-    for (station, event), count in sorted(numbers.events.items()):
-        events.add_metric([station, event], count)
-    yield from (driven, unsafe, events)
+    names = sorted({*numbers.driven, *numbers.unsafe, *(station for station, _ in numbers.events)})
+    driven, unsafe = ({(name,): name in known for name in names} for known in (numbers.driven, numbers.unsafe))
+    yield _family("station_driven", "1 while a run drives the station", ("station",), driven)
+    yield _family(
+        "station_unsafe", "1 where the station was not reported safe after its last run", ("station",), unsafe
+    )
+    events = dict(sorted(numbers.events.items()))
+    yield _family("station_events", "Events in the log of the state folder", ("station", "event"), events)
 
 
-def _family(name: str, text: str, labels: Sequence[str]) -> GaugeMetricFamily:
-    return GaugeMetricFamily(f"tumbleline_{name}", text, labels=labels)
-
-
-def _one(
-    name: str, text: str, value: float, labels: Sequence[str] = (), values: Sequence[str] = ()
-) -> GaugeMetricFamily:
-    family = _family(name, text, labels)
-    family.add_metric(values, value)
+def _family(name: str, text: str, labels: Sequence[str], values: Mapping[tuple[str, ...], float]) -> GaugeMetricFamily:
+    """A family of numbers, each by the values of the labels."""
+    family = GaugeMetricFamily(f"tumbleline_{name}", text, labels=labels)
+    for own, value in values.items():
+        family.add_metric(own, float(value))
     return family

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import json
 import os
 import urllib.error
@@ -12,7 +11,7 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
 from typing import Any, cast
 
-from pipelines.orchestrator.settings import CLIENT_KEY, KEY_FILE, use_key
+from pipelines.orchestrator.settings import CLIENT_KEY, KEY_FILE, use_key, with_key
 from schemas.errors import LinkLost
 
 ADDRESS = "PREFECT_API_URL"
@@ -115,11 +114,8 @@ def _ask(path: str, content: dict[str, Any]) -> list[dict[str, Any]]:
     request = urllib.request.Request(  # noqa: S310 - the address of the line's own server, from its configuration
         f"{address}/{path}", json.dumps(content).encode(), {"Content-Type": "application/json"}
     )
-    key = os.environ.get(CLIENT_KEY)
-    if key:
-        request.add_header("Authorization", "Basic " + base64.b64encode(key.encode()).decode())
     try:
-        with urllib.request.urlopen(request, timeout=TIMEOUT_S) as answer:  # noqa: S310
+        with urllib.request.urlopen(with_key(request), timeout=TIMEOUT_S) as answer:  # noqa: S310
             return cast("list[dict[str, Any]]", json.load(answer))
     except (urllib.error.URLError, TimeoutError, ConnectionError, ValueError) as problem:
         if isinstance(problem, urllib.error.HTTPError):

@@ -15,6 +15,7 @@ from starlette.routing import Route
 from pipelines.monitoring.alerts import Poster, alerts_of
 from pipelines.monitoring.exposition import text
 from pipelines.monitoring.snapshot import Monitor
+from pipelines.orchestrator.worker_health import in_thread
 from schemas.log_lines import tell
 
 CONTENT_TYPE = "text/plain; version=0.0.4; charset=utf-8"
@@ -41,9 +42,8 @@ def application(monitor: Monitor) -> Starlette:
 @contextmanager
 def alerting(monitor: Monitor, poster: Poster, audits: Path | None, every_s: float = EVERY_S) -> Generator[None]:
     """A context in which alerts are posted every ``every_s`` seconds, in a thread of this process."""
-    ended = threading.Event()
 
-    def repeat() -> None:
+    def repeat(ended: threading.Event) -> None:
         before = ""
         while True:
             try:
@@ -58,10 +58,5 @@ def alerting(monitor: Monitor, poster: Poster, audits: Path | None, every_s: flo
             if ended.wait(every_s):
                 return
 
-    thread = threading.Thread(target=repeat, name="alerts", daemon=True)
-    thread.start()
-    try:
+    with in_thread("alerts", repeat, EVERY_S):
         yield
-    finally:
-        ended.set()
-        thread.join(EVERY_S)

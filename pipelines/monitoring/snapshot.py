@@ -4,24 +4,55 @@ from __future__ import annotations
 
 import threading
 import time
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
+from pathlib import Path
 from typing import Any
 
 from pipelines.archive import Archive
 from pipelines.monitoring.archive_numbers import ArchiveNumbers, ArchiveReader
 from pipelines.monitoring.documents import HealthDocument
 from pipelines.monitoring.queue_numbers import QueueNumbers, configured, read_queues
-from pipelines.monitoring.station_numbers import StationNumbers, read_stations
 from schemas.errors import TumblelineError
-from stations.safety.folder import state_folder
+from stations.safety.folder import read_log, state_folder
+from stations.safety.lease_files import read_holder
 
 KEEP_S = 10.0
 """Time for which a snapshot is reused, s: several scrapers cause one reading."""
 
 LAG_S = 3600.0
 """Longest time, s, between the start of a finished run and its entry in the hash chain; a killed writer leaves it out."""
+
+
+@dataclass
+class StationNumbers:
+    """Numbers from the state folder.
+
+    driven : stations with a live run · unsafe : stations without a live run and not reported safe, with the last run
+    events : number of events in the log, by station and event
+    """
+
+    driven: set[str] = field(default_factory=set[str])
+    unsafe: dict[str, str] = field(default_factory=dict[str, str])
+    events: Counter[tuple[str, str]] = field(default_factory=Counter[tuple[str, str]])
+
+
+def read_stations(folder: Path) -> StationNumbers:
+    """The numbers of the stations whose leases are in a folder."""
+    numbers = StationNumbers()
+    for path in sorted((folder / "leases").glob("*.json")):
+        holder = read_holder(path)
+        if holder is None:
+            continue
+        if holder.lives(path) and holder.role == "run" and not holder.tripped:
+            numbers.driven.add(holder.station)
+        else:
+            numbers.unsafe[holder.station] = f"{holder.run} (process {holder.pid} on {holder.host})"
+    for line in read_log(folder):
+        numbers.events[str(line.get("station", "")), str(line.get("event", ""))] += 1
+    return numbers
 
 
 @dataclass(frozen=True)

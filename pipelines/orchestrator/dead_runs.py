@@ -1,4 +1,9 @@
-"""Flow runs that the orchestrator lists as running although their process has ended."""
+"""Flow runs that the orchestrator lists as running although their process has ended.
+
+Where no process at the station can close such a run, the server does. A flow sends a heartbeat every ``HEARTBEAT_S`` (the
+shortest period that Prefect allows). An automation of the server marks a run as crashed that has sent none for ``SILENCE_S`` and
+has no final state: its computer has no power, or its network is down.
+"""
 
 from __future__ import annotations
 
@@ -22,6 +27,9 @@ from prefect.client.schemas.filters import (
 )
 from prefect.client.schemas.objects import FlowRun, StateType
 from prefect.client.schemas.sorting import FlowRunSort
+from prefect.events.actions import ActionTypes, ChangeFlowRunState
+from prefect.events.schemas.automations import AutomationCore, EventTrigger, Posture
+from prefect.events.schemas.events import ResourceSpecification
 from prefect.states import Crashed
 
 PROCESSES = Path("/proc")
@@ -46,19 +54,23 @@ GONE = "its process has ended: it was killed, or its worker ended; give the same
 def close_dead_runs(name: str) -> None:
     """Mark flow runs of a name as crashed whose process was killed and which the orchestrator still lists as running."""
     message = "its process was killed; another flow run of this name continues its work"
-    flow_filter = FlowRunFilter(name=FlowRunFilterName(any_=[name]))
     with get_client(sync_client=True) as client:
-        flow_runs = client.read_flow_runs(flow_run_filter=flow_filter, sort=FlowRunSort.START_TIME_DESC, limit=MANY)
-        for run in flow_runs:
+        for run in runs_of_name(client, name):
             if run.state_type == StateType.RUNNING:
                 client.set_flow_run_state(run.id, Crashed(message=message), force=True)
+
+
+def runs_of_name(client: SyncPrefectClient, name: str) -> list[FlowRun]:
+    """Flow runs of a name, the newest first."""
+    flow_filter = FlowRunFilter(name=FlowRunFilterName(any_=[name]))
+    return client.read_flow_runs(flow_run_filter=flow_filter, sort=FlowRunSort.START_TIME_DESC, limit=MANY)
 
 
 def close_dead_runs_of_queue(pool: str, queue: str, worker: str = "") -> list[str]:
     """Mark the runs of a station's queue as crashed that began and have no process; return their names.
 
     A run that another worker took is left alone, as its process may live on another computer: the server closes it when its
-    heartbeat stops (:mod:`pipelines.orchestrator.heartbeat`).
+    heartbeat stops (:func:`have_automation`).
     """
     with get_client(sync_client=True) as client:
         dead = _without_process(client, pool, queue, worker)
@@ -154,3 +166,51 @@ def _environment(process: Path) -> bytes:
     except OSError:
         return b""
     return environment
+
+
+HEARTBEAT_S = 30
+SILENCE_S = 60
+FREQUENCY = "PREFECT_FLOWS_HEARTBEAT_FREQUENCY"
+NAME = "tumbleline: runs without a heartbeat"
+HEARTBEAT = "prefect.flow-run.heartbeat"
+ENDS = ("Completed", "Failed", "Cancelled", "Crashed", "Suspended")
+"""Events after which no heartbeat follows; a suspended run waits for the operator without a process."""
+
+MESSAGE = f"no heartbeat for {SILENCE_S} s: its computer or its network is down"
+
+
+def have_automation() -> None:
+    """Make or renew the automation of the server."""
+    ends = {f"prefect.flow-run.{end}" for end in ENDS}
+    close: list[ActionTypes] = [
+        ChangeFlowRunState(state=StateType.CRASHED, name="Crashed", message=MESSAGE, force=False)
+    ]
+    _keep(
+        AutomationCore(
+            name=NAME,
+            description="Made by pipelines.flows.deploy; changes are overwritten there.",
+            enabled=True,
+            trigger=EventTrigger(
+                after={HEARTBEAT},
+                expect={HEARTBEAT, *ends},
+                match=ResourceSpecification({"prefect.resource.id": ["prefect.flow-run.*"]}),
+                for_each={"prefect.resource.id"},
+                posture=Posture.Proactive,
+                threshold=1,
+                within=timedelta(seconds=SILENCE_S),
+            ),
+            actions=close,
+        )
+    )
+
+
+def _keep(automation: AutomationCore) -> None:
+    """Make an automation, or update the existing one of the same name; further ones of the name are removed."""
+    with get_client(sync_client=True) as client:
+        same = [existing.id for existing in client.read_automations_by_name(automation.name)]
+        if not same:
+            client.create_automation(automation)
+            return
+        client.update_automation(same[0], automation)
+        for further in same[1:]:
+            client.delete_automation(further)

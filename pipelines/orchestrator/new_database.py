@@ -39,9 +39,8 @@ def make_database(home: Path) -> bool:
         with tempfile.NamedTemporaryFile(dir=home) as file:
             file.write(content)
             file.flush()
-            place.hardlink_to(
-                file.name
-            )  # complete or not at all, and never over one that another process has just made
+            # complete or not at all, and never over one that another process has just made
+            place.hardlink_to(file.name)
     except (OSError, RuntimeError, sqlite3.Error, subprocess.SubprocessError):  # RuntimeError: the user has no home
         return False
     return True

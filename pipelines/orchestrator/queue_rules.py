@@ -13,6 +13,7 @@ from collections import defaultdict
 from collections.abc import Generator, Mapping, Sequence
 from contextlib import contextmanager
 from datetime import UTC, datetime, timedelta
+from functools import partial
 from time import monotonic
 from typing import Any, cast
 from uuid import UUID
@@ -30,6 +31,7 @@ from prefect.states import Cancelled, Scheduled
 
 from pipelines.orchestrator.dead_runs import WORKING, LostRuns, lives, runs_of_queue
 from pipelines.orchestrator.policy import policy_of_tags
+from pipelines.orchestrator.worker_health import in_thread
 from schemas.log_lines import tell
 
 EVERY_S = 10.0
@@ -73,14 +75,9 @@ def applied(pool: str, queues: Sequence[str], worker: str) -> Generator[None]:
     ----------
     worker : name of the worker of Prefect that takes the runs
     """
-    ended = threading.Event()
     lost = {queue: LostRuns(pool, queue, worker) for queue in queues}
-    thread = threading.Thread(target=_repeat, args=(pool, lost, ended), name="queue rules", daemon=True)
-    thread.start()
-    try:
+    with in_thread("queue rules", partial(_repeat, pool, lost)):
         yield
-    finally:
-        ended.set()
 
 
 def _repeat(pool: str, lost: Mapping[str, LostRuns], ended: threading.Event) -> None:
@@ -146,23 +143,17 @@ def _cancelled(client: SyncPrefectClient, run: FlowRun, message: str) -> list[st
     if client.read_flow_run(run.id).state_type != StateType.SCHEDULED:
         return []
     client.set_flow_run_state(run.id, Cancelled(message=message))
-    if client.read_flow_run(run.id).state_type != StateType.CANCELLED:
-        return []
-    return [f"run {run.name} is cancelled: {message}"]
+    cancelled = client.read_flow_run(run.id).state_type == StateType.CANCELLED
+    return [f"run {run.name} is cancelled: {message}"] if cancelled else []
 
 
 def _skip_where_busy(client: SyncPrefectClient, pool: str, queue: str, now: datetime) -> list[str]:
     """Cancel scheduled runs with ``busy=skip`` that are due while another run has the station."""
     due = [run for run in _due(client, pool, queue, now - GRACE) if policy_of_tags(run.tags).busy == "skip"]
-    if not due:
-        return []
-    working = runs_of_queue(client, pool, queue, (*WORKING, StateType.PAUSED))
-    if not working:
-        return []
+    working = runs_of_queue(client, pool, queue, (*WORKING, StateType.PAUSED)) if due else []
     texts: list[str] = []
-    for run in due:
-        message = SKIPPED.format(when=_text(_start(run)), other=working[0].name)
-        texts += _cancelled(client, run, message)
+    for run in due if working else ():
+        texts += _cancelled(client, run, SKIPPED.format(when=_text(_start(run)), other=working[0].name))
     return texts
 
 
@@ -171,17 +162,15 @@ def _continue_crashed(client: SyncPrefectClient, pool: str, queue: str, now: dat
     texts: list[str] = []
     crashed = runs_of_queue(client, pool, queue, (StateType.CRASHED,), FlowRunSort.EXPECTED_START_TIME_DESC)
     for run in crashed:
-        if policy_of_tags(run.tags).crashed != "continue":
-            continue
-        if lives(run):  # the server missed its heartbeats: it still drives the station
+        # one that lives still drives the station: the server missed its heartbeats
+        if policy_of_tags(run.tags).crashed != "continue" or lives(run):
             continue
         if run.state is None or not settled <= now - run.state.timestamp <= CONTINUED_WITHIN:
             continue
         # not run_count: a run whose process could not start has none
         crashes = sum(state.type == StateType.CRASHED for state in client.read_flow_run_states(run.id))
-        if crashes >= ATTEMPTS:
-            continue
-        if client.read_flow_run(run.id).state_type != StateType.CRASHED:  # another worker was faster
+        # one that has not crashed now was continued by another worker, which was faster
+        if crashes >= ATTEMPTS or client.read_flow_run(run.id).state_type != StateType.CRASHED:
             continue
         message = CONTINUED.format(attempt=crashes + 1, attempts=ATTEMPTS)
         client.set_flow_run_state(run.id, Scheduled(scheduled_time=now, message=message), force=True)

@@ -45,9 +45,8 @@ LOOK_S = 1.0
 CLIENTS = "clients"
 START_LOCK = "start.lock"
 ADDRESS = "server.json"
-PAGES = (
-    "PREFECT_UI_STATIC_DIRECTORY"  # by default Prefect copies its pages into its own package, which may be read-only
-)
+# by default Prefect copies its pages into its own package, which may be read-only
+PAGES = "PREFECT_UI_STATIC_DIRECTORY"
 PRIVATE = 0o077  # removed from the modes of all files of the server: its database has unencrypted parameters and logs
 
 
@@ -122,15 +121,12 @@ def private_folder(path: Path) -> None:
 
 
 def _leave_when_alone(home: Path, server: uvicorn.Server) -> None:
-    while True:
+    while not server.should_exit:
         time.sleep(LOOK_S)
         try:
-            left = _left(home)
+            server.should_exit = _left(home)
         except FileNotFoundError:  # the folder was removed with the command of this server: no client can find it
-            left = True
-        if left:
             server.should_exit = True
-            return
 
 
 def _left(home: Path) -> bool:

@@ -1,14 +1,22 @@
-"""Settings of the orchestrator before its import: place of its history, its key, and no network access to third parties."""
+"""Settings of the orchestrator before its import: place of its history, its key, and no network access to third parties.
+
+:func:`check_server` finds out before Prefect, whose errors are tracebacks, whether a server answers and accepts the key.
+"""
 
 from __future__ import annotations
 
+import base64
 import os
 import secrets
 import stat
+import time
+import urllib.error
+import urllib.request
 from collections.abc import Sequence
+from http import HTTPStatus
 from pathlib import Path
 
-from schemas.errors import WrongUse
+from schemas.errors import LinkLost, WrongUse
 
 LOCAL = "local"
 """In place of the address of a Dask scheduler: a cluster of processes on this computer."""
@@ -29,6 +37,8 @@ RETENTION_D = 90
 
 EVENTS_D = 7
 LOOPBACK = ("127.0.0.1", "localhost")
+POLL_S, TIMEOUT_S = 1.0, 5.0
+"""Time between two questions to a server that does not answer yet, and for its answer, s."""
 
 
 def cache_folder() -> Path:
@@ -99,7 +109,8 @@ def use_key(variable: str) -> str:
     WrongUse
         The key is missing or too short, or other users may read its file.
     """
-    key = os.environ.get(variable) or os.environ.get(SERVER_KEY) or os.environ.get(CLIENT_KEY) or _key_of_file()
+    given = next(filter(None, map(os.environ.get, (variable, SERVER_KEY, CLIENT_KEY))), "")
+    key = given or _secret(KEY_FILE, CREDENTIAL, "key file")
     if len(key) < SHORTEST_KEY or ":" not in key:
         fault = "no key" if not key else f"a key of {len(key)} characters"
         raise WrongUse(
@@ -126,10 +137,6 @@ def use_database() -> None:
         os.environ[DATABASE] = address
 
 
-def _key_of_file() -> str:
-    return _secret(KEY_FILE, CREDENTIAL, "key file")
-
-
 def _secret(variable: str, credential: str, what: str) -> str:
     """Content of the file that a variable names, or of a credential of a unit; empty where there is neither."""
     named, credentials = os.environ.get(variable), os.environ.get("CREDENTIALS_DIRECTORY")
@@ -149,3 +156,48 @@ def _secret(variable: str, credential: str, what: str) -> str:
             f"orchestrator: {what} {path} has mode {mode:04o}, 0600 or less is needed; run 'chmod 600 {path}'"
         )
     return text
+
+
+def check_server(patience_s: float = 0.0) -> None:
+    """Wait until the orchestrator of PREFECT_API_URL answers, and check that it accepts PREFECT_API_AUTH_STRING.
+
+    Raises
+    ------
+    WrongUse
+        The address is invalid, or the key is missing or wrong.
+    LinkLost
+        It does not answer in time.
+    """
+    address = os.environ.get("PREFECT_API_URL", "")
+    if not address.startswith(("http://", "https://")):
+        raise WrongUse(
+            f"orchestrator: PREFECT_API_URL is '{address}', an address is needed, such as http://127.0.0.1:4200/api"
+        )
+    end = time.monotonic() + patience_s
+    while True:
+        try:
+            request = with_key(urllib.request.Request(f"{address.rstrip('/')}/admin/version"))  # noqa: S310 - checked above
+            urllib.request.urlopen(request, timeout=TIMEOUT_S).close()  # noqa: S310
+        except urllib.error.HTTPError as problem:
+            problem.close()
+            if problem.code != HTTPStatus.UNAUTHORIZED:
+                return  # another kind of server: Prefect reports the error
+            fault = "refuses the key of PREFECT_API_AUTH_STRING" if os.environ.get(CLIENT_KEY) else "requires a key"
+            raise WrongUse(
+                f"orchestrator: {address} {fault}; give the key of its server in {CLIENT_KEY}, or the key file in {KEY_FILE}"
+            ) from None
+        except (urllib.error.URLError, TimeoutError, ConnectionError) as problem:
+            if time.monotonic() >= end:
+                fault = f"{address} does not answer ({problem}), a running server is needed"
+                raise LinkLost(f"orchestrator: {fault}; start it, or correct PREFECT_API_URL") from None
+            time.sleep(POLL_S)
+        else:
+            return
+
+
+def with_key(request: urllib.request.Request) -> urllib.request.Request:
+    """The request with the key of this process, where it has one."""
+    key = os.environ.get(CLIENT_KEY)
+    if key:
+        request.add_header("Authorization", "Basic " + base64.b64encode(key.encode()).decode())
+    return request

@@ -27,8 +27,7 @@ from datetime import timedelta
 from pathlib import Path
 from types import FrameType
 
-from pipelines.orchestrator.server_check import POLL_S, check_server
-from pipelines.orchestrator.settings import CLIENT_KEY, JSON_FORMAT, STARTUP_S, use_key
+from pipelines.orchestrator.settings import CLIENT_KEY, JSON_FORMAT, POLL_S, STARTUP_S, check_server, use_key
 from pipelines.orchestrator.worker_health import heartbeat_of, period_s, watched
 from schemas import host
 from schemas.errors import OperatorNeeded, TumblelineError, WrongUse
@@ -54,11 +53,10 @@ def start(
     WrongUse, LinkLost
         The orchestrator does not accept the key, or does not answer.
     """
-    from pipelines.orchestrator.dead_runs import close_dead_runs_of_queue
-    from pipelines.orchestrator.heartbeat import HEARTBEAT_S, VARIABLE
+    from pipelines.orchestrator.dead_runs import FREQUENCY, HEARTBEAT_S, close_dead_runs_of_queue
     from pipelines.orchestrator.queue_rules import applied, apply_rules
 
-    os.environ.setdefault(VARIABLE, str(HEARTBEAT_S))
+    os.environ.setdefault(FREQUENCY, str(HEARTBEAT_S))
     if wants_json():
         os.environ.setdefault(JSON_FORMAT, JSON)
     name = f"{station} on {host or platform.node()}"

@@ -87,10 +87,9 @@ def watched(
     child : the process; None before it has started.
     every_s : period of the heartbeats.
     """
-    ended = threading.Event()
     silence = Silence(MISSED * every_s, startup_s, 3.0 * every_s)
 
-    def repeat() -> None:
+    def repeat(ended: threading.Event) -> None:
         while not ended.wait(every_s):
             try:
                 silent = silence.heard(ask(), time.monotonic())
@@ -108,12 +107,26 @@ def watched(
                 os.kill(process.pid, signal.SIGKILL)
                 return
 
-    thread = threading.Thread(target=repeat, name="worker health", daemon=True)
+    with in_thread("worker health", repeat):
+        yield
+
+
+@contextmanager
+def in_thread(name: str, repeat: Callable[[threading.Event], None], patience_s: float = 0.0) -> Generator[None]:
+    """A context in which a function runs in a thread of this process; its event is set at the end.
+
+    Parameters
+    ----------
+    patience_s : time to wait for the end of the thread, s
+    """
+    ended = threading.Event()
+    thread = threading.Thread(target=repeat, args=(ended,), name=name, daemon=True)
     thread.start()
     try:
         yield
     finally:
         ended.set()
+        thread.join(patience_s)
 
 
 def heartbeat_of(pool: str, name: str) -> str:

@@ -31,7 +31,12 @@ def diff(a: Run, b: Run) -> dict[str, Any]:
     """
     coefficients = _changed(_table(a, "coefficients"), _table(b, "coefficients"), COEFFICIENT, "standard_error")
     figures = _changed(_standard(a), _standard(b), FIGURE, "standard_error")
-    units = _units(a, b, coefficients)
+    before, after = _grades(a), _grades(b)
+    if before.keys().isdisjoint(after):
+        raise DataRejected(
+            f"diff: runs {a.id} and {b.id} have no unit in common, one is needed; name two runs of the same units"
+        )
+    units = _units(before, after, coefficients)
     return {
         "a": a.id,
         "b": b.id,
@@ -39,10 +44,10 @@ def diff(a: Run, b: Run) -> dict[str, Any]:
         "because": causes(a, b),
         "flipped": [row["unit"] for row in units if row["flipped"]],
         "units": units,
-        "coefficients": _documented(coefficients),
-        "figures": _documented(figures),
-        "only_a": _only(a, b),
-        "only_b": _only(b, a),
+        "coefficients": rows_of(coefficients.drop(columns="largest")),
+        "figures": rows_of(figures.drop(columns="largest")),
+        "only_a": [unit for unit in before if unit not in after],
+        "only_b": [unit for unit in after if unit not in before],
     }
 
 
@@ -101,40 +106,23 @@ def _over(change: pd.Series, size: pd.Series) -> pd.Series:
     return change / size.where(size > 0.0)
 
 
-def _units(a: Run, b: Run, coefficients: pd.DataFrame) -> list[dict[str, Any]]:
+def _units(
+    before: dict[str, dict[str, Any]], after: dict[str, dict[str, Any]], coefficients: pd.DataFrame
+) -> list[dict[str, Any]]:
     """One row for every unit of both runs, changed grades first."""
-    before, after = _grades(a), _grades(b)
-    common = [unit for unit in before if unit in after]
-    if not common:
-        raise DataRejected(
-            f"diff: runs {a.id} and {b.id} have no unit in common, one is needed; name two runs of the same units"
-        )
     finite = coefficients[np.isfinite(coefficients["largest"].to_numpy(dtype=float))]
     largest = finite.groupby("unit")["largest"].max().to_dict()
     moved = set(coefficients["unit"])
-    rows = [_unit_row(unit, before[unit], after[unit], float(largest.get(unit, 0.0)), unit in moved) for unit in common]
+    rows: list[dict[str, Any]] = []
+    for unit in (unit for unit in before if unit in after):
+        pairs = {key: [before[unit][key], after[unit][key]] for key in ("outcome", "grade", "reasons")}
+        differs = {key: one != other for key, (one, other) in pairs.items()}
+        flipped = differs["outcome"] or differs["grade"]
+        head = {"unit": unit, "flipped": flipped, "changed": flipped or unit in moved or differs["reasons"]}
+        rows.append({**head, **pairs, "largest_over_both": float(largest.get(unit, 0.0))})
     return sorted(
         rows, key=lambda row: (not row["flipped"], not row["changed"], -row["largest_over_both"], row["unit"])
     )
-
-
-def _unit_row(
-    unit: str,
-    before: dict[str, Any],
-    after: dict[str, Any],
-    largest: float,
-    moved: bool,  # noqa: FBT001 - its coefficients
-) -> dict[str, Any]:
-    flipped = (before["outcome"], before["grade"]) != (after["outcome"], after["grade"])
-    return {
-        "unit": unit,
-        "flipped": flipped,
-        "changed": flipped or moved or before["reasons"] != after["reasons"],
-        "outcome": [before["outcome"], after["outcome"]],
-        "grade": [before["grade"], after["grade"]],
-        "reasons": [before["reasons"], after["reasons"]],
-        "largest_over_both": largest,
-    }
 
 
 def _grades(run: Run) -> dict[str, dict[str, Any]]:
@@ -143,15 +131,6 @@ def _grades(run: Run) -> dict[str, dict[str, Any]]:
         return {row["unit"]: row for row in rows_of(run.table("grades"))}
     units = dict.fromkeys(run.table("coefficients")["unit"].astype(str))
     return {unit: {"outcome": "", "grade": "", "reasons": ""} for unit in units}
-
-
-def _only(one: Run, other: Run) -> list[str]:
-    there = _grades(other)
-    return [unit for unit in _grades(one) if unit not in there]
-
-
-def _documented(rows: pd.DataFrame) -> list[dict[str, Any]]:
-    return rows_of(rows.drop(columns="largest"))
 
 
 ORDER = ("import", "capture", *BY_NAME)
@@ -164,7 +143,7 @@ def causes(a: Run, b: Run) -> list[dict[str, Any]]:
 
     Every row has ``what`` (data, model, limits, code, library, another parameter), its ``stage``, and the values in both runs.
     """
-    rows = _data(a, b) + _chosen(a, b)
+    rows = _chosen(a, b)
     seen: set[tuple[str, str]] = {("model", ""), ("limits", "")}
     for stage, (before, after) in _manifests(a, b).items():
         rows += [row for row in _of_stage(stage, before, after) if (row["what"], row["name"]) not in seen]
@@ -174,12 +153,6 @@ def causes(a: Run, b: Run) -> list[dict[str, Any]]:
 
 def _row(what: str, name: str, before: Any, after: Any, stage: str = "") -> dict[str, Any]:
     return {"what": what, "stage": stage, "name": name, "a": before, "b": after}
-
-
-def _data(a: Run, b: Run) -> list[dict[str, Any]]:
-    """Whether the runs have different measurements."""
-    before, after = (_measured(run) for run in (a, b))
-    return [] if before == after else [_row("data", "", before, after)]
 
 
 def _measured(run: Run) -> str:
@@ -193,23 +166,23 @@ def _measured(run: Run) -> str:
 
 
 def _chosen(a: Run, b: Run) -> list[dict[str, Any]]:
-    """Differences of model and limits, by their names."""
+    """Differences of the measurements, and of model and limits, by their names."""
     rows: list[dict[str, Any]] = []
-    before, after = (_model(run) for run in (a, b))
-    if before != after:
-        rows.append(_row("model", "", _model_text(before, after), _model_text(after, before)))
-    first, second = (run.about.get("limits") for run in (a, b))
-    if first != second:
-        changed = _limits_text(first or {}, second or {})
-        rows.append(_row("limits", changed, (first or {}).get("name", "none"), (second or {}).get("name", "none")))
+    data, models, limits = zip(*((_measured(run), _model(run), run.about.get("limits")) for run in (a, b)), strict=True)
+    if data[0] != data[1]:
+        rows.append(_row("data", "", *data))
+    if models[0] != models[1]:
+        rows.append(_row("model", "", _model_text(*models), _model_text(*reversed(models))))
+    if limits[0] != limits[1]:
+        first, second = (one or {} for one in limits)
+        rows.append(_row("limits", _limits_text(first, second), *(one.get("name", "none") for one in (first, second))))
     return rows
 
 
 def _model(run: Run) -> dict[str, Any]:
     recipe = run.about.get("recipe", {})
-    if recipe.get("effects"):
-        return {"effects": list(recipe["effects"]), "formulas": recipe.get("formulas", [])}
-    return {"effects": [], "formulas": []}
+    effects = list(recipe.get("effects") or ())
+    return {"effects": effects, "formulas": recipe.get("formulas", []) if effects else []}
 
 
 def _model_text(own: dict[str, Any], other: dict[str, Any]) -> str:
@@ -231,14 +204,8 @@ def _limits_text(before: dict[str, Any], after: dict[str, Any]) -> str:
 
 def _manifests(a: Run, b: Run) -> dict[str, tuple[dict[str, Any], dict[str, Any]]]:
     """Manifests of every stage that both runs have, in the order of the chain."""
-    first, second = (_by_stage(run) for run in (a, b))
-    common = [stage for stage in ORDER if stage in first and stage in second]
-    return {stage: (first[stage], second[stage]) for stage in common}
-
-
-def _by_stage(run: Run) -> dict[str, dict[str, Any]]:
-    manifests = [run.manifest(name) for name in run.tables()]
-    return {manifest["stage"]: manifest for manifest in manifests}
+    first, second = ({one["stage"]: one for one in map(run.manifest, run.tables())} for run in (a, b))
+    return {stage: (first[stage], second[stage]) for stage in ORDER if stage in first and stage in second}
 
 
 def _of_stage(stage: str, before: dict[str, Any], after: dict[str, Any]) -> list[dict[str, Any]]:

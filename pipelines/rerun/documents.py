@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal, NotRequired
 from typing_extensions import TypedDict
 
 from pipelines.diagnosis.documents import LeaveOut, VerdictEvidence
+from pipelines.rerun.rerun import RerunOutcome
 
 
 class UnitDifference(TypedDict):
@@ -136,17 +137,6 @@ class WhatIfDocument(TypedDict):
     verdict: Annotated[str, "`better`, `worse`, `no better` or that nothing tells the models apart"]
     words: Annotated[str, "the verdict as a sentence"]
     evidence: Annotated[str, "name of the evidence kept for `tumbleline release`"]
-
-
-class RerunOutcome(TypedDict):
-    """What became of one run."""
-
-    run: str
-    new: Annotated[str, "id of the re-run; the run's own if nothing changed, empty if it failed"]
-    because: Annotated[list[dict[str, str]], "what changed: data, model, limits, code, library"]
-    stages: Annotated[dict[str, str], "`computed` or `reused` by stage"]
-    seconds: float
-    error: str
 
 
 class RerunDocument(TypedDict):

@@ -99,14 +99,14 @@ def import_step(data: ImportedData, left_out: Dwells, old: Run) -> StageCall:
 
 def fit_step(model: dict[str, Any], data: ImportedData) -> StageCall:
     """The fit of the chain; by the norm of gravity alone where the poses are not known."""
-    effects, parameters = model["effects"], {"effects": model["effects"], "formulas": model["formulas"]}
-    if data.known:
-        return _call("fit", data.read(), parameters, lambda run: fit(run.table("dwells"), data.past(run), effects))
 
-    def of_norms(run: Run) -> Tables:
-        return fit_of_norms(run.table("dwells"), data.past(run), effects, data.gravity)
+    def call(run: Run) -> Tables:
+        read = run.table("dwells"), data.past(run), model["effects"]
+        return fit(*read) if data.known else fit_of_norms(*read, data.gravity)
 
-    return _call("fit", data.read(), {**parameters, "gravity_g": data.gravity}, of_norms, "fit of norms")
+    more, code = ({}, "") if data.known else ({"gravity_g": data.gravity}, "fit of norms")
+    parameters = {"effects": model["effects"], "formulas": model["formulas"], **more}
+    return _call("fit", data.read(), parameters, call, code)
 
 
 def plane_step(across: int, gravity: float) -> StageCall:
@@ -137,15 +137,12 @@ def verify_step(data: ImportedData) -> StageCall:
     fitted = ("coefficients", "covariance", "predictions" if data.known else "wander")
 
     def call(run: Run) -> Tables:
-        dwells, past = run.table("dwells"), data.past(run)
         coefficients, covariance, third = (run.table(name) for name in fitted)
-        if data.known:
-            return verify(dwells, past, coefficients, covariance, third)
-        return verify_norms(dwells, past, coefficients, covariance, third, data.gravity)
+        read = run.table("dwells"), data.past(run), coefficients, covariance, third
+        return verify(*read) if data.known else verify_norms(*read, data.gravity)
 
-    if data.known:
-        return _call("verify", data.read(*fitted), {}, call)
-    return _call("verify", data.read(*fitted), {"gravity_g": data.gravity}, call, "verify of norms")
+    parameters, code = ({}, "") if data.known else ({"gravity_g": data.gravity}, "verify of norms")
+    return _call("verify", data.read(*fitted), parameters, call, code)
 
 
 def budget_step(terms: BudgetTerms, data: ImportedData) -> StageCall:

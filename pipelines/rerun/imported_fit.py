@@ -25,12 +25,9 @@ def fit_document(done: Run, source: str) -> ImportedFitDocument:
     if not plane and has_poses(dwells):
         judged = _known_poses(dwells, past, effects)
     else:
-        gravity, unit = gravity_of_import(done.about), str(dwells["out_unit"].iloc[0])
-        answer = (
-            plane_answer(dwells, AXES.index(plane), gravity, unit)
-            if plane
-            else fitted(dwells, past, effects, gravity, unit)
-        )
+        known = gravity_of_import(done.about), str(dwells["out_unit"].iloc[0])
+        across = AXES.index(plane) if plane else 0
+        answer = plane_answer(dwells, across, *known) if plane else fitted(dwells, past, effects, *known)
         judged = {"evidence": None, "leave_out": None, "missing": [], **answer.document, "lines": list(answer.lines)}
     grades = rows_of(done.table("grades")) if "grades" in done.tables() and not plane else []
     units = [{key: row[key] for key in ("unit", "outcome", "grade", "reasons")} for row in grades]

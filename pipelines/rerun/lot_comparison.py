@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -63,6 +64,11 @@ class LotComparison:
     new: Side | None = None
     error: str = ""
 
+    @property
+    def sides(self) -> list[Side]:
+        """The old and the new side; none where the lot could not be judged."""
+        return [] if self.old is None or self.new is None else [self.old, self.new]
+
 
 @dataclass(frozen=True)
 class FreshTask:
@@ -85,18 +91,15 @@ class Fresh:
 
 def judged(part: Batch) -> list[LotComparison]:
     """Every run of a portion under both models; what cannot be judged says why."""
-    archive = Archive(part.archive)
+    archive, lots = Archive(part.archive), list[LotComparison]()
     part.change.use()
-    return [_judged(BufferedRun(archive, run_id), part.change) for run_id in part.runs]
-
-
-def _judged(run: Run, change: ModelChange) -> LotComparison:
-    entry = entry_of(run.id, run.about)
-    try:
-        old, new = _both(run, change)
-    except (TumblelineError, InertialError) as problem:
-        return LotComparison(entry, error=str(problem))
-    return LotComparison(entry, old, new)
+    for run in (BufferedRun(archive, run_id) for run_id in part.runs):
+        entry = entry_of(run.id, run.about)
+        try:
+            lots.append(LotComparison(entry, *_both(run, part.change)))
+        except (TumblelineError, InertialError) as problem:
+            lots.append(LotComparison(entry, error=str(problem)))
+    return lots
 
 
 def _both(run: Run, change: ModelChange) -> tuple[Side, Side]:
@@ -107,39 +110,22 @@ def _both(run: Run, change: ModelChange) -> tuple[Side, Side]:
     lot = LotTables(run.table("dwells"), run.table("history"))
     new, expected, own = fit_in_memory(lot, job.recipe.effects)
     new |= verify_tables(lot, new["coefficients"], new["covariance"], expected, own)
+    names = ("coefficients", "covariance", "verification", "verification_poses")
     # the noise is in µg already, and the response by which it was made so hardly depends on the model
-    names = ("coefficients", "covariance", "wander", "verification", "verification_poses")
-    stated = decision_budget(
-        BudgetTables(
-            lot.dwells, lot.history, *(new[name] for name in names), noise=old["noise"], lot=lot, calibration=own
-        ),
-        job.terms,
-    )
-    evidence = GradeEvidence(
-        old["verdicts"],
-        *(new[name] for name in ("coefficients", "covariance", "residuals", "verification", "verification_poses")),
-        noise=old["noise"],
-        calibration=own,
-        budget=stated,
-    )
+    shared: dict[str, Any] = {**{name: new[name] for name in names}, "noise": old["noise"], "calibration": own}
+    tables = BudgetTables(lot.dwells, lot.history, wander=new["wander"], lot=lot, **shared)
+    stated = decision_budget(tables, job.terms)
+    evidence = GradeEvidence(old["verdicts"], residuals=new["residuals"], budget=stated, **shared)
     new |= grade(evidence, job.limits, job.recipe.zero_output, figures=False)
-    return _side(old, _calibration(old)), _side(new, own)
-
-
-def _calibration(tables: Mapping[str, pd.DataFrame]) -> Calibration | None:
-    """The calibration of a lot; None where no unit was fitted."""
-    return read_calibration(tables["coefficients"], tables["covariance"]) if len(tables["coefficients"]) else None
+    fitted = len(old["coefficients"])  # no unit may have been
+    return _side(old, read_calibration(old["coefficients"], old["covariance"]) if fitted else None), _side(new, own)
 
 
 def _side(tables: Mapping[str, pd.DataFrame], calibration: Calibration | None) -> Side:
-    units, outcome, reasons = (tables["grades"][name].tolist() for name in ("unit", "outcome", "reasons"))
-    return Side(
-        outcome=dict(zip(units, outcome, strict=True)),
-        reasons=dict(zip(units, reasons, strict=True)),
-        fitted=_sums(tables["residuals"], "residual_ug"),
-        verified=_sums(tables["verification"], "error_ug"),
-        calibration=calibration,
-    )
+    units, *columns = (tables["grades"][name].tolist() for name in ("unit", "outcome", "reasons"))
+    outcome, reasons = (dict(zip(units, column, strict=True)) for column in columns)
+    fitted, verified = _sums(tables["residuals"], "residual_ug"), _sums(tables["verification"], "error_ug")
+    return Side(outcome, reasons, fitted, verified, calibration)
 
 
 def _sums(table: pd.DataFrame, column: str) -> Sums:
@@ -150,19 +136,16 @@ def _sums(table: pd.DataFrame, column: str) -> Sums:
 
 def fresh(tasks: Sequence[FreshTask]) -> list[Fresh]:
     """Errors on the fresh dwells of some runs."""
-    return [_fresh(task) for task in tasks]
-
-
-def _fresh(task: FreshTask) -> Fresh:
-    task.change.use()
-    run = Run(Archive(task.archive), task.run)
-    fresh_sums = Fresh(task.run)
-    dwells, history = run.table("dwells"), run.table("history")
-    for units, old, new in task.earlier:
-        for calibration, sums in ((old, fresh_sums.old), (new, fresh_sums.new)):
-            if calibration is not None:
-                sums.update(applied(calibration, units, dwells, history))
-    return fresh_sums
+    found = [Fresh(task.run) for task in tasks]
+    for task, errors in zip(tasks, found, strict=True):
+        task.change.use()
+        run = Run(Archive(task.archive), task.run)
+        dwells, history = run.table("dwells"), run.table("history")
+        for units, *calibrations in task.earlier:
+            for calibration, sums in zip(calibrations, (errors.old, errors.new), strict=True):
+                if calibration is not None:
+                    sums.update(applied(calibration, units, dwells, history))
+    return found
 
 
 def applied(calibration: Calibration, units: Sequence[str], dwells: pd.DataFrame, history: pd.DataFrame) -> Sums:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
+from typing import TypeVar
 
 from inertial.errors import InertialError
 from pipelines.archive import Archive
@@ -36,26 +38,24 @@ def parts(
 
 
 def run_again(part: Batch) -> list[RerunOutcome]:
-    """The outcome of every run of a batch; a run that fails has an error, the others continue."""
-    archive = Archive(part.archive)
-    return [_one(archive, run_id, part) for run_id in part.runs]
-
-
-def _one(archive: Archive, run_id: str, part: Batch) -> RerunOutcome:
-    try:
-        return again(archive, run_id, part.change, report=part.report)
-    except (TumblelineError, InertialError) as problem:
-        return RerunOutcome(run_id, error=str(problem))
+    """The outcome of every run of a batch."""
+    return _each(part, partial(again, change=part.change, report=part.report), RerunOutcome)
 
 
 def checked(part: Batch) -> list[Reproduction]:
     """Whether every run of a batch is reproduced."""
-    archive = Archive(part.archive)
-    return [_check(archive, run_id) for run_id in part.runs]
+    return _each(part, check, Reproduction)
 
 
-def _check(archive: Archive, run_id: str) -> Reproduction:
-    try:
-        return check(archive, run_id)
-    except (TumblelineError, InertialError) as problem:
-        return Reproduction(run_id, error=str(problem))
+Result = TypeVar("Result")
+
+
+def _each(part: Batch, call: Callable[[Archive, str], Result], failed: Callable[..., Result]) -> list[Result]:
+    """What a call makes of every run of a batch; a run that fails has an error, the others continue."""
+    archive, results = Archive(part.archive), list[Result]()
+    for run_id in part.runs:
+        try:
+            results.append(call(archive, run_id))
+        except (TumblelineError, InertialError) as problem:
+            results.append(failed(run_id, error=str(problem)))
+    return results

@@ -11,7 +11,7 @@ from threadpoolctl import threadpool_limits
 from pipelines.archive import Archive, Run, files, parquet
 from pipelines.archive.keys import libraries
 from pipelines.jobs.model_change import ModelChange
-from pipelines.rerun.rerun import raw_samples
+from pipelines.rerun.rerun import has_static_record, raw_samples
 from pipelines.rerun.steps import RAW, StageCall, plan_of
 from schemas import table_check, tables
 from schemas.errors import DataRejected
@@ -53,7 +53,7 @@ def check(archive: Archive, run_id: str) -> Reproduction:
         for step in plan.steps:
             if step.name == "import" or not there.issuperset(step.outputs):
                 continue
-            if not raw and (step.name in {"capture", *RAW[:2]} or (step.name == "noise" and _static(run))):
+            if not raw and (step.name in {"capture", *RAW[:2]} or (step.name == "noise" and has_static_record(run))):
                 result.tables.update(dict.fromkeys(step.outputs, LEFT_OUT))
                 continue
             _changed(run, step, result.changed)
@@ -63,10 +63,6 @@ def check(archive: Archive, run_id: str) -> Reproduction:
             f"run {run_id}: none of its tables can be computed again, at least one is needed; re-run it first"
         )
     return result
-
-
-def _static(run: Run) -> bool:
-    return bool((run.table("readings")["kind"] == "allan").any())
 
 
 def _compare(run: Run, step: StageCall, result: Reproduction) -> None:
@@ -98,8 +94,7 @@ def _difference(before: pd.DataFrame, after: pd.DataFrame) -> str:
         return f"{len(before)} rows are stored, {len(after)} are computed"
     texts = [_of_column(name, before[name], after[name].reset_index(drop=True)) for name in before.columns]
     return (
-        "; ".join(one for one in texts if one)
-        or "the same values in different bytes (another version of the Parquet writer)"
+        "; ".join(filter(None, texts)) or "the same values in different bytes (another version of the Parquet writer)"
     )
 
 

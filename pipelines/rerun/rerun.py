@@ -5,13 +5,13 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass, field
 from functools import cache
-from typing import Any
+from typing import Annotated, Any
 
 from threadpoolctl import ThreadpoolController
 
 from pipelines.archive import Archive, Run, files, stage_key
+from pipelines.archive.keys import provenance
 from pipelines.archive.locks import alone
-from pipelines.archive.provenance import provenance
 from pipelines.archive.run import START
 from pipelines.chain.chain import RECORDS
 from pipelines.jobs.model_change import ModelChange
@@ -27,12 +27,14 @@ samples it reads are not in the archive; worked out."""
 
 @dataclass(frozen=True)
 class RerunOutcome:
-    """What became of one run: its re-run, what had changed, and how every stage came about."""
+    """What became of one run, also in the JSON document: its re-run, what had changed, and how every stage came about."""
 
     run: str
-    new: str = ""
-    because: list[dict[str, str]] = field(default_factory=list)
-    stages: dict[str, str] = field(default_factory=dict)
+    new: Annotated[str, "id of the re-run; the run's own if nothing changed, empty if it failed"] = ""
+    because: Annotated[list[dict[str, str]], "what changed: data, model, limits, code, library"] = field(
+        default_factory=list
+    )
+    stages: Annotated[dict[str, str], "`computed` or `reused` by stage"] = field(default_factory=dict)
     seconds: float = 0.0
     error: str = ""
 
@@ -64,7 +66,7 @@ def again(
                     new.flush()  # a run that was there goes on behind the last stage that was done
         else:
             archive.prepare()
-            new.begin(_about(old, plan, because))
+            new.begin({**provenance(), **plan.about, **old.origin, "because": because})
             stages = _done(old, new, plan, raw=raw)
             with alone(new.path, wait=True):
                 files.sweep(new.path)
@@ -112,6 +114,11 @@ def raw_samples(run: Run) -> bool:
     return False
 
 
+def has_static_record(run: Run) -> bool:
+    """Whether a run has a static record, whose samples its noise is made from."""
+    return bool((run.table("readings")["kind"] == "allan").any())
+
+
 def changes(old: Run, plan: Plan, *, raw: bool) -> list[dict[str, str]]:
     """What a re-run would do otherwise than the run did: by stage, ``code``, ``model``, ``limits`` or another parameter.
 
@@ -124,51 +131,39 @@ def changes(old: Run, plan: Plan, *, raw: bool) -> list[dict[str, str]]:
     for step in plan.steps:
         if step.name == "leave_out":
             named = ", ".join(f"{unit}:{dwell}" for unit, dwell in step.parameters["left_out"])
-            rows.append({"stage": step.name, "what": "dwells left out", "from": "", "to": named})
+            rows.append(_change(step.name, "dwells left out", "", named))
             continue
-        if (
-            not there.issuperset(step.outputs)
-            or step.name in {"capture", "import"}
-            or (step.name in RAW[:2] and not raw)
-        ):
+        kept = step.name in {"capture", "import"} or (step.name in RAW[:2] and not raw)
+        if kept or not there.issuperset(step.outputs):
             continue
         manifest = old.manifest(step.outputs[0])
         if manifest.get("code") != step.code:
-            rows.append({"stage": step.name, "what": "code", "from": str(manifest.get("code", "")), "to": step.code})
+            rows.append(_change(step.name, "code", str(manifest.get("code", "")), step.code))
         before = manifest.get("parameters", {})
         rows += [
-            {
-                "stage": step.name,
-                "what": PARAMETER_TITLES.get(key, key),
-                "from": _short_text(before[key]),
-                "to": _short_text(value),
-            }
+            _change(step.name, PARAMETER_TITLES.get(key, key), _short_text(before[key]), _short_text(value))
             for key, value in step.parameters.items()
             if key in before and before[key] != value
         ]
     whole = {name for step in plan.steps for name in step.outputs}
     if there >= {"dwells"} and not whole <= there and not old.about.get("capture"):
-        rows.append({"stage": "fit", "what": "not fitted yet", "from": "", "to": ""})
+        rows.append(_change("fit", "not fitted yet", "", ""))
     return rows
 
 
-PARAMETER_TITLES = {"effects": "model", "formulas": "model", "lot": "lot", "limits": "limits"}
+PARAMETER_TITLES = {"effects": "model", "formulas": "model"}
+
+
+def _change(stage: str, what: str, before: str, after: str) -> dict[str, str]:
+    return {"stage": stage, "what": what, "from": before, "to": after}
 
 
 def _short_text(value: Any) -> str:
     """A parameter in short."""
     if isinstance(value, dict):
         return str(value.get("name", "")) or "…"
-    return (
-        ", ".join(str(item.get("id", "")) if isinstance(item, dict) else str(item) for item in value)
-        if isinstance(value, list)
-        else str(value)
-    )
-
-
-def _about(old: Run, plan: Plan, because: list[dict[str, str]]) -> dict[str, Any]:
-    """What a re-run is begun with."""
-    return {**provenance(), **plan.about, **old.origin, "because": because}
+    items = value if isinstance(value, list) else [value]
+    return ", ".join(str(item.get("id", "") if isinstance(item, dict) else item) for item in items)
 
 
 class StageRunner:
@@ -218,10 +213,7 @@ class StageRunner:
         return self._records
 
     def _refuse_without_samples(self, step: StageCall) -> None:
-        if step.name != "noise" or self.raw:
-            return
-        readings = self.new.table("readings")
-        if (readings["kind"] == "allan").any():
+        if step.name == "noise" and not self.raw and has_static_record(self.new):
             raise DataRejected(
                 f"run {self.old.id}: its static record is not in the archive, the noise under other coefficients needs it; "
                 "bring the capture's folder back"

@@ -74,13 +74,12 @@ def selected(archive: Archive, words: Sequence[str]) -> list[SelectedRun]:
     """
     known = entries(archive)
     parts = [part.strip() for word in words for part in word.split(",") if part.strip()]
-    filters = [_filter(part) for part in parts if _key(part)]
-    names = [part for part in parts if not _key(part)]
+    filters = [_filter(part) for part in parts if ":" in part]
+    by_name = [part for part in parts if ":" not in part and part != ALL]
     if not known:
         raise WrongUse(
             f"archive {archive.root}: no run exists; make one with 'tumbleline run', or name another archive"
         )
-    by_name = [name for name in names if name != ALL]
     chosen = _named(known, by_name, archive) if by_name else [entry for entry in known if not entry.derived]
     left = [entry for entry in chosen if all(_holds(entry, key, value) for key, value in filters)]
     if not left:
@@ -91,23 +90,14 @@ def selected(archive: Archive, words: Sequence[str]) -> list[SelectedRun]:
     return left
 
 
-def _key(part: str) -> str:
-    """The key of a condition such as ``device:ADXL355``; empty for a name."""
-    key, colon, _ = part.partition(":")
-    if not colon:
-        return ""
+def _filter(part: str) -> tuple[str, Any]:
+    """Key and value of a condition such as ``device:ADXL355``."""
+    key, _, value = part.partition(":")
     if key not in KEYS:
         raise WrongUse(f"selection: '{part}' is not known; {did_you_mean(key, KEYS)}")
-    return key
-
-
-def _filter(part: str) -> tuple[str, Any]:
-    key, _, value = part.partition(":")
     if not value:
         raise WrongUse(f"selection: '{part}' says nothing after the colon, a value is needed; write {key}:VALUE")
-    if key == "since":
-        return key, moment(value, part)
-    return (key, moment(value, part, end=True)) if key == "until" else (key, value)
+    return key, moment(value, part, end=key == "until") if key in {"since", "until"} else value
 
 
 def moment(text: str, where: str, *, end: bool = False) -> datetime:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import pandas as pd
@@ -75,12 +75,8 @@ def archived_job(run: Run, change: ModelChange) -> ArchivedJob:
         raise explain(problem, f"run {run.id}", Recipe) from None
     if change.limits is not None:
         recipe = recipe.model_copy(update={"limits": change.limits_name})
-    run_document = without_provenance(about)
     station = StationConfig.model_construct(**about.get("station", {}))
-    capture = about["capture"]
-    job = ArchivedJob(
-        recipe=recipe, limits=limits, lot=lot, station=station, captured=capture, run_document=run_document
-    )
+    job = ArchivedJob(recipe, limits, lot, station, captured=about["capture"], run_document=without_provenance(about))
     refuse_unknown_effects(recipe.effects, f"run {run.id}")
     refuse_limits_without_figures(limits, recipe)
     return job
@@ -133,17 +129,10 @@ def _captured(run: Run, change: ModelChange) -> Plan:
     job = archived_job(run, change)
     steps = [_capture_step(run, job)]
     for stage in STAGES:
-        call = _called(stage.call, job)
-        steps.append(
-            StageCall(stage.name, stage.inputs, stage.outputs, stage.parameters(job), code_hash(stage.name), call)
-        )
-    code = {stage.name: code_hash(stage.name) for stage in STAGES}
+        parameters, code, call = stage.parameters(job), code_hash(stage.name), partial(stage.call, job)
+        steps.append(StageCall(stage.name, stage.inputs, stage.outputs, parameters, code, call))
     decisive = {key: value for key, value in job.about.items() if key != "station"}
-    return Plan(job.recipe.name, tuple(steps), job.about, {**decisive, "code": code})
-
-
-def _called(call: Callable[[Job, Run], Tables], job: Job) -> Callable[[Run], Tables]:
-    return lambda run: call(job, run)
+    return Plan(job.recipe.name, tuple(steps), job.about, {**decisive, "code": {s.name: s.code for s in steps[1:]}})
 
 
 def _capture_step(run: Run, job: ArchivedJob) -> StageCall:
@@ -170,47 +159,46 @@ def _imported(run: Run, change: ModelChange, left_out: Dwells) -> Plan:
     use_formulas([FormulaSpec.model_validate(f) for f in model["formulas"]], f"run {run.id}")
     refuse_unknown_effects(model["effects"], f"run {run.id}")
     limits = change.limits or (limits_of(about["limits"], UNITS) if about.get("limits") else None)
+    stated = {"limits": limits.model_dump(mode="json") if limits else None}
     steps = [import_step(data, left_out, run), fit_step(model, data), judge_step(model, data), verify_step(data)]
-    terms = archived_terms({**about, "limits": limits.model_dump(mode="json") if limits else about.get("limits")})
+    terms = archived_terms({**about, **(stated if limits else {})})
     steps += [budget_step(terms, data)] if terms else []
     zero = float((about.get("mapping") or {}).get("zero_output", 0.0))
     steps += [grade_step(limits, zero, budgeted=terms is not None)] if limits else []
-    recipe = {**about.get("recipe", {}), "name": "import", **model}
-    recipe |= {"limits": change.limits_name} if change.limits else {}
-    new = {
-        **without_provenance(about),
-        "recipe": recipe,
-        "limits": limits.model_dump(mode="json") if limits else None,
-    }
+    recipe = {**model, **({"limits": change.limits_name} if change.limits else {})}
     hashes = {name: run.manifest(name)["sha256"] for name in data.read()}
     code = {step.name: step.code for step in steps}
-    decisive = {"data": hashes, "model": model, "limits": new["limits"], "code": code}
-    _note_left_out(about, left_out, new, decisive)
-    return Plan("import", tuple(steps), new, decisive)
+    return _import_plan(run, steps, left_out, recipe, stated, {"data": hashes, "model": model, **stated, "code": code})
 
 
 def _in_a_plane(run: Run, change: ModelChange, left_out: Dwells, across: int, data: ImportedData) -> Plan:
     """The fit of a unit that was turned about one of its axes: its default model is of the two axes in the plane."""
-    about, axis = run.about, AXES[across]
+    axis = AXES[across]
     if change.limits is not None:
         raise WrongUse(
             f"run {run.id}: turned about {axis} alone, limits need the scale of {axis} too; measure other orientations, or fit "
             "without limits"
         )
-    steps = (import_step(data, left_out, run), plane_step(across, data.gravity))
-    recipe = {**about.get("recipe", {}), "name": "import"}
-    new: dict[str, Any] = {**without_provenance(about), "recipe": recipe, "plane_across": axis}
+    steps = [import_step(data, left_out, run), plane_step(across, data.gravity)]
     hashes = {"dwells": run.manifest("dwells")["sha256"]}
-    decisive: dict[str, Any] = {"data": hashes, "plane": axis, "code": steps[1].code}
-    _note_left_out(about, left_out, new, decisive)
-    return Plan("import", steps, new, decisive)
+    depends = {"data": hashes, "plane": axis, "code": steps[1].code}
+    return _import_plan(run, steps, left_out, {}, {"plane_across": axis}, depends)
 
 
-def _note_left_out(about: dict[str, Any], left_out: Dwells, new: dict[str, Any], decisive: dict[str, Any]) -> None:
-    """Adds the dwells that are left out to what a run is kept with and to what its result depends on."""
-    if left_out:
-        named = [f"{unit}:{dwell}" for unit, dwell in left_out]
-        decisive["left_out"] = new["left_out"] = [*about.get("left_out", []), *named]
+def _import_plan(
+    run: Run,
+    steps: list[StageCall],
+    left_out: Dwells,
+    recipe: dict[str, Any],
+    more: dict[str, Any],
+    depends: dict[str, Any],
+) -> Plan:
+    """The plan of an import: what it is kept with, and what its result depends on, have the dwells that are left out."""
+    about = run.about
+    named = [f"{unit}:{dwell}" for unit, dwell in left_out]
+    noted = {"left_out": [*about.get("left_out", []), *named]} if left_out else {}
+    kept = {"recipe": {**about.get("recipe", {}), "name": "import", **recipe}, **more}
+    return Plan("import", tuple(steps), {**without_provenance(about), **kept, **noted}, {**depends, **noted})
 
 
 def _fit_for_a_fit(run: Run) -> pd.DataFrame:

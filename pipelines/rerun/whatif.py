@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from pipelines.jobs.model_change import ModelChange
 from pipelines.jobs.releases import keep_evidence
 from pipelines.parallel import Distributor, map_partitions
 from pipelines.rerun import lot_comparison
-from pipelines.rerun.lot_comparison import Fresh, FreshTask, LotComparison, Side, Sums
+from pipelines.rerun.lot_comparison import Fresh, FreshTask, LotComparison, Sums
 from pipelines.rerun.partition import parts
 
 FALLS = 0.005
@@ -46,7 +47,7 @@ def evaluated(
     report_progress("lots with both models")
     batches = parts(archive, list(runs), change, workers)
     portions = map_partitions(lot_comparison.judged, batches, distribute, workers=workers, name="what if")
-    lots = [one for portion in portions for one in portion]
+    lots = list(chain.from_iterable(portions))
     report_progress("later runs of the same units")
     tasks = fresh_tasks(lots, archive.address, change)
     size = max(1, -(-len(tasks) // (4 * workers)))
@@ -57,7 +58,7 @@ def evaluated(
         "version": change.model_version,
         "effects": list(change.effects or ()),
         "limits": change.limits_name or "as each lot had them",
-        **summary(lots, [one for chunk in done for one in chunk]),
+        **summary(lots, list(chain.from_iterable(done))),
     }
     document["evidence"] = keep_evidence(archive, change, document, list(runs))
     return document
@@ -67,34 +68,26 @@ def fresh_tasks(lots: Sequence[LotComparison], archive: str, change: ModelChange
     """For every run, the calibrations from the previous run of each of its units."""
     last: dict[str, LotComparison] = {}
     tasks: list[FreshTask] = []
-    for judged in lots:
-        if judged.old is None or judged.new is None:
-            continue
+    by_run = {judged.entry.id: judged for judged in lots}
+    for judged in (one for one in lots if one.sides):
         earlier: dict[str, list[str]] = defaultdict(list)
-        runs = {before.entry.id: before for before in last.values()}
-        for unit in judged.new.fitted:
-            if unit in last and not _same_data(last[unit], judged):
+        capture = judged.entry.capture
+        for unit in judged.sides[1].fitted:
+            # the dwells of a run are not fresh for another one of the same capture
+            if unit in last and not (capture and last[unit].entry.capture == capture):
                 earlier[last[unit].entry.id].append(unit)
             last[unit] = judged
-        pairs = tuple((tuple(units), *_calibrations(runs[run])) for run, units in earlier.items())
-        if pairs:
+        if earlier:
+            old, new = ([by_run[run].sides[k].calibration for run in earlier] for k in (0, 1))
+            pairs = tuple(zip(map(tuple, earlier.values()), old, new, strict=True))
             tasks.append(FreshTask(archive, judged.entry.id, change, pairs))
     return tasks
-
-
-def _same_data(one: LotComparison, other: LotComparison) -> bool:
-    """Whether two runs are of one capture: the dwells of one are not fresh for the other."""
-    return bool(one.entry.capture) and one.entry.capture == other.entry.capture
-
-
-def _calibrations(judged: LotComparison) -> tuple[Any, Any]:
-    return (judged.old.calibration if judged.old else None, judged.new.calibration if judged.new else None)
 
 
 def summary(lots: Sequence[LotComparison], later: Sequence[Fresh]) -> dict[str, Any]:
     """The what-if as a document: total, by station and device, changed outcomes, failed lots, and a verdict."""
     by_run = {one.run: one for one in later}
-    whole = [judged for judged in lots if judged.old is not None and judged.new is not None]
+    whole = [judged for judged in lots if judged.sides]
     groups: dict[tuple[str, str], list[LotComparison]] = defaultdict(list)
     for judged in whole:
         groups[judged.entry.station, judged.entry.device].append(judged)
@@ -117,23 +110,20 @@ def summary(lots: Sequence[LotComparison], later: Sequence[Fresh]) -> dict[str, 
 
 def _figures(lots: Sequence[LotComparison], fresh: dict[str, Fresh]) -> dict[str, Any]:
     """Yield and root mean square errors of some lots, each [old, new]."""
-    sides = [[judged.old for judged in lots], [judged.new for judged in lots]]
+    sides = [[judged.sides[k] for judged in lots] for k in (0, 1)]
     again = [fresh[judged.entry.id] for judged in lots if judged.entry.id in fresh]
     on_fresh = [[one.old for one in again], [one.new for one in again]]
-    units = sum(len(side.outcome) for side in sides[0] if side)
+    units = sum(len(side.outcome) for side in sides[0])
+    passed = [sum(list(side.outcome.values()).count("pass") for side in own) for own in sides]
     return {
         "lots": len(lots),
         "units": units,
-        "yield": [_passed(own) / units if units else None for own in sides],
-        "fit_rms_ug": [_rms([side.fitted for side in own if side]) for own in sides],
-        "verification_rms_ug": [_rms([side.verified for side in own if side]) for own in sides],
+        "yield": [count / units if units else None for count in passed],
+        "fit_rms_ug": [_rms([side.fitted for side in own]) for own in sides],
+        "verification_rms_ug": [_rms([side.verified for side in own]) for own in sides],
         "fresh_rms_ug": [_rms(own) for own in on_fresh],
         "fresh_units": sum(len(one) for one in on_fresh[1]),
     }
-
-
-def _passed(sides: Sequence[Side | None]) -> int:
-    return sum(outcome == "pass" for side in sides if side for outcome in side.outcome.values())
 
 
 def _rms(parts: Sequence[Sums]) -> float | None:
@@ -146,16 +136,14 @@ def _flips(lots: Sequence[LotComparison]) -> dict[str, list[dict[str, str]]]:
     """Units that pass with the old model only, and units that pass with the new model only."""
     flips: dict[str, list[dict[str, str]]] = {"to_fail": [], "to_pass": []}
     for judged in lots:
-        if judged.old is None or judged.new is None:
-            continue
-        for unit, before in judged.old.outcome.items():
-            after = judged.new.outcome.get(unit, "")
-            if (before == "pass") == (after == "pass"):
-                continue
-            worse = before == "pass"
-            reasons = (judged.new if worse else judged.old).reasons[unit]
-            row = {"run": judged.entry.id, "unit": unit, "old": before, "new": after, "reasons": reasons}
-            flips["to_fail" if worse else "to_pass"].append(row)
+        old, new = judged.sides
+        for unit, before in old.outcome.items():
+            after = new.outcome.get(unit, "")
+            if (before == "pass") != (after == "pass"):
+                worse = before == "pass"
+                reasons = (new if worse else old).reasons[unit]
+                row = {"run": judged.entry.id, "unit": unit, "old": before, "new": after, "reasons": reasons}
+                flips["to_fail" if worse else "to_pass"].append(row)
     return flips
 
 
@@ -163,9 +151,10 @@ def _verdict(
     total: dict[str, Any], rows: Sequence[dict[str, Any]], lots: Sequence[LotComparison], fresh: dict[str, Fresh]
 ) -> tuple[str, str]:
     """Whether the new model is better, by the errors on data that were not fitted and their scatter over units."""
-    figure, where = _telling(total)
+    figure = next(iter(_known(total)), "")
     if not figure:
         return NOTHING, "no lot has dwells that were not fitted; the models cannot be compared"
+    where = WHERE[figure]
     before, after = total["yield"]
     old, new = total[figure]
     yields = f"the yield from {100.0 * before:.0f} % to {100.0 * after:.0f} %"
@@ -178,13 +167,12 @@ def _verdict(
         return EQUAL, f"{sentence}; {count} cannot show that this is more than scatter, {FEWEST} are needed"
     if not _differs(ratio, LEVEL):
         return EQUAL, f"{sentence}: no more than {count} scatter"
-    hurt = [
-        f"{row['device']} on {row['station']}"
-        for row in rows
-        if figure in _known(row)
-        and _share(row[figure]) > FALLS
-        and _rises(_log_ratios(figure, _of(lots, row), fresh), LEVEL / len(rows))
+    groups = [row for row in rows if figure in _known(row) and _share(row[figure]) > FALLS]
+    own = [
+        [one for one in lots if (one.entry.station, one.entry.device) == (r["station"], r["device"])] for r in groups
     ]
+    rises = [_rises(_log_ratios(figure, one, fresh), LEVEL / len(rows)) for one in own]
+    hurt = [f"{row['device']} on {row['station']}" for row, rise in zip(groups, rises, strict=True) if rise]
     return _decided(_share(total[figure]), float(ratio.mean()), hurt, sentence)
 
 
@@ -199,21 +187,11 @@ def _decided(share: float, mean: float, hurt: Sequence[str], sentence: str) -> t
     return EQUAL, f"{sentence}: the error does not decrease"
 
 
-def _of(lots: Sequence[LotComparison], row: dict[str, Any]) -> list[LotComparison]:
-    """The lots of a group."""
-    return [one for one in lots if (one.entry.station, one.entry.device) == (row["station"], row["device"])]
-
-
-def _pairs(
-    figure: str, lots: Sequence[LotComparison], fresh: dict[str, Fresh]
-) -> Iterator[tuple[lot_comparison.Sums, lot_comparison.Sums]]:
+def _pairs(figure: str, lots: Sequence[LotComparison], fresh: dict[str, Fresh]) -> list[tuple[Sums, Sums]]:
     """Errors of the units of each lot, under the old and the new model."""
-    for one in lots:
-        if figure == "fresh_rms_ug":
-            later = fresh.get(one.entry.id)
-            yield (later.old, later.new) if later else ({}, {})
-        else:
-            yield one.old.verified if one.old else {}, one.new.verified if one.new else {}
+    if figure == "fresh_rms_ug":
+        return [(later.old, later.new) for one in lots if (later := fresh.get(one.entry.id))]
+    return [(old.verified, new.verified) for old, new in (one.sides for one in lots)]
 
 
 def _log_ratios(figure: str, lots: Sequence[LotComparison], fresh: dict[str, Fresh]) -> NDArray[np.float64]:
@@ -247,16 +225,12 @@ def _rises(ratios: NDArray[np.float64], level: float) -> bool:
     return bool(ratios.size >= FEWEST and ratios.mean() > 0.0 and _differs(ratios, level))
 
 
-def _telling(total: dict[str, Any]) -> tuple[str, str]:
-    known = _known(total)
-    if "fresh_rms_ug" in known:
-        return "fresh_rms_ug", "on later runs"
-    return ("verification_rms_ug", "in poses that were not fitted") if "verification_rms_ug" in known else ("", "")
+WHERE = {"fresh_rms_ug": "on later runs", "verification_rms_ug": "in poses that were not fitted"}
+"""Errors on data that were not fitted, by which a model is judged, the more telling first."""
 
 
 def _known(row: dict[str, Any]) -> list[str]:
-    names = ("fresh_rms_ug", "verification_rms_ug")
-    return [name for name in names if None not in row[name] and row[name][0]]
+    return [name for name in WHERE if None not in row[name] and row[name][0]]
 
 
 def _share(pair: Sequence[float]) -> float:

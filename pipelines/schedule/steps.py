@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 from pipelines.procedures import PROCEDURES, Part, ProcedureStep, parts_of
 from schemas.poses import Pose
 from schemas.recipe import Recipe
 
 Kind = Literal["dwell", "verification", "allan", "procedure"]
+ALIKE = ("kind", "pose", "wait_s", "settled", "off_s", "lasting_s", "rate_hz")
+"""What a step has of the step of its procedure."""
 
 
 @dataclass(frozen=True)
@@ -58,20 +60,8 @@ def steps(recipe: Recipe) -> list[Step]:
         same = bool(records and own) and records[-1].temperature == own[0].temperature_C and own[0].settled
         first = (records[-1].soak + (0 if same else 1)) if records else 0
         for one in own:
-            records.append(
-                Step(
-                    len(records),
-                    one.kind,
-                    first + one.soak - own[0].soak,
-                    one.temperature_C,
-                    one.pose,
-                    one.wait_s,
-                    one.settled,
-                    one.off_s,
-                    number if recipe.procedures else None,
-                    one.lasting_s,
-                    one.rate_hz,
-                    one if recipe.procedures else None,
-                )
-            )
+            own_values: dict[str, Any] = {name: getattr(one, name) for name in ALIKE}
+            own_values |= {"procedure": number, "order": one} if recipe.procedures else {}
+            soak = first + one.soak - own[0].soak
+            records.append(Step(len(records), soak=soak, temperature=one.temperature_C, **own_values))
     return records

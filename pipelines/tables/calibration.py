@@ -53,17 +53,16 @@ class Calibration:
 
     def value(self, effect: str) -> NDArray[np.float64]:
         """Coefficients of one effect, (units, 3, columns of the effect)."""
-        return np.stack(
-            [self.coefficients[:, axis, self._where(effect, axis)] for axis in range(len(self.axes))], axis=1
-        )
+        return self._of(effect, self.coefficients)
 
     def standard_error(self, effect: str) -> NDArray[np.float64]:
         """Standard errors of one effect's coefficients, (units, 3, columns of the effect)."""
-        errors = np.sqrt(np.diagonal(self.covariance, axis1=-2, axis2=-1))
-        return np.stack([errors[:, axis, self._where(effect, axis)] for axis in range(len(self.axes))], axis=1)
+        return self._of(effect, np.sqrt(np.diagonal(self.covariance, axis1=-2, axis2=-1)))
 
-    def _where(self, effect: str, axis: int) -> list[int]:
-        return [column for column, (name, _) in enumerate(self.names[axis]) if name == effect]
+    def _of(self, effect: str, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The columns of one effect, of values (units, 3, p)."""
+        own = [[column for column, (name, _) in enumerate(names) if name == effect] for names in self.names]
+        return np.stack([values[:, axis, columns] for axis, columns in enumerate(own)], axis=1)
 
 
 def column_names(
@@ -253,9 +252,11 @@ def unit_texts(effect: SensorEffect, out_unit: str) -> tuple[str, ...]:
         return tuple(_per(out_unit, below) for below in effect.per)
     if effect.nonlinear or effect.id.startswith("covariate:"):
         return (out_unit,) * len(effect.names(0))
-    base, by_force, by_theta = columns(1.0, 1.0)[0], columns(2.0, 1.0)[0], columns(1.0, 2.0)[0]
+    base, *doubled = columns(1.0, 1.0)[0], columns(2.0, 1.0)[0], columns(1.0, 2.0)[0]
+    degrees = [[_degree(*values) for values in zip(base, other, strict=True)] for other in doubled]
     return tuple(
-        _unit_text(out_unit, _degree(base[c], by_force[c]), _degree(base[c], by_theta[c])) for c in range(base.size)
+        _per(out_unit, "·".join(name + _POWERS[degree] for name, degree in zip("gK", own, strict=True) if degree > 0))
+        for own in zip(*degrees, strict=True)
     )
 
 
@@ -264,12 +265,6 @@ def _degree(base: float, doubled: float) -> int:
         return 0
     degree = np.log2(doubled / base)
     return round(degree) if abs(degree - round(degree)) < 1e-6 else 0
-
-
-def _unit_text(out_unit: str, force: int, theta: int) -> str:
-    return _per(
-        out_unit, "·".join(name + _POWERS[degree] for name, degree in (("g", force), ("K", theta)) if degree > 0)
-    )
 
 
 def _per(out_unit: str, below: str) -> str:

@@ -177,9 +177,7 @@ def lot_arrays(
 
 
 def _stated_unit(dwells: pd.DataFrame) -> str | None:
-    if "out_unit" not in dwells.columns:
-        return None
-    stated = dwells["out_unit"].dropna().astype(str).unique()
+    stated = dwells["out_unit"].dropna().astype(str).unique() if "out_unit" in dwells.columns else ()
     return str(stated[0]) if len(stated) == 1 else None
 
 

@@ -37,9 +37,8 @@ class ByUnit:
     def column(self, name: str) -> NDArray[Any]:
         """A column of the table, (rows,)."""
         if name not in self._columns:
-            self._columns[name] = np.ascontiguousarray(
-                self._table[name].to_numpy()
-            )  # slices of a contiguous array are fast
+            # slices of a contiguous array are fast
+            self._columns[name] = np.ascontiguousarray(self._table[name].to_numpy())
         return self._columns[name]
 
     def of(self, unit: str) -> UnitRows:

@@ -29,10 +29,7 @@ _ONE_POSE = 0.15
 _FAR = 8.0
 """Robust standard deviations beyond which a dwell takes no part in finding the point of expansion."""
 
-_SPARE, _ROUNDS = (
-    6,
-    4,
-)  # degrees of freedom from which on single dwells are judged, and turns of leaving some out
+_SPARE, _ROUNDS = 6, 4  # degrees of freedom from which on single dwells are judged, and turns of leaving some out
 _WHITE_RANGE = 20.0
 """Factor about the median beyond which a white standard error is taken for a slip: weights must not follow it."""
 
@@ -85,8 +82,7 @@ def expansion(readings: Readings, unit: int, *, shape: Shape = "nine") -> Ellips
     heat = _heat(readings, unit, kept)
     warm = heat is not None and float(np.ptp(heat)) > WARM and shape == "nine"
     unknowns = {"six": 6, "nine": 9}[shape] + (3 if warm else 0)
-    if warm and int(kept.sum()) <= unknowns + _SPARE:
-        warm = False
+    warm = warm and int(kept.sum()) > unknowns + _SPARE
     try:
         fit = _fitted(readings, unit, kept, shape, warm=warm)
     except NotIdentified:

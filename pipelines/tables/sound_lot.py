@@ -56,11 +56,8 @@ def sound_lot(
     try:
         # two threads on small matrices wait for each other: on a busy machine it takes sixty times as long
         with threadpool_limits(1):
-            return (
-                measurement,
-                faults,
-                lot_of(measurement.pick(sound) if blocked else measurement, square="misalignment" not in effects),
-            )
+            picked = measurement.pick(sound) if blocked else measurement
+            return measurement, faults, lot_of(picked, square="misalignment" not in effects)
     except InertialError as problem:
         raise DataRejected(str(problem)) from None
 
@@ -88,9 +85,8 @@ def gaps(measurement: Measured, faults: Sequence[Fault], left_out: Collection[st
             parts.append(f"{unit} {len(numbers)} ({shown})")
     if not parts:
         return []
-    text = ", ".join(parts[:_SHOWN]) + (
-        f" and {number_of(len(parts) - _SHOWN, 'more unit')}" if len(parts) > _SHOWN else ""
-    )
+    more = f" and {number_of(len(parts) - _SHOWN, 'more unit')}" if len(parts) > _SHOWN else ""
+    text = ", ".join(parts[:_SHOWN]) + more
     return [f"of {len(measurement.dwells)} dwells of the lot are missing: {text}; these units are judged by the others"]
 
 

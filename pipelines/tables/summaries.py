@@ -9,17 +9,18 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from pipelines.tables.frames import empty_table
 from pipelines.tables.samples import by_record
 from schemas.units import AXES
 
 Array = NDArray[np.float64]
 
 MEANS, SPREADS, LOWS, HIGHS = (tuple(f"{name}_{axis}" for axis in AXES) for name in ("out", "sd", "low", "high"))
-NUMBERS = (*MEANS, *SPREADS, *LOWS, *HIGHS, "wild_value")
+NUMBERS = " ".join((*MEANS, *SPREADS, *LOWS, *HIGHS, "wild_value"))
 OUTLIER_SIGMA = 20.0
 OUTLIER_PART = 1e-3  # of the full scale: a smaller outlier changes a mean of a hundred samples by at most 1e-5 of it
 FEWEST_FOR_OUTLIERS = 20
-WHOLE = ("record", "n", "wild_count", "wild_axis", "wild_row", "clipped", "clipped_axis")
+WHOLE = "record n wild_count wild_axis wild_row clipped clipped_axis"
 
 
 def summarised(samples: Iterable[pd.DataFrame], readings: pd.DataFrame, zero_output: float = 0.0) -> pd.DataFrame:
@@ -38,11 +39,7 @@ def summarised(samples: Iterable[pd.DataFrame], readings: pd.DataFrame, zero_out
     """
     full = readings[readings["status"] == "ok"].set_index(["record", "unit"])["full_scale"]
     rows = [row for record, tables in by_record(samples) for row in _of_record(record, tables, full, zero_output)]
-    if not rows:
-        texts = {name: pd.Series([], dtype="str") for name in ("unit", "kind")}
-        numbers = {name: pd.Series([], dtype=np.float64) for name in NUMBERS}
-        return pd.DataFrame(texts | {name: pd.Series([], dtype=np.int64) for name in WHOLE} | numbers)
-    return pd.DataFrame(rows)
+    return pd.DataFrame(rows) if rows else empty_table(texts="unit kind", numbers=NUMBERS, whole=WHOLE)
 
 
 def unit_means(table: pd.DataFrame) -> dict[str, Array]:
@@ -57,11 +54,9 @@ def _of_record(
     """The rows of one record, from all of its tables."""
     known: dict[str, dict[str, Any]] = {}
     for table in tables:
-        kind = str(table["kind"].iloc[0])
         for unit, part in _parts(table, record, full, zero_output):
-            known[unit] = (
-                _joined(known[unit], part) if unit in known else {"unit": unit, "record": record, "kind": kind} | part
-            )
+            head = {"unit": unit, "record": record, "kind": str(table["kind"].iloc[0])}
+            known[unit] = _joined(known[unit], part) if unit in known else head | part
     for row in known.values():
         flat = {name: value for name, value in row.items() if not isinstance(value, np.ndarray)}
         columns = zip((MEANS, SPREADS, LOWS, HIGHS), ("mean", "sd", "low", "high"), strict=True)

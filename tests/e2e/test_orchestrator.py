@@ -23,7 +23,7 @@ from root_process import ROOT, python
 
 from pipelines.doctor.orchestrator import orchestrator_checks
 from pipelines.orchestrator.credentials import REFUSED
-from pipelines.orchestrator.server_check import check_server
+from pipelines.orchestrator.settings import check_server
 from pipelines.serving.connections import MOST
 from schemas.errors import LinkLost
 

@@ -15,8 +15,7 @@ from root_process import ROOT
 
 from pipelines.flows.deploy import register
 from pipelines.monitoring.queue_numbers import read_queues
-from pipelines.orchestrator.dead_runs import LOST_S, WORKER, LostRuns
-from pipelines.orchestrator.heartbeat import have_automation
+from pipelines.orchestrator.dead_runs import LOST_S, WORKER, LostRuns, have_automation
 from pipelines.orchestrator.queue_rules import CONTINUED_WITHIN, SETTLED, apply_rules, newer_run
 
 QUEUE, DAILY_QUEUE = "line-7", "line-8"

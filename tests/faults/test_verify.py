@@ -18,7 +18,8 @@ from pipelines.chain.certify import certify
 from pipelines.chain.chain import ORDER
 from pipelines.chain.runner import Runner
 from pipelines.cli import app
-from pipelines.integrity import Report, captures, seals, verify
+from pipelines.integrity import Report, seals, verify
+from pipelines.integrity import runs as run_checks
 from pipelines.integrity.findings import VerifiedPart
 from schemas.errors import ArchiveUnusable, WrongUse
 from schemas.event import Event
@@ -438,14 +439,14 @@ def test_a_record_that_is_stored_during_the_check_is_no_finding(
 ) -> None:
     monkeypatch.setenv(VARIABLE, "")
     measured_on(tmp_path, 4)
-    real, looks = captures._check_state, []
+    real, looks = run_checks._check_state, []
 
     def meanwhile(path: Path, last: tuple, checked: VerifiedPart) -> None:
         looks.append(last[2].name)
         measured_on(tmp_path, 1)  # drops the state that the record of this look refers to
         real(path, last, checked)
 
-    monkeypatch.setattr(captures, "_check_state", meanwhile)
+    monkeypatch.setattr(run_checks, "_check_state", meanwhile)
     assert verify(Archive(tmp_path / "archive"), keys={}).checked.findings == []
     assert looks == ["00003", "00004"]
 

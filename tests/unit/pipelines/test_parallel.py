@@ -68,7 +68,7 @@ def test_a_cluster_at_an_address_gives_the_same_results(tmp_path) -> None:
 
 @pytest.mark.slow
 def test_says_that_no_scheduler_answers(tmp_path, monkeypatch) -> None:
-    monkeypatch.setattr("pipelines.flows.dask.CONNECT_S", 1)
+    monkeypatch.setattr("pipelines.flows.dask_cluster.CONNECT_S", 1)
     with pytest.raises(LinkLost, match="no Dask scheduler answers"):
         map_partitions(square, [1], on_dask("tcp://127.0.0.1:9", home=tmp_path))
 

@@ -28,8 +28,7 @@ from pipelines.monitoring.archive_numbers import ArchiveNumbers, ArchiveReader, 
 from pipelines.monitoring.exposition import text
 from pipelines.monitoring.queue_numbers import OpenRun, QueueNumbers
 from pipelines.monitoring.service import alerting, application
-from pipelines.monitoring.snapshot import Monitor, Snapshot
-from pipelines.monitoring.station_numbers import StationNumbers, read_stations
+from pipelines.monitoring.snapshot import Monitor, Snapshot, StationNumbers, read_stations
 from schemas.errors import WrongUse
 from schemas.log_lines import log_line
 from stations.safety.lease_files import lease_file, new_holder, write_holder
@@ -46,7 +45,8 @@ def run(state: str, minutes_ago: float, name: str = "a-run", message: str = "", 
 
 def full(**changes: object) -> Snapshot:
     """A snapshot in which every family has a sample; its names need escapes."""
-    numbers = ArchiveNumbers({('st "1"\\x', "line\nsix"): LineNumbers(3, 1, 20, 4, NOW, 7200.0, 2, 60.0, 1, 1)})
+    times = Counter({"station_s": 7200.0, "pauses": 2, "paused_s": 60.0, "repeated": 1, "door": 1})
+    numbers = ArchiveNumbers({('st "1"\\x', "line\nsix"): LineNumbers(3, 1, 20, 4, NOW, times)})
     numbers.free_bytes, numbers.certified, numbers.due = 10**11, 24, {0: 2, 30: 5}
     queues = QueueNumbers([run("RUNNING", 20)], [], {"line-1": False}, {"line-1 on host": True})
     stations = StationNumbers({"line-1"}, {}, Counter({("line-1", "watchdog_safe"): 2}))
@@ -118,7 +118,7 @@ def test_the_numbers_of_an_archive_are_those_of_its_tables(tmp_path: Path) -> No
     assert (line.finished, line.unfinished) == (1, 0)
     assert (line.passed, line.failed) == ((grades == "pass").sum(), (grades != "pass").sum())
     assert line.failed >= 1
-    assert line.station_s == pytest.approx(made.table("dwells")["time_s"].max())
+    assert line.times["station_s"] == pytest.approx(made.table("dwells")["time_s"].max())
     assert numbers.unsealed == 0
     (made.path / "sealed.json").unlink()
     again = ArchiveReader(Archive(tmp_path / "archive"), 30).read(datetime.now(UTC) + timedelta(hours=2))
