@@ -17,7 +17,7 @@ from typing import Any
 
 import yaml
 
-from pipelines.orchestrator.credentials import refuse_credentials
+from pipelines.orchestrator.archive_address import refuse_credentials
 from pipelines.orchestrator.policy import policy_of
 from pipelines.orchestrator.settings import CLIENT_KEY, check_server, use_key
 from schemas.errors import TumblelineError
@@ -42,8 +42,6 @@ def register(path: Path) -> list[str]:
     for item in content["deployments"]:
         refuse_credentials(item["parameters"].get("archive"))
         policy_of(item["name"], item.get("policy"))
-    for pool in {item["work_pool"]["name"]: None for item in content["deployments"]}:
-        _have_pool(pool)
     for item in content["deployments"]:
         _have_queue(item["work_pool"]["name"], item["work_pool"]["work_queue_name"])
     names = [_register(item) for item in content["deployments"]]
@@ -53,8 +51,8 @@ def register(path: Path) -> list[str]:
     return names
 
 
-def _have_pool(name: str) -> None:
-    """Make a pool of processes unless it exists."""
+def _have_queue(pool: str, name: str) -> None:
+    """Make a pool of processes unless it exists, and a queue in it with one run at a time; an existing queue is changed."""
     from prefect.client.orchestration import get_client
     from prefect.client.schemas.actions import WorkPoolCreate
     from prefect.exceptions import ObjectNotFound
@@ -62,18 +60,10 @@ def _have_pool(name: str) -> None:
 
     with get_client(sync_client=True) as client:
         try:
-            client.read_work_pool(name)
+            client.read_work_pool(pool)
         except ObjectNotFound:
             template = ProcessWorker.get_default_base_job_template()
-            client.create_work_pool(WorkPoolCreate(name=name, type=ProcessWorker.type, base_job_template=template))
-
-
-def _have_queue(pool: str, name: str) -> None:
-    """Make a queue with one run at a time; an existing queue is changed."""
-    from prefect.client.orchestration import get_client
-    from prefect.exceptions import ObjectNotFound
-
-    with get_client(sync_client=True) as client:
+            client.create_work_pool(WorkPoolCreate(name=pool, type=ProcessWorker.type, base_job_template=template))
         try:
             queue = client.read_work_queue_by_name(name, work_pool_name=pool)
         except ObjectNotFound:

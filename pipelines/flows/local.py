@@ -24,7 +24,7 @@ from pipelines.chain.attendance import Operator
 from pipelines.chain.chain import BY_NAME, ORDER
 from pipelines.chain.runner import Done
 from pipelines.jobs.job import Job, Request
-from pipelines.orchestrator.credentials import without_credentials
+from pipelines.orchestrator.archive_address import named, without_credentials
 from pipelines.orchestrator.server import ADDRESS, CLIENTS, START_LOCK, private_folder, quick_imports
 from pipelines.orchestrator.settings import (
     CLIENT_KEY,
@@ -87,7 +87,6 @@ def flow_run(archive: Archive, name: str, meanwhile: Callable[[], None] = lambda
     """A block for one flow run of a name, with the address by which it finds an archive; its history is complete at the end."""
     with reached(archive, meanwhile):
         from pipelines.flows.calibrate import settle_history
-        from pipelines.orchestrator.archive_address import named
         from pipelines.orchestrator.dead_runs import close_dead_runs
 
         close_dead_runs(name)

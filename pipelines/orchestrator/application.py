@@ -16,7 +16,7 @@ from starlette.middleware.trustedhost import TrustedHostMiddleware
 from starlette.responses import JSONResponse, PlainTextResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from pipelines.orchestrator.credentials import REFUSED, credentials_in
+from pipelines.orchestrator.archive_address import REFUSED, credentials_in
 
 STORED = ("/api/flow_runs/", "/api/deployments/")
 """Addresses that receive parameters of flows."""

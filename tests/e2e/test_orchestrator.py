@@ -22,7 +22,7 @@ from orchestrator import Orchestrator, served
 from root_process import ROOT, python
 
 from pipelines.doctor.orchestrator import orchestrator_checks
-from pipelines.orchestrator.credentials import REFUSED
+from pipelines.orchestrator.archive_address import REFUSED
 from pipelines.orchestrator.settings import check_server
 from pipelines.serving.connections import MOST
 from schemas.errors import LinkLost

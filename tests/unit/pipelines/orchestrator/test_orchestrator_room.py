@@ -10,8 +10,13 @@ from hypothesis import strategies as st
 from root_process import ROOT
 
 from pipelines.archive import Archive
-from pipelines.orchestrator.archive_address import archive_of, named
-from pipelines.orchestrator.credentials import credentials_in, refuse_credentials, without_credentials
+from pipelines.orchestrator.archive_address import (
+    archive_of,
+    credentials_in,
+    named,
+    refuse_credentials,
+    without_credentials,
+)
 from pipelines.orchestrator.policy import CHOICES, Policy, policy_of, policy_of_tags
 from pipelines.orchestrator.server import quick_imports
 from schemas.errors import WrongUse
