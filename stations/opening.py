@@ -19,12 +19,11 @@ from schemas.station_devices import Device
 from stations.clock import Clock, WallClock
 from stations.devices.adapters import axis_adapter, chamber_adapter, equipment_adapter
 from stations.devices.axis import TableAxis
-from stations.devices.commands import Commands
+from stations.devices.commands import Commands, Values
 from stations.devices.reader import Reader
 from stations.devices.registers import Registers
 from stations.devices.slot import Slot
 from stations.devices.table import TiltTable
-from stations.devices.values import Values
 from stations.links.gate import Permit
 from stations.links.making import Links
 from stations.links.recorder import RecordedClock
@@ -79,7 +78,7 @@ def open_station(
         try:
             yield station
         except StationError:
-            protection.held()  # what a run finds at a station that it has lost is not why it ends
+            protection.leases.require()  # what a run finds at a station that it has lost is not why it ends
             raise
         finally:
             protection.leave(station.make_safe)
@@ -94,8 +93,10 @@ def open_devices(
     roles: Sequence[str] = (),
 ) -> Generator[Station]:
     """The devices of a station of hardware; without ``protection`` to look at them, or to make them safe."""
-    permit = None if protection is None else Permit(protection, config.link.timeout_s)
-    require = nobody_else if protection is None else protection.require
+    permit, require = None, nobody_else
+    if protection is not None:
+        permit = Permit(protection.leases.alive, protection.leases.require, config.link.timeout_s)
+        require = protection.require
     links, clock = Links(config, permit=permit), WallClock(resume, config.link.speed)
     try:
         yield replace(_assemble(config, slots, links, clock, roles), state=clock.state, exact=False, require=require)

@@ -12,8 +12,8 @@ from stations.codec import Value
 from stations.devices.adapters import axis_adapter, chamber_adapter
 from stations.devices.axis import TableAxis
 from stations.devices.chamber import ThermalChamber
+from stations.devices.commands import Values
 from stations.devices.registers import Registers
-from stations.devices.values import Values
 from stations.recordings.decoding import told
 
 SPEED_DEG_S = 1.0

@@ -141,26 +141,11 @@ class BringUp:
         beat = threading.Thread(target=_beat, args=(leases, stop), name="heartbeat", daemon=True)
         beat.start()
         try:
-            yield Permit(_Held(leases), self.timeout_s * 2.0)
+            yield Permit(leases.alive, leases.require, self.timeout_s * 2.0)
         finally:
             stop.set()
             beat.join()
             leases.release()
-
-
-@dataclass(frozen=True)
-class _Held:
-    """The lease as the gate asks for it."""
-
-    leases: Leases
-
-    def alive(self) -> None:
-        """Checks the age of the heartbeat."""
-        self.leases.alive()
-
-    def held(self) -> None:
-        """Checks heartbeat and files."""
-        self.leases.require()
 
 
 def _beat(leases: Leases, stop: threading.Event) -> None:

@@ -11,8 +11,8 @@ from stations.bringup.person import Findings, Person, Point
 from stations.bringup.plausible import plausible
 from stations.bringup.target import Target
 from stations.codec import Value
+from stations.devices.commands import Values
 from stations.devices.registers import Registers
-from stations.devices.values import Values
 from stations.recordings.decoding import told
 
 PANEL = ("temperature", "set_point", "feedback_position", "humidity")

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from schemas.errors import RecipeInvalid, WrongUse
 from schemas.profile import TEXT_CARRIERS, Profile, WordOrder
 from schemas.station_devices import Device
-from stations.devices.commands import Commands
+from stations.devices.commands import Commands, Values
 from stations.devices.registers import Registers
-from stations.devices.values import Values
 from stations.links.making import SingleLink
 
 NAME = "device"

@@ -8,7 +8,7 @@ from abc import ABC, abstractmethod
 from typing import ClassVar
 
 from schemas.errors import LinkLost, OperatorNeeded, StationRefused, StationTimeout
-from stations.devices.values import Values
+from stations.devices.commands import Values
 
 READ_BACK_K = 1e-3
 AUTOMATIC = "automatic"

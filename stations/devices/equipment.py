@@ -8,8 +8,8 @@ from typing import ClassVar
 from schemas.errors import StationRefused, StationTimeout
 from stations.clock import Clock
 from stations.codec import Value
+from stations.devices.commands import Values
 from stations.devices.recording import STANDARD_GRAVITY, Recording, RecordingSpoilt, read_recording
-from stations.devices.values import Values
 
 
 class Equipment(ABC):

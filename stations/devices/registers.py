@@ -7,13 +7,13 @@ from schemas.errors import LinkLost, StationRefused, StationTimeout
 from schemas.profile import Profile, Register, Space
 from stations.clock import steady
 from stations.codec import NotEncodable, Value, decode, encode, named
-from stations.links.link import Link
+from stations.links.gate import GatedLink
 
 
 class Registers:
     """Reads and writes of one device; ``name`` is its name in messages."""
 
-    def __init__(self, name: str, link: Link, device_id: int, profile: Profile) -> None:
+    def __init__(self, name: str, link: GatedLink, device_id: int, profile: Profile) -> None:
         self.name = name
         self.profile = profile
         self._link = link

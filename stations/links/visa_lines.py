@@ -29,7 +29,7 @@ class VisaLines:
 
     def exchange(self, line: str, what: str, before: Callable[[], None] | None = None) -> str:
         """The answer to a line."""
-        pyvisa = self._library()
+        pyvisa = self._pyvisa = self._pyvisa or library("pyvisa", "visa", NEEDED)
         try:
             session = self._opened(pyvisa)
             if before is not None:
@@ -42,12 +42,8 @@ class VisaLines:
             if problem.error_code == pyvisa.constants.StatusCode.error_timeout:
                 raise Silence from None
             raise Broken(str(problem.description or problem)) from None
-        except (
-            pyvisa.errors.Error,
-            OSError,
-            ValueError,
-            UserWarning,
-        ) as problem:  # an unknown resource, a back end without its library
+        # an unknown resource, a back end without its library
+        except (pyvisa.errors.Error, OSError, ValueError, UserWarning) as problem:
             self.close()
             raise Broken(str(problem)) from None
 
@@ -61,11 +57,6 @@ class VisaLines:
                 except (pyvisa.errors.Error, OSError):  # it is gone already
                     continue
         self._session = self._manager = None
-
-    def _library(self) -> Any:
-        if self._pyvisa is None:
-            self._pyvisa = library("pyvisa", "visa", NEEDED)
-        return self._pyvisa
 
     def _opened(self, pyvisa: Any) -> Any:
         if self._session is None:

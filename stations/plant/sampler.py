@@ -1,32 +1,17 @@
 """Sampling of the reader: one clock for all slots, a ring buffer of packed samples per slot."""
 
-from typing import Protocol
-
 import numpy as np
-from numpy.typing import NDArray
 
-from stations.codec import WORDS_PER_SAMPLE, Counts, Packing, pack_samples
+from stations.codec import WORDS_PER_SAMPLE, Packing, pack_samples
+from stations.plant.physics import Physics
 
-Array = NDArray[np.float64]
 CHUNK = 1024
-
-
-class SampleSource(Protocol):
-    """Source of the samples."""
-
-    def begin(self, start: float, rate: float) -> None:
-        """Sampling starts at ``start`` s with ``rate`` Hz; the first sample is one period later."""
-        ...
-
-    def samples(self, time: Array, rate: float) -> Counts:
-        """Counts (n, s, 3) at the next instants ``time`` (n,), s."""
-        ...
 
 
 class Sampler:
     """Ring buffers of ``registers`` words, filled as the time of the plant advances."""
 
-    def __init__(self, source: SampleSource, units: int, packing: Packing, registers: int) -> None:
+    def __init__(self, source: Physics, units: int, packing: Packing, registers: int) -> None:
         self._source = source
         self.packing: Packing = packing
         self._words = WORDS_PER_SAMPLE[packing]

@@ -25,14 +25,6 @@ class Protection:
     watchdog: Watchdog
     safe: bool = field(init=False, default=False)
 
-    def alive(self) -> None:
-        """Refuses a reading where this run has lost its leases by missed heartbeats."""
-        self.leases.alive()
-
-    def held(self) -> None:
-        """Refuses a command where the leases are no longer this run's."""
-        self.leases.require()
-
     def require(self) -> None:
         """Refuses to continue without the leases or without a watchdog."""
         self.leases.require()

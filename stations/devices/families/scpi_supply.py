@@ -4,8 +4,8 @@ from typing import ClassVar
 
 from schemas.errors import OperatorNeeded, StationRefused
 from stations.clock import Clock
+from stations.devices.commands import Values
 from stations.devices.equipment import Equipment
-from stations.devices.values import Values
 
 NOMINAL = 1.0  # the memory that holds the nominal setting
 SETTLE_S = 1.0
