@@ -4,14 +4,13 @@ Writes go only to devices in the station file, and only to registers that their 
 run drives, the run must hold the lease of the station; this is the last check before each write is sent.
 """
 
-import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 
 from schemas.errors import StationRefused, StationTimeout
-from schemas.profile import Command, Profile, Space
+from schemas.profile import Command, Profile, Space, limits_of
 from stations.clock import steady
 from stations.links.lines import LineLink
 from stations.links.modbus import WireLink
@@ -150,7 +149,5 @@ def _fits(command: Command, order: str) -> bool:
         return value in command.values
     if not _NUMBER.fullmatch(value):  # float() also reads "inf", "1_000" and spaces, which controllers read otherwise
         return False
-    number = float(value)
-    low = -math.inf if command.minimum is None else command.minimum
-    high = math.inf if command.maximum is None else command.maximum
-    return low <= number <= high
+    low, high = limits_of(command)
+    return low <= float(value) <= high

@@ -10,11 +10,10 @@ from schemas.profile import TEXT_CARRIERS, Carrier, Profile
 from schemas.station import StationConfig
 from schemas.station_devices import Carried, Device, Devices, Slots
 from stations.links.gate import GatedLines, GatedLink, Permit
-from stations.links.lines import LineLink, TcpLines
+from stations.links.lines import LineLink, TcpLines, VisaLines
 from stations.links.modbus import WireLink
 from stations.links.recorder import FrameRecorder, RecordedLines, RecordedWire, active_recorder
 from stations.links.serial_wire import SerialWire
-from stations.links.visa_lines import VisaLines
 from stations.links.wires import LineWire, TcpWire, Wire, tls_context
 from stations.profile_files import load_profile
 
@@ -212,19 +211,19 @@ class SingleLink:
     place: str = "device"
     _made: GatedLink | GatedLines | None = None
 
-    def registers(self, attempts: int = 1) -> GatedLink:
+    def registers(self) -> GatedLink:
         """The link to its registers, on a new connection."""
         self.close()
         wire = wire_to(self.device, self.device.host, self.device.port, self.timeout_s)
         behind = {self.device.device_id: (self.place, self.profile)}
-        self._made = made = _gated_link(wire, behind, self.recorder, attempts, self.permit)
+        self._made = made = _gated_link(wire, behind, self.recorder, 1, self.permit)
         return made
 
-    def lines(self, attempts: int = 1) -> GatedLines:
+    def lines(self) -> GatedLines:
         """The connection for its lines, anew."""
         self.close()
         wire = lines_to(self.device, self.device.host, self.device.port, self.timeout_s)
-        self._made = made = _gated_lines(wire, self.place, self.profile, self.recorder, attempts, self.permit)
+        self._made = made = _gated_lines(wire, self.place, self.profile, self.recorder, 1, self.permit)
         return made
 
     def close(self) -> None:

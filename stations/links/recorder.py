@@ -96,16 +96,16 @@ class FrameRecorder:
         entry: dict[str, Any] = {**self._head(begun), "link": link, "id": device_id, "what": what}
         if SECRET.search(what):
             self._write({**entry, "q": request[:5].hex(), "x": WITHHELD})
-            return
-        self._write({**entry, "q": request.hex(), **({"a": reply.hex()} if reply is not None else {"x": failed})})
+        else:
+            self._write({**entry, "q": request.hex(), **({"x": failed} if reply is None else {"a": reply.hex()})})
 
     def line(self, link: str, text: str, what: str, begun: float, answer: str | None, failed: str) -> None:
         """A line of text and its answer."""
         entry: dict[str, Any] = {**self._head(begun), "link": link, "id": 0, "what": what}
         if SECRET.search(f"{what} {text}"):
             self._write({**entry, "line": WITHHELD, "x": WITHHELD})
-            return
-        self._write({**entry, "line": text, **({"answer": answer} if answer is not None else {"x": failed})})
+        else:
+            self._write({**entry, "line": text, **({"x": failed} if answer is None else {"answer": answer})})
 
     def close(self) -> None:
         """Ends the recording."""

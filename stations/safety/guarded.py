@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from schemas.errors import LeaseLost, OperatorNeeded
 from schemas.station import StationConfig
 from stations.safety.folder import log_event, state_folder
-from stations.safety.lease_parts import addresses
+from stations.safety.lease_files import addresses
 from stations.safety.leases import Leases, new_holder
 from stations.safety.safe_state import Reached
 from stations.safety.watchdog_client import Watchdog

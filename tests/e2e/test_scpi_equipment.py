@@ -28,8 +28,8 @@ from schemas.station_devices import Device, Equipment
 from stations import open_station
 from stations.clock import Clock
 from stations.devices.commands import Values
+from stations.devices.equipment import RecordingSpoilt
 from stations.devices.families.scpi_supply import ScpiSupply
-from stations.devices.recording import RecordingSpoilt
 from stations.station import Station
 
 FAMILIES = ROOT / "stations" / "devices" / "families"

@@ -2,8 +2,8 @@
 
 from typing import Any
 
-from stations.plant.chamber import Chamber
 from stations.plant.faults.base import AXES, UNIT, Effect, Fault, fault
+from stations.plant.fixture import Chamber
 from stations.plant.world import World
 
 
