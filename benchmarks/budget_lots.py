@@ -13,8 +13,8 @@ from inertial.frames import force_from_angles
 from inertial.noise.dwells import DwellNoise, dwell_covariance
 from schemas.simulation import ReferenceErrors
 from stations.plant.device import Truth, draw_truth, rotation
+from stations.plant.hidden.table import StationErrors
 from stations.plant.preset import Preset
-from stations.plant.reference_errors import StationErrors
 from stations.plant.table import turn
 
 Array = np.ndarray

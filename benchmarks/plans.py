@@ -38,8 +38,8 @@ from pipelines.schedule.timing import spent  # noqa: E402
 from schemas.errors import TumblelineError  # noqa: E402
 from schemas.simulation import Simulation  # noqa: E402
 from schemas.station import load_station  # noqa: E402
-from stations.plant.chamber import STEP_S, Chamber  # noqa: E402
 from stations.plant.device import PlantDevices, Truth, draw_truth, rotation, stream  # noqa: E402
+from stations.plant.fixture import STEP_S, Chamber  # noqa: E402
 from stations.plant.noise import UnitNoise  # noqa: E402
 from stations.plant.preset import Preset, load_preset  # noqa: E402
 

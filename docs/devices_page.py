@@ -10,8 +10,8 @@ from docs.generated_page import cell, write_or_check
 from pipelines.commissioning.conformance import read_conformance
 from schemas.profile import Command, Profile, Register
 from stations.devices.adapters import adapters
-from stations.devices.axis import TableAxis
 from stations.devices.equipment import Equipment
+from stations.devices.table import TableAxis
 from stations.profile_files import load_profile, profile_names
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "reference" / "devices.md"

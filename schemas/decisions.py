@@ -29,11 +29,7 @@ class Law(Protocol):
 
 
 # The notes give the grades by the bias that is left: consumer to 1000 µg, industrial to 200 µg, navigation under 50 µg.
-GRADES: Mapping[str, float] = {
-    "navigation": 50.0,
-    "industrial": 200.0,
-    "consumer": 1000.0,
-}
+GRADES: Mapping[str, float] = {"navigation": 50.0, "industrial": 200.0, "consumer": 1000.0}
 GRADE_FIGURE = "bias_error_ug"
 PERIOD_FIGURE = "bias_error_period_ug"
 """The figure that a grade rests on where it is known: the 95 % bound of the largest error over the period of validity."""
@@ -125,11 +121,8 @@ def decide(
     least = own.min is not None
     limit = own.min or own.max or 0.0  # a limit has one of both
     if law is None:
-        inner, outer, risk = (
-            limit - guard,
-            limit + guard,
-            (below if least else outside)(value, standard_uncertainty, limit),
-        )
+        inner, outer = limit - guard, limit + guard
+        risk = (below if least else outside)(value, standard_uncertainty, limit)
         rule = describe_rule(limits)
     else:
         inner, outer = (law.threshold(limit, sign * limits.guard_factor) for sign in (1.0, -1.0))
@@ -153,18 +146,9 @@ def _decide_bound(limits: Limits, figure: str, bound: float, median: float) -> D
     limit = limits.figures[figure].max or 0.0
     risk = exceedance(median, bound, limit)
     allowed = (limits.pfa_max or LARGEST_PFA) if limits.rule == "allowed_pfa" else 1.0 - BOUND_SHARE
-    accept = limit if limits.rule != "allowed_pfa" else float("nan")
-    return Decision(
-        figure=figure,
-        value=bound,
-        uncertainty=0.0,
-        limit=limit,
-        unit=limits.figures[figure].unit,
-        rule=describe_rule(limits),
-        outcome="pass" if risk <= allowed else "fail",
-        risk=risk,
-        accept=accept,
-    )
+    accept, unit = limit if limits.rule != "allowed_pfa" else float("nan"), limits.figures[figure].unit
+    outcome: Outcome = "pass" if risk <= allowed else "fail"
+    return Decision(figure, bound, 0.0, limit, unit, describe_rule(limits), outcome, risk, accept)
 
 
 def exceedance(median: float, bound: float, limit: float) -> float:
@@ -215,7 +199,4 @@ def describe_rule(limits: Limits) -> str:
 
 def grade_with(value_ug: float, guard_ug: float) -> str | None:
     """The best grade whose bias limit accepts the value with a guard band; None where not even the lowest does."""
-    for name, limit in GRADES.items():
-        if abs(value_ug) <= limit - guard_ug:
-            return name
-    return None
+    return next((name for name, limit in GRADES.items() if abs(value_ug) <= limit - guard_ug), None)

@@ -32,7 +32,6 @@ class EventLog(Protocol):
 
     def note(self, event: Event) -> None:
         """Write an event durably; an event in the log is not written twice."""
-        ...
 
     def recorded(self) -> list[Event]:
         """Every event so far, in order."""

@@ -8,13 +8,12 @@ import math
 from typing import Annotated, Literal
 
 from pydantic import Field, ValidationError, model_validator
-from pydantic_core import ErrorDetails
 
 from schemas.bounds import LARGEST_TIME_S, Number, Text
 from schemas.errors import WrongUse
 from schemas.foreign import shown
-from schemas.reasons import reason_of
 from schemas.strict import Strict
+from schemas.toml_files import reason_of
 
 Part = Literal["", "outer", "inner", "chamber", "reader"]
 SEPARATOR = ":"
@@ -67,13 +66,8 @@ def parse_fault(text: str) -> FaultOrder:
     try:
         return FaultOrder.model_validate({**keys, "figures": figures})
     except ValidationError as problem:
-        raise WrongUse(
-            f"fault '{shown(text)}': {_sentence(problem.errors(include_url=False)[0])}; write kind:key=value:key=value"
-        ) from None
-
-
-def _sentence(detail: ErrorDetails) -> str:
-    """The error and its key, as a sentence."""
-    where = ".".join(str(part) for part in detail["loc"] if part != "figures")
-    reason = reason_of(detail)
-    return f"{where}: {reason[:1].lower()}{reason[1:]}" if where else reason
+        detail = problem.errors(include_url=False)[0]
+        where, sentence = ".".join(str(part) for part in detail["loc"] if part != "figures"), reason_of(detail)
+        if where:
+            sentence = f"{where}: {sentence[:1].lower()}{sentence[1:]}"
+        raise WrongUse(f"fault '{shown(text)}': {sentence}; write kind:key=value:key=value") from None

@@ -2,26 +2,17 @@
 
 from typing import Annotated
 
-from pydantic import (
-    Field,
-    model_validator,
-)
+from pydantic import Field, model_validator
 
-from schemas.bounds import (
-    MOST_UNITS,
-    Seed,
-)
+from schemas.bounds import MOST_UNITS, Seed
 from schemas.serials import LONGEST_SERIAL, SERIAL_PATTERN
-from schemas.strict import Strict
+from schemas.strict import Strict, refuse_repeated
 
 
 class Unit(Strict):
     """One device under test and the slot of the fixture that it sits in, counted from 0."""
 
-    serial: Annotated[
-        str,
-        Field(min_length=1, max_length=LONGEST_SERIAL, pattern=SERIAL_PATTERN),
-    ]
+    serial: Annotated[str, Field(min_length=1, max_length=LONGEST_SERIAL, pattern=SERIAL_PATTERN)]
     slot: Annotated[int, Field(ge=0, le=MOST_UNITS)]
 
 
@@ -42,14 +33,6 @@ class Lot(Strict):
 
     @model_validator(mode="after")
     def _each_once(self) -> "Lot":
-        for what, values in (
-            ("serial", [u.serial for u in self.units]),
-            ("slot", [u.slot for u in self.units]),
-        ):
-            texts = [str(value) for value in values]
-            twice = sorted({text for text in texts if texts.count(text) > 1})
-            if twice:
-                raise ValueError(
-                    f"{what} {', '.join(twice)} is there twice, each may be there once; correct the list of units"
-                )
+        refuse_repeated((unit.serial for unit in self.units), "serial ", "correct the list of units")
+        refuse_repeated((unit.slot for unit in self.units), "slot ", "correct the list of units")
         return self

@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from schemas.bounds import Name, Text
 from schemas.recipe import FormulaSpec
-from schemas.strict import Strict
+from schemas.strict import Strict, refuse_repeated
 from schemas.toml_files import parse_as, read_text
 
 MOST_VERSIONS = 1_000_000
@@ -45,16 +45,8 @@ class ModelFile(Strict):
 
     @model_validator(mode="after")
     def _consistent(self) -> "ModelFile":
-        effects = self.model.effects
-        twice = sorted({e for e in effects if effects.count(e) > 1})
-        if twice:
-            raise ValueError(
-                f"model.effects: {', '.join(twice)} is there twice, each may be there once; remove the second"
-            )
-        formulas = [formula.id for formula in self.formula]
-        again = sorted({f for f in formulas if formulas.count(f) > 1})
-        if again:
-            raise ValueError(f"formula: {', '.join(again)} is there twice, each may be there once; rename the second")
+        refuse_repeated(self.model.effects, "model.effects: ", "remove the second")
+        refuse_repeated((formula.id for formula in self.formula), "formula: ", "rename the second")
         versions = [change.version for change in self.change]
         if versions != sorted(set(versions)):
             raise ValueError(f"change: versions {versions} do not rise; write one [[change]] per version, oldest first")

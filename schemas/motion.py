@@ -9,8 +9,8 @@ from pydantic import Field
 
 from schemas.bounds import Number
 from schemas.strict import Strict
+from schemas.units import STANDARD_GRAVITY_M_S2
 
-STANDARD_G = 9.80665
 PEAK_FACTOR = 3.0  # peaks of Gaussian vibration that the exciter must follow, over the rms: drives are clipped there
 PARTS = 200  # of a straight segment of a profile, for its integral
 
@@ -31,7 +31,7 @@ class Motion(Strict):
 
     def beyond_sine(self, frequency: float, level_g: float) -> str:
         """The limit that a sine of this peak level exceeds, in words; empty where it exceeds none."""
-        w, a = 2.0 * math.pi * frequency, level_g * STANDARD_G
+        w, a = 2.0 * math.pi * frequency, level_g * STANDARD_GRAVITY_M_S2
         return self._beyond(1e3 * a / w**2, a / w, level_g)
 
     def beyond_random(self, breakpoints: Sequence[tuple[float, float]], level_g: float) -> str:
@@ -40,7 +40,7 @@ class Motion(Strict):
         if moments[2] <= 0.0:
             return ""
         share = PEAK_FACTOR * level_g / math.sqrt(moments[2])
-        mm, m_s = (share * STANDARD_G * math.sqrt(one) for one in moments[:2])
+        mm, m_s = (share * STANDARD_GRAVITY_M_S2 * math.sqrt(one) for one in moments[:2])
         return self._beyond(1e3 * mm, m_s, PEAK_FACTOR * level_g)
 
     def _beyond(self, mm: float, m_s: float, g: float) -> str:

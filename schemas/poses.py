@@ -2,16 +2,9 @@
 
 from typing import Annotated
 
-from pydantic import (
-    Field,
-)
+from pydantic import Field
 
-from schemas.bounds import (
-    MOST_POSES,
-    Celsius,
-    Degrees,
-    Wait,
-)
+from schemas.bounds import MOST_POSES, Celsius, Degrees, Wait
 from schemas.strict import Strict
 
 

@@ -83,24 +83,19 @@ class Register(Strict):
 
     @model_validator(mode="after")
     def _fits(self) -> "Register":
+        wrong = ""
         if self.end > ADDRESSES:
-            raise ValueError(
-                f"{self.name}: ends at address {self.end}, the last one is {ADDRESSES - 1}; move or shorten it"
-            )
-        if (self.space in BITS) != (self.type == "bit"):
-            raise ValueError(
-                f"{self.name}: type {self.type} in space {self.space}; coils and discrete inputs hold bits, others none"
-            )
-        if self.space in READ_ONLY and self.writable:
-            raise ValueError(
-                f"{self.name}: access {self.access} in space {self.space}, which can only be read; correct one"
-            )
-        if self.column and (self.type in {"string", "bit"} or self.count > 1 or self.access == "write"):
-            raise ValueError(
-                f"{self.name}: column '{self.column}', one number that can be read is needed; record another register"
-            )
-        if (self.enumeration or self.bits) and self.type in {"float32", "string"}:
-            raise ValueError(f"{self.name}: {self.type} cannot hold an enumeration or bits; use an integer type")
+            wrong = f"ends at address {self.end}, the last one is {ADDRESSES - 1}; move or shorten it"
+        elif (self.space in BITS) != (self.type == "bit"):
+            wrong = f"type {self.type} in space {self.space}; coils and discrete inputs hold bits, others none"
+        elif self.space in READ_ONLY and self.writable:
+            wrong = f"access {self.access} in space {self.space}, which can only be read; correct one"
+        elif self.column and (self.type in {"string", "bit"} or self.count > 1 or self.access == "write"):
+            wrong = f"column '{self.column}', one number that can be read is needed; record another register"
+        elif (self.enumeration or self.bits) and self.type in {"float32", "string"}:
+            wrong = f"{self.type} cannot hold an enumeration or bits; use an integer type"
+        if wrong:
+            raise ValueError(f"{self.name}: {wrong}")
         return self
 
 
@@ -131,6 +126,12 @@ class Command(Strict):
 
 
 AnyEntry = TypeVar("AnyEntry", Register, Command)
+
+
+def limits_of(entry: Register | Command) -> tuple[float, float]:
+    """Smallest and largest value, infinite where there is no limit."""
+    low = -math.inf if entry.minimum is None else entry.minimum
+    return low, math.inf if entry.maximum is None else entry.maximum
 
 
 class Fifo(Strict):

@@ -8,7 +8,6 @@ class Progress(Protocol):
 
     def __call__(self, done: int, total: int, note: str) -> None:
         """Report that ``done`` of ``total`` parts are finished."""
-        ...
 
 
 def silent(done: int, total: int, note: str) -> None:

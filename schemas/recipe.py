@@ -28,7 +28,7 @@ from schemas.bounds import (
 )
 from schemas.fault import FaultOrder
 from schemas.poses import Pose, SoakPart
-from schemas.strict import Grown, Strict
+from schemas.strict import Grown, Strict, refuse_repeated
 from schemas.toml_files import parse_as
 from schemas.uncertainty import Uncertainty
 from schemas.validity import CertificateTerms, Stability
@@ -140,9 +140,7 @@ class _Measurement(Grown):
     @field_validator("effects", "units")
     @classmethod
     def _no_repeats(cls, values: list[Any]) -> list[Any]:
-        twice = sorted({str(v) for v in values if values.count(v) > 1})
-        if twice:
-            raise ValueError(f"{', '.join(twice)} is there twice, each may be there once; remove the second")
+        refuse_repeated(values, "", "remove the second")
         return values
 
 
@@ -208,10 +206,14 @@ class Recipe(_Measurement):
                     )
         return self
 
+    @property
+    def _dwells(self) -> int:
+        """The number of dwells of all soaks."""
+        return sum(len(self.poses_at(k)) + len(self.verification_at(k)) for k in range(len(self.temperatures_C)))
+
     @model_validator(mode="after")
     def _comes_to_an_end(self) -> "Recipe":
-        soaks = range(len(self.temperatures_C))
-        dwells = sum(len(self.poses_at(k)) + len(self.verification_at(k)) for k in soaks)
+        soaks, dwells = range(len(self.temperatures_C)), self._dwells
         waits = sum(
             sum(self.waits_at(k)) + sum(self.off_at(k)) + self.settle_s * len(self.verification_at(k)) for k in soaks
         )
@@ -254,9 +256,7 @@ class Recipe(_Measurement):
     @property
     def planned_records(self) -> int:
         """The number of records that capture makes: the poses of every soak, and the static one."""
-        soaks = range(len(self.temperatures_C))
-        dwells = sum(len(self.poses_at(k)) + len(self.verification_at(k)) for k in soaks)
-        return dwells + (1 if self.static_record_s > 0.0 else 0)
+        return self._dwells + (1 if self.static_record_s > 0.0 else 0)
 
 
 def _picked(poses: list[Pose], numbers: list[int] | None) -> list[Pose]:

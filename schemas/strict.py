@@ -1,8 +1,17 @@
 """The bases of the parts of a file that is written by hand."""
 
+from collections.abc import Iterable
 from typing import Any, ClassVar
 
 from pydantic import BaseModel, ConfigDict, SerializerFunctionWrapHandler, model_serializer
+
+
+def refuse_repeated(values: Iterable[object], where: str, remedy: str) -> None:
+    """Refuse values that are there more than once; ``where`` begins the message, ``remedy`` ends it."""
+    texts = [str(value) for value in values]
+    twice = sorted({text for text in texts if texts.count(text) > 1})
+    if twice:
+        raise ValueError(f"{where}{', '.join(twice)} is there twice, each may be there once; {remedy}")
 
 
 class Strict(BaseModel):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Literal
@@ -71,36 +70,21 @@ class Table:
         )
 
 
+def each(column: Column, *names: str) -> dict[str, Column]:
+    """The same column under several names."""
+    return dict.fromkeys(names, column)
+
+
 def text(*allowed: str) -> Column:
     """A text: one of the allowed ones, or any that is not empty."""
     return Column("str", allowed=allowed, filled=not allowed)
 
 
-def any_text() -> Column:
-    """A text that may be empty."""
-    return Column("str")
-
-
-def flag() -> Column:
-    """True or false."""
-    return Column("bool")
-
-
-def number(*, low: float | None = None, missing: bool = False) -> Column:
-    """A floating-point number, at least ``low`` where it is given; NaN only where ``missing``."""
-    return Column("float64", low=low, missing=missing)
-
-
-def whole(low: int = 0) -> Column:
-    """A whole number, at least ``low``."""
-    return Column("int64", low=low)
-
-
-def numbers(names: Sequence[str]) -> dict[str, Column]:
-    """Columns of numbers of which none is missing, by name."""
-    return {name: number() for name in names}
-
-
-def gaps(names: Sequence[str]) -> dict[str, Column]:
-    """Columns of numbers that may be NaN, by name."""
-    return {name: number(missing=True) for name in names}
+ANY_TEXT = Column("str")
+"""A text that may be empty."""
+FLAG = Column("bool")
+NUMBER = Column("float64")
+"""A number that is not missing."""
+GAPS = Column("float64", missing=True)
+"""A number that may be NaN."""
+WHOLE = Column("int64", low=0)

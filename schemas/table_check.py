@@ -99,15 +99,11 @@ def _explain(problem: SchemaError, frame: pd.DataFrame, source: str) -> str:
     cases = problem.failure_cases
     if isinstance(cases, pd.DataFrame) and len(cases) and "index" in cases and pd.notna(cases["index"].iloc[0]):
         index, value = cases["index"].iloc[0], cases["failure_case"].iloc[0]
-        row = _row(frame, index)
-        return f"{source}: {row}, column {column}: found {value}, {_needed(problem)} is needed; correct the row"
+        # the requirement of the check, without the library's notation
+        words = str(problem.check).removeprefix("<Check ").removesuffix(">")
+        needed = words.split(": ", 1)[-1].replace("_", " ")
+        return f"{source}: {_row(frame, index)}, column {column}: found {value}, {needed} is needed; correct the row"
     return f"{source}: column {column}: {str(problem).splitlines()[0]}; correct the column"
-
-
-def _needed(problem: SchemaError) -> str:
-    """The requirement of a check, without the library's notation."""
-    words = str(problem.check).removeprefix("<Check ").removesuffix(">")
-    return words.split(": ", 1)[-1].replace("_", " ")
 
 
 def _row(frame: pd.DataFrame, index: Any) -> str:

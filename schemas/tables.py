@@ -5,7 +5,7 @@ Every table has a schema version that travels with its file.
 """
 
 from schemas import version
-from schemas.table import Table, any_text, flag, gaps, number, numbers, text, whole
+from schemas.table import ANY_TEXT, FLAG, GAPS, NUMBER, WHOLE, Column, Table, each, text
 from schemas.units import AXES
 
 VERSION = version.VERSION
@@ -18,213 +18,174 @@ ADEQUATE, NOT_ADEQUATE, NOT_JUDGED = VERDICTS = ("adequate", "not adequate", "no
 _OUT = ("out_x", "out_y", "out_z")
 _SD = ("sd_x", "sd_y", "sd_z")
 _FORCE = ("force_x", "force_y", "force_z")
-_PLACE = {"unit": text(), "slot": whole(), "record": whole(), "kind": text(*KINDS)}
 _ANGLES = ("outer_deg", "inner_deg", "outer_command_deg", "inner_command_deg")
 _SURROUNDINGS = ("chamber_C", "unit_C", "supply_V", "vibration_g", "since_move_s", "since_power_s")
+_UNIT, _AXIS = each(text(), "unit"), each(text(*AXES), "axis")
+_RECORD = {**_UNIT, **each(WHOLE, "slot", "record"), "kind": text(*KINDS)}
 
 TABLES: dict[str, Table] = {
     # Samples may hold NaN: what a device really sent is kept, and the validate stage refuses the unit.
-    "samples": Table({**_PLACE, "time_s": number(), **gaps(AXES)}),
+    "samples": Table({**_RECORD, "time_s": NUMBER, **each(GAPS, *AXES)}),
     "readings": Table(
         {
-            **_PLACE,
+            **_RECORD,
             "pose": text(),
-            "soak": whole(),
-            **gaps(_ANGLES),
-            **gaps(_SURROUNDINGS),
-            **numbers(("start_s", "duration_s", "rate_hz")),
-            "n": whole(),
-            "overflow": flag(),
+            "soak": WHOLE,
+            **each(GAPS, *_ANGLES, *_SURROUNDINGS),
+            **each(NUMBER, "start_s", "duration_s", "rate_hz"),
+            "n": WHOLE,
+            "overflow": FLAG,
             "status": text(),
             "out_unit": text(*OUTPUT_UNITS),
-            "full_scale": number(low=0.0),
+            "full_scale": Column("float64", low=0.0),
         },
         measured=(*_ANGLES, "chamber_C", "unit_C"),
         key=("unit", "record"),
         only_ok=True,
     ),
-    "history": Table(
-        {
-            "time_s": number(),
-            "chamber_C": number(),
-            "slot": whole(),
-            "unit": text(),
-            **gaps(("unit_C",)),
-        },
-    ),
+    "history": Table({**each(NUMBER, "time_s", "chamber_C"), "slot": WHOLE, **_UNIT, "unit_C": GAPS}),
     "events": Table(
         {
-            "time_s": number(),
+            "time_s": NUMBER,
             "kind": text(),
-            "record": whole(-1),  # −1: none
-            "reason": any_text(),
-            "action": any_text(),
+            "record": Column("int64", low=-1),  # −1: none
+            **each(ANY_TEXT, "reason", "action"),
         },
     ),
     "soaks": Table(
         {
-            "time_s": number(),
-            "record": whole(),
-            **numbers(("target_C", "seconds", "air_overshoot_K", "device_overshoot_K")),
+            "time_s": NUMBER,
+            "record": WHOLE,
+            **each(NUMBER, "target_C", "seconds", "air_overshoot_K", "device_overshoot_K"),
         },
     ),
     "verdicts": Table(
-        {
-            "unit": text(),
-            "slot": whole(),
-            "refused": flag(),
-            "fault": any_text(),
-            "reason": any_text(),
-        },
+        {**_UNIT, "slot": WHOLE, "refused": FLAG, **each(ANY_TEXT, "fault", "reason")},
         key=("unit",),
     ),
     "dwells": Table(
-        {"unit": text(), "dwell": whole(), "time_s": number()},
+        {**_UNIT, "dwell": WHOLE, "time_s": NUMBER},
         measured=(*_OUT, *_SD, *_FORCE, "outer_deg", "inner_deg", "unit_C", "chamber_C"),
         key=("unit", "dwell"),
     ),
     "coefficients": Table(
         {
-            "unit": text(),
+            **_UNIT,
             "axis": text(*AXES, "*"),
-            "effect": text(),
-            "name": text(),
-            **numbers(("value", "standard_error")),
-            "unit_text": any_text(),
+            **each(text(), "effect", "name"),
+            **each(NUMBER, "value", "standard_error"),
+            "unit_text": ANY_TEXT,
         },
         key=("unit", "axis", "effect", "name"),
     ),
     "covariance": Table(
-        {
-            "unit": text(),
-            "axis": text(*AXES),
-            "row": whole(),
-            "column": whole(),
-            "value": number(),
-        },
+        {**_UNIT, **_AXIS, **each(WHOLE, "row", "column"), "value": NUMBER},
         key=("unit", "axis", "row", "column"),
     ),
     "residuals": Table(
         {
-            "unit": text(),
-            "dwell": whole(),
+            **_UNIT,
+            "dwell": WHOLE,
             "axis": text(*AXES, "norm"),
             "pose": text(),
-            **numbers(("force_g", "residual_ug", "standard_error_ug", "expected_ug")),
-            **gaps(("unit_C",)),
+            **each(NUMBER, "force_g", "residual_ug", "standard_error_ug", "expected_ug"),
+            "unit_C": GAPS,
         },
         key=("unit", "dwell", "axis"),
     ),
     "predictions": Table(
-        {
-            "unit": text(),
-            "axis": text(*AXES),
-            "dwell": whole(),
-            "other": whole(),
-            "covariance_ug2": number(),
-        },
+        {**_UNIT, **_AXIS, **each(WHOLE, "dwell", "other"), "covariance_ug2": NUMBER},
         key=("unit", "axis", "dwell", "other"),
     ),
     "wander": Table(
         {
-            "unit": text(),
-            "axis": text(*AXES),
+            **_UNIT,
+            **_AXIS,
             "method": text("wander", "birge"),
-            **numbers(("white_ug", "flicker_ug", "walk_ug", "lack_of_fit")),
-            "dof": whole(),
+            **each(NUMBER, "white_ug", "flicker_ug", "walk_ug", "lack_of_fit"),
+            "dof": WHOLE,
         },
         key=("unit", "axis"),
     ),
     "verification": Table(
-        {
-            "unit": text(),
-            "dwell": whole(),
-            "pose": text(),
-            **numbers(("norm_g", "error_ug", "uncertainty_ug")),
-        },
+        {**_UNIT, "dwell": WHOLE, "pose": text(), **each(NUMBER, "norm_g", "error_ug", "uncertainty_ug")},
         measured=("error_x_ug", "error_y_ug", "error_z_ug"),
         key=("unit", "dwell"),
     ),
     "verification_poses": Table(
-        {"unit": text(), "pose": text(), "dwells": whole(1), **numbers(("error_ug", "uncertainty_ug"))},
+        {**_UNIT, "pose": text(), "dwells": Column("int64", low=1), **each(NUMBER, "error_ug", "uncertainty_ug")},
         key=("unit", "pose"),
     ),
     "allan": Table(
-        {
-            "unit": text(),
-            "axis": text(*AXES),
-            **numbers(("tau_s", "deviation_ug", "low_ug", "high_ug")),
-            **gaps(("fitted_ug",)),
-        },
+        {**_UNIT, **_AXIS, **each(NUMBER, "tau_s", "deviation_ug", "low_ug", "high_ug"), "fitted_ug": GAPS},
         key=("unit", "axis", "tau_s"),
     ),
     "noise": Table(
         {
-            "unit": text(),
-            "axis": text(*AXES),
+            **_UNIT,
+            **_AXIS,
             "term": text(),
-            **gaps(("value", "low", "high")),
-            "identified": flag(),
-            "unit_text": any_text(),
+            **each(GAPS, "value", "low", "high"),
+            "identified": FLAG,
+            "unit_text": ANY_TEXT,
         },
         key=("unit", "axis", "term"),
     ),
     "procedure_points": Table(
         {
-            **{name: text() for name in ("unit", "procedure", "axis", "series")},
-            **{name: whole() for name in ("number", "point")},
-            **gaps(("setting", "value", "uncertainty")),
+            **each(text(), "unit", "procedure", "axis", "series"),
+            **each(WHOLE, "number", "point"),
+            **each(GAPS, "setting", "value", "uncertainty"),
         },
         key=("number", "unit", "axis", "series", "point"),
     ),
     "procedure_figures": Table(
         {
-            **{name: text() for name in ("unit", "procedure", "figure", "axis")},
-            "number": whole(),
-            **gaps(("value", "uncertainty", "low", "high")),
-            "identified": flag(),
+            **each(text(), "unit", "procedure", "figure", "axis"),
+            "number": WHOLE,
+            **each(GAPS, "value", "uncertainty", "low", "high"),
+            "identified": FLAG,
             "unit_text": text(),
-            "note": any_text(),
+            "note": ANY_TEXT,
         },
         key=("number", "unit", "figure", "axis"),
     ),
     "procedure_findings": Table(
-        {"unit": any_text(), "procedure": text(), "number": whole(), "subject": text(), "text": text()}
+        {"unit": ANY_TEXT, "procedure": text(), "number": WHOLE, **each(text(), "subject", "text")}
     ),
     "figures": Table(
         {
-            "unit": text(),
-            "figure": text(),
-            **numbers(("value", "uncertainty")),
-            "limit": number(missing=True),
-            "unit_text": any_text(),
+            **each(text(), "unit", "figure"),
+            **each(NUMBER, "value", "uncertainty"),
+            "limit": GAPS,
+            "unit_text": ANY_TEXT,
             "outcome": text(),
-            "rule": any_text(),
+            "rule": ANY_TEXT,
         },
         key=("unit", "figure"),
     ),
     # one row per unit, quantity and contribution
     "budget": Table(
         {
-            **{name: text() for name in ("unit", "quantity", "axis", "contribution", "type", "distribution", "scope")},
-            **{name: any_text() for name in ("unit_text", "input_unit", "source")},
-            **numbers(("u", "share", "divisor", "stated")),
-            **gaps(("dof", "sensitivity", "visible")),
+            **each(text(), "unit", "quantity", "axis", "contribution", "type", "distribution", "scope"),
+            **each(ANY_TEXT, "unit_text", "input_unit", "source"),
+            **each(NUMBER, "u", "share", "divisor", "stated"),
+            **each(GAPS, "dof", "sensitivity", "visible"),
         },
         key=("unit", "quantity", "axis", "contribution"),
     ),
     "uncertainties": Table(
         {
-            **{name: text() for name in ("unit", "quantity", "axis", "frame")},
-            **{name: any_text() for name in ("unit_text", "largest")},
-            **numbers(("value", "u_a", "u_b", "u", "k", "expanded")),
-            **gaps(("dof", "shown", "unseen")),
+            **each(text(), "unit", "quantity", "axis", "frame"),
+            **each(ANY_TEXT, "unit_text", "largest"),
+            **each(NUMBER, "value", "u_a", "u_b", "u", "k", "expanded"),
+            **each(GAPS, "dof", "shown", "unseen"),
         },
         key=("unit", "quantity", "axis"),
     ),
     # of the coefficients of all axes in one vector, x before y before z, lower triangle
     "budget_covariance": Table(
-        {"unit": text(), "row": whole(), "column": whole(), "value": number()},
+        {**_UNIT, **each(WHOLE, "row", "column"), "value": NUMBER},
         key=("unit", "row", "column"),
     ),
     # on the model of the run: the effects of the fit; one row, none without a model
@@ -232,10 +193,10 @@ TABLES: dict[str, Table] = {
         {
             "model": text(),
             "verdict": text(*VERDICTS),
-            **{name: any_text() for name in ("reason", "faulty")},
-            **gaps(("rms_ug", "floor_ug", "p_value")),
-            "named": flag(),
-            "units": whole(),
+            **each(ANY_TEXT, "reason", "faulty"),
+            **each(GAPS, "rms_ug", "floor_ug", "p_value"),
+            "named": FLAG,
+            "units": WHOLE,
         },
         key=("model",),
     ),
@@ -243,22 +204,15 @@ TABLES: dict[str, Table] = {
     "lot_risks": Table(
         {
             "figure": text(),
-            "unit_text": any_text(),
-            "units": whole(1),
-            **numbers(("mean", "u", "limit", "accept")),
-            **gaps(("process", "pfa", "pfr", "accepted", "largest_pfa")),
+            "unit_text": ANY_TEXT,
+            "units": Column("int64", low=1),
+            **each(NUMBER, "mean", "u", "limit", "accept"),
+            **each(GAPS, "process", "pfa", "pfr", "accepted", "largest_pfa"),
         },
         key=("figure",),
     ),
     "grades": Table(
-        {
-            "unit": text(),
-            "slot": whole(),
-            "outcome": text(*OUTCOMES),
-            "grade": any_text(),
-            "reasons": any_text(),
-            "rule": any_text(),
-        },
+        {**_UNIT, "slot": WHOLE, "outcome": text(*OUTCOMES), **each(ANY_TEXT, "grade", "reasons", "rule")},
         key=("unit",),
     ),
 }

@@ -12,11 +12,10 @@ from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, mod
 from schemas.bounds import Degrees, NotNegative, Number, Positive
 from schemas.stated import TO_SI, AngleEntry, Entry, RelativeEntry, Scope, StandardUncertainty, Stated
 from schemas.strict import Strict
+from schemas.units import STANDARD_GRAVITY_M_S2
 
 __all__ = ["NEEDED", "TO_SI", "Entry", "StandardUncertainty", "Uncertainty", "formula_gravity"]
 
-STANDARD_GRAVITY = 9.80665
-"""m/s², CGPM 1901: a unit, and no site's value."""
 FREE_AIR = -3.086e-6
 """m/s² per m of height."""
 
@@ -90,7 +89,7 @@ class Gravity(RelativeEntry):
             raise ValueError(
                 'value_m_s2: missing; state it as surveyed, or latitude_deg and height_m with source = "formula"'
             )
-        if self.value_m_s2 == STANDARD_GRAVITY and not self.standard_gravity_meant and not self.exact:
+        if self.value_m_s2 == STANDARD_GRAVITY_M_S2 and not self.standard_gravity_meant and not self.exact:
             raise ValueError(
                 "value_m_s2: 9.80665 is standard gravity, not a site's value, and off by up to 2700 ppm; state it as surveyed, "
                 "give latitude_deg and height_m, or confirm it with standard_gravity_meant = true"

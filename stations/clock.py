@@ -20,7 +20,6 @@ class Clock(Protocol):
 
     def sleep(self, seconds: float) -> None:
         """Returns ``seconds`` later."""
-        ...
 
 
 class WallClock:

@@ -34,7 +34,11 @@ class NotEncodable(ValueError):
 def encode(register: Register, order: WordOrder, value: Value) -> list[int]:
     """The words, or bits, of a value; a number outside the type or limits of the register is refused."""
     if register.type == "string":
-        return _encode_text(register, value)
+        if not isinstance(value, str) or not value.isascii() or len(value) > 2 * register.count:
+            raise NotEncodable(
+                f"{register.name}: {value!r} is not an ASCII text of at most {2 * register.count} characters"
+            )
+        return list(struct.unpack(f">{register.count}H", value.encode("ascii").ljust(2 * register.count, b"\0")))
     values = value if isinstance(value, list) else [value]
     if len(values) != register.count:
         raise NotEncodable(
@@ -51,15 +55,6 @@ def decode(register: Register, order: WordOrder, words: Sequence[int]) -> Value:
     size = register.words // register.count
     numbers = [_decode_number(register, order, words[i : i + size]) for i in range(0, len(words), size)]
     return numbers if register.count > 1 else numbers[0]
-
-
-def _encode_text(register: Register, value: Value) -> list[int]:
-    if not isinstance(value, str) or not value.isascii() or len(value) > 2 * register.count:
-        raise NotEncodable(
-            f"{register.name}: {value!r} is not an ASCII text of at most {2 * register.count} characters"
-        )
-    raw = value.encode("ascii").ljust(2 * register.count, b"\0")
-    return list(struct.unpack(f">{register.count}H", raw))
 
 
 def _encode_number(register: Register, order: WordOrder, value: float | str) -> tuple[int, ...]:

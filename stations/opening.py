@@ -13,18 +13,16 @@ from typing import TYPE_CHECKING
 
 from schemas.errors import RecipeInvalid, StationError
 from schemas.lot import Lot
-from schemas.profile import TEXT_CARRIERS, Carrier, Profile
+from schemas.profile import TEXT_CARRIERS, Carrier, Profile, limits_of
 from schemas.station import Limits, StationConfig
 from schemas.station_devices import Device
 from stations.clock import Clock, WallClock
 from stations.devices.adapters import axis_adapter, chamber_adapter, equipment_adapter
-from stations.devices.axis import TableAxis
-from stations.devices.commands import Commands
+from stations.devices.commands import Commands, Values
 from stations.devices.reader import Reader
 from stations.devices.registers import Registers
 from stations.devices.slot import Slot
-from stations.devices.table import TiltTable
-from stations.devices.values import Values
+from stations.devices.table import TableAxis, TiltTable
 from stations.links.gate import Permit
 from stations.links.making import Links
 from stations.links.recorder import RecordedClock
@@ -79,7 +77,7 @@ def open_station(
         try:
             yield station
         except StationError:
-            protection.held()  # what a run finds at a station that it has lost is not why it ends
+            protection.leases.require()  # what a run finds at a station that it has lost is not why it ends
             raise
         finally:
             protection.leave(station.make_safe)
@@ -94,8 +92,10 @@ def open_devices(
     roles: Sequence[str] = (),
 ) -> Generator[Station]:
     """The devices of a station of hardware; without ``protection`` to look at them, or to make them safe."""
-    permit = None if protection is None else Permit(protection, config.link.timeout_s)
-    require = nobody_else if protection is None else protection.require
+    permit, require = None, nobody_else
+    if protection is not None:
+        permit = Permit(protection.leases.alive, protection.leases.require, config.link.timeout_s)
+        require = protection.require
     links, clock = Links(config, permit=permit), WallClock(resume, config.link.speed)
     try:
         yield replace(_assemble(config, slots, links, clock, roles), state=clock.state, exact=False, require=require)
@@ -129,8 +129,7 @@ def serve_plant(config: StationConfig, lot: Lot, plant: Plant, roles: Sequence[s
 def serve_devices(config: StationConfig, plant: Plant, roles: Sequence[str] = ()) -> Generator[Links]:
     """The links to a plant's devices, served on loopback: registers over Modbus TCP, lines beside it."""
     from stations.plant.faults.wire import on_the_wire  # noqa: PLC0415
-    from stations.plant.line_server import LineServer  # noqa: PLC0415
-    from stations.plant.server import PlantServer  # noqa: PLC0415
+    from stations.plant.server import LOOPBACK, PlantServer, serve_lines  # noqa: PLC0415
 
     with ExitStack() as stack:
         stack.enter_context(one_processor())
@@ -142,8 +141,7 @@ def serve_devices(config: StationConfig, plant: Plant, roles: Sequence[str] = ()
         wanted = {device.device_id for role, device in config.fitted().items() if role in roles}
         for device_id in plant.line_devices:
             if device_id in wanted or device_id == config.devices.chamber.device_id:
-                lines = stack.enter_context(LineServer(plant, device_id))
-                lines_at[device_id] = at["ascii"] = (lines.host, lines.port)
+                lines_at[device_id] = at["ascii"] = (LOOPBACK, stack.enter_context(serve_lines(plant, device_id)))
         links = Links(config, at, lines_at=lines_at)
         stack.callback(links.close)
         yield links
@@ -211,8 +209,8 @@ def tighter(bounds: tuple[float, float], profile: Profile, name: str) -> tuple[f
     if not profile.has(name):
         return bounds
     own = profile.entry(name)
-    low = bounds[0] if own.minimum is None else max(bounds[0], own.minimum)
-    high = bounds[1] if own.maximum is None else min(bounds[1], own.maximum)
+    low, high = limits_of(own)
+    low, high = max(bounds[0], low), min(bounds[1], high)
     if low >= high:
         raise RecipeInvalid(
             f"profile {profile.name}: {name} from {own.minimum} to {own.maximum} {own.unit}, the station's limits are "

@@ -72,19 +72,13 @@ def looked_at(config: StationConfig, lot: Lot) -> Generator[Callable[[], Overvie
 def look_at(config: StationConfig, station: Station) -> Overview:
     """The present state of the station; a part that does not answer is recorded in ``faults``, the others are shown."""
     now = Overview(config.name, config.kind, station.clock.now())
-    _ask(now, "table", lambda: _table(now, station))
-    _ask(now, "chamber", lambda: _chamber(now, station))
-    _ask(now, "reader", lambda: _reader(now, station))
-    if config.kind != "simulated":
-        _ask(now, "lease", lambda: _add_lease(now, config))
+    parts = {"table": _table, "chamber": _chamber, "reader": _reader}
+    for part, look in (parts if config.kind == "simulated" else {**parts, "lease": _lease}).items():
+        try:
+            look(now, station)
+        except StationError as problem:
+            now.faults[part] = str(problem)
     return now
-
-
-def _ask(now: Overview, part: str, question: Callable[[], None]) -> None:
-    try:
-        question()
-    except StationError as problem:
-        now.faults[part] = str(problem)
 
 
 def _table(now: Overview, station: Station) -> None:
@@ -126,20 +120,11 @@ def _occupied(station: Station) -> list[int]:
         return []
 
 
-def _add_lease(now: Overview, config: StationConfig) -> None:
+def _lease(now: Overview, station: Station) -> None:
     """Holder of the lease, and the reason where a run has not left the station safe."""
-    now.lease = _lease(config)
-    if problem := unsafe_reason(state_folder(), config):
+    for holder, age in filter(None, holders(state_folder(), station.config).values()):
+        keys = ("run", "pid", "host", "since", "role", "tripped")
+        now.lease = {**{key: getattr(holder, key) for key in keys}, "heard_s": round(age, 1)}
+        break
+    if problem := unsafe_reason(state_folder(), station.config):
         now.faults["safe state"] = problem
-
-
-def _lease(config: StationConfig) -> dict[str, Any] | None:
-    """Holder of the lease; None without one."""
-    entries = [entry for entry in holders(state_folder(), config).values() if entry is not None]
-    if not entries:
-        return None
-    holder, age = entries[0]
-    return {
-        **{k: getattr(holder, k) for k in ("run", "pid", "host", "since", "role", "tripped")},
-        "heard_s": round(age, 1),
-    }

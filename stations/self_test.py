@@ -3,10 +3,10 @@
 import json
 import math
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -168,18 +168,16 @@ class SelfTestBench:
             means.append(float(self._sampled()[numbers[0]][:, 2].mean()))
         unit = slots[numbers[0]].identity().out_unit
         temperature = self.station.reader.instruments().temperature_C[numbers[0]]
-        self.standard = Standard(
-            self.rules.standard, (means[0] + means[1]) / 2.0, (means[0] - means[1]) / 2.0, temperature, _now()
-        )
-        part, past = f"standard {self.rules.standard}", [s for s in self.history if s.serial == self.rules.standard]
-        self._controlled("offset", part, self.standard.offset, unit, self.rules.offset, [s.offset for s in past])
-        self._controlled("scale", part, self.standard.scale, f"{unit}/g", self.rules.scale, [s.scale for s in past])
-
-    def _controlled(
-        self, check: str, part: str, value: float, unit: str, given: tuple[float, float] | None, past: list[float]
-    ) -> None:
-        bounds = given or control_limits(past, self.rules.history_min) or (-math.inf, math.inf)
-        self._value(check, part, value, unit, bounds)
+        when, serial = datetime.now(UTC).isoformat(timespec="seconds"), self.rules.standard
+        offset, scale = (means[0] + means[1]) / 2.0, (means[0] - means[1]) / 2.0
+        self.standard = Standard(serial, offset, scale, temperature, when)
+        past, fewest = [s for s in self.history if s.serial == serial], self.rules.history_min
+        for check, value, of, given, earlier in (
+            ("offset", offset, unit, self.rules.offset, [s.offset for s in past]),
+            ("scale", scale, f"{unit}/g", self.rules.scale, [s.scale for s in past]),
+        ):
+            bounds = given or control_limits(earlier, fewest) or (-math.inf, math.inf)
+            self._value(check, f"standard {serial}", value, of, bounds)
 
     def _sampled(self) -> dict[int, NDArray[np.float64]]:
         """Samples by slot, (n, 3) in the unit of each output, at the present pose.
@@ -193,9 +191,8 @@ class SelfTestBench:
         clock.sleep(self.rules.sample_s)
         ended = reader.since_power()
         reader.stop()
-        self.elapsed = (
-            ended - begun - 2.0 * float(np.spacing(np.float32(abs(ended))))
-        )  # the register has single precision
+        # the register has single precision
+        self.elapsed = ended - begun - 2.0 * float(np.spacing(np.float32(abs(ended))))
         return {number: slot.take().outputs for number, slot in sorted(reader.slots.items())}
 
 
@@ -216,11 +213,8 @@ def read_history(path: Path) -> list[Standard]:
     """Earlier measurements of check standards, oldest first; an incomplete line is skipped."""
     measurements: list[Standard] = []
     for line in path.read_text("utf-8").splitlines() if path.is_file() else []:
-        try:
-            content: dict[str, Any] = json.loads(line)
-            measurements.append(Standard(**content))
-        except (ValueError, TypeError):
-            continue
+        with suppress(ValueError, TypeError):
+            measurements.append(Standard(**json.loads(line)))
     return measurements
 
 
@@ -233,7 +227,3 @@ def keep(path: Path, standard: Standard) -> None:
 
 def _finite(value: float) -> float | None:
     return value if math.isfinite(value) else None
-
-
-def _now() -> str:
-    return datetime.now(UTC).isoformat(timespec="seconds")

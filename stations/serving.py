@@ -108,8 +108,7 @@ def serve(
 
 def _listening(plant: Plant, host: str, port: int, stack: ExitStack) -> PlantServer:
     """The servers of all devices, left to ``stack``; with port 0 another port is tried when a program has just taken one."""
-    from stations.plant.line_server import LineServer  # noqa: PLC0415
-    from stations.plant.server import PlantServer  # noqa: PLC0415
+    from stations.plant.server import PlantServer, serve_lines  # noqa: PLC0415
 
     for attempt in range(TRIES):
         with ExitStack() as own:
@@ -117,7 +116,7 @@ def _listening(plant: Plant, host: str, port: int, stack: ExitStack) -> PlantSer
             try:
                 server = own.enter_context(PlantServer(plant, host, begin))
                 for number, device_id in enumerate(plant.line_devices, server.port + 1):
-                    own.enter_context(LineServer(plant, device_id, host, number))
+                    own.enter_context(serve_lines(plant, device_id, host, number))
             except StationRefused:
                 if port != 0 or attempt == TRIES - 1:
                     raise

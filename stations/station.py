@@ -25,10 +25,6 @@ class Unsettled(NotReached):
         super().__init__(message)
 
 
-def _no_state() -> bytes:
-    return b""
-
-
 def nobody_else() -> None:
     """For a station in this process, which no other run can drive."""
 
@@ -47,7 +43,7 @@ class Station:
     table: TiltTable
     chamber: ThermalChamber
     reader: Reader
-    state: Callable[[], bytes] = _no_state
+    state: Callable[[], bytes] = bytes
     exact: bool = True
     require: Callable[[], None] = nobody_else
     safe_steps: list[SafeStep] = field(default_factory=list[SafeStep])

@@ -25,7 +25,7 @@ from schemas.station import StationConfig
 from stations.clock import steady
 from stations.opening import open_devices
 from stations.safety.folder import log_event
-from stations.safety.lease_parts import Part, addresses
+from stations.safety.lease_files import Part, addresses
 from stations.safety.leases import Leases, new_holder
 from stations.safety.safe_state import SafeStep, reach_safe_state
 from stations.safety.watchdog_client import BEAT, DONE, READY
@@ -177,9 +177,7 @@ def main() -> None:
     holder = new_holder(config.name, order["run"], "watchdog", order["token"])
     leases = Leases(Path(order["folder"]), holder, order["wanted"], config.safety.lapse_s)
     os.set_blocking(1, False)
-    with open_devices(
-        config, (), roles=tuple(config.fitted())
-    ) as station:  # connects later, but all modules are loaded
+    with open_devices(config, (), roles=tuple(config.fitted())) as station:  # connects later; all modules are loaded
         watch = Watch(config, leases, os.getppid(), [_sturdy(step) for step in station.safe_steps])
         _send(READY)
         why = watch.until_gone()

@@ -13,7 +13,7 @@ from small_station import lot_of
 
 from stations.opening import open_devices
 from stations.safety import folder
-from stations.safety.lease_parts import addresses
+from stations.safety.lease_files import addresses
 from stations.safety.leases import Leases, new_holder
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -257,7 +257,7 @@ def row(case: Case, result: CaseResult) -> str:
 
 def page(rows: list[str]) -> str:
     """The complete page."""
-    descriptions = [f"| `{name}` | {(kind.__doc__ or '').splitlines()[0]} |" for name, kind in kinds().items()]
+    descriptions = [f"| `{name}` | {kind.meaning} |" for name, kind in kinds().items()]
     parts = [
         HEAD + "## Outcomes\n",
         "| fault | target | start | figures | outcome | part of the message |",

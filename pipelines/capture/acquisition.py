@@ -1,7 +1,5 @@
 """Measuring and storing one record: the move, the samples, the observations meanwhile, and units that stop answering."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
@@ -19,8 +17,8 @@ from schemas.errors import LinkLost, OperatorNeeded, StationError, StationTimeou
 from schemas.event import NO_RECORD
 from schemas.lot import Lot, Unit
 from schemas.recipe import Recipe
+from stations.devices.equipment import RecordingSpoilt
 from stations.devices.reader import Instruments
-from stations.devices.recording import RecordingSpoilt
 from stations.devices.slot import Identity, Samples, SamplesLost
 from stations.safety.suspenders import Reason, Suspended
 from stations.station import Station
@@ -35,7 +33,6 @@ class CaptureSink(Protocol):
 
     def part(self, record: int, number: int, samples: pd.DataFrame) -> None:
         """Stores a part of the samples of a long record before the record is complete; part 0 discards earlier parts."""
-        ...
 
     def put(
         self,
@@ -47,7 +44,6 @@ class CaptureSink(Protocol):
         parts: int = 0,
     ) -> None:
         """Stores a record durably, with the station's state after it; ``parts`` parts of its samples are stored already."""
-        ...
 
     def last_state(self) -> bytes | None:
         """The station's state after the last stored record."""
@@ -96,14 +92,14 @@ class Acquisition:
 
     def identify(self) -> None:
         """Reads the identity of every unit; a serial number other than the lot's ends the run before anything is measured."""
-        lost = {event.action.split()[1]: event.reason for event in self.supervisor.past() if event.kind == "unit_lost"}
+        lost = {event.action.split()[1]: event.reason for event in self.supervisor.past("unit_lost")}
         for unit in self.lot.units:
+            if unit.serial in lost:
+                self.lost[unit.serial] = lost[unit.serial]
             try:
                 identity = self.station.reader.slots[unit.slot].identity()
             except StationError as problem:
-                if unit.serial in lost:
-                    self.lost[unit.serial] = lost[unit.serial]
-                else:
+                if unit.serial not in lost:
                     self.give_up(unit.serial, fault_text(unit.slot, problem))
                 continue
             if identity.serial != unit.serial:
@@ -112,8 +108,6 @@ class Acquisition:
                     "seat the unit, or correct the lot"
                 )
             self.identities[unit.serial] = identity
-            if unit.serial in lost:
-                self.lost[unit.serial] = lost[unit.serial]
         if not self.identities:
             raise OperatorNeeded(
                 "reader: no unit of the lot answers, at least one is needed; check reader, power and cables"
@@ -122,7 +116,7 @@ class Acquisition:
     @property
     def slots(self) -> list[int]:
         """Slots of the units that still answer."""
-        return [unit.slot for unit in self.lot.units if unit.serial not in self.lost]
+        return [unit.slot for unit in self.answering]
 
     @property
     def answering(self) -> list[Unit]:
@@ -140,8 +134,8 @@ class Acquisition:
 
     def give_up_slots(self, slots: Sequence[int], text: str) -> None:
         """Gives up the units of these slots."""
-        for unit in self.lot.units:
-            if unit.slot in slots and unit.serial not in self.lost:
+        for unit in self.answering:
+            if unit.slot in slots:
                 self.give_up(unit.serial, f"slot {unit.slot}: {text}")
 
     def read_instruments(self) -> Instruments:
@@ -181,9 +175,8 @@ class Acquisition:
         record.since_power = powered + duration / 2.0
         record.power_off = self.power.off_before(step) if self.power.ordered else None
         if not step.settled:
-            self.observe(
-                step, record
-            )  # observations at the ends of the spans alone would be late by half a span on average
+            # observations at the ends of the spans alone would be late by half a span on average
+            self.observe(step, record)
         for _ in self._spans(record):
             self.observe(step, record)
             self.read_samples(record)
@@ -195,10 +188,9 @@ class Acquisition:
         self.supervisor.require_steady_clocks(spoilt=True)
         for unit, problem in self.plausibility.unreachable_units(self.answering):
             self.give_up(unit.serial, fault_text(unit.slot, problem))
-        counts = {u.slot: record.count(u.serial) for u in self.lot.units if u.serial not in self.lost}
-        overflow = {u.slot for u in self.lot.units if u.serial not in self.lost and record.overflow(u.serial)}
-        reasons = short_of_samples(counts, overflow, duration, rate)
-        if reasons:
+        counts = {unit.slot: record.count(unit.serial) for unit in self.answering}
+        overflow = {unit.slot for unit in self.answering if record.overflow(unit.serial)}
+        if reasons := short_of_samples(counts, overflow, duration, rate):
             raise Suspended(reasons, spoilt=True)
         self.plausibility.refuse_outliers(record, self.answering)
         samples, readings = self.tables(record)
@@ -284,14 +276,13 @@ class Acquisition:
 
     def read_samples(self, record: Record) -> None:
         """Moves the samples from the slots' memories to the record; the unit of a slot that does not answer is given up."""
-        for unit in self.lot.units:
-            if unit.serial not in self.lost:
-                try:
-                    record.keep(unit.serial, self.station.reader.slots[unit.slot].take())
-                except SamplesLost as problem:
-                    raise Suspended([Reason("samples", str(problem), (unit.slot,))], spoilt=True) from None
-                except StationError as problem:
-                    self.give_up(unit.serial, fault_text(unit.slot, problem))
+        for unit in self.answering:
+            try:
+                record.keep(unit.serial, self.station.reader.slots[unit.slot].take())
+            except SamplesLost as problem:
+                raise Suspended([Reason("samples", str(problem), (unit.slot,))], spoilt=True) from None
+            except StationError as problem:
+                self.give_up(unit.serial, fault_text(unit.slot, problem))
 
     def tables(self, record: Record) -> tuple[pd.DataFrame, pd.DataFrame]:
         """The record as tables: samples of the units that answer, readings of all units."""

@@ -1,13 +1,10 @@
 """Capture: drives a station through a recipe and hands every record to a sink; the only place that does."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from pipelines.capture.acquisition import Acquisition, CaptureSink
-from pipelines.capture.soak_response import Approach
 from pipelines.capture.supervision import LINK_ATTEMPTS, LOST_FOR, WARMING, StillSuspended, Supervisor
-from pipelines.capture.time_left import Remaining
+from pipelines.capture.time_left import Approach, Remaining
 from pipelines.schedule.steps import Step, steps
 from schemas.errors import LeaseLost, LinkLost, NotReached, StationError, StationTimeout
 from schemas.event import EventLog, MemoryLog

@@ -1,9 +1,5 @@
 """Interruptions of a run at its station: open door, pauses, repeated dwells, units that were given up."""
 
-from __future__ import annotations
-
-from typing import Any
-
 from typing_extensions import TypedDict
 
 from pipelines.archive import Run
@@ -49,7 +45,18 @@ def interruptions(run: Run) -> Interruptions | None:
     if "events" not in run.tables():
         return None
     poses = _poses(run)
-    events = [_event(row, poses) for row in rows_of(run.table("events")) if row["kind"] in KINDS]
+    rows = [row for row in rows_of(run.table("events")) if row["kind"] in KINDS]
+    events: list[Interruption] = [
+        {
+            "time_s": float(row["time_s"]),
+            "kind": str(row["kind"]),
+            "record": int(row["record"]),
+            "pose": poses.get(int(row["record"]), ""),
+            "reason": str(row["reason"]),
+            "action": str(row["action"]),
+        }
+        for row in rows
+    ]
     pauses = [event for event in events if event["kind"] in PAUSES]
     return {
         "door_opened": sum(DOOR in event["reason"] for event in pauses),
@@ -57,18 +64,6 @@ def interruptions(run: Run) -> Interruptions | None:
         "paused_s": round(_paused(events), 3),
         "repeated_dwells": _repeated(events),
         "events": events,
-    }
-
-
-def _event(row: dict[str, Any], poses: dict[int, str]) -> Interruption:
-    record = int(row["record"])
-    return {
-        "time_s": float(row["time_s"]),
-        "kind": str(row["kind"]),
-        "record": record,
-        "pose": poses.get(record, ""),
-        "reason": str(row["reason"]),
-        "action": str(row["action"]),
     }
 
 

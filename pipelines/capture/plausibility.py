@@ -3,8 +3,6 @@
 Means and outliers come from the one module that decodes samples, which validation and reduction use, too.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -56,8 +54,7 @@ class Plausibility:
         outliers: dict[int, str] = {}
         for unit in units:
             identity = self.identities[unit.serial]
-            text = record.outlier(unit.serial, identity.lsb, identity.full_scale)
-            if text:
+            if text := record.outlier(unit.serial, identity.lsb, identity.full_scale):
                 outliers[unit.slot] = text
         if outliers:
             slot = min(outliers)

@@ -1,7 +1,5 @@
 """The data of one record during a capture, and the tables made from them."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -124,17 +122,14 @@ class Record:
 
         In a static dwell an outlier was changed in transmission, or the unit was knocked.
         """
-        first = first_outlier(self._outputs(serial), lsb, full_scale)
+        outputs = np.concatenate([np.zeros((0, 3)), *(part.outputs for part in self.parts.get(serial, []))])
+        first = first_outlier(outputs, lsb, full_scale)
         if first is None:
             return ""
         return (
             f"sample {self.stored.get(serial, 0) + first.row} is {first.value:g} on {AXES[first.axis]}, the median of the dwell "
             f"is {first.median:g}"
         )
-
-    def _outputs(self, serial: str) -> NDArray[np.float64]:
-        parts = [part.outputs for part in self.parts.get(serial, [])]
-        return np.concatenate(parts) if parts else np.zeros((0, 3))
 
     def _held(self, serial: str) -> int:
         return sum(len(part.outputs) for part in self.parts.get(serial, []))
@@ -143,10 +138,11 @@ class Record:
         """The samples of these units, one row each; a sample's time follows from its number since the start."""
         units = [unit for unit in units if self._held(unit.serial)]
         counts = [self._held(unit.serial) for unit in units]
-        numbers = [_numbers(self.parts[unit.serial]) for unit in units]
-        outputs = [part.outputs for unit in units for part in self.parts[unit.serial]]
-        table = np.concatenate(outputs) if outputs else np.zeros((0, 3))
-        since = np.concatenate(numbers) if numbers else np.zeros(0)
+        parts = [part for unit in units for part in self.parts[unit.serial]]
+        table = np.concatenate([np.zeros((0, 3)), *(part.outputs for part in parts)])
+        since = np.concatenate(
+            [np.zeros(0), *(part.first + np.arange(len(part.outputs), dtype=float) for part in parts)]
+        )
         columns: dict[str, Any] = {
             "unit": pd.Series([u.serial for u in units], dtype="str").repeat(counts).reset_index(drop=True),
             "slot": np.repeat(np.array([u.slot for u in units], dtype=np.int64), counts),
@@ -155,11 +151,6 @@ class Record:
             "time_s": self.start + (since + 1.0) / self.rate,
         }
         return pd.DataFrame(columns | {axis: table[:, i] for i, axis in enumerate(AXES)})
-
-
-def _numbers(parts: Sequence[Samples]) -> NDArray[np.float64]:
-    """Numbers of samples since the start, from 0."""
-    return np.concatenate([part.first + np.arange(len(part.outputs), dtype=np.float64) for part in parts])
 
 
 def readings_row(record: Record, unit: Unit, identity: Identity, status: str) -> dict[str, object]:

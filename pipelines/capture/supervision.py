@@ -1,7 +1,5 @@
 """Supervision of a capture: conditions that pause it, the journal of pauses, repeats and their reasons, and power orders."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -17,11 +15,7 @@ from stations.station import Station
 
 LINK_ATTEMPTS = 3  # attempts at a record whose device does not answer; each takes its time-outs
 FEWEST_SAMPLES = 0.99  # smallest part of the expected samples
-LASTING = {
-    "door",
-    "vibration",
-    "supply",
-}  # end by themselves and are waited for; the others end with a new soak or record
+LASTING = {"door", "vibration", "supply"}  # end by themselves and are waited for; the others with a new soak or record
 WARMING = {"door", "chamber", "device", "supply", "clock"}  # after these the shortest soak starts again
 LOST_FOR = {"supply": "supply out of tolerance", "device": "left its temperature", "samples": "samples missing"}
 VOLT = "_V"
@@ -46,8 +40,7 @@ class Supervisor:
     def begin(self, units: Sequence[Unit]) -> None:
         """Journals the supplies at the start, the reference of later checks; a resumed run uses those of its first start."""
         config = self.station.config
-        known = [event for event in self.past() if event.kind == "reference"]
-        if known:
+        if known := self.past("reference"):
             figures = known[0].figures
         else:
             supply = self.station.reader.instruments().supply_V
@@ -62,18 +55,17 @@ class Supervisor:
         """The devices' supply that later checks expect, over that at the start: a procedure may set it."""
         self.watched = replace(self.watched, supply_ratio=ratio)
 
-    def past(self) -> list[Event]:
-        """Events up to the present time: a simulated run that was killed resumes at an earlier time than its last events."""
+    def past(self, kind: Kind) -> list[Event]:
+        """Events of a kind until now: a simulated run that was killed resumes at an earlier time than its last events."""
         now = self.station.clock.now()
-        return [event for event in self.events.recorded() if event.time_s <= now]
+        return [event for event in self.events.recorded() if event.kind == kind and event.time_s <= now]
 
     def check_before(self, slots: Sequence[int]) -> None:
         """Suspends a record before it starts, where a condition holds."""
         self.station.require()
         instruments = self.station.reader.instruments()
         require_released(instruments)
-        reasons = self.watched.instrument_reasons(instruments, slots)
-        if reasons:
+        if reasons := self.watched.instrument_reasons(instruments, slots):
             raise Suspended(reasons, spoilt=False)
 
     def require_steady_clocks(self, *, spoilt: bool) -> None:
@@ -162,8 +154,7 @@ class Supervisor:
         rules, clock = self.watched.rules, self.station.clock
         if not any(reason.condition in LASTING for reason in why.reasons):
             return
-        start = clock.now()
-        clear = start
+        start = clear = clock.now()
         while True:
             self.station.require()
             instruments = observe()
@@ -172,13 +163,8 @@ class Supervisor:
             if reasons:
                 clear, why = now, Suspended(reasons, spoilt=False)
             elif now - clear >= rules.clear_s:
-                self.note(
-                    "resumed",
-                    record,
-                    f"absent for {rules.clear_s:g} s",
-                    "soaked again, then measured",
-                    {"paused_s": round(now - start, 3)},
-                )
+                figures = {"paused_s": round(now - start, 3)}
+                self.note("resumed", record, f"absent for {rules.clear_s:g} s", "soaked again, then measured", figures)
                 return
             if now - start > rules.limit_s:
                 raise StillSuspended(f"paused for {_long(now - start)}", why)
@@ -262,7 +248,7 @@ class Power:
         reader = self.station.reader
         if reader.powered():
             return
-        last = [event for event in self.supervisor.past() if event.kind == "power"]
+        last = self.supervisor.past("power")
         left = last[-1] if last and OFF_S not in last[-1].figures else None
         reader.switch("on")
         seconds = 0.0 if left is None else self.station.clock.now() - left.time_s
@@ -271,11 +257,8 @@ class Power:
 
     def off_before(self, step: Step) -> float:
         """Time without power directly before a record, s; 0 where the devices were not off."""
-        return {
-            event.record: event.figures[OFF_S]
-            for event in self.supervisor.past()
-            if event.kind == "power" and OFF_S in event.figures
-        }.get(step.record, 0.0)
+        events = [event for event in self.supervisor.past("power") if OFF_S in event.figures]
+        return {event.record: event.figures[OFF_S] for event in events}.get(step.record, 0.0)
 
     def cycle(self, step: Step) -> None:
         """Switches the devices off for the step's ``off_s`` and on again, also after an error; once for each record."""

@@ -103,8 +103,7 @@ def _written(session: BringUp, folder: Path, person: _Typed, by: str, *, as_json
     """Writes page, document and corrected profile, and prints the result."""
     import json
 
-    from pipelines.commissioning.conformance import document_of
-    from pipelines.commissioning.conformance_page import conformance_page
+    from pipelines.commissioning.conformance import conformance_page, document_of
     from stations.bringup.corrected import corrected_name, corrected_text
 
     corrected = corrected_text(session.profile, session.findings, session.made)

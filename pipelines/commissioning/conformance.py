@@ -1,15 +1,19 @@
-"""The conformance document of a bring-up: per register and per promise of the family held, differs or not tried."""
+"""The conformance of a bring-up as document and page: per register and per promise of the family held, differs or not tried."""
 
-from __future__ import annotations
-
+from dataclasses import asdict
 from pathlib import Path
+from typing import cast
 
 from pydantic import TypeAdapter
 
-from pipelines.commissioning.documents import ConformanceDocument, Platform
+from pipelines.commissioning.documents import ConformanceDocument, ConformancePoint, Platform
+from pipelines.commissioning.frames import timeline
+from pipelines.drawing import svg_text
+from pipelines.report.templates import template
 from schemas.errors import DataRejected
 from schemas.foreign import foreign
 from stations.bringup.session import BringUp
+from stations.recordings.frame_file import read_frames
 
 FORMAT = "tumbleline conformance 1"
 
@@ -34,17 +38,7 @@ def document_of(
         "held": findings.count("held"),
         "differs": findings.count("differs"),
         "not_tried": findings.count("not tried"),
-        "points": [
-            {
-                "part": p.part,
-                "what": p.what,
-                "verdict": p.verdict,
-                "found": p.found,
-                "expected": p.expected,
-                "remedy": p.remedy,
-            }
-            for p in findings.points
-        ],
+        "points": [cast("ConformancePoint", asdict(point)) for point in findings.points],
         "answers": {
             "usual_ms": round(1e3 * bring_up.read.usual, 3),
             "slowest_ms": round(1e3 * bring_up.read.slowest, 3),
@@ -71,3 +65,18 @@ def read_conformance(path: Path) -> ConformanceDocument:
             f"conformance: {path} has format '{document['format'][:40]}', '{FORMAT}' is needed; update the product"
         )
     return document
+
+
+SECTIONS = {"Reach": "reach", "Against the panel": "panel", "Orders": "order", "Registers": "register"}
+
+
+def conformance_page(document: ConformanceDocument, recording: Path | None) -> str:
+    """The page as one HTML text without other files."""
+    chart = ""
+    if recording is not None and recording.is_file():
+        content = read_frames(recording)
+        chart = svg_text(timeline(content)) if content.exchanges else ""
+    sections = [("What differs", [point for point in document["points"] if point["verdict"] == "differs"])]
+    for title, part in SECTIONS.items():
+        sections.append((title, [point for point in document["points"] if point["part"] == part]))
+    return template("conformance.html").render(d=document, sections=sections, chart=chart)

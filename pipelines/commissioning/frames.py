@@ -1,37 +1,105 @@
-"""A recording as a document, a page, and a test."""
-
-from __future__ import annotations
+"""A recording of the links of a station as a time line, a document, a page, and a test."""
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Literal
+
+import numpy as np
 
 from pipelines.commissioning.documents import FrameRow, FramesDocument, RecordedDeviceRow
-from pipelines.commissioning.frame_pictures import kind_of, timeline
-from pipelines.drawing import svg_text
+from pipelines.drawing import Chart, Plot, PlotAxis, Trace, svg_text
+from pipelines.drawing.chart import Role, Symbol
 from pipelines.report.templates import template
+from stations.links.frames import EXCEPTION
 from stations.recordings.clients_view import what_a_client_gets
 from stations.recordings.decoding import said
-from stations.recordings.frame_file import FrameFile
+from stations.recordings.frame_file import Exchange, FrameFile
+
+MOST_MARKS = 20_000
+Kind = Literal["read", "order", "refused", "no answer"]
+KINDS: tuple[tuple[Kind, Role, Symbol, float], ...] = (
+    ("read", "x", "circle", -0.24),
+    ("order", "before", "triangle-up", -0.08),
+    ("refused", "limit", "square", 0.08),
+    ("no answer", "ink", "diamond", 0.24),
+)
+"""With the colour, the mark, and how far from the line of its device each kind is drawn."""
+
+
+def kind_of(exchange: Exchange) -> Kind:
+    """Whether an exchange is a read, an order, a refusal or a silence."""
+    if exchange.reply is None:
+        return "no answer"
+    if not exchange.text and exchange.reply and exchange.reply[0] & EXCEPTION:
+        return "refused"
+    if exchange.text and exchange.reply.startswith(b"NA:"):
+        return "refused"
+    return "order" if exchange.writes else "read"
+
+
+def timeline(recording: FrameFile) -> Chart:
+    """Exchanges by device over time, and the time until each answer."""
+    exchanges = _thinned(recording.exchanges)
+    places = list(dict.fromkeys(recording.place_of(exchange) for exchange in exchanges))
+    at, spent = [], []
+    for kind, role, symbol, beside in KINDS:
+        own = [exchange for exchange in exchanges if kind_of(exchange) == kind]
+        if not own:
+            continue
+        time = np.array([exchange.at_s for exchange in own])
+        row = np.array([places.index(recording.place_of(exchange)) + beside for exchange in own])
+        texts = tuple(_told(recording, exchange) for exchange in own)
+        at.append(Trace(kind, time, row, role=role, symbol=symbol, size=7.0, texts=texts))
+        if kind != "no answer":
+            seconds = np.array([max(exchange.seconds, 1e-6) for exchange in own]) * 1e3
+            spent.append(Trace(kind, time, seconds, role=role, symbol=symbol, size=5.0, texts=texts, legend=False))
+    last = max((exchange.at_s + exchange.seconds for exchange in exchanges), default=1.0)
+    span = PlotAxis("time since the start of the recording / s", low=0.0, high=last or 1.0)
+    plots = (
+        Plot("exchanges", span, PlotAxis("", names=tuple(places)), tuple(at)),
+        Plot("answer time", span, PlotAxis("time until the answer / ms", log=True), tuple(spent)),
+    )
+    left = len(recording.exchanges) - len(exchanges)
+    note = (
+        f"{left} of {len(recording.exchanges)} exchanges are not drawn; those without an answer all are" if left else ""
+    )
+    return Chart("Exchanges over time", plots, 1, height=max(220, 60 + 24 * len(places)), note=note)
+
+
+def _thinned(exchanges: Sequence[Exchange]) -> list[Exchange]:
+    """At most so many marks: orders, refusals and silences first, then evenly taken reads."""
+    if len(exchanges) <= MOST_MARKS:
+        return list(exchanges)
+    reads = [k for k, exchange in enumerate(exchanges) if kind_of(exchange) == "read"]
+    others = len(exchanges) - len(reads)
+    step = -(-len(reads) // max(MOST_MARKS - others, MOST_MARKS // 10))
+    left_out = set(reads) - set(reads[::step])
+    return [exchange for k, exchange in enumerate(exchanges) if k not in left_out]
+
+
+def _told(recording: FrameFile, exchange: Exchange) -> str:
+    answer = said(exchange, recording.device_of(exchange))
+    return f"{recording.place_of(exchange)}: {exchange.what} → {answer[:120]}, {1e3 * exchange.seconds:.1f} ms"
+
 
 MOST_ROWS = 2_000
 
 
 def devices_of(recording: FrameFile) -> list[RecordedDeviceRow]:
     """The devices of a recording with the number of their exchanges."""
-    rows: list[RecordedDeviceRow] = []
-    for device in recording.devices:
-        own = [exchange for exchange in recording.exchanges if recording.device_of(exchange) == device]
-        rows.append(
-            {
-                "place": device.place,
-                "link": device.link,
-                "device_id": device.device_id,
-                "profile": "" if device.profile is None else device.profile.name,
-                "exchanges": len(own),
-                "no_answer": sum(exchange.reply is None for exchange in own),
-            }
-        )
-    return rows
+    of = [(recording.device_of(exchange), exchange.reply is None) for exchange in recording.exchanges]
+    return [
+        {
+            "place": device.place,
+            "link": device.link,
+            "device_id": device.device_id,
+            "profile": "" if device.profile is None else device.profile.name,
+            "exchanges": sum(own == device for own, _ in of),
+            "no_answer": sum(own == device and silent for own, silent in of),
+        }
+        for device in recording.devices
+    ]
 
 
 def frames_document(recording: FrameFile, limit: int | None = None) -> FramesDocument:

@@ -1,7 +1,5 @@
 """The archive: there, of the format of this version, writable, with room, in time, and its signing key outside it."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import stat
@@ -46,23 +44,23 @@ def _checks(archive: Archive, *, named: bool, free_gb: float) -> list[Check]:
     mark = root / "archive.json"
     if not mark.is_file():
         return [_missing(archive, named=named)]
+    out = [Check(PART, "reachable", "good", str(root))]
     form = files.read_json(mark).get("format")
-    remedy = "use the version that wrote it, or name another archive"
-    needed = f"{FORMAT}, which this version writes"
-    out = [
-        Check(PART, "reachable", "good", str(root)),
-        judged(PART, "format", f"{form}", needed, remedy, good=form == FORMAT),
-    ]
+    remedy, needed = "use the version that wrote it, or name another archive", f"{FORMAT}, which this version writes"
+    out.append(judged(PART, "format", f"{form}", needed, remedy, good=form == FORMAT))
     try:
         ahead_s = write_probe(root)
     except OSError as problem:
         remedy = "give this user the right to write, or make room; nothing was left behind"
         out.append(unwritable(PART, root, problem, remedy))
     else:
-        out += [Check(PART, "writable", "good", "1 MiB was written, read back and removed")]
-        out += [clock_check(PART, ahead_s, "the archive")]
+        out.append(Check(PART, "writable", "good", "1 MiB was written, read back and removed"))
+        out.append(clock_check(PART, ahead_s, "the archive"))
     if isinstance(root, Path):
-        out += [_room(root, free_gb), *_later_than_now(root)]
+        free = shutil.disk_usage(root).free / GIGA
+        remedy, needed = "make room on its disk, or give it a larger one", f"at least {free_gb:g} GB"
+        out.append(judged(PART, "free space", f"{free:.1f} GB", needed, remedy, good=free >= free_gb))
+        out += _later_than_now(root)
     return out
 
 
@@ -74,12 +72,6 @@ def _missing(archive: Archive, *, named: bool) -> Check:
         return Check(PART, "reachable", "not configured", found, "", remedy)
     remedy = "mount its disk or correct the address; the first run makes an archive in an empty folder"
     return Check(PART, "reachable", "fault", found, "an archive", remedy)
-
-
-def _room(root: Path, free_gb: float) -> Check:
-    free = shutil.disk_usage(root).free / GIGA
-    remedy = "make room on its disk, or give it a larger one"
-    return judged(PART, "free space", f"{free:.1f} GB", f"at least {free_gb:g} GB", remedy, good=free >= free_gb)
 
 
 def _later_than_now(root: Path) -> list[Check]:
@@ -103,13 +95,13 @@ def key_checks(address: str | None) -> list[Check]:
         name = name_of(private_key(place).public_key())
     except TumblelineError as problem:
         return [of_error(KEY, "present", problem)]
-    return [Check(KEY, "present", "good", f"{name} in {place}"), _mode(place), _outside(place, address)]
-
-
-def _mode(place: Path) -> Check:
     mode = stat.S_IMODE(place.stat().st_mode)
-    remedy = f"run: chmod 600 {place}"
-    return judged(KEY, "private", f"mode {mode:04o}", "0600 or less", remedy, good=not mode & OTHERS)
+    private = not mode & OTHERS
+    return [
+        Check(KEY, "present", "good", f"{name} in {place}"),
+        judged(KEY, "private", f"mode {mode:04o}", "0600 or less", f"run: chmod 600 {place}", good=private),
+        _outside(place, address),
+    ]
 
 
 def _outside(place: Path, address: str | None) -> Check:
@@ -117,7 +109,8 @@ def _outside(place: Path, address: str | None) -> Check:
         root = Archive(address).root
     except TumblelineError:
         return Check(KEY, "outside the archive", "not configured", "the archive cannot be reached")
-    if isinstance(root, Path) and place.resolve().is_relative_to(root.resolve()):
-        remedy = "move it elsewhere: who can change the archive could sign with it"
-        return Check(KEY, "outside the archive", "fault", f"{place} lies in the archive", "a place outside", remedy)
-    return Check(KEY, "outside the archive", "good", "yes")
+    inside = isinstance(root, Path) and place.resolve().is_relative_to(root.resolve())
+    found, remedy = "yes", "move it elsewhere: who can change the archive could sign with it"
+    if inside:
+        found = f"{place} lies in the archive"
+    return judged(KEY, "outside the archive", found, "a place outside", remedy, good=not inside)

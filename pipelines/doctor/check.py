@@ -1,7 +1,5 @@
 """One result of a check, and the checks that several parts share: a file that is written, read and removed; a clock."""
 
-from __future__ import annotations
-
 import os
 import time
 from contextlib import suppress

@@ -1,7 +1,5 @@
 """All checks in their order, and the document of their results."""
 
-from __future__ import annotations
-
 import ctypes
 import platform
 import sys

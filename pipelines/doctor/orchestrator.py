@@ -1,7 +1,5 @@
 """The orchestrator: it answers, its database is ready, it takes the key, it has the version of the client, it is in time."""
 
-from __future__ import annotations
-
 import base64
 import http.client
 import json
@@ -50,9 +48,13 @@ def orchestrator_checks() -> list[Check]:
     except (OSError, http.client.HTTPException, ValueError) as problem:
         found = f"{shown} does not answer ({getattr(problem, 'reason', None) or problem})"
         return [Check(PART, "reachable", "fault", found, "a server that runs", f"start it, or correct {VARIABLE}")]
+    reached, is_ready = health.status == HTTPStatus.OK, ready.status == HTTPStatus.OK
+    found, remedy = shown if reached else f"{shown} answers {health.status}", f"correct {VARIABLE}: it ends in /api"
+    state, log = "ready" if is_ready else f"not ready ({ready.status})", "look into the server's log"
+    database = f"{log}: its database does not answer, or its disk is full"
     return [
-        _reachable(shown, health),
-        _database(ready),
+        judged(PART, "reachable", found, "200 of a Prefect server", remedy, good=reached),
+        judged(PART, "database", state, "200 at /ready", database, good=is_ready),
         *_authenticated(address),
         *([clock_check(PART, health.ahead_s, "its server")] if health.ahead_s is not None else []),
         *_in_clear(address),
@@ -67,9 +69,8 @@ def ask(address: str, key: str = "") -> ServerAnswer:
     OSError, http.client.HTTPException
         There is no answer within 5 s.
     """
-    request = urllib.request.Request(address)  # noqa: S310 - http or https, looked at above
-    if key:
-        request.add_header("Authorization", "Basic " + base64.b64encode(key.encode()).decode())
+    head = {"Authorization": "Basic " + base64.b64encode(key.encode()).decode()} if key else {}
+    request = urllib.request.Request(address, headers=head)  # noqa: S310 - http or https, looked at above
     begun = time.time()
     try:
         with urllib.request.urlopen(request, timeout=TIMEOUT_S) as reply:  # noqa: S310
@@ -87,19 +88,6 @@ def _ahead(stated: str | None, begun: float, ended: float) -> float | None:
         return offset(parsedate_to_datetime(stated).timestamp(), begun, ended, 1.0)
     except ValueError:
         return None
-
-
-def _reachable(shown: str, answer: ServerAnswer) -> Check:
-    good, remedy = answer.status == HTTPStatus.OK, f"correct {VARIABLE}: it ends in /api"
-    found = shown if good else f"{shown} answers {answer.status}"
-    return judged(PART, "reachable", found, "200 of a Prefect server", remedy, good=good)
-
-
-def _database(answer: ServerAnswer) -> Check:
-    good = answer.status == HTTPStatus.OK
-    remedy = "look into the server's log: its database does not answer, or its disk is full"
-    found = "ready" if good else f"not ready ({answer.status})"
-    return judged(PART, "database", found, "200 at /ready", remedy, good=good)
 
 
 def _authenticated(address: str) -> list[Check]:

@@ -1,12 +1,9 @@
 """Versions: of Python and of the libraries, against the ranges that the product declares and against its lock."""
 
-from __future__ import annotations
-
 import platform
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from importlib import metadata
 from pathlib import Path
-from typing import NamedTuple
 
 from packaging.requirements import Requirement
 from packaging.specifiers import SpecifierSet
@@ -22,16 +19,10 @@ SHOWN = 5
 DEVELOPMENT = {"build", "dev", "bench", "docs"}  # extras of those who change the product, not of those who use it
 
 
-class Needed(NamedTuple):
-    """A requirement, and the distribution that declares it."""
-
-    by: str
-    requirement: Requirement
-
-
 def software_checks() -> list[Check]:
     """Python, the product, its libraries, the lock, and the optional libraries."""
-    return [_python(), _product(), *_libraries(), _pinned(), _optional()]
+    product = Check(PART, PRODUCT, "good", f"{metadata.version(PRODUCT)} in {Path(__file__).resolve().parents[2]}")
+    return [_python(), product, *_libraries(), _pinned(), _optional()]
 
 
 def _python() -> Check:
@@ -39,7 +30,8 @@ def _python() -> Check:
     needed = metadata.metadata(PRODUCT)["Requires-Python"] or ""
     if version not in SpecifierSet(needed, prereleases=True):
         return Check(PART, "Python", "fault", version, needed, "install the product in an environment of that version")
-    tested = _tested()
+    classes = metadata.metadata(PRODUCT).get_all("Classifier") or ()  # the versions that the tests have run on
+    tested = [one.rpartition(" :: ")[2] for one in classes if one.startswith("Programming Language :: Python :: 3.")]
     if version.rpartition(".")[0] not in tested:
         remedy = "install the product in an environment of one of these where it is validated"
         needed = f"{', '.join(tested)}, which the tests run on"
@@ -47,72 +39,44 @@ def _python() -> Check:
     return Check(PART, "Python", "good", version)
 
 
-def _tested() -> list[str]:
-    """The versions of Python that the product declares: those that its tests have run on."""
-    classes = metadata.metadata(PRODUCT).get_all("Classifier") or ()
-    return [one.rpartition(" :: ")[2] for one in classes if one.startswith("Programming Language :: Python :: 3.")]
-
-
-def _product() -> Check:
-    return Check(PART, PRODUCT, "good", f"{metadata.version(PRODUCT)} in {Path(__file__).resolve().parents[2]}")
-
-
 def _libraries() -> list[Check]:
     """Libraries that are missing or outside the ranges of the product or of one another: a check each, the product's first."""
     checks: dict[str, Check] = {}
-    count = 0
-    for needed in _closure():
-        count += 1
-        name, by = needed.requirement.name, needed.by
-        remedy = f"run: pip install '{name}{needed.requirement.specifier}'"
-        try:
-            version = metadata.version(name)
-        except metadata.PackageNotFoundError:
+    needed = list(_closure())
+    for by, requirement in needed:
+        name, specifier = requirement.name, requirement.specifier
+        remedy, version = f"run: pip install '{name}{specifier}'", _installed(name)
+        if version is None:
             checks.setdefault(name, Check(PART, name, "fault", "not installed", f"{by} needs it", remedy))
-            continue
-        if not needed.requirement.specifier.contains(version, prereleases=True):
+        elif not specifier.contains(version, prereleases=True):
             state = "fault" if by == PRODUCT else "warning"
-            check = Check(PART, name, state, version, f"{needed.requirement.specifier} for {by}", remedy)
-            checks.setdefault(name, check)
-    return list(checks.values()) or [Check(PART, "libraries", "good", f"{count} requirements are met")]
+            checks.setdefault(name, Check(PART, name, state, version, f"{specifier} for {by}", remedy))
+    return list(checks.values()) or [Check(PART, "libraries", "good", f"{len(needed)} requirements are met")]
 
 
-def _closure() -> Iterator[Needed]:
-    """The requirements of the product and, of what is installed, theirs; each once per distribution that declares it."""
+def _closure() -> Iterator[tuple[str, Requirement]]:
+    """The requirements of the product and, of what is installed, theirs, each with the distribution that declares it."""
     left: list[tuple[str, frozenset[str]]] = [(PRODUCT, frozenset())]
     seen: set[tuple[str, frozenset[str]]] = set()
     while left:
         name, extras = left.pop()
-        if (name, extras) in seen:
+        if (name, extras) in seen or _installed(name) is None:
             continue
         seen.add((name, extras))
-        try:
-            declared = metadata.requires(name) or []
-        except metadata.PackageNotFoundError:
-            continue
-        for requirement in _that_hold(declared, extras):
-            if canonicalize_name(requirement.name) in UNUSED.get(name, ()):
-                continue
-            yield Needed(name, requirement)
-            left.append((canonicalize_name(requirement.name), frozenset(requirement.extras)))
-
-
-def _that_hold(declared: Iterable[str], extras: frozenset[str]) -> list[Requirement]:
-    parsed = [Requirement(one) for one in declared]
-    return [
-        one
-        for one in parsed
-        if one.marker is None or any(one.marker.evaluate({"extra": extra}) for extra in extras or {""})
-    ]
+        for requirement in map(Requirement, metadata.requires(name) or ()):
+            needed, marker = canonicalize_name(requirement.name), requirement.marker
+            holds = marker is None or any(marker.evaluate({"extra": extra}) for extra in extras or {""})
+            if holds and needed not in UNUSED.get(name, ()):
+                yield name, requirement
+                left.append((needed, frozenset(requirement.extras)))
 
 
 def _pinned() -> Check:
     """Versions that are not those of the lock: they may work, but they are not tested."""
     path = shipped(LOCK)
     if path is None:
-        return Check(
-            PART, "lock", "not configured", f"{LOCK} is not installed", "", "install the product from its wheel"
-        )
+        remedy = "install the product from its wheel"
+        return Check(PART, "lock", "not configured", f"{LOCK} is not installed", "", remedy)
     locked = {pin.name: pin.version for pin in pins(path.read_text(encoding="utf-8")) if pin.holds()}
     held: dict[str, str] = {canonicalize_name(one.name): one.version for one in metadata.distributions()}
     other = [
@@ -124,14 +88,8 @@ def _pinned() -> Check:
         same = len(locked.keys() & held.keys())
         return Check(PART, "lock", "good", f"{same} libraries have the versions of the lock")
     more = f" and {len(other) - SHOWN} more" if len(other) > SHOWN else ""
-    return Check(
-        PART,
-        "lock",
-        "warning",
-        f"{'; '.join(other[:SHOWN])}{more}",
-        "the versions of the lock, which were tested together",
-        f"run: pip install --no-deps --require-hashes -r {path}",
-    )
+    found, needed = f"{'; '.join(other[:SHOWN])}{more}", "the versions of the lock, which were tested together"
+    return Check(PART, "lock", "warning", found, needed, f"run: pip install --no-deps --require-hashes -r {path}")
 
 
 def _optional() -> Check:
@@ -149,7 +107,7 @@ def _optional() -> Check:
             and canonicalize_name(one.name) != PRODUCT
         ]
         if own:
-            (have if all(_is_installed(one.name) for one in own) else lack).append(extra)
+            (have if all(_installed(one.name) for one in own) else lack).append(extra)
     if not have and not lack:
         remedy = "install the product again, so that its metadata are those of its code"
         return Check(PART, "optional parts", "warning", "the metadata name none", "the extras of this version", remedy)
@@ -160,9 +118,9 @@ def _optional() -> Check:
     return Check(PART, "optional parts", "not configured", found, "", remedy)
 
 
-def _is_installed(name: str) -> bool:
+def _installed(name: str) -> str | None:
+    """The version of a distribution; None where it is not installed."""
     try:
-        metadata.version(name)
+        return metadata.version(name)
     except metadata.PackageNotFoundError:
-        return False
-    return True
+        return None

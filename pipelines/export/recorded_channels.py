@@ -10,7 +10,7 @@ from pipelines.archive import Run
 from pipelines.export.waveforms.channel import Channel
 from schemas.errors import WrongUse, did_you_mean
 from schemas.units import AXES
-from stations.devices.recording import REFERENCE
+from stations.devices.equipment import REFERENCE
 
 
 def channels_of(run: Run, number: int, unit: str) -> list[Channel]:

@@ -55,7 +55,7 @@ NEEDED = (
     "pipelines.report",
     "stations.opening",
 )
-SIMULATED = ("stations.plant.plant", "stations.plant.server", "stations.plant.line_server")
+SIMULATED = ("stations.plant.plant", "stations.plant.server")
 """Modules that a run imports, and those of a simulated station: the slow ones."""
 
 _started: list[subprocess.Popen[bytes]] = []  # they end by themselves; kept so that the interpreter does not complain

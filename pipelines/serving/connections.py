@@ -91,15 +91,12 @@ class Connection:
 
     def look(self, now: float, limits: ConnectionLimits) -> None:
         """End it if it has been idle for too long, or takes nothing of an answer that is left to the system to send."""
-        unsent = self._unsent()
+        unsent = host.unsent_bytes(self.socket)
         if unsent != self.unsent:
             self.unsent, self.moved = unsent, now
         patience = limits.answer_s if unsent else limits.idle_s
         if not self.requests and max(self.since, self.moved) < now - patience:
             self.close()
-
-    def _unsent(self) -> int:
-        return host.unsent_bytes(self.socket)
 
     def close(self) -> None:
         """End it; the loop of events sees its end and frees it."""

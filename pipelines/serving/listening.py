@@ -1,7 +1,5 @@
 """Sockets that servers listen on, with limits of their connections."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import socket

@@ -13,7 +13,7 @@ from urllib.parse import urlencode
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from schemas.foreign import shown
-from schemas.reasons import reason_of
+from schemas.toml_files import reason_of
 
 Text = Annotated[str, Field(max_length=200)]
 Texts = Annotated[tuple[Annotated[str, Field(min_length=1, max_length=400)], ...], Field(max_length=60)]

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 from schemas.errors import StationRefused
 from stations.bringup.orders import Orders
-from stations.bringup.safe import axis_of, limits_of_orders
-from stations.devices.axis import TableAxis
+from stations.bringup.target import axis_of, limits_of_orders
+from stations.devices.table import TableAxis
 
 TURN_DEG = 1.0
 STOPPED_DEG = 3.0
@@ -36,16 +36,17 @@ class AxisOrders:
     def _state(self) -> None:
         """Alarm, home and readiness: what the drive says before anything is ordered."""
         state = axis_of(self.orders.target).state()
-        said = f"ready {_yes(state.ready)}, homed {_yes(state.homed)}, moving {_yes(state.moving)}"
+        flags = {"ready": state.ready, "homed": state.homed, "moving": state.moving}
+        said = ", ".join(f"{name} {'yes' if flag else 'no'}" for name, flag in flags.items())
         if state.alarm:
-            self.orders.add("no alarm", "differs", state.alarm, "none", "clear the cause and reset the drive")
-            self.orders.blocked = "the drive has an alarm"
+            self._block(
+                "no alarm", state.alarm, "none", "clear the cause and reset the drive", "the drive has an alarm"
+            )
         elif not state.homed:
-            self.orders.add("home position known", "differs", said, "homed", "home the axis at the drive, then repeat")
-            self.orders.blocked = "the axis has no home position"
+            remedy = "home the axis at the drive, then repeat"
+            self._block("home position known", said, "homed", remedy, "the axis has no home position")
         elif state.moving:
-            self.orders.add("at rest", "differs", said, "not moving", "wait until it stands, then repeat")
-            self.orders.blocked = "the axis moves"
+            self._block("at rest", said, "not moving", "wait until it stands, then repeat", "the axis moves")
         else:
             self.orders.add("state of the drive", "held", said)
         order = next((point for point in self.orders.findings.points if point.what == "word order"), None)
@@ -54,29 +55,34 @@ class AxisOrders:
                 "the word order is not known, so that a target might be another angle: jog the axis, then repeat"
             )
 
+    def _block(self, what: str, found: str, expected: str, remedy: str, why: str) -> None:
+        """A finding after which no further order is given."""
+        self.orders.add(what, "differs", found, expected, remedy)
+        self.orders.blocked = why
+
     def _turn(self) -> None:
         """A degree and back, with its read-back; the same order twice moves nothing."""
         axis = axis_of(self.orders.target)
         start = axis.position()
         goal = self._goal(start, TURN_DEG)
+        what = "turns by a degree and reads it back"
         text = (
             f"the drive is enabled and the axis turns from {start:.3f}° to {goal:.3f}° at {self._speed:g}°/s, and back"
         )
-        if not self.orders.consent("MOVE", text, "turns by a degree and reads it back"):
+        if not self.orders.consent("MOVE", text, what):
             return
         self.orders.moving()
         turned = self._moved(axis, goal, start)
         if turned is None:
             return
-        ratio = turned / (goal - start)
+        ratio, ordered = turned / (goal - start), f"{goal - start:g}°"
         if abs(ratio - 1.0) > SCALE:
-            found = f"feedback_position changed by {turned:.4g}° for {goal - start:g}°"
+            found = f"feedback_position changed by {turned:.4g}° for {ordered}"
             remedy = f"the scale of target or of feedback_position is wrong by {ratio:.4g}: compare both with the drive's display"
-            self.orders.add("turns by a degree and reads it back", "differs", found, f"{goal - start:g}°", remedy)
-            self.orders.blocked = "scales of target and position differ"
+            self._block(what, found, ordered, remedy, "scales of target and position differ")
             axis.stop()
             return
-        self.orders.add("turns by a degree and reads it back", "held", f"{turned:.4f}°", f"{goal - start:g}°")
+        self.orders.add(what, "held", f"{turned:.4f}°", ordered)
         typed = self.orders.person.ask("By how many degrees has the table turned, as you saw it? (Enter: skip)").strip()
         self._seen(typed, turned)
         before = axis.position()
@@ -84,27 +90,25 @@ class AxisOrders:
         axis.start(goal)
         time.sleep(0.5)
         again = abs(axis.position() - before)
-        verdict = "held" if again < STEADY_DEG else "differs"
-        self.orders.add("the same order again moves nothing", verdict, f"{again:.4f}°", "0°", "")
+        self.orders.judge("the same order again moves nothing", f"{again:.4f}°", "0°", good=again < STEADY_DEG)
         axis.done()
         back = self._moved(axis, start, goal)
         if back is not None:
             off = axis.position() - start
-            self.orders.add("comes back", "held" if abs(off) <= STEADY_DEG else "differs", f"{off:+.4f}° off", "0°")
+            self.orders.judge("comes back", f"{off:+.4f}° off", "0°", good=abs(off) <= STEADY_DEG)
 
     def _seen(self, typed: str, turned: float) -> None:
+        what = "turns as seen by a person"
         try:
             seen = abs(float(typed.replace(",", ".")))
         except ValueError:
-            self.orders.add("turns as seen by a person", "not tried", "", f"{abs(turned):.3g}°")
+            self.orders.add(what, "not tried", "", f"{abs(turned):.3g}°")
             return
         held = abs(seen - abs(turned)) <= max(0.2 * abs(turned), 0.2)
         remedy = (
             f"the scales of target, feedback_position and speed are wrong by {seen / abs(turned):.3g}: enter the gear"
         )
-        self.orders.add(
-            "turns as seen by a person", "held" if held else "differs", f"{seen:g}°", f"{abs(turned):.3g}°", remedy
-        )
+        self.orders.judge(what, f"{seen:g}°", f"{abs(turned):.3g}°", remedy, good=held)
         if not held and turned:
             for name in ("target", "feedback_position", "command_position"):
                 if self.orders.target.profile.has(name):
@@ -130,9 +134,7 @@ class AxisOrders:
         crept, left = abs(axis.position() - stood), abs(goal - stood)
         held = left > STEADY_DEG and crept < STEADY_DEG
         found = f"stands {left:.3f}° before the target" + (f", creeps by {crept:.3f}°" if crept >= STEADY_DEG else "")
-        self.orders.add(
-            what, "held" if held else "differs", found, "stands before the target", "do not use this drive in a station"
-        )
+        self.orders.judge(what, found, "stands before the target", "do not use this drive in a station", good=held)
         axis.done()
         self._moved(axis, start, stood)
 
@@ -148,10 +150,8 @@ class AxisOrders:
             self.orders.add(what, "not tried", "no alarm, and the drive was not ready before either; allow MOVE first")
             return
         stopped = bool(state.alarm) or not state.ready
-        found = state.alarm or ("not ready" if not state.ready else "ready, no alarm")
-        self.orders.add(
-            what, "held" if stopped else "differs", found, "an alarm, or not ready", "check the wiring of the stop"
-        )
+        found = state.alarm or ("ready, no alarm" if state.ready else "not ready")
+        self.orders.judge(what, found, "an alarm, or not ready", "check the wiring of the stop", good=stopped)
         self.orders.person.ask("Release the emergency stop and reset the drive, then press Enter.")
 
     def _lost_link(self) -> None:
@@ -210,10 +210,8 @@ class AxisOrders:
             if gone > RUNAWAY * abs(goal - start) + STEADY_DEG:
                 axis.stop()
                 remedy = "the scale of target is too large, or that of feedback_position"
-                self.orders.add(
-                    "turns no further than ordered", "differs", f"{gone:.3g}°", f"{abs(goal - start):g}°", remedy
-                )
-                self.orders.blocked = "the axis went further than ordered"
+                what, ordered = "turns no further than ordered", f"{abs(goal - start):g}°"
+                self._block(what, f"{gone:.3g}°", ordered, remedy, "the axis went further than ordered")
                 return None
             if time.monotonic() > end:
                 axis.stop()
@@ -228,7 +226,3 @@ def _await_rest(axis: TableAxis) -> None:
     end = time.monotonic() + MARGIN_S
     while axis.state().moving and time.monotonic() < end:
         time.sleep(POLL_S)
-
-
-def _yes(value: bool) -> str:  # noqa: FBT001 - the state itself
-    return "yes" if value else "no"

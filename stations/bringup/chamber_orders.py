@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from stations.bringup.orders import Orders
 from stations.bringup.person import Verdict
-from stations.bringup.safe import bounds_of, chamber_of
+from stations.bringup.target import bounds_of, chamber_of
 
 STEP_K = 1.0
 SAME_K = 0.1
@@ -43,9 +43,8 @@ class ChamberOrders:
         low, high = bounds_of(self.orders.target.profile, "set_point", (-100.0, 250.0))
         goal = round(before + STEP_K if before + STEP_K <= high else before - STEP_K, 1)
         if not low <= goal <= high:
-            self.orders.add(
-                what, "differs", f"set point {before:g} °C", f"{low:g} to {high:g} °C", "correct the limits"
-            )
+            found, allowed = f"set point {before:g} °C", f"{low:g} to {high:g} °C"
+            self.orders.add(what, "differs", found, allowed, "correct the limits")
             return
         text = f"the set point goes from {before:g} °C to {goal:g} °C and back; the chamber heats or cools by a kelvin"
         if not self.orders.consent("SET", text, what):
@@ -73,8 +72,7 @@ class ChamberOrders:
         """Off and on again: the safe state of a station may be a chamber that is off."""
         what = "switches off and on"
         if not self._switches:
-            reason = "no writable mode; set safety.chamber to set_point or hold"
-            self.orders.add(what, "not tried", reason)
+            self.orders.add(what, "not tried", "no writable mode; set safety.chamber to set_point or hold")
             return
         chamber = chamber_of(self.orders.target)
         if not self.orders.consent("OFF", "heating and cooling are switched off, and on again", what):
@@ -103,6 +101,5 @@ class ChamberOrders:
         after, then = self.orders.again(chamber.set_point), chamber.mode()
         held = abs(after - before) <= SAME_K and then == mode
         remedy = "it has a time-out of its own: see its manual, and set it longer than a pause of the network"
-        self.orders.add(
-            what, "held" if held else "differs", f"{after:g} °C, mode {then}", f"{before:g} °C, mode {mode}", remedy
-        )
+        found, expected = f"{after:g} °C, mode {then}", f"{before:g} °C, mode {mode}"
+        self.orders.judge(what, found, expected, remedy, good=held)

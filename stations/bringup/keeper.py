@@ -5,7 +5,6 @@ ends without the last message, as after a kill, it stops the axis, writes back w
 """
 
 import json
-import os
 import signal
 import subprocess
 import sys
@@ -18,9 +17,9 @@ from typing import IO, Any
 from schemas.errors import StationError, StationTimeout
 from schemas.profile import Profile
 from schemas.station_devices import Device
-from stations.bringup.safe import AsFound, leave_as_found
-from stations.bringup.target import Target
+from stations.bringup.target import AsFound, Target, leave_as_found
 from stations.links.making import SingleLink
+from stations.safety.watchdog_client import close_pipes, start_module
 
 MODULE = "stations.bringup.keeper"
 READY = b"ready\n"
@@ -44,13 +43,7 @@ class Keeper:
         StationTimeout
             It does not start; nothing has been ordered.
         """
-        self._process = subprocess.Popen(  # noqa: S603 - this interpreter and a module of the product
-            [sys.executable, "-m", MODULE],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
-            start_new_session=True,  # Ctrl-C and a terminal that closes do not reach it
-        )
+        self._process = start_module(MODULE)
         device = self.target.link.device.model_dump(mode="json")
         profile = self.target.profile.model_dump(mode="json", exclude_defaults=True)
         self._send({"device": device, "profile": profile, "timeout_s": self.target.link.timeout_s})
@@ -68,10 +61,7 @@ class Keeper:
         if self._process is None:
             return
         self._send({"done": True})
-        for pipe in (self._process.stdin, self._process.stdout):
-            if pipe is not None:
-                with suppress(OSError):
-                    pipe.close()
+        close_pipes(self._process)
         try:
             self._process.wait(LEAVE_S)
         except subprocess.TimeoutExpired:

@@ -7,9 +7,8 @@ from typing import TypeVar
 
 from schemas.errors import LinkLost, StationError, StationTimeout
 from stations.bringup.keeper import Keeper
-from stations.bringup.person import Findings, Person, Point, Verdict
-from stations.bringup.safe import AsFound
-from stations.bringup.target import Target
+from stations.bringup.person import Findings, Person, Verdict, judged
+from stations.bringup.target import AsFound, Target
 
 Made = TypeVar("Made")
 RECONNECT_S = 20.0
@@ -39,19 +38,22 @@ class Orders:
 
     def add(self, what: str, verdict: Verdict, found: str = "", expected: str = "", remedy: str = "") -> None:
         """A finding of an order."""
-        point = Point("order", what, verdict, found, expected, "" if verdict == "held" else remedy)
-        self.findings.add(point)
-        self.person.tell(f"{point.verdict}: {what}" + (f": {found}" if found else ""))
+        self.findings.add("order", what, verdict, found, expected, remedy)
+        self.person.tell(f"{verdict}: {what}" + (f": {found}" if found else ""))
+
+    def judge(self, what: str, found: str, expected: str, remedy: str = "", *, good: bool) -> None:
+        """A finding of an order that held or differs."""
+        self.add(what, judged(good=good), found, expected, remedy)
 
     def consent(self, word: str, text: str, what: str) -> bool:
         """Whether a person has typed the word for this step; a step without it is not tried."""
         if self.blocked:
-            self.findings.add(Point("order", what, "not tried", self.blocked))
+            self.findings.add("order", what, "not tried", self.blocked)
             return False
         typed = self.person.ask(f"{text}.\nType {word} to allow it, anything else to skip:").strip()
         self.note(f"consent to {word}: {'typed' if typed == word else 'not given'}")
         if typed != word:
-            self.findings.add(Point("order", what, "not tried", "no consent"))
+            self.findings.add("order", what, "not tried", "no consent")
         return typed == word
 
     def moving(self) -> None:

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 from typing import Literal, Protocol
 
 Verdict = Literal["held", "differs", "not tried"]
+Part = Literal["reach", "register", "panel", "order", "link"]
 
 
 class Person(Protocol):
@@ -11,7 +12,6 @@ class Person(Protocol):
 
     def tell(self, text: str) -> None:
         """Shows a line."""
-        ...
 
     def ask(self, question: str) -> str:
         """What is typed in answer; empty for a skipped question, and where nobody types."""
@@ -22,12 +22,17 @@ class Person(Protocol):
 class Point:
     """One line of a conformance page: a register, or a promise of the device's family."""
 
-    part: Literal["reach", "register", "panel", "order", "link"]
+    part: Part
     what: str
     verdict: Verdict
     found: str = ""
     expected: str = ""
     remedy: str = ""
+
+
+def judged(*, good: bool) -> Verdict:
+    """Whether something held or differs."""
+    return "held" if good else "differs"
 
 
 @dataclass
@@ -37,10 +42,11 @@ class Findings:
     points: list[Point] = field(default_factory=list[Point])
     changes: dict[str, dict[str, object]] = field(default_factory=dict[str, dict[str, object]])
 
-    def add(self, point: Point) -> Point:
-        """Another point."""
-        self.points.append(point)
-        return point
+    def add(
+        self, part: Part, what: str, verdict: Verdict, found: str = "", expected: str = "", remedy: str = ""
+    ) -> None:
+        """Another point; what held needs no remedy."""
+        self.points.append(Point(part, what, verdict, found, expected, "" if verdict == "held" else remedy))
 
     def change(self, register: str, key: str, value: object) -> None:
         """A corrected key of a register of the profile; of the profile itself where ``register`` is empty."""

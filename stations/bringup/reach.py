@@ -1,12 +1,13 @@
 """Reaching a device by reading alone: its address, its id, the order of words and bytes, and addresses counted from one."""
 
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 
 from schemas.errors import LinkLost, NoConnection, OperatorNeeded, StationError, StationRefused, StationTimeout
 from schemas.profile import Profile, Register
 from schemas.station_devices import Device
-from stations.bringup.person import Findings, Person, Point
+from stations.bringup.person import Findings, Person
 from stations.bringup.plausible import best_order, depends_on_order, votes
 from stations.bringup.target import Target
 from stations.links.gate import GatedLink
@@ -30,13 +31,13 @@ class Answer:
     shift: int = 0
     space: str = ""
 
+    votes: tuple[int, int] = (0, 0)
+
     @property
     def score(self) -> int:
         """Registers that are there and plausible, less those that are not."""
         good, bad = self.votes
         return good - 2 * bad - len(self.refused)
-
-    votes: tuple[int, int] = (0, 0)
 
 
 def reach(target: Target, findings: Findings, person: Person, *, given_id: int, search_line: bool = False) -> None:
@@ -53,54 +54,32 @@ def reach(target: Target, findings: Findings, person: Person, *, given_id: int, 
         Nothing answers, or several devices could be meant.
     """
     if target.text:
-        _reach_lines(target, findings)
+        first = target.profile.commands[0]
+        found = target.values().text(first.name)
+        findings.add("reach", "lines", "held", f"{first.ask} is answered by '{found}'")
         return
     answers = _answers(target, given_id, search_line=search_line, person=person)
     best = _best(target, answers, given_id)
     target.link.device = target.link.device.model_copy(update={"device_id": best.device_id})
-    findings.add(
-        Point(
-            "reach",
-            "device id",
-            "held",
-            f"{best.device_id}",
-            "" if given_id else "found by reading the identity registers",
-        )
-    )
+    how = "" if given_id else "found by reading the identity registers"
+    findings.add("reach", "device id", "held", f"{best.device_id}", how)
     if best.shift or best.space:
         target.moved(best.shift, best.space)
-        found = "; ".join(
-            part
-            for part in (
-                f"every address is {abs(best.shift)} {'higher' if best.shift > 0 else 'lower'}" if best.shift else "",
-                f"the registers are {best.space} registers" if best.space else "",
-            )
-            if part
-        )
+        way = "higher" if best.shift > 0 else "lower"
+        found = [f"every address is {abs(best.shift)} {way}"] if best.shift else []
+        found += [f"the registers are {best.space} registers"] if best.space else []
         remedy = "the manual counts from one, or names the registers by another function; see the corrected profile"
-        findings.add(Point("reach", "addresses", "differs", found, "those of the profile", remedy))
+        findings.add("reach", "addresses", "differs", "; ".join(found), "those of the profile", remedy)
         for register in target.profile.registers:
             findings.change(register.name, "address", register.address)
             if best.space:
                 findings.change(register.name, "space", best.space)
     else:
-        findings.add(
-            Point(
-                "reach",
-                "addresses",
-                "held",
-                f"{len(best.words)} of {len(best.words) + len(best.refused)} identity registers answer",
-            )
-        )
+        answered = f"{len(best.words)} of {len(best.words) + len(best.refused)} identity registers answer"
+        findings.add("reach", "addresses", "held", answered)
     _order_of_words(target, findings, best.words)
     for point in findings.points:
         person.tell(f"{point.verdict}: {point.what}: {point.found}")
-
-
-def _reach_lines(target: Target, findings: Findings) -> None:
-    values, first = target.values(), target.profile.commands[0]
-    found = values.text(first.name)
-    findings.add(Point("reach", "lines", "held", f"{first.ask} is answered by '{found}'"))
 
 
 def readable(profile: Profile) -> list[Register]:
@@ -112,13 +91,9 @@ def probes(profile: Profile) -> list[Register]:
     """The registers that say most about who answers: texts, named values, then values of two words with a unit."""
 
     def worth(register: Register) -> int:
-        text = register.type == "string"
-        return (
-            4 * text
-            + 3 * bool(register.enumeration)
-            + 2 * (depends_on_order(register) and bool(register.unit))
-            + bool(register.bits)
-        )
+        number = depends_on_order(register) and bool(register.unit)
+        named = 3 * bool(register.enumeration) + bool(register.bits)
+        return 4 * (register.type == "string") + named + 2 * number
 
     return sorted(readable(profile), key=worth, reverse=True)[:PROBES]
 
@@ -195,13 +170,10 @@ def _read(link: GatedLink, profile: Profile, device_id: int, registers: Sequence
             raise  # no device can be there, whatever its id
         except LinkLost:
             return answer if answer.words or answer.refused else None
-    good, bad = 0, 0
     if answer.words:
         order, counted = best_order(profile, answer.words)
-        good, bad = votes(
-            profile, answer.words, order or max(counted, key=lambda o: counted[o][0] - 3 * counted[o][1]), orderly=False
-        )
-    answer.votes = good, bad
+        order = order or max(counted, key=lambda o: counted[o][0] - 3 * counted[o][1])
+        answer.votes = votes(profile, answer.words, order, orderly=False)
     return answer
 
 
@@ -231,25 +203,21 @@ def _order_of_words(target: Target, findings: Findings, probed: dict[str, list[i
     words, registers = dict(probed), target.registers()
     for register in readable(target.profile):
         if depends_on_order(register) and register.name not in words:
-            try:
+            with suppress(StationError):
                 words[register.name] = registers.raw(register.name)
-            except StationError:
-                continue
     profile = target.profile
     if not any(depends_on_order(profile.register(name)) for name in words):
-        findings.add(Point("reach", "word order", "not tried", "no register of two words can be read"))
+        findings.add("reach", "word order", "not tried", "no register of two words can be read")
         return
     order, counted = best_order(profile, words)
     seen = ", ".join(f"{name}: {good} plausible, {bad} not" for name, (good, bad) in counted.items())
     if order is None:
         remedy = "move the axis, or wait for another temperature, and repeat; the profile's order is used"
-        findings.add(
-            Point("reach", "word order", "not tried", f"the values do not tell ({seen})", profile.word_order, remedy)
-        )
+        findings.add("reach", "word order", "not tried", f"the values do not tell ({seen})", profile.word_order, remedy)
     elif order == profile.word_order:
-        findings.add(Point("reach", "word order", "held", order, profile.word_order))
+        findings.add("reach", "word order", "held", order, profile.word_order)
     else:
         remedy = "set word_order of the device in the station's file, or use the corrected profile"
-        findings.add(Point("reach", "word order", "differs", f"{order} ({seen})", profile.word_order, remedy))
+        findings.add("reach", "word order", "differs", f"{order} ({seen})", profile.word_order, remedy)
         target.ordered(order)
         findings.change("", "word_order", order)

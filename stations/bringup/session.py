@@ -15,16 +15,15 @@ from stations.bringup.axis_orders import AxisOrders
 from stations.bringup.chamber_orders import ChamberOrders
 from stations.bringup.keeper import Keeper
 from stations.bringup.orders import Orders
-from stations.bringup.person import Findings, Person, Point
+from stations.bringup.person import Findings, Person
 from stations.bringup.reach import reach
-from stations.bringup.safe import AsFound, as_found, leave_as_found
 from stations.bringup.survey import Survey, panel, survey
-from stations.bringup.target import Target
+from stations.bringup.target import AsFound, Target, as_found, leave_as_found
 from stations.links.gate import Permit
 from stations.links.making import SingleLink
 from stations.links.recorder import active_recorder
 from stations.safety.folder import state_folder
-from stations.safety.lease_parts import Part, address_of
+from stations.safety.lease_files import Part, address_of
 from stations.safety.leases import Leases, new_holder
 
 BEAT_S = 1.0
@@ -82,11 +81,9 @@ class BringUp:
                 self._ordered()
             else:
                 reason = (
-                    "only readings were asked for"
-                    if not self.orders
-                    else f"no orders are known for a {self.profile.kind}"
+                    f"no orders are known for a {self.profile.kind}" if self.orders else "only readings were asked for"
                 )
-                self.findings.add(Point("order", "orders", "not tried", reason))
+                self.findings.add("order", "orders", "not tried", reason)
         except BaseException as problem:
             self.ended = "interrupted" if isinstance(problem, KeyboardInterrupt) else str(problem)
             raise
@@ -131,36 +128,19 @@ class BringUp:
     @contextmanager
     def _leased(self) -> Generator[Permit]:
         """The lease of the device's address, with its heartbeat: no run may drive it meanwhile."""
-        kind = self.profile.kind
-        part: Part = LEASED.get(kind, "reader")
-        lapse = Safety().lapse_s
+        places: dict[Part, str] = {LEASED.get(self.profile.kind, "reader"): address_of(self.target.link.device)}
         holder = new_holder(f"bring-up of {self.profile.name}", f"bring-up {os.getpid()}")
-        leases = Leases(state_folder(), holder, {part: address_of(self.target.link.device)}, lapse)
+        leases = Leases(state_folder(), holder, places, Safety().lapse_s)
         leases.take()
         stop = threading.Event()
         beat = threading.Thread(target=_beat, args=(leases, stop), name="heartbeat", daemon=True)
         beat.start()
         try:
-            yield Permit(_Held(leases), self.timeout_s * 2.0)
+            yield Permit(leases.alive, leases.require, self.timeout_s * 2.0)
         finally:
             stop.set()
             beat.join()
             leases.release()
-
-
-@dataclass(frozen=True)
-class _Held:
-    """The lease as the gate asks for it."""
-
-    leases: Leases
-
-    def alive(self) -> None:
-        """Checks the age of the heartbeat."""
-        self.leases.alive()
-
-    def held(self) -> None:
-        """Checks heartbeat and files."""
-        self.leases.require()
 
 
 def _beat(leases: Leases, stop: threading.Event) -> None:

@@ -1,15 +1,24 @@
-"""Where a device is: the ``--link`` of a bring-up, and its values once it is found."""
+"""The device of a bring-up: where it is, its values once it is found, and how it is left as it was found.
+
+An axis is stopped, a chamber gets the set point and the mode that it had. Both the bring-up and its keeper, which outlives a
+killed bring-up, send the same absolute orders; a device may get them twice.
+"""
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from schemas.errors import RecipeInvalid, WrongUse
-from schemas.profile import TEXT_CARRIERS, Profile, WordOrder
+from schemas.profile import TEXT_CARRIERS, Profile, WordOrder, limits_of
+from schemas.station import Limits
 from schemas.station_devices import Device
-from stations.devices.commands import Commands
+from stations.codec import Value
+from stations.devices.adapters import axis_adapter, chamber_adapter
+from stations.devices.chamber import ThermalChamber
+from stations.devices.commands import Commands, Values
 from stations.devices.registers import Registers
-from stations.devices.values import Values
+from stations.devices.table import TableAxis
 from stations.links.making import SingleLink
+from stations.recordings.decoding import told
 
 NAME = "device"
 FORMS = "tcp://HOST[:PORT], serial:DEVICE[,BAUD[,PARITY[,STOP]]] or visa:RESOURCE"
@@ -62,16 +71,16 @@ class Target:
         """Whether it speaks in lines of text."""
         return self.link.device.link in TEXT_CARRIERS
 
-    def values(self, attempts: int = 1) -> Values:
+    def values(self) -> Values:
         """Its values by name, on a new connection."""
         self.link.profile = self.profile
         if self.text:
-            return Commands(NAME, self.link.lines(attempts), self.profile)
-        return Registers(NAME, self.link.registers(attempts), self.link.device.device_id, self.profile)
+            return Commands(NAME, self.link.lines(), self.profile)
+        return Registers(NAME, self.link.registers(), self.link.device.device_id, self.profile)
 
-    def registers(self, attempts: int = 1) -> Registers:
+    def registers(self) -> Registers:
         """Its registers, on a new connection."""
-        values = self.values(attempts)
+        values = self.values()
         if not isinstance(values, Registers):
             raise RecipeInvalid(f"profile {self.profile.name}: registers are needed, it has commands", key="links")
         return values
@@ -89,3 +98,92 @@ class Target:
 
         kept = [r.model_copy(update=changed(r.address)) for r in self.profile.registers]
         self.profile = self.profile.model_copy(update={"registers": kept})
+
+
+SPEED_DEG_S = 1.0
+ACCELERATION_DEG_S2 = 10.0
+KEPT = {
+    "axis": ("servo_on", "serial_mode"),
+    "chamber": ("set_point", "set_point_basic", "set_point_manual", "mode", "remote_enable"),
+}
+"""Values that a bring-up may change and that start nothing when they are written back, in this order."""
+
+
+@dataclass
+class AsFound:
+    """What the device held before the first order; ``moved`` says whether an axis has been ordered to move."""
+
+    values: dict[str, Value] = field(default_factory=dict[str, Value])
+    moved: bool = False
+
+
+def limits_of_orders(profile: Profile, speed: float = SPEED_DEG_S) -> Limits:
+    """Limits of the axis for the small orders of a bring-up."""
+    low, high = bounds_of(profile, "target", (-360.0, 360.0))
+    slowest, fastest = bounds_of(profile, "speed", (0.0, speed))
+    slow = max(min(speed, fastest), slowest, smallest_speed(profile))
+    least, most = bounds_of(profile, "acceleration", (0.0, ACCELERATION_DEG_S2))
+    kept = max(min(ACCELERATION_DEG_S2, most), least)
+    return Limits(outer_deg=(low, high), speed_deg_s=slow, acceleration_deg_s2=kept)
+
+
+def smallest_speed(profile: Profile) -> float:
+    """The smallest speed that can be ordered: a step of its register."""
+    register = profile.register("speed") if profile.has("speed") else None
+    return 0.0 if register is None or register.type == "float32" else register.scale
+
+
+def bounds_of(profile: Profile, name: str, wide: tuple[float, float]) -> tuple[float, float]:
+    """The limits of an order in the profile, inside ``wide``."""
+    if not profile.has(name):
+        return wide
+    low, high = limits_of(profile.entry(name))
+    return max(wide[0], low), min(wide[1], high)
+
+
+def axis_of(target: Target, speed: float = SPEED_DEG_S) -> TableAxis:
+    """The adapter of an axis, on a new connection, with the slow limits of a bring-up."""
+    limits = limits_of_orders(target.profile, speed)
+    return axis_adapter(target.profile)(target.registers(), limits.outer_deg, limits)
+
+
+def chamber_of(target: Target) -> ThermalChamber:
+    """The adapter of a chamber, on a new connection."""
+    bounds = bounds_of(target.profile, "set_point", (-100.0, 250.0))
+    return chamber_adapter(target.profile)(target.values(), *bounds)
+
+
+def as_found(target: Target) -> AsFound:
+    """What the device holds now, of what an order may change."""
+    found, values = AsFound(), target.values()
+    for name in KEPT.get(target.profile.kind, ()):
+        if target.profile.has(name) and target.profile.entry(name).writable:
+            found.values[name] = value_of(values, name)
+    return found
+
+
+def leave_as_found(target: Target, found: AsFound) -> list[str]:
+    """Stops an axis, writes back what has changed, and tells what was done.
+
+    Raises
+    ------
+    StationError
+        The device did not take an order; it may be given again.
+    """
+    done: list[str] = []
+    if target.profile.kind == "axis" and found.moved:
+        axis_of(target).stop()
+        done.append("axis stopped")
+    values = target.values()
+    for name, wanted in found.values.items():
+        if value_of(values, name) != wanted:
+            values.write(name, wanted)
+            done.append(f"{name} back to {told(target.profile.entry(name), wanted)}")
+    return done
+
+
+def value_of(values: Values, name: str) -> Value:
+    """A value as it can be written back."""
+    if isinstance(values, Registers):
+        return values.read(name)
+    return values.number(name) if values.profile.command(name).type == "number" else values.text(name)

@@ -9,9 +9,9 @@ from typing import TypeVar
 from schemas.errors import RecipeInvalid, did_you_mean
 from schemas.profile import Profile
 from stations.devices import families
-from stations.devices.axis import TableAxis
 from stations.devices.chamber import ThermalChamber
 from stations.devices.equipment import Equipment
+from stations.devices.table import TableAxis
 
 Adapter = TypeVar("Adapter", bound="TableAxis | ThermalChamber | Equipment")
 

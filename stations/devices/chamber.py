@@ -8,7 +8,7 @@ from abc import ABC, abstractmethod
 from typing import ClassVar
 
 from schemas.errors import LinkLost, OperatorNeeded, StationRefused, StationTimeout
-from stations.devices.values import Values
+from stations.devices.commands import Values
 
 READ_BACK_K = 1e-3
 AUTOMATIC = "automatic"
@@ -58,9 +58,9 @@ class ThermalChamber(ABC):
         try:
             self.order(temperature)
         except (StationTimeout, LinkLost):
-            if not self._holds(temperature):
+            if not self._near(self.set_point(), temperature):
                 raise
-        actual, mode = self._values.number("set_point"), self.mode()
+        actual, mode = self.set_point(), self.mode()
         if not self._near(actual, temperature) or mode != self.running:
             raise StationRefused(
                 f"{self.name}: set point {actual:g} °C in mode {mode}, {temperature:g} °C in {self.running} is needed; "
@@ -111,9 +111,6 @@ class ThermalChamber(ABC):
                 f"{self.name}: set point {temperature:g} °C, the controller allows {low:g} to {high:g} °C; "
                 "change the recipe, or the controller's limits"
             )
-
-    def _holds(self, temperature: float) -> bool:
-        return self._near(self._values.number("set_point"), temperature)
 
     def _near(self, actual: float, temperature: float) -> bool:
         return abs(actual - temperature) <= READ_BACK_K + self._values.step("set_point") / 2.0

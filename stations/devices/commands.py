@@ -3,7 +3,8 @@
 from schemas.errors import StationRefused
 from schemas.profile import Command, Profile
 from stations.codec import Value
-from stations.links.link import TextLink
+from stations.devices.registers import Registers
+from stations.links.gate import GatedLines
 
 STEP = 0.1  # numbers are written with one decimal
 
@@ -11,7 +12,7 @@ STEP = 0.1  # numbers are written with one decimal
 class Commands:
     """Queries and commands of one device; ``name`` is its name in messages."""
 
-    def __init__(self, name: str, link: TextLink, profile: Profile) -> None:
+    def __init__(self, name: str, link: GatedLines, profile: Profile) -> None:
         self.name = name
         self.profile = profile
         self._link = link
@@ -57,3 +58,7 @@ class Commands:
             allowed = ", ".join(command.values) if command.type == "text" else f"{low} to {high} {command.unit}"
             message = f"{self.name}: {command.name} {value!r}; {allowed if command.writable else 'no write'} is allowed"
             raise StationRefused(f"{message}; give an allowed value")
+
+
+Values = Registers | Commands
+"""Values of one device by the names of its profile, for adapters that take both kinds of devices."""

@@ -1,15 +1,100 @@
-"""Test equipment in a role of a station: exciter, shock machine, centrifuge, power supply, generator of steps."""
+"""Test equipment in a role of a station: exciter, shock machine, centrifuge, power supply, generator of steps; its recordings.
+
+A recording comes from a result file: a MATLAB file with a rate, a unit and slots.
+"""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
 
-from schemas.errors import StationRefused, StationTimeout
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from scipy.io import loadmat
+
+from schemas.errors import OperatorNeeded, StationError, StationRefused, StationTimeout
+from schemas.motion import Motion
+from schemas.profile import Profile
+from schemas.vibration_profile import load_vibration_profile
 from stations.clock import Clock
 from stations.codec import Value
-from stations.devices.recording import STANDARD_GRAVITY, Recording, RecordingSpoilt, read_recording
-from stations.devices.values import Values
+from stations.devices.commands import Values
+
+Array = NDArray[np.float64]
+REFERENCE = "@reference"
+REFERENCE_SLOT = 999
+NEEDED = ("rate_hz", "reference", "reference_rate_hz", "reference_unit")
+STANDARD_GRAVITY = {"g": 1.0, "m/s^2": 9.80665}
+
+
+class RecordingSpoilt(StationError):
+    """A recording that is of no use, such as a missed trigger or a clipped reference; it is discarded and taken again."""
+
+
+@dataclass(frozen=True)
+class Recording:
+    """The outputs of the units by slot, and the reference sensor, each on its own time base.
+
+    Attributes
+    ----------
+    outputs : (n, 3) by slot, unit of the output
+    rate_hz : nominal rate of the outputs, Hz; a device with a clock of its own departs from it
+    reference : (m, 3), g, in the axes of the units
+    reference_rate_hz : of the reference, Hz
+    """
+
+    outputs: dict[int, Array]
+    rate_hz: float
+    reference: Array
+    reference_rate_hz: float
+
+    def reference_frame(self, record: int, start: float) -> pd.DataFrame:
+        """The reference as samples, under a name that no serial can have."""
+        n = len(self.reference)
+        return pd.DataFrame(
+            {
+                "unit": pd.Series([REFERENCE] * n, dtype="str"),
+                "slot": np.full(n, REFERENCE_SLOT, dtype=np.int64),
+                "record": np.full(n, record, dtype=np.int64),
+                "kind": pd.Series(["procedure"] * n, dtype="str"),
+                "time_s": start + (np.arange(n) + 1.0) / self.reference_rate_hz,
+                "x": self.reference[:, 0],
+                "y": self.reference[:, 1],
+                "z": self.reference[:, 2],
+            }
+        )
+
+
+def read_recording(path: Path, slots: list[int], name: str, units: Mapping[str, float] = STANDARD_GRAVITY) -> Recording:
+    """The recording in a result file; a file without rate or unit is refused.
+
+    Parameters
+    ----------
+    slots : whose channels are wanted; one that is not there is left out
+    name : of the equipment, for messages
+    units : allowed units of the reference, with their number in the one that is returned
+    """
+    try:
+        content: dict[str, Any] = loadmat(path, simplify_cells=True)
+    except (OSError, ValueError, NotImplementedError) as problem:  # the last: files of MATLAB 7.3, which are HDF5
+        raise StationRefused(f"{name}: result file {path.name} cannot be read ({problem}); check the share") from None
+    missing = [key for key in NEEDED if key not in content]
+    if missing:
+        raise StationRefused(
+            f"{name}: result file {path.name} lacks {', '.join(missing)}; set up the export of the recorder"
+        )
+    unit = str(content["reference_unit"])
+    if unit not in units:
+        raise StationRefused(f"{name}: reference in '{unit}', {' or '.join(units)} is needed; correct the set-up")
+    outputs = {
+        slot: np.atleast_2d(np.asarray(content[f"slot_{slot}"], dtype=np.float64))
+        for slot in slots
+        if f"slot_{slot}" in content
+    }
+    reference = np.asarray(content["reference"], dtype=np.float64) / units[unit]
+    return Recording(outputs, float(content["rate_hz"]), reference, float(content["reference_rate_hz"]))
 
 
 class Equipment(ABC):
@@ -64,3 +149,49 @@ class RecordingEquipment(Equipment):
         if path in {before, "NONE"}:
             raise RecordingSpoilt(f"{self.name}: no {what}, the trigger was missed; check the recorder")
         return read_recording(Path(path), list(slots), self.name, units)
+
+
+Array = NDArray[np.float64]
+FLAT_SHARE = (
+    5e-4  # of the samples of Gaussian vibration within a thousandth of an extreme: a range of 3.3 σ has so many
+)
+FEWEST_FLAT = 20
+FLAT_SHARE_OF_SINE = 0.1  # of the samples of a sine: it has less
+
+
+def refuse_motion(profile: Profile, name: str, frequency: float, level_g: float) -> None:
+    """Refuse a sine that exceeds the exciter's motion; :class:`OperatorNeeded`, since repeating it changes nothing."""
+    _refuse((profile.motion or Motion()).beyond_sine(frequency, level_g), f"{name}: {level_g:g} g at {frequency:g} Hz")
+
+
+def refuse_random_motion(profile: Profile, name: str, vibration: str, level_g: float) -> None:
+    """Refuse a random profile whose three-sigma peaks exceed the exciter's motion; :class:`OperatorNeeded`."""
+    points = load_vibration_profile(vibration).breakpoints
+    _refuse((profile.motion or Motion()).beyond_random(points, level_g), f"{name}: {vibration} at {level_g:g} g rms")
+
+
+def refuse_clipped_random(driven: Array, name: str) -> None:
+    """Refuse Gaussian vibration (n,) whose extremes are flat: the conditioner of the reference clips."""
+    refuse_flat(np.abs(driven - driven.mean()), name, max(FEWEST_FLAT, FLAT_SHARE * driven.size))
+
+
+def refuse_flat(size: Array, name: str, most: float, near: float = 0.999) -> None:
+    """Refuse a reference that lies near its largest size (n,) in more than ``most`` samples: its conditioner clips."""
+    top = float(size.max())
+    if int(np.count_nonzero(size > near * top)) > most:
+        raise RecordingSpoilt(
+            f"{name}: the reference is clipped at {top:.4g} g; choose a larger range of its conditioner"
+        )
+
+
+def tone_level(driven: Array, rate_hz: float, frequency: float) -> tuple[float, float]:
+    """Peak value of the tone in a record (n,), and the standard deviation of what is left beside it and its offset."""
+    phase = 2.0 * np.pi * frequency * np.arange(driven.size) / rate_hz
+    rows = np.column_stack([np.cos(phase), np.sin(phase), np.ones_like(phase)])
+    c = np.linalg.lstsq(rows, driven, rcond=None)[0]
+    return float(np.hypot(c[0], c[1])), float(np.std(driven - rows @ c))
+
+
+def _refuse(why: str, what: str) -> None:
+    if why:
+        raise OperatorNeeded(f"{what}: {why}; lower the level, or correct maximum of the exciter in the station's file")

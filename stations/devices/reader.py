@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from schemas.errors import StationRefused
+from schemas.profile import limits_of
 from stations.codec import named
 from stations.devices.registers import Registers
 from stations.devices.slot import Slot
@@ -101,7 +102,9 @@ class Reader:
         temperature, supply = self._registers.numbers("temperature"), self._registers.numbers("supply")
         guarded = self.guarded()
         vibration = guarded.vibration_g
-        wrong = [slot for slot in self.slots if not _possible(temperature[slot], supply[slot])]
+        (coldest, hottest), (lowest, highest) = POSSIBLE_C, POSSIBLE_V  # NaN is outside
+        inside = {s: coldest < temperature[s] < hottest and lowest < supply[s] < highest for s in self.slots}
+        wrong = [slot for slot, is_inside in inside.items() if not is_inside]
         if (wrong and len(wrong) == len(self.slots)) or not 0.0 <= vibration < STRONGEST_G:
             first = min(self.slots, default=0)
             raise StationRefused(
@@ -116,9 +119,7 @@ class Reader:
         recorded: dict[str, float] = {}
         for register in self._registers.profile.registers:
             if register.column:
-                value = self._registers.number(register.name)
-                low = -math.inf if register.minimum is None else register.minimum
-                high = math.inf if register.maximum is None else register.maximum
+                value, (low, high) = self._registers.number(register.name), limits_of(register)
                 recorded[register.column] = value if low <= value <= high else math.nan
         return recorded
 
@@ -155,10 +156,3 @@ class Reader:
         """Switches the supply of all devices: an absolute state, written once and read back; a repetition changes nothing."""
         self.require_switch()
         self._registers.set("power", state)
-
-
-def _possible(celsius: float, volts: float) -> bool:
-    """Whether the readings of an occupied slot are physically possible; NaN is not."""
-    low, high = POSSIBLE_C
-    lowest, highest = POSSIBLE_V
-    return low < celsius < high and lowest < volts < highest

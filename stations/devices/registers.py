@@ -7,13 +7,13 @@ from schemas.errors import LinkLost, StationRefused, StationTimeout
 from schemas.profile import Profile, Register, Space
 from stations.clock import steady
 from stations.codec import NotEncodable, Value, decode, encode, named
-from stations.links.link import Link
+from stations.links.gate import GatedLink
 
 
 class Registers:
     """Reads and writes of one device; ``name`` is its name in messages."""
 
-    def __init__(self, name: str, link: Link, device_id: int, profile: Profile) -> None:
+    def __init__(self, name: str, link: GatedLink, device_id: int, profile: Profile) -> None:
         self.name = name
         self.profile = profile
         self._link = link
@@ -53,18 +53,14 @@ class Registers:
     def number_in(self, name: str, value: Value) -> float:
         """The number of a register in a value that was read with a group."""
         if not isinstance(value, int | float):
-            raise StationRefused(
-                f"{self.name}: {name} is {value!r}, a number is needed; check profile {self.profile.name}"
-            )
+            raise self._wrong(name, f"{value!r}", "a number")
         return value
 
     def numbers(self, name: str) -> list[float]:
         """The numbers of a register with a count."""
         value = self.read(name)
         if not isinstance(value, list):
-            raise StationRefused(
-                f"{self.name}: {name} is {value!r}, a list is needed; check profile {self.profile.name}"
-            )
+            raise self._wrong(name, f"{value!r}", "a list")
         return value
 
     def text(self, name: str) -> str:
@@ -73,9 +69,7 @@ class Registers:
         if isinstance(value, str):
             return value
         if isinstance(value, list):
-            raise StationRefused(
-                f"{self.name}: {name} is a list, one value is needed; check profile {self.profile.name}"
-            )
+            raise self._wrong(name, "a list", "one value")
         return named(self.profile.register(name), value)
 
     def flags(self, name: str) -> dict[str, bool]:
@@ -125,27 +119,24 @@ class Registers:
             lost = problem
         actual = self.read_group(group)
         for name, value in values.items():
-            register = self._scaled(name)
-            if actual[name] != decode(register, self.profile.order(register), self._encoded(register, value)):
-                message = (
-                    f"{self.name}: {name} is {actual[name]} {register.unit} after {value} was written; nothing was started; "
-                    "check the device"
+            if actual[name] != self._as_held(name, value):
+                raise lost or StationRefused(
+                    f"{self.name}: {name} is {actual[name]} {self.profile.register(name).unit} after {value} was written; "
+                    "nothing was started; check the device"
                 )
-                raise lost or StationRefused(message)
 
     def set(self, name: str, value: Value) -> None:
         """Writes a register that keeps its value, once, and reads it back, which decides after a lost answer."""
+        lost: StationTimeout | LinkLost | None = None
         try:
             self.write(name, value)
-        except (StationTimeout, LinkLost):
-            if not self._holds(name, value):
-                raise
-        else:
-            if not self._holds(name, value):
-                raise StationRefused(
-                    f"{self.name}: {name} is {self.read(name)} after {value} was written, {value} is needed; "
-                    "check the device's panel and its write protection"
-                )
+        except (StationTimeout, LinkLost) as problem:
+            lost = problem
+        if not self._holds(name, value):
+            raise lost or StationRefused(
+                f"{self.name}: {name} is {self.read(name)} after {value} was written, {value} is needed; "
+                "check the device's panel and its write protection"
+            )
 
     def words(self, address: int, count: int, what: str) -> list[int]:
         """Raw words of an address range without register names."""
@@ -160,10 +151,17 @@ class Registers:
         since = self._read_at if self._deciding else None
         self._link.write(self._device_id, address, words, f"{self.name} {what}", space, since=since)
 
+    def _wrong(self, name: str, found: str, needed: str) -> StationRefused:
+        return StationRefused(f"{self.name}: {name} is {found}, {needed} is needed; check profile {self.profile.name}")
+
     def _holds(self, name: str, value: Value) -> bool:
         """Whether a register holds the encoded value."""
+        return self.read(name) == self._as_held(name, value)
+
+    def _as_held(self, name: str, value: Value) -> Value:
+        """A value as a register holds it, rounded to its steps."""
         register = self._scaled(name)
-        return self.read(name) == decode(register, self.profile.order(register), self._encoded(register, value))
+        return decode(register, self.profile.order(register), self._encoded(register, value))
 
     def _scaled(self, name: str) -> Register:
         """The register with the decimals that are set in the device; they are read once."""

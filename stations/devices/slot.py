@@ -61,11 +61,8 @@ class Slot:
 
     def identity(self) -> Identity:
         """Identity of the device in the slot; read once."""
-        if self._identity is None:
-            self._identity = self._read_identity()
-        return self._identity
-
-    def _read_identity(self) -> Identity:
+        if self._identity is not None:
+            return self._identity
         registers, values = self._registers, self._registers.read_group("identity")
         names = ("packing", "output_unit", "lsb", "full_scale", "capacity")
         numbers = {name: registers.number_in(name, values[name]) for name in names}
@@ -78,7 +75,9 @@ class Slot:
                 f"full scale of {FEWEST_COUNTS} to {MOST_COUNTS} counts are needed; check the reader and its word order"
             )
         capacity = int(numbers["capacity"])
-        return Identity(str(values["serial"]), PACKINGS[packing], UNITS[unit], lsb, full_scale, capacity)
+        serial = str(values["serial"])
+        self._identity = made = Identity(serial, PACKINGS[packing], UNITS[unit], lsb, full_scale, capacity)
+        return made
 
     def holds(self, serial: str) -> bool:
         """Whether the slot holds this unit now; read again at each call."""

@@ -1,10 +1,172 @@
-"""The two-axis tilt table: absolute moves, each read back."""
+"""The two-axis tilt table: each axis behind a servo drive, with absolute moves, each commanded once and read back.
 
-from schemas.errors import StationTimeout
+The adapter of a drive family defines the meaning of its registers; this module defines a move.
+"""
+
+import math
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import ClassVar
+
+from schemas.errors import LinkLost, OperatorNeeded, StationRefused, StationTimeout
+from schemas.station import Limits
 from stations.clock import Clock
-from stations.devices.axis import TableAxis
+from stations.devices.registers import Registers
 
-__all__ = ["TableAxis", "TiltTable"]
+SETTLING_DEG = 0.5  # largest distance from the target while an axis settles
+BEGIN_LOOKS = 3  # readings of the drive after which a move that has not started counts as finished
+
+
+@dataclass(frozen=True)
+class DriveState:
+    """State of a drive; ``alarm`` is the text of its alarm, empty without one."""
+
+    ready: bool
+    homed: bool
+    moving: bool
+    in_position: bool
+    alarm: str = ""
+
+
+class TableAxis(ABC):
+    """One axis behind a servo drive."""
+
+    needs: ClassVar[tuple[str, ...]] = ()
+
+    def __init__(self, registers: Registers, bounds: tuple[float, float], limits: Limits) -> None:
+        self._registers = registers
+        self.name = registers.name
+        self._low, self._high = bounds
+        self._limits = limits
+        self._target: float | None = None
+        self._pending: float | None = None  # the target of a command that has not been confirmed
+        self._looks = 0
+
+    @abstractmethod
+    def state(self) -> DriveState:
+        """The present state of the drive."""
+
+    @abstractmethod
+    def prepare(self) -> None:
+        """Enables the drive for commands; nothing moves."""
+
+    def _switch_on(self) -> None:
+        """Selects the serial line as the source of commands and switches the servo on, of drives with coils for both."""
+        for coil in ("serial_mode", "servo_on"):
+            if self._registers.text(coil) != "on":
+                self._registers.set(coil, "on")
+
+    @abstractmethod
+    def order(self, target: float) -> None:
+        """Commands a move to ``target`` degrees with the speed and acceleration of the station; the start is sent once."""
+
+    @abstractmethod
+    def stop(self) -> None:
+        """Stops the axis; it holds its position and discards the rest of its move."""
+
+    def check(self, target: float) -> None:
+        """Refuses a target outside the limits of the station before anything moves."""
+        if not self._low <= target <= self._high:
+            raise StationRefused(
+                f"{self.name}: target {target:g} deg, {self._low:g} to {self._high:g} deg is allowed; change the pose"
+            )
+
+    def start(self, target: float) -> float:
+        """Starts a move to ``target`` degrees and returns its expected duration, s.
+
+        Where the answer to the command is lost, the state of the drive decides whether it has accepted it; the command is never
+        sent twice. If the drive has not accepted it, the error of the link is raised. A later start to the same target checks
+        again. A command that depends on a reading is not sent when the reading is too old.
+        """
+        self.check(target)
+        limits = self._limits
+        with self._registers.deciding():
+            distance = abs(target - self.position())
+            pending, self._pending = self._pending, target
+            self._target, self._looks = target, 0
+            if pending != target or not self._took(target):
+                self._require_ready()
+                self._order_once(target)
+        return distance / limits.speed_deg_s + 2.0 * math.sqrt(distance / limits.acceleration_deg_s2)
+
+    def _order_once(self, target: float) -> None:
+        try:
+            self.order(target)
+        except (StationTimeout, LinkLost):
+            if not self._took(target):
+                raise
+        except StationRefused:
+            self._pending = None
+            raise
+
+    def _took(self, target: float) -> bool:
+        """Whether the drive moves to its target, settles at it, or stands there."""
+        state = self.state()
+        settling = not state.in_position and abs(self.position() - target) <= SETTLING_DEG
+        return state.moving or settling or self._stands(target)
+
+    def _stands(self, target: float) -> bool:
+        return abs(self.position() - target) <= self._tolerance()
+
+    def _tolerance(self) -> float:
+        return self._limits.position_deg + self._registers.step("feedback_position") / 2.0
+
+    def _require_ready(self) -> None:
+        """Enables the drive; refuses one that is not ready, with the reason."""
+        self.prepare()
+        state = self.state()
+        self._refuse_alarm(state)
+        if not state.homed:
+            message = (
+                f"{self.name}: the drive has no home position, its angles are not valid; home the axis at the drive"
+            )
+            raise OperatorNeeded(f"{message} and check its zero")
+        if not state.ready or state.moving:
+            reason = "busy with a move" if state.moving else "not ready"
+            raise StationRefused(
+                f"{self.name}: the drive is {reason}, a drive that stands still and is ready is needed; wait, or check its panel"
+            )
+
+    def _refuse_alarm(self, state: DriveState) -> None:
+        if state.alarm:
+            raise OperatorNeeded(f"{self.name}: {state.alarm}, none is needed; clear the cause and reset the drive")
+
+    def moving(self) -> bool:
+        """Whether the drive reports a move."""
+        return self.state().moving
+
+    def arrived(self) -> bool:
+        """Whether the drive reports that it is in position; an alarm stops the run.
+
+        A drive starts after a delay: a drive that stands far from its target is read again before the move counts as finished.
+        """
+        state = self.state()
+        self._refuse_alarm(state)
+        if state.moving or not state.in_position:
+            self._looks = BEGIN_LOOKS
+            return False
+        if self._target is None or self._looks >= BEGIN_LOOKS or self._stands(self._target):
+            return True
+        self._looks += 1
+        return False
+
+    def position(self) -> float:
+        """The encoder's reading, degrees."""
+        return self._registers.number("feedback_position")
+
+    def done(self) -> None:
+        """Ends the move: both axes are confirmed, so that the next command is a new one, also to the same target."""
+        self._pending = None
+
+    def confirm(self, target: float) -> None:
+        """Refuses to continue where the encoder reads another angle than the target."""
+        angle = self.position()
+        if abs(angle - target) > self._tolerance():
+            raise OperatorNeeded(
+                f"{self.name}: stands at {angle:.4f} deg, {target:g} ± {self._limits.position_deg:g} deg is needed; "
+                "check the load and the brake of the table"
+            )
+
 
 POLL_S = 0.25
 PATIENCE = 2.0  # times the expected duration of a move

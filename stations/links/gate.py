@@ -4,41 +4,34 @@ Writes go only to devices in the station file, and only to registers that their 
 run drives, the run must hold the lease of the station; this is the last check before each write is sent.
 """
 
-import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Protocol
 
 from schemas.errors import StationRefused, StationTimeout
-from schemas.profile import Command, Profile, Space
+from schemas.profile import Command, Profile, Space, limits_of
 from stations.clock import steady
-from stations.links.link import Carrier, TextCarrier
-
-
-class Lease(Protocol):
-    """Whether this process may drive the station; both raise :class:`schemas.errors.LeaseLost` where it may not."""
-
-    def alive(self) -> None:
-        """Checks the age of the own heartbeat only; it is fast and is called before each reading."""
-        ...
-
-    def held(self) -> None:
-        """Checks the heartbeat and the files of the lease; called before each write."""
-        ...
+from stations.links.lines import LineLink
+from stations.links.modbus import WireLink
 
 
 @dataclass(frozen=True)
 class Permit:
-    """Conditions for a write to hardware in a run: the lease, and at most ``patience_s`` seconds after the reading."""
+    """Conditions for a write to hardware in a run: the lease, and at most ``patience_s`` seconds after the reading.
 
-    lease: Lease
+    alive : checks the age of the own heartbeat only; it is fast and is called before each reading
+    held : checks the heartbeat and the files of the lease; called before each write. Both raise
+        :class:`schemas.errors.LeaseLost` where this process may not drive the station
+    """
+
+    alive: Callable[[], None]
+    held: Callable[[], None]
     patience_s: float
 
     def require(self, order: str, since: float | None) -> None:
         """Refuses a command that must not be sent now, before it is sent."""
-        self.lease.held()
+        self.held()
         late = 0.0 if since is None else steady() - since
         if not late <= self.patience_s:
             raise StationTimeout(
@@ -51,7 +44,7 @@ class GatedLink:
     """A link that checks each write against the profile of its device, by device id."""
 
     def __init__(
-        self, link: Carrier, where: str, profiles: Mapping[int, Profile], permit: Permit | None = None
+        self, link: WireLink, where: str, profiles: Mapping[int, Profile], permit: Permit | None = None
     ) -> None:
         self._link = link
         self._where = where
@@ -61,7 +54,7 @@ class GatedLink:
     def read(self, device_id: int, address: int, count: int, what: str, space: Space = "holding") -> list[int]:
         """Words of registers, or bits; a run that has lost its lease is refused before the read."""
         if self._permit is not None:
-            self._permit.lease.alive()
+            self._permit.alive()
         return self._link.read(device_id, address, count, what, space)
 
     def write(
@@ -106,7 +99,7 @@ class GatedLink:
 class GatedLines:
     """A text connection to one device that checks each command against its profile."""
 
-    def __init__(self, link: TextCarrier, where: str, profile: Profile, permit: Permit | None = None) -> None:
+    def __init__(self, link: LineLink, where: str, profile: Profile, permit: Permit | None = None) -> None:
         self._link = link
         self._where = where
         self._commands = [command for command in profile.commands if command.writable]
@@ -119,7 +112,7 @@ class GatedLines:
         if question not in self._queries:
             raise self._refusal(question, what)
         if self._permit is not None:
-            self._permit.lease.alive()
+            self._permit.alive()
         return self._link.ask(question, what)
 
     def tell(self, order: str, what: str) -> str:
@@ -156,7 +149,5 @@ def _fits(command: Command, order: str) -> bool:
         return value in command.values
     if not _NUMBER.fullmatch(value):  # float() also reads "inf", "1_000" and spaces, which controllers read otherwise
         return False
-    number = float(value)
-    low = -math.inf if command.minimum is None else command.minimum
-    high = math.inf if command.maximum is None else command.maximum
-    return low <= number <= high
+    low, high = limits_of(command)
+    return low <= float(value) <= high

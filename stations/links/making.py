@@ -8,18 +8,19 @@ from typing import Protocol
 from schemas.errors import RecipeInvalid
 from schemas.profile import TEXT_CARRIERS, Carrier, Profile
 from schemas.station import StationConfig
-from schemas.station_devices import Carried, Device, Devices
+from schemas.station_devices import Carried, Device, Devices, Slots
 from stations.links.gate import GatedLines, GatedLink, Permit
-from stations.links.lines import LineLink, TcpLines
+from stations.links.lines import LineLink, TcpLines, VisaLines
 from stations.links.modbus import WireLink
 from stations.links.recorder import FrameRecorder, RecordedLines, RecordedWire, active_recorder
 from stations.links.serial_wire import SerialWire
-from stations.links.visa_lines import VisaLines
 from stations.links.wires import LineWire, TcpWire, Wire, tls_context
 from stations.profile_files import load_profile
 
 Address = tuple[str, int]
 Key = tuple[str, str, int]
+Behind = dict[int, tuple[str, Profile]]
+"""Name and profile of every device behind one address, by device id."""
 
 
 class WireSource(Protocol):
@@ -58,22 +59,14 @@ class Links:
                 f"devices.{place}.link: {device.link}, registers need tcp, rtu or tls; correct the station's file",
                 key=f"devices.{place}.link",
             )
-        key = self._key(device)
+        key, settings = self._key(device), self.config.link
         if key not in self.made:
             behind = self._behind(key)
-            name = next(iter(behind.values()))[0]
-            wire = (
-                wire_to(device, *key[1:], self.config.link.timeout_s)
-                if self.instead is None
-                else self.instead.wire(name, _where(key))
-            )
-            if self.recorder is not None:
-                for device_id, (at, own) in behind.items():
-                    self.recorder.device(name, device_id, at, own)
-                wire = RecordedWire(wire, self.recorder, name)
-            link = WireLink(wire, read_attempts=self.config.link.read_attempts)
-            profiles = {device_id: own for device_id, (_, own) in behind.items()}
-            self.made[key] = GatedLink(link, wire.where, profiles, self.permit)
+            if self.instead is None:
+                wire = wire_to(device, *key[1:], settings.timeout_s)
+            else:
+                wire = self.instead.wire(next(iter(behind.values()))[0], _where(key))
+            self.made[key] = _gated_link(wire, behind, self.recorder, settings.read_attempts, self.permit)
         made = self.made[key]
         if isinstance(made, GatedLines):
             raise self._shared(place, profile)
@@ -82,18 +75,13 @@ class Links:
     def lines(self, place: str) -> GatedLines:
         """The line to the device at a place of the station."""
         device, profile = self._at(place)
-        key = self._key(device)
+        key, settings = self._key(device), self.config.link
         if key not in self.made:
-            wire = (
-                lines_to(device, *key[1:], self.config.link.timeout_s)
-                if self.instead is None
-                else self.instead.lines(place, _where(key))
-            )
-            if self.recorder is not None:
-                self.recorder.device(place, 0, place, profile)
-                wire = RecordedLines(wire, self.recorder, place)
-            link = LineLink(wire, read_attempts=self.config.link.read_attempts)
-            self.made[key] = GatedLines(link, wire.where, profile, self.permit)
+            if self.instead is None:
+                wire = lines_to(device, *key[1:], settings.timeout_s)
+            else:
+                wire = self.instead.lines(place, _where(key))
+            self.made[key] = _gated_lines(wire, place, profile, self.recorder, settings.read_attempts, self.permit)
         made = self.made[key]
         if isinstance(made, GatedLink):
             raise self._shared(place, profile)
@@ -104,9 +92,10 @@ class Links:
         for link in self.made.values():
             link.close()
 
-    def _at(self, place: str) -> tuple[Carried, Profile]:
-        """The device at a place and its profile, which must be carried as the file says."""
-        device = self._device(place)
+    def _at(self, place: str) -> tuple[Device | Slots, Profile]:
+        """The device at a place, or the equipment in a role, and its profile, which must be carried as the file says."""
+        equipment = self.config.fitted().get(place)
+        device: Device | Slots = getattr(self.config.devices, place) if equipment is None else equipment
         profile = load_profile(device.profile)
         if device.link not in profile.links:
             raise RecipeInvalid(
@@ -116,16 +105,11 @@ class Links:
             )
         return device, profile
 
-    def _device(self, place: str) -> Carried:
-        """The device at a place, or the equipment in a role."""
-        equipment = self.config.fitted().get(place)
-        return getattr(self.config.devices, place) if equipment is None else equipment
-
-    def _key(self, device: Carried) -> Key:
+    def _key(self, device: Device | Slots) -> Key:
         if self.config.kind == "simulated" and self.instead is not None:
-            return (device.link, "", getattr(device, "device_id", 0) if device.link in TEXT_CARRIERS else 0)
+            return (device.link, "", device.device_id if device.link in TEXT_CARRIERS else 0)
         if self.config.kind == "simulated":
-            own = self.lines_at.get(getattr(device, "device_id", 0))
+            own = self.lines_at.get(device.device_id)
             if device.link in TEXT_CARRIERS and own is not None:
                 return (device.link, *own)
             if device.link not in self.simulated_at:
@@ -139,9 +123,9 @@ class Links:
             return (device.link, getattr(device, "resource", ""), 0)
         return ("rtu", device.serial, 0) if device.link == "rtu" else (device.link, device.host, device.port)
 
-    def _behind(self, key: Key) -> dict[int, tuple[str, Profile]]:
-        """Name and profile of every device behind one address, by device id; the first one names the link."""
-        behind: dict[int, tuple[str, Profile]] = {}
+    def _behind(self, key: Key) -> Behind:
+        """The devices behind one address; the first one names the link."""
+        behind: Behind = {}
         for place in Devices.model_fields:
             device = getattr(self.config.devices, place)
             if self._key(device) == key:
@@ -163,6 +147,29 @@ def _where(key: Key) -> str:
     """The address of a link, as messages name it."""
     _, host, port = key
     return f"{host}:{port}" if port else host
+
+
+def _gated_link(
+    wire: Wire, behind: Behind, recorder: FrameRecorder | None, attempts: int, permit: Permit | None
+) -> GatedLink:
+    """The gate before a wire with these devices behind it; in a recording it has the name of the first one."""
+    if recorder is not None:
+        name = next(iter(behind.values()))[0]
+        for device_id, (place, profile) in behind.items():
+            recorder.device(name, device_id, place, profile)
+        wire = RecordedWire(wire, recorder, name)
+    profiles = {device_id: profile for device_id, (_, profile) in behind.items()}
+    return GatedLink(WireLink(wire, read_attempts=attempts), wire.where, profiles, permit)
+
+
+def _gated_lines(
+    wire: LineWire, place: str, profile: Profile, recorder: FrameRecorder | None, attempts: int, permit: Permit | None
+) -> GatedLines:
+    """The gate before the text connection of a device."""
+    if recorder is not None:
+        recorder.device(place, 0, place, profile)
+        wire = RecordedLines(wire, recorder, place)
+    return GatedLines(LineLink(wire, read_attempts=attempts), wire.where, profile, permit)
 
 
 def wire_to(device: Carried, host: str, port: int, timeout_s: float) -> Wire:
@@ -204,26 +211,19 @@ class SingleLink:
     place: str = "device"
     _made: GatedLink | GatedLines | None = None
 
-    def registers(self, attempts: int = 1) -> GatedLink:
+    def registers(self) -> GatedLink:
         """The link to its registers, on a new connection."""
         self.close()
-        device = self.device
-        wire = wire_to(device, device.host, device.port, self.timeout_s)
-        if self.recorder is not None:
-            self.recorder.device(self.place, device.device_id, self.place, self.profile)
-            wire = RecordedWire(wire, self.recorder, self.place)
-        link = WireLink(wire, read_attempts=attempts)
-        self._made = made = GatedLink(link, wire.where, {device.device_id: self.profile}, self.permit)
+        wire = wire_to(self.device, self.device.host, self.device.port, self.timeout_s)
+        behind = {self.device.device_id: (self.place, self.profile)}
+        self._made = made = _gated_link(wire, behind, self.recorder, 1, self.permit)
         return made
 
-    def lines(self, attempts: int = 1) -> GatedLines:
+    def lines(self) -> GatedLines:
         """The connection for its lines, anew."""
         self.close()
         wire = lines_to(self.device, self.device.host, self.device.port, self.timeout_s)
-        if self.recorder is not None:
-            self.recorder.device(self.place, 0, self.place, self.profile)
-            wire = RecordedLines(wire, self.recorder, self.place)
-        self._made = made = GatedLines(LineLink(wire, read_attempts=attempts), wire.where, self.profile, self.permit)
+        self._made = made = _gated_lines(wire, self.place, self.profile, self.recorder, 1, self.permit)
         return made
 
     def close(self) -> None:

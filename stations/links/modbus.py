@@ -20,12 +20,7 @@ REASONS = {
     10: "gateway without a path",
     11: "no answer behind the gateway",
 }
-NAMES: dict[str, str] = {
-    "holding": "registers",
-    "input": "input registers",
-    "coil": "coils",
-    "discrete": "discrete inputs",
-}
+NAMES = {"holding": "registers", "input": "input registers", "coil": "coils", "discrete": "discrete inputs"}
 
 
 class WireLink:
@@ -82,14 +77,13 @@ class WireLink:
             self._wire.close()
             raise LinkLost(f"{where}: no valid answer to '{purpose}' ({problem}); check gateway and cable") from None
         except Refused as problem:
-            raise _refusal(where, purpose, problem.code) from None
+            code = problem.code
+            reason = REASONS.get(code, f"exception {code}")
+            kind = _BehindGateway if code in GATEWAY else StationRefused
+            raise kind(
+                f"{where}: exception {code} ({reason}) in answer to '{purpose}'; check the device and its profile"
+            ) from None
 
 
 class _BehindGateway(StationTimeout):
     """The gateway reports that the device behind it does not answer; a repetition has no use."""
-
-
-def _refusal(where: str, purpose: str, code: int) -> StationRefused | StationTimeout:
-    reason = REASONS.get(code, f"exception {code}")
-    message = f"{where}: exception {code} ({reason}) in answer to '{purpose}'; check the device and its profile"
-    return _BehindGateway(message) if code in GATEWAY else StationRefused(message)

@@ -13,8 +13,9 @@ from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 from schemas.errors import WrongUse
 from schemas.log_lines import tell
@@ -37,6 +38,9 @@ SECRET = re.compile(
 )
 """Whole words: "damping" and "spin" are no secrets."""
 WITHHELD = "withheld"
+
+AnyWire = TypeVar("AnyWire", Wire, LineWire)
+Answer = TypeVar("Answer", bytes, str)
 
 
 @dataclass
@@ -92,16 +96,16 @@ class FrameRecorder:
         entry: dict[str, Any] = {**self._head(begun), "link": link, "id": device_id, "what": what}
         if SECRET.search(what):
             self._write({**entry, "q": request[:5].hex(), "x": WITHHELD})
-            return
-        self._write({**entry, "q": request.hex(), **({"a": reply.hex()} if reply is not None else {"x": failed})})
+        else:
+            self._write({**entry, "q": request.hex(), **({"x": failed} if reply is None else {"a": reply.hex()})})
 
     def line(self, link: str, text: str, what: str, begun: float, answer: str | None, failed: str) -> None:
         """A line of text and its answer."""
         entry: dict[str, Any] = {**self._head(begun), "link": link, "id": 0, "what": what}
         if SECRET.search(f"{what} {text}"):
             self._write({**entry, "line": WITHHELD, "x": WITHHELD})
-            return
-        self._write({**entry, "line": text, **({"answer": answer} if answer is not None else {"x": failed})})
+        else:
+            self._write({**entry, "line": text, **({"x": failed} if answer is None else {"answer": answer})})
 
     def close(self) -> None:
         """Ends the recording."""
@@ -160,63 +164,46 @@ def meaning(request: bytes, registers: Sequence[Register]) -> str:
     return f"{verb} {names or f'{count} of {SPACE_OF[function]} from {first}'}"
 
 
-class RecordedWire:
-    """A Modbus wire whose exchanges are recorded; ``link`` is its name in the recording."""
+class _Recorded(Generic[AnyWire, Answer]):
+    """A wire whose exchanges are recorded; ``link`` is its name in the recording."""
 
-    def __init__(self, wire: Wire, recorder: FrameRecorder, link: str) -> None:
+    def __init__(self, wire: AnyWire, recorder: FrameRecorder, link: str) -> None:
         self._wire, self._recorder, self._link = wire, recorder, link
         self.where, self.timeout_s = wire.where, wire.timeout_s
-
-    def exchange(self, device_id: int, request: bytes, before: Callable[[], None] | None = None) -> bytes:
-        """The answer to a request. One that was never sent, because ``before`` raised, is not recorded."""
-        begun = steady()
-
-        def record(reply: bytes | None, failed: str = "") -> None:
-            self._recorder.exchange(self._link, device_id, request, begun, reply, failed)
-
-        try:
-            reply = self._wire.exchange(device_id, request, before)
-        except Silence:
-            record(None, "silence")
-            raise
-        except Broken as problem:
-            record(None, f"broken: {problem}")
-            raise
-        except Malformed as problem:
-            record(None, f"malformed: {problem}")
-            raise
-        record(reply)
-        return reply
 
     def close(self) -> None:
         """Ends the connection."""
         self._wire.close()
 
+    def _answer(self, exchange: Callable[[], Answer], record: Callable[[float, Answer | None, str], None]) -> Answer:
+        """The answer of an exchange, recorded. One that was never sent, because its ``before`` raised, is not recorded."""
+        begun = steady()
+        try:
+            answer = exchange()
+        except (Silence, Broken, Malformed) as problem:
+            kind = "broken" if isinstance(problem, Broken) else "malformed"
+            record(begun, None, "silence" if isinstance(problem, Silence) else f"{kind}: {problem}")
+            raise
+        record(begun, answer, "")
+        return answer
 
-class RecordedLines:
+
+class RecordedWire(_Recorded[Wire, bytes]):
+    """A Modbus wire whose exchanges are recorded."""
+
+    def exchange(self, device_id: int, request: bytes, before: Callable[[], None] | None = None) -> bytes:
+        """The answer to a request."""
+        record = partial(self._recorder.exchange, self._link, device_id, request)
+        return self._answer(lambda: self._wire.exchange(device_id, request, before), record)
+
+
+class RecordedLines(_Recorded[LineWire, str]):
     """A text connection whose lines are recorded."""
-
-    def __init__(self, wire: LineWire, recorder: FrameRecorder, link: str) -> None:
-        self._wire, self._recorder, self._link = wire, recorder, link
-        self.where, self.timeout_s = wire.where, wire.timeout_s
 
     def exchange(self, line: str, what: str, before: Callable[[], None] | None = None) -> str:
         """The answer to a line."""
-        begun = steady()
-        try:
-            answer = self._wire.exchange(line, what, before)
-        except Silence:
-            self._recorder.line(self._link, line, what, begun, None, "silence")
-            raise
-        except Broken as problem:
-            self._recorder.line(self._link, line, what, begun, None, f"broken: {problem}")
-            raise
-        self._recorder.line(self._link, line, what, begun, answer, "")
-        return answer
-
-    def close(self) -> None:
-        """Ends the connection."""
-        self._wire.close()
+        record = partial(self._recorder.line, self._link, line, what)
+        return self._answer(lambda: self._wire.exchange(line, what, before), record)
 
 
 @dataclass(frozen=True)

@@ -39,9 +39,8 @@ class SerialWire:
         self._baud, self._parity, self._stop_bits = baud, PARITIES[parity], stop_bits
         self._port: Serial | None = None
         self._late_until = 0.0
-        self._unsure: dict[
-            int, int
-        ] = {}  # devices with an outstanding answer, and the number of requests for a sign since
+        # devices with an outstanding answer, and the number of requests for a sign since
+        self._unsure: dict[int, int] = {}
         character = (10 if parity == "none" else 11) / baud
         self._quiet = max(QUIET_S, QUIET_CHARACTERS * character)
         self._last_input = 0.0

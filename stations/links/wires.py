@@ -54,7 +54,6 @@ class Wire(Protocol):
 
     def close(self) -> None:
         """Ends the connection; the next request makes a new one."""
-        ...
 
 
 class LineWire(Protocol):
@@ -69,7 +68,6 @@ class LineWire(Protocol):
 
     def close(self) -> None:
         """Ends the connection; the next line makes a new one."""
-        ...
 
 
 class TcpWire:

@@ -1,6 +1,7 @@
 """Registers of one simulated device: the profile connected to the values of the plant."""
 
 from collections.abc import Callable, Mapping
+from functools import partial
 
 from schemas.profile import Profile, Register, Space
 from stations.codec import NotEncodable, Value, decode, encode
@@ -14,11 +15,6 @@ class Busy(Exception):
     """The device cannot carry this out now; the server answers with exception 6."""
 
 
-def refuse_write(values: dict[str, Value]) -> None:
-    """The write function of a device without commands."""
-    raise NotEncodable(f"{', '.join(values)}: read-only")
-
-
 def number(values: dict[str, Value], name: str) -> float:
     """The number in a write to a register."""
     value = values[name]
@@ -27,11 +23,26 @@ def number(values: dict[str, Value], name: str) -> float:
     return float(value)
 
 
+def stored(values: Mapping[str, Value]) -> dict[str, Source]:
+    """Sources of registers that hold what was last written to them."""
+    return {name: partial(values.__getitem__, name) for name in values}
+
+
+def store(values: dict[str, Value], written: Mapping[str, Value]) -> None:
+    """Takes over the written values of known names."""
+    values.update({name: value for name, value in written.items() if name in values})
+
+
+def bits_of(register: Register, flags: Mapping[str, bool]) -> int:
+    """The value of a register whose named bits are set or not."""
+    return sum(1 << register.bits[flag] for flag, is_set in flags.items() if is_set)
+
+
 class Bank:
     """The present values of the registers of a device, and the effect of writes."""
 
     def __init__(
-        self, profile: Profile, sources: Mapping[str, Source], sink: Sink = refuse_write, window: Window | None = None
+        self, profile: Profile, sources: Mapping[str, Source], sink: Sink, window: Window | None = None
     ) -> None:
         self.profile = profile
         self._sources = dict(sources)

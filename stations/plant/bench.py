@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from scipy.fft import next_fast_len
 
 from stations.plant.device import PlantDevices, Truth, stream
+from stations.plant.dynamics import DynamicTruth, Rig, directions, two_pole_behind
 from stations.plant.preset import Preset
-from stations.plant.rig import DynamicTruth, Rig, directions, two_pole_behind
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -25,7 +25,6 @@ ANALOGUE_HZ = 51200.0
 FINE_HZ = 102400.0
 PERIOD_POINTS = 64
 PER_CYCLE, SLOWEST_HZ = 40.0, 1600.0  # samples of a cycle, and the slowest rate, of the recorder in a sine test
-STANDARD_G = 9.80665
 STEP_FINE_HZ = 409600.0
 DRIVE_RISE_S = 2e-6  # time constant of the generator at the self-test inputs
 SELF_TEST_G_V, SELF_TEST_SPREAD = 0.5, 0.1  # force of the self-test, and its standard deviation over units and axes
@@ -72,7 +71,6 @@ class Bench:
             fixture_damping=0.02,
             arm_radius_error_m=20e-6 * float(z[1]),
             arm_stretch=2e-9 * (1.0 + float(u[4])),
-            axis_tilt=1e-4 * float(z[2]),
         )
 
     def _unit(self, serial: str) -> DynamicTruth:

@@ -178,3 +178,8 @@ def rotation(vector: Array) -> Array:
     x, y, z = vector / angle
     k = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     return np.eye(3) + np.sin(angle) * k + (1.0 - np.cos(angle)) * k @ k
+
+
+def keyed_normal(seed: int, channel: int, tick: int, n: int) -> NDArray[np.float64]:
+    """``n`` standard normal numbers that depend on seed, channel and tick only."""
+    return np.random.Generator(np.random.Philox(key=seed, counter=[0, 0, channel, tick])).standard_normal(n)

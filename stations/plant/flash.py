@@ -20,9 +20,7 @@ class Flash:
     buffer: list[int] = field(default_factory=lambda: [0] * WORDS)
     offsets: list[int] = field(default_factory=lambda: [0, 0, 0])
     failed: bool = False
-    stuck: dict[tuple[int, int], int] = field(
-        default_factory=dict[tuple[int, int], int]
-    )  # bits that can no longer be set
+    stuck: dict[tuple[int, int], int] = field(default_factory=dict[tuple[int, int], int])  # bits that are always 0
     lose_power_s: float | None = None  # time after the next command at which the supply fails
     _begun_us: int = -1
     _copy: int = 0

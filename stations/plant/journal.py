@@ -68,9 +68,8 @@ class Journal:
         self._writes = array("q")  # time, device, space, address, count and words of each write, in sequence
         self._count = 0
         self._others: list[tuple[int, LineOrder | Injection]] = []  # with the number of writes before each
-        self._texts: list[
-            str
-        ] = []  # the first events as JSON, so that a state after every record costs no more each time
+        # the first events as JSON, so that a state after every record costs no more each time
+        self._texts: list[str] = []
 
     def add(self, event: Event) -> None:
         """Appends an event."""
@@ -135,11 +134,9 @@ def _as_json(event: Event) -> dict[str, object]:
         return {"at_us": event.at_us, "fault": event.fault.model_dump()}
     if isinstance(event, LineOrder):
         return {"at_us": event.at_us, "device_id": event.device_id, "line": event.line}
-    item: dict[str, object] = {"at_us": event.at_us, "device_id": event.device_id, "address": event.address}
-    item["words"] = list(event.words)
-    if event.space != "holding":
-        item["space"] = event.space
-    return item
+    space = {} if event.space == "holding" else {"space": event.space}
+    place = {"at_us": event.at_us, "device_id": event.device_id, "address": event.address}
+    return {**place, "words": list(event.words), **space}
 
 
 def _from_json(item: dict[str, Any]) -> Event:

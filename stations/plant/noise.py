@@ -45,9 +45,7 @@ class UnitNoise:
         self._streams = list(streams)
         self._flicker = self._sigma * self._draw(1, TERMS)[0]
         self._walk: Array = np.zeros((len(self._streams), 3))
-        self._filtered: Array = np.zeros(
-            (len(self._streams), 3)
-        )  # white noise behind the output filter at the last sample
+        self._filtered: Array = np.zeros_like(self._walk)  # white noise behind the output filter at the last sample
 
     def jump(self, gap: float) -> None:
         """Advances the slow processes over ``gap`` seconds without sampling; exact, in one step."""

@@ -92,8 +92,11 @@ class Plant(World):
 
     def _arrange(self, order: FaultOrder) -> None:
         fault = build_fault(order, self.serials)
-        fault.device_id = self._id_of(order)
-        fault.unit = self.serials.index(order.serial) if order.serial else 0
+        if order.device:
+            fault.device_id = int(getattr(self._devices, order.device).device_id)
+        if order.serial:
+            fault.unit = self.serials.index(order.serial)
+            fault.device_id = self._devices.slots.device_id + self.slots[fault.unit]
         self.faults.append(fault)
         number = 2 * len(self.faults)
         self.schedule(order.at_s, number, fault.begins)
@@ -105,14 +108,6 @@ class Plant(World):
         """Faults of a device that are active now."""
         now = self.now
         return [f for f in self.faults if f.device_id == device_id and f.order.at_s <= now < f.order.until_s]
-
-    def _id_of(self, order: FaultOrder) -> int:
-        """The device id that a fault concerns; 0 where it concerns none."""
-        if order.device:
-            return int(getattr(self._devices, order.device).device_id)
-        if order.serial:
-            return self._devices.slots.device_id + self.slots[self.serials.index(order.serial)]
-        return 0
 
 
 class PlantClock:

@@ -1,13 +1,14 @@
-"""Modbus TCP server of the plant, in its own thread, on loopback.
+"""Servers of the plant on loopback, each in its own thread: Modbus TCP, and lines of text.
 
 An action awaits nothing: pymodbus would otherwise answer one request with the transaction number of the next.
 """
 
 import asyncio
 import logging
+import socketserver
 import threading
+from contextlib import AbstractContextManager, suppress
 from functools import partial
-from types import TracebackType
 from typing import Self, get_args
 
 from pymodbus.constants import ExcCodes
@@ -20,6 +21,7 @@ from pymodbus.simulator import DataType, SimData, SimDevice
 from schemas.errors import StationRefused
 from schemas.profile import BITS, Profile, Space
 from stations.codec import NotEncodable
+from stations.listening import listening
 from stations.plant.bank import Busy
 from stations.plant.faults.base import MUTE
 from stations.plant.plant import Plant
@@ -31,6 +33,8 @@ SPACES: dict[int, Space] = {
     3: "holding", 6: "holding", 16: "holding", 22: "holding", 23: "holding",
 }  # fmt: skip
 START_S = 20.0
+END = b"\r\n"
+LONGEST = 256
 
 
 def sim_device(device_id: int, profile: Profile, plant: Plant) -> SimDevice:
@@ -146,7 +150,7 @@ class PlantServer:
         self._ready = threading.Event()
         self._loop: asyncio.AbstractEventLoop | None = None
         self._server: ModbusBaseServer | None = None
-        self._thread = threading.Thread(target=self._run, name="plant-server", daemon=True)
+        self._thread = threading.Thread(target=lambda: asyncio.run(self._serve()), name="plant-server", daemon=True)
 
     def __enter__(self) -> Self:
         """Starts, and waits until the port listens."""
@@ -158,16 +162,11 @@ class PlantServer:
             )
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """Stops the server and its thread."""
         if self._loop is not None and self._server is not None and self._thread.is_alive():
             asyncio.run_coroutine_threadsafe(self._server.shutdown(), self._loop).result(START_S)
         self._thread.join(START_S)
-
-    def _run(self) -> None:
-        asyncio.run(self._serve())
 
     async def _serve(self) -> None:
         self._loop = asyncio.get_running_loop()
@@ -193,3 +192,18 @@ class PlantServer:
         if not isinstance(transport, asyncio.Server):
             raise StationRefused("simulated station: the server cannot listen, a free port is needed; give one")
         return int(transport.sockets[0].getsockname()[1])
+
+
+def serve_lines(plant: Plant, device_id: int, host: str = LOOPBACK, port: int = 0) -> AbstractContextManager[int]:
+    """The port of a device with a text protocol, which is served while the context is open."""
+
+    class Lines(socketserver.StreamRequestHandler):
+        def handle(self) -> None:
+            """Sends one answer for each line; none while the device does not respond."""
+            with suppress(OSError):
+                while line := self.rfile.readline(LONGEST):
+                    answer = plant.send_line(device_id, line.rstrip(END).decode("ascii", errors="replace"))
+                    if answer is not None:
+                        self.wfile.write(answer.encode("ascii", errors="replace") + END)
+
+    return listening(Lines, host, port, "simulated station")

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from stations.plant.keyed import keyed_normal
+from stations.plant.device import keyed_normal
 
 Array = NDArray[np.float64]
 

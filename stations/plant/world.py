@@ -16,25 +16,23 @@ from schemas.lot import Lot
 from schemas.simulation import Simulation
 from schemas.station import StationConfig
 from schemas.station_devices import MOST_SLOTS
+from schemas.units import STANDARD_GRAVITY_M_S2
 from stations.plant.bench import Bench
-from stations.plant.device import PlantDevices, Truth, draw_truth, rotation, stream
+from stations.plant.device import PlantDevices, Truth, draw_truth, keyed_normal, rotation, stream
 from stations.plant.dynamics import Dynamics
 from stations.plant.fixture import Fixture, Moisture
 from stations.plant.flash import Flash
 from stations.plant.hidden import HiddenEffect, hidden_effect
-from stations.plant.keyed import keyed_normal
+from stations.plant.hidden.table import StationErrors
 from stations.plant.noise import UnitNoise
-from stations.plant.physics import Physics
+from stations.plant.physics import Physics, Sampler
 from stations.plant.preset import Preset, load_preset
-from stations.plant.reference_errors import StationErrors
-from stations.plant.sampler import Sampler
 from stations.plant.table import Axis
 from stations.profile_files import load_profile
 
 Array = NDArray[np.float64]
 
 AIR, THERMOMETER, SUPPLY, VIBRATION, HUMIDITY, OUTER, INNER = 1, 2, 3, 4, 5, 10, 20  # channels of keyed noise
-STANDARD_G = 9.80665  # m/s², CGPM 1901
 AIR_NOISE_K = 0.01
 VIBRATION_NOISE = 0.02
 HUMIDITY_NOISE_PCT = 0.1
@@ -51,7 +49,12 @@ class World:
 
     def __init__(self, config: StationConfig, lot: Lot, hidden: Sequence[HiddenEffect] = ()) -> None:
         sim = config.simulation or Simulation()
-        _refuse_slots(lot, config.devices.slots.count)
+        count = config.devices.slots.count
+        for unit in lot.units:
+            if unit.slot >= count:
+                raise WrongUse(
+                    f"lot: unit {unit.serial} sits in slot {unit.slot}, the fixture has 0 to {count - 1}; move it"
+                )
         self.lock = threading.RLock()
         self.now_us = 0
         self.emergency_stop = False
@@ -78,6 +81,7 @@ class World:
         self._truths = self._draw_truths(sim, lot)
         noise = [stream(sim.seed, lot.seed, lot.repeat, serial, "noise") for serial in self.serials]
         turn_on = [stream(sim.seed, lot.seed, lot.repeat, serial, "turn-on") for serial in self.serials]
+        gravity = sim.local_gravity_m_s2 / STANDARD_GRAVITY_M_S2
         self.physics = Physics(
             (self.outer, self.inner),
             self.fixture,
@@ -86,7 +90,7 @@ class World:
             Dynamics(self.preset),
             UnitNoise(self.preset, noise),
             effects,
-            sim.local_gravity_m_s2 / STANDARD_G,
+            gravity,
         )
         self.physics.orthogonality = 0.0 if self.station_errors is None else self.station_errors.orthogonality
         self.flash = [Flash() for _ in self.serials]  # by unit, in any slot
@@ -94,7 +98,7 @@ class World:
             self.preset,
             self._truths,
             self.physics.devices,
-            sim.local_gravity_m_s2 / STANDARD_G,
+            gravity,
             sim.seed,
             lot.seed,
             self._key,
@@ -227,14 +231,6 @@ class World:
         for slot, value in zip(self.slots, values, strict=True):
             out[slot] = float(value)
         return out
-
-
-def _refuse_slots(lot: Lot, count: int) -> None:
-    for unit in lot.units:
-        if unit.slot >= count:
-            raise WrongUse(
-                f"lot: unit {unit.serial} sits in slot {unit.slot}, the fixture has 0 to {count - 1}; move it"
-            )
 
 
 class Supplies:

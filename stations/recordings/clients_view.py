@@ -1,5 +1,6 @@
 """What this product's client gets from a recorded device, so that a recorded defect becomes a test."""
 
+from dataclasses import replace
 from pathlib import Path
 
 from schemas.station_devices import Carried
@@ -54,15 +55,5 @@ def _one(
         failed = SILENCE
     except (Broken, Malformed) as problem:
         failed = f"{type(problem).__name__.lower()}"
-    got = Exchange(
-        exchange.at_s,
-        0.0,
-        exchange.link,
-        exchange.device_id,
-        exchange.what,
-        exchange.request,
-        reply,
-        failed,
-        exchange.text,
-    )
+    got = replace(exchange, seconds=0.0, reply=reply, failed=failed)
     return f"{recording.place_of(exchange)}: {exchange.what} -> {said(got, recording.device_of(exchange))}"

@@ -80,37 +80,32 @@ class Held:
 
 
 @dataclass
-class HeldWire:
-    """A wire that answers from a recording."""
+class _HeldLink:
+    """A link that answers from a recording."""
 
     held: Held
     link: str
     where: str
     timeout_s: float = 0.0
+
+    def close(self) -> None:
+        """Nothing is open."""
+
+
+class HeldWire(_HeldLink):
+    """A wire that answers from a recording."""
 
     def exchange(self, device_id: int, request: bytes, before: Callable[[], None] | None = None) -> bytes:
         """The recorded answer."""
         return self.held.exchange(self.link, device_id, request)
 
-    def close(self) -> None:
-        """Nothing is open."""
 
-
-@dataclass
-class HeldLines:
+class HeldLines(_HeldLink):
     """A connection for lines that answers from a recording."""
-
-    held: Held
-    link: str
-    where: str
-    timeout_s: float = 0.0
 
     def exchange(self, line: str, what: str, before: Callable[[], None] | None = None) -> str:
         """The recorded answer."""
         return self.held.exchange(self.link, 0, line.encode("ascii")).decode("ascii", errors="replace")
-
-    def close(self) -> None:
-        """Nothing is open."""
 
 
 @dataclass(frozen=True)

@@ -103,7 +103,14 @@ class _Pending:
 
     at: float
     link: str
-    frame: bytes
+    device_id: int
+    data: bytes
+
+    def exchange(self, zero: float, when: float, reply: bytes | None) -> Exchange:
+        """With its answer at a time, or without one; ``zero`` is the beginning of the recording, s."""
+        failed = "" if reply is not None else SILENCE
+        at, seconds, what = self.at - zero, when - self.at, meaning(self.data, ())
+        return Exchange(at, seconds, self.link, self.device_id, what, self.data, reply, failed)
 
 
 def _of_packets(path: Path) -> Iterator[Exchange]:
@@ -134,11 +141,12 @@ def _of_packets(path: Path) -> Iterator[Exchange]:
             for frame in stream.frames():
                 answered = waiting.pop((target, source, frame[:2], frame[6]), None)
                 if answered is not None:
-                    found.append(_exchange(answered, zero, when, frame[HEADER:]))
+                    found.append(answered.exchange(zero, when, frame[HEADER:]))
                 elif frame[HEADER] in KNOWN:
-                    link = f"{_address(target[0])}:{target[1]}"
-                    waiting[source, target, frame[:2], frame[6]] = _Pending(when, link, frame)
-    found += [_exchange(one, zero or 0.0, one.at, None) for one in waiting.values()]
+                    address = ".".join(map(str, target[0])) if len(target[0]) == 4 else target[0].hex()
+                    pending = _Pending(when, f"{address}:{target[1]}", frame[6], frame[HEADER:])
+                    waiting[source, target, frame[:2], frame[6]] = pending
+    found += [one.exchange(zero or 0.0, one.at, None) for one in waiting.values()]
     yield from sorted(found, key=lambda exchange: exchange.at_s)
 
 
@@ -169,22 +177,11 @@ def _segment(dpkt: Any, link_type: int, raw: bytes) -> tuple[tuple[bytes, int], 
     return (network.src, segment.sport), (network.dst, segment.dport), segment.seq, bytes(segment.data)
 
 
-def _address(raw: bytes) -> str:
-    return ".".join(map(str, raw)) if len(raw) == 4 else raw.hex()
-
-
-def _exchange(request: _Pending, zero: float, when: float, reply: bytes | None) -> Exchange:
-    data = request.frame[HEADER:]
-    return Exchange(
-        request.at - zero, when - request.at, request.link, request.frame[6], meaning(data, ()), data, reply,
-        "" if reply is not None else SILENCE,
-    )  # fmt: skip
-
-
 def _of_log(path: Path) -> Iterator[Exchange]:
     """The exchanges in a log with one frame a line, each a request or an answer, of RTU or TCP."""
     text = path.read_bytes().decode("utf-8-sig", errors="replace")
-    zero, last, pending = None, 0.0, None
+    zero, last = None, 0.0
+    pending: _Pending | None = None
     for line in text.splitlines():
         part = _frame_in(line)
         if part is None:
@@ -193,21 +190,16 @@ def _of_log(path: Path) -> Iterator[Exchange]:
         at = _time_in(line)
         zero = at if zero is None else zero
         last = last if at is None or zero is None else at - zero
-        answers = pending is not None and pending[1] == device_id and (data[0] & ~EXCEPTION) == pending[2][0]
+        answers = pending is not None and (pending.device_id, pending.data[0]) == (device_id, data[0] & ~EXCEPTION)
         if answers and pending is not None and not SENT.search(line):
-            yield _logged(*pending, seconds=max(last - pending[0], 0.0), reply=data)
+            yield pending.exchange(0.0, max(last, pending.at), data)
             pending = None
         elif not RECEIVED.search(line) or SENT.search(line):
             if pending is not None:
-                yield _logged(*pending, seconds=0.0, reply=None)
-            pending = last, device_id, data
+                yield pending.exchange(0.0, pending.at, None)
+            pending = _Pending(last, "log", device_id, data)
     if pending is not None:
-        yield _logged(*pending, seconds=0.0, reply=None)
-
-
-def _logged(at: float, device_id: int, data: bytes, *, seconds: float, reply: bytes | None) -> Exchange:
-    failed = "" if reply is not None else SILENCE
-    return Exchange(at, seconds, "log", device_id, meaning(data, ()), data, reply, failed)
+        yield pending.exchange(0.0, pending.at, None)
 
 
 def _frame_in(line: str) -> tuple[int, bytes] | None:

@@ -1,26 +1,85 @@
-"""Serves a recording as devices: Modbus over TCP for any client, and lines of text on a port of its own for each text device."""
+"""What a recorded device answers, and a server for it: to the same requests the same answers, in their order.
+
+A device is followed through its recording by the orders that it gets. Between two orders a client may read more or less often
+than the recorded one did: a read gets the next recorded answer before the next order, and after the last one that answer again.
+What was never asked while it was recorded has no answer, and is listed.
+"""
 
 import socket
 import socketserver
 import struct
 import threading
 import time
+from bisect import bisect_left
+from collections import defaultdict
 from collections.abc import Callable
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field
-from types import TracebackType
 from typing import Self
 
-from schemas.errors import StationRefused
 from stations.links.frames import EXCEPTION
 from stations.links.lines import END, LONGEST
 from stations.links.wires import HEADER
+from stations.listening import listening
 from stations.recordings.frame_file import BROKEN, SILENCE, Exchange, FrameFile
-from stations.recordings.replay import Replay, Who
+
+Who = tuple[str, int]
+
+
+@dataclass
+class _Followed:
+    """Where a device is in its recording."""
+
+    orders: list[int] = field(default_factory=list[int])
+    by_request: dict[bytes, list[int]] = field(default_factory=lambda: defaultdict(list))
+    next: int = 0
+
+
+@dataclass
+class Replay:
+    """The devices of a recording; ``asked_anew`` is what was asked and is not in it."""
+
+    exchanges: list[Exchange]
+    asked_anew: list[str] = field(default_factory=list[str])
+    answered: int = 0
+    _devices: dict[Who, _Followed] = field(default_factory=lambda: defaultdict(_Followed))
+
+    def __post_init__(self) -> None:
+        """Sorts the exchanges by device and request."""
+        for number, exchange in enumerate(self.exchanges):
+            device = self._devices[exchange.link, exchange.device_id]
+            device.by_request[exchange.request].append(number)
+            if exchange.writes:
+                device.orders.append(number)
+
+    @classmethod
+    def of(cls, recording: FrameFile) -> "Replay":
+        """The devices of a recording."""
+        return cls(recording.exchanges)
+
+    @property
+    def who(self) -> list[Who]:
+        """Link and device id of every device, in order of their first exchange."""
+        return list(self._devices)
+
+    def answer(self, who: Who, request: bytes) -> Exchange | None:
+        """The recorded exchange that this request continues with; None where it was never recorded."""
+        device = self._devices.get(who)
+        numbers = device.by_request.get(request, []) if device is not None else []
+        if device is None or not numbers:
+            self.asked_anew.append(f"{who[0]} device {who[1]}: {request.hex(' ')}")
+            return None
+        k = bisect_left(numbers, device.next)
+        order = bisect_left(device.orders, device.next)
+        until = device.orders[order] if order < len(device.orders) else len(self.exchanges)
+        self.answered += 1
+        if k < len(numbers) and (self.exchanges[numbers[k]].writes or numbers[k] < until):
+            device.next = numbers[k] + 1
+            return self.exchanges[numbers[k]]
+        return self.exchanges[numbers[max(k - 1, 0)]]
+
 
 NO_SUCH_REGISTER, NO_SUCH_DEVICE = 2, 11
-END_S = 5.0
-POLL_S = 0.05
 
 
 @dataclass
@@ -70,29 +129,12 @@ class ReplayServer:
             self.port = min(self.lines_at.values())
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """Ends the servers and their connections."""
         self._stack.close()
 
     def _listen(self, handler: type[socketserver.BaseRequestHandler], port: int) -> int:
-        try:
-            server = _Server((self.host, port), handler)
-        except OSError as problem:
-            raise StationRefused(
-                f"replay: {self.host}:{port} cannot listen ({problem.strerror}), a free port is needed; give one with --port"
-            ) from None
-        thread = threading.Thread(target=server.serve_forever, args=(POLL_S,), name="replay", daemon=True)
-        thread.start()
-
-        def end() -> None:
-            server.shutdown()
-            server.server_close()
-            thread.join(END_S)
-
-        self._stack.callback(end)
-        return int(server.server_address[1])
+        return self._stack.enter_context(listening(handler, self.host, port, "replay", "give one with --port"))
 
     def _line_handler(self, link: str) -> type[socketserver.BaseRequestHandler]:
         server = self
@@ -140,11 +182,3 @@ class ReplayServer:
     def _refusal(self, device_id: int, request: bytes) -> bytes:
         code = NO_SUCH_REGISTER if device_id in self._by_id else NO_SUCH_DEVICE
         return bytes([request[0] | EXCEPTION, code]) if request else bytes([EXCEPTION, code])
-
-
-class _Server(socketserver.ThreadingTCPServer):
-    """A server that ends its connections with itself."""
-
-    allow_reuse_address = True
-    daemon_threads = True
-    block_on_close = False

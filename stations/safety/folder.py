@@ -2,6 +2,7 @@
 
 import json
 import os
+from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -47,12 +48,8 @@ def log_event(folder: Path, station: str, event: str, **details: Any) -> bool:
 def read_log(folder: Path) -> list[dict[str, Any]]:
     """Every line of the machine's log in order; an incomplete line is left out."""
     path = folder / LOG
-    if not path.is_file():
-        return []
     lines: list[dict[str, Any]] = []
-    for line in path.read_text("utf-8", errors="replace").splitlines():
-        try:
+    for line in path.read_text("utf-8", errors="replace").splitlines() if path.is_file() else ():
+        with suppress(ValueError):
             lines.append(json.loads(line))
-        except ValueError:
-            continue
     return lines

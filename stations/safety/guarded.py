@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from schemas.errors import LeaseLost, OperatorNeeded
 from schemas.station import StationConfig
 from stations.safety.folder import log_event, state_folder
-from stations.safety.lease_parts import addresses
+from stations.safety.lease_files import addresses
 from stations.safety.leases import Leases, new_holder
 from stations.safety.safe_state import Reached
 from stations.safety.watchdog_client import Watchdog
@@ -24,14 +24,6 @@ class Protection:
     leases: Leases
     watchdog: Watchdog
     safe: bool = field(init=False, default=False)
-
-    def alive(self) -> None:
-        """Refuses a reading where this run has lost its leases by missed heartbeats."""
-        self.leases.alive()
-
-    def held(self) -> None:
-        """Refuses a command where the leases are no longer this run's."""
-        self.leases.require()
 
     def require(self) -> None:
         """Refuses to continue without the leases or without a watchdog."""

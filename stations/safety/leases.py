@@ -20,13 +20,14 @@ from stations.clock import steady
 from stations.safety.folder import log_event
 from stations.safety.lease_files import (
     Holder,
+    Part,
+    addresses,
     lease_file,
     new_holder,
     read_holder,
     seconds_since_beat,
     write_holder,
 )
-from stations.safety.lease_parts import Part, addresses
 
 __all__ = ["Holder", "Leases", "holders", "new_holder"]
 

@@ -5,8 +5,7 @@ import time
 from pathlib import Path
 
 from schemas.station import StationConfig
-from stations.safety.lease_files import Holder, lease_file, read_holder
-from stations.safety.lease_parts import addresses
+from stations.safety.lease_files import Holder, addresses, lease_file, read_holder
 
 AGAIN_S = 0.5
 

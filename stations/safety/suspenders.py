@@ -64,11 +64,8 @@ class Watched:
         if self.rules.door and instruments.door_open:
             reasons.append(Reason("door", "the chamber's door is open, closed is needed"))
         if not instruments.vibration_g <= self.rules.vibration_g:
-            reasons.append(
-                Reason(
-                    "vibration", f"vibration {instruments.vibration_g:.3g} g rms, {self.rules.vibration_g:g} is allowed"
-                )
-            )
+            text = f"vibration {instruments.vibration_g:.3g} g rms, {self.rules.vibration_g:g} is allowed"
+            reasons.append(Reason("vibration", text))
         wrong = {slot: text for slot in slots if (text := self._supply(slot, instruments.supply_V[slot]))}
         if wrong:
             first = min(wrong)
@@ -83,15 +80,12 @@ class Watched:
         reasons: list[Reason] = []
         band = max(self.rules.chamber_band_K, self.soak.band_K)
         if abs(air - target) > band:
-            reasons.append(
-                Reason("chamber", f"the chamber's air is at {air:.2f} °C, {target:g} ± {band:g} °C is needed")
-            )
-        temperature = instruments.temperature_C
-        left = tuple(
-            s for s in slots if math.isfinite(temperature[s]) and abs(temperature[s] - target) > self.soak.band_K
-        )
+            text = f"the chamber's air is at {air:.2f} °C, {target:g} ± {band:g} °C is needed"
+            reasons.append(Reason("chamber", text))
+        celsius, own = instruments.temperature_C, self.soak.band_K
+        left = tuple(s for s in slots if math.isfinite(celsius[s]) and abs(celsius[s] - target) > own)
         if left:
-            text = f"slot {left[0]}: device at {temperature[left[0]]:.2f} °C, {target:g} ± {self.soak.band_K:g} °C is needed"
+            text = f"slot {left[0]}: device at {celsius[left[0]]:.2f} °C, {target:g} ± {own:g} °C is needed"
             reasons.append(Reason("device", text, left))
         return reasons
 

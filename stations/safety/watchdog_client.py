@@ -49,14 +49,7 @@ class Watchdog:
         self._begun, self._unanswered = steady(), 0
         self._watches.clear()
         with _errors(self.leases) as errors:
-            self._process = subprocess.Popen(  # noqa: S603 - this interpreter and a module of the product
-                [sys.executable, "-m", MODULE],
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=errors,
-                env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
-                start_new_session=True,  # neither Ctrl-C, a terminal that closes nor the end of a process group reaches it
-            )
+            self._process = start_module(MODULE, errors)
         self.pid = self._process.pid
         order = {
             "config": self.config.model_dump(mode="json"),
@@ -156,10 +149,28 @@ class Watchdog:
             self._process = None
 
     def _close(self) -> None:
-        for pipe in (self._process.stdin, self._process.stdout) if self._process is not None else ():
-            if pipe is not None:
-                with suppress(OSError):
-                    pipe.close()
+        if self._process is not None:
+            close_pipes(self._process)
+
+
+def start_module(module: str, errors: IO[bytes] | None = None) -> subprocess.Popen[bytes]:
+    """A process that runs a module of the product, with pipes to its input and from its output."""
+    return subprocess.Popen(  # noqa: S603 - this interpreter and a module of the product
+        [sys.executable, "-m", module],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=errors,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+        start_new_session=True,  # neither Ctrl-C, a terminal that closes nor the end of a process group reaches it
+    )
+
+
+def close_pipes(process: subprocess.Popen[bytes]) -> None:
+    """Closes the pipes to a process."""
+    for pipe in (process.stdin, process.stdout):
+        if pipe is not None:
+            with suppress(OSError):
+                pipe.close()
 
 
 def _errors(leases: Leases) -> IO[bytes]:

@@ -10,7 +10,7 @@ from in_process import document_of, given, refused
 from pipelines.cli.keys import SUBJECTS
 from pipelines.demo.scenes import SCENES
 from schemas.key_list import FILES, keys_of
-from stations.plant.faults.catalogue import figures, kinds
+from stations.plant.faults.catalogue import kinds
 
 
 @each(FILES)
@@ -39,7 +39,7 @@ def test_every_fault_is_listed_with_its_figures() -> None:
     assert set(rows) == set(kinds())
     for name, kind in kinds().items():
         assert rows[name]["meaning"], name
-        assert all(f"{figure}=" in rows[name]["keys"] for figure in figures(kind))
+        assert all(f"{figure}=" in rows[name]["keys"] for figure in kind.figures)
 
 
 def test_every_hidden_effect_of_the_demo_is_listed() -> None:

@@ -19,7 +19,7 @@ from each import each
 from in_process import command
 
 from pipelines.archive import Archive
-from pipelines.commissioning.frame_pictures import kind_of, timeline
+from pipelines.commissioning.frames import kind_of, timeline
 from schemas.errors import DataRejected, StationTimeout, WrongUse
 from schemas.station_devices import Device
 from stations.links import recorder as recording_module

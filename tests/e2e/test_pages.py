@@ -35,8 +35,8 @@ from schemas.station import load_station
 from schemas.station_devices import Device
 from stations.devices.adapters import adapters, chamber_adapter
 from stations.plant.hidden import HIDDEN
+from stations.plant.physics import Sampler
 from stations.plant.preset import load_preset
-from stations.plant.sampler import Sampler
 from stations.self_test import NOISIER, SIGMAS
 
 PAGES = [page for page in pages.PAGES if "deploy" not in page.parts] + [ROOT / "CONTRIBUTING.md"]

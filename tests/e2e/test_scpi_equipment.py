@@ -27,9 +27,9 @@ from schemas.station import load_station, with_faults
 from schemas.station_devices import Device, Equipment
 from stations import open_station
 from stations.clock import Clock
+from stations.devices.commands import Values
+from stations.devices.equipment import RecordingSpoilt
 from stations.devices.families.scpi_supply import ScpiSupply
-from stations.devices.recording import RecordingSpoilt
-from stations.devices.values import Values
 from stations.station import Station
 
 FAMILIES = ROOT / "stations" / "devices" / "families"

@@ -8,7 +8,7 @@ from fault_matrix import CASES, PAGE, RECOVERED, RUN, UNIT, Case, page, row, run
 from schemas.errors import STATION
 from stations.plant.faults.base import DEVICES
 from stations.plant.faults.base import UNIT as UNIT_TARGET
-from stations.plant.faults.catalogue import figures, kinds
+from stations.plant.faults.catalogue import kinds
 
 FIRST = {(case.kind, case.outcome): case for case in reversed(CASES)}
 """The first case of each kind of fault with each of its outcomes; the others are in the slow suite."""
@@ -42,7 +42,8 @@ def test_a_fault_ends_as_the_matrix_says(case: Case) -> None:
 
 def test_every_kind_is_in_the_matrix_and_the_page_is_of_these_cases() -> None:
     elsewhere = {".equipment": "test_equipment_faults.py", ".memory": "test_programming.py"}
-    others = {name: kind.__module__ for name, kind in kinds().items() if kind.__module__.endswith(tuple(elsewhere))}
+    modules = {name: "" if kind.effect is None else kind.effect.__module__ for name, kind in kinds().items()}
+    others = {name: module for name, module in modules.items() if module.endswith(tuple(elsewhere))}
     assert {case.kind for case in CASES} == set(kinds()) - set(others)
     for ending, file in elsewhere.items():
         text = (Path(__file__).parent / file).read_text(encoding="utf-8")
@@ -62,5 +63,5 @@ def test_a_sound_station_is_true_to_the_last_dwell() -> None:
 def test_every_kind_has_a_description_known_targets_and_figures_with_defaults(name: str) -> None:
     kind = kinds()[name]
     assert set(kind.targets) <= {UNIT_TARGET, *DEVICES}
-    assert (kind.__doc__ or "").strip().endswith(".")
-    assert all(isinstance(value, float) for value in figures(kind).values())
+    assert kind.meaning.endswith(".")
+    assert all(isinstance(value, float) for value in kind.figures.values())

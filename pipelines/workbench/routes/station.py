@@ -7,7 +7,7 @@ from pathlib import Path
 from fastapi import APIRouter, Request
 from starlette.responses import Response
 
-from pipelines.commissioning.frame_pictures import timeline
+from pipelines.commissioning.frames import timeline
 from pipelines.report.run_pictures import station_chart
 from pipelines.tables.frames import rows_of
 from pipelines.workbench.pages import Workbench, figure, page, run_table, state_of, workbench_of

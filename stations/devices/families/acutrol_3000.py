@@ -1,11 +1,9 @@
 """Centrifuges and rate tables that speak as the ACUTROL 3000, with a recorder that leaves a result file."""
 
 from collections.abc import Sequence
-from typing import ClassVar
 
 from schemas.errors import OperatorNeeded, StationTimeout
-from stations.devices.equipment import RecordingEquipment
-from stations.devices.recording import Recording, RecordingSpoilt
+from stations.devices.equipment import Recording, RecordingEquipment, RecordingSpoilt
 
 POLL_S = 0.5
 PATIENCE_S = 600.0
@@ -18,7 +16,7 @@ OVERSPEED = 1.02  # of the larger of the rate at the start and the ordered one, 
 class Acutrol(RecordingEquipment):
     """Absolute rates, each read back; standing means below 0.01 °/s, then the interlock opens."""
 
-    needs: ClassVar[tuple[str, ...]] = (
+    needs = (
         "rate", "interlock", "mode", "rate_read", "fault", "record", "direction", "file",
     )  # fmt: skip
 
@@ -39,7 +37,10 @@ class Acutrol(RecordingEquipment):
             The recorder has missed its trigger, or the rate has left its band.
         """
         self._require_no_fault()
-        self._mount({"direction": float(direction)} | self._radius(radius_m))
+        wanted = {"direction": float(direction)}
+        if radius_m is not None and self.values.has("radius"):
+            wanted["radius"] = radius_m
+        self._mount(wanted)
         self.write_all(interlock="close 1", mode="rate 1", rate=rate_deg_s)
         self._wait(rate_deg_s, REACHED * max(rate_deg_s, 1.0))
         before = self.values.text("file")
@@ -53,9 +54,6 @@ class Acutrol(RecordingEquipment):
                 f"{self.name}: {rate:g} °/s after the record, {rate_deg_s:g} °/s is needed; check the drive"
             )
         return self.recorded(before, slots)
-
-    def _radius(self, radius_m: float | None) -> dict[str, float]:
-        return {} if radius_m is None or not self.values.has("radius") else {"radius": radius_m}
 
     def _mount(self, wanted: dict[str, float]) -> None:
         """Stops, orders another mounting, and waits until it is confirmed; nothing where the units are mounted so."""

@@ -6,9 +6,7 @@ from typing import ClassVar
 import numpy as np
 
 from schemas.errors import OperatorNeeded
-from stations.devices.equipment import RecordingEquipment
-from stations.devices.exciter_limits import FEWEST_FLAT, refuse_flat
-from stations.devices.recording import Recording, RecordingSpoilt
+from stations.devices.equipment import FEWEST_FLAT, Recording, RecordingEquipment, RecordingSpoilt, refuse_flat
 
 POLL_S = 0.2
 PATIENCE_S = 60.0
@@ -18,7 +16,7 @@ PEAK_SHARE = 0.2  # IEC 60068-2-27: peak within ± 20 %
 class ShockMachine(RecordingEquipment):
     """One shock an order: set, armed, released; the machine disarms itself after the shock."""
 
-    needs: ClassVar[tuple[str, ...]] = (
+    needs = (
         "peak", "duration", "axis", "direction", "arm", "release", "door", "state", "file",
     )  # fmt: skip
     on: ClassVar[str | int] = "ON"  # what is written, in the form of the controller

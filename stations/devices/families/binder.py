@@ -1,15 +1,13 @@
 """Binder MB1 and MB2."""
 
-from typing import ClassVar
-
 from stations.devices.chamber import AUTOMATIC, ThermalChamber, refuse_program
 
 
 class BinderChamber(ThermalChamber):
     """Binder MB1 and MB2: the active set point is read-only, the others are written."""
 
-    written: ClassVar[tuple[str, ...]] = ("set_point_basic", "set_point_manual")
-    needs: ClassVar[tuple[str, ...]] = ("temperature", "set_point", "set_point_manual")
+    written = ("set_point_basic", "set_point_manual")
+    needs = ("temperature", "set_point", "set_point_manual")
 
     def mode(self) -> str:
         """Basic and manual operation both have a set point; the MB2 reports no mode."""

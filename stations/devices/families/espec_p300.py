@@ -1,7 +1,5 @@
 """ESPEC P300."""
 
-from typing import ClassVar
-
 from schemas.errors import OperatorNeeded
 from stations.devices.chamber import ThermalChamber, refuse_program
 
@@ -9,9 +7,9 @@ from stations.devices.chamber import ThermalChamber, refuse_program
 class P300Chamber(ThermalChamber):
     """ESPEC P300: text protocol, constant operation."""
 
-    needs: ClassVar[tuple[str, ...]] = ("temperature", "set_point", "set_point_low", "set_point_high", "mode", "alarms")
-    running: ClassVar[str] = "CONSTANT"
-    standing: ClassVar[str] = "STANDBY"
+    needs = ("temperature", "set_point", "set_point_low", "set_point_high", "mode", "alarms")
+    running = "CONSTANT"
+    standing = "STANDBY"
 
     def mode(self) -> str:
         """OFF, STANDBY, CONSTANT, or RUN while a program runs."""

@@ -1,14 +1,12 @@
 """Eurotherm 3200."""
 
-from typing import ClassVar
-
 from stations.devices.chamber import AUTOMATIC, ThermalChamber, refuse_program
 
 
 class EurothermChamber(ThermalChamber):
     """Eurotherm 3200: only the remote set point is written, because writes to the others wear out its memory."""
 
-    needs: ClassVar[tuple[str, ...]] = ("temperature", "set_point", "remote_enable", "program_status")
+    needs = ("temperature", "set_point", "remote_enable", "program_status")
 
     def mode(self) -> str:
         """Automatic while the remote set point is enabled."""

@@ -1,14 +1,12 @@
 """IAI ROBO Cylinder controllers in direct numerical mode: the low word of the target starts the move."""
 
-from typing import ClassVar
-
-from stations.devices.axis import DriveState, TableAxis
+from stations.devices.table import DriveState, TableAxis
 
 
 class NumericAxis(TableAxis):
     """A ROBO Cylinder controller."""
 
-    needs: ClassVar[tuple[str, ...]] = (
+    needs = (
         "serial_mode", "servo_on", "pause", "alarm_reset", "state", "motion", "target",
         "feedback_position",
     )  # fmt: skip
@@ -25,9 +23,7 @@ class NumericAxis(TableAxis):
 
     def prepare(self) -> None:
         """Selects the serial line as the source of commands and switches the servo on."""
-        for coil in ("serial_mode", "servo_on"):
-            if self._registers.text(coil) != "on":
-                self._registers.set(coil, "on")
+        self._switch_on()
 
     def order(self, target: float) -> None:
         """Writes band, speed and acceleration and reads them back; then writes the target, whose low word starts the move."""

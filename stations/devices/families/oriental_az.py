@@ -1,14 +1,12 @@
 """Oriental Motor AZ drives in direct data operation: one request holds the whole move with its trigger."""
 
-from typing import ClassVar
-
-from stations.devices.axis import DriveState, TableAxis
+from stations.devices.table import DriveState, TableAxis
 
 
 class DirectDataAxis(TableAxis):
     """An AZ drive. A failed request may have written some of its registers; the trigger comes last, so nothing has moved."""
 
-    needs: ClassVar[tuple[str, ...]] = ("direct_data", "command", "status", "alarm", "feedback_position")
+    needs = ("direct_data", "command", "status", "alarm", "feedback_position")
 
     def state(self) -> DriveState:
         """Status bits, and the alarm code where an alarm is active."""

@@ -1,14 +1,20 @@
 """Function generator with a multichannel recorder, by SCPI: before an exciter's amplifier, or at the self-test inputs."""
 
 from collections.abc import Sequence
-from typing import ClassVar
 
 import numpy as np
 
 from schemas.errors import OperatorNeeded
-from stations.devices.equipment import RecordingEquipment
-from stations.devices.exciter_limits import FLAT_SHARE_OF_SINE, refuse_flat, refuse_motion, tone_level
-from stations.devices.recording import STANDARD_GRAVITY, Recording, RecordingSpoilt
+from stations.devices.equipment import (
+    FLAT_SHARE_OF_SINE,
+    STANDARD_GRAVITY,
+    Recording,
+    RecordingEquipment,
+    RecordingSpoilt,
+    refuse_flat,
+    refuse_motion,
+    tone_level,
+)
 
 POLL_S = 0.05
 GRACE_S = 30.0
@@ -30,7 +36,7 @@ class ScpiGenerator(RecordingEquipment):
     The generator runs open loop: the adapter finds the amplitude from the level that the reference shows.
     """
 
-    needs: ClassVar[tuple[str, ...]] = (
+    needs = (
         "function", "frequency", "amplitude", "cycles", "output", "length", "before", "axis", "start", "state", "error", "file",
     )  # fmt: skip
 
@@ -120,8 +126,11 @@ class ScpiGenerator(RecordingEquipment):
         before = self.values.text("file")
         cycles = cycles or float(np.ceil(frequency * (seconds + 0.5)) + 1.0)
         self.write_all(amplitude=volts, length=seconds, cycles=cycles)
+        late = f"still records {GRACE_S:g} s after the end; check the recorder"
         try:
-            state = self._burst(volts, frequency, seconds)
+            self.write_all(output="ON", start="NOW")
+            self.refuse_error(f"{volts:.4g} V at {frequency:.4g} Hz", "check its ranges")
+            state = self.ended(seconds + GRACE_S, POLL_S, late)
         finally:
             self.make_safe()
         if state == "FAULT":
@@ -130,12 +139,6 @@ class ScpiGenerator(RecordingEquipment):
             )
         units = VOLT if self.values.profile.kind == "step_generator" else STANDARD_GRAVITY
         return self.recorded(before, slots, units=units)
-
-    def _burst(self, volts: float, frequency: float, seconds: float) -> str:
-        """Starts a burst and waits for its end: the recorder's last state. The caller switches the output off."""
-        self.write_all(output="ON", start="NOW")
-        self.refuse_error(f"{volts:.4g} V at {frequency:.4g} Hz", "check its ranges")
-        return self.ended(seconds + GRACE_S, POLL_S, f"still records {GRACE_S:g} s after the end; check the recorder")
 
     def _level(self, recording: Recording, axis: int, frequency: float) -> float:
         """Peak level in g of the tone in the reference, 0 where noise hides it; a clipped reference is refused."""

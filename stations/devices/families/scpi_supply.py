@@ -1,11 +1,9 @@
 """Programmable power supplies that speak SCPI; the nominal setting of the devices is in the supply's memory 1."""
 
-from typing import ClassVar
-
 from schemas.errors import OperatorNeeded, StationRefused
 from stations.clock import Clock
+from stations.devices.commands import Values
 from stations.devices.equipment import Equipment
-from stations.devices.values import Values
 
 NOMINAL = 1.0  # the memory that holds the nominal setting
 SETTLE_S = 1.0
@@ -19,7 +17,7 @@ REACHED = 0.01  # share of the order by which the measured voltage may differ
 class ScpiSupply(Equipment):
     """Sets the voltage of the devices and measures it; an error in the supply's queue refuses the order."""
 
-    needs: ClassVar[tuple[str, ...]] = ("voltage", "measured", "output", "recall", "error")
+    needs = ("voltage", "measured", "output", "recall", "error")
 
     def __init__(self, values: Values, clock: Clock) -> None:
         super().__init__(values, clock)

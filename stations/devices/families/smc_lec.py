@@ -1,14 +1,12 @@
 """SMC LEC controllers: coils enable the drive, step data are read back, then the start register is written alone."""
 
-from typing import ClassVar
-
-from stations.devices.axis import DriveState, TableAxis
+from stations.devices.table import DriveState, TableAxis
 
 
 class StepDataAxis(TableAxis):
     """A LECP6 with a rotary table."""
 
-    needs: ClassVar[tuple[str, ...]] = (
+    needs = (
         "serial_mode", "servo_on", "reset", "state", "step_data", "start", "feedback_position",
     )  # fmt: skip
 
@@ -23,9 +21,7 @@ class StepDataAxis(TableAxis):
 
     def prepare(self) -> None:
         """Selects the serial line as the source of commands and switches the servo on."""
-        for coil in ("serial_mode", "servo_on"):
-            if self._registers.text(coil) != "on":
-                self._registers.set(coil, "on")
+        self._switch_on()
 
     def order(self, target: float) -> None:
         """Writes the step data, which start no move, and reads them back; then writes the start register."""

@@ -1,20 +1,20 @@
 """Vibration controllers that a host selects, starts and reads over lines of text, with the recording in a result file."""
 
 from collections.abc import Sequence
-from typing import ClassVar
 
 import numpy as np
 
 from schemas.errors import OperatorNeeded, StationTimeout
-from stations.devices.equipment import RecordingEquipment
-from stations.devices.exciter_limits import (
+from stations.devices.equipment import (
     FLAT_SHARE_OF_SINE,
+    Recording,
+    RecordingEquipment,
+    RecordingSpoilt,
     refuse_clipped_random,
     refuse_flat,
     refuse_motion,
     refuse_random_motion,
 )
-from stations.devices.recording import Recording, RecordingSpoilt
 
 POLL_S = 0.5
 GRACE_S = 30.0
@@ -24,7 +24,7 @@ LEVEL_SHARE = 0.3  # by which the level that was reached may depart from the ord
 class VibrationController(RecordingEquipment):
     """Runs its own closed loop; the host orders finite tests, so that an exciter that is left alone stops by itself."""
 
-    needs: ClassVar[tuple[str, ...]] = (
+    needs = (
         "frequency", "level", "duration", "axis", "turn", "start", "stop", "state", "reason", "file",
     )  # fmt: skip
 

@@ -1,14 +1,12 @@
 """Watlow F4."""
 
-from typing import ClassVar
-
 from stations.devices.chamber import AUTOMATIC, CELSIUS, RUNNING, ThermalChamber, refuse_program
 
 
 class F4Chamber(ThermalChamber):
     """Watlow F4: integers with the decimals set in the controller; a static set point or a program."""
 
-    needs: ClassVar[tuple[str, ...]] = (
+    needs = (
         "temperature", "set_point", "set_point_low", "set_point_high", "decimals", "status", "temperature_unit", "program_end",
     )  # fmt: skip
 

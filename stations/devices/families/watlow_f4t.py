@@ -1,7 +1,5 @@
 """Watlow F4T."""
 
-from typing import ClassVar
-
 from schemas.errors import OperatorNeeded
 from stations.devices.chamber import CELSIUS, RUNNING, ThermalChamber, refuse_program
 
@@ -9,7 +7,7 @@ from stations.devices.chamber import CELSIUS, RUNNING, ThermalChamber, refuse_pr
 class F4TChamber(ThermalChamber):
     """Watlow F4T: 32-bit floats, a loop mode, programs, alarms."""
 
-    needs: ClassVar[tuple[str, ...]] = (
+    needs = (
         "temperature", "set_point", "set_point_low", "set_point_high", "mode", "actual_mode", "alarm_1", "temperature_unit",
         "program_state", "program_end",
     )  # fmt: skip

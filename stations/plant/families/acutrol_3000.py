@@ -5,9 +5,10 @@ import math
 import numpy as np
 
 from schemas.profile import Profile
-from stations.plant.bench import STANDARD_G, Bench, Waveforms
+from schemas.units import STANDARD_GRAVITY_M_S2
+from stations.plant.bench import Bench, Waveforms
+from stations.plant.controller import ResultFiles
 from stations.plant.device import stream
-from stations.plant.result_files import ResultFiles
 from stations.plant.world import World
 
 UNKNOWN, WRONG = "NA:CMD ERR", "NA:PARA ERR"
@@ -128,7 +129,7 @@ class Centrifuge:
         rig, omega = bench.rig, math.radians(self._to)
         arm = (self._radius + radius_error(bench, self._radius)) * (1.0 + rig.arm_stretch * omega**2)
         offsets = np.array([unit.mass_offset_m for unit in bench.units])
-        force = self._direction * (arm + self._direction * offsets) * omega**2 / STANDARD_G
+        force = self._direction * (arm + self._direction * offsets) * omega**2 / STANDARD_GRAVITY_M_S2
         wobble = bench.stream_at(self._start_us, 10).standard_normal()
         force = force * (1.0 + 2e-6 * float(wobble))
         outputs = bench.steady(force, 2, self._seconds, RECORD_HZ, self._start_us)

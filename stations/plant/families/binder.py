@@ -2,7 +2,7 @@
 
 from schemas.profile import Profile
 from stations.codec import Value
-from stations.plant.bank import Bank, Source
+from stations.plant.bank import Bank, Source, store, stored
 from stations.plant.controller import controller_bank, set_by
 from stations.plant.world import World
 
@@ -16,14 +16,11 @@ def simulated(world: World, profile: Profile) -> Bank:
     act = set_by(chamber, "set_point_manual")
 
     def command(values: dict[str, Value]) -> None:
-        written.update({name: value for name, value in values.items() if name in written})
+        store(written, values)
         act(values)
 
-    def own(name: str) -> Source:
-        return lambda: written[name]
-
     sources: dict[str, Source] = {
-        **{name: own(name) for name in written},
+        **stored(written),
         "mode": lambda: "manual",
         "door": lambda: int(chamber.door_open),
         "operation_lines": lambda: 0,

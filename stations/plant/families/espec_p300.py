@@ -10,11 +10,6 @@ MODES = {"CONSTANT": True, "STANDBY": False, "OFF": False}
 UNKNOWN, OUTSIDE, WRONG = "NA:CMD ERR", "NA:DATA OUT OF RANGE", "NA:PARA ERR"
 
 
-def simulated(world: World, profile: Profile) -> "P300":
-    """A P300 that controls the simulated chamber."""
-    return P300(world, profile)
-
-
 class P300:
     """The controller of the simulated chamber; it starts in constant operation."""
 
@@ -60,3 +55,6 @@ class P300:
         self._mode = mode
         self._world.fixture.chamber.running = MODES[mode]
         return f"OK:{line}", True
+
+
+simulated = P300

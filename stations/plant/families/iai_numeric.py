@@ -1,10 +1,8 @@
 """The simulated IAI ROBO Cylinder controller."""
 
-from collections.abc import Callable
-
 from schemas.profile import Profile
 from stations.codec import Value
-from stations.plant.bank import Bank, Busy
+from stations.plant.bank import Bank, Busy, Source, bits_of, store, stored
 from stations.plant.controller import start_move
 from stations.plant.table import Axis
 from stations.plant.world import World
@@ -12,7 +10,6 @@ from stations.plant.world import World
 
 def simulated(world: World, axis: Axis, profile: Profile) -> Bank:
     """IAI ROBO Cylinder: a write of the target starts the move, with the band, speed and acceleration written before."""
-    status_bits, more_bits = profile.register("status").bits, profile.register("extended_status").bits
     settings: dict[str, Value] = {"position_band": 0.1, "speed": 10.0, "acceleration": 9.80665}
     coils: dict[str, Value] = dict.fromkeys(("servo_on", "alarm_reset", "pause", "home", "serial_mode"), 0)
 
@@ -20,15 +17,15 @@ def simulated(world: World, axis: Axis, profile: Profile) -> Bank:
         flags = {"ready": True, "servo_on": coils["servo_on"] == 1, "paused": coils["pause"] == 1}
         flags |= {"home_end": axis.homed, "in_position": axis.in_position(world.now)}
         flags["emergency_stop"] = world.emergency_stop
-        return sum(1 << status_bits[flag] for flag, up in flags.items() if up)
+        return bits_of(profile.register("status"), flags)
 
     def more() -> Value:
         flags = {"serial_mode": coils["serial_mode"] == 1, "move": axis.moving(world.now)}
-        return sum(1 << more_bits[flag] for flag, up in flags.items() if up)
+        return bits_of(profile.register("extended_status"), flags)
 
     def command(values: dict[str, Value]) -> None:
-        settings.update({name: value for name, value in values.items() if name in settings})
-        coils.update({name: value for name, value in values.items() if name in coils})
+        store(settings, values)
+        store(coils, values)
         if values.get("alarm_reset") == 1 and coils["pause"] == 1:
             axis.halt(world.now)
         if "target" not in values:
@@ -37,12 +34,9 @@ def simulated(world: World, axis: Axis, profile: Profile) -> Bank:
             raise Busy(profile.name)
         start_move(world, axis, profile, {**settings, "target": values["target"]})
 
-    def own(values: dict[str, Value], name: str) -> Callable[[], Value]:
-        return lambda: values[name]
-
-    sources: dict[str, Callable[[], Value]] = {
-        **{name: own(settings, name) for name in settings},
-        **{name: own(coils, name) for name in coils},
+    sources: dict[str, Source] = {
+        **stored(settings),
+        **stored(coils),
         "feedback_position": lambda: axis.encoder(world.now),
         **{name: lambda: 0 for name in ("alarm", "inputs", "outputs")},
         "status": status,

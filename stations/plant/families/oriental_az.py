@@ -2,7 +2,7 @@
 
 from schemas.profile import Profile
 from stations.codec import NotEncodable, Value
-from stations.plant.bank import Bank, number
+from stations.plant.bank import Bank, bits_of, number
 from stations.plant.controller import ABSOLUTE, start_move
 from stations.plant.table import Axis
 from stations.plant.world import World
@@ -10,7 +10,6 @@ from stations.plant.world import World
 
 def simulated(world: World, axis: Axis, profile: Profile) -> Bank:
     """Oriental Motor AZ: the trigger in the direct data starts the move; the STOP input ends it."""
-    bits = profile.register("status").bits
     stop = 1 << profile.register("command").bits["stop"]
     level = {"command": 0}
 
@@ -18,7 +17,7 @@ def simulated(world: World, axis: Axis, profile: Profile) -> Bank:
         moving = axis.moving(world.now)
         flags = {"home_end": axis.homed, "ready": not moving, "busy": moving, "move": moving}
         flags["in_position"] = axis.in_position(world.now)
-        return sum(1 << bits[flag] for flag, up in flags.items() if up)
+        return bits_of(profile.register("status"), flags)
 
     def command(values: dict[str, Value]) -> None:
         if "command" in values:

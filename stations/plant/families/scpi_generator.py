@@ -4,15 +4,12 @@ import math
 
 from schemas.profile import Profile
 from stations.plant.bench import Waveforms
-from stations.plant.result_files import ResultFiles
-from stations.plant.scpi import DONE, UNDEFINED, ScpiDevice
+from stations.plant.controller import DONE, UNDEFINED, ResultFiles, ScpiDevice, exciter_reach
 from stations.plant.world import World
 
 SETTLE_S = 0.3
 MOST_V = 10.0
 GAIN_G_V, SUSPENSION_HZ, SUSPENSION_DAMPING = 10.0, 12.0, 0.4
-STROKE_M, VELOCITY_M_S, ACCELERATION_G = 0.0127, 1.5, 50.0
-STANDARD_G = 9.80665
 NUMBERS = {
     "SOUR1:FREQ": (1e-3, 2e4),
     "SOUR1:VOLT": (0.0, MOST_V),
@@ -76,7 +73,8 @@ class Generator(ScpiDevice):
             return ("FAULT" if self._fault else "RUN" if world.now_us < self._until_us else "DONE"), False
         if head == "ACQ:FILE":
             done = self._there and world.now_us >= self._until_us
-            return (self._files.write(self._number, self._recorded, world.slots, self._unit) if done else "NONE"), False
+            unit = "V" if self._steps else "g"
+            return (self._files.write(self._number, self._recorded, world.slots, unit) if done else "NONE"), False
         texts = {
             "SOUR1:FUNC": self._function,
             "OUTP1": str(int(self._on)),
@@ -84,18 +82,13 @@ class Generator(ScpiDevice):
         }
         return texts.get(head, ""), False
 
-    @property
-    def _unit(self) -> str:
-        return "V" if self._steps else "g"
-
     def _level(self) -> float:
         return exciter_gain(self._set["SOUR1:FREQ"]) * self._set["SOUR1:VOLT"]
 
     def _begin(self) -> None:
-        world, w = self._world, 2.0 * math.pi * self._set["SOUR1:FREQ"]
-        conditions = world.bench.conditions
-        reach = min(STROKE_M * w**2 / STANDARD_G, VELOCITY_M_S * w / STANDARD_G, ACCELERATION_G)
-        self._fault = "controller_abort" in conditions or (not self._steps and self._level() > reach)
+        world, conditions = self._world, self._world.bench.conditions
+        too_far = not self._steps and self._level() > exciter_reach(self._set["SOUR1:FREQ"])
+        self._fault = "controller_abort" in conditions or too_far
         self._there = False
         if self._fault:
             return

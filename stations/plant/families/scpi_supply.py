@@ -1,15 +1,10 @@
 """The simulated programmable power supply of the devices."""
 
 from schemas.profile import Profile
-from stations.plant.scpi import DONE, UNDEFINED, ScpiDevice
+from stations.plant.controller import DONE, UNDEFINED, ScpiDevice
 from stations.plant.world import World
 
 DROP = 0.9  # of the set voltage, where the current limit holds it
-
-
-def simulated(world: World, profile: Profile) -> "Supply":
-    """A supply of all devices of the world."""
-    return Supply(world, profile)
 
 
 class Supply(ScpiDevice):
@@ -44,13 +39,13 @@ class Supply(ScpiDevice):
             self._set = self._nominal
         elif line != "*OPC?":
             self.error = UNDEFINED
-        self._apply()
+        world = self._world
+        world.scale_supply(range(len(world.slots)), self._voltage() / self._nominal)
         return DONE, line != "*OPC?"
 
     def _voltage(self) -> float:
         limited = "current_limit" in self._world.bench.conditions and self._set > self._nominal
         return (DROP if limited else 1.0) * self._set if self._on else 0.0
 
-    def _apply(self) -> None:
-        world = self._world
-        world.scale_supply(range(len(world.slots)), self._voltage() / self._nominal)
+
+simulated = Supply

@@ -1,10 +1,8 @@
 """The simulated SMC LEC controller."""
 
-from collections.abc import Callable
-
 from schemas.profile import Profile
 from stations.codec import NotEncodable, Value
-from stations.plant.bank import Bank
+from stations.plant.bank import Bank, Source, store, stored
 from stations.plant.controller import ABSOLUTE, start_move
 from stations.plant.table import Axis
 from stations.plant.world import World
@@ -18,7 +16,7 @@ def simulated(world: World, axis: Axis, profile: Profile) -> Bank:
     registers: dict[str, Value] = dict.fromkeys(names, 0)
 
     def command(values: dict[str, Value]) -> None:
-        registers.update({name: value for name, value in values.items() if name in registers})
+        store(registers, values)
         if values.get("reset") == 1:
             axis.halt(world.now)
         ready = registers["serial_mode"] == 1 and registers["servo_on"] == 1 and axis.homed
@@ -28,11 +26,8 @@ def simulated(world: World, axis: Axis, profile: Profile) -> Bank:
             raise NotEncodable("step data: only absolute moves are simulated")
         start_move(world, axis, profile, registers)
 
-    def own(name: str) -> Callable[[], Value]:
-        return lambda: registers[name]
-
-    sources: dict[str, Callable[[], Value]] = {
-        **{name: own(name) for name in names},
+    sources: dict[str, Source] = {
+        **stored(registers),
         "step_inputs": lambda: [0.0] * 6,
         "busy": lambda: int(axis.moving(world.now)),
         "servo_ready": lambda: registers["servo_on"],

@@ -6,12 +6,10 @@ from numpy.typing import NDArray
 from schemas.profile import Profile
 from schemas.vibration_profile import load_vibration_profile
 from stations.plant.bench import Waveforms
-from stations.plant.result_files import ResultFiles
+from stations.plant.controller import ResultFiles, exciter_reach
 from stations.plant.world import World
 
 UNKNOWN, WRONG, BUSY = "NA:CMD ERR", "NA:PARA ERR", "NA:BUSY"
-STROKE_M, VELOCITY_M_S, ACCELERATION_G = 0.0127, 1.5, 50.0
-STANDARD_G = 9.80665
 SETTLE_S = 0.5
 RANDOM_FINE_HZ, RANDOM_HZ = 25600.0, 12800.0
 
@@ -19,11 +17,6 @@ RANDOM_FINE_HZ, RANDOM_HZ = 25600.0, 12800.0
 Array = NDArray[np.float64]
 REST_S = 1.0
 RAMP_S = 0.05
-
-
-def simulated(world: World, profile: Profile) -> "Controller":
-    """A controller in front of the world's bench."""
-    return Controller(world, profile)
 
 
 class Controller:
@@ -41,9 +34,11 @@ class Controller:
         """The answer to a line, and whether the line changed anything."""
         head, _, value = line.partition(" ")
         if line == "STAT?":
-            return self._state(), False
+            state = "RUN,-" if self._world.now_us < self._until_us else "DONE,-"
+            return (f"ABORT,{self._aborted}" if self._aborted else state), False
         if line == "FILE?":
-            return self._file(), False
+            done = self._kind and self._number and self._world.now_us >= self._until_us
+            return (self._files.write(self._number, self._recorded, self._world.slots) if done else "NONE"), False
         if head in self._set:
             return self._change(head, value)
         if head == "PROFILE":
@@ -72,12 +67,10 @@ class Controller:
         world, conditions = self._world, self._world.bench.conditions
         if world.now_us < self._until_us:
             return BUSY, False
-        w = 2.0 * np.pi * self._set["FREQ"]
-        reach = min(STROKE_M * w**2 / STANDARD_G, VELOCITY_M_S * w / STANDARD_G, ACCELERATION_G)
         self._aborted = ""
         if "controller_abort" in conditions:
             self._aborted = "interlock open"
-        elif kind in {"SINE", "ACROSS"} and self._set["LEVEL"] > 1.001 * reach:
+        elif kind in {"SINE", "ACROSS"} and self._set["LEVEL"] > 1.001 * exciter_reach(self._set["FREQ"]):
             self._aborted = "limit of stroke velocity or acceleration"
         if self._aborted:
             return "OK", True
@@ -89,29 +82,18 @@ class Controller:
             self._number += 1
         return "OK", True
 
-    def _state(self) -> str:
-        if self._aborted:
-            return f"ABORT,{self._aborted}"
-        return "RUN,-" if self._world.now_us < self._until_us else "DONE,-"
-
-    def _file(self) -> str:
-        if not self._kind or self._number == 0 or self._world.now_us < self._until_us:
-            return "NONE"
-        return self._files.write(self._number, self._recorded, self._world.slots)
-
     def _recorded(self) -> Waveforms:
         bench, axis, seconds = self._world.bench, int(self._set["AXIS"]), self._set["DUR"]
         tick = self._start_us
         if self._kind in {"SINE", "ACROSS"}:
             angle = self._set["TURN"] if self._kind == "ACROSS" else None
             return bench.sine(self._set["FREQ"], self._set["LEVEL"], axis, seconds, tick, self._conditions, angle)
-        return bench.transient(self._random(seconds, tick), axis, tick, RANDOM_FINE_HZ, RANDOM_HZ, self._conditions)
+        level = (0.3 if "level_not_reached" in self._conditions else 1.0) * self._set["LEVEL"]
+        force = random_force(self._density, level, seconds, RANDOM_FINE_HZ, bench.stream_at(tick, 6))
+        return bench.transient(force, axis, tick, RANDOM_FINE_HZ, RANDOM_HZ, self._conditions)
 
-    def _random(self, seconds: float, tick: int) -> np.ndarray:
-        """Gaussian vibration along the axis at the fine rate, at rest at both ends."""
-        rng = self._world.bench.stream_at(tick, 6)
-        share = 0.3 if "level_not_reached" in self._conditions else 1.0
-        return random_force(self._density, share * self._set["LEVEL"], seconds, RANDOM_FINE_HZ, rng)
+
+simulated = Controller
 
 
 def random_force(profile: str, level_g: float, seconds: float, rate_hz: float, rng: np.random.Generator) -> Array:

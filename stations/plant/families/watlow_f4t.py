@@ -2,7 +2,7 @@
 
 from schemas.profile import Profile
 from stations.codec import NotEncodable, Value, named
-from stations.plant.bank import Bank, Source, number
+from stations.plant.bank import Bank, Source, number, store, stored
 from stations.plant.controller import controller_bank
 from stations.plant.world import World
 
@@ -25,7 +25,7 @@ def simulated(world: World, profile: Profile) -> Bank:
             chamber.set_point = number(values, "set_point")
         if "ramp_rate" in values:
             chamber.ramp_K_min = number(values, "ramp_rate")
-        kept.update({name: value for name, value in values.items() if name in kept})
+        store(kept, values)
 
     def mode() -> Value:
         return "automatic" if chamber.running else "off"
@@ -36,8 +36,7 @@ def simulated(world: World, profile: Profile) -> Bank:
         "mode": mode,
         "actual_mode": mode,
         "manual_power": lambda: 0.0,
-        "ramp_action": lambda: kept["ramp_action"],
-        "ramp_scale": lambda: kept["ramp_scale"],
+        **stored(kept),
         "program_state": lambda: "off",
         **{f"event_{n}": lambda: "off" for n in range(1, 5)},
         **{name: lambda: 0 for name in ("program_number", "program_step", "current_program", "current_step")},

@@ -1,55 +1,26 @@
 """Faults of the memory of a unit."""
 
-from dataclasses import dataclass
-from typing import ClassVar
-
-from stations.plant.faults.base import UNIT, Fault
+from stations.plant.faults.base import UNIT, Effect, Fault, fault
 from stations.plant.world import World
 
 
-@dataclass
-class BadBlock(Fault):
+@fault(UNIT)
+def memory_bad_block(fault: Fault, world: World, copy: float = 0.0, word: float = 40.0) -> Effect:
     """A word of a unit's memory no longer keeps some bits: word ``word`` of copy A (``copy`` 0) or B (1)."""
-
-    kind: ClassVar[str] = "memory_bad_block"
-    targets: ClassVar[tuple[str, ...]] = (UNIT,)
-
-    copy: float = 0.0
-    word: float = 40.0
-
-    def begins(self, world: World) -> None:
-        """Bits stay cleared."""
-        world.flash[self.unit].stuck[int(self.copy), int(self.word)] = 0xFF00
-
-    def ends(self, world: World) -> None:
-        """The bits work again."""
-        world.flash[self.unit].stuck.clear()
+    stuck = world.flash[fault.unit].stuck
+    stuck[int(copy), int(word)] = 0xFF00
+    yield
+    stuck.clear()
 
 
-@dataclass
-class PowerLostWhileWriting(Fault):
+@fault(UNIT)
+def memory_power_lost(fault: Fault, world: World, after_s: float = 0.45) -> None:
     """The supply of the devices fails for a second, ``after_s`` after the next command to program the unit's memory."""
-
-    kind: ClassVar[str] = "memory_power_lost"
-    targets: ClassVar[tuple[str, ...]] = (UNIT,)
-
-    after_s: float = 0.45
-
-    def begins(self, world: World) -> None:
-        """Waits for the command."""
-        world.flash[self.unit].lose_power_s = self.after_s
+    world.flash[fault.unit].lose_power_s = after_s
 
 
-@dataclass
-class WornOut(Fault):
+@fault(UNIT)
+def memory_worn(fault: Fault, world: World, left: float = 0.0) -> None:
     """The memory of a unit has ``left`` of its specified erasures left."""
-
-    kind: ClassVar[str] = "memory_worn"
-    targets: ClassVar[tuple[str, ...]] = (UNIT,)
-
-    left: float = 0.0
-
-    def begins(self, world: World) -> None:
-        """Counts erasures up."""
-        flash = world.flash[self.unit]
-        flash.erases = [flash.endurance - int(self.left)] * 2
+    flash = world.flash[fault.unit]
+    flash.erases = [flash.endurance - int(left)] * 2

@@ -3,27 +3,44 @@
 from collections import Counter
 from collections.abc import Generator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
-from typing import ClassVar
 
-import numpy as np
-
-from stations.plant.faults.base import DEVICES, UNIT, Fault
+from stations.plant.faults.base import Fault, Kind, add
 from stations.plant.faults.proxy import ActionKind, ChaosProxy, Script, Way, WireAction
 from stations.plant.world import World
 
 
-@dataclass
-class WireFault(Fault):
-    """A fault of the next ``frames`` answers of the station, whichever device sends them; ``action`` is what happens to each."""
+def _on_answers(name: str, action: ActionKind, meaning: str, **figures: float) -> Kind:
+    """A fault of the next ``frames`` answers of the station, whichever device sends them."""
+    return Kind(name, meaning, figures={"frames": 1.0, **figures}, action=action)
 
-    action: ClassVar[ActionKind]
 
-    frames: float = 1.0
-
-    def wire_action(self) -> WireAction:
-        """What happens to an answer; a kind with figures adds them."""
-        return WireAction(self.action)
+add(
+    _on_answers(
+        "byte_garbage",
+        "garble",
+        "Some bytes of an answer change in transit; Modbus TCP has no checksum of its own.",
+        size=2.0,
+    ),
+    _on_answers(
+        "delay", "delay", "An answer, and all that follow it, are delayed by ``delay_s`` of wall time.", delay_s=0.2
+    ),
+    _on_answers(
+        "half_open",
+        "half_open",
+        "The connection stays open and passes nothing: the device lost its power and could not close it.",
+    ),
+    _on_answers(
+        "late_reply", "late", "An answer arrives late, in front of the next one, with its own older transaction id."
+    ),
+    _on_answers("other_transaction", "retag", "An answer arrives with a transaction id that no request had."),
+    _on_answers(
+        "reset", "reset", "The connection is reset in place of an answer: a switch restarts, a cable is moved."
+    ),
+    _on_answers(
+        "time_out", "drop", "The answer to a request is lost: the device has acted, and the client cannot know it."
+    ),
+    _on_answers("truncated", "truncate", "An answer ends too early, and the connection is closed.", size=3.0),
+)
 
 
 @contextmanager
@@ -43,15 +60,14 @@ def script_of(world: World, faults: Sequence[Fault]) -> Script | None:
     Faults that began before a resumed world's time are over: their frames were sent in the earlier session.
     """
     begun = world.now
-    wires = [f for f in faults if isinstance(f, WireFault) and (f.order.at_s > begun or begun == 0.0)]
+    wires = [(f, _action(f.kind.action, f)) for f in faults if f.kind.action and (f.order.at_s > begun or begun == 0.0)]
     if not wires:
         return None
     spent: Counter[int] = Counter()
 
     def script(way: Way, _frame: bytes) -> WireAction | None:
-        for number, wire in enumerate(wires):
-            action = wire.wire_action()
-            due = wire.order.at_s <= world.now < wire.order.until_s and spent[number] < wire.frames
+        for number, (fault, action) in enumerate(wires):
+            due = fault.order.at_s <= world.now < fault.order.until_s and spent[number] < fault.figures["frames"]
             if due and action.way == way:
                 spent[number] += 1
                 return action
@@ -60,109 +76,5 @@ def script_of(world: World, faults: Sequence[Fault]) -> Script | None:
     return script
 
 
-@dataclass
-class ByteGarbage(WireFault):
-    """Some bytes of an answer change in transit; Modbus TCP has no checksum of its own."""
-
-    kind: ClassVar[str] = "byte_garbage"
-    action: ClassVar[ActionKind] = "garble"
-
-    size: float = 2.0
-
-    def wire_action(self) -> WireAction:
-        """Its action with its figure."""
-        return WireAction(self.action, size=int(self.size))
-
-
-@dataclass
-class Delay(WireFault):
-    """An answer, and all that follow it, are delayed by ``delay_s`` of wall time."""
-
-    kind: ClassVar[str] = "delay"
-    action: ClassVar[ActionKind] = "delay"
-
-    delay_s: float = 0.2
-
-    def wire_action(self) -> WireAction:
-        """Its action with its figure."""
-        return WireAction(self.action, delay_s=self.delay_s)
-
-
-@dataclass
-class Garbage(Fault):
-    """A device reports random words in valid frames: its memory is corrupt and its interface works."""
-
-    kind: ClassVar[str] = "garbage"
-    targets: ClassVar[tuple[str, ...]] = (UNIT, *DEVICES)
-
-    def on_read(self, now_us: int, address: int, words: list[int]) -> list[int]:
-        """Random words, seeded by time, address and device."""
-        rng = np.random.default_rng([now_us, address, self.device_id])
-        return rng.integers(0, 65536, len(words)).tolist()
-
-
-@dataclass
-class HalfOpen(WireFault):
-    """The connection stays open and passes nothing: the device lost its power and could not close it."""
-
-    kind: ClassVar[str] = "half_open"
-    action: ClassVar[ActionKind] = "half_open"
-
-
-@dataclass
-class LateReply(WireFault):
-    """An answer arrives late, in front of the next one, with its own older transaction id."""
-
-    kind: ClassVar[str] = "late_reply"
-    action: ClassVar[ActionKind] = "late"
-
-
-@dataclass
-class OtherTransaction(WireFault):
-    """An answer arrives with a transaction id that no request had."""
-
-    kind: ClassVar[str] = "other_transaction"
-    action: ClassVar[ActionKind] = "retag"
-
-
-@dataclass
-class Reset(WireFault):
-    """The connection is reset in place of an answer: a switch restarts, a cable is moved."""
-
-    kind: ClassVar[str] = "reset"
-    action: ClassVar[ActionKind] = "reset"
-
-
-@dataclass
-class SwappedWords(Fault):
-    """A device reports 32-bit numbers with their words exchanged: its word order was changed."""
-
-    kind: ClassVar[str] = "swapped_words"
-    targets: ClassVar[tuple[str, ...]] = (UNIT, *DEVICES)
-
-    def on_read(self, now_us: int, address: int, words: list[int]) -> list[int]:
-        """Exchanges the words of each pair."""
-        even = len(words) // 2 * 2
-        return [word for i in range(0, even, 2) for word in (words[i + 1], words[i])] + words[even:]
-
-
-@dataclass
-class TimeOut(WireFault):
-    """The answer to a request is lost: the device has acted, and the client cannot know it."""
-
-    kind: ClassVar[str] = "time_out"
-    action: ClassVar[ActionKind] = "drop"
-
-
-@dataclass
-class Truncated(WireFault):
-    """An answer ends too early, and the connection is closed."""
-
-    kind: ClassVar[str] = "truncated"
-    action: ClassVar[ActionKind] = "truncate"
-
-    size: float = 3.0
-
-    def wire_action(self) -> WireAction:
-        """Its action with its figure."""
-        return WireAction(self.action, size=int(self.size))
+def _action(kind: ActionKind, fault: Fault) -> WireAction:
+    return WireAction(kind, delay_s=fault.figures.get("delay_s", 0.0), size=int(fault.figures.get("size", 1.0)))

@@ -8,37 +8,25 @@ from collections.abc import Mapping
 from dataclasses import fields
 
 from schemas.errors import RecipeInvalid, did_you_mean
+from stations.plant.hidden import device, table
 from stations.plant.hidden.base import Block, HiddenEffect
-from stations.plant.hidden.device import (
-    Creep,
-    CubicTransfer,
-    ElementLag,
-    HysteresisPlay,
-    MoistureSwelling,
-    PendulousMass,
-    StepChange,
-    StressRelaxation,
-    VibrationRectification,
-    WarmUp,
-)
-from stations.plant.hidden.table import EncoderHarmonic, LevelError, SlotRotation
 
 __all__ = ["HIDDEN", "Block", "HiddenEffect", "hidden_effect"]
 
 HIDDEN: Mapping[str, type[HiddenEffect]] = {
-    "cubic_transfer": CubicTransfer,
-    "pendulous_mass": PendulousMass,
-    "hysteresis_play": HysteresisPlay,
-    "element_lag": ElementLag,
-    "creep": Creep,
-    "level_error": LevelError,
-    "encoder_harmonic": EncoderHarmonic,
-    "slot_rotation": SlotRotation,
-    "vibration_rectification": VibrationRectification,
-    "warm_up": WarmUp,
-    "moisture_swelling": MoistureSwelling,
-    "stress_relaxation": StressRelaxation,
-    "step_change": StepChange,
+    "cubic_transfer": device.CubicTransfer,
+    "pendulous_mass": device.PendulousMass,
+    "hysteresis_play": device.HysteresisPlay,
+    "element_lag": device.ElementLag,
+    "creep": device.Creep,
+    "level_error": table.LevelError,
+    "encoder_harmonic": table.EncoderHarmonic,
+    "slot_rotation": table.SlotRotation,
+    "vibration_rectification": device.VibrationRectification,
+    "warm_up": device.WarmUp,
+    "moisture_swelling": device.MoistureSwelling,
+    "stress_relaxation": device.StressRelaxation,
+    "step_change": device.StepChange,
 }
 
 

@@ -128,9 +128,7 @@ class WarmUp(HiddenEffect):
 
     size: float = 500e-6  # g, bias of a cold device minus that of a warm one
     tau: float = 900.0  # s
-    _cold: float = field(
-        default=1.0, init=False
-    )  # missing fraction of the self-heating at the last switching of the supply
+    _cold: float = field(default=1.0, init=False)  # missing fraction of the self-heating when the supply was switched
     _switched: float = field(default=0.0, init=False)
 
     def power(self, now: float, *, on: bool) -> None:

@@ -27,9 +27,9 @@ from schemas.decisions import decide
 from schemas.errors import DataRejected, RecipeInvalid
 from schemas.key_list import keys_of
 from schemas.limits import parse_limits
-from schemas.reasons import PATTERNS
 from schemas.recipe import FaultOrder
 from schemas.station import StationConfig, load_station
+from schemas.toml_files import PATTERNS
 from stations.plant.faults.catalogue import build_fault
 
 

@@ -33,7 +33,7 @@ from pipelines.doctor.archive import archive_checks, key_checks
 from pipelines.doctor.check import PROBE_BYTES, Check, clock_check, offset
 from pipelines.doctor.examine import host_checks, station_checks
 from pipelines.doctor.orchestrator import orchestrator_checks
-from stations.safety.lease_parts import addresses
+from stations.safety.lease_files import addresses
 from stations.safety.leases import Leases, new_holder
 
 NOBODY = 65534

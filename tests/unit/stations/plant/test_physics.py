@@ -8,8 +8,7 @@ from inertial.frames import force_from_angles
 from schemas.errors import RecipeInvalid, WrongUse
 from schemas.lot import Lot, Unit
 from stations.codec import unpack_samples
-from stations.plant.chamber import Chamber
-from stations.plant.fixture import Moisture
+from stations.plant.fixture import Chamber, Moisture
 from stations.plant.hidden import HIDDEN, hidden_effect
 from stations.plant.preset import load_preset
 from stations.plant.table import Axis, Move, turn

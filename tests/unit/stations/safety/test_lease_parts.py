@@ -8,7 +8,7 @@ from unittest.mock import Mock
 import pytest
 
 from schemas.station_devices import Device
-from stations.safety.lease_parts import address_of
+from stations.safety.lease_files import address_of
 
 
 def at(**where: object) -> str:
