@@ -9,9 +9,9 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inertial import design
+from inertial.arrays import Array, Flags, Index
 from inertial.correction import correct
 from inertial.design import Values
 from inertial.errors import NotIdentified
@@ -19,8 +19,6 @@ from inertial.fits.descent import descended
 from inertial.fits.linear import LotFit, force_along_axes, response_matrix
 from inertial.fits.norm_noise import PlausibleNoise, SolvedNorms
 from inertial.state import State
-
-Array = NDArray[np.float64]
 
 _SETTLED = 1e-10  # share of the cost that a step no longer takes off
 _SINGULAR = 1e-6  # smallest singular value of the whitened columns of unit length, over the largest
@@ -43,10 +41,10 @@ class NormFit:
     force: Array
     left: Array
     rows: Array
-    free: NDArray[np.bool_]
+    free: Flags
     covariance: Array
     record: Array | None
-    dof: NDArray[np.int64]
+    dof: Index
     nonlinear_error: dict[str, dict[str, float]]
 
 

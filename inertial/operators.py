@@ -1,9 +1,9 @@
 """Operators with memory: a lag, a play, a relaxation. Each runs along the last axis, which is time."""
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from inertial.arrays import Array
 
 _MANY = 64
 """Signals above which a play is faster point by point."""

@@ -6,11 +6,9 @@ from functools import cached_property
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array, Places
 from inertial.errors import MissingInput
-
-Array = NDArray[np.float64]
 
 _DIMENSIONS = {"force": 3, "felt": 3, "output_run": 3, "slot": 1}
 """Number of dimensions of the arrays of a lot of units; two for all others."""
@@ -153,7 +151,7 @@ class State:
 
         return self.remember(key, run)
 
-    def pick(self, index: slice | NDArray[np.intp]) -> Self:
+    def pick(self, index: slice | Places) -> Self:
         """The units at ``index`` along the first batch dimension."""
         changed: dict[str, object] = {}
         for item in fields(self):

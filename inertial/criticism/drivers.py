@@ -7,8 +7,8 @@ from itertools import combinations_with_replacement
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.design import of_axes
 from inertial.effects.base import AXES
 from inertial.estimation.candidate import Candidate
@@ -17,8 +17,6 @@ from inertial.estimation.problem import Problem
 from inertial.estimation.space import Space
 from inertial.quantities import attribute_drivers, is_clock
 from inertial.state import ALL_AXES, State
-
-Array = NDArray[np.float64]
 
 _KNOTS = 5
 _TIME_KNOTS = 8

@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inertial import effects as catalogue
+from inertial.arrays import Array
 from inertial.counts import degrees_of_freedom, number_of
 from inertial.criticism.field import Candidates
 from inertial.distributions import f_upper, noncentral_f_tail
@@ -13,8 +13,6 @@ from inertial.estimation.bases import SEEN
 from inertial.estimation.model import Model
 from inertial.estimation.term import Term
 from inertial.roots import root
-
-Array = NDArray[np.float64]
 
 FEWEST_DOF = 9
 """Degrees of freedom needed for a verdict if the noise is known from the residuals only: 18 positions of unknown orientation.

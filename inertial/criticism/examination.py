@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inertial import effects as catalogue
+from inertial.arrays import Array, Places
 from inertial.criticism.bad_or_effect import bad_beside_effects, candidates_of
 from inertial.criticism.classes import EffectClass, class_of
 from inertial.criticism.field import Candidates
@@ -28,8 +28,6 @@ from inertial.estimation.penalty import cost_of_model
 from inertial.estimation.problem import Lot, Problem
 from inertial.estimation.refinement import better_placed, replaced, terms_of
 from inertial.estimation.term import Term, with_turn_on
-
-Array = NDArray[np.float64]
 
 _MENDED = 6  # largest number of handling errors reported for one run
 _TURNS = 3  # searches after which single dwells are not tested again
@@ -81,7 +79,7 @@ class ExaminedRun:
     removed: list[BadDwell] = field(default_factory=list[BadDwell])
     barred: set[str] = field(default_factory=set[str])
     drift: Unexplained | None = None
-    soak: NDArray[np.intp] | None = None
+    soak: Places | None = None
     _made: tuple[list[object], Model] | None = None
 
     def alternatives(self) -> list[Handling]:

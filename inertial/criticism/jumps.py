@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from math import comb, log
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.criticism.field import Candidates, Rival
 from inertial.decisions import CLASS_WIDTH, JUMPS_RARE
 from inertial.estimation.alternative import Handling
@@ -21,8 +21,6 @@ from inertial.estimation.penalty import freedom, price
 from inertial.estimation.space import Space
 from inertial.estimation.term import Term
 from inertial.probability import log_f_tail
-
-Array = NDArray[np.float64]
 
 _AXES = 6
 """Largest number of axes whose jumps take the place of one effect."""

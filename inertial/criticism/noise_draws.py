@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import NDArray
 
+from inertial.arrays import Array, Places
 from inertial.data_errors.tails import heavy
 from inertial.decisions import LEAST_SHARE
 from inertial.estimation.bases import SEEN, eigen
@@ -19,8 +19,6 @@ from inertial.estimation.noise_shares import Noise, Shares
 from inertial.estimation.shares import place_of, shares_at
 from inertial.estimation.space import Space
 from inertial.probability import log_f_tail
-
-Array = NDArray[np.float64]
 
 _PIECE = 150_000
 """Largest number of values worked on at a time."""
@@ -139,7 +137,7 @@ class NoiseDraws:
             self._bases[place] = made
         return self._bases[place]
 
-    def _estimated(self, rows: Array) -> NDArray[np.intp]:
+    def _estimated(self, rows: Array) -> Places:
         """The place of the lattice with the smallest restricted deviance of each draw, (draws,).
 
         Descent from the shares that the draws were made with, by the places about the best of each draw.
@@ -163,7 +161,7 @@ class NoiseDraws:
             done |= wanted
             best = np.argmin(deviances, axis=0)
 
-    def _deviances(self, basis: _Basis, rows: Array, draws: NDArray[np.intp]) -> Array:
+    def _deviances(self, basis: _Basis, rows: Array, draws: Places) -> Array:
         """Restricted deviance of some draws at some shares, (draws,), each block with its own variance."""
         covariance = self.model.problem.covariance
         log_squares = np.zeros(draws.size)
@@ -209,7 +207,7 @@ class Directions:
     """
 
     turn: Array
-    ranks: NDArray[np.intp]
+    ranks: Places
     shared: bool
 
     @staticmethod

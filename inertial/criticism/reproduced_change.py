@@ -9,8 +9,8 @@ them), λ = Σ dᵀV⁻¹e0 / Σ dᵀV⁻¹d: one if the effect is real and has 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.data_errors.bad_dwells import bad_dwells
 from inertial.data_errors.removed_dwells import without
 from inertial.decisions import BLOCKS, CONFIRMED, REFUTED
@@ -20,8 +20,6 @@ from inertial.estimation.model import Model
 from inertial.estimation.problem import Lot, Problem
 from inertial.estimation.space import Space
 from inertial.estimation.term import Term
-
-Array = NDArray[np.float64]
 
 _ENOUGH = 3
 """Fewest units, or stretches of time, whose scatter gives a standard error."""

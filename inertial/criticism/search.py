@@ -4,7 +4,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inertial import decisions
 from inertial.criticism.field import Candidates, Rival
@@ -20,8 +19,6 @@ from inertial.estimation.refinement import refine
 from inertial.estimation.space import Gain, Space
 from inertial.estimation.term import Term
 from inertial.probability import log_chi2_tail
-
-Array = NDArray[np.float64]
 
 _FINALISTS = 5  # finalists at each noise, for which the noise is estimated again
 _AGAIN = 3  # the same for the second examination of an effect

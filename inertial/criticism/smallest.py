@@ -7,8 +7,8 @@ is adequate with such noise is adequate only for effects larger than these sizes
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array, Flags
 from inertial.criticism.field import Candidates
 from inertial.decisions import MATERIAL, NAMED_BELOW
 from inertial.distributions import chi2_upper
@@ -18,8 +18,6 @@ from inertial.estimation.model import Model
 from inertial.estimation.noise_shares import Noise, Shares
 from inertial.estimation.penalty import price
 from inertial.estimation.space import Space
-
-Array = NDArray[np.float64]
 
 _DIGITS = 6
 """Decimals to which ratios of sizes are compared."""
@@ -87,7 +85,7 @@ def _sizes(field: Candidates, model: Model, spaces: tuple[Space, Space], name: s
     return np.concatenate(values, axis=1)
 
 
-def _squares(piece: Candidate, there: NDArray[np.bool_]) -> Array:
+def _squares(piece: Candidate, there: Flags) -> Array:
     """Sums of squares (grid, p) of columns in g over the dwells (blocks, n) that are there."""
     each = piece.columns**2
     if piece.rows is None:

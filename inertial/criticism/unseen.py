@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.criticism.field import Candidates
 from inertial.design import grid_of
 from inertial.effects.base import AnyEffect, SensorEffect
@@ -17,7 +17,6 @@ from inertial.estimation.term import Term
 from inertial.planning.ranges import UnseenRange, unseen_ranges
 from inertial.state import History, State
 
-Array = NDArray[np.float64]
 InPart = tuple[tuple[str, tuple[UnseenRange, ...]], ...]
 
 _SCATTER = 5.0

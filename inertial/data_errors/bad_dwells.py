@@ -5,8 +5,8 @@ chi-square: no further fit is needed. Deletion identifies the dwell; robust weig
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array, Flags, Places
 from inertial.data_errors.bad_norms import bad_norms
 from inertial.data_errors.removed_dwells import BadDwell, model_without
 from inertial.decisions import BAD_DWELL, COMMON, MOST_BAD
@@ -14,8 +14,6 @@ from inertial.distributions import chi2_upper, f_tail
 from inertial.estimation.alternative import poses
 from inertial.estimation.model import Model
 from inertial.estimation.space import Space
-
-Array = NDArray[np.float64]
 
 _ROUNDS = 8
 _ALIKE = 0.6
@@ -91,7 +89,7 @@ class _Deletion:
         self.prior, self.looks = space.noise.prior, max(int(self.there.sum()) // axes, 1)
         self.left_to_poses = np.zeros(self.n, dtype=bool)
 
-    def off_every_time(self, pose: NDArray[np.intp]) -> NDArray[np.bool_]:
+    def off_every_time(self, pose: Places) -> Flags:
         """Dwells (n,) of poses (n,) all of whose dwells, two at least, are off by about the same."""
         known = self.there & (self.size > 1e-9 * self.size.max())
         size = np.where(known, self.size, 1.0)

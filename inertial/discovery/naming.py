@@ -10,9 +10,9 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inertial import effects as effects_catalogue
+from inertial.arrays import Array, Places
 from inertial.decisions import CLASS_WIDTH
 from inertial.discovery.driver_sums import (
     INSIDE_ONLY,
@@ -23,8 +23,6 @@ from inertial.discovery.driver_sums import (
     weights_of,
 )
 from inertial.discovery.evidence import INSIDE, MEAN, ScoredLot
-
-Array = NDArray[np.float64]
 
 _MOST = 6
 """Largest number of names of one night."""
@@ -262,7 +260,7 @@ class Pool:
         score = np.where(own > 0.0, left + share * sums, 0.0)
         return replace(lot, score=score, own=own, information=information)
 
-    def places(self, effect: str) -> NDArray[np.intp]:
+    def places(self, effect: str) -> Places:
         """Columns of an effect, (p,)."""
         return np.array([k for k, (one, _) in enumerate(self.columns) if one == effect], dtype=np.intp)
 
@@ -276,7 +274,7 @@ class Pool:
             out[effect] = max(drop - k * (1.0 + np.log(drop / k)), 0.0) if k > 0.0 and drop > k else 0.0
         return out
 
-    def _drop(self, name: str, sums: DriverSums, at: NDArray[np.intp]) -> tuple[float, Array]:
+    def _drop(self, name: str, sums: DriverSums, at: Places) -> tuple[float, Array]:
         """Fall of the misfit by an effect's columns, and the number of coefficients of each axis and column."""
         count = len(self.columns)
         total, rank = 0.0, np.zeros((self.axes, at.size))

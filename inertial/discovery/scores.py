@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inertial import effects as catalogue
+from inertial.arrays import Array
 from inertial.design import starting_values
 from inertial.effects.base import AnyEffect
 from inertial.errors import MissingInput
@@ -24,8 +24,6 @@ from inertial.estimation.problem import Lot, Problem
 from inertial.estimation.refinement import terms_of
 from inertial.estimation.term import with_turn_on
 from inertial.state import State
-
-Array = NDArray[np.float64]
 
 LEAST_LEFT = 0.05
 """Share of its information that an effect keeps beside free errors of the station; below it, no lot can tell it from them."""

@@ -3,11 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.errors import NotIdentified
 
-Array = NDArray[np.float64]
 STANDARD_GRAVITY = 9.80665
 TERMS = ("bias", "scale", "second_order", "third_order", "arm_stretch_or_odd_quadratic", "mass_offset_or_asymmetry")
 
@@ -66,11 +65,10 @@ def fit_polynomial(acceleration: Array, output: Array, error: Array, names: tupl
     design = columns(acceleration, names) / error[:, None]
     size = np.linalg.norm(design, axis=0)
     if len(output) < len(names) or np.linalg.matrix_rank(design / size, tol=1e-8) < len(names):
-        msg = (
+        raise NotIdentified(
             f"centrifuge: {len(output)} points do not tell {', '.join(names)} apart; add speeds, or measure with the mounting "
             "reversed too"
         )
-        raise NotIdentified(msg)
     c = np.linalg.lstsq(design / size, output / error, rcond=None)[0] / size
     residuals = output - columns(acceleration, names) @ c
     inverse = np.linalg.inv((design / size).T @ (design / size)) / np.outer(size, size)

@@ -1,9 +1,10 @@
 """What an exciter can do at a frequency."""
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from inertial.arrays import Array
+
 STANDARD_GRAVITY = 9.80665
 
 

@@ -3,12 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
+from inertial.arrays import Array
 from inertial.errors import NotIdentified
 
-Array = NDArray[np.float64]
 TEN_PERCENT = 1.0 - 2.0 * float(np.arcsin(0.1)) / np.pi
 """0.936: part of a half sine's duration between its 10 % points."""
 TOP = 0.9  # of the largest sample: the part of the pulse through which the parabola is laid
@@ -63,24 +62,25 @@ def measured_pulse(record: Array, rate_hz: float, *, before_s: float) -> Pulse:
     """
     quiet = record[: int(before_s * rate_hz)]
     if quiet.size < 8:
-        msg = f"shock: {quiet.size} samples before the pulse, 8 or more are needed for the baseline; trigger later"
-        raise NotIdentified(msg)
+        raise NotIdentified(
+            f"shock: {quiet.size} samples before the pulse, 8 or more are needed for the baseline; trigger later"
+        )
     baseline, noise = float(quiet.mean()), float(quiet.std(ddof=1))
     y = record - baseline
     sign = 1.0 if y.max() >= -y.min() else -1.0
     y = sign * y
     top = int(np.argmax(y))
     if not y[top] > 8.0 * noise:
-        msg = (
+        raise NotIdentified(
             f"shock: the largest excursion is {y[top]:.3g}, {8.0 * noise:.3g} is needed above a noise of "
             f"{noise:.3g}; check the trigger"
         )
-        raise NotIdentified(msg)
     low, high = _span(y, top, TOP * y[top])
     places = np.arange(low, high + 1)
     if places.size < 5:
-        msg = f"shock: {places.size} samples in the top tenth of the pulse, 5 or more are needed; sample faster"
-        raise NotIdentified(msg)
+        raise NotIdentified(
+            f"shock: {places.size} samples in the top tenth of the pulse, 5 or more are needed; sample faster"
+        )
     x = (places - places.mean()) / rate_hz
     rows = np.column_stack([np.ones_like(x), x, x**2])
     c = np.linalg.lstsq(rows, y[places], rcond=None)[0]
@@ -90,8 +90,7 @@ def measured_pulse(record: Array, rate_hz: float, *, before_s: float) -> Pulse:
     vertex = np.array([1.0, at, at**2])
     start, stop = _crossings(y, top, 0.1 * value)
     if start < 1 or stop > y.size - 2:
-        msg = "shock: the pulse is cut off at an end of the record; move the trigger, or record longer"
-        raise NotIdentified(msg)
+        raise NotIdentified("shock: the pulse is cut off at an end of the record; move the trigger, or record longer")
     duration = (stop - start) / rate_hz / TEN_PERCENT
     pad = 0.5 * (1.0 - TEN_PERCENT) * duration * rate_hz
     first, last = max(0, round(start - pad)), min(y.size - 1, round(stop + pad))
@@ -141,8 +140,9 @@ def found_duration(record: Array, rate_hz: float) -> tuple[float, float]:
         y = y if y[np.argmax(np.abs(y))] > 0.0 else -y
         top = int(np.argmax(y))
         if not y[top] > 8.0 * noise:
-            msg = f"shock: the largest excursion is {y[top]:.3g} at a noise of {noise:.3g}, no pulse; check the trigger"
-            raise NotIdentified(msg)
+            raise NotIdentified(
+                f"shock: the largest excursion is {y[top]:.3g} at a noise of {noise:.3g}, no pulse; check the trigger"
+            )
         start, stop = _crossings(y, top, 0.5 * float(y[top]))
         wider = max((stop - start) / rate_hz / HALF_WIDTH, 4.0 / rate_hz)
         if abs(wider - duration) < _SETTLED * wider:
@@ -153,11 +153,10 @@ def found_duration(record: Array, rate_hz: float) -> tuple[float, float]:
     start, stop = _crossings(y, top, 0.1 * float(y[top]))
     by_foot = (stop - start) / rate_hz / TEN_PERCENT
     if abs(by_foot / duration - 1.0) > _ALIKE:
-        msg = (
+        raise NotIdentified(
             f"shock: the pulse is no half sine: by its width at 10 % of the peak it lasts {1e3 * by_foot:.3g} ms, at 50 % "
             f"{1e3 * duration:.3g} ms; state duration_ms, or look at the mounting"
         )
-        raise NotIdentified(msg)
     return by_foot, max(start / rate_hz - 0.5 * by_foot, 0.0)
 
 

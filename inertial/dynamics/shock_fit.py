@@ -5,14 +5,12 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from inertial.arrays import Array, Flags
 from inertial.dynamics.shock_effects import EFFECTS
 from inertial.dynamics.transfer_effects.base import Coordinates, Parameter
 from inertial.errors import NotIdentified
-
-Array = NDArray[np.float64]
 
 _KEPT = 200
 """Largest number of waveforms that a design keeps."""
@@ -59,7 +57,7 @@ class ShockFit:
     dof: int
 
 
-def fit_shock(record: ShockRecord, effects: Sequence[str], rows: Sequence[NDArray[np.bool_]] | None = None) -> ShockFit:
+def fit_shock(record: ShockRecord, effects: Sequence[str], rows: Sequence[Flags] | None = None) -> ShockFit:
     """Least squares of sensitivity and effects over all shocks; nonlinear parameters from several starts.
 
     Parameters
@@ -77,8 +75,9 @@ def fit_shock(record: ShockRecord, effects: Sequence[str], rows: Sequence[NDArra
     used = [np.ones(len(one.unit), dtype=bool) for one in record.shocks] if rows is None else list(rows)
     count = sum(int(one.sum()) for one in used)
     if count < len(effects) + len(parameters) + 2:
-        msg = f"shock: {count} samples for {len(effects) + len(parameters) + 1} parameters; record faster"
-        raise NotIdentified(msg)
+        raise NotIdentified(
+            f"shock: {count} samples for {len(effects) + len(parameters) + 1} parameters; record faster"
+        )
     whole = np.concatenate(used)
     target = np.concatenate([one.unit / one.error for one in record.shocks])[whole]
     model = Design(record, effects, parameters)

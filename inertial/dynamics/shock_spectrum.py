@@ -1,12 +1,11 @@
 """Shock response spectrum, absolute acceleration: ISO 18431-4, the ramp-invariant recursion after Smallwood."""
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from inertial.arrays import Array
 from inertial.errors import NotIdentified
 
-Array = NDArray[np.float64]
 PER_OCTAVE = 12
 FEWEST_PER_PERIOD = 10.0
 
@@ -46,12 +45,11 @@ def shock_spectrum(record: Array, rate_hz: float, natural_hz: Array, q: float = 
     """
     highest = float(np.max(natural_hz))
     if rate_hz < FEWEST_PER_PERIOD * highest:
-        msg = (
+        raise NotIdentified(
             f"shock spectrum: {rate_hz:g} Hz for {highest:g} Hz, at least "
             f"{FEWEST_PER_PERIOD * highest:g} Hz is needed; lower the "
             "highest frequency, or sample faster"
         )
-        raise NotIdentified(msg)
     tail = np.zeros(int(np.ceil(rate_hz / float(np.min(natural_hz)))) + 1)
     padded = np.concatenate([record, tail])
     return np.array([np.max(np.abs(responses(padded, rate_hz, float(f), q))) for f in natural_hz])

@@ -3,12 +3,12 @@
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy import signal
 from scipy.stats import chi2
 
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from inertial.arrays import Array, Complex
+
 HANN_HALF = 0.945
 """Independent averages per segment for a Hann window with half overlap (Welch 1967)."""
 

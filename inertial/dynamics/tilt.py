@@ -4,14 +4,13 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import norm
 
+from inertial.arrays import Array
 from inertial.dynamics.wander import wander
 from inertial.errors import NotIdentified
 from inertial.noise.flicker import flicker_kernel
 
-Array = NDArray[np.float64]
 TERMS = ("bias", "sine", "cosine", "second_order", "third_order")
 
 
@@ -129,8 +128,9 @@ def fit_tilt(angle: Array, output: Array, error: Array, *, orders: int = 1, time
     if len(angle) < len(names) + 1 or np.linalg.matrix_rank(weighted, tol=1e-8 * np.linalg.norm(weighted, 2)) < len(
         names
     ):
-        msg = f"tilt: {len(angle)} angles do not tell {', '.join(names)} apart; add angles over the whole turn"
-        raise NotIdentified(msg)
+        raise NotIdentified(
+            f"tilt: {len(angle)} angles do not tell {', '.join(names)} apart; add angles over the whole turn"
+        )
     whole = np.diag(error**2)
     if time is not None:
         kernel = flicker_kernel(time)

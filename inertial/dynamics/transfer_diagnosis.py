@@ -4,13 +4,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inertial.dynamics.missing_effects import CLASS_WIDTH, FOLDS, EffectClass, Judged, judge
 from inertial.dynamics.transfer_effects import EFFECTS, Conditions
 from inertial.dynamics.transfer_model import IDENTIFIED_SHARE, Points, TransferFit, best_of_exchange, fit_transfer
-
-Array = NDArray[np.float64]
 
 SEPARATED = 10.0
 """Uncertainties of a point by which rival models must differ at a frequency that is proposed: several of their errors as well."""

@@ -5,16 +5,14 @@ from dataclasses import dataclass, field
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from inertial.arrays import Array, Complex, Flags
 from inertial.dynamics.missing_effects import p_value
 from inertial.dynamics.transfer_effects import EFFECTS, Conditions, Parameter
 from inertial.dynamics.transfer_effects.base import Coordinates
 from inertial.errors import NotIdentified
 
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 MOST_STARTS = 1200  # combinations whose residual is looked at: it costs less than a step of a search
 SCREENED = 6  # of them that are searched from, those with the least residual
 POLISHED = 2  # of them that are carried to the end
@@ -41,7 +39,7 @@ class Points:
     magnitude_error: Array
     phase_error: Array
 
-    def picked(self, rows: NDArray[np.bool_]) -> "Points":
+    def picked(self, rows: Flags) -> "Points":
         """Some of the points."""
         return Points(
             self.conditions.picked(rows), self.value[rows], self.magnitude_error[rows], self.phase_error[rows]
@@ -149,8 +147,9 @@ def fit_transfer(
     conditions = points.conditions
     parameters = tuple(p for name in effects for p in EFFECTS[name].parameters(conditions))
     if 2 * len(points.value) < len(parameters) + 2:
-        msg = f"transfer function: {len(points.value)} points for {len(parameters) + 1} parameters; sweep more frequencies"
-        raise NotIdentified(msg)
+        raise NotIdentified(
+            f"transfer function: {len(points.value)} points for {len(parameters) + 1} parameters; sweep more frequencies"
+        )
     low_end = np.argsort(conditions.frequency)[: max(3, len(points.value) // 5)]
     sign = -1.0 if np.median(np.abs(np.angle(points.value[low_end]))) > 0.5 * np.pi else 1.0
     coordinates = Coordinates(parameters)

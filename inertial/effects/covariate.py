@@ -1,7 +1,6 @@
 """Dependence of the bias on any other recorded quantity: humidity, pressure, heater current."""
 
 from collections.abc import Mapping
-from typing import ClassVar
 
 import numpy as np
 
@@ -21,15 +20,14 @@ class Covariate(SensorEffect):
     The curve is a natural cubic spline over the range met in the run, straight beyond it.
     """
 
-    symbol: ClassVar[str] = "kc"
-    equation: ClassVar[str] = "kc1·z + Σ kcj·Nj(z), z the column scaled to −1 … 1, Nj a natural cubic spline"
-    source: ClassVar[str] = "an empirical dependence: no physics is claimed"
-    typical_ug: ClassVar[tuple[float, float]] = (1.0, 10000.0)
-    hides_behind: ClassVar[tuple[str, ...]] = ()
-    breaker: ClassVar[str] = "vary this quantity alone"
-    same_on_axes: ClassVar[bool] = True
-    simplicity: ClassVar[int] = 60
-    primary: ClassVar[int | None] = 1
+    symbol = "kc"
+    equation = "kc1·z + Σ kcj·Nj(z), z the column scaled to −1 … 1, Nj a natural cubic spline"
+    source = "an empirical dependence: no physics is claimed"
+    typical_ug = (1.0, 10000.0)
+    breaker = "vary this quantity alone"
+    same_on_axes = True
+    simplicity = 60
+    primary = 1
 
     def __init__(self, column: str, *, curve: bool = True) -> None:
         self.column = column

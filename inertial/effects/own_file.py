@@ -9,15 +9,13 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.effects.base import Effect, SensorEffect, StationEffect
 from inertial.errors import BrokenEffect, InertialError
 
 NEEDED = ("id", "symbol", "equation", "source", "typical_ug", "breaker")
 METHODS = ("parameters", "constants", "names", "names_at", "columns", "start_columns", "force_change", "start_change")
-
-Array = NDArray[np.float64]
 
 
 def checked_classes(module: ModuleType, source: Path) -> None:

@@ -10,14 +10,12 @@ from dataclasses import replace
 from typing import ClassVar, Literal, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array, Places
 from inertial.design import of_axes
 from inertial.effects.base import Effect
 from inertial.estimation.lot import Lot
 from inertial.state import State
-
-Array = NDArray[np.float64]
 
 
 class Misfit(Protocol):
@@ -198,18 +196,18 @@ def tilts(state: State) -> Array:
     return np.stack([by_outer, by_inner], axis=-1)
 
 
-def poses(lot: "Lot") -> NDArray[np.intp]:
+def poses(lot: "Lot") -> Places:
     """Number of the pose of each dwell, (n,)."""
     force = lot.state.force.reshape(-1, *lot.state.force.shape[-2:])[0]
     return np.unique(np.round(force, 3), axis=0, return_inverse=True)[1].reshape(-1)
 
 
-def soaks(state: State) -> NDArray[np.intp]:
+def soaks(state: State) -> Places:
     """Number of the soak of each dwell, (n,); all zero at constant temperature."""
     return state.remember(("soaks",), lambda: _soaks(state).astype(np.float64)).astype(np.intp)
 
 
-def _soaks(state: State) -> NDArray[np.intp]:
+def _soaks(state: State) -> Places:
     if state.temperature is None:
         return np.zeros(state.time.shape[-1], dtype=np.intp)
     typical = np.median(state.temperature.reshape(-1, state.temperature.shape[-1]), axis=0)

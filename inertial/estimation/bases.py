@@ -1,9 +1,8 @@
 """Bases of what columns span, eigenvalues of their products, and what is visible of a column."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from inertial.arrays import Array, Places
 
 SEEN = 0.01
 """Share of a column, after the base model, below which it is not visible (noise of the drivers has this size)."""
@@ -39,12 +38,12 @@ def _eigen_of_two(gram: Array) -> tuple[Array, Array]:
     return values, vectors
 
 
-def orthonormal(columns: Array) -> tuple[Array, NDArray[np.intp]]:
+def orthonormal(columns: Array) -> tuple[Array, Places]:
     """Orthonormal bases (blocks, n, p) of what the columns span, directions below the tolerance zeroed; ranks (blocks,)."""
     return basis(columns)[:2]
 
 
-def basis(columns: Array) -> tuple[Array, NDArray[np.intp], float]:
+def basis(columns: Array) -> tuple[Array, Places, float]:
     """Bases and ranks as of :func:`orthonormal`, and the logarithm of the determinant of the columns' products over all blocks.
 
     Directions that vanish count with a limit.

@@ -4,14 +4,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array, Flags
 from inertial.estimation.model import Model
 from inertial.estimation.problem import Problem
 from inertial.estimation.term import Term
 from inertial.state import History
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -99,7 +97,7 @@ def _pooled(model: Model, unit: Array, right: Array, scaled: Array, covariance: 
     return drawn[..., 0].astype(np.float64)
 
 
-def _shrinkable(model: Model, count: int) -> NDArray[np.bool_]:
+def _shrinkable(model: Model, count: int) -> Flags:
     """The local coefficients that are shrunk: those of the effects beyond bias, scale and misalignment."""
     flags: list[bool] = []
     for term in model.terms:
@@ -141,7 +139,7 @@ def rms(values: Array) -> float:
     return float(np.sqrt(np.nanmean(values**2)))
 
 
-def residuals(problem: Problem, terms: Sequence[Term], train: NDArray[np.bool_]) -> Array:
+def residuals(problem: Problem, terms: Sequence[Term], train: Flags) -> Array:
     """Residuals (blocks, n) in g of least squares on some dwells, weighted by the white standard errors.
 
     Parameters
@@ -164,7 +162,7 @@ class Fitting:
         self._z = of_terms(problem, [t for t in terms if t.shared])
         self._weight = np.where(np.isfinite(problem.error), 1.0 / problem.error, 0.0)
 
-    def left(self, series: Array, train: NDArray[np.bool_]) -> Array:
+    def left(self, series: Array, train: Flags) -> Array:
         """Residuals of a fit to the dwells ``train`` (n,) on series (blocks, n, m), on all dwells."""
         x, z, weight = self._x, self._z, self._weight * train
         solve = _solver(x, weight)

@@ -14,16 +14,14 @@ from collections.abc import Callable, Iterable, Iterator
 from functools import cached_property, lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array, Places
 from inertial.decisions import SHARE_STEP
 from inertial.estimation.candidate import Candidate
 from inertial.estimation.noise_shares import LONGEST, Noise, Shares
 from inertial.estimation.whitener import Whitener, grouped, whitener_of
 from inertial.noise.flicker import flicker_kernel
 from inertial.noise.measurands import walk_kernel
-
-Array = NDArray[np.float64]
 
 PIECE = 1_000_000
 """Largest number of columns' values that are whitened at a time."""
@@ -129,7 +127,7 @@ class Covariance:
                 variance[blocks] += share * 10.0 ** (steps / SHARE_STEP) * variance_of(own)
         return variance
 
-    def _groups_at(self, shares: Shares) -> list[tuple[int, int, NDArray[np.intp], Shares]]:
+    def _groups_at(self, shares: Shares) -> list[tuple[int, int, Places, Shares]]:
         """Groups of blocks that have a whitener in common at shares: place of the profile, steps, blocks, and their shares."""
         common = shares.common
         if not shares.own:
@@ -169,9 +167,7 @@ class Covariance:
         self._whiteners.move_to_end(key)
         return self._whiteners[key]
 
-    def _by_whitener(
-        self, shares: Shares, blocks: NDArray[np.intp] | None = None
-    ) -> Iterator[tuple[NDArray[np.intp], Whitener]]:
+    def _by_whitener(self, shares: Shares, blocks: Places | None = None) -> Iterator[tuple[Places, Whitener]]:
         """Places, among all or some blocks, of those that share a whitener, and it."""
         where = np.arange(len(self.level))
         if blocks is not None:
@@ -183,7 +179,7 @@ class Covariance:
             if own.size:
                 yield own, self._whitener(place, steps, common)
 
-    def whiten(self, columns: Array, shares: Shares, blocks: NDArray[np.intp] | None = None) -> Array:
+    def whiten(self, columns: Array, shares: Shares, blocks: Places | None = None) -> Array:
         """Columns (blocks, n, m) of all or some blocks with white noise of variance s² in them; zero where a dwell is missing."""
         level = self.level if blocks is None else self.level[blocks]
         out = np.empty(columns.shape)
@@ -193,7 +189,7 @@ class Covariance:
                 out[some] = whitener.columns(columns[some] / level[some, None, None])
         return out
 
-    def whiteners(self, shares: Shares) -> Iterator[tuple[NDArray[np.intp], Array]]:
+    def whiteners(self, shares: Shares) -> Iterator[tuple[Places, Array]]:
         """Blocks that share a whitener, and the whitener (n, n), lower triangle, for white noise of variance one."""
         return ((members, whitener.matrix) for members, whitener in self._by_whitener(shares))
 
@@ -213,7 +209,7 @@ class Covariance:
             rows[own] = whitener.rows(rows[own], overwrite=True)
         return rows
 
-    def back(self, rows: Array, shares: Shares, blocks: NDArray[np.intp] | None = None) -> Array:
+    def back(self, rows: Array, shares: Shares, blocks: Places | None = None) -> Array:
         """Rows (blocks, k, n) of whitened series of all or some blocks times the whiteners, for white noise of variance one."""
         out = np.empty(rows.shape)
         few = max(PIECE // max(rows[0].size, 1), 1)
@@ -222,9 +218,7 @@ class Covariance:
                 out[some] = whitener.back(rows[some])
         return out
 
-    def solved(
-        self, columns: Array, places: NDArray[np.intp], shares: Shares
-    ) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp], Array]]:
+    def solved(self, columns: Array, places: Places, shares: Shares) -> Iterator[tuple[Places, Places, Array]]:
         """V⁻¹ times columns, for white noise of variance one: blocks that share a whitener, their columns, and rows (k, n).
 
         Parameters
@@ -268,7 +262,7 @@ class Covariance:
             logdets[members] = whitener.logdet
         return logdets
 
-    def of_dwells(self, block: int, noise: Noise, dwells: NDArray[np.intp]) -> Array:
+    def of_dwells(self, block: int, noise: Noise, dwells: Places) -> Array:
         """Covariance (k, k), g², of some dwells of a block."""
         place, steps = self._group_of[block]
         kernel = self._kernels[place]
@@ -287,7 +281,7 @@ class Covariance:
         return Noise(noise.shares.times(factor, factor * self.span / other.span), noise.scale, noise.prior)
 
 
-def _products_of(candidate: Candidate, level: Array, groups: Iterable[tuple[NDArray[np.intp], Whitener]]) -> Array:
+def _products_of(candidate: Candidate, level: Array, groups: Iterable[tuple[Places, Whitener]]) -> Array:
     """Products cᵀV⁻¹c (b, grid, p, p) of a candidate's columns; rows that blocks share are whitened once.
 
     Parameters

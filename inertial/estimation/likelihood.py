@@ -9,8 +9,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.decisions import TOGETHER, UNITS_TOGETHER
 from inertial.design import of_axes
 from inertial.distributions import chi2_quantile
@@ -22,8 +22,6 @@ from inertial.estimation.penalty import freedom, price
 from inertial.estimation.space import Space
 from inertial.estimation.term import Term
 from inertial.probability import log_chi2_tail
-
-Array = NDArray[np.float64]
 
 _MEDIAN = float(chi2_quantile(0.5, 1.0))
 _FEWEST_POSES = 10

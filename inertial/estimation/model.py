@@ -4,8 +4,8 @@ from collections.abc import Callable, Sequence
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.errors import NotIdentified
 from inertial.estimation.candidate import Candidate
 from inertial.estimation.covariance import LARGE
@@ -15,8 +15,6 @@ from inertial.estimation.share_statistics import ShareStatistics
 from inertial.estimation.shares import best_shares, own_shares, plausible_shares
 from inertial.estimation.space import Space
 from inertial.estimation.term import Term
-
-Array = NDArray[np.float64]
 
 _LONG = 400
 """Number of dwells above which shares are searched by half decades, because each whitener takes time and memory."""

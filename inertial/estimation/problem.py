@@ -6,8 +6,8 @@ from functools import cached_property
 from itertools import groupby
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array, Places
 from inertial.design import of_axes
 from inertial.effects import SensorEffect
 from inertial.effects.base import AnyEffect, excited, has_start
@@ -16,8 +16,6 @@ from inertial.estimation.candidate import Candidate, blocks_of_units, finest_row
 from inertial.estimation.covariance import Covariance
 from inertial.estimation.lot import Lot
 from inertial.estimation.noise_shares import Shares
-
-Array = NDArray[np.float64]
 
 SHARED = ("station", "data")
 """Scopes of effects whose coefficients all blocks share."""
@@ -251,7 +249,7 @@ class Problem:
         """Columns over values, those of one value after another: rows that blocks share are stored once."""
         shared = effect.scope in SHARED
         every: list[Array] = []
-        rows_of: list[NDArray[np.intp] | None] = []
+        rows_of: list[Places | None] = []
         for values in grid:
             known = self._terms.get((effect.id, *values.items()))
             own = (self._columns(effect, values) if known is None else known)[..., :first]
@@ -298,9 +296,7 @@ class Problem:
             size = max(1, _PIECE // (len(self.axes) * self.n * _WIDEST * len(places)))
             yield from self._of_units(effect, units, [dict(place) for place in places], size)
 
-    def _of_units(
-        self, effect: Handling, units: NDArray[np.intp], places: Sequence[Values], size: int
-    ) -> Iterator[Candidate]:
+    def _of_units(self, effect: Handling, units: Places, places: Sequence[Values], size: int) -> Iterator[Candidate]:
         """The places of an alternative of one unit, for some units; at most ``size`` units at a time if their columns differ."""
         key = (effect.id, units.size, int(units[0]), len(places), *places[0].items(), *places[-1].items())
 

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.decisions import AXES_DIFFER
 from inertial.design import grid_of
 from inertial.effects.base import Nonlinear
@@ -21,8 +21,6 @@ from inertial.estimation.noise_shares import Noise
 from inertial.estimation.problem import Values
 from inertial.estimation.refinement import around, cell, on_scale
 from inertial.estimation.term import Term
-
-Array = NDArray[np.float64]
 
 Place = tuple[tuple[str, float | tuple[float, ...]], ...]
 

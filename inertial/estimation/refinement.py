@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inertial import decisions
+from inertial.arrays import Array
 from inertial.design import grid_of
 from inertial.effects.base import AnyEffect, Nonlinear
 from inertial.estimation.alternative import Handling
@@ -16,9 +16,6 @@ from inertial.estimation.problem import Problem, Values
 from inertial.estimation.space import Gain, Space
 from inertial.estimation.term import Term
 from inertial.state import ALL_AXES
-
-Array = NDArray[np.float64]
-
 
 _NEAR = 3
 """Dwells on either side of a change of handling that are tried once more with all other terms in the model."""

@@ -4,15 +4,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array, Places
 from inertial.estimation.bases import SEEN
 from inertial.estimation.candidate import shared_rows
 from inertial.estimation.covariance import PIECE
 from inertial.estimation.noise_shares import Shares
 from inertial.estimation.problem import Problem
-
-Array = NDArray[np.float64]
 
 VANISHING = 3e-5
 """Singular value of columns of unit length, over the largest, below which a combination of them vanishes."""
@@ -142,11 +140,11 @@ class ShareStatistics:
         return left[:, seen].reshape(*self._shared.shape[:2], -1)
 
     @cached_property
-    def _distinct(self) -> tuple[Array, NDArray[np.intp]]:
+    def _distinct(self) -> tuple[Array, Places]:
         """The columns that differ, (rows, n), and where each column of each block is among them, (blocks, r + q + 1)."""
         blocks = self.problem.blocks
         few: list[Array] = []
-        places: list[NDArray[np.intp]] = []
+        places: list[Places] = []
         count = 0
         for column in np.swapaxes(self._rows, 0, 1):
             rows = shared_rows(column, self.problem.per_unit)

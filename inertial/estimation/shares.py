@@ -10,14 +10,13 @@ the block, its residuals no longer deviate, and the block has the lot's shares a
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.decisions import LARGEST_SHARE, LEAST_SHARE, OWN_SHARES, OWN_SUSPECT, SHARE_STEP
 from inertial.estimation.noise_shares import LONGEST, Shares
 from inertial.estimation.problem import Problem
 from inertial.estimation.space import Space
 
-Array = NDArray[np.float64]
 Place = tuple[int | None, int | None]
 
 _STRIDES = (4, 2, 1)

@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.stats import f as f_distribution
 
-Array = NDArray[np.float64]
+from inertial.arrays import Array
 
 
 @dataclass(frozen=True)
@@ -135,8 +135,9 @@ def six_position(up: ArrayLike, down: ArrayLike, local_gravity: float) -> SixPos
     """
     plus, minus = np.asarray(up, dtype=np.float64), np.asarray(down, dtype=np.float64)
     if plus.shape[-2:] != (3, 3) or minus.shape != plus.shape:
-        msg = f"six position: means of shape {plus.shape} and {minus.shape}, (..., 3, 3) each is needed: face by output"
-        raise ValueError(msg)
+        raise ValueError(
+            f"six position: means of shape {plus.shape} and {minus.shape}, (..., 3, 3) each is needed: face by output"
+        )
     centre = 0.5 * (plus + minus)
     response = np.swapaxes(plus - minus, -1, -2) / (2.0 * local_gravity)
     return SixPosition(

@@ -9,10 +9,9 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
-Array = NDArray[np.float64]
+from inertial.arrays import Array
 
 _STEP = 10.0
 SHARES = (0.0, *(0.1 * _STEP ** np.arange(7)).tolist())

@@ -10,15 +10,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.distributions import f_tail
 from inertial.errors import NotIdentified
 from inertial.fits.descent import descended
 from inertial.fits.norm_noise import norm_noise
 from inertial.fits.wander import student
-
-Array = NDArray[np.float64]
 
 FLAT = 0.05
 """Singular value of the directions across a plane, over the largest, below which they lie in the plane: 3° of wobble."""

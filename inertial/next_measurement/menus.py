@@ -10,15 +10,14 @@ from itertools import product
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inertial import frames, poses
+from inertial.arrays import Array
 from inertial.planning.drivers import first_unit
 from inertial.planning.features import levels
 from inertial.planning.sequences import SequenceStep, StationPace, n_of, standing
 from inertial.state import T_REFERENCE, State
 
-Array = NDArray[np.float64]
 Kind = Literal["poses", "soaks", "waits", "approach", "excursion", "ramp", "later", "power"]
 
 _DETOUR = np.radians(20.0)

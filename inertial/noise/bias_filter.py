@@ -12,13 +12,11 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
+from inertial.arrays import Array, Flags
 from inertial.distributions import chi2_quantile
 from inertial.noise.gauss_markov import BiasModel, StepOfProcess, step_of_process, step_of_walk
-
-Array = NDArray[np.float64]
 
 AXES = 3
 GATE_SIGMA = 5.0
@@ -232,7 +230,7 @@ class Track:
     covariance: Array
     expected: Array
     expected_covariance: Array
-    updated: NDArray[np.bool_]
+    updated: Flags
     consistency: Consistency
     rejected: int
     end: BiasState

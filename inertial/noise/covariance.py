@@ -14,9 +14,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from inertial.arrays import Array, Index
 
 NOISES = ("Q", "N", "B", "K")
 """Terms that are random; the ramp R is deterministic and enters as the mean of z."""
@@ -51,7 +50,7 @@ def autocovariance(lag: Array) -> Array:
 class Sums:
     """Moments of the Allan variances of one record length: everything but the strengths of the noises."""
 
-    m: NDArray[np.int64]
+    m: Index
     """(t,) spacings, samples."""
     quadratic: Array
     """(t, t, 4, 4): Cov[v1, v2] is the quadratic form of the strengths of `NOISES`."""

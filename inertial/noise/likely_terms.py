@@ -8,12 +8,10 @@ stated five times the true deviation after an hour without an update.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array, Index
 from inertial.noise import mixture
 from inertial.noise.covariance import Sums, sums
-
-Array = NDArray[np.float64]
 
 SYMBOLS = ("N", "B", "K")
 _FREE = np.array([symbol not in {"K", "R"} for symbol in mixture.TERMS])
@@ -35,7 +33,7 @@ class LikelyTerms:
     walk: Array
 
 
-def likely_terms(deviation: Array, m: NDArray[np.int64], n: int, rate_hz: float) -> LikelyTerms:
+def likely_terms(deviation: Array, m: Index, n: int, rate_hz: float) -> LikelyTerms:
     """The likeliest mixture of Q, N, B and K of every channel, with one walk for all of them.
 
     The walk of a record is the least known term: alone, the likeliest one of a channel is zero in half of the cases and several

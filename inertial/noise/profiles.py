@@ -5,15 +5,13 @@ from functools import cache
 from typing import NamedTuple, cast
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from inertial.arrays import Array, Flags
 from inertial.distributions import chi2_quantile
 from inertial.noise import mixture
 from inertial.noise.covariance import Sums
 from inertial.noise.mixture import MixtureFit
-
-Array = NDArray[np.float64]
 
 _KEPT_AT = 6.635
 """Chi-square (1 % for one term) that a term must be worth to be called identified."""
@@ -120,7 +118,7 @@ class _Curve:
             start[j] = strength
         return min(self._deviance(free, self._seeded(start)) for start in starts) - self.best
 
-    def _deviance(self, free: NDArray[np.bool_], start: Array) -> float:
+    def _deviance(self, free: Flags, start: Array) -> float:
         return mixture.deviance(self.variance, self.moments, free, start)[0]
 
     def worth(self, j: int) -> float:
@@ -143,9 +141,7 @@ class _Curve:
         return _crossing(excess, outside, inside, _ROUGH)
 
 
-def _needed(
-    task: MixtureFit, strengths: Array, best: float, allowed: NDArray[np.bool_]
-) -> tuple[NDArray[np.bool_], Array, float]:
+def _needed(task: MixtureFit, strengths: Array, best: float, allowed: Flags) -> tuple[Flags, Array, float]:
     """Terms that stay after dropping, one by one, the one whose loss costs least, while that is little."""
     kept = (strengths > 0.0) & allowed
     current, cost = np.where(kept, strengths, 0.0), best

@@ -4,15 +4,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.distributions import chi2_quantile, chi2_tail
 from inertial.noise import mixture, profiles
 from inertial.noise.allan import AllanCurve
 from inertial.noise.covariance import sums
 from inertial.noise.flicker import FLICKER_FLOOR
-
-Array = NDArray[np.float64]
 
 NAMES: Mapping[str, str] = {
     "Q": "quantisation",
@@ -130,12 +128,14 @@ def fit_terms(curve: AllanCurve, *, confidence: float = 0.95) -> NoiseTerms:
     """
     count = len(mixture.TERMS)
     if curve.m.size <= count:
-        msg = f"noise: {curve.m.size} averaging times, at least {count + 1} are needed for {count} terms; record longer"
-        raise ValueError(msg)
+        raise ValueError(
+            f"noise: {curve.m.size} averaging times, at least {count + 1} are needed for {count} terms; record longer"
+        )
     if not np.all(curve.deviation > 0.0):
         where = np.argwhere(~(curve.deviation > 0.0))[0]
-        msg = f"noise: channel {tuple(where[:-1].tolist())} has zero Allan deviation; a constant output says nothing"
-        raise ValueError(msg)
+        raise ValueError(
+            f"noise: channel {tuple(where[:-1].tolist())} has zero Allan deviation; a constant output says nothing"
+        )
     moments = sums(curve.n, tuple(curve.m.tolist()))
     variances = (curve.deviation**2).reshape(-1, curve.m.size)
     rows = [profiles.fit_terms(variance, moments, float(chi2_quantile(confidence, 1))) for variance in variances]

@@ -4,14 +4,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inertial import design
+from inertial.arrays import Array
 from inertial.errors import NotIdentified
 from inertial.noise.dwells import whitener
 from inertial.state import State
-
-Array = NDArray[np.float64]
 
 _SINGULAR = 1e-11
 """Smallest eigenvalue of the scaled normal matrix; below it a coefficient is not determined, as in a fit."""

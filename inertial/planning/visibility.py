@@ -7,10 +7,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inertial import design
 from inertial import effects as catalogue
+from inertial.arrays import Array
 from inertial.design import of_axes
 from inertial.effects import SensorEffect
 from inertial.effects.base import AnyEffect, excited
@@ -18,8 +18,6 @@ from inertial.errors import MissingInput
 from inertial.noise.dwells import whitener
 from inertial.planning.ranges import UnseenRange, unseen_ranges
 from inertial.state import State
-
-Array = NDArray[np.float64]
 
 SEEN = 0.01
 """Remaining fraction v up to which an effect counts as not visible."""

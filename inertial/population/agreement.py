@@ -1,11 +1,10 @@
 """Agreement of two results with their uncertainties."""
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import norm
 from scipy.stats import t as student
 
-Array = NDArray[np.float64]
+from inertial.arrays import Array
 
 COVERAGE = 2.0
 

@@ -3,16 +3,12 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import chi2, median_abs_deviation, norm, rankdata, tiecorrect
 from scipy.stats import f as f_distribution
 from scipy.stats import t as student
 
+from inertial.arrays import Array, Index
 from inertial.population.memory import TO_SIGMA
-
-Array = NDArray[np.float64]
-Codes = NDArray[np.int64]
-Flags = NDArray[np.bool_]
 
 MAD_EFFICIENCY = 0.37  # Rousseeuw and Croux 1993, J. Am. Stat. Assoc. 88, 1273
 
@@ -31,7 +27,7 @@ class Comparison:
     effect: float
 
 
-def compare(values: Array, groups: Codes) -> Comparison | None:
+def compare(values: Array, groups: Index) -> Comparison | None:
     """Analysis of variance and its rank form (Kruskal and Wallis 1952, ties corrected); None with less than two groups.
 
     Parameters
@@ -52,7 +48,7 @@ def compare(values: Array, groups: Codes) -> Comparison | None:
     return Comparison(k, n, float(f_distribution.sf(f, k - 1, n - k)), _rank_p(values, groups, counts, k), effect)
 
 
-def _rank_p(values: Array, groups: Codes, counts: Codes, k: int) -> float:
+def _rank_p(values: Array, groups: Index, counts: Index, k: int) -> float:
     n, ranks = values.size, rankdata(values)
     sums = np.bincount(groups, ranks)
     used = counts > 0

@@ -4,13 +4,10 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from inertial.arrays import Array, Flags, Index
 from inertial.population.memory import MOST, drawn_in, memories_of, memory_of, tail_of
-
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 D2_OF_TWO = 1.128  # mean range of two normal values over their σ (NIST/SEMATECH e-Handbook 6.3.2.2)
 RULES = (
@@ -68,7 +65,7 @@ class FalseAlarms:
     """How many alarms charts in control give: their mean, and of simulated charts the sorted numbers (charts,)."""
 
     mean: float
-    numbers: NDArray[np.int64]
+    numbers: Index
 
     def p_value(self, number: int) -> float:
         """Probability of as many alarms by chance: the share of simulated charts, beyond their 98 % with a geometric tail.
@@ -108,7 +105,7 @@ def false_alarms(n: int, first: int, counted: int, memory: float = 0.0, tail: fl
     """
     code = [n, first, counted, round(100.0 * memory), 0 if np.isinf(tail) else round(tail)]
     rng = np.random.default_rng(np.random.SeedSequence(code[:3] if code[3:] == [0, 0] else code))
-    counts: list[NDArray[np.int64]] = []
+    counts: list[Index] = []
     for _ in range(10):
         values = _in_control(rng, (CHARTS_SIMULATED // 10, n), memory, tail)
         sigma = np.mean(np.abs(np.diff(values)), axis=-1, keepdims=True) / D2_OF_TWO

@@ -8,14 +8,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.correction import predict
 from inertial.design import Values
 from inertial.frames import rotation_x, rotation_z
 from inertial.state import T_REFERENCE, State
-
-Array = NDArray[np.float64]
 
 STEP = 1e-6
 """Of the central differences: rad, or relative."""

@@ -7,10 +7,10 @@ measured as Y = X + N(0, u) and accepted where A_L ≤ Y ≤ A_U.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtr
 
-Array = NDArray[np.float64]
+from inertial.arrays import Array
+
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(64)
 _REACH = 9.0
 """Standard deviations beyond which a normal density is nothing."""

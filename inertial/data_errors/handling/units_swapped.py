@@ -3,8 +3,8 @@
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Flags
 from inertial.data_errors.exchanged import EDGE, PlainFit
 from inertial.estimation.alternative import Array, Handling, Misfit, by_block
 from inertial.estimation.lot import Lot
@@ -71,7 +71,7 @@ class UnitsSwapped(Handling):
         return outputs if misfits[0] <= misfits[1] else whole
 
 
-def _places(lot: Lot, **place: float) -> tuple[int, int, NDArray[np.bool_]]:
+def _places(lot: Lot, **place: float) -> tuple[int, int, Flags]:
     """The two units, and the dwells (n,) from which on both were measured as the other."""
     one, other = int(place["unit"]), int(place["other"])
     there = np.isfinite(lot.error[[one, other]]).all(axis=(0, 2))
@@ -113,7 +113,7 @@ def _temperatures_exchanged(state: State, **place: float) -> State:
     return replace(state, temperature=_exchanged(state.temperature, pair, after), history=history, memory={})
 
 
-def _exchanged(values: Array, pair: list[int], after: NDArray[np.bool_]) -> Array:
+def _exchanged(values: Array, pair: list[int], after: Flags) -> Array:
     """Values (units, m) with two rows exchanged in some columns (m,)."""
     changed = values.copy()
     changed[pair] = np.where(after, values[pair[::-1]], values[pair])
