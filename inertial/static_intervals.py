@@ -42,7 +42,6 @@ def find(
     *,
     window_s: float = 1.0,
     shortest_s: float = 1.0,
-    trim_s: float | None = None,
     threshold: float | None = None,
 ) -> StaticIntervals:
     """Static intervals of a record of three axes.
@@ -58,7 +57,6 @@ def find(
     rate_hz : Hz
     window_s : length of the sliding window, s
     shortest_s : shortest interval that counts after trimming, s
-    trim_s : taken off both ends, where the hand still lets go, s; half a window by default
     threshold : standard deviation of a window above which it moves, in the unit of the record; found in the record by default
     """
     data = np.asarray(x, dtype=np.float64)
@@ -71,7 +69,7 @@ def find(
     quiet = _quietest(sd, width)
     limit = _threshold(sd, quiet) if threshold is None else threshold
     inside = _spread(sd <= limit, width, data.shape[0])
-    trim = round((0.5 * window_s if trim_s is None else trim_s) * rate_hz)
+    trim = round(0.5 * window_s * rate_hz)  # taken off both ends, where the hand still lets go
     start, stop = _runs(inside)
     # the ends of the record are no hand's doing: nothing is trimmed there
     start = np.where(start > 0, start + trim, start)

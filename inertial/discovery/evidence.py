@@ -146,8 +146,8 @@ class Levels:
 class Scale:
     """Root mean square of what came before, bounded at each step; a median of the first lots begins it."""
 
-    def __init__(self, start: Array, weight: float = 10.0) -> None:
-        self.squares, self.n = weight * start**2, np.full(start.size, weight)
+    def __init__(self, start: Array) -> None:
+        self.squares, self.n = 10.0 * start**2, np.full(start.size, 10.0)
 
     @property
     def rms(self) -> Array:

@@ -8,7 +8,6 @@ and lots. Errors of the station of that day are free: their coefficients are est
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -55,11 +54,6 @@ class LotScores:
     station_information: Array
     floor: float
     size: Array
-
-    @cached_property
-    def sums(self) -> Array:
-        """Scores of the lot, (m, k): sums over the units."""
-        return self.score.sum(axis=0)
 
 
 def scores_of(lot: Lot, effects: Sequence[str], tried: Iterable[AnyEffect] | None = None) -> LotScores:

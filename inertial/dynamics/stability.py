@@ -61,10 +61,10 @@ def block_means(record: Array, size: int) -> Array:
     return record[: count * size].reshape(count, size).mean(axis=1)
 
 
-def error_of_mean(record: Array, parts: int = 10) -> Array:
-    """Standard uncertainty of the mean of a record (n, 3), by axis (3,), from the scatter of the means of its parts."""
-    means = np.array([part.mean(axis=0) for part in np.array_split(record, parts)])
-    return np.asarray(means.std(axis=0, ddof=1) / np.sqrt(float(parts)))
+def error_of_mean(record: Array) -> Array:
+    """Standard uncertainty of the mean of a record (n, 3), by axis (3,), from the scatter of the means of its ten parts."""
+    means = np.array([part.mean(axis=0) for part in np.array_split(record, 10)])
+    return np.asarray(means.std(axis=0, ddof=1) / np.sqrt(10.0))
 
 
 def stability(record: Array, rate_hz: float, identified: IdentifiedNoise | None = None) -> StabilityFigures:

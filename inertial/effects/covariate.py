@@ -29,9 +29,8 @@ class Covariate(SensorEffect):
     simplicity = 60
     primary = 1
 
-    def __init__(self, column: str, *, curve: bool = True) -> None:
+    def __init__(self, column: str) -> None:
         self.column = column
-        self.curve = curve
         self.id = f"{COVARIATE_PREFIX}{column}"  # type: ignore[misc]  # one id per column, not per class
 
     def constants(self, state: State) -> Mapping[str, float]:
@@ -42,7 +41,7 @@ class Covariate(SensorEffect):
         return {
             "centre": 0.5 * (low + high),
             "half_range": max(0.5 * (high - low), 1e-12),
-            "degree": float(_KNOTS.size - 1) if self.curve and many else 1.0,
+            "degree": float(_KNOTS.size - 1) if many else 1.0,
         }
 
     def columns(
@@ -54,7 +53,7 @@ class Covariate(SensorEffect):
 
     def names(self, axis: int) -> tuple[str, ...]:
         """Names of the coefficients."""
-        return tuple(f"kc{k + 1}" for k in range(_KNOTS.size - 1)) if self.curve else ("kc1",)
+        return tuple(f"kc{k + 1}" for k in range(_KNOTS.size - 1))
 
     def names_at(self, axis: int, **nonlinear: float) -> tuple[str, ...]:
         """Names of the coefficients that the column's values in the run allow."""

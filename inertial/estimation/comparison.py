@@ -16,14 +16,15 @@ from inertial.state import History
 class Estimate:
     """Coefficients of a model's terms in the blocks of a problem, from data whitened for white noise and wander.
 
-    local : (blocks, p), shared : (q,), g per unit of the column; standard errors likewise. The coefficients of the unknown state
-    before the first dwell follow those of the terms; a run of the same plan is assumed to start in the same state.
+    local : (blocks, p), shared : (q,), g per unit of the column; shared_error : (q,), standard errors
+
+    The coefficients of the unknown state before the first dwell follow those of the terms; a run of the same plan is assumed to
+    start in the same state.
     """
 
     terms: tuple[Term, ...]
     local: Array
     shared: Array
-    local_error: Array
     shared_error: Array
 
 
@@ -52,8 +53,7 @@ def estimate(model: Model) -> Estimate:
     right = np.einsum("bnp,bn->bp", unit, y)
     scaled = np.einsum("bpr,br->bp", inverse, right)
     scaled = _pooled(model, unit, right, scaled, variance * inverse, size)
-    errors = np.sqrt(variance * np.diagonal(inverse, axis1=-2, axis2=-1)) / size
-    return Estimate(model.terms, scaled / size, shared, errors, shared_error)
+    return Estimate(model.terms, scaled / size, shared, shared_error)
 
 
 CONDITION = 1e-8

@@ -24,7 +24,7 @@ _CLEARLY = 1.0
 """Chi-square by which another of them must be better."""
 
 
-def refine(model: Model, term: Term, noise: Noise, *, axes: bool = True) -> Term:
+def refine(model: Model, term: Term, noise: Noise) -> Term:
     """A term with its continuous nonlinear parameters moved to the best fit near their grid values.
 
     One value serves all units and axes, unless one per axis reduces the residual far more than noise can.
@@ -39,7 +39,7 @@ def refine(model: Model, term: Term, noise: Noise, *, axes: bool = True) -> Term
     continuous = [p for p in parameters if not p.choices]
     for parameter in continuous:
         term = _refine_one(space, model.problem, term, parameter)
-    if not axes or term.shared or model.problem.lot.radial:
+    if term.shared or model.problem.lot.radial:
         return term
     for parameter in continuous:
         term = _per_axis(space, model.problem, term, parameter)

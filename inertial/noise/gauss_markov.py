@@ -162,12 +162,6 @@ class BiasModel:
     walk: Array
     turn_on: Array
 
-    def allan_variance(self, tau: ArrayLike) -> Array:
-        """Allan variance (3, t), g², of white noise, processes and walk together."""
-        times = np.asarray(tau, dtype=np.float64)
-        processes = self.sd**2 @ allan_variance(times[None, :], self.correlation_s[:, None])
-        return self.white[:, None] ** 2 / times + processes + self.walk[:, None] ** 2 * times / 3.0
-
 
 def bias_model(
     white: ArrayLike, instability: ArrayLike, walk: ArrayLike, turn_on: ArrayLike, flicker: FlickerTerms

@@ -60,7 +60,7 @@ class NoiseTerms:
     """Coefficients of every channel of a curve (leading dimensions), the last axis in the order of `symbols`.
 
     N is the coefficient of IEEE Std 952 (two-sided density; sigma = N/√tau, a sample has N·√rate). Data sheets give the
-    one-sided density `density_one_sided` = N·√2.
+    one-sided density N·√2.
     """
 
     symbols: tuple[str, ...]
@@ -79,11 +79,6 @@ class NoiseTerms:
     """(..., 5) coefficients of the likeliest mixture, which runs through the points whether or not its terms are identified."""
     bias_instability_bound: Array
     """(...,) min sigma / 0.664: an upper bound of B, reached only on a flat part: N and K alone report √(2.617·N·K)."""
-
-    @property
-    def density_one_sided(self) -> Array:
-        """n_d = N·√2 (...,), the one-sided noise density of data sheets, output unit/√Hz; NaN where not identified."""
-        return self.value[..., self.symbols.index("N")] * np.sqrt(2.0)
 
     @property
     def p_value(self) -> Array:

@@ -91,15 +91,13 @@ def visibilities(
     return [_visibility(n, remainders[n], error if noise is None else noise, aliases.get(n, {})) for n in names]
 
 
-def confounding(
-    state: State, base: Sequence[str], candidates: Sequence[str] | None = None
-) -> tuple[tuple[str, ...], Array]:
+def confounding(state: State, base: Sequence[str]) -> tuple[tuple[str, ...], Array]:
     """The visible effects, and the cosines (m, m) of their remaining columns with the span of the others', 0 … 1.
 
     Row by column: cosine of the row's effect with the span of the column's; the smallest over the axes where it is visible.
     """
     span = _span(state, base)
-    names = [n for n in (candidates or catalogue.catalogue()) if n not in set(base)]
+    names = [n for n in catalogue.catalogue() if n not in set(base)]
     remainders = {n: _remainder(catalogue.get(n), state, span) for n in names}
     cosines = alias_cosines({n: r for n, r in remainders.items() if r is not None and r.remaining_fraction > SEEN})
     seen = tuple(cosines)

@@ -19,14 +19,7 @@ def effective_degrees(u: Array, dof: Array) -> Array:
 
 
 def coverage_factors(dof: Array, probability: float = PROBABILITY) -> Array:
-    """:func:`coverage_factor` of every element."""
+    """K of Student's distribution for ν_eff truncated to a whole number (JCGM 100, G.4.1, table G.2); 2 for 95.45 % and ν = ∞."""
     finite = dof < _LARGEST
     whole = np.maximum(np.where(finite, dof, 1.0).astype(np.int64), 1)
     return np.where(finite, stdtrit(whole, 0.5 * (1.0 + probability)), ndtri(0.5 * (1.0 + probability)))
-
-
-def coverage_factor(dof: float, probability: float = PROBABILITY) -> float:
-    """K of Student's distribution for ν_eff truncated to a whole number (JCGM 100, G.4.1, table G.2); 2 for 95.45 % and ν = ∞."""
-    if not dof < _LARGEST:
-        return float(ndtri(0.5 * (1.0 + probability)))
-    return float(stdtrit(max(int(dof), 1), 0.5 * (1.0 + probability)))
