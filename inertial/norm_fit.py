@@ -145,7 +145,8 @@ class _Work:
     def rows(self, theta: Array) -> tuple[Array, Array]:
         """Derivatives of the residuals by the free coefficients, (units, n, k), and by the nonlinear parameters."""
         force = self.force(theta)
-        state = self._at(theta, force)
+        felt = force_along_axes(response_matrix(theta, self.names), force)
+        state = replace(self.state, force=force, felt=felt, memory={})
         columns = design.local_columns(self.sensor, state, self.values)
         columns = np.broadcast_to(columns, (len(self.output), *columns.shape[-3:]))
         direction = force / np.linalg.norm(force, axis=-1, keepdims=True)
@@ -172,11 +173,6 @@ class _Work:
             columns = design.local_columns(self.sensor, replace(state, memory={}), moved)
             ends.append(np.einsum("...jnp,...jp->...nj", columns, theta))
         return -np.sum(along * (ends[0] - ends[1]) / (2.0 * step), axis=-1)
-
-    def _at(self, theta: Array, force: Array) -> State:
-        """The dwells with their force, also along the sensor's own axes."""
-        felt = force_along_axes(response_matrix(theta, self.names), force)
-        return replace(self.state, force=force, felt=felt, memory={})
 
     def step(self, theta: Array) -> Array:
         """Change (units, 3, p) of the coefficients by the linear model about them."""

@@ -102,20 +102,16 @@ def clipped(values: ArrayLike) -> tuple[float, float, int]:
     """
     x = np.asarray(values, dtype=np.float64)
     low, high = float(x.min()), float(x.max())
+    usual = x.size / (1.0 + float(np.count_nonzero(np.diff(x))))  # mean length of runs of equal samples
     count = 0
     if low < high:
         for extreme in (low, high):
             start, stop = runs_of(x == extreme)
             long = stop - start >= _AT_LIMIT
             # noise that only touches its extreme does so in single samples
-            if np.count_nonzero(long) and np.mean((stop - start)[long]) > 2 * _usual_run(x):
+            if np.count_nonzero(long) and np.mean((stop - start)[long]) > 2 * usual:
                 count += int(np.sum((stop - start)[long]))
     return low, high, count
-
-
-def _usual_run(x: Array) -> float:
-    """Mean length of runs of equal samples."""
-    return x.size / (1.0 + float(np.count_nonzero(np.diff(x))))
 
 
 def frozen(x: ArrayLike) -> list[Frozen]:

@@ -10,9 +10,6 @@ import numpy as np
 from inertial.arrays import Array, Places
 from inertial.errors import MissingInput
 
-_DIMENSIONS = {"force": 3, "felt": 3, "output_run": 3, "slot": 1}
-"""Number of dimensions of the arrays of a lot of units; two for all others."""
-
 _REMEMBERED = 3_000_000
 """Largest number of values that a state remembers of operators with memory."""
 
@@ -126,7 +123,7 @@ class State:
     @cached_property
     def force_step(self) -> Array:
         """Change of specific force at the move before each dwell, (..., n, 3), g; zero for the first dwell."""
-        return _step(self.force, axis=-2)
+        return np.diff(self.force, axis=-2, prepend=self.force[..., :1, :])
 
     @property
     def batch(self) -> tuple[int, ...]:
@@ -164,11 +161,6 @@ class State:
                 changed[item.name] = History(value.time, value.temperature[index])
         changed["memory"] = {}
         return replace(self, **changed)
-
-
-def _step(values: Array, axis: int) -> Array:
-    first = np.take(values, [0], axis=axis)
-    return np.diff(values, axis=axis, prepend=first)
 
 
 def _slope(time: Array, values: Array) -> Array:

@@ -24,9 +24,9 @@ from scipy.linalg import solve_triangular
 from inertial import decisions
 from inertial.arrays import Array, Flags, Places
 from inertial.decisions import BLOCKS
-from inertial.estimation.alternative import Handling, soaks
+from inertial.estimation.alternative import Handling, poses, soaks
 from inertial.estimation.bases import orthonormal
-from inertial.estimation.comparison import Fitting
+from inertial.estimation.comparison import Fitting, rms
 from inertial.estimation.model import Model
 from inertial.estimation.noise_shares import LONGEST
 from inertial.estimation.problem import Problem
@@ -61,7 +61,7 @@ class LeftOut:
     def rms(self, kinds: set[Kind] | None = None) -> float:
         """The worst RMS over the kinds that can judge the model, g; NaN where none can."""
         usable: list[Kind] = [k for k in self.density if kinds is None or k in kinds]
-        return max((_rms(self.missed[k]) for k in usable), default=float("nan"))
+        return max((rms(self.missed[k]) for k in usable), default=float("nan"))
 
 
 def left_out(model: Model, judged: Term | None = None, also: Sequence[Term] = ()) -> LeftOut:
@@ -116,7 +116,7 @@ def _without_wander(model: Model, judged: Term | None) -> LeftOut:
     fold = _by_pose(problem)
     whole = np.full((problem.blocks, problem.n), np.nan)
     kept = _kept(model, judged)
-    series = problem.series
+    series = problem.y
     if kept.any():
         series = series - model.shared[..., kept] @ model.space.shared_sizes[kept]
     fitting = Fitting(problem, [t for t in model.terms if not _keeps(t, judged)])
@@ -308,12 +308,7 @@ def _folds(problem: Problem) -> dict[Kind, Places]:
 
 def _by_pose(problem: Problem) -> Places:
     """Equal poses together; dwells in turn if no pose is repeated."""
-    force = np.round(problem.lot.state.force[0], 3)
-    pose = np.unique(force, axis=0, return_inverse=True)[1].reshape(-1)
+    pose = poses(problem.lot)
     if pose.max() + 1 < 2 * _POSES:
         return np.arange(problem.n) % min(_POSES, problem.n)
     return (pose * 7) % _POSES  # neighbours on the sphere fall into different folds
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.nanmean(values**2)))

@@ -144,10 +144,9 @@ def _own_out(problem: Problem, base: Model, series: Array) -> Array:
     """Series (blocks, n), g, without the part that the base model explains by ordinary least squares."""
     level = problem.covariance.level[:, None]
     local = np.where(np.isfinite(problem.error)[..., None], base.local, 0.0) / level[..., None]
-    q = np.linalg.svd(local, full_matrices=False) if local.shape[-1] else None
-    if q is None:
+    if not local.shape[-1]:
         return series
-    u, s, _ = q
+    u, s, _ = np.linalg.svd(local, full_matrices=False)
     u = u * (s > 1e-9 * s[:, :1])[:, None, :]
     own = np.where(np.isfinite(problem.error), series, 0.0)
     return own - (u @ (np.swapaxes(u, -1, -2) @ own[..., None]))[..., 0]

@@ -144,17 +144,13 @@ class _Deletion:
             self.squares[b] -= self.left[b, dwell] ** 2 / self.size[b, dwell]
             self.dof[b] -= 1.0
             column = self.space.projector_at(b, dwell) * self.space.noise.scale[b] ** 2
-            for other in np.flatnonzero(~self.there[b] & self.space.covariance.there[b]):
-                column = column - self._held(b, int(other), dwell)
+            for gone in np.flatnonzero(~self.there[b] & self.space.covariance.there[b]).tolist():
+                first = self.space.projector_at(b, gone) * self.space.noise.scale[b] ** 2
+                column = column - first * float(first[dwell] / max(first[gone], 1e-300))
             self.left[b] -= column * off[place]
             self.size[b] = np.maximum(self.size[b] - column**2 / max(float(column[dwell]), 1e-300), 0.0)
             self.there[b, dwell] = False
         return off
-
-    def _held(self, block: int, gone: int, dwell: int) -> Array:
-        """The change of a column of P by earlier deletions."""
-        first = self.space.projector_at(block, gone) * self.space.noise.scale[block] ** 2
-        return first * float(first[dwell] / max(first[gone], 1e-300))
 
 
 def deletion_residuals(model: Model) -> Array:

@@ -112,16 +112,11 @@ def robust_fit(force: Array, output: Array, theta: Array | None = None) -> Array
         if middle <= 0.0:
             break
         # absolute values first: they reject outliers between which the biweight could remain
-        weight = (
-            np.sqrt(1.0 / np.maximum(size, 0.1 * middle)) if turn < 5 else _biweight(size / (_TUKEY * 1.5 * middle))
-        )
+        u = size / (_TUKEY * 1.5 * middle)
+        weight = np.sqrt(1.0 / np.maximum(size, 0.1 * middle)) if turn < 5 else np.where(u < 1.0, 1.0 - u**2, 0.0)
         if np.count_nonzero(weight) <= x.shape[1]:
             break
     return coefficients.T
-
-
-def _biweight(u: Array) -> Array:
-    return np.where(u < 1.0, 1.0 - u**2, 0.0)
 
 
 @dataclass(frozen=True)

@@ -121,14 +121,11 @@ class Pool:
         effect, driver = new.effects[0], new.drivers[0]
         for name in found:
             little = new.score < _REMAINDER * name.score
-            alike = set(new.effects) & set(name.effects) or self._likeness(effect, name.effects[0]) > _ALIKE
+            cosines = self.lot[:, self.places(effect)][:, :, self.places(name.effects[0])]
+            alike = set(new.effects) & set(name.effects) or np.abs(cosines).max() > _ALIKE
             if (alike and (little or driver in {MEAN, name.drivers[0]})) or (little and driver == name.drivers[0]):
                 return True
         return False
-
-    def _likeness(self, one: str, other: str) -> float:
-        """Largest cosine between columns of two effects, in sums of lots."""
-        return float(np.abs(self.lot[:, self.places(one)][:, :, self.places(other)]).max())
 
     def _fitted_out(self, lots: Sequence[ScoredLot], driver: str, effect: str) -> Sequence[ScoredLot]:
         """The lots without an effect of a driver: columns of the effect, and levels that share lots, are fitted in turns."""

@@ -22,7 +22,6 @@ from inertial.estimation.model import Model, refuse_without_freedom
 from inertial.estimation.problem import Lot, Problem
 from inertial.estimation.refinement import terms_of
 from inertial.estimation.term import with_turn_on
-from inertial.state import State
 
 LEAST_LEFT = 0.05
 """Share of its information that an effect keeps beside free errors of the station; below it, no lot can tell it from them."""
@@ -86,7 +85,7 @@ def _columns(problem: Problem, effects: Sequence[AnyEffect]) -> tuple[Array, tup
     names: list[tuple[str, int]] = []
     for effect in effects:
         try:
-            own = problem.columns(effect, _values(effect, problem.lot.state))
+            own = problem.columns(effect, starting_values([effect], problem.lot.state).get(effect.id, {}))
         except MissingInput:
             continue
         own = own[..., : effect.primary]
@@ -97,10 +96,6 @@ def _columns(problem: Problem, effects: Sequence[AnyEffect]) -> tuple[Array, tup
     if not made:
         return np.zeros((problem.blocks, problem.n, 0)), ()
     return np.concatenate(made, axis=-1), tuple(names)
-
-
-def _values(effect: AnyEffect, state: State) -> dict[str, float]:
-    return starting_values([effect], state).get(effect.id, {})
 
 
 def _scored(

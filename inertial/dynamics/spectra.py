@@ -1,4 +1,4 @@
-"""In frequency: confidence of densities, means under vibration, folding, and the second-order accelerometer."""
+"""In frequency: confidence of densities, means under vibration, folding, exciters, and the second-order accelerometer."""
 
 from typing import Any
 
@@ -9,6 +9,7 @@ from scipy.stats import chi2
 
 from inertial.arrays import Array, Complex
 
+STANDARD_GRAVITY = 9.80665  # m/s²
 HANN_HALF = 0.945
 """Independent averages per segment for a Hann window with half overlap (Welch 1967)."""
 
@@ -64,3 +65,9 @@ def bandwidth(natural_hz: float, damping: float) -> float:
     """
     q = 1.0 - 2.0 * damping**2
     return natural_hz * float(np.sqrt(q + np.sqrt(q**2 - 1.0 + 2.0)))
+
+
+def largest_level(frequency: ArrayLike, *, displacement_m: float, velocity_m_s: float, acceleration_g: float) -> Array:
+    """Largest peak acceleration in g at frequencies in Hz: the least of ω²·displacement, ω·velocity and the limit."""
+    w = 2.0 * np.pi * np.asarray(frequency, dtype=np.float64)
+    return np.minimum(np.minimum(w**2 * displacement_m, w * velocity_m_s) / STANDARD_GRAVITY, acceleration_g)

@@ -41,9 +41,8 @@ class Points:
 
     def picked(self, rows: Flags) -> "Points":
         """Some of the points."""
-        return Points(
-            self.conditions.picked(rows), self.value[rows], self.magnitude_error[rows], self.phase_error[rows]
-        )
+        own = (each[rows] for each in (self.value, self.magnitude_error, self.phase_error))
+        return Points(self.conditions.picked(rows), *own)
 
 
 @dataclass(frozen=True)
@@ -81,12 +80,13 @@ class TransferFit:
         value, error = float(self.values[k]), float(self.errors[k])
         if not self.parameters[k].log:
             return value, error, value - 1.96 * error, value + 1.96 * error
-        return (
-            value,
-            value * error,
-            value * float(np.exp(-1.96 * min(error, 20.0))),
-            value * float(np.exp(1.96 * min(error, 20.0))),
-        )
+        reach = 1.96 * min(error, 20.0)
+        return value, value * error, value * float(np.exp(-reach)), value * float(np.exp(reach))
+
+    @property
+    def known(self) -> dict[str, float]:
+        """The values of the parameters by name."""
+        return {p.name: float(v) for p, v in zip(self.parameters, self.values, strict=True)}
 
     def identified(self, name: str) -> bool:
         """Whether a log parameter is known to a fifth, or another differs from 0 by three standard uncertainties."""
@@ -205,7 +205,7 @@ def exchanged(points: Points, fit: TransferFit) -> TransferFit | None:
     """
     if not (fit.has("natural_hz") and fit.has("two_pole_hz")):
         return None
-    near = {p.name: float(v) for p, v in zip(fit.parameters, fit.values, strict=True)}
+    near = fit.known
     near |= {"natural_hz": near["two_pole_hz"], "two_pole_hz": near["natural_hz"], "damping": float(np.sqrt(0.5))}
     return fit_transfer(points, fit.effects, near, only_near=True)
 

@@ -18,5 +18,4 @@ class AgingLinear(SensorEffect):
     simplicity = 27
 
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
-        hours = state.time / 3600.0
-        return stack(state, [hours])
+        return stack(state, [state.time / 3600.0])

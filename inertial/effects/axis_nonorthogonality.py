@@ -10,6 +10,7 @@ class AxisNonorthogonality(StationEffect):
     id = "axis_nonorthogonality"
     symbol = "η"
     equation = "f = (Rx(α)·Ry(η)·Rz(β))ᵀ·up"
+    coefficients = ("axis_square",)
     source = "geometry of a two-axis table"
     typical_ug = (5.0, 2000.0)
     hides_behind = ("level_error",)
@@ -20,6 +21,3 @@ class AxisNonorthogonality(StationEffect):
         outer, inner = state.need("outer", self.id), state.need("inner", self.id)
         tipped = -np.cos(outer)
         return np.stack([tipped * np.cos(inner), -tipped * np.sin(inner), np.zeros_like(tipped)], axis=-1)[..., None]
-
-    def names(self) -> tuple[str, ...]:
-        return ("axis_square",)

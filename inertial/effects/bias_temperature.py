@@ -17,5 +17,4 @@ class BiasTemperature(SensorEffect):
     simplicity = 3
 
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
-        theta = state.need("theta", self.id)
-        return stack(state, [theta])
+        return stack(state, [state.need("theta", self.id)])

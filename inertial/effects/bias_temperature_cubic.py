@@ -18,5 +18,4 @@ class BiasTemperatureCubic(SensorEffect):
     after = ("bias_temperature",)
 
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
-        theta = state.need("theta", self.id)
-        return stack(state, [theta**3])
+        return stack(state, [state.need("theta", self.id) ** 3])

@@ -18,5 +18,4 @@ class BiasTemperatureQuadratic(SensorEffect):
     after = ("bias_temperature",)
 
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
-        theta = state.need("theta", self.id)
-        return stack(state, [theta**2])
+        return stack(state, [state.need("theta", self.id) ** 2])

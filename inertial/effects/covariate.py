@@ -5,6 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from inertial.effects.base import Array, SensorEffect, stack
+from inertial.operators import natural_spline
 from inertial.state import State
 
 COVARIATE_PREFIX = "covariate:"
@@ -49,7 +50,7 @@ class Covariate(SensorEffect):
     ) -> Array:
         """A line, and the curved functions of the spline, of the scaled column: (..., n, degree)."""
         z = (state.need(self.column, self.id) - centre) / half_range
-        return stack(state, [z, *_natural(z)][: int(degree)])
+        return stack(state, [z, *natural_spline(z, _KNOTS)][: int(degree)])
 
     def names(self, axis: int) -> tuple[str, ...]:
         """Names of the coefficients."""
@@ -59,12 +60,3 @@ class Covariate(SensorEffect):
         """Names of the coefficients that the column's values in the run allow."""
         names = self.names(axis)
         return names[: int(nonlinear.get("degree", len(names)))]
-
-
-def _natural(z: Array) -> list[Array]:
-    """Curved functions of a natural cubic spline. Hastie, Tibshirani, Friedman: Elements of Statistical Learning, eq. 5.4."""
-
-    def d(k: int) -> Array:
-        return (np.maximum(z - _KNOTS[k], 0.0) ** 3 - np.maximum(z - _KNOTS[-1], 0.0) ** 3) / (_KNOTS[-1] - _KNOTS[k])
-
-    return [d(k) - d(_KNOTS.size - 2) for k in range(_KNOTS.size - 2)]

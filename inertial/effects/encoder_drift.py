@@ -1,5 +1,3 @@
-"""Zeros of both encoders that creep during a run: ε·s, s = τ·(1 − exp(−t/τ))."""
-
 import numpy as np
 
 from inertial import frames
@@ -14,6 +12,7 @@ class EncoderDrift(StationEffect):
     id = "encoder_drift"
     symbol = "εαt, εβt"
     equation = "α + εαt·s, β + εβt·s, s = τ·(1 − exp(−t/τ))"
+    coefficients = ("outer_zero_t", "inner_zero_t")
     source = "mechanism: a coupling or a clamp that creeps"
     typical_ug = (5.0, 2000.0)
     hides_behind = ("outer_encoder_offset", "slot_rotation", "misalignment_temperature")
@@ -27,6 +26,3 @@ class EncoderDrift(StationEffect):
         by_outer = frames.to_fixture((0.0, 1.0, 0.0), outer, inner)
         by_inner = np.stack([force[..., 1], -force[..., 0], np.zeros_like(inner)], axis=-1)
         return np.stack([by_outer, by_inner], axis=-1) * approach(state.time / 3600.0, settling_h)[..., None, None]
-
-    def names(self) -> tuple[str, ...]:
-        return "outer_zero_t", "inner_zero_t"

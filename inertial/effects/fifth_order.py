@@ -17,5 +17,4 @@ class FifthOrder(SensorEffect):
     sharp = True
 
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
-        f = state.along(axis)
-        return stack(state, [f**5])
+        return stack(state, [state.along(axis) ** 5])

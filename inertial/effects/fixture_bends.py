@@ -10,6 +10,7 @@ class FixtureBends(StationEffect):
     id = "fixture_bends"
     symbol = "ρT"
     equation = "f + θ·f×ρT"
+    coefficients = tuple(f"rhoT_{axis}" for axis in AXES)
     source = "mechanism: thermal strain of plate and screws"
     typical_ug = (5.0, 2000.0)
     hides_behind = ("misalignment_temperature",)
@@ -19,6 +20,3 @@ class FixtureBends(StationEffect):
     def force_change(self, state: State, **nonlinear: float) -> Array:
         theta = state.need("theta", self.id)
         return np.stack([theta[..., None] * np.cross(state.force, way) for way in np.eye(3)], axis=-1)
-
-    def names(self) -> tuple[str, ...]:
-        return tuple(f"rhoT_{axis}" for axis in AXES)

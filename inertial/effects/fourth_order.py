@@ -17,5 +17,4 @@ class FourthOrder(SensorEffect):
     sharp = True
 
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
-        f = state.along(axis)
-        return stack(state, [f**4])
+        return stack(state, [state.along(axis) ** 4])

@@ -1,5 +1,3 @@
-"""Floor or base of the station that gives way: up = (δ1t·s, δ2t·s, 1), s = τ·(1 − exp(−t/τ))."""
-
 import numpy as np
 
 from inertial import frames
@@ -14,6 +12,7 @@ class LevelDrift(StationEffect):
     id = "level_drift"
     symbol = "δ1t, δ2t"
     equation = "f = R(α, β)ᵀ·(δ1t·s, δ2t·s, 1), s = τ·(1 − exp(−t/τ))"
+    coefficients = ("level_1t", "level_2t")
     source = "mechanism: a foundation or feet that creep under load"
     typical_ug = (5.0, 2000.0)
     hides_behind = ("base_tilts", "level_error", "misalignment_temperature")
@@ -25,6 +24,3 @@ class LevelDrift(StationEffect):
         outer, inner = state.need("outer", self.id), state.need("inner", self.id)
         ways = [frames.to_fixture(v, outer, inner) for v in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))]
         return np.stack(ways, axis=-1) * approach(state.time / 3600.0, settling_h)[..., None, None]
-
-    def names(self) -> tuple[str, ...]:
-        return "level_1t", "level_2t"

@@ -18,5 +18,4 @@ class OuterEncoderOffset(StationEffect):
 
     def force_change(self, state: State, **nonlinear: float) -> Array:
         outer, inner = state.need("outer", self.id), state.need("inner", self.id)
-        turned = frames.to_fixture((0.0, 1.0, 0.0), outer, inner)
-        return turned[..., None]
+        return frames.to_fixture((0.0, 1.0, 0.0), outer, inner)[..., None]

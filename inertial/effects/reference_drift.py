@@ -11,6 +11,7 @@ class ReferenceDrift(StationEffect):
     id = "reference_drift"
     symbol = "εt"
     equation = "f·(1 + εt·s), s = τ·(1 − exp(−t/τ))"
+    coefficients = ("epsilon_t",)
     source = "mechanism: warm-up or ageing of the voltage reference of the reader"
     typical_ug = (1.0, 1000.0)
     hides_behind = ("scale_temperature", "scale_aging")
@@ -20,6 +21,3 @@ class ReferenceDrift(StationEffect):
 
     def force_change(self, state: State, *, settling_h: float, **nonlinear: float) -> Array:
         return approach(state.time / 3600.0, settling_h)[..., None, None] * state.force[..., None]
-
-    def names(self) -> tuple[str, ...]:
-        return ("epsilon_t",)

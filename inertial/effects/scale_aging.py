@@ -18,5 +18,4 @@ class ScaleAging(SensorEffect):
     sharp = True
 
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
-        hours = state.time / 3600.0
-        return stack(state, [hours * state.along(axis)])
+        return stack(state, [state.time / 3600.0 * state.along(axis)])

@@ -19,5 +19,4 @@ class ScaleAsymmetry(SensorEffect):
     sharp = True
 
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
-        f = state.along(axis)
-        return stack(state, [np.abs(f)])
+        return stack(state, [np.abs(state.along(axis))])

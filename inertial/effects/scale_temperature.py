@@ -17,5 +17,4 @@ class ScaleTemperature(SensorEffect):
     sharp = True
 
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
-        theta = state.need("theta", self.id)
-        return stack(state, [theta * state.along(axis)])
+        return stack(state, [state.need("theta", self.id) * state.along(axis)])

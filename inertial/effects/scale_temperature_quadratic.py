@@ -18,5 +18,4 @@ class ScaleTemperatureQuadratic(SensorEffect):
     after = ("scale_temperature",)
 
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
-        theta = state.need("theta", self.id)
-        return stack(state, [theta**2 * state.along(axis)])
+        return stack(state, [state.need("theta", self.id) ** 2 * state.along(axis)])

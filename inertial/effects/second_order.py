@@ -17,5 +17,4 @@ class SecondOrder(SensorEffect):
     sharp = True
 
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
-        f = state.along(axis)
-        return stack(state, [f**2])
+        return stack(state, [state.along(axis) ** 2])

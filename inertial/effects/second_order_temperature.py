@@ -18,5 +18,4 @@ class SecondOrderTemperature(SensorEffect):
 
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
         theta = state.need("theta", self.id)
-        f = state.along(axis)
-        return stack(state, [theta * f**2])
+        return stack(state, [theta * state.along(axis) ** 2])

@@ -17,5 +17,4 @@ class ThirdOrder(SensorEffect):
     sharp = True
 
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
-        f = state.along(axis)
-        return stack(state, [f**3])
+        return stack(state, [state.along(axis) ** 3])

@@ -18,5 +18,4 @@ class VibrationRectification(SensorEffect):
     simplicity = 34
 
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
-        vibration = state.need("vibration", self.id)
-        return stack(state, [vibration**2])
+        return stack(state, [state.need("vibration", self.id) ** 2])

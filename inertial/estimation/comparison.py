@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from inertial.arrays import Array, Flags
+from inertial.estimation.bases import unit_columns
 from inertial.estimation.model import Model
 from inertial.estimation.problem import Problem
 from inertial.estimation.term import Term
@@ -33,9 +34,7 @@ def estimate(model: Model) -> Estimate:
     space = model.space
     x, z = space.local, space.whiten(model.shared)
     y = space.whiten(model.problem.y[..., None])[..., 0]
-    size = np.sqrt(np.einsum("bnp,bnp->bp", x, x))
-    size = np.where(size > 0.0, size, 1.0)
-    unit = x / size[:, None, :]
+    unit, size = unit_columns(x)
     inverse: Array = np.linalg.pinv(np.swapaxes(unit, -1, -2) @ unit, rcond=CONDITION, hermitian=True).astype(
         np.float64
     )
@@ -116,7 +115,7 @@ def residuals_of(problem: Problem, fit: Estimate) -> Array:
     """Residuals (blocks, n) in g of a problem under given coefficients; NaN where a dwell is missing."""
     local = [t for t in fit.terms if not t.shared]
     shared = [t for t in fit.terms if t.shared]
-    left = problem.series - np.einsum("bnp,bp->bn", _with_start(problem, local), fit.local)
+    left = problem.y - np.einsum("bnp,bp->bn", _with_start(problem, local), fit.local)
     if shared:
         left -= _with_start(problem, shared) @ fit.shared
     return np.where(np.isfinite(problem.error), left, np.nan)
@@ -146,7 +145,7 @@ def residuals(problem: Problem, terms: Sequence[Term], train: Flags) -> Array:
     ----------
     train : (n,), dwells that are fitted; all are predicted
     """
-    left = Fitting(problem, terms).left(problem.series[..., None], train)[..., 0]
+    left = Fitting(problem, terms).left(problem.y[..., None], train)[..., 0]
     return np.where(np.isfinite(problem.error), left, np.nan)
 
 
@@ -185,16 +184,14 @@ def fitted_residuals(model: Model) -> Array:
     if problem.lot.radial:
         return residuals_of(problem, estimate(model))
     fitting = Fitting(problem, model.terms, start=True)
-    left = fitting.left(problem.series[..., None], np.ones(problem.n, dtype=bool))[..., 0]
+    left = fitting.left(problem.y[..., None], np.ones(problem.n, dtype=bool))[..., 0]
     return np.where(np.isfinite(problem.error), left, np.nan)
 
 
 def _solver(x: Array, weight: Array) -> Callable[[Array], Array]:
     """What gives the coefficients (blocks, p, m) of weighted least squares on columns (blocks, n, p) for targets (..., m)."""
-    weighted = x * weight[..., None]
-    size = np.sqrt(np.einsum("bnp,bnp->bp", weighted, weighted))
-    size = np.where(size > 0.0, size, 1.0)
-    across = np.swapaxes(weighted / size[:, None, :], -1, -2)
+    unit, size = unit_columns(x * weight[..., None])
+    across = np.swapaxes(unit, -1, -2)
     inverse = np.linalg.pinv(across @ np.swapaxes(across, -1, -2), rcond=1e-9, hermitian=True)
     return lambda target: (inverse @ (across @ (target * weight[..., None]))) / size[..., None]
 

@@ -43,6 +43,12 @@ def _lattice(shares: Shares) -> tuple[int | None, ...]:
     return tuple(None if s <= 0.0 else round(SHARE_STEP * np.log10(s)) for s in (shares.flicker, shares.walk))
 
 
+def _pieces(members: Places, size: int) -> list[Places]:
+    """Members in pieces whose values, each of some size, are worked on at a time."""
+    few = max(PIECE // max(size, 1), 1)
+    return np.split(members, range(few, members.size, few))
+
+
 def _about_mean(covariance: Array) -> float:
     n = max(len(covariance), 1)
     return float(np.trace(covariance) / n - covariance.sum() / n**2)
@@ -183,9 +189,8 @@ class Covariance:
         """Columns (blocks, n, m) of all or some blocks with white noise of variance s² in them; zero where a dwell is missing."""
         level = self.level if blocks is None else self.level[blocks]
         out = np.empty(columns.shape)
-        few = max(PIECE // max(columns[0].size, 1), 1)
         for members, whitener in self._by_whitener(shares, blocks):
-            for some in np.split(members, range(few, members.size, few)):
+            for some in _pieces(members, columns[0].size):
                 out[some] = whitener.columns(columns[some] / level[some, None, None])
         return out
 
@@ -195,9 +200,8 @@ class Covariance:
 
     def coloured(self, noise: Noise, drawn: Array) -> Array:
         """Series (blocks, m, n), g, with this noise, in place of independent normal numbers; zero where a dwell is missing."""
-        few = max(PIECE // max(drawn[0].size, 1), 1)
         for members, whitener in self._by_whitener(noise.shares):
-            for some in np.split(members, range(few, members.size, few)):
+            for some in _pieces(members, drawn[0].size):
                 drawn[some] = whitener.coloured(drawn[some]) * (self.level * noise.scale)[some, None, None]
         return drawn
 
@@ -212,9 +216,8 @@ class Covariance:
     def back(self, rows: Array, shares: Shares, blocks: Places | None = None) -> Array:
         """Rows (blocks, k, n) of whitened series of all or some blocks times the whiteners, for white noise of variance one."""
         out = np.empty(rows.shape)
-        few = max(PIECE // max(rows[0].size, 1), 1)
         for own, whitener in self._by_whitener(shares, blocks):
-            for some in np.split(own, range(few, own.size, few)):
+            for some in _pieces(own, rows[0].size):
                 out[some] = whitener.back(rows[some])
         return out
 
@@ -294,9 +297,8 @@ def _products_of(candidate: Candidate, level: Array, groups: Iterable[tuple[Plac
     out = np.empty((level.size, grid, p, p))
     for own, whitener in groups:
         rows, back = np.unique(row_of[own], return_inverse=True)
-        few = max(PIECE // columns[0].size, 1)
-        parts = np.split(rows, range(few, rows.size, few))
-        out[own] = np.concatenate([_squares(columns[some], whitener) for some in parts])[back]
+        parts = [_squares(columns[some], whitener) for some in _pieces(rows, columns[0].size)]
+        out[own] = np.concatenate(parts)[back]
     return out / level[:, None, None, None] ** 2
 
 

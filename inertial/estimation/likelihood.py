@@ -15,6 +15,7 @@ from inertial.decisions import TOGETHER, UNITS_TOGETHER
 from inertial.design import of_axes
 from inertial.distributions import chi2_quantile
 from inertial.estimation.alternative import Handling, by_block, tilts
+from inertial.estimation.bases import unit_columns
 from inertial.estimation.comparison import estimate, residuals
 from inertial.estimation.model import Model
 from inertial.estimation.noise_shares import Noise, deviance_of
@@ -166,8 +167,7 @@ def along_mean(model: Model, noise: Noise, term: Term) -> float:
         return 1.0
     space = model.at(noise)
     columns = space.project(space.whiten(term.candidate(model.problem).of_blocks[:, :, 0, :]))
-    size = np.sqrt(np.einsum("bnp,bnp->bp", columns, columns))
-    unit = columns / np.where(size > 0.0, size, 1.0)[:, None, :]
+    unit = unit_columns(columns)[0]
     inverse = np.linalg.pinv(np.swapaxes(unit, -1, -2) @ unit, rcond=1e-4, hermitian=True)
     fitted = (unit @ (inverse @ (np.swapaxes(unit, -1, -2) @ space.residual[..., None])))[..., 0]
     fitted = fitted.reshape(units, model.problem.per_unit, -1)

@@ -81,16 +81,8 @@ class Problem:
         self._kept: dict[tuple[object, ...], Candidate] = {}
         self._terms: dict[tuple[object, ...], Array] = {}
         self._room = _CACHE
-        self._deviances: dict[frozenset[tuple[object, ...]], KnownDeviances] = {}
-
-    def deviances_of(self, terms: frozenset[tuple[object, ...]]) -> KnownDeviances:
-        """What is known of the models whose terms have these keys."""
-        return self._deviances.setdefault(terms, KnownDeviances())
-
-    @property
-    def series(self) -> Array:
-        """Measurements (blocks, n), g."""
-        return self.y
+        self.deviances: dict[frozenset[tuple[object, ...]], KnownDeviances] = {}
+        """What is known of models, by the keys of their terms."""
 
     @cached_property
     def covariance(self) -> Covariance:

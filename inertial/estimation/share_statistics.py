@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from inertial.arrays import Array, Places
-from inertial.estimation.bases import SEEN
+from inertial.estimation.bases import SEEN, unit_columns
 from inertial.estimation.candidate import shared_rows
 from inertial.estimation.covariance import PIECE
 from inertial.estimation.noise_shares import Shares
@@ -117,9 +117,7 @@ class ShareStatistics:
     def _after_plain_fit(self, series: Array) -> Array:
         """What the columns with coefficients by block leave of series (blocks, n, k) in a fit of equal weights."""
         there = self.problem.covariance.there[..., None]
-        own = self._determined * there
-        size = np.sqrt(np.einsum("bnp,bnp->bp", own, own))
-        unit = own / np.where(size > 0.0, size, 1.0)[:, None, :]
+        unit = unit_columns(self._determined * there)[0]
         across = np.swapaxes(unit, -1, -2)
         fitted = unit @ (np.linalg.pinv(across @ unit, rcond=1e-12, hermitian=True) @ (across @ series))
         return (series - fitted) * there

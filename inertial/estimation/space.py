@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from inertial.arrays import Array, Flags, Places
-from inertial.estimation.bases import SEEN, basis, eigen, schur
+from inertial.estimation.bases import SEEN, basis, eigen, inverse_roots, schur
 from inertial.estimation.candidate import Candidate, times_rows
 from inertial.estimation.covariance import Covariance
 from inertial.estimation.noise_shares import Noise
@@ -212,10 +212,8 @@ class Space:
         size = np.sqrt(found.squares)
         size = np.where(size > 0.0, size, 1.0)
         values, vectors = eigen(found.left / (size[..., :, None] * size[..., None, :]))
-        seen = values > SEEN**2
-        scale = np.where(seen, 1.0 / np.sqrt(np.where(seen, values, 1.0)), 0.0)
         along = np.swapaxes(vectors, -1, -2) @ (found.inside / size[..., None])
-        return self._gain_along(along * scale[..., None], seen)
+        return self._gain_along(along * inverse_roots(values, SEEN**2)[..., None], values > SEEN**2)
 
     def gain_of_dwells(self, columns: Array, places: Places) -> Gain:
         """Gain of columns of one dwell each, for every dwell separately; all blocks share their coefficients.

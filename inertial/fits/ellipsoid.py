@@ -114,7 +114,9 @@ def fit_ellipsoid(
         )
     flat = a.reshape(-1, n, 3)
     rise = np.broadcast_to(heat - reference[..., None], (*lead, n)).reshape(-1, n)
-    problem = _Sphere(flat, rise, norm, _which(free, free_heat))
+    # of bias (3), C (6) and temperature offset (3)
+    chosen = np.concatenate([np.arange(free), 9 + np.arange(free_heat)]).astype(np.int64)
+    problem = _Sphere(flat, rise, norm, chosen)
     theta = problem.solve(problem.algebraic())
     dof = n - free - free_heat
     noises: tuple[NormNoise, ...] = ()
@@ -166,11 +168,6 @@ def _with_wander(problem: "_Sphere", theta: Array, time: Array, error: Array) ->
         theta = problem.solve(theta)
     problem.whiten = None
     return theta, noises
-
-
-def _which(free: int, free_heat: int) -> Index:
-    """Indices of the free parameters among bias (3), C (6), temperature offset (3)."""
-    return np.concatenate([np.arange(free), 9 + np.arange(free_heat)]).astype(np.int64)
 
 
 def _unpack(theta: Array) -> tuple[Array, Array, Array]:

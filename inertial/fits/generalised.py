@@ -243,13 +243,11 @@ class Restricted:
         Kept, since the grids of one likelihood share some of their strengths.
         """
         if share not in self._bases:
-            self._bases[share] = self._basis_at(share)
+            shrink = 1.0 / np.sqrt(1.0 + share * self._second)
+            values, vectors = np.linalg.eigh(shrink[:, None] * self._first * shrink)
+            volume = self._volume - 2.0 * float(np.log(shrink).sum())
+            self._bases[share] = np.maximum(values, 0.0), (shrink[:, None] * vectors).T, volume
         return self._bases[share]
-
-    def _basis_at(self, share: float) -> tuple[Array, Array, float]:
-        shrink = 1.0 / np.sqrt(1.0 + share * self._second)
-        values, vectors = np.linalg.eigh(shrink[:, None] * self._first * shrink)
-        return np.maximum(values, 0.0), (shrink[:, None] * vectors).T, self._volume - 2.0 * float(np.log(shrink).sum())
 
     def _products(self, piece: Array, turn: Array, weight: Array) -> Array:
         """Products (k, pairs, b) of the columns (m, p + 1, b) of some blocks, weighted for every share."""

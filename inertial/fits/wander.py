@@ -235,7 +235,7 @@ def _solve(series: Series) -> tuple[tuple[float, float], Solved]:
     The scatter of the samples is a lower bound: where less than it is left, the fit is the weighted one.
     """
     shares, solved = _prudent(series, series.best_shares())
-    middle = _median(series.dof) / np.median(solved.squares)
+    middle = float(chi2_quantile(0.5, series.dof)) / np.median(solved.squares)
     lacking = lack_of_fit(solved.squares * middle, series.dof) > 1.0
     if lacking.any() and not lacking.all():
         series.sound = ~lacking
@@ -282,12 +282,6 @@ def _scattered(series: Series, solved: Solved) -> bool:
 def _exceeded(probability: float, dof: int) -> float:
     """The χ² of ``dof`` degrees of freedom that is exceeded with a probability."""
     return float(chi2_upper(probability, dof))
-
-
-@lru_cache(maxsize=1024)
-def _median(dof: int) -> float:
-    """The median χ² of ``dof`` degrees of freedom."""
-    return float(chi2_quantile(0.5, dof))
 
 
 def _known(series: Series, shares: tuple[float, float], solved: Solved) -> float:

@@ -125,7 +125,8 @@ def courses(state: State, reach: TableReach, best: Sequence[SequenceStep], here:
     best : poses that separate the rivals by their directions; some are used if any pose is suitable
     here : °C, present temperature of the chamber
     """
-    chosen = _spread(best, reach, here)
+    faces = [SequenceStep(0.0, 0.0, here, reach.settle), SequenceStep(np.pi, 0.0, here, reach.settle)]
+    chosen = [*faces, *(replace(s, temperature=here) for s in best[:2])]
     sequences = [
         *_waits(here),
         *_approaches(state, reach, here, chosen),
@@ -139,12 +140,6 @@ def courses(state: State, reach: TableReach, best: Sequence[SequenceStep], here:
             *_ramps(*reach.temperature, here, chosen),
         ]
     return [c for c in sequences if c.steps and all(reach.allows(s) for s in c.steps)]
-
-
-def _spread(best: Sequence[SequenceStep], reach: TableReach, here: float) -> list[SequenceStep]:
-    """Two opposed faces, and the two best poses."""
-    faces = [SequenceStep(0.0, 0.0, here, reach.settle), SequenceStep(np.pi, 0.0, here, reach.settle)]
-    return [*faces, *(replace(s, temperature=here) for s in best[:2])]
 
 
 def _waits(here: float) -> list[StepSequence]:

@@ -95,15 +95,11 @@ class BiasFilter:
         if key not in self._steps:
             if len(self._steps) >= _MOST_STEPS:
                 self._steps.clear()
-            self._steps[key] = self._transition(seconds, mean=averaged_s > 0.0)
+            transitions, added = transitions_by_axis(self.model, seconds, mean=averaged_s > 0.0)
+            self._steps[key] = _blocks(list(transitions)), _blocks(list(added))
         phi, grown = self._steps[key]
         self._x = phi @ self._x
         self._p = phi @ self._p @ phi.T + grown
-
-    def _transition(self, seconds: float, *, mean: bool) -> tuple[Array, Array]:
-        """Transition and added covariance, both (3w, 3w), of a time, whose mean or whose end is the bias."""
-        transitions, added = transitions_by_axis(self.model, seconds, mean=mean)
-        return _blocks(list(transitions)), _blocks(list(added))
 
     def known_force(self, difference: Array, seconds: float) -> None:
         """Updates with corrected output minus true force (3,), g, each a mean over ``seconds``."""

@@ -116,10 +116,8 @@ class _Curve:
         starts += [np.where(np.arange(free.size) == k, self._ceiling, self.strengths) for k in (2, 3, 4) if k != j]
         for start in starts:
             start[j] = strength
-        return min(self._deviance(free, self._seeded(start)) for start in starts) - self.best
-
-    def _deviance(self, free: Flags, start: Array) -> float:
-        return mixture.deviance(self.variance, self.moments, free, start)[0]
+        tried = (mixture.deviance(self.variance, self.moments, free, self._seeded(start))[0] for start in starts)
+        return min(tried) - self.best
 
     def worth(self, j: int) -> float:
         """Chi-square that the curve is worse without term j; computed once, whichever other terms are allowed meanwhile."""

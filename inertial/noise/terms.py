@@ -135,7 +135,8 @@ def fit_terms(curve: AllanCurve, *, confidence: float = 0.95) -> NoiseTerms:
     variances = (curve.deviation**2).reshape(-1, curve.m.size)
     rows = [profiles.fit_terms(variance, moments, float(chi2_quantile(confidence, 1))) for variance in variances]
     lead = curve.deviation.shape[:-1]
-    scale = np.sqrt(_per_sample(curve.rate_hz))
+    rate = curve.rate_hz
+    scale = np.sqrt(np.array([1.0 / rate**2, 1.0 / rate, 1.0, rate, rate**2]))  # per unit strength in samples
 
     def coefficients(strengths: list[Array]) -> Array:
         return np.sqrt(np.stack(strengths)).reshape(*lead, count) * scale
@@ -158,8 +159,3 @@ def model_deviation(terms: NoiseTerms, tau: Array) -> Array:
     q, n, b, k, r = np.moveaxis(terms.mixture, -1, 0)[..., None]
     flat = (FLICKER_FLOOR * b) ** 2
     return np.sqrt(3.0 * q**2 / tau**2 + n**2 / tau + flat + k**2 * tau / 3.0 + r**2 * tau**2 / 2.0)
-
-
-def _per_sample(rate_hz: float) -> Array:
-    """Squares of the coefficients Q, N, B, K, R per unit strength in samples."""
-    return np.array([1.0 / rate_hz**2, 1.0 / rate_hz, 1.0, rate_hz, rate_hz**2])

@@ -1,4 +1,4 @@
-"""Groups compared, and what stands out of a population."""
+"""Groups compared, what stands out of a population, and the agreement of two results."""
 
 from dataclasses import dataclass
 
@@ -10,6 +10,7 @@ from scipy.stats import t as student
 from inertial.arrays import Array, Index
 from inertial.population.memory import TO_SIGMA
 
+COVERAGE = 2.0
 MAD_EFFICIENCY = 0.37  # Rousseeuw and Croux 1993, J. Am. Stat. Assoc. 88, 1273
 
 
@@ -103,3 +104,17 @@ def outlier_limit(n: int, known_from: int | None = None, level: float = 0.01) ->
     """
     tail = 0.5 * level / max(n, 1)
     return float(norm.isf(tail) if known_from is None else student.isf(tail, max(MAD_EFFICIENCY * known_from, 1.0)))
+
+
+def e_n(new: Array, old: Array, new_error: Array, old_error: Array, dof: Array | float = np.inf) -> Array:
+    """The E_n number of two results: their difference over the root sum of squares of their expanded uncertainties.
+
+    |E_n| ≤ 1 agrees (ISO/IEC 17043:2010, B.3.1.3; ISO 13528:2015, 9.7). Standard uncertainties are given. Their coverage factor
+    is 2, or larger where they are known from few values: Student's for the same 95.45 % (JCGM 100, G.4).
+
+    Parameters
+    ----------
+    dof : effective degrees of freedom of the combined uncertainty, infinite where it is known
+    """
+    coverage = np.where(np.isinf(dof), COVERAGE, student.isf(norm.sf(COVERAGE), np.maximum(dof, 1.0)))
+    return (new - old) / (coverage * np.sqrt(new_error**2 + old_error**2))

@@ -6,6 +6,7 @@ encoder errors add to the angles; the seat turns the fixture's slot; the thermom
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -43,19 +44,11 @@ class Errors:
 
     def times(self, size: float) -> "Errors":
         """The same errors, scaled."""
-        x, y, z = self.seat
-        a, b, c = self.offset
-        return Errors(
-            gravity=size * self.gravity,
-            level=(size * self.level[0], size * self.level[1]),
-            orthogonality=size * self.orthogonality,
-            outer=size * self.outer,
-            inner=size * self.inner,
-            temperature=size * self.temperature,
-            seat=(size * x, size * y, size * z),
-            gain=size * self.gain,
-            offset=(size * a, size * b, size * c),
-        )
+        scaled: dict[str, Any] = {
+            name: tuple(size * v for v in value) if isinstance(value, tuple) else size * value
+            for name, value in vars(self).items()
+        }
+        return Errors(**scaled)
 
 
 @dataclass(frozen=True)

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from inertial.population.agreement import e_n
 from inertial.population.capability import cpk, fraction_interval
-from inertial.population.comparison import compare, holm, sigma_of
+from inertial.population.comparison import compare, e_n, holm, sigma_of
 from inertial.population.control_charts import (
     EWMA_RUN_LENGTH,
     EWMA_WEIGHT,

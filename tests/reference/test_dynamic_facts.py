@@ -6,7 +6,6 @@ from scipy.signal import lsim
 
 from inertial.dynamics import (
     centrifuge,
-    exciter,
     pulses,
     random_vibration,
     shock_spectrum,
@@ -159,7 +158,7 @@ def test_overall_level_and_the_hann_mean(rng: np.random.Generator) -> None:
 
 def test_limits_of_the_exciter_decide_the_level() -> None:
     for stroke, start in ((0.005, 15.8), (0.0127, 9.9), (0.0254, 7.0)):
-        level = exciter.largest_level(start, displacement_m=stroke, velocity_m_s=10.0, acceleration_g=50.0)
+        level = spectra.largest_level(start, displacement_m=stroke, velocity_m_s=10.0, acceleration_g=50.0)
         assert level == pytest.approx(5.0, rel=0.01)
 
 

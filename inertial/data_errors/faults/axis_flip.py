@@ -1,5 +1,3 @@
-"""Axes in another order, or inverted."""
-
 from collections.abc import Iterator
 from itertools import permutations
 

@@ -1,5 +1,3 @@
-"""Time that runs backwards."""
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,5 +1,3 @@
-"""An axis that does not respond to gravity."""
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,5 +1,3 @@
-"""Dwells with fewer samples than they should have."""
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,5 +1,3 @@
-"""Outputs in steps that are coarser than the noise."""
-
 from collections.abc import Iterator
 
 import numpy as np

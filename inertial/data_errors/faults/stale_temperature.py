@@ -1,5 +1,3 @@
-"""A thermometer that repeats itself."""
-
 from collections.abc import Iterator
 
 import numpy as np

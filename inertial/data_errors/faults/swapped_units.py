@@ -1,5 +1,3 @@
-"""Single dwells that two units have of each other."""
-
 from collections.abc import Iterator
 
 import numpy as np

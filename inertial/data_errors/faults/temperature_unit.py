@@ -1,5 +1,3 @@
-"""Temperatures in a unit other than °C."""
-
 from collections.abc import Iterator
 
 import numpy as np

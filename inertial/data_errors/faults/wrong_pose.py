@@ -1,5 +1,3 @@
-"""Dwells in another pose than the one commanded."""
-
 from collections.abc import Iterator
 
 import numpy as np
