@@ -15,9 +15,8 @@ from inertial.criticism.examination import Named, worst
 from inertial.criticism.field import Candidates, Rival
 from inertial.criticism.influence import CarriedEvidence, carried_by, influence
 from inertial.criticism.left_out import left_out
-from inertial.criticism.smallest import Smallest, smallest_named
 from inertial.criticism.unknown import Unexplained
-from inertial.criticism.unseen import unseen
+from inertial.criticism.unseen import Smallest, smallest_named, unseen
 from inertial.criticism.verdict import judged
 from inertial.data_errors.removed_dwells import BadDwell, model_without
 from inertial.decisions import ADEQUATE_ABOVE

@@ -71,7 +71,6 @@ def fit_shock(record: ShockRecord, effects: Sequence[str], rows: Sequence[Flags]
     """
     duration = record.duration_s
     parameters = [(name, p) for name in effects for p in EFFECTS[name].parameters(duration)]
-    coordinates = Coordinates([p for _, p in parameters])
     used = [np.ones(len(one.unit), dtype=bool) for one in record.shocks] if rows is None else list(rows)
     count = sum(int(one.sum()) for one in used)
     if count < len(effects) + len(parameters) + 2:
@@ -81,6 +80,7 @@ def fit_shock(record: ShockRecord, effects: Sequence[str], rows: Sequence[Flags]
     whole = np.concatenate(used)
     target = np.concatenate([one.unit / one.error for one in record.shocks])[whole]
     model = Design(record, effects, parameters)
+    coordinates = model.coordinates
 
     def design(x: Array) -> Array:
         return model.at(x)[whole]
@@ -112,10 +112,10 @@ def fit_shock(record: ShockRecord, effects: Sequence[str], rows: Sequence[Flags]
 def predicted(record: ShockRecord, fit: ShockFit) -> float:
     """Rms residual of shocks that were not fitted, in % of the peak: sensitivity and effects applied to the reference."""
     parameters = [(name, p) for name in fit.effects for p in EFFECTS[name].parameters(record.duration_s)]
-    x = Coordinates([p for _, p in parameters]).of(np.array([fit.parameters[p.name][0] for _, p in parameters]))
+    model = Design(record, fit.effects, parameters)
+    x = model.coordinates.of(np.array([fit.parameters[p.name][0] for _, p in parameters]))
     c = np.array([fit.sensitivity, *(value for value, _ in fit.coefficients.values())])
-    left = _residuals(record, Design(record, fit.effects, parameters).at(x), c)
-    return residual_percent(record, left)
+    return residual_percent(record, _residuals(record, model.at(x), c))
 
 
 class Design:

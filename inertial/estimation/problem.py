@@ -201,7 +201,7 @@ class Problem:
         first : how many columns an axis; all if None
         """
         key = (effect.id, len(grid), tuple(grid[0].items()), tuple(grid[-1].items()), first)
-        return self._stored(key, lambda: self._made(effect, grid, first, key))
+        return self._stored(key, lambda: self.varied(effect, grid, first=first, key=key))
 
     def _stored(self, key: tuple[object, ...], make: Callable[[], Candidate]) -> Candidate:
         """A candidate, made where it is not kept, and kept where its columns have room."""
@@ -219,26 +219,21 @@ class Problem:
         return max(1, _WIDE // (1 + self.blocks * self.n * _WIDEST))
 
     def varied(
-        self, effect: AnyEffect | Handling, grid: Sequence[Values], *, first: int | None = None, start: bool = False
+        self,
+        effect: AnyEffect | Handling,
+        grid: Sequence[Values],
+        *,
+        first: int | None = None,
+        start: bool = False,
+        key: object = None,
     ) -> Candidate:
-        """The same for values that are tried once: nothing of them is kept.
+        """The same for values that are tried once: nothing of them is kept. Rows that blocks share are stored once.
 
         Parameters
         ----------
         start : whether columns of the unknown state of a memory follow
+        key : of the candidate
         """
-        return self._made(effect, grid, first, None, start=start)
-
-    def _made(
-        self,
-        effect: AnyEffect | Handling,
-        grid: Sequence[Values],
-        first: int | None,
-        key: object,
-        *,
-        start: bool = False,
-    ) -> Candidate:
-        """Columns over values, those of one value after another: rows that blocks share are stored once."""
         shared = effect.scope in SHARED
         every: list[Array] = []
         rows_of: list[Places | None] = []

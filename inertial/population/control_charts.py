@@ -16,9 +16,6 @@ RULES = (
     "four of five points beyond 1σ on one side",
     "eight points in a row on one side",
 )
-IN_CONTROL_RUN_LENGTH = (
-    91.75  # points between false signals of the four rules together (Champ and Woodall 1987, table 1)
-)
 CHARTS_SIMULATED = 6000
 IN_THE_TAIL = 0.02  # share of the simulated charts that the tail is known from
 SURELY_BELOW = 0.8
@@ -26,7 +23,6 @@ SURELY_BELOW = 0.8
 0.92 (500 series in control with ρ = 0.6; 40, 100 and 150 points): at most 1.4 % have p < 0.01. With 0.8: at most 1.0 % (10, 20
 and 40 points of the baseline)."""
 EWMA_WEIGHT, EWMA_WIDTH = 0.2, 2.962
-EWMA_RUN_LENGTH = 500.0  # of these two (Lucas and Saccucci 1990; Montgomery, table 9.11)
 
 
 @dataclass(frozen=True)

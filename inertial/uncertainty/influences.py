@@ -86,12 +86,11 @@ class Sensitivity:
     """Change of the outputs per standard uncertainty of every influence.
 
     changes : (..., n, 3, q), output unit: J·u
-    contributions, scopes, dof, seen : of the q columns
+    contributions, dof, seen : of the q columns
     """
 
     changes: Array
     contributions: tuple[str, ...]
-    scopes: tuple[str, ...]
     dof: tuple[float, ...]
     seen: tuple[bool, ...]
 
@@ -180,7 +179,6 @@ def sensitivity(
     return Sensitivity(
         changes,
         tuple(one.contribution for one in sources),
-        tuple(one.scope for one in sources),
         tuple(one.dof for one in sources),
         tuple(one.seen for one in sources),
     )

@@ -8,7 +8,6 @@ from inertial.dynamics import (
     centrifuge,
     pulses,
     random_vibration,
-    shock_spectrum,
     sine_fit,
     spectra,
     stability,
@@ -74,7 +73,7 @@ def test_shock_response_spectrum_of_the_half_sine(q: float) -> None:
     products = np.array([0.1, 0.2, 0.5, 0.8, 1.0, 1.5, 2.0, 3.0, 5.0, 10.0])
     duration, rate = 1.0, 4000.0
     t = np.arange(int(duration * rate) + 1) / rate
-    spectrum = shock_spectrum.shock_spectrum(np.sin(np.pi * t / duration), rate, products / duration, q)
+    spectrum = pulses.shock_spectrum(np.sin(np.pi * t / duration), rate, products / duration, q)
     assert spectrum == pytest.approx(SRS[q], abs=6e-4)
 
 
@@ -84,7 +83,7 @@ def test_the_recursion_is_exact_for_straight_segments() -> None:
     x[0] = 0.0
     wn, zeta = 2.0 * np.pi * f, 0.5 / q
     system = ([2.0 * zeta * wn, wn**2], [1.0, 2.0 * zeta * wn, wn**2])
-    assert shock_spectrum.responses(x, rate, f, q) == pytest.approx(lsim(system, x, np.arange(200) / rate)[1], abs=1e-9)
+    assert pulses.responses(x, rate, f, q) == pytest.approx(lsim(system, x, np.arange(200) / rate)[1], abs=1e-9)
 
 
 def test_the_largest_response_and_the_undamped_residual() -> None:
@@ -92,11 +91,11 @@ def test_the_largest_response_and_the_undamped_residual() -> None:
     t = np.arange(0, 1.0 + 1e-9, 1 / 2000.0)
     largest_at = {np.inf: (1.7685, 0.810), 25.0: (1.7184, 0.816), 10.0: (1.6516, 0.823), 5.0: (1.5584, 0.834)}
     for q, (largest, place) in largest_at.items():
-        spectrum = shock_spectrum.shock_spectrum(np.sin(np.pi * t), 2000.0, x, q)
+        spectrum = pulses.shock_spectrum(np.sin(np.pi * t), 2000.0, x, q)
         assert spectrum.max() == pytest.approx(largest, abs=3e-4)
         assert x[int(np.argmax(spectrum))] == pytest.approx(place, abs=0.004)
     with pytest.raises(NotIdentified, match="sample faster"):
-        shock_spectrum.shock_spectrum(np.ones(10), 100.0, np.array([20.0]))
+        pulses.shock_spectrum(np.ones(10), 100.0, np.array([20.0]))
 
 
 def test_sine_fit_variances(rng: np.random.Generator) -> None:
