@@ -140,8 +140,8 @@ def _best(field: Candidates, space: Space, block: int, single: dict[int, _OfAxis
         unit, axis = divmod(block, field.problem.per_unit)
         for drop, dwells in _several(space, block):
             chosen = float(np.log(comb(space.q.shape[1] - 1, len(dwells)) * axes))
-            places = ({"unit": float(unit), "axis": float(axis), "dwell": float(k)} for k in dwells)
-            terms = tuple(Term(jump, tuple(place.items())) for place in places)
+            here = (("unit", float(unit)), ("axis", float(axis)))
+            terms = tuple(Term(jump, (*here, ("dwell", float(k)))) for k in dwells)
             tried.append(_OfAxis(drop - price(drop, len(dwells)) - 2.0 * chosen, terms))
     return max(tried, key=lambda one: one.score)
 

@@ -158,17 +158,9 @@ class _Parts:
         pz, self.inner = pz[..., again], inner[np.ix_(again, again)]
         level = space.covariance.level * space.noise.scale
         along = space.backed(space.q) * level[:, None, None]
+        by_block = (along, level, py, pz, model.local)
         self.groups = [
-            _Group(
-                members,
-                space.covariance.there[members[0]],
-                whitener,
-                along[members],
-                level[members],
-                py[members],
-                pz[members],
-                model.local[members],
-            )
+            _Group(members, space.covariance.there[members[0]], whitener, *(each[members] for each in by_block))
             for members, whitener in space.covariance.whiteners(space.noise.shares)
         ]
 

@@ -151,16 +151,12 @@ def _waits(here: float) -> list[StepSequence]:
     )
     sequences: list[StepSequence] = []
     for waits in ((0.0, 20.0, 60.0), (0.0, 10.0, 30.0, 100.0, 300.0), (0.0, 0.0, 0.0, 120.0), (0.0, 600.0)):
-        steps = [SequenceStep(o, i, here, w) for w in waits for pair in pairs for o, i in pair]
-        sequences.append(StepSequence("waits", tuple(steps)))
-        short = [SequenceStep(o, i, here, w) for w in waits for o, i in pairs[0]]
-        sequences.append(StepSequence("waits", tuple(short)))
-    stay = [0.0, *[0.0] * 7]
-    dwell_on = [SequenceStep(o, i, here, w) for pair in pairs for o, i in pair for w in stay]
-    sequences.append(
-        StepSequence("waits", tuple(dwell_on))
-    )  # dwell after dwell at one pose: the whole settling is measured
-    return sequences
+        for some in (pairs, pairs[:1]):
+            steps = [SequenceStep(o, i, here, w) for w in waits for pair in some for o, i in pair]
+            sequences.append(StepSequence("waits", tuple(steps)))
+    # dwell after dwell at one pose: the whole settling is measured
+    stay = [SequenceStep(o, i, here, 0.0) for pair in pairs for o, i in pair for _ in range(8)]
+    return [*sequences, StepSequence("waits", tuple(stay))]
 
 
 def _approaches(state: State, reach: TableReach, here: float, chosen: Sequence[SequenceStep]) -> list[StepSequence]:
