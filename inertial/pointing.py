@@ -54,6 +54,11 @@ def contradicts(turned: float) -> str:
     )
 
 
+def _force(angles: Array) -> Array:
+    turned = np.radians(angles)
+    return force_from_angles(turned[:, 0], turned[:, 1])
+
+
 @dataclass
 class Pointing:
     """The dwells of the soak that is under way, as far as this process has taken them."""
@@ -72,5 +77,4 @@ class Pointing:
         if not units:
             return 0.0
         output = np.array([[dwell[unit] for unit in units] for dwell in self.means])
-        turned = np.radians(np.array(self.angles))
-        return pointing_error(force_from_angles(turned[:, 0], turned[:, 1]), output)
+        return pointing_error(_force(np.array(self.angles)), output)

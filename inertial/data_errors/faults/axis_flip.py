@@ -1,3 +1,5 @@
+"""Axes in another order, or inverted."""
+
 from collections.abc import Iterator
 from itertools import permutations
 

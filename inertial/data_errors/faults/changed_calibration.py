@@ -1,3 +1,5 @@
+"""A calibration that changes during the run: cables exchanged, or another range."""
+
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,3 +1,5 @@
+"""Time that runs backwards."""
+
 from collections.abc import Iterator
 
 import numpy as np

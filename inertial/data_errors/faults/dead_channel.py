@@ -1,3 +1,5 @@
+"""An axis that does not respond to gravity."""
+
 from collections.abc import Iterator
 
 import numpy as np

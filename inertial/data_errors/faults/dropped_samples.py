@@ -1,3 +1,5 @@
+"""Dwells with fewer samples than they should have."""
+
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,3 +1,5 @@
+"""Dwells with far more scatter than the others: spikes, torn words."""
+
 from collections.abc import Iterator
 
 import numpy as np

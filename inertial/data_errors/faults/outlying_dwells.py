@@ -1,3 +1,5 @@
+"""Single dwells far off on one axis, where no scatter was recorded."""
+
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,3 +1,5 @@
+"""Outputs in steps that are coarser than the noise."""
+
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,3 +1,5 @@
+"""A scale unlike that of the lot: another range, or another unit."""
+
 from collections.abc import Iterator
 
 import numpy as np

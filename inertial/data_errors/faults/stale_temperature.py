@@ -1,3 +1,5 @@
+"""A thermometer that repeats itself."""
+
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,3 +1,5 @@
+"""An output that repeats itself in new poses, or has no scatter."""
+
 from collections.abc import Iterator
 
 import numpy as np

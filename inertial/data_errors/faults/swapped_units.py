@@ -1,3 +1,5 @@
+"""Single dwells that two units have of each other."""
+
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,3 +1,5 @@
+"""Temperatures in a unit other than °C."""
+
 from collections.abc import Iterator
 
 import numpy as np

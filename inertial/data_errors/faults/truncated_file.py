@@ -1,3 +1,5 @@
+"""A record that ends before the lot's, or that lacks most dwells."""
+
 from collections.abc import Iterator
 
 import numpy as np

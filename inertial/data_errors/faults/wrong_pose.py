@@ -1,3 +1,5 @@
+"""Dwells in another pose than the one commanded."""
+
 from collections.abc import Iterator
 
 import numpy as np
