@@ -25,7 +25,7 @@ import numpy as np  # noqa: E402
 from inertial.noise.allan import overlapping  # noqa: E402
 from inertial.noise.bias_filter import Track, track  # noqa: E402
 from inertial.noise.gauss_markov import AT_MAXIMUM, BiasModel, bias_model, flicker_of_steps  # noqa: E402
-from inertial.noise.likely_terms import likely_terms  # noqa: E402
+from inertial.noise.terms import likely_terms  # noqa: E402
 from stations.plant.preset import Preset, load_preset  # noqa: E402
 from tests import made_noise as generate  # noqa: E402
 

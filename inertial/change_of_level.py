@@ -4,9 +4,9 @@ import heapq
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from inertial.arrays import Array, Index
 
 _MANY_TIMES = 4.0
 """Scatter of a stretch over its noise from neighbouring samples, from which on it is more than one level."""
@@ -25,8 +25,8 @@ class Levels:
     start, stop : (k,), first and one past the last sample · explained : share of the squares about the mean that they explain
     """
 
-    start: NDArray[np.int64]
-    stop: NDArray[np.int64]
+    start: Index
+    stop: Index
     explained: float
 
     def __len__(self) -> int:
@@ -78,10 +78,9 @@ def levels(x: ArrayLike, count: int | None, *, shortest: int = _SHORTEST) -> Lev
     data = np.asarray(x, dtype=np.float64)
     n = len(data)
     if count is not None and n < count * shortest:
-        msg = (
+        raise ValueError(
             f"positions: {n} samples, {count * shortest} are needed for {count} positions of {shortest}; ask for fewer"
         )
-        raise ValueError(msg)
     noise = neighbour_noise(data)
     scaled = (data - data.mean(axis=0)) / np.where(noise > 0.0, noise, 1.0)
     sums = np.concatenate([np.zeros((1, data.shape[1])), np.cumsum(scaled, axis=0)])

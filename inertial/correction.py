@@ -4,15 +4,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inertial import design
+from inertial.arrays import Array
 from inertial.design import Values, of_axes
 from inertial.effects import SensorEffect
 from inertial.fits.linear import force_along_axes, of_every_axis, response_matrix
 from inertial.state import ALL_AXES, State
-
-Array = NDArray[np.float64]
 
 _STEPS = 12
 """Fixed-point steps: each shrinks the error by the size of the nonlinearity, below 0.1 for any sensor worth calibrating."""

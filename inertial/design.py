@@ -5,14 +5,13 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inertial import effects as catalogue
+from inertial.arrays import Array
 from inertial.effects import SensorEffect, StationEffect
 from inertial.effects.base import AnyEffect
 from inertial.state import State
 
-Array = NDArray[np.float64]
 Values = Mapping[str, Mapping[str, Any]]
 """Nonlinear parameters and constants by effect id: one number, or a tuple of one per sensor axis."""
 

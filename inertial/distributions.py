@@ -4,10 +4,10 @@ Loading scipy.stats takes 0.7 s of processor time, which a command that needs on
 """
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy import special
 
-Array = NDArray[np.float64]
+from inertial.arrays import Array
 
 
 def chi2_quantile(probability: ArrayLike, dof: ArrayLike) -> Array:

@@ -10,13 +10,11 @@ from difflib import get_close_matches
 from typing import NoReturn
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.errors import InertialError, MissingInput
 from inertial.quantities import formula_names
 from inertial.state import State
-
-Array = NDArray[np.float64]
 
 FUNCTIONS: Mapping[str, tuple[int, Callable[..., Array]]] = {
     "abs": (1, np.abs),

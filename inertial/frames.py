@@ -4,9 +4,9 @@ At rest a device feels +1 g upwards: f = (Rx(outer)·Rz(inner))ᵀ·(0, 0, 1). R
 """
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from inertial.arrays import Array
 
 UP: tuple[float, float, float] = (0.0, 0.0, 1.0)
 

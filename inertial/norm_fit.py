@@ -9,9 +9,9 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inertial import design
+from inertial.arrays import Array, Flags, Index
 from inertial.correction import correct
 from inertial.design import Values
 from inertial.errors import NotIdentified
@@ -19,8 +19,6 @@ from inertial.fits.descent import descended
 from inertial.fits.linear import LotFit, force_along_axes, response_matrix
 from inertial.fits.norm_noise import PlausibleNoise, SolvedNorms
 from inertial.state import State
-
-Array = NDArray[np.float64]
 
 _SETTLED = 1e-10  # share of the cost that a step no longer takes off
 _SINGULAR = 1e-6  # smallest singular value of the whitened columns of unit length, over the largest
@@ -43,10 +41,10 @@ class NormFit:
     force: Array
     left: Array
     rows: Array
-    free: NDArray[np.bool_]
+    free: Flags
     covariance: Array
     record: Array | None
-    dof: NDArray[np.int64]
+    dof: Index
     nonlinear_error: dict[str, dict[str, float]]
 
 
@@ -147,7 +145,8 @@ class _Work:
     def rows(self, theta: Array) -> tuple[Array, Array]:
         """Derivatives of the residuals by the free coefficients, (units, n, k), and by the nonlinear parameters."""
         force = self.force(theta)
-        state = self._at(theta, force)
+        felt = force_along_axes(response_matrix(theta, self.names), force)
+        state = replace(self.state, force=force, felt=felt, memory={})
         columns = design.local_columns(self.sensor, state, self.values)
         columns = np.broadcast_to(columns, (len(self.output), *columns.shape[-3:]))
         direction = force / np.linalg.norm(force, axis=-1, keepdims=True)
@@ -174,11 +173,6 @@ class _Work:
             columns = design.local_columns(self.sensor, replace(state, memory={}), moved)
             ends.append(np.einsum("...jnp,...jp->...nj", columns, theta))
         return -np.sum(along * (ends[0] - ends[1]) / (2.0 * step), axis=-1)
-
-    def _at(self, theta: Array, force: Array) -> State:
-        """The dwells with their force, also along the sensor's own axes."""
-        felt = force_along_axes(response_matrix(theta, self.names), force)
-        return replace(self.state, force=force, felt=felt, memory={})
 
     def step(self, theta: Array) -> Array:
         """Change (units, 3, p) of the coefficients by the linear model about them."""

@@ -1,9 +1,9 @@
 """Operators with memory: a lag, a play, a relaxation. Each runs along the last axis, which is time."""
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from inertial.arrays import Array
 
 _MANY = 64
 """Signals above which a play is faster point by point."""
@@ -29,6 +29,15 @@ def first_order_lag(time: ArrayLike, signal: ArrayLike, tau: float) -> Array:
     keep = np.exp(-step / tau)
     drive = (x[..., 1:] - tau * slope) - keep * (x[..., :-1] - tau * slope)
     return recursion(x[..., 0], keep, drive)
+
+
+def natural_spline(z: Array, knots: Array) -> list[Array]:
+    """The curved functions of a natural cubic spline. Hastie, Tibshirani, Friedman: Elements of Statistical Learning, eq. 5.4."""
+
+    def d(k: int) -> Array:
+        return (np.maximum(z - knots[k], 0.0) ** 3 - np.maximum(z - knots[-1], 0.0) ** 3) / (knots[-1] - knots[k])
+
+    return [d(k) - d(knots.size - 2) for k in range(knots.size - 2)]
 
 
 def recursion(start: ArrayLike, keep: Array, drive: Array) -> Array:

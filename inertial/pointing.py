@@ -4,12 +4,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.frames import force_from_angles
-
-Array = NDArray[np.float64]
-
 
 SPARE = 2  # degrees of freedom per axis before anything is said
 

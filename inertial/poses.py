@@ -8,11 +8,9 @@ from collections.abc import Callable
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.frames import angles_from_force
-
-Array = NDArray[np.float64]
 
 
 def _angles(directions: Array) -> Array:

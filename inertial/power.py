@@ -1,11 +1,9 @@
 """Devices switched off and on again within a run: when, for how long, and how cold they have become."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.state import State
-
-Array = NDArray[np.float64]
 
 
 def switched(state: State) -> list[int]:

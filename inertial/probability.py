@@ -4,10 +4,10 @@ The tails are those of scipy.special: a thousand calls of scipy.stats take half 
 """
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy import special
 
-Array = NDArray[np.float64]
+from inertial.arrays import Array
 
 
 def passes(probability: ArrayLike, above: float) -> bool | None:

@@ -6,10 +6,10 @@ All tests look at one axis at a time and need nothing to be known of poses or no
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.ndimage import median_filter
 
-Array = NDArray[np.float64]
+from inertial.arrays import Array, Flags, Index
 
 _MOST_DISTINCT = 200_000
 _BLOCK = 64  # samples over which the share of equal neighbours is measured
@@ -55,7 +55,7 @@ class Torn:
     """
 
     axis: int
-    rows: NDArray[np.int64]
+    rows: Index
     offsets: tuple[int, ...]
     share: float
 
@@ -102,20 +102,16 @@ def clipped(values: ArrayLike) -> tuple[float, float, int]:
     """
     x = np.asarray(values, dtype=np.float64)
     low, high = float(x.min()), float(x.max())
+    usual = x.size / (1.0 + float(np.count_nonzero(np.diff(x))))  # mean length of runs of equal samples
     count = 0
     if low < high:
         for extreme in (low, high):
             start, stop = runs_of(x == extreme)
             long = stop - start >= _AT_LIMIT
             # noise that only touches its extreme does so in single samples
-            if np.count_nonzero(long) and np.mean((stop - start)[long]) > 2 * _usual_run(x):
+            if np.count_nonzero(long) and np.mean((stop - start)[long]) > 2 * usual:
                 count += int(np.sum((stop - start)[long]))
     return low, high, count
-
-
-def _usual_run(x: Array) -> float:
-    """Mean length of runs of equal samples."""
-    return x.size / (1.0 + float(np.count_nonzero(np.diff(x))))
 
 
 def frozen(x: ArrayLike) -> list[Frozen]:
@@ -145,7 +141,7 @@ def frozen(x: ArrayLike) -> list[Frozen]:
     return stretches
 
 
-def _usual_share(equal: NDArray[np.bool_]) -> float | None:
+def _usual_share(equal: Flags) -> float | None:
     """Share of equal neighbours in the block that has most of them by chance; None where chance cannot be measured."""
     size = min(_BLOCK, max(8, equal.size // 4))
     blocks = equal[: equal.size // size * size].reshape(-1, size).mean(axis=1)
@@ -181,7 +177,7 @@ def running_median(x: Array, width: int = _MEDIAN) -> Array:
     return np.asarray(median_filter(x, width, mode="mirror"), dtype=np.float64)
 
 
-def _wings(x: Array, step: float) -> tuple[NDArray[np.int64], NDArray[np.int64], int]:
+def _wings(x: Array, step: float) -> tuple[Index, Index, int]:
     """Samples off by a power of two, the powers, and how many samples were looked at.
 
     A power counts when several blocks have samples that far off, and clearly more do than lie at three quarters, five quarters
@@ -208,7 +204,7 @@ def _wings(x: Array, step: float) -> tuple[NDArray[np.int64], NDArray[np.int64],
     return (calm[rows] * _BLOCK + columns).astype(np.int64), offsets[hits], calm.size * _BLOCK
 
 
-def runs_of(inside: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def runs_of(inside: Flags) -> tuple[Index, Index]:
     """Starts and ends (one past the last) of the stretches of True."""
     steps = np.diff(np.concatenate([[0], inside.astype(np.int8), [0]]))
     return np.flatnonzero(steps == 1).astype(np.int64), np.flatnonzero(steps == -1).astype(np.int64)

@@ -6,14 +6,9 @@ from functools import cached_property
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array, Places
 from inertial.errors import MissingInput
-
-Array = NDArray[np.float64]
-
-_DIMENSIONS = {"force": 3, "felt": 3, "output_run": 3, "slot": 1}
-"""Number of dimensions of the arrays of a lot of units; two for all others."""
 
 _REMEMBERED = 3_000_000
 """Largest number of values that a state remembers of operators with memory."""
@@ -128,7 +123,7 @@ class State:
     @cached_property
     def force_step(self) -> Array:
         """Change of specific force at the move before each dwell, (..., n, 3), g; zero for the first dwell."""
-        return _step(self.force, axis=-2)
+        return np.diff(self.force, axis=-2, prepend=self.force[..., :1, :])
 
     @property
     def batch(self) -> tuple[int, ...]:
@@ -153,7 +148,7 @@ class State:
 
         return self.remember(key, run)
 
-    def pick(self, index: slice | NDArray[np.intp]) -> Self:
+    def pick(self, index: slice | Places) -> Self:
         """The units at ``index`` along the first batch dimension."""
         changed: dict[str, object] = {}
         for item in fields(self):
@@ -166,11 +161,6 @@ class State:
                 changed[item.name] = History(value.time, value.temperature[index])
         changed["memory"] = {}
         return replace(self, **changed)
-
-
-def _step(values: Array, axis: int) -> Array:
-    first = np.take(values, [0], axis=axis)
-    return np.diff(values, axis=axis, prepend=first)
 
 
 def _slope(time: Array, values: Array) -> Array:

@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from inertial.arrays import Array, Flags, Index
 
 _BINS = 256  # of the histogram of log scatter (Otsu's threshold)
 
@@ -14,9 +14,9 @@ _BINS = 256  # of the histogram of log scatter (Otsu's threshold)
 class StaticIntervals:
     """Where a record stands still, and how that was decided."""
 
-    start: NDArray[np.int64]
+    start: Index
     """(k,) first sample of each interval."""
-    stop: NDArray[np.int64]
+    stop: Index
     """(k,) one past the last sample."""
     quiet_sd: float
     """Standard deviation of the quietest stretch (all axes, root of the sum of squares), unit of the record."""
@@ -42,7 +42,6 @@ def find(
     *,
     window_s: float = 1.0,
     shortest_s: float = 1.0,
-    trim_s: float | None = None,
     threshold: float | None = None,
 ) -> StaticIntervals:
     """Static intervals of a record of three axes.
@@ -58,19 +57,19 @@ def find(
     rate_hz : Hz
     window_s : length of the sliding window, s
     shortest_s : shortest interval that counts after trimming, s
-    trim_s : taken off both ends, where the hand still lets go, s; half a window by default
     threshold : standard deviation of a window above which it moves, in the unit of the record; found in the record by default
     """
     data = np.asarray(x, dtype=np.float64)
     width = max(3, round(window_s * rate_hz))
     if data.shape[0] < 3 * width:
-        msg = f"static: record of {data.shape[0]} samples, at least {3 * width} are needed ({3 * window_s} s); record longer"
-        raise ValueError(msg)
+        raise ValueError(
+            f"static: record of {data.shape[0]} samples, at least {3 * width} are needed ({3 * window_s} s); record longer"
+        )
     sd = np.sqrt(moving_variance(data, width).sum(axis=-1))
     quiet = _quietest(sd, width)
     limit = _threshold(sd, quiet) if threshold is None else threshold
     inside = _spread(sd <= limit, width, data.shape[0])
-    trim = round((0.5 * window_s if trim_s is None else trim_s) * rate_hz)
+    trim = round(0.5 * window_s * rate_hz)  # taken off both ends, where the hand still lets go
     start, stop = _runs(inside)
     # the ends of the record are no hand's doing: nothing is trimmed there
     start = np.where(start > 0, start + trim, start)
@@ -114,7 +113,7 @@ def _threshold(sd: Array, quiet: float) -> float:
     return float(np.clip(best, 3.0 * quiet, 10.0 * quiet))
 
 
-def _spread(still: NDArray[np.bool_], width: int, n: int) -> NDArray[np.bool_]:
+def _spread(still: Flags, width: int, n: int) -> Flags:
     """Samples (n,) that lie in at least one still window."""
     edges = np.zeros(n + 1, dtype=np.int64)
     starts = np.flatnonzero(still)
@@ -123,7 +122,7 @@ def _spread(still: NDArray[np.bool_], width: int, n: int) -> NDArray[np.bool_]:
     return np.cumsum(edges[:-1]) > 0
 
 
-def _runs(inside: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _runs(inside: Flags) -> tuple[Index, Index]:
     """Starts and ends of the stretches of True."""
     steps = np.diff(np.concatenate([[0], inside.astype(np.int8), [0]]))
     return np.flatnonzero(steps == 1).astype(np.int64), np.flatnonzero(steps == -1).astype(np.int64)

@@ -4,7 +4,6 @@ from collections.abc import Callable, Iterable, Iterator
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import NDArray
 
 from inertial.criticism.drivers import Driver
 from inertial.criticism.field import Candidates
@@ -16,8 +15,6 @@ from inertial.estimation.likelihood import scatter_of_poses, shared_noise
 from inertial.estimation.model import Model
 from inertial.estimation.penalty import log_p_value
 from inertial.estimation.space import Space
-
-Array = NDArray[np.float64]
 
 _BATCH = 33
 _NUMBERS = 4_000_000

@@ -3,15 +3,13 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.criticism.drivers import Part
 from inertial.estimation.candidate import Candidate
 from inertial.estimation.model import Model
 from inertial.estimation.penalty import PER_COEFFICIENT, cost_of_model
 from inertial.estimation.space import Space
-
-Array = NDArray[np.float64]
 
 _TURNS = 8  # alternating estimates of sizes and shape
 

@@ -15,20 +15,17 @@ from inertial.criticism.examination import Named, worst
 from inertial.criticism.field import Candidates, Rival
 from inertial.criticism.influence import CarriedEvidence, carried_by, influence
 from inertial.criticism.left_out import left_out
-from inertial.criticism.smallest import Smallest, smallest_named
 from inertial.criticism.unknown import Unexplained
-from inertial.criticism.unseen import unseen
+from inertial.criticism.unseen import Smallest, smallest_named, unseen
 from inertial.criticism.verdict import judged
 from inertial.data_errors.removed_dwells import BadDwell, model_without
 from inertial.decisions import ADEQUATE_ABOVE
 from inertial.effects.covariate import Covariate
-from inertial.estimation.alternative import Handling
 from inertial.estimation.comparison import fitted_residuals
 from inertial.estimation.comparison import rms as rms_of
 from inertial.estimation.model import Model
 from inertial.estimation.problem import Lot, Problem
 from inertial.estimation.space import Space
-from inertial.estimation.term import Term
 from inertial.planning.ranges import UnseenRange
 
 
@@ -140,10 +137,9 @@ def _classes(field: Candidates, base: Model, final: Model) -> list[EffectClass]:
     model, classes = final, []
     for term in [t for t in final.terms if t.effect.id not in held]:
         group = class_of(field, model, term)
-        best = next((m.term for m in group.members if not isinstance(m.term.effect, Handling)), term)
-        if (
-            best is not term
-        ):  # a rival that is better beside the others replaces the effect, so that no other class contains it
+        best = group.physics[0].term if group.physics else term
+        if best is not term:
+            # a rival that is better beside the others replaces the effect, so that no other class contains it
             others = [t for t in model.terms if t is not term]
             model = Model(base.problem, [*others, best], near=model.noise)
         classes.append(group)
@@ -154,7 +150,9 @@ def _named(problem: Problem, base: Model, classes: Sequence[EffectClass]) -> tup
     """Errors after each class is added to those before it."""
     named: list[Named] = []
     model = base
-    terms = [_first(group) for group in classes]
+    terms = [
+        (group.physics or group.members)[0].term for group in classes
+    ]  # an error of handling if there is no effect
     before = left_out(base, also=terms) if classes else None
     for group, first in zip(classes, terms, strict=True):
         model = model.with_term(first)
@@ -165,11 +163,6 @@ def _named(problem: Problem, base: Model, classes: Sequence[EffectClass]) -> tup
         named.append(Named(group, left, *errors, carried=carried_by(rest, first)))
         before = after
     return tuple(named)
-
-
-def _first(group: EffectClass) -> Term:
-    """The best effect of a class, a handling error only if there is no effect."""
-    return next((m.term for m in group.members if not isinstance(m.term.effect, Handling)), group.members[0].term)
 
 
 def _covariate(classes: Sequence[EffectClass]) -> Unexplained | None:

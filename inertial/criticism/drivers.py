@@ -7,18 +7,17 @@ from itertools import combinations_with_replacement
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.design import of_axes
 from inertial.effects.base import AXES
 from inertial.estimation.candidate import Candidate
 from inertial.estimation.penalty import log_p_value
 from inertial.estimation.problem import Problem
 from inertial.estimation.space import Space
+from inertial.operators import natural_spline
 from inertial.quantities import attribute_drivers, is_clock
 from inertial.state import ALL_AXES, State
-
-Array = NDArray[np.float64]
 
 _KNOTS = 5
 _TIME_KNOTS = 8
@@ -170,17 +169,7 @@ def curve(values: Array, knots: int) -> Array:
     if distinct.size <= 3:
         return np.stack([z**k for k in range(1, distinct.size)], axis=-1)
     places = np.unique(np.quantile(distinct, np.linspace(0.0, 1.0, min(knots + 1, distinct.size))))
-    return np.stack([z, *_natural(z, places)], axis=-1)
-
-
-def _natural(z: Array, knots: Array) -> list[Array]:
-    """The nonlinear functions of a natural spline. Hastie, Tibshirani, Friedman: Elements of Statistical Learning, eq. 5.4."""
-
-    def d(k: int) -> Array:
-        top = np.maximum(z - knots[k], 0.0) ** 3 - np.maximum(z - knots[-1], 0.0) ** 3
-        return top / (knots[-1] - knots[k])
-
-    return [d(k) - d(knots.size - 2) for k in range(knots.size - 2)]
+    return np.stack([z, *natural_spline(z, places)], axis=-1)
 
 
 def _pose_columns(state: State, most: int) -> Array:

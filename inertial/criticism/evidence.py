@@ -3,18 +3,16 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inertial import effects as catalogue
+from inertial.arrays import Array
 from inertial.counts import degrees_of_freedom, number_of
 from inertial.criticism.field import Candidates
 from inertial.distributions import f_upper, noncentral_f_tail
-from inertial.estimation.bases import SEEN
+from inertial.estimation.bases import SEEN, unit_columns
 from inertial.estimation.model import Model
 from inertial.estimation.term import Term
 from inertial.roots import root
-
-Array = NDArray[np.float64]
 
 FEWEST_DOF = 9
 """Degrees of freedom needed for a verdict if the noise is known from the residuals only: 18 positions of unknown orientation.
@@ -83,7 +81,8 @@ def not_judged(model: Model, rms: float) -> str:
         return ""
     if not np.isfinite(space.rss) or not np.isfinite(rms):
         return "the residuals are undefined: the orientations do not determine the model; add poses in between"
-    if _is_movement(model):
+    lot = model.problem.lot
+    if lot.radial and not lot.recorded and model.noise.shares.walk >= SMOOTH:
         return (
             "the residual varies smoothly from dwell to dwell, as in samples of a movement, dwells at rest are needed; "
             "import the samples to find the stretches at rest, or state sd_x, sd_y, sd_z and n of each dwell"
@@ -98,20 +97,12 @@ def not_judged(model: Model, rms: float) -> str:
     return ""
 
 
-def _is_movement(model: Model) -> bool:
-    """Whether dwells without recorded noise vary so smoothly that they are samples of a movement."""
-    lot = model.problem.lot
-    return lot.radial and not lot.recorded and model.noise.shares.walk >= SMOOTH
-
-
 def condition(model: Model) -> float:
     """Largest singular value of the whitened columns of unit length over the smallest that the plan determines; worst block."""
     local = model.space.local
     if local.shape[-1] == 0:
         return 1.0
-    size = np.sqrt(np.einsum("bnp,bnp->bp", local, local))
-    unit = local / np.where(size > 0.0, size, 1.0)[:, None, :]
-    values = np.linalg.svd(unit, compute_uv=False)
+    values = np.linalg.svd(unit_columns(local)[0], compute_uv=False)
     seen = np.where(values > 1e-4 * values[:, :1], values, np.inf)
     return float(np.max(values[:, 0] / seen.min(axis=1)))
 
@@ -122,9 +113,8 @@ def _by_dwell(model: Model) -> tuple[float | None, float | None, tuple[int, int]
     if not columns:
         return None, None, None
     space, axes = model.space, model.problem.per_unit
-    size = np.sqrt(np.einsum("bnp,bnp->bp", space.local, space.local))
-    size = np.where(size > 0.0, size, 1.0)
-    inverse = (np.linalg.pinv(space.local / size[:, None], rcond=1e-5) / size[..., None])[:, columns]
+    unit, size = unit_columns(space.local)
+    inverse = (np.linalg.pinv(unit, rcond=1e-5) / size[..., None])[:, columns]
     off = _deleted(model)[0]
     moved = space.backed(np.swapaxes(inverse, -1, -2)) * off[:, None]
     count = np.maximum(np.count_nonzero(off, axis=1), 2)

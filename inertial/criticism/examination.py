@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inertial import effects as catalogue
+from inertial.arrays import Array, Places
 from inertial.criticism.bad_or_effect import bad_beside_effects, candidates_of
 from inertial.criticism.classes import EffectClass, class_of
 from inertial.criticism.field import Candidates
@@ -19,7 +19,7 @@ from inertial.data_errors.bad_dwells import bad_dwells
 from inertial.data_errors.handling import alternatives
 from inertial.data_errors.removed_dwells import BadDwell, without
 from inertial.decisions import CLASS_WIDTH, RISES
-from inertial.estimation.alternative import Exchangeable, Handling, Misfit, soaks
+from inertial.estimation.alternative import Handling, Misfit, soaks
 from inertial.estimation.candidate import blocks_of_units
 from inertial.estimation.comparison import fitted_residuals, rms, slope_of
 from inertial.estimation.loudness import loudness_of
@@ -28,8 +28,6 @@ from inertial.estimation.penalty import cost_of_model
 from inertial.estimation.problem import Lot, Problem
 from inertial.estimation.refinement import better_placed, replaced, terms_of
 from inertial.estimation.term import Term, with_turn_on
-
-Array = NDArray[np.float64]
 
 _MENDED = 6  # largest number of handling errors reported for one run
 _TURNS = 3  # searches after which single dwells are not tested again
@@ -81,12 +79,8 @@ class ExaminedRun:
     removed: list[BadDwell] = field(default_factory=list[BadDwell])
     barred: set[str] = field(default_factory=set[str])
     drift: Unexplained | None = None
-    soak: NDArray[np.intp] | None = None
+    soak: Places | None = None
     _made: tuple[list[object], Model] | None = None
-
-    def alternatives(self) -> list[Handling]:
-        """Handling errors that are searched."""
-        return [a for a in alternatives() if a.id not in self.barred]
 
     def estimate_loudness(self) -> None:
         """Estimate the noise of each soak again: an error that was corrected is none of it."""
@@ -201,7 +195,8 @@ def mended(run: ExaminedRun) -> EffectSearch:
     """The search for effects; a handling error that ranks first is reported and removed before the next search."""
     while True:
         base = run.model()
-        fields = Candidates(base.problem, candidates_of(base, run.effects), run.alternatives())
+        searched_for = [a for a in alternatives() if a.id not in run.barred]
+        fields = Candidates(base.problem, candidates_of(base, run.effects), searched_for)
         part = part_of(fields, base, wide=run.drift is not None)
         searched, of = search(part.field, part.base, part.imitates), part.field
         if not searched.handling and part.field is not fields:
@@ -279,12 +274,11 @@ def _described(
     best = judge(fields, beside, term).cost
     texts: list[str] = []
     dwells = list(alternative.dwells(lot, **place))
-    if isinstance(alternative, Exchangeable):
-        for other in alternative.instead(lot, **place):
-            rival = judge(fields, beside, Term(alternative, tuple(other.items())))
-            if rival.cost < best + CLASS_WIDTH:
-                texts.append(alternative.short(beside.with_term(rival.term).shared_sizes(rival.term), **other))
-                dwells += alternative.dwells(lot, **other)
+    for other in alternative.instead(lot, **place):
+        rival = judge(fields, beside, Term(alternative, tuple(other.items())))
+        if rival.cost < best + CLASS_WIDTH:
+            texts.append(alternative.short(beside.with_term(rival.term).shared_sizes(rival.term), **other))
+            dwells += alternative.dwells(lot, **other)
     evidence = alternative.describe(lot, size, **place)
     evidence += f"; these dwells cannot separate it from {' or '.join(texts)}" if texts else ""
     return evidence, tuple(sorted(dwells))

@@ -4,8 +4,8 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.design import grid_of
 from inertial.effects.base import AnyEffect
 from inertial.errors import MissingInput
@@ -15,8 +15,6 @@ from inertial.estimation.likelihood import Ratio
 from inertial.estimation.problem import Problem
 from inertial.estimation.space import Gain, Space
 from inertial.estimation.term import Term
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -3,15 +3,13 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.data_errors.removed_dwells import model_without
 from inertial.estimation.likelihood import along_mean, of_station, scatter_of_poses, shared_noise, weighed
 from inertial.estimation.model import Model
 from inertial.estimation.penalty import fall, freedom
 from inertial.estimation.term import Term
-
-Array = NDArray[np.float64]
 
 _MOST, _MOST_DWELLS = 8, 3
 _CARRY = 0.5

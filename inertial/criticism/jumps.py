@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from math import comb, log
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.criticism.field import Candidates, Rival
 from inertial.decisions import CLASS_WIDTH, JUMPS_RARE
 from inertial.estimation.alternative import Handling
@@ -21,8 +21,6 @@ from inertial.estimation.penalty import freedom, price
 from inertial.estimation.space import Space
 from inertial.estimation.term import Term
 from inertial.probability import log_f_tail
-
-Array = NDArray[np.float64]
 
 _AXES = 6
 """Largest number of axes whose jumps take the place of one effect."""
@@ -142,8 +140,8 @@ def _best(field: Candidates, space: Space, block: int, single: dict[int, _OfAxis
         unit, axis = divmod(block, field.problem.per_unit)
         for drop, dwells in _several(space, block):
             chosen = float(np.log(comb(space.q.shape[1] - 1, len(dwells)) * axes))
-            places = ({"unit": float(unit), "axis": float(axis), "dwell": float(k)} for k in dwells)
-            terms = tuple(Term(jump, tuple(place.items())) for place in places)
+            here = (("unit", float(unit)), ("axis", float(axis)))
+            terms = tuple(Term(jump, (*here, ("dwell", float(k)))) for k in dwells)
             tried.append(_OfAxis(drop - price(drop, len(dwells)) - 2.0 * chosen, terms))
     return max(tried, key=lambda one: one.score)
 

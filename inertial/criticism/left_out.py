@@ -19,20 +19,19 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
 from inertial import decisions
+from inertial.arrays import Array, Flags, Places
 from inertial.decisions import BLOCKS
-from inertial.estimation.alternative import Handling, soaks
+from inertial.estimation.alternative import Handling, poses, soaks
 from inertial.estimation.bases import orthonormal
-from inertial.estimation.comparison import Fitting
+from inertial.estimation.comparison import Fitting, rms
 from inertial.estimation.model import Model
 from inertial.estimation.noise_shares import LONGEST
 from inertial.estimation.problem import Problem
 from inertial.estimation.term import Term
 
-Array = NDArray[np.float64]
 Kind = Literal["poses", "soaks", "blocks of time"]
 
 _POSES = 6
@@ -62,7 +61,7 @@ class LeftOut:
     def rms(self, kinds: set[Kind] | None = None) -> float:
         """The worst RMS over the kinds that can judge the model, g; NaN where none can."""
         usable: list[Kind] = [k for k in self.density if kinds is None or k in kinds]
-        return max((_rms(self.missed[k]) for k in usable), default=float("nan"))
+        return max((rms(self.missed[k]) for k in usable), default=float("nan"))
 
 
 def left_out(model: Model, judged: Term | None = None, also: Sequence[Term] = ()) -> LeftOut:
@@ -104,7 +103,7 @@ def _begun(problem: Problem, terms: Iterable[Term]) -> Array:
     return joined[:, size > 0.0] / size[size > 0.0]
 
 
-def _alone(begun: Array, fold: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _alone(begun: Array, fold: Flags) -> Flags:
     """Dwells (n,) of a fold that alone determine a column (n, k) of unit length."""
     inside = np.where(fold[:, None], begun, 0.0)
     within = inside[:, np.sum(inside**2, axis=0) > _ALONE]
@@ -117,7 +116,7 @@ def _without_wander(model: Model, judged: Term | None) -> LeftOut:
     fold = _by_pose(problem)
     whole = np.full((problem.blocks, problem.n), np.nan)
     kept = _kept(model, judged)
-    series = problem.series
+    series = problem.y
     if kept.any():
         series = series - model.shared[..., kept] @ model.space.shared_sizes[kept]
     fitting = Fitting(problem, [t for t in model.terms if not _keeps(t, judged)])
@@ -131,7 +130,7 @@ def _keeps(term: Term, judged: Term | None) -> bool:
     return isinstance(term.effect, Handling) and (judged is None or term.key != judged.key)
 
 
-def _kept(model: Model, judged: Term | None) -> NDArray[np.bool_]:
+def _kept(model: Model, judged: Term | None) -> Flags:
     """The shared columns (q,) of a model that keep their coefficients."""
     flags: list[bool] = []
     for term in (t for t in model.terms if t.shared):
@@ -159,27 +158,19 @@ class _Parts:
         pz, self.inner = pz[..., again], inner[np.ix_(again, again)]
         level = space.covariance.level * space.noise.scale
         along = space.backed(space.q) * level[:, None, None]
+        by_block = (along, level, py, pz, model.local)
         self.groups = [
-            _Group(
-                members,
-                space.covariance.there[members[0]],
-                whitener,
-                along[members],
-                level[members],
-                py[members],
-                pz[members],
-                model.local[members],
-            )
+            _Group(members, space.covariance.there[members[0]], whitener, *(each[members] for each in by_block))
             for members, whitener in space.covariance.whiteners(space.noise.shares)
         ]
 
-    def predicted(self, out: NDArray[np.bool_]) -> tuple[Array, float] | None:
+    def predicted(self, out: Flags) -> tuple[Array, float] | None:
         """Deviations (blocks, k) of the dwells ``out`` (n,) from their prediction, and their log density; None if undefined."""
         missed = np.full((self.blocks, int(out.sum())), np.nan)
         density = 0.0
         inner = self.inner.copy()
         right = np.zeros(inner.shape[0])
-        held: list[tuple[_Group, NDArray[np.intp], _Fold]] = []
+        held: list[tuple[_Group, Places, _Fold]] = []
         for group in self.groups:
             places = np.flatnonzero(out & group.there)
             if not places.size:
@@ -238,8 +229,8 @@ class _Group:
     local : (b, n, p), columns with coefficients by block
     """
 
-    members: NDArray[np.intp]
-    there: NDArray[np.bool_]
+    members: Places
+    there: Flags
     whitener: Array
     along: Array
     level: Array
@@ -262,7 +253,7 @@ class _Group:
         inside = np.einsum("bnp,bnp->b", root.T @ basis, root.T @ basis)
         return self.level**2 * (np.sum(root**2) - inside) / np.maximum(own.size - rank, 1)
 
-    def left_out(self, places: NDArray[np.intp]) -> _Fold | None:
+    def left_out(self, places: Places) -> _Fold | None:
         """The dwells at some places; None if the others determine too little.
 
         (S − AᵀA)⁻¹ = S⁻¹ + S⁻¹Aᵀ(I − AS⁻¹Aᵀ)⁻¹AS⁻¹: one inverse for all blocks, and a small one for each.
@@ -292,11 +283,11 @@ class _Group:
         return None if fold.is_blind() else fold
 
 
-def _folds(problem: Problem) -> dict[Kind, NDArray[np.intp]]:
+def _folds(problem: Problem) -> dict[Kind, Places]:
     """Fold of every dwell, (n,), by kind."""
     state = problem.lot.state
     n = problem.n
-    folds: dict[Kind, NDArray[np.intp]] = {"poses": _by_pose(problem)}
+    folds: dict[Kind, Places] = {"poses": _by_pose(problem)}
     number = soaks(state)
     if number.max() > 0:
         folds["soaks"] = number
@@ -307,14 +298,9 @@ def _folds(problem: Problem) -> dict[Kind, NDArray[np.intp]]:
     return folds
 
 
-def _by_pose(problem: Problem) -> NDArray[np.intp]:
+def _by_pose(problem: Problem) -> Places:
     """Equal poses together; dwells in turn if no pose is repeated."""
-    force = np.round(problem.lot.state.force[0], 3)
-    pose = np.unique(force, axis=0, return_inverse=True)[1].reshape(-1)
+    pose = poses(problem.lot)
     if pose.max() + 1 < 2 * _POSES:
         return np.arange(problem.n) % min(_POSES, problem.n)
     return (pose * 7) % _POSES  # neighbours on the sphere fall into different folds
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.nanmean(values**2)))

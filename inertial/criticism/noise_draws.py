@@ -8,19 +8,17 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import NDArray
 
+from inertial.arrays import Array, Places
 from inertial.data_errors.tails import heavy
 from inertial.decisions import LEAST_SHARE
-from inertial.estimation.bases import SEEN, eigen
+from inertial.estimation.bases import SEEN, eigen, inverse_roots
 from inertial.estimation.candidate import Candidate, times_rows
 from inertial.estimation.model import Model
 from inertial.estimation.noise_shares import Noise, Shares
 from inertial.estimation.shares import place_of, shares_at
 from inertial.estimation.space import Space
 from inertial.probability import log_f_tail
-
-Array = NDArray[np.float64]
 
 _PIECE = 150_000
 """Largest number of values worked on at a time."""
@@ -112,16 +110,14 @@ class NoiseDraws:
         self._states = []
         for first in range(0, batches * count, count):
             for some in _some_blocks(rows):
-                white = self._white((len(rows[some]), problem.n, count))
+                shape = (len(rows[some]), problem.n, count)
+                if self.heavy:  # the residuals of the model in random order
+                    white = self._values[self.rng.integers(self._values.size, size=shape)]
+                else:
+                    white = self.rng.standard_normal(shape)
                 rows[some, first : first + count] = np.swapaxes(white, 1, 2)
             self._states.append(self.rng.bit_generator.state)
         return problem.covariance.coloured(self.model.noise, rows)
-
-    def _white(self, shape: tuple[int, ...]) -> Array:
-        """White noise of variance one; with heavy tails the residuals of the model in random order."""
-        if self.heavy:
-            return self._values[self.rng.integers(self._values.size, size=shape)]
-        return self.rng.standard_normal(shape)
 
     def _shares(self, place: int) -> Shares:
         flicker, walk = self.lattice
@@ -139,7 +135,7 @@ class NoiseDraws:
             self._bases[place] = made
         return self._bases[place]
 
-    def _estimated(self, rows: Array) -> NDArray[np.intp]:
+    def _estimated(self, rows: Array) -> Places:
         """The place of the lattice with the smallest restricted deviance of each draw, (draws,).
 
         Descent from the shares that the draws were made with, by the places about the best of each draw.
@@ -163,7 +159,7 @@ class NoiseDraws:
             done |= wanted
             best = np.argmin(deviances, axis=0)
 
-    def _deviances(self, basis: _Basis, rows: Array, draws: NDArray[np.intp]) -> Array:
+    def _deviances(self, basis: _Basis, rows: Array, draws: Places) -> Array:
         """Restricted deviance of some draws at some shares, (draws,), each block with its own variance."""
         covariance = self.model.problem.covariance
         log_squares = np.zeros(draws.size)
@@ -209,7 +205,7 @@ class Directions:
     """
 
     turn: Array
-    ranks: NDArray[np.intp]
+    ranks: Places
     shared: bool
 
     @staticmethod
@@ -221,10 +217,9 @@ class Directions:
             own, squares = own.sum(axis=0, keepdims=True), squares.sum(axis=0, keepdims=True)
         size = np.sqrt(np.where(squares > 0.0, squares, 1.0))
         values, vectors = eigen(own / (size[..., :, None] * size[..., None, :]))
-        seen = values > SEEN**2
-        vectors = vectors * np.where(seen, 1.0 / np.sqrt(np.where(seen, values, 1.0)), 0.0)[..., None, :]
+        vectors = vectors * inverse_roots(values, SEEN**2)[..., None, :]
         turn = np.swapaxes(vectors, -1, -2) / size[..., None, :]
-        return Directions(turn, seen.sum(axis=(0, 2)), candidate.shared)
+        return Directions(turn, (values > SEEN**2).sum(axis=(0, 2)), candidate.shared)
 
     def drops(self, along: Array) -> Array:
         """Reduction (grid, draws) of the squares of draws, from their products (blocks, grid, p, draws) with the columns."""

@@ -9,8 +9,8 @@ them), λ = Σ dᵀV⁻¹e0 / Σ dᵀV⁻¹d: one if the effect is real and has 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.data_errors.bad_dwells import bad_dwells
 from inertial.data_errors.removed_dwells import without
 from inertial.decisions import BLOCKS, CONFIRMED, REFUTED
@@ -20,8 +20,6 @@ from inertial.estimation.model import Model
 from inertial.estimation.problem import Lot, Problem
 from inertial.estimation.space import Space
 from inertial.estimation.term import Term
-
-Array = NDArray[np.float64]
 
 _ENOUGH = 3
 """Fewest units, or stretches of time, whose scatter gives a standard error."""
@@ -146,10 +144,9 @@ def _own_out(problem: Problem, base: Model, series: Array) -> Array:
     """Series (blocks, n), g, without the part that the base model explains by ordinary least squares."""
     level = problem.covariance.level[:, None]
     local = np.where(np.isfinite(problem.error)[..., None], base.local, 0.0) / level[..., None]
-    q = np.linalg.svd(local, full_matrices=False) if local.shape[-1] else None
-    if q is None:
+    if not local.shape[-1]:
         return series
-    u, s, _ = q
+    u, s, _ = np.linalg.svd(local, full_matrices=False)
     u = u * (s > 1e-9 * s[:, :1])[:, None, :]
     own = np.where(np.isfinite(problem.error), series, 0.0)
     return own - (u @ (np.swapaxes(u, -1, -2) @ own[..., None]))[..., 0]

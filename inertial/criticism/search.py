@@ -4,7 +4,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inertial import decisions
 from inertial.criticism.field import Candidates, Rival
@@ -20,8 +19,6 @@ from inertial.estimation.refinement import refine
 from inertial.estimation.space import Gain, Space
 from inertial.estimation.term import Term
 from inertial.probability import log_chi2_tail
-
-Array = NDArray[np.float64]
 
 _FINALISTS = 5  # finalists at each noise, for which the noise is estimated again
 _AGAIN = 3  # the same for the second examination of an effect
@@ -224,29 +221,20 @@ def _refined(field: Candidates, model: Model, term: Term, noise: Noise | None) -
     for _ in range(_REFINED if noise is None and term.effect.nonlinear else 1):
         before = term
         term = refine(model, term, noise or model.with_term(term).noise)
-        if not _moved(before, term):
-            break
+        old, new = (np.ravel(np.array([np.mean(v) for v in t.keywords.values()])) for t in (before, term))
+        if not np.any(np.abs(new - old) > _UNCHANGED * np.abs(old) + 1e-12):
+            break  # where a parameter moves, part of the effect had counted as noise, and the noise changes
     return _judged(field, model, term)
-
-
-def _moved(before: Term, after: Term) -> bool:
-    """Whether a nonlinear parameter moved: then part of the effect had counted as noise, and the noise changes."""
-    old, new = (np.ravel(np.array([np.mean(v) for v in t.keywords.values()])) for t in (before, after))
-    return bool(np.any(np.abs(new - old) > _UNCHANGED * np.abs(old) + 1e-12))
 
 
 def judge(field: Candidates, model: Model, term: Term) -> Rival:
     """A term added to a model, with the noise estimated again; no gain for a handling error that cannot be it."""
-    if isinstance(term.effect, Handling) and not _possible(model, term, term.effect):
-        return Rival(term, 0.0, 0, 0.0, 0.0)
+    if isinstance(term.effect, Handling):
+        # it can have its size, and if of a single dwell it leaves nothing else of the dwell
+        possible = term.effect.possible(model.with_term(term).shared_sizes(term))
+        if not possible or (isinstance(term.effect, OfOneDwell) and not _only_tilted(model, term)):
+            return Rival(term, 0.0, 0, 0.0, 0.0)
     return min((_judged(field, model, each) for each in _begun(model, term)), key=lambda r: r.cost)
-
-
-def _possible(model: Model, term: Term, effect: Handling) -> bool:
-    """Whether a handling error can have its size, and one of a single dwell leaves nothing else of the dwell."""
-    if not effect.possible(model.with_term(term).shared_sizes(term)):
-        return False
-    return not isinstance(effect, OfOneDwell) or _only_tilted(model, term)
 
 
 def _only_tilted(model: Model, term: Term) -> bool:

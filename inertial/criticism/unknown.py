@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inertial import decisions, frames
+from inertial.arrays import Array, Flags
 from inertial.criticism.curves import CurveFit, fit_curve
 from inertial.criticism.drivers import Part, across, curve, forces_along, own_forces, quantities, transfer, varies
 from inertial.design import of_axes
@@ -18,8 +18,6 @@ from inertial.estimation.penalty import PER_COEFFICIENT, cost_of_model, log_p_va
 from inertial.estimation.problem import Problem
 from inertial.estimation.term import Term
 from inertial.quantities import is_clock
-
-Array = NDArray[np.float64]
 
 _KNOTS = 9  # of a smooth curve over a driver
 _TIME_KNOTS = 12  # the same over time
@@ -52,7 +50,7 @@ class Unexplained:
     part: Part = "bias"
     floor: float = float("inf")
     cost: float = float("inf")
-    there: NDArray[np.bool_] | None = None
+    there: Flags | None = None
 
 
 @dataclass(frozen=True)

@@ -143,7 +143,7 @@ def _judged(lot: Lot, effects: Sequence[str], rng: Generator, barred: frozenset[
         floor=final.floor() if unexplained is None else min(final.floor(), unexplained.floor),
         log_p=min(log_p, *_decided(searched, unexplained, search.field.looks)),
         sound=sound,
-        adequate=_adequate(sound=sound, named_data=named_data, unjudged=unjudged),
+        adequate=False if named_data else None if unjudged else sound,
         unjudged=unjudged,
     )
 
@@ -170,13 +170,6 @@ def _decided(searched: SearchResult, unexplained: Unexplained | None, looks: int
     """Log probabilities, over all looks, of what is found where the adequacy of the whole does not decide; zero for nothing."""
     first = [r.log_p + float(np.log(max(looks, 1))) for r in searched.ladder[:1] if searched.added]
     return [0.0, *first, *([] if unexplained is None else [unexplained.log_p])]
-
-
-def _adequate(*, sound: bool, named_data: bool, unjudged: str) -> bool | None:
-    """Whether a model is adequate; None if the data cannot decide."""
-    if named_data:
-        return False
-    return None if unjudged else sound
 
 
 def _with_curves(

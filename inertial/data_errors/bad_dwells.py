@@ -5,8 +5,8 @@ chi-square: no further fit is needed. Deletion identifies the dwell; robust weig
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array, Flags, Places
 from inertial.data_errors.bad_norms import bad_norms
 from inertial.data_errors.removed_dwells import BadDwell, model_without
 from inertial.decisions import BAD_DWELL, COMMON, MOST_BAD
@@ -14,8 +14,6 @@ from inertial.distributions import chi2_upper, f_tail
 from inertial.estimation.alternative import poses
 from inertial.estimation.model import Model
 from inertial.estimation.space import Space
-
-Array = NDArray[np.float64]
 
 _ROUNDS = 8
 _ALIKE = 0.6
@@ -91,7 +89,7 @@ class _Deletion:
         self.prior, self.looks = space.noise.prior, max(int(self.there.sum()) // axes, 1)
         self.left_to_poses = np.zeros(self.n, dtype=bool)
 
-    def off_every_time(self, pose: NDArray[np.intp]) -> NDArray[np.bool_]:
+    def off_every_time(self, pose: Places) -> Flags:
         """Dwells (n,) of poses (n,) all of whose dwells, two at least, are off by about the same."""
         known = self.there & (self.size > 1e-9 * self.size.max())
         size = np.where(known, self.size, 1.0)
@@ -146,17 +144,13 @@ class _Deletion:
             self.squares[b] -= self.left[b, dwell] ** 2 / self.size[b, dwell]
             self.dof[b] -= 1.0
             column = self.space.projector_at(b, dwell) * self.space.noise.scale[b] ** 2
-            for other in np.flatnonzero(~self.there[b] & self.space.covariance.there[b]):
-                column = column - self._held(b, int(other), dwell)
+            for gone in np.flatnonzero(~self.there[b] & self.space.covariance.there[b]).tolist():
+                first = self.space.projector_at(b, gone) * self.space.noise.scale[b] ** 2
+                column = column - first * float(first[dwell] / max(first[gone], 1e-300))
             self.left[b] -= column * off[place]
             self.size[b] = np.maximum(self.size[b] - column**2 / max(float(column[dwell]), 1e-300), 0.0)
             self.there[b, dwell] = False
         return off
-
-    def _held(self, block: int, gone: int, dwell: int) -> Array:
-        """The change of a column of P by earlier deletions."""
-        first = self.space.projector_at(block, gone) * self.space.noise.scale[block] ** 2
-        return first * float(first[dwell] / max(first[gone], 1e-300))
 
 
 def deletion_residuals(model: Model) -> Array:

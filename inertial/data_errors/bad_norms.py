@@ -6,16 +6,14 @@ every suspicion is judged with the noise of the other dwells: with P = V⁻¹ �
 """
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import gammaln
 
+from inertial.arrays import Array
 from inertial.data_errors.removed_dwells import BadDwell, model_without
 from inertial.distributions import chi2_quantile
 from inertial.estimation.model import Model
 from inertial.estimation.noise_shares import Noise
 from inertial.probability import log_f_tail
-
-Array = NDArray[np.float64]
 
 FEWEST_DOF = 8
 """Degrees of freedom below which no dwell can be identified as bad."""

@@ -1,10 +1,11 @@
 """What errors of handling have in common: a change from a dwell on, an error that one unit alone has, one of a single axis."""
 
 from abc import abstractmethod
+from typing import ClassVar
 
 import numpy as np
 
-from inertial.estimation.alternative import Array, Handling, after, times
+from inertial.estimation.alternative import Array, Handling, after, tilts, times, without
 from inertial.estimation.lot import Lot
 
 AXES = "xyz"
@@ -84,6 +85,30 @@ class OfOneAxis(Handling):
     def of_each_unit(self, lot: Lot, slope: Array | None, **place: float) -> Array:
         """The same for every unit."""
         return self.change(lot, slope, **place)
+
+
+class AnglesOff(Handling):
+    """Wrong angles of the table in some dwells, for all units: two angles identify the dwells, and do not correct them.
+
+    which : the dwells that are off, and that they are left out
+    """
+
+    symbol = "Δα, Δβ"
+    which: ClassVar[str]
+
+    def change(self, lot: Lot, slope: Array | None, **place: float) -> Array:
+        """Errors of the two angles in the dwells."""
+        here = np.isin(np.arange(lot.state.time.shape[1]), self.dwells(lot, **place))
+        return tilts(lot.state) * here[:, None, None]
+
+    def describe(self, lot: Lot, size: Array, **place: float) -> str:
+        """The two angles."""
+        angles = np.degrees(size)
+        return f"the pose was off by about {angles[0]:+.3f}° (outer) and {angles[1]:+.3f}° (inner) {self.which}"
+
+    def mended(self, lot: Lot, size: Array, **place: float) -> Lot | None:
+        """Without the dwells."""
+        return without(lot, self.dwells(lot, **place))
 
 
 def axes_of_units(lot: Lot) -> list[dict[str, float]]:

@@ -7,9 +7,8 @@ vanish. A look at all pairs costs one product of the residuals with themselves.
 from collections.abc import Callable, Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from inertial.arrays import Array, Flags
 
 EDGE = 3
 """Dwells at both ends within which no exchange can be detected."""
@@ -45,7 +44,7 @@ class PlainFit:
         output: Array,
         force: Array,
         theta: Array | None,
-        there: NDArray[np.bool_],
+        there: Flags,
         of_other: Callable[[int, int], Array],
     ) -> None:
         units, n = there.shape

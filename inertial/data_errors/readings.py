@@ -4,12 +4,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array, Flags, Places
 from inertial.frames import shown_force
 from inertial.state import ALL_AXES
-
-Array = NDArray[np.float64]
 
 STANDARD_GRAVITY = 9.80665  # m/s² in one g
 _TURNED = 0.05  # singular value, per root of a dwell, below which poses do not separate response and bias
@@ -46,9 +44,9 @@ class Readings:
     axes: tuple[int, ...] = ALL_AXES
 
     @cached_property
-    def there(self) -> NDArray[np.bool_]:
+    def there(self) -> Flags:
         """Which units have which dwells, (units, n)."""
-        there: NDArray[np.bool_] = np.all(np.isfinite(self.output), axis=-1)
+        there: Flags = np.all(np.isfinite(self.output), axis=-1)
         return there
 
     @cached_property
@@ -114,16 +112,11 @@ def robust_fit(force: Array, output: Array, theta: Array | None = None) -> Array
         if middle <= 0.0:
             break
         # absolute values first: they reject outliers between which the biweight could remain
-        weight = (
-            np.sqrt(1.0 / np.maximum(size, 0.1 * middle)) if turn < 5 else _biweight(size / (_TUKEY * 1.5 * middle))
-        )
+        u = size / (_TUKEY * 1.5 * middle)
+        weight = np.sqrt(1.0 / np.maximum(size, 0.1 * middle)) if turn < 5 else np.where(u < 1.0, 1.0 - u**2, 0.0)
         if np.count_nonzero(weight) <= x.shape[1]:
             break
     return coefficients.T
-
-
-def _biweight(u: Array) -> Array:
-    return np.where(u < 1.0, 1.0 - u**2, 0.0)
 
 
 @dataclass(frozen=True)
@@ -175,7 +168,7 @@ def find_split(force: Array, output: Array) -> Split | None:
     return Split(int(there[best]), before, after) if min(errors) < _BETTER * whole and apart else None
 
 
-def _far_from_split(force: Array, output: Array, places: NDArray[np.intp]) -> bool:
+def _far_from_split(force: Array, output: Array, places: Places) -> bool:
     """Whether no place comes near to what a split needs, by the products of all dwells up to each place."""
     x = np.concatenate([np.ones((len(force), 1)), force], axis=-1)
     left = output - x @ np.linalg.lstsq(x, output, rcond=1e-9)[0]

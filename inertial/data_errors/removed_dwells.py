@@ -4,13 +4,12 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.estimation.lot import Lot
 from inertial.estimation.model import Model
 from inertial.estimation.problem import Problem
 
-Array = NDArray[np.float64]
 Place = tuple[int, int]
 """A unit and its dwell."""
 

@@ -18,15 +18,13 @@ from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.data_errors.bad_dwells import deletion_residuals
 from inertial.data_errors.removed_dwells import BadDwell
 from inertial.decisions import HEAVY, TAILS, TAILS_REACH
 from inertial.distributions import chi2_tail, kurtosis_tail, normal_tail, student_tail
 from inertial.estimation.model import Model
-
-Array = NDArray[np.float64]
 
 _SHARES = (0.0, 0.05, 0.1, 0.2, 0.35, 0.6, 1.0)
 """Shares of the variance that heavy tails may have."""

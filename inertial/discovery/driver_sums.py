@@ -6,11 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.discovery.evidence import DATE, MEAN, SLOT, STATION, UNIT, ScoredLot
-
-Array = NDArray[np.float64]
 
 INSIDE_ONLY = {SLOT, UNIT}
 """Drivers that are judged by differences inside a lot alone."""

@@ -14,9 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
+from inertial.arrays import Array, Flags
 from inertial.discovery.station_wander import WALK_FROM, Innovation, Wander
-
-Array = NDArray[np.float64]
 
 FIRST = 30
 """Lots that are held back: their medians bound what one of them can do. One lot multiplies evidence by 1.65 at most."""
@@ -147,8 +146,8 @@ class Levels:
 class Scale:
     """Root mean square of what came before, bounded at each step; a median of the first lots begins it."""
 
-    def __init__(self, start: Array, weight: float = 10.0) -> None:
-        self.squares, self.n = weight * start**2, np.full(start.size, weight)
+    def __init__(self, start: Array) -> None:
+        self.squares, self.n = 10.0 * start**2, np.full(start.size, 10.0)
 
     @property
     def rms(self) -> Array:
@@ -198,7 +197,7 @@ class Evidence:
         self._add(lot)
 
     @property
-    def guarded(self) -> NDArray[np.bool_]:
+    def guarded(self) -> Flags:
         """Effects (h,) for which the stations wander by themselves: what is constant in a lot may be that."""
         return self.wander.gained > WALK_FROM
 
@@ -209,7 +208,7 @@ class Evidence:
         both = (self._scales[name].rms if name in self._scales else one for name in ("between", "inside"))
         return next(both), next(both)
 
-    def shared_by_stations(self) -> NDArray[np.bool_]:
+    def shared_by_stations(self) -> Flags:
         """Effects (h,) that stations share, by three hundred to one, rather than differ in.
 
         The references of each station may have an error of their own for good. Stations about a common mean are compared with
@@ -284,7 +283,7 @@ class Evidence:
     def _centre(self) -> Array:
         return self.score / np.maximum(self.information, 1e-300)
 
-    def _stations(self, lot: ScoredLot, size: Array, safe: Array, seen: NDArray[np.bool_]) -> None:
+    def _stations(self, lot: ScoredLot, size: Array, safe: Array, seen: Flags) -> None:
         """Stations that differ for good: each lot against what its station's earlier ones predict."""
         table = self.levels.setdefault(STATION, Levels(self.count))
         predicted = table.predicted((lot.station,), SHRUNK * self._typical)[0][0]

@@ -10,9 +10,9 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inertial import effects as effects_catalogue
+from inertial.arrays import Array, Places
 from inertial.decisions import CLASS_WIDTH
 from inertial.discovery.driver_sums import (
     INSIDE_ONLY,
@@ -23,8 +23,6 @@ from inertial.discovery.driver_sums import (
     weights_of,
 )
 from inertial.discovery.evidence import INSIDE, MEAN, ScoredLot
-
-Array = NDArray[np.float64]
 
 _MOST = 6
 """Largest number of names of one night."""
@@ -123,14 +121,11 @@ class Pool:
         effect, driver = new.effects[0], new.drivers[0]
         for name in found:
             little = new.score < _REMAINDER * name.score
-            alike = set(new.effects) & set(name.effects) or self._likeness(effect, name.effects[0]) > _ALIKE
+            cosines = self.lot[:, self.places(effect)][:, :, self.places(name.effects[0])]
+            alike = set(new.effects) & set(name.effects) or np.abs(cosines).max() > _ALIKE
             if (alike and (little or driver in {MEAN, name.drivers[0]})) or (little and driver == name.drivers[0]):
                 return True
         return False
-
-    def _likeness(self, one: str, other: str) -> float:
-        """Largest cosine between columns of two effects, in sums of lots."""
-        return float(np.abs(self.lot[:, self.places(one)][:, :, self.places(other)]).max())
 
     def _fitted_out(self, lots: Sequence[ScoredLot], driver: str, effect: str) -> Sequence[ScoredLot]:
         """The lots without an effect of a driver: columns of the effect, and levels that share lots, are fitted in turns."""
@@ -262,7 +257,7 @@ class Pool:
         score = np.where(own > 0.0, left + share * sums, 0.0)
         return replace(lot, score=score, own=own, information=information)
 
-    def places(self, effect: str) -> NDArray[np.intp]:
+    def places(self, effect: str) -> Places:
         """Columns of an effect, (p,)."""
         return np.array([k for k, (one, _) in enumerate(self.columns) if one == effect], dtype=np.intp)
 
@@ -276,7 +271,7 @@ class Pool:
             out[effect] = max(drop - k * (1.0 + np.log(drop / k)), 0.0) if k > 0.0 and drop > k else 0.0
         return out
 
-    def _drop(self, name: str, sums: DriverSums, at: NDArray[np.intp]) -> tuple[float, Array]:
+    def _drop(self, name: str, sums: DriverSums, at: Places) -> tuple[float, Array]:
         """Fall of the misfit by an effect's columns, and the number of coefficients of each axis and column."""
         count = len(self.columns)
         total, rank = 0.0, np.zeros((self.axes, at.size))

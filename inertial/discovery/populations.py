@@ -9,10 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import NDArray
 from scipy import optimize, special
 
-Array = NDArray[np.float64]
+from inertial.arrays import Array
 
 FEWEST = 200
 """Units from which on two populations are looked for."""
@@ -54,7 +53,10 @@ def two_populations(values: Array, rng: Generator) -> TwoPopulations | None:
         return None
     z = rng.permutation((known - centre) / scale)
     halves = z[0::2], z[1::2]
-    ways = [_mixture_log(other, *_fitted(own)) - _one_peak(other) for own, other in (halves, halves[::-1])]
+    ways = [
+        float(np.sum(np.logaddexp(*_parts(other, *_fitted(own))))) - _one_peak(other)
+        for own, other in (halves, halves[::-1])
+    ]
     log_e = float(special.logsumexp(ways) - np.log(2.0))
     weights, means, widths = _fitted(z)
     small = int(np.argmin(weights))
@@ -67,17 +69,8 @@ def two_populations(values: Array, rng: Generator) -> TwoPopulations | None:
     )
 
 
-def _mixture_log(z: Array, weights: Array, means: Array, widths: Array) -> float:
-    """Log likelihood of values under a mixture."""
-    return float(np.sum(_total(_parts(z, weights, means, widths))))
-
-
-def _total(parts: Array) -> Array:
-    """Log of the sums (n,) of the exponentials of parts (2, n)."""
-    return np.logaddexp(parts[0], parts[1])
-
-
 def _parts(z: Array, weights: Array, means: Array, widths: Array) -> Array:
+    """Log likelihoods (2, n) of values under the two laws of a mixture."""
     about = (z - means[:, None]) / widths[:, None]
     return np.log(weights / widths)[:, None] - 0.5 * about**2 - 0.5 * np.log(2.0 * np.pi)
 
@@ -94,7 +87,7 @@ def _fitted(z: Array) -> tuple[Array, Array, Array]:
         before = -np.inf
         for _ in range(_STEPS):
             parts = _parts(z, weights, means, widths)
-            total = _total(parts)
+            total = np.logaddexp(*parts)
             mine = np.exp(parts - total)
             counts = np.maximum(mine.sum(axis=1), 2.0)
             weights, means = counts / counts.sum(), mine @ z / counts

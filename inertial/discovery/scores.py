@@ -8,12 +8,11 @@ and lots. Errors of the station of that day are free: their coefficients are est
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inertial import effects as catalogue
+from inertial.arrays import Array
 from inertial.design import starting_values
 from inertial.effects.base import AnyEffect
 from inertial.errors import MissingInput
@@ -23,9 +22,6 @@ from inertial.estimation.model import Model, refuse_without_freedom
 from inertial.estimation.problem import Lot, Problem
 from inertial.estimation.refinement import terms_of
 from inertial.estimation.term import with_turn_on
-from inertial.state import State
-
-Array = NDArray[np.float64]
 
 LEAST_LEFT = 0.05
 """Share of its information that an effect keeps beside free errors of the station; below it, no lot can tell it from them."""
@@ -58,11 +54,6 @@ class LotScores:
     floor: float
     size: Array
 
-    @cached_property
-    def sums(self) -> Array:
-        """Scores of the lot, (m, k): sums over the units."""
-        return self.score.sum(axis=0)
-
 
 def scores_of(lot: Lot, effects: Sequence[str], tried: Iterable[AnyEffect] | None = None) -> LotScores:
     """Scores of the effects that a model lacks.
@@ -94,7 +85,7 @@ def _columns(problem: Problem, effects: Sequence[AnyEffect]) -> tuple[Array, tup
     names: list[tuple[str, int]] = []
     for effect in effects:
         try:
-            own = problem.columns(effect, _values(effect, problem.lot.state))
+            own = problem.columns(effect, starting_values([effect], problem.lot.state).get(effect.id, {}))
         except MissingInput:
             continue
         own = own[..., : effect.primary]
@@ -105,10 +96,6 @@ def _columns(problem: Problem, effects: Sequence[AnyEffect]) -> tuple[Array, tup
     if not made:
         return np.zeros((problem.blocks, problem.n, 0)), ()
     return np.concatenate(made, axis=-1), tuple(names)
-
-
-def _values(effect: AnyEffect, state: State) -> dict[str, float]:
-    return starting_values([effect], state).get(effect.id, {})
 
 
 def _scored(

@@ -10,9 +10,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from inertial.arrays import Array, Flags
 
 WALKS: Array = np.array([0.0, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1, 3e-1, 1.0])
 """Variance of the walk from one lot of a station to the next, over that of the noise of a lot."""
@@ -30,7 +29,7 @@ class Level:
 
     mean: Array
     variance: Array
-    known: NDArray[np.bool_]
+    known: Flags
     predictors: dict[str, Array] = field(default_factory=dict[str, Array])
 
 
@@ -47,7 +46,7 @@ class Innovation:
     every: Array
     gain: Array
     roots: Array
-    known: NDArray[np.bool_]
+    known: Flags
 
 
 class Wander:
@@ -102,7 +101,7 @@ class Wander:
         prediction: Array,
         found: Innovation,
         rms: Array,
-        told: NDArray[np.bool_],
+        told: Flags,
     ) -> tuple[Array, Array]:
         """Innovation, and what the filter leaves of a driver's prediction over the noise of it, (h,) each.
 

@@ -3,11 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.errors import NotIdentified
 
-Array = NDArray[np.float64]
 STANDARD_GRAVITY = 9.80665
 TERMS = ("bias", "scale", "second_order", "third_order", "arm_stretch_or_odd_quadratic", "mass_offset_or_asymmetry")
 
@@ -66,11 +65,10 @@ def fit_polynomial(acceleration: Array, output: Array, error: Array, names: tupl
     design = columns(acceleration, names) / error[:, None]
     size = np.linalg.norm(design, axis=0)
     if len(output) < len(names) or np.linalg.matrix_rank(design / size, tol=1e-8) < len(names):
-        msg = (
+        raise NotIdentified(
             f"centrifuge: {len(output)} points do not tell {', '.join(names)} apart; add speeds, or measure with the mounting "
             "reversed too"
         )
-        raise NotIdentified(msg)
     c = np.linalg.lstsq(design / size, output / error, rcond=None)[0] / size
     residuals = output - columns(acceleration, names) @ c
     inverse = np.linalg.inv((design / size).T @ (design / size)) / np.outer(size, size)
@@ -79,24 +77,11 @@ def fit_polynomial(acceleration: Array, output: Array, error: Array, names: tupl
     )
 
 
-def linearity_percent(polynomial: Polynomial, full_scale_g: float, line: str = "least_squares") -> float:
-    """Largest deviation from a straight line over 0 … full scale of both signs, % of the one-sided range.
-
-    Parameters
-    ----------
-    line : ``least_squares``, ``end_point`` or ``best`` (smallest largest deviation)
-    """
+def linearity_percent(polynomial: Polynomial, full_scale_g: float) -> float:
+    """Largest deviation from the least-squares line over 0 … full scale of both signs, % of the one-sided range."""
     x = np.linspace(-full_scale_g, full_scale_g, 2001)
-    y = columns(x, polynomial.names) @ polynomial.value
-    gain = polynomial.of("scale")[0]
-    if line == "least_squares":
-        deviation = _apart(x, y)
-    elif line == "end_point":
-        slope = (y[-1] - y[0]) / (x[-1] - x[0])
-        deviation = y - (y[0] + slope * (x - x[0]))
-    else:
-        deviation = _minimax(x, y)
-    return float(100.0 * np.max(np.abs(deviation)) / (abs(gain) * full_scale_g))
+    deviation = _apart(x, columns(x, polynomial.names) @ polynomial.value)
+    return float(100.0 * np.max(np.abs(deviation)) / (abs(polynomial.of("scale")[0]) * full_scale_g))
 
 
 def linearity_error(polynomial: Polynomial, full_scale_g: float) -> float:
@@ -115,18 +100,3 @@ def linearity_error(polynomial: Polynomial, full_scale_g: float) -> float:
 def _apart(x: Array, y: Array) -> Array:
     """Deviations (n,) or (n, k) from the least-squares line."""
     return np.asarray(y - np.vander(x, 2) @ np.polyfit(x, y, 1), dtype=np.float64)
-
-
-def _minimax(x: Array, y: Array) -> Array:
-    """Deviations from the straight line whose largest deviation is smallest: half the least vertical extent over slopes."""
-    start = (y[-1] - y[0]) / (x[-1] - x[0])
-    reach = 4.0 * float(np.ptp(y - start * x)) / float(np.ptp(x))
-    low, high = start - reach, start + reach
-    for _ in range(200):  # the extent is a convex function of the slope
-        one, two = low + (high - low) / 3.0, high - (high - low) / 3.0
-        if np.ptp(y - one * x) <= np.ptp(y - two * x):
-            high = two
-        else:
-            low = one
-    left = y - 0.5 * (low + high) * x
-    return np.asarray(left - 0.5 * (left.max() + left.min()))

@@ -4,14 +4,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.dynamics.centrifuge_effects import EFFECTS, Spins
 from inertial.dynamics.centrifuge_radii import radii_as_observed
 from inertial.dynamics.missing_effects import FOLDS, Judged, breakers_of, judge
 from inertial.errors import NotIdentified
 
-Array = NDArray[np.float64]
 DEFAULT = ("second_order", "third_order")
 
 
@@ -64,8 +63,7 @@ def fit_spins(points: Spins, output: Array, error: Array, effects: Sequence[str]
         There are fewer points than coefficients.
     """
     if len(output) < 2 + len(effects):
-        msg = f"centrifuge: {len(output)} points for {2 + len(effects)} coefficients; add speeds"
-        raise NotIdentified(msg)
+        raise NotIdentified(f"centrifuge: {len(output)} points for {2 + len(effects)} coefficients; add speeds")
     rows = _rows(points, effects)
     known = radii_as_observed(len(_uncertain_radii(points)), rows.shape[1], points.radius_error_m)
     weighted = np.vstack([rows / error[:, None], known])

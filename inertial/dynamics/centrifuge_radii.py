@@ -3,12 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.dynamics.centrifuge import STANDARD_GRAVITY, Polynomial, columns
 from inertial.errors import NotIdentified
 
-Array = NDArray[np.float64]
 BOTH = ("bias", "scale", "second_order", "third_order", "odd_quadratic", "asymmetry")
 """Terms of a unit that both mountings and two radii separate."""
 ONE_WAY = BOTH[:4]
@@ -101,11 +100,10 @@ def _solved(
         weighted, target = np.vstack([weighted, known]), np.append(target, np.zeros(len(known)))
     size = np.linalg.norm(weighted, axis=0)
     if len(output) < rows.shape[1] or np.linalg.matrix_rank(weighted / size, tol=1e-8) < weighted.shape[1]:
-        msg = (
+        raise NotIdentified(
             f"centrifuge: {len(output)} points do not tell the terms of two radii apart; add speeds, choose radii further "
             "apart, or measure with the mounting reversed too"
         )
-        raise NotIdentified(msg)
     value = np.linalg.lstsq(weighted / size, target, rcond=None)[0] / size
     covariance = np.linalg.inv((weighted / size).T @ (weighted / size)) / np.outer(size, size)
     residuals = output - np.column_stack([rows, of_radii]) @ value

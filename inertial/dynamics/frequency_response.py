@@ -8,15 +8,12 @@ well, of which every segment has another part.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import czt
 from scipy.signal.windows import tukey
 from scipy.stats import norm, t
 
+from inertial.arrays import Array, Complex, Flags
 from inertial.errors import NotIdentified
-
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 PER_OCTAVE = 24
 FEWEST_LINES = 6
@@ -52,7 +49,7 @@ class Response:
     error: Array
     lines: Array
 
-    def picked(self, rows: NDArray[np.bool_]) -> "Response":
+    def picked(self, rows: Flags) -> "Response":
         """Some of the bands."""
         return Response(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
 
@@ -82,10 +79,9 @@ def frequency_response(
     lines = np.arange(1, int(top * seconds))
     if lines.size < 8 * FEWEST_LINES:
         needed = 8 * FEWEST_LINES
-        msg = (
+        raise NotIdentified(
             f"response: {seconds:.3g} s give {lines.size} lines up to {top:.4g} Hz, {needed} are needed; record longer"
         )
-        raise NotIdentified(msg)
     f = lines / seconds
     from_x, from_y = (_lines(wave, rate, seconds, lines.size) for wave, rate in ((x, x_rate), (y, y_rate)))
     from_y = from_y * np.exp(-2j * np.pi * f * late_s)
@@ -100,8 +96,9 @@ def frequency_response(
     power = np.array([np.mean(np.abs(from_x[a:b]) ** 2) for a, b in _edges(f, per_octave)])
     kept = (made.error < LARGEST_ERROR) & (power > EXCITED * power.max())
     if not kept.any():
-        msg = "response: in no band does the output follow the reference; check channels, cable and mounting"
-        raise NotIdentified(msg)
+        raise NotIdentified(
+            "response: in no band does the output follow the reference; check channels, cable and mounting"
+        )
     made = made.picked(kept)
     back = np.exp(-2j * np.pi * made.frequency * delay)
     return Response(made.frequency, made.h1 * back, made.h2 * back, made.coherence, made.error, made.lines)
@@ -212,8 +209,9 @@ def clock_departure(reference: tuple[Array, float], output: tuple[Array, float])
         left = delays - delays.mean() - slope * apart
         departure, error = departure - slope, float(np.sqrt(left @ left / (count - 2) / (apart @ apart)))
         if not abs(departure) < _LARGEST_DEPARTURE:
-            msg = "response: the output has no common clock with the reference; check channels, cable and mounting"
-            raise NotIdentified(msg)
+            raise NotIdentified(
+                "response: the output has no common clock with the reference; check channels, cable and mounting"
+            )
     return departure, error
 
 

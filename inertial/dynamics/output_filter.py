@@ -4,12 +4,10 @@ from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import butter, firwin, lfilter, lfilter_zi
 
+from inertial.arrays import Array
 from inertial.roots import root
-
-Array = NDArray[np.float64]
 
 Kind = Literal["butterworth", "fir", "moving-average"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
@@ -90,8 +88,9 @@ def designed(kind: Kind, cutoff_hz: float, rate_hz: float) -> OutputFilter:
     """
     share = cutoff_hz / rate_hz
     if not 0.0 < share <= HIGHEST:
-        msg = f"cut-off {cutoff_hz:g} Hz at {rate_hz:g} Hz, above 0 and at most {HIGHEST * rate_hz:g} Hz is needed"
-        raise ValueError(msg)
+        raise ValueError(
+            f"cut-off {cutoff_hz:g} Hz at {rate_hz:g} Hz, above 0 and at most {HIGHEST * rate_hz:g} Hz is needed"
+        )
     if kind == "butterworth":
         pair: Any = butter(2, cutoff_hz, fs=rate_hz)
         return OutputFilter(kind, rate_hz, np.asarray(pair[0], dtype=np.float64), np.asarray(pair[1], dtype=np.float64))
@@ -101,10 +100,9 @@ def designed(kind: Kind, cutoff_hz: float, rate_hz: float) -> OutputFilter:
         else max(2, round(np.sqrt(1.0 + (0.4429 / share) ** 2)))
     )
     if count > MOST_TAPS:
-        msg = (
+        raise ValueError(
             f"cut-off {cutoff_hz:g} Hz at {rate_hz:g} Hz takes {count} samples, at most {MOST_TAPS}; choose butterworth"
         )
-        raise ValueError(msg)
     if kind == "moving-average":
         return _of_taps(kind, rate_hz, np.full(count, 1.0 / count))
 

@@ -1,14 +1,13 @@
-"""Shock pulses: peak, duration, baseline and velocity change of a recorded pulse."""
+"""Shock pulses: peak, duration, baseline and velocity change of a recorded pulse, and its response spectrum (ISO 18431-4)."""
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.signal import butter, sosfiltfilt
+from scipy.signal import butter, lfilter, sosfiltfilt
 
+from inertial.arrays import Array
 from inertial.errors import NotIdentified
 
-Array = NDArray[np.float64]
 TEN_PERCENT = 1.0 - 2.0 * float(np.arcsin(0.1)) / np.pi
 """0.936: part of a half sine's duration between its 10 % points."""
 TOP = 0.9  # of the largest sample: the part of the pulse through which the parabola is laid
@@ -63,24 +62,25 @@ def measured_pulse(record: Array, rate_hz: float, *, before_s: float) -> Pulse:
     """
     quiet = record[: int(before_s * rate_hz)]
     if quiet.size < 8:
-        msg = f"shock: {quiet.size} samples before the pulse, 8 or more are needed for the baseline; trigger later"
-        raise NotIdentified(msg)
+        raise NotIdentified(
+            f"shock: {quiet.size} samples before the pulse, 8 or more are needed for the baseline; trigger later"
+        )
     baseline, noise = float(quiet.mean()), float(quiet.std(ddof=1))
     y = record - baseline
     sign = 1.0 if y.max() >= -y.min() else -1.0
     y = sign * y
     top = int(np.argmax(y))
     if not y[top] > 8.0 * noise:
-        msg = (
+        raise NotIdentified(
             f"shock: the largest excursion is {y[top]:.3g}, {8.0 * noise:.3g} is needed above a noise of "
             f"{noise:.3g}; check the trigger"
         )
-        raise NotIdentified(msg)
     low, high = _span(y, top, TOP * y[top])
     places = np.arange(low, high + 1)
     if places.size < 5:
-        msg = f"shock: {places.size} samples in the top tenth of the pulse, 5 or more are needed; sample faster"
-        raise NotIdentified(msg)
+        raise NotIdentified(
+            f"shock: {places.size} samples in the top tenth of the pulse, 5 or more are needed; sample faster"
+        )
     x = (places - places.mean()) / rate_hz
     rows = np.column_stack([np.ones_like(x), x, x**2])
     c = np.linalg.lstsq(rows, y[places], rcond=None)[0]
@@ -90,8 +90,7 @@ def measured_pulse(record: Array, rate_hz: float, *, before_s: float) -> Pulse:
     vertex = np.array([1.0, at, at**2])
     start, stop = _crossings(y, top, 0.1 * value)
     if start < 1 or stop > y.size - 2:
-        msg = "shock: the pulse is cut off at an end of the record; move the trigger, or record longer"
-        raise NotIdentified(msg)
+        raise NotIdentified("shock: the pulse is cut off at an end of the record; move the trigger, or record longer")
     duration = (stop - start) / rate_hz / TEN_PERCENT
     pad = 0.5 * (1.0 - TEN_PERCENT) * duration * rate_hz
     first, last = max(0, round(start - pad)), min(y.size - 1, round(stop + pad))
@@ -141,8 +140,9 @@ def found_duration(record: Array, rate_hz: float) -> tuple[float, float]:
         y = y if y[np.argmax(np.abs(y))] > 0.0 else -y
         top = int(np.argmax(y))
         if not y[top] > 8.0 * noise:
-            msg = f"shock: the largest excursion is {y[top]:.3g} at a noise of {noise:.3g}, no pulse; check the trigger"
-            raise NotIdentified(msg)
+            raise NotIdentified(
+                f"shock: the largest excursion is {y[top]:.3g} at a noise of {noise:.3g}, no pulse; check the trigger"
+            )
         start, stop = _crossings(y, top, 0.5 * float(y[top]))
         wider = max((stop - start) / rate_hz / HALF_WIDTH, 4.0 / rate_hz)
         if abs(wider - duration) < _SETTLED * wider:
@@ -153,11 +153,10 @@ def found_duration(record: Array, rate_hz: float) -> tuple[float, float]:
     start, stop = _crossings(y, top, 0.1 * float(y[top]))
     by_foot = (stop - start) / rate_hz / TEN_PERCENT
     if abs(by_foot / duration - 1.0) > _ALIKE:
-        msg = (
+        raise NotIdentified(
             f"shock: the pulse is no half sine: by its width at 10 % of the peak it lasts {1e3 * by_foot:.3g} ms, at 50 % "
             f"{1e3 * duration:.3g} ms; state duration_ms, or look at the mounting"
         )
-        raise NotIdentified(msg)
     return by_foot, max(start / rate_hz - 0.5 * by_foot, 0.0)
 
 
@@ -199,3 +198,52 @@ def _crossings(y: Array, top: int, level: float) -> tuple[float, float]:
     if high < y.size - 1 and y[high] > y[high + 1]:
         stop = high + (y[high] - level) / (y[high] - y[high + 1])
     return start, stop
+
+
+PER_OCTAVE = 12
+FEWEST_PER_PERIOD = 10.0
+
+
+def octave_frequencies(low_hz: float, high_hz: float, per_octave: int = PER_OCTAVE) -> Array:
+    """Frequencies (n,) in Hz from low to at most high, ``per_octave`` in an octave."""
+    count = int(np.floor(per_octave * np.log2(high_hz / low_hz) + 1e-9)) + 1
+    return low_hz * 2.0 ** (np.arange(count) / per_octave)
+
+
+def responses(record: Array, rate_hz: float, natural_hz: float, q: float) -> Array:
+    """Absolute acceleration (n,) of a base-excited oscillator with this natural frequency and Q (``inf``: undamped)."""
+    damping = 0.0 if np.isinf(q) else 0.5 / q
+    wn, t = 2.0 * np.pi * natural_hz, 1.0 / rate_hz
+    wd = wn * np.sqrt(1.0 - damping**2)
+    e, k = np.exp(-damping * wn * t), wd * t
+    c, s = e * np.cos(k), e * np.sin(k)
+    sp = s / k
+    return np.asarray(lfilter([1.0 - sp, 2.0 * (sp - c), e**2 - sp], [1.0, -2.0 * c, e**2], record), dtype=np.float64)
+
+
+def shock_spectrum(record: Array, rate_hz: float, natural_hz: Array, q: float = 10.0) -> Array:
+    """Largest absolute response (m,), the maximax spectrum, in the record's unit.
+
+    One period of the lowest frequency of zeros is added behind the record, so that the residual response is seen.
+
+    Parameters
+    ----------
+    record : (n,), baseline already taken out
+    natural_hz : (m,), Hz
+    q : 1/(2ζ); ``inf`` for undamped oscillators
+
+    Raises
+    ------
+    NotIdentified
+        The sampling rate is below ten times the highest frequency: the maximum would be up to 8 % low.
+    """
+    highest = float(np.max(natural_hz))
+    if rate_hz < FEWEST_PER_PERIOD * highest:
+        raise NotIdentified(
+            f"shock spectrum: {rate_hz:g} Hz for {highest:g} Hz, at least "
+            f"{FEWEST_PER_PERIOD * highest:g} Hz is needed; lower the "
+            "highest frequency, or sample faster"
+        )
+    tail = np.zeros(int(np.ceil(rate_hz / float(np.min(natural_hz)))) + 1)
+    padded = np.concatenate([record, tail])
+    return np.array([np.max(np.abs(responses(padded, rate_hz, float(f), q))) for f in natural_hz])

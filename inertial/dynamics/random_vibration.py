@@ -1,9 +1,8 @@
 """Random vibration: densities by breakpoints, their overall level, and the rectification coefficient."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from inertial.arrays import Array
 
 
 def segment_power(f1: float, p1: float, f2: float, p2: float) -> float:

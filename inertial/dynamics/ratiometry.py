@@ -3,12 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.distributions import chi2_tail
 from inertial.dynamics.missing_effects import ADEQUATE_P
 
-Array = NDArray[np.float64]
 FEWEST_OF_PARABOLA = 3  # supplies: a parabola through the first has two coefficients
 CLEAR_SQUARE_TERM = (
     2.58  # standard uncertainties of a parabola's square term, 1 % by chance, from which on no line is a slope

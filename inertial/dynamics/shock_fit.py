@@ -5,14 +5,12 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from inertial.arrays import Array, Flags
 from inertial.dynamics.shock_effects import EFFECTS
 from inertial.dynamics.transfer_effects.base import Coordinates, Parameter
 from inertial.errors import NotIdentified
-
-Array = NDArray[np.float64]
 
 _KEPT = 200
 """Largest number of waveforms that a design keeps."""
@@ -59,7 +57,7 @@ class ShockFit:
     dof: int
 
 
-def fit_shock(record: ShockRecord, effects: Sequence[str], rows: Sequence[NDArray[np.bool_]] | None = None) -> ShockFit:
+def fit_shock(record: ShockRecord, effects: Sequence[str], rows: Sequence[Flags] | None = None) -> ShockFit:
     """Least squares of sensitivity and effects over all shocks; nonlinear parameters from several starts.
 
     Parameters
@@ -73,15 +71,16 @@ def fit_shock(record: ShockRecord, effects: Sequence[str], rows: Sequence[NDArra
     """
     duration = record.duration_s
     parameters = [(name, p) for name in effects for p in EFFECTS[name].parameters(duration)]
-    coordinates = Coordinates([p for _, p in parameters])
     used = [np.ones(len(one.unit), dtype=bool) for one in record.shocks] if rows is None else list(rows)
     count = sum(int(one.sum()) for one in used)
     if count < len(effects) + len(parameters) + 2:
-        msg = f"shock: {count} samples for {len(effects) + len(parameters) + 1} parameters; record faster"
-        raise NotIdentified(msg)
+        raise NotIdentified(
+            f"shock: {count} samples for {len(effects) + len(parameters) + 1} parameters; record faster"
+        )
     whole = np.concatenate(used)
     target = np.concatenate([one.unit / one.error for one in record.shocks])[whole]
     model = Design(record, effects, parameters)
+    coordinates = model.coordinates
 
     def design(x: Array) -> Array:
         return model.at(x)[whole]
@@ -113,10 +112,10 @@ def fit_shock(record: ShockRecord, effects: Sequence[str], rows: Sequence[NDArra
 def predicted(record: ShockRecord, fit: ShockFit) -> float:
     """Rms residual of shocks that were not fitted, in % of the peak: sensitivity and effects applied to the reference."""
     parameters = [(name, p) for name in fit.effects for p in EFFECTS[name].parameters(record.duration_s)]
-    x = Coordinates([p for _, p in parameters]).of(np.array([fit.parameters[p.name][0] for _, p in parameters]))
+    model = Design(record, fit.effects, parameters)
+    x = model.coordinates.of(np.array([fit.parameters[p.name][0] for _, p in parameters]))
     c = np.array([fit.sensitivity, *(value for value, _ in fit.coefficients.values())])
-    left = _residuals(record, Design(record, fit.effects, parameters).at(x), c)
-    return residual_percent(record, left)
+    return residual_percent(record, _residuals(record, model.at(x), c))
 
 
 class Design:

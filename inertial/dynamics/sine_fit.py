@@ -7,12 +7,10 @@ periods errs by up to d/(πn).
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array, Complex
 from inertial.errors import NotIdentified
 
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 ROUNDS = 12
 HARMONICS = 5
 
@@ -49,8 +47,7 @@ def fit_tone(record: Array, rate_hz: float, frequency: float, *, first_s: float 
     """
     n = len(record)
     if n < 8:
-        msg = f"sine fit: {n} samples, 8 or more are needed; record longer"
-        raise NotIdentified(msg)
+        raise NotIdentified(f"sine fit: {n} samples, 8 or more are needed; record longer")
     time = first_s + np.arange(n) / rate_hz
     design = np.hstack([_columns(time, frequency), *_harmonics(time, rate_hz, frequency, harmonics)])
     c, left = _projected(design, record)

@@ -1,22 +1,23 @@
-"""In frequency: confidence of densities, means under vibration, folding, and the second-order accelerometer."""
+"""In frequency: confidence of densities, means under vibration, folding, exciters, and the second-order accelerometer."""
 
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy import signal
 from scipy.stats import chi2
 
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from inertial.arrays import Array, Complex
+
+STANDARD_GRAVITY = 9.80665  # m/s²
 HANN_HALF = 0.945
 """Independent averages per segment for a Hann window with half overlap (Welch 1967)."""
 
 
-def density_confidence(averages: float, level: float = 0.99) -> tuple[float, float]:
-    """Deviations in dB, low and high, between which a density estimate lies: χ² with 2n degrees of freedom over 2n."""
+def density_confidence(averages: float) -> tuple[float, float]:
+    """Deviations in dB, low and high, between which a density estimate lies with 99 %: χ² with 2n degrees of freedom over 2n."""
     dof = 2.0 * averages
-    low, high = chi2.ppf([0.5 - 0.5 * level, 0.5 + 0.5 * level], dof) / dof
+    low, high = chi2.ppf([0.5 - 0.5 * 0.99, 0.5 + 0.5 * 0.99], dof) / dof
     return float(10.0 * np.log10(low)), float(10.0 * np.log10(high))
 
 
@@ -57,10 +58,16 @@ def transfer(frequency: ArrayLike, natural_hz: float, damping: float) -> Complex
     return np.asarray(-1.0 / ((1.0 - ratio**2) + 2.0j * damping * ratio), dtype=np.complex128)
 
 
-def bandwidth(natural_hz: float, damping: float, level: float = 0.5) -> float:
-    """Frequency in Hz where |H|² has fallen to ``level`` of its static value; the −3 dB point by default.
+def bandwidth(natural_hz: float, damping: float) -> float:
+    """Frequency in Hz where |H|² has fallen to half of its static value, the −3 dB point.
 
-    (1 - r²)² + 4ζ²r² = 1/level solved for r = f/f_n; with q = 1 − 2ζ² and level ½ it is √(q + √(q² + 1)).
+    (1 - r²)² + 4ζ²r² = 2 solved for r = f/f_n: √(q + √(q² + 1)) with q = 1 − 2ζ².
     """
     q = 1.0 - 2.0 * damping**2
-    return natural_hz * float(np.sqrt(q + np.sqrt(q**2 - 1.0 + 1.0 / level)))
+    return natural_hz * float(np.sqrt(q + np.sqrt(q**2 - 1.0 + 2.0)))
+
+
+def largest_level(frequency: ArrayLike, *, displacement_m: float, velocity_m_s: float, acceleration_g: float) -> Array:
+    """Largest peak acceleration in g at frequencies in Hz: the least of ω²·displacement, ω·velocity and the limit."""
+    w = 2.0 * np.pi * np.asarray(frequency, dtype=np.float64)
+    return np.minimum(np.minimum(w**2 * displacement_m, w * velocity_m_s) / STANDARD_GRAVITY, acceleration_g)

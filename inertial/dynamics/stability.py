@@ -3,10 +3,10 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import toeplitz
 from scipy.stats import chi2, norm
 
+from inertial.arrays import Array
 from inertial.dynamics.wander import Posterior, logarithmic_kernel, stated_error, wander, wander_posterior
 from inertial.dynamics.wandering_means import (
     IdentifiedNoise,
@@ -19,7 +19,6 @@ from inertial.dynamics.wandering_means import (
 from inertial.errors import NotIdentified
 from inertial.noise.allan import overlapping
 
-Array = NDArray[np.float64]
 NOISE_MEANS = 40  # of a short record, for its flicker
 MEAN_S, MOST_MEANS = 100.0, 144  # of the means of a stability; of those whose noise is told
 
@@ -62,10 +61,10 @@ def block_means(record: Array, size: int) -> Array:
     return record[: count * size].reshape(count, size).mean(axis=1)
 
 
-def error_of_mean(record: Array, parts: int = 10) -> Array:
-    """Standard uncertainty of the mean of a record (n, 3), by axis (3,), from the scatter of the means of its parts."""
-    means = np.array([part.mean(axis=0) for part in np.array_split(record, parts)])
-    return np.asarray(means.std(axis=0, ddof=1) / np.sqrt(float(parts)))
+def error_of_mean(record: Array) -> Array:
+    """Standard uncertainty of the mean of a record (n, 3), by axis (3,), from the scatter of the means of its ten parts."""
+    means = np.array([part.mean(axis=0) for part in np.array_split(record, 10)])
+    return np.asarray(means.std(axis=0, ddof=1) / np.sqrt(10.0))
 
 
 def stability(record: Array, rate_hz: float, identified: IdentifiedNoise | None = None) -> StabilityFigures:
@@ -83,8 +82,7 @@ def stability(record: Array, rate_hz: float, identified: IdentifiedNoise | None 
     """
     hundred = block_means(record, round(MEAN_S * rate_hz))
     if hundred.size < 10:
-        msg = f"stability: {hundred.size} means of 100 s, 10 or more are needed; record at least 1000 s"
-        raise NotIdentified(msg)
+        raise NotIdentified(f"stability: {hundred.size} means of 100 s, 10 or more are needed; record at least 1000 s")
     second = block_means(record, max(1, round(rate_hz)))
     time: Array = np.asarray(MEAN_S * np.arange(hundred.size) / 3600.0, dtype=np.float64)
     rows: Array = np.asarray(np.column_stack([np.ones_like(time), time - time.mean()]), dtype=np.float64)
@@ -241,8 +239,9 @@ def warm_up_time(time: Array, record: Array, *, band: float, window_s: float) ->
         return float(time[0]), final
     last = float(middle[outside[-1]])
     if last > time[0] + 0.8 * float(np.ptp(time)):
-        msg = f"warm-up: the output leaves ± {band:.3g} at {last:.0f} s, in the last fifth of the record; record longer"
-        raise NotIdentified(msg)
+        raise NotIdentified(
+            f"warm-up: the output leaves ± {band:.3g} at {last:.0f} s, in the last fifth of the record; record longer"
+        )
     return last + step, final
 
 
@@ -271,8 +270,7 @@ def repeatability(means: Array, own_error: float) -> Repeatability:
     """
     n = means.size
     if n < 3:
-        msg = f"turn-on: {n} cycles, 3 or more are needed; add cycles"
-        raise NotIdentified(msg)
+        raise NotIdentified(f"turn-on: {n} cycles, 3 or more are needed; add cycles")
     s2, dof = float(np.var(means, ddof=1)), n - 1
 
     def reduced(value: float) -> float:

@@ -4,11 +4,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.errors import NotIdentified
 
-Array = NDArray[np.float64]
 ALIGNMENTS = 3
 FEWEST = 7  # points of a local fit
 CENTRINGS = 3  # fits about a crossing, each about what the last one found
@@ -69,16 +68,14 @@ def step_figures(
     """
     noise = float(np.sqrt(np.mean(error**2)))
     if 3.0 * noise > band:
-        msg = (
+        raise NotIdentified(
             f"step: noise {100.0 * noise:.3g} % of the step, a third of the band at most is needed; average more steps"
         )
-        raise NotIdentified(msg)
     ten, ninety = (_first_above(time, response, level) for level in (0.1, 0.9))
     rise = ninety - ten
     within = int(np.count_nonzero((time >= ten) & (time <= ninety)))
     if within < FEWEST:
-        msg = f"step: {within} points in the rise time, {FEWEST} are needed; sample faster"
-        raise NotIdentified(msg)
+        raise NotIdentified(f"step: {within} points in the rise time, {FEWEST} are needed; sample faster")
     width = 0.12 * rise
     blur = bin_s**2 / 12.0
     first, half, last = (
@@ -148,18 +145,18 @@ def _smoothed(time: Array, response: Array, error: Array, width: float) -> tuple
 def _first_above(time: Array, response: Array, level: float) -> float:
     above = np.flatnonzero(response >= level)
     if above.size == 0 or above[0] == 0:
-        msg = (
+        raise NotIdentified(
             f"step: the response does not rise through {100.0 * level:g} % of the step; check drive, cable and trigger"
         )
-        raise NotIdentified(msg)
     return float(time[above[0]])
 
 
 def _last_outside(time: Array, response: Array, band: float) -> float:
     outside = np.flatnonzero(np.abs(response - 1.0) > band)
     if outside.size == 0 or outside[-1] > len(time) - 2 - FEWEST:
-        msg = f"step: the response does not settle within ± {100.0 * band:.3g} % of the step; record longer"
-        raise NotIdentified(msg)
+        raise NotIdentified(
+            f"step: the response does not settle within ± {100.0 * band:.3g} % of the step; record longer"
+        )
     return float(0.5 * (time[outside[-1]] + time[outside[-1] + 1]))
 
 

@@ -4,14 +4,13 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import norm
 
+from inertial.arrays import Array
 from inertial.dynamics.wander import wander
 from inertial.errors import NotIdentified
 from inertial.noise.flicker import flicker_kernel
 
-Array = NDArray[np.float64]
 TERMS = ("bias", "sine", "cosine", "second_order", "third_order")
 
 
@@ -57,8 +56,9 @@ class TiltFit:
 
     def curve(self, angle: Array) -> Array:
         """Departure (n,) of the K2–K3 curve from bias and scale at table angles (n,), rad; output unit."""
-        turn = angle + self.phase[0]
-        return _departures(turn) @ self.value[[self.names.index(name) for name in TERMS[3:]]]
+        turn = angle + self.phase[0]  # from the zero of the input axis
+        columns = np.column_stack([-0.5 * np.cos(2.0 * turn), -0.25 * np.sin(3.0 * turn)])
+        return columns @ self.value[[self.names.index(name) for name in TERMS[3:]]]
 
     @property
     def departure(self) -> tuple[float, float]:
@@ -97,11 +97,6 @@ class TiltFit:
         return float(self.value[k]), float(np.sqrt(self.covariance[k, k]))
 
 
-def _departures(turn: Array) -> Array:
-    """Columns (n, 2) of K2 and K3 after bias and scale, at angles (n,) from the zero of the input axis."""
-    return np.column_stack([-0.5 * np.cos(2.0 * turn), -0.25 * np.sin(3.0 * turn)])
-
-
 def fit_tilt(angle: Array, output: Array, error: Array, *, orders: int = 1, time: Array | None = None) -> TiltFit:
     """Generalised least squares of one axis over angles in its plane.
 
@@ -129,8 +124,9 @@ def fit_tilt(angle: Array, output: Array, error: Array, *, orders: int = 1, time
     if len(angle) < len(names) + 1 or np.linalg.matrix_rank(weighted, tol=1e-8 * np.linalg.norm(weighted, 2)) < len(
         names
     ):
-        msg = f"tilt: {len(angle)} angles do not tell {', '.join(names)} apart; add angles over the whole turn"
-        raise NotIdentified(msg)
+        raise NotIdentified(
+            f"tilt: {len(angle)} angles do not tell {', '.join(names)} apart; add angles over the whole turn"
+        )
     whole = np.diag(error**2)
     if time is not None:
         kernel = flicker_kernel(time)
@@ -156,12 +152,6 @@ def left_open(*, in_plane: bool) -> tuple[str, ...]:
     return ("scale", "K2", "K3", "bias apart from scale times the tilt of the axis of rotation")
 
 
-def mean_magnitude(mean: Array) -> Array:
-    """Mean of |x| for x from a normal distribution of standard deviation 1 about ``mean`` (n,)."""
-    size = np.abs(mean)
-    return np.asarray(size * (1.0 - 2.0 * norm.cdf(-size)) + 2.0 * norm.pdf(size))
-
-
 def magnitude(value: float, error: float) -> float:
     """The size μ for which the mean of |N(μ, σ²)| is the one found; 0 where noise alone makes as much on average.
 
@@ -179,5 +169,6 @@ def magnitude(value: float, error: float) -> float:
 
 @cache
 def _table() -> tuple[Array, Array]:
+    """Sizes (n,), and the means (n,) of |x| for x from normal distributions of standard deviation 1 about them."""
     sizes = np.linspace(0.0, FARTHEST, GRID)
-    return sizes, mean_magnitude(sizes)
+    return sizes, np.asarray(sizes * (1.0 - 2.0 * norm.cdf(-sizes)) + 2.0 * norm.pdf(sizes))

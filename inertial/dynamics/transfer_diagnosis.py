@@ -4,13 +4,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inertial.dynamics.missing_effects import CLASS_WIDTH, FOLDS, EffectClass, Judged, judge
 from inertial.dynamics.transfer_effects import EFFECTS, Conditions
 from inertial.dynamics.transfer_model import IDENTIFIED_SHARE, Points, TransferFit, best_of_exchange, fit_transfer
-
-Array = NDArray[np.float64]
 
 SEPARATED = 10.0
 """Uncertainties of a point by which rival models must differ at a frequency that is proposed: several of their errors as well."""
@@ -95,8 +92,7 @@ def diagnose_transfer(
     """
 
     def extended_fit(names: list[str], best: TransferFit) -> TransferFit:
-        known = {p.name: float(v) for p, v in zip(best.parameters, best.values, strict=True)}
-        fit = fit_transfer(points, names, known)
+        fit = fit_transfer(points, names, best.known)
         # mass and low-pass exchanged are another minimum, which breeds further effects
         return best_of_exchange(points, fit)[0] if names[-1] in {"two_pole", "second_order"} else fit
 
@@ -130,7 +126,6 @@ def _rivals(points: Points, extended: TransferFit, classes: Sequence[EffectClass
     A model that describes the points is not the only one: up to 1 kHz a sprung mass of 2.5 kHz with a low-pass of 1.6 kHz looks
     like one of 1.5 kHz with a delay.
     """
-    known = {p.name: float(v) for p, v in zip(extended.parameters, extended.values, strict=True)}
     chosen = [one.effects[0] for one in classes]
     models = [
         [other if name == one.effects[0] else name for name in extended.effects]
@@ -145,7 +140,7 @@ def _rivals(points: Points, extended: TransferFit, classes: Sequence[EffectClass
         and name not in extended.effects
         and 2 * len(points.value) > 3 * len(extended.parameters) + 8
     ]
-    fits = [fit_transfer(points, effects, known, only_near=True) for effects in models]
+    fits = [fit_transfer(points, effects, extended.known, only_near=True) for effects in models]
     for fit in (extended, *fits):
         other = best_of_exchange(points, fit)[1] if "second_order" in fit.effects else None
         if other is not None:
@@ -180,8 +175,7 @@ def _left_out(points: Points, effects: Sequence[str]) -> float:
         return float("nan")
     place = np.argsort(np.argsort(points.conditions.frequency))
     squares = 0.0
-    whole = fit_transfer(points, effects)
-    near = {p.name: float(v) for p, v in zip(whole.parameters, whole.values, strict=True)}
+    near = fit_transfer(points, effects).known
     for fold in range(FOLDS):
         out = place % FOLDS == fold
         seen, unseen = points.picked(~out), points.picked(out)
@@ -200,12 +194,7 @@ def _next_frequencies(
     c = points.conditions
     low, top = float(c.frequency.min()), float(c.frequency.max())
     grid = np.geomspace(low, max(highest, top), 200)
-    plan = Conditions(
-        grid,
-        np.full(200, np.median(c.level)),
-        np.full(200, np.median(c.temperature)),
-        np.full(200, np.median(c.record_s)),
-    )
+    plan = Conditions(grid, *(np.full(200, np.median(each)) for each in (c.level, c.temperature, c.record_s)))
     models = [one for one in (extended, *rivals) if all(EFFECTS[name].parameters(plan) for name in one.effects)]
     values = np.stack([np.log(np.maximum(np.abs(one.response(plan)), 1e-300)) for one in models])
     spread = np.ptp(values, axis=0)

@@ -5,16 +5,14 @@ from dataclasses import dataclass, field
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from inertial.arrays import Array, Complex, Flags
 from inertial.dynamics.missing_effects import p_value
 from inertial.dynamics.transfer_effects import EFFECTS, Conditions, Parameter
 from inertial.dynamics.transfer_effects.base import Coordinates
 from inertial.errors import NotIdentified
 
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 MOST_STARTS = 1200  # combinations whose residual is looked at: it costs less than a step of a search
 SCREENED = 6  # of them that are searched from, those with the least residual
 POLISHED = 2  # of them that are carried to the end
@@ -41,11 +39,10 @@ class Points:
     magnitude_error: Array
     phase_error: Array
 
-    def picked(self, rows: NDArray[np.bool_]) -> "Points":
+    def picked(self, rows: Flags) -> "Points":
         """Some of the points."""
-        return Points(
-            self.conditions.picked(rows), self.value[rows], self.magnitude_error[rows], self.phase_error[rows]
-        )
+        own = (each[rows] for each in (self.value, self.magnitude_error, self.phase_error))
+        return Points(self.conditions.picked(rows), *own)
 
 
 @dataclass(frozen=True)
@@ -83,12 +80,13 @@ class TransferFit:
         value, error = float(self.values[k]), float(self.errors[k])
         if not self.parameters[k].log:
             return value, error, value - 1.96 * error, value + 1.96 * error
-        return (
-            value,
-            value * error,
-            value * float(np.exp(-1.96 * min(error, 20.0))),
-            value * float(np.exp(1.96 * min(error, 20.0))),
-        )
+        reach = 1.96 * min(error, 20.0)
+        return value, value * error, value * float(np.exp(-reach)), value * float(np.exp(reach))
+
+    @property
+    def known(self) -> dict[str, float]:
+        """The values of the parameters by name."""
+        return {p.name: float(v) for p, v in zip(self.parameters, self.values, strict=True)}
 
     def identified(self, name: str) -> bool:
         """Whether a log parameter is known to a fifth, or another differs from 0 by three standard uncertainties."""
@@ -149,8 +147,9 @@ def fit_transfer(
     conditions = points.conditions
     parameters = tuple(p for name in effects for p in EFFECTS[name].parameters(conditions))
     if 2 * len(points.value) < len(parameters) + 2:
-        msg = f"transfer function: {len(points.value)} points for {len(parameters) + 1} parameters; sweep more frequencies"
-        raise NotIdentified(msg)
+        raise NotIdentified(
+            f"transfer function: {len(points.value)} points for {len(parameters) + 1} parameters; sweep more frequencies"
+        )
     low_end = np.argsort(conditions.frequency)[: max(3, len(points.value) // 5)]
     sign = -1.0 if np.median(np.abs(np.angle(points.value[low_end]))) > 0.5 * np.pi else 1.0
     coordinates = Coordinates(parameters)
@@ -206,7 +205,7 @@ def exchanged(points: Points, fit: TransferFit) -> TransferFit | None:
     """
     if not (fit.has("natural_hz") and fit.has("two_pole_hz")):
         return None
-    near = {p.name: float(v) for p, v in zip(fit.parameters, fit.values, strict=True)}
+    near = fit.known
     near |= {"natural_hz": near["two_pole_hz"], "two_pole_hz": near["natural_hz"], "damping": float(np.sqrt(0.5))}
     return fit_transfer(points, fit.effects, near, only_near=True)
 

@@ -3,13 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import chi2, norm
 
+from inertial.arrays import Array, Complex
 from inertial.errors import NotIdentified
 
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 FEWEST = 6
 ROUNDS, TURNED = 60, 1e-9
 Z95 = float(norm.ppf(0.975))
@@ -60,14 +58,14 @@ def fit_transverse(first: Array, second: Array, output: Array, error: Array) -> 
     """
     n = len(output)
     if n < FEWEST:
-        msg = f"transverse sensitivity: {n} angles, {FEWEST} or more are needed; turn the unit in smaller steps"
-        raise NotIdentified(msg)
+        raise NotIdentified(
+            f"transverse sensitivity: {n} angles, {FEWEST} or more are needed; turn the unit in smaller steps"
+        )
     rows = np.column_stack([first, second, np.ones(n)]) / error[:, None]
     if np.linalg.cond(rows * error.mean()) > 100.0:
-        msg = (
+        raise NotIdentified(
             "transverse sensitivity: the angles do not separate two directions and a constant; turn over a whole circle"
         )
-        raise NotIdentified(msg)
     covariance = np.linalg.inv(rows.T @ rows)
     c = covariance @ (rows.T @ (output / error))
     fitted = rows @ c * error
@@ -116,8 +114,7 @@ def relative_phase(drive: Complex, answer: Complex) -> Complex:
         moved, before = drive @ matrix, gain
         gain = np.sum(np.conj(moved) * answer, axis=1) / np.sum(np.abs(moved) ** 2, axis=1)
         if not np.all(np.abs(gain) > 0.0):
-            msg = "transverse sensitivity: the unit does not answer the motion; check cable and mounting"
-            raise NotIdentified(msg)
+            raise NotIdentified("transverse sensitivity: the unit does not answer the motion; check cable and mounting")
         gain = gain * len(gain) / np.sum(np.abs(gain))  # the size belongs to the matrix
         if np.max(np.abs(gain - before)) < TURNED:
             break

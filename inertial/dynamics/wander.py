@@ -5,12 +5,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import null_space
 from scipy.optimize import brentq, minimize_scalar
 from scipy.stats import norm, t
 
-Array = NDArray[np.float64]
+from inertial.arrays import Array
+
 FEWEST_DOF = 1.0
 GRID = 120  # variances of wander of a posterior
 WALK_SHARES = np.array([0.0, 0.15, 0.4, 0.65, 0.85, 0.95, 0.985, 1.0])  # of the random walk in it

@@ -4,12 +4,11 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import toeplitz
 
+from inertial.arrays import Array
 from inertial.dynamics.wander import KnownStrength, Posterior, Remainders, logarithmic_kernel
 
-Array = NDArray[np.float64]
 ALLAN_PARTS, MOST_PARTS = 10, 720  # of a mean, beginnings of overlapping means; of all means
 CONSTANT_DOF = 1.0  # of a constant output
 

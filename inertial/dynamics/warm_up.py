@@ -3,14 +3,12 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import norm
 
+from inertial.arrays import Array
 from inertial.dynamics.stability import short_noise, warm_up_time
 from inertial.dynamics.wander import stated_error, variance_of_sum
 from inertial.errors import NotIdentified
-
-Array = NDArray[np.float64]
 
 SPANS = (1.0, 2.0, 4.0, 8.0)  # windows on either side of the entry that the parabola spans
 REACH = 3.0  # least span, in standard uncertainties of the time
@@ -82,11 +80,10 @@ def entered(time: Array, record: Array, *, band: float, window_s: float) -> Warm
         starts, reaches = [at], [k * window_s for k in SPANS[:-1] if k * window_s >= REACH * error]
     if best is not None:
         return best
-    msg = (
+    raise NotIdentified(
         f"warm-up: noise of the output leaves open when it enters ± {band:.3g}, last seen outside at {last:.0f} s; lengthen "
         "window_s, or widen the band"
     )
-    raise NotIdentified(msg)
 
 
 def _ends(at: float, error: float, constant: float, share: float) -> tuple[float, float]:

@@ -1,5 +1,3 @@
-from typing import ClassVar
-
 import numpy as np
 
 from inertial.effects.base import Array, Nonlinear, SensorEffect, stack
@@ -15,17 +13,17 @@ class AgingLog(SensorEffect):
     Where the devices were switched off for a while within a run, it may have gone on without power, or have begun again.
     """
 
-    id: ClassVar[str] = "aging_log"
-    symbol: ClassVar[str] = "kl"
-    equation: ClassVar[str] = "kl·ln(1 + u/τ)"
-    coefficients: ClassVar[tuple[str, ...]] = ("kl",)
-    source: ClassVar[str] = "mechanism: thermally activated relaxation with a spread of barriers"
-    typical_ug: ClassVar[tuple[float, float]] = (1.0, 1000.0)
-    hides_behind: ClassVar[tuple[str, ...]] = ("warm_up", "aging_linear")
-    breaker: ClassVar[str] = "a long stay at constant temperature after power-on"
-    same_on_axes: ClassVar[bool] = True
-    simplicity: ClassVar[int] = 29
-    nonlinear: ClassVar[tuple[Nonlinear, ...]] = (Nonlinear("tau", "s", 30.0, 36000.0, "log", 8),)
+    id = "aging_log"
+    symbol = "kl"
+    equation = "kl·ln(1 + u/τ)"
+    coefficients = ("kl",)
+    source = "mechanism: thermally activated relaxation with a spread of barriers"
+    typical_ug = (1.0, 1000.0)
+    hides_behind = ("warm_up", "aging_linear")
+    breaker = "a long stay at constant temperature after power-on"
+    same_on_axes = True
+    simplicity = 29
+    nonlinear = (Nonlinear("tau", "s", 30.0, 36000.0, "log", 8),)
 
     def parameters(self, state: State) -> tuple[Nonlinear, ...]:
         """What the time counts from, too, where that makes a difference."""

@@ -1,5 +1,3 @@
-from typing import ClassVar
-
 import numpy as np
 
 from inertial.effects.base import Array, StationEffect
@@ -9,19 +7,17 @@ from inertial.state import State
 class AxisNonorthogonality(StationEffect):
     """Inner axis not square to the outer: a small rotation about y between the two."""
 
-    id: ClassVar[str] = "axis_nonorthogonality"
-    symbol: ClassVar[str] = "η"
-    equation: ClassVar[str] = "f = (Rx(α)·Ry(η)·Rz(β))ᵀ·up"
-    source: ClassVar[str] = "geometry of a two-axis table"
-    typical_ug: ClassVar[tuple[float, float]] = (5.0, 2000.0)
-    hides_behind: ClassVar[tuple[str, ...]] = ("level_error",)
-    breaker: ClassVar[str] = "twelve poses or more"
-    simplicity: ClassVar[int] = 41
+    id = "axis_nonorthogonality"
+    symbol = "η"
+    equation = "f = (Rx(α)·Ry(η)·Rz(β))ᵀ·up"
+    coefficients = ("axis_square",)
+    source = "geometry of a two-axis table"
+    typical_ug = (5.0, 2000.0)
+    hides_behind = ("level_error",)
+    breaker = "twelve poses or more"
+    simplicity = 41
 
     def force_change(self, state: State, **nonlinear: float) -> Array:
         outer, inner = state.need("outer", self.id), state.need("inner", self.id)
         tipped = -np.cos(outer)
         return np.stack([tipped * np.cos(inner), -tipped * np.sin(inner), np.zeros_like(tipped)], axis=-1)[..., None]
-
-    def names(self) -> tuple[str, ...]:
-        return ("axis_square",)

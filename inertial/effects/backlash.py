@@ -1,5 +1,4 @@
 from collections.abc import Callable
-from typing import ClassVar
 
 import numpy as np
 
@@ -14,15 +13,15 @@ _PLAY_RAD = 1e-4
 class Backlash(StationEffect):
     """Lost motion of the drives: the table stops short on the side it comes from."""
 
-    id: ClassVar[str] = "backlash"
-    symbol: ClassVar[str] = "ε"
-    equation: ClassVar[str] = "α + ε·sgn(Δα), β + ε·sgn(Δβ)"
-    coefficients: ClassVar[tuple[str, ...]] = ("backlash_outer", "backlash_inner")
-    source: ClassVar[str] = "geometry of a two-axis table"
-    typical_ug: ClassVar[tuple[float, float]] = (5.0, 2000.0)
-    hides_behind: ClassVar[tuple[str, ...]] = ("pose_hysteresis",)
-    breaker: ClassVar[str] = "every pose approached from both sides"
-    simplicity: ClassVar[int] = 43
+    id = "backlash"
+    symbol = "ε"
+    equation = "α + ε·sgn(Δα), β + ε·sgn(Δβ)"
+    coefficients = ("backlash_outer", "backlash_inner")
+    source = "geometry of a two-axis table"
+    typical_ug = (5.0, 2000.0)
+    hides_behind = ("pose_hysteresis",)
+    breaker = "every pose approached from both sides"
+    simplicity = 43
 
     def force_change(self, state: State, **nonlinear: float) -> Array:
         return self._turned(state, operators.play)  # the drive rests on a side of the play while the axis does not move

@@ -6,11 +6,10 @@ from dataclasses import dataclass
 from typing import ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.state import State
 
-Array = NDArray[np.float64]
 Scope = Literal["sensor", "station", "slot"]
 
 

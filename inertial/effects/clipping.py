@@ -1,5 +1,3 @@
-from typing import ClassVar
-
 import numpy as np
 
 from inertial.effects.base import CONVERTER, Array, Nonlinear, SensorEffect, place, stack
@@ -9,17 +7,17 @@ from inertial.state import State
 class Clipping(SensorEffect):
     """Output that stops at full scale."""
 
-    id: ClassVar[str] = "clipping"
-    symbol: ClassVar[str] = "FS"
-    equation: ClassVar[str] = "min(max(fi, −FS), FS) − fi"
-    coefficients: ClassVar[tuple[str, ...]] = ("FS",)
-    source: ClassVar[str] = "transfer curve of a limiter"
-    typical_ug: ClassVar[tuple[float, float]] = (100.0, 500000.0)
-    hides_behind: ClassVar[tuple[str, ...]] = ("third_order",)
-    breaker: ClassVar[str] = "a margin between the largest specific force and the range"
-    simplicity: ClassVar[int] = 23
-    sharp: ClassVar[bool] = True
-    nonlinear: ClassVar[tuple[Nonlinear, ...]] = (Nonlinear("full_scale", "g", 0.5, 0.999, "linear", 14),)
+    id = "clipping"
+    symbol = "FS"
+    equation = "min(max(fi, −FS), FS) − fi"
+    coefficients = ("FS",)
+    source = "transfer curve of a limiter"
+    typical_ug = (100.0, 500000.0)
+    hides_behind = ("third_order",)
+    breaker = "a margin between the largest specific force and the range"
+    simplicity = 23
+    sharp = True
+    nonlinear = (Nonlinear("full_scale", "g", 0.5, 0.999, "linear", 14),)
 
     def parameters(self, state: State) -> tuple[Nonlinear, ...]:
         """Where it acts, too, if the output runs with temperature."""

@@ -1,11 +1,11 @@
 """Dependence of the bias on any other recorded quantity: humidity, pressure, heater current."""
 
 from collections.abc import Mapping
-from typing import ClassVar
 
 import numpy as np
 
 from inertial.effects.base import Array, SensorEffect, stack
+from inertial.operators import natural_spline
 from inertial.state import State
 
 COVARIATE_PREFIX = "covariate:"
@@ -21,19 +21,17 @@ class Covariate(SensorEffect):
     The curve is a natural cubic spline over the range met in the run, straight beyond it.
     """
 
-    symbol: ClassVar[str] = "kc"
-    equation: ClassVar[str] = "kc1·z + Σ kcj·Nj(z), z the column scaled to −1 … 1, Nj a natural cubic spline"
-    source: ClassVar[str] = "an empirical dependence: no physics is claimed"
-    typical_ug: ClassVar[tuple[float, float]] = (1.0, 10000.0)
-    hides_behind: ClassVar[tuple[str, ...]] = ()
-    breaker: ClassVar[str] = "vary this quantity alone"
-    same_on_axes: ClassVar[bool] = True
-    simplicity: ClassVar[int] = 60
-    primary: ClassVar[int | None] = 1
+    symbol = "kc"
+    equation = "kc1·z + Σ kcj·Nj(z), z the column scaled to −1 … 1, Nj a natural cubic spline"
+    source = "an empirical dependence: no physics is claimed"
+    typical_ug = (1.0, 10000.0)
+    breaker = "vary this quantity alone"
+    same_on_axes = True
+    simplicity = 60
+    primary = 1
 
-    def __init__(self, column: str, *, curve: bool = True) -> None:
+    def __init__(self, column: str) -> None:
         self.column = column
-        self.curve = curve
         self.id = f"{COVARIATE_PREFIX}{column}"  # type: ignore[misc]  # one id per column, not per class
 
     def constants(self, state: State) -> Mapping[str, float]:
@@ -44,7 +42,7 @@ class Covariate(SensorEffect):
         return {
             "centre": 0.5 * (low + high),
             "half_range": max(0.5 * (high - low), 1e-12),
-            "degree": float(_KNOTS.size - 1) if self.curve and many else 1.0,
+            "degree": float(_KNOTS.size - 1) if many else 1.0,
         }
 
     def columns(
@@ -52,22 +50,13 @@ class Covariate(SensorEffect):
     ) -> Array:
         """A line, and the curved functions of the spline, of the scaled column: (..., n, degree)."""
         z = (state.need(self.column, self.id) - centre) / half_range
-        return stack(state, [z, *_natural(z)][: int(degree)])
+        return stack(state, [z, *natural_spline(z, _KNOTS)][: int(degree)])
 
     def names(self, axis: int) -> tuple[str, ...]:
         """Names of the coefficients."""
-        return tuple(f"kc{k + 1}" for k in range(_KNOTS.size - 1)) if self.curve else ("kc1",)
+        return tuple(f"kc{k + 1}" for k in range(_KNOTS.size - 1))
 
     def names_at(self, axis: int, **nonlinear: float) -> tuple[str, ...]:
         """Names of the coefficients that the column's values in the run allow."""
         names = self.names(axis)
         return names[: int(nonlinear.get("degree", len(names)))]
-
-
-def _natural(z: Array) -> list[Array]:
-    """Curved functions of a natural cubic spline. Hastie, Tibshirani, Friedman: Elements of Statistical Learning, eq. 5.4."""
-
-    def d(k: int) -> Array:
-        return (np.maximum(z - _KNOTS[k], 0.0) ** 3 - np.maximum(z - _KNOTS[-1], 0.0) ** 3) / (_KNOTS[-1] - _KNOTS[k])
-
-    return [d(k) - d(_KNOTS.size - 2) for k in range(_KNOTS.size - 2)]

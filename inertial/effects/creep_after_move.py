@@ -1,5 +1,3 @@
-from typing import ClassVar
-
 import numpy as np
 
 from inertial import frames, operators
@@ -20,18 +18,18 @@ _MIDDLE = 1.0 - (np.arange(_PARTS) + 0.5) / _PARTS
 class CreepAfterMove(SensorEffect):
     """Output that creeps to its new value after a change of specific force."""
 
-    id: ClassVar[str] = "creep_after_move"
-    symbol: ClassVar[str] = "kC"
-    equation: ClassVar[str] = "kC·ΣΔfi·exp(−s/τ), over all moves so far, and the way of the table if way = 1"
-    coefficients: ClassVar[tuple[str, ...]] = ("kC",)
-    source: ClassVar[str] = "mechanism: viscoelastic hinge or adhesive (one Maxwell element)"
-    typical_ug: ClassVar[tuple[float, float]] = (10.0, 5000.0)
-    per: ClassVar[tuple[str, ...]] = ("g",)
-    hides_behind: ClassVar[tuple[str, ...]] = ("pose_hysteresis",)
-    breaker: ClassVar[str] = "waits of different length after a move"
-    simplicity: ClassVar[int] = 32
-    memory: ClassVar[bool] = True
-    nonlinear: ClassVar[tuple[Nonlinear, ...]] = (
+    id = "creep_after_move"
+    symbol = "kC"
+    equation = "kC·ΣΔfi·exp(−s/τ), over all moves so far, and the way of the table if way = 1"
+    coefficients = ("kC",)
+    source = "mechanism: viscoelastic hinge or adhesive (one Maxwell element)"
+    typical_ug = (10.0, 5000.0)
+    per = ("g",)
+    hides_behind = ("pose_hysteresis",)
+    breaker = "waits of different length after a move"
+    simplicity = 32
+    memory = True
+    nonlinear = (
         Nonlinear("tau", "s", 2.0, 2000.0, "log", 12),
         Nonlinear("way", "1", 0.0, 1.0, choices=(0.0, 1.0)),
     )

@@ -1,5 +1,3 @@
-from typing import ClassVar
-
 from inertial.effects.base import AXES, Array, SensorEffect, others, stack
 from inertial.state import State
 
@@ -7,15 +5,15 @@ from inertial.state import State
 class CrossAxisQuadratic(SensorEffect):
     """Quadratic response to specific force across the axis."""
 
-    id: ClassVar[str] = "cross_axis_quadratic"
-    symbol: ClassVar[str] = "Kpp, Koo, Kpo"
-    equation: ClassVar[str] = "Kpp·fp² + Koo·fo² + Kpo·fp·fo"
-    source: ClassVar[str] = "IEEE Std 1293-1998, model equation"
-    typical_ug: ClassVar[tuple[float, float]] = (5.0, 500.0)
-    hides_behind: ClassVar[tuple[str, ...]] = ("bias", "second_order")
-    breaker: ClassVar[str] = "general directions; K2 + Kpp + Koo as a sum is identical with the bias"
-    simplicity: ClassVar[int] = 18
-    vanishing: ClassVar[float] = 1e-3
+    id = "cross_axis_quadratic"
+    symbol = "Kpp, Koo, Kpo"
+    equation = "Kpp·fp² + Koo·fo² + Kpo·fp·fo"
+    source = "IEEE Std 1293-1998, model equation"
+    typical_ug = (5.0, 500.0)
+    hides_behind = ("bias", "second_order")
+    breaker = "general directions; K2 + Kpp + Koo as a sum is identical with the bias"
+    simplicity = 18
+    vanishing = 1e-3
 
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
         f, (j, k) = state.force, others(axis)

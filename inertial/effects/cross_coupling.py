@@ -1,5 +1,3 @@
-from typing import ClassVar
-
 from inertial.effects.base import AXES, Array, SensorEffect, others, stack
 from inertial.state import State
 
@@ -7,15 +5,14 @@ from inertial.state import State
 class CrossCoupling(SensorEffect):
     """Product of the specific force along the axis with that across it: a pendulum that tips."""
 
-    id: ClassVar[str] = "cross_coupling"
-    symbol: ClassVar[str] = "Kip, Kio"
-    equation: ClassVar[str] = "Kip·fi·fp + Kio·fi·fo"
-    source: ClassVar[str] = "IEEE Std 1293-1998, model equation"
-    typical_ug: ClassVar[tuple[float, float]] = (5.0, 1000.0)
-    hides_behind: ClassVar[tuple[str, ...]] = ()
-    breaker: ClassVar[str] = "edges and general directions; β off the multiples of 90°, where fx·fy is zero"
-    simplicity: ClassVar[int] = 15
-    vanishing: ClassVar[float] = 1e-3
+    id = "cross_coupling"
+    symbol = "Kip, Kio"
+    equation = "Kip·fi·fp + Kio·fi·fo"
+    source = "IEEE Std 1293-1998, model equation"
+    typical_ug = (5.0, 1000.0)
+    breaker = "edges and general directions; β off the multiples of 90°, where fx·fy is zero"
+    simplicity = 15
+    vanishing = 1e-3
 
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
         f, (j, k) = state.force, others(axis)

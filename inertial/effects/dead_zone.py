@@ -1,5 +1,3 @@
-from typing import ClassVar
-
 import numpy as np
 
 from inertial.effects.base import CONVERTER, Array, Nonlinear, SensorEffect, place, stack
@@ -9,17 +7,17 @@ from inertial.state import State
 class DeadZone(SensorEffect):
     """Output that stays at zero until the specific force leaves a zone about null."""
 
-    id: ClassVar[str] = "dead_zone"
-    symbol: ClassVar[str] = "DZ"
-    equation: ClassVar[str] = "−clip(fi, −w, w)"
-    coefficients: ClassVar[tuple[str, ...]] = ("DZ",)
-    source: ClassVar[str] = "mechanism: stiction or a threshold of the converter; IEEE Std 1293-1998, threshold"
-    typical_ug: ClassVar[tuple[float, float]] = (1.0, 5000.0)
-    hides_behind: ClassVar[tuple[str, ...]] = ("bias_asymmetry", "odd_quadratic")
-    breaker: ClassVar[str] = "a micro-tilt through zero"
-    simplicity: ClassVar[int] = 22
-    sharp: ClassVar[bool] = True
-    nonlinear: ClassVar[tuple[Nonlinear, ...]] = (Nonlinear("width", "g", 1e-5, 0.5, "log", 12),)
+    id = "dead_zone"
+    symbol = "DZ"
+    equation = "−clip(fi, −w, w)"
+    coefficients = ("DZ",)
+    source = "mechanism: stiction or a threshold of the converter; IEEE Std 1293-1998, threshold"
+    typical_ug = (1.0, 5000.0)
+    hides_behind = ("bias_asymmetry", "odd_quadratic")
+    breaker = "a micro-tilt through zero"
+    simplicity = 22
+    sharp = True
+    nonlinear = (Nonlinear("width", "g", 1e-5, 0.5, "log", 12),)
 
     def parameters(self, state: State) -> tuple[Nonlinear, ...]:
         """Where it acts, too, if the output runs with temperature."""

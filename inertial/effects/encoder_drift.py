@@ -1,7 +1,3 @@
-"""Zeros of both encoders that creep during a run: ε·s, s = τ·(1 − exp(−t/τ))."""
-
-from typing import ClassVar
-
 import numpy as np
 
 from inertial import frames
@@ -13,15 +9,16 @@ from inertial.state import State
 class EncoderDrift(StationEffect):
     """Zeros of both encoders that creep during a run: ε·s, s = τ·(1 − exp(−t/τ))."""
 
-    id: ClassVar[str] = "encoder_drift"
-    symbol: ClassVar[str] = "εαt, εβt"
-    equation: ClassVar[str] = "α + εαt·s, β + εβt·s, s = τ·(1 − exp(−t/τ))"
-    source: ClassVar[str] = "mechanism: a coupling or a clamp that creeps"
-    typical_ug: ClassVar[tuple[float, float]] = (5.0, 2000.0)
-    hides_behind: ClassVar[tuple[str, ...]] = ("outer_encoder_offset", "slot_rotation", "misalignment_temperature")
-    breaker: ClassVar[str] = "the first pose once more at the end, under an autocollimator"
-    simplicity: ClassVar[int] = 46
-    nonlinear: ClassVar[tuple[Nonlinear, ...]] = (Nonlinear("settling_h", "h", 0.3, 30.0, "log", 5),)
+    id = "encoder_drift"
+    symbol = "εαt, εβt"
+    equation = "α + εαt·s, β + εβt·s, s = τ·(1 − exp(−t/τ))"
+    coefficients = ("outer_zero_t", "inner_zero_t")
+    source = "mechanism: a coupling or a clamp that creeps"
+    typical_ug = (5.0, 2000.0)
+    hides_behind = ("outer_encoder_offset", "slot_rotation", "misalignment_temperature")
+    breaker = "the first pose once more at the end, under an autocollimator"
+    simplicity = 46
+    nonlinear = (Nonlinear("settling_h", "h", 0.3, 30.0, "log", 5),)
 
     def force_change(self, state: State, *, settling_h: float, **nonlinear: float) -> Array:
         outer, inner = state.need("outer", self.id), state.need("inner", self.id)
@@ -29,6 +26,3 @@ class EncoderDrift(StationEffect):
         by_outer = frames.to_fixture((0.0, 1.0, 0.0), outer, inner)
         by_inner = np.stack([force[..., 1], -force[..., 0], np.zeros_like(inner)], axis=-1)
         return np.stack([by_outer, by_inner], axis=-1) * approach(state.time / 3600.0, settling_h)[..., None, None]
-
-    def names(self) -> tuple[str, ...]:
-        return "outer_zero_t", "inner_zero_t"

@@ -1,5 +1,3 @@
-from typing import ClassVar
-
 import numpy as np
 
 from inertial import frames
@@ -10,16 +8,16 @@ from inertial.state import State
 class EncoderHarmonic(StationEffect):
     """Encoder error that repeats once or twice a turn: eccentric disc, sagging load."""
 
-    id: ClassVar[str] = "encoder_harmonic"
-    symbol: ClassVar[str] = "ε, φ"
-    equation: ClassVar[str] = "α + ε·sin(nα + φ), likewise β"
-    coefficients: ClassVar[tuple[str, ...]] = ("harmonic_sin", "harmonic_cos")
-    source: ClassVar[str] = "geometry of a two-axis table"
-    typical_ug: ClassVar[tuple[float, float]] = (5.0, 2000.0)
-    hides_behind: ClassVar[tuple[str, ...]] = ("second_order", "cross_coupling")
-    breaker: ClassVar[str] = "angles off the 90° steps: the second harmonic is nothing there"
-    simplicity: ClassVar[int] = 42
-    nonlinear: ClassVar[tuple[Nonlinear, ...]] = (
+    id = "encoder_harmonic"
+    symbol = "ε, φ"
+    equation = "α + ε·sin(nα + φ), likewise β"
+    coefficients = ("harmonic_sin", "harmonic_cos")
+    source = "geometry of a two-axis table"
+    typical_ug = (5.0, 2000.0)
+    hides_behind = ("second_order", "cross_coupling")
+    breaker = "angles off the 90° steps: the second harmonic is nothing there"
+    simplicity = 42
+    nonlinear = (
         Nonlinear("harmonic", "1", 1.0, 2.0, choices=(1.0, 2.0)),
         Nonlinear("inner_axis", "1", 0.0, 1.0, choices=(0.0, 1.0)),
     )

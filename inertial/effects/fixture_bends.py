@@ -1,5 +1,3 @@
-from typing import ClassVar
-
 import numpy as np
 
 from inertial.effects.base import AXES, Array, StationEffect
@@ -9,18 +7,16 @@ from inertial.state import State
 class FixtureBends(StationEffect):
     """Fixture that turns all units as it follows the temperature."""
 
-    id: ClassVar[str] = "fixture_bends"
-    symbol: ClassVar[str] = "ρT"
-    equation: ClassVar[str] = "f + θ·f×ρT"
-    source: ClassVar[str] = "mechanism: thermal strain of plate and screws"
-    typical_ug: ClassVar[tuple[float, float]] = (5.0, 2000.0)
-    hides_behind: ClassVar[tuple[str, ...]] = ("misalignment_temperature",)
-    breaker: ClassVar[str] = "the same units in other slots, turned by 90°: what turns with the fixture is not theirs"
-    simplicity: ClassVar[int] = 9
+    id = "fixture_bends"
+    symbol = "ρT"
+    equation = "f + θ·f×ρT"
+    coefficients = tuple(f"rhoT_{axis}" for axis in AXES)
+    source = "mechanism: thermal strain of plate and screws"
+    typical_ug = (5.0, 2000.0)
+    hides_behind = ("misalignment_temperature",)
+    breaker = "the same units in other slots, turned by 90°: what turns with the fixture is not theirs"
+    simplicity = 9
 
     def force_change(self, state: State, **nonlinear: float) -> Array:
         theta = state.need("theta", self.id)
         return np.stack([theta[..., None] * np.cross(state.force, way) for way in np.eye(3)], axis=-1)
-
-    def names(self) -> tuple[str, ...]:
-        return tuple(f"rhoT_{axis}" for axis in AXES)

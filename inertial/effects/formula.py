@@ -1,7 +1,6 @@
 """An effect written as formulas in a model file, a user's hypothesis: tried like every other effect."""
 
 from collections.abc import Sequence
-from typing import ClassVar
 
 from inertial.effects.base import Array, SensorEffect, stack
 from inertial.expressions import Expression
@@ -25,9 +24,9 @@ class Formula(SensorEffect):
         A formula is no formula.
     """
 
-    source: ClassVar[str] = "a formula of a model file"
-    breaker: ClassVar[str] = "vary the quantities of the formula, each alone"
-    simplicity: ClassVar[int] = 55
+    source = "a formula of a model file"
+    breaker = "vary the quantities of the formula, each alone"
+    simplicity = 55
 
     def __init__(
         self,

@@ -1,5 +1,3 @@
-from typing import ClassVar
-
 import numpy as np
 
 from inertial import frames
@@ -10,18 +8,18 @@ from inertial.state import State
 class LevelError(StationEffect):
     """Outer axis or laboratory vertical out of level: up = (δ1, δ2, 1)."""
 
-    id: ClassVar[str] = "level_error"
-    symbol: ClassVar[str] = "δ1, δ2"
-    equation: ClassVar[str] = "f = R(α, β)ᵀ·(δ1, δ2, 1)"
-    coefficients: ClassVar[tuple[str, ...]] = ("level_1", "level_2")
-    source: ClassVar[str] = "geometry of a two-axis table, or of a plate and the heading of each placement"
-    typical_ug: ClassVar[tuple[float, float]] = (5.0, 5000.0)
-    hides_behind: ClassVar[tuple[str, ...]] = ("outer_encoder_offset", "magnetic")
-    breaker: ClassVar[str] = (
+    id = "level_error"
+    symbol = "δ1, δ2"
+    equation = "f = R(α, β)ᵀ·(δ1, δ2, 1)"
+    coefficients = ("level_1", "level_2")
+    source = "geometry of a two-axis table, or of a plate and the heading of each placement"
+    typical_ug = (5.0, 5000.0)
+    hides_behind = ("outer_encoder_offset", "magnetic")
+    breaker = (
         "a level on the table; the tilt along the outer axis is identical with the offset of its encoder; of units put down by "
         "hand the same face at several headings"
     )
-    simplicity: ClassVar[int] = 40
+    simplicity = 40
 
     def force_change(self, state: State, **nonlinear: float) -> Array:
         if state.outer is None and state.heading is not None:

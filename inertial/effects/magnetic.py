@@ -1,5 +1,3 @@
-from typing import ClassVar
-
 import numpy as np
 
 from inertial import frames
@@ -13,15 +11,15 @@ class Magnetic(SensorEffect):
     The outer axis lies along the laboratory's x, which the fixture's z therefore never sees: five columns, not six.
     """
 
-    id: ClassVar[str] = "magnetic"
-    symbol: ClassVar[str] = "B"
-    equation: ClassVar[str] = "Σ bj·(e1·R)j + cj·(e2·R)j"
-    source: ClassVar[str] = "mechanism: magnetised proof mass or torquer leakage"
-    typical_ug: ClassVar[tuple[float, float]] = (1.0, 1000.0)
-    hides_behind: ClassVar[tuple[str, ...]] = ("level_error",)
-    breaker: ClassVar[str] = "turn the station, or a coil about it"
-    same_on_axes: ClassVar[bool] = True
-    simplicity: ClassVar[int] = 45
+    id = "magnetic"
+    symbol = "B"
+    equation = "Σ bj·(e1·R)j + cj·(e2·R)j"
+    source = "mechanism: magnetised proof mass or torquer leakage"
+    typical_ug = (1.0, 1000.0)
+    hides_behind = ("level_error",)
+    breaker = "turn the station, or a coil about it"
+    same_on_axes = True
+    simplicity = 45
 
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
         outer, inner = state.need("outer", self.id), state.need("inner", self.id)

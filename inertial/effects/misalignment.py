@@ -1,5 +1,4 @@
 from collections.abc import Mapping
-from typing import ClassVar
 
 import numpy as np
 
@@ -11,14 +10,14 @@ from inertial.state import ALL_AXES, State
 class Misalignment(SensorEffect):
     """Response to specific force across the sensor's axis: axes that are not square, and the mounting's rotation."""
 
-    id: ClassVar[str] = "misalignment"
-    symbol: ClassVar[str] = "δ"
-    equation: ClassVar[str] = "δj·fj + δk·fk"
-    source: ClassVar[str] = "IEEE Std 1293-1998, model equation"
-    typical_ug: ClassVar[tuple[float, float]] = (1000.0, 10000.0)
-    hides_behind: ClassVar[tuple[str, ...]] = ("slot_rotation",)
-    breaker: ClassVar[str] = "take the device off, turn it and mount it again; or report the symmetric part only"
-    simplicity: ClassVar[int] = 2
+    id = "misalignment"
+    symbol = "δ"
+    equation = "δj·fj + δk·fk"
+    source = "IEEE Std 1293-1998, model equation"
+    typical_ug = (1000.0, 10000.0)
+    hides_behind = ("slot_rotation",)
+    breaker = "take the device off, turn it and mount it again; or report the symmetric part only"
+    simplicity = 2
 
     def constants(self, state: State) -> Mapping[str, float]:
         """Zero for each direction across that the poses of a device with one axis or two do not show."""

@@ -1,5 +1,3 @@
-from typing import ClassVar
-
 from inertial.effects.base import AXES, Array, SensorEffect, others, stack
 from inertial.state import State
 
@@ -7,14 +5,14 @@ from inertial.state import State
 class MisalignmentTemperature(SensorEffect):
     """Axes that tilt with temperature."""
 
-    id: ClassVar[str] = "misalignment_temperature"
-    symbol: ClassVar[str] = "δT"
-    equation: ClassVar[str] = "θ·(δTj·fj + δTk·fk)"
-    source: ClassVar[str] = "mechanism: thermal strain of the package"
-    typical_ug: ClassVar[tuple[float, float]] = (10.0, 3000.0)
-    hides_behind: ClassVar[tuple[str, ...]] = ("slot_rotation",)
-    breaker: ClassVar[str] = "a fixture whose own tilt over temperature is known"
-    simplicity: ClassVar[int] = 8
+    id = "misalignment_temperature"
+    symbol = "δT"
+    equation = "θ·(δTj·fj + δTk·fk)"
+    source = "mechanism: thermal strain of the package"
+    typical_ug = (10.0, 3000.0)
+    hides_behind = ("slot_rotation",)
+    breaker = "a fixture whose own tilt over temperature is known"
+    simplicity = 8
 
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
         theta = state.need("theta", self.id)

@@ -9,15 +9,13 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.effects.base import Effect, SensorEffect, StationEffect
 from inertial.errors import BrokenEffect, InertialError
 
 NEEDED = ("id", "symbol", "equation", "source", "typical_ug", "breaker")
 METHODS = ("parameters", "constants", "names", "names_at", "columns", "start_columns", "force_change", "start_change")
-
-Array = NDArray[np.float64]
 
 
 def checked_classes(module: ModuleType, source: Path) -> None:
@@ -77,24 +75,16 @@ def _guarded(method: Callable[..., Any], where: str, source: Path) -> Callable[.
             raise
         except Exception as error:  # whatever a user's file raises is reported with its class and line
             raise BrokenEffect(f"{where}: {raised_in(source, error)}; mend the file") from error
+        if method.__name__ not in {"columns", "force_change"}:
+            return made
+        state = given[0] if given else named["state"]
         if method.__name__ == "columns":
-            state, axis = _state_and_axis(given, named)
-            return _shaped(made, (*state.force.shape[:-1], len(self.names_at(axis, **_rest(named)))), where, "columns")
-        if method.__name__ == "force_change":
-            state = given[0] if given else named["state"]
-            return _shaped(made, (*state.force.shape, len(self.names())), where, "force_change")
-        return made
+            axis = given[1] if len(given) > 1 else named["axis"]
+            rest = {name: value for name, value in named.items() if name not in {"state", "axis"}}
+            return _shaped(made, (*state.force.shape[:-1], len(self.names_at(axis, **rest))), where, "columns")
+        return _shaped(made, (*state.force.shape, len(self.names())), where, "force_change")
 
     return guarded
-
-
-def _state_and_axis(given: tuple[Any, ...], named: dict[str, Any]) -> tuple[Any, int]:
-    state = given[0] if given else named["state"]
-    return state, given[1] if len(given) > 1 else named["axis"]
-
-
-def _rest(named: dict[str, Any]) -> dict[str, Any]:
-    return {name: value for name, value in named.items() if name not in {"state", "axis"}}
 
 
 def _shaped(made: Any, needed: tuple[int, ...], where: str, method: str) -> Array:

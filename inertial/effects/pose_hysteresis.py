@@ -1,5 +1,3 @@
-from typing import ClassVar
-
 import numpy as np
 
 from inertial import operators
@@ -10,21 +8,17 @@ from inertial.state import State
 class PoseHysteresis(SensorEffect):
     """Output that remembers from which side a specific force was reached: for good, or until the next move."""
 
-    id: ClassVar[str] = "pose_hysteresis"
-    symbol: ClassVar[str] = "kP"
-    equation: ClassVar[str] = (
-        "kP·h(fi), h the play operator of half width w; or kP·tanh(Δfi/w), where each move wipes the last"
-    )
-    coefficients: ClassVar[tuple[str, ...]] = ("kP",)
-    source: ClassVar[str] = (
-        "Visintin, Differential Models of Hysteresis; mechanism: friction or charging of the pickoff"
-    )
-    typical_ug: ClassVar[tuple[float, float]] = (5.0, 1000.0)
-    hides_behind: ClassVar[tuple[str, ...]] = ("backlash", "bias_asymmetry")
-    breaker: ClassVar[str] = "the same poses from both sides"
-    simplicity: ClassVar[int] = 33
-    memory: ClassVar[bool] = True
-    nonlinear: ClassVar[tuple[Nonlinear, ...]] = (
+    id = "pose_hysteresis"
+    symbol = "kP"
+    equation = "kP·h(fi), h the play operator of half width w; or kP·tanh(Δfi/w), where each move wipes the last"
+    coefficients = ("kP",)
+    source = "Visintin, Differential Models of Hysteresis; mechanism: friction or charging of the pickoff"
+    typical_ug = (5.0, 1000.0)
+    hides_behind = ("backlash", "bias_asymmetry")
+    breaker = "the same poses from both sides"
+    simplicity = 33
+    memory = True
+    nonlinear = (
         Nonlinear("half_width", "g", 0.02, 1.0, "log", 6),
         Nonlinear("kept", "1", 0.0, 1.0, choices=(0.0, 1.0)),
     )

@@ -1,5 +1,4 @@
 from dataclasses import replace
-from typing import ClassVar
 
 import numpy as np
 
@@ -13,17 +12,17 @@ _GAPS = 120
 class StepChange(SensorEffect):
     """Bias that jumps once."""
 
-    id: ClassVar[str] = "step_change"
-    symbol: ClassVar[str] = "kS"
-    equation: ClassVar[str] = "kS·H(t − t0)"
-    coefficients: ClassVar[tuple[str, ...]] = ("kS",)
-    source: ClassVar[str] = "mechanism: stiction released, a shock, a charge trapped"
-    typical_ug: ClassVar[tuple[float, float]] = (10.0, 10000.0)
-    hides_behind: ClassVar[tuple[str, ...]] = ("aging_linear",)
-    breaker: ClassVar[str] = "a reference pose repeated through the run"
-    same_on_axes: ClassVar[bool] = True
-    simplicity: ClassVar[int] = 31
-    nonlinear: ClassVar[tuple[Nonlinear, ...]] = (Nonlinear("instant", "s", 0.0, 1.0, "linear", 40),)
+    id = "step_change"
+    symbol = "kS"
+    equation = "kS·H(t − t0)"
+    coefficients = ("kS",)
+    source = "mechanism: stiction released, a shock, a charge trapped"
+    typical_ug = (10.0, 10000.0)
+    hides_behind = ("aging_linear",)
+    breaker = "a reference pose repeated through the run"
+    same_on_axes = True
+    simplicity = 31
+    nonlinear = (Nonlinear("instant", "s", 0.0, 1.0, "linear", 40),)
 
     def columns(self, state: State, axis: int, *, instant: float, **nonlinear: float) -> Array:
         return stack(state, [(state.time > instant).astype(float)])

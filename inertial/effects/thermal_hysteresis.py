@@ -1,5 +1,3 @@
-from typing import ClassVar
-
 from inertial import operators
 from inertial.effects.base import Array, Nonlinear, SensorEffect, stack
 from inertial.state import State
@@ -11,22 +9,20 @@ _NARROW = 0.35
 class ThermalHysteresis(SensorEffect):
     """Bias that remembers from which side a temperature was reached: one play, or two of different width."""
 
-    id: ClassVar[str] = "thermal_hysteresis"
-    symbol: ClassVar[str] = "kH"
-    equation: ClassVar[str] = (
-        "kH·h(T; w) + kH2·h(T; 0.35·w), h the play operator of half width w that begins at s, −1 … 1"
-    )
-    coefficients: ClassVar[tuple[str, ...]] = ("kH", "kH2")
-    source: ClassVar[str] = "Visintin, Differential Models of Hysteresis; mechanism: friction in the die attach"
-    typical_ug: ClassVar[tuple[float, float]] = (100.0, 10000.0)
-    per: ClassVar[tuple[str, ...]] = ("K", "K")
-    hides_behind: ClassVar[tuple[str, ...]] = ("aging_linear", "bias_temperature_quadratic")
-    breaker: ClassVar[str] = "a closed loop of temperature, and minor loops; a one-way soak holds no information"
-    same_on_axes: ClassVar[bool] = True
-    simplicity: ClassVar[int] = 24
-    memory: ClassVar[bool] = True
-    primary: ClassVar[int | None] = 1
-    nonlinear: ClassVar[tuple[Nonlinear, ...]] = (
+    id = "thermal_hysteresis"
+    symbol = "kH"
+    equation = "kH·h(T; w) + kH2·h(T; 0.35·w), h the play operator of half width w that begins at s, −1 … 1"
+    coefficients = ("kH", "kH2")
+    source = "Visintin, Differential Models of Hysteresis; mechanism: friction in the die attach"
+    typical_ug = (100.0, 10000.0)
+    per = ("K", "K")
+    hides_behind = ("aging_linear", "bias_temperature_quadratic")
+    breaker = "a closed loop of temperature, and minor loops; a one-way soak holds no information"
+    same_on_axes = True
+    simplicity = 24
+    memory = True
+    primary = 1
+    nonlinear = (
         Nonlinear("half_width", "K", 1.0, 60.0, "log", 10),
         Nonlinear("start", "1", -1.0, 1.0, "linear", 3, of_run=True),
     )

@@ -1,5 +1,4 @@
 from dataclasses import replace
-from typing import ClassVar
 
 import numpy as np
 
@@ -10,19 +9,19 @@ from inertial.state import State
 class ThermalKink(SensorEffect):
     """Bias whose slope over temperature changes at one temperature."""
 
-    id: ClassVar[str] = "thermal_kink"
-    symbol: ClassVar[str] = "kK"
-    equation: ClassVar[str] = "kK·w·softplus((T − Tc)/w)"
-    coefficients: ClassVar[tuple[str, ...]] = ("kK",)
-    source: ClassVar[str] = "mechanism: glass transition of an adhesive"
-    typical_ug: ClassVar[tuple[float, float]] = (50.0, 5000.0)
-    per: ClassVar[tuple[str, ...]] = ("K",)
-    hides_behind: ClassVar[tuple[str, ...]] = ("bias_temperature_cubic", "bias_temperature_quadratic")
-    breaker: ClassVar[str] = "steps of 5 K about the kink"
-    same_on_axes: ClassVar[bool] = True
-    simplicity: ClassVar[int] = 25
-    after: ClassVar[tuple[str, ...]] = ("bias_temperature",)
-    nonlinear: ClassVar[tuple[Nonlinear, ...]] = (
+    id = "thermal_kink"
+    symbol = "kK"
+    equation = "kK·w·softplus((T − Tc)/w)"
+    coefficients = ("kK",)
+    source = "mechanism: glass transition of an adhesive"
+    typical_ug = (50.0, 5000.0)
+    per = ("K",)
+    hides_behind = ("bias_temperature_cubic", "bias_temperature_quadratic")
+    breaker = "steps of 5 K about the kink"
+    same_on_axes = True
+    simplicity = 25
+    after = ("bias_temperature",)
+    nonlinear = (
         Nonlinear("centre", "degC", -40.0, 85.0, "linear", 12),
         Nonlinear("width", "K", 0.5, 8.0, "log", 3),
     )

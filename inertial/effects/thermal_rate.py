@@ -1,5 +1,3 @@
-from typing import ClassVar
-
 from inertial import operators
 from inertial.effects.base import Array, Nonlinear, SensorEffect, stack
 from inertial.state import State
@@ -8,18 +6,18 @@ from inertial.state import State
 class ThermalRate(SensorEffect):
     """Bias in proportion to the rate of temperature: a gradient across the sensor, which settles within a minute."""
 
-    id: ClassVar[str] = "thermal_rate"
-    symbol: ClassVar[str] = "kR"
-    equation: ClassVar[str] = "kR·dT/dt, over a settling time τ"
-    coefficients: ClassVar[tuple[str, ...]] = ("kR",)
-    source: ClassVar[str] = "mechanism: gradient under a steady flow of heat"
-    typical_ug: ClassVar[tuple[float, float]] = (10.0, 5000.0)
-    per: ClassVar[tuple[str, ...]] = ("(K/min)",)
-    hides_behind: ClassVar[tuple[str, ...]] = ("thermal_lag",)
-    breaker: ClassVar[str] = "ramps at two rates; soaked readings never see it"
-    same_on_axes: ClassVar[bool] = True
-    simplicity: ClassVar[int] = 20
-    nonlinear: ClassVar[tuple[Nonlinear, ...]] = (Nonlinear("settling", "s", 4.0, 60.0, "log", 4),)
+    id = "thermal_rate"
+    symbol = "kR"
+    equation = "kR·dT/dt, over a settling time τ"
+    coefficients = ("kR",)
+    source = "mechanism: gradient under a steady flow of heat"
+    typical_ug = (10.0, 5000.0)
+    per = ("(K/min)",)
+    hides_behind = ("thermal_lag",)
+    breaker = "ramps at two rates; soaked readings never see it"
+    same_on_axes = True
+    simplicity = 20
+    nonlinear = (Nonlinear("settling", "s", 4.0, 60.0, "log", 4),)
 
     def columns(self, state: State, axis: int, *, settling: float, **nonlinear: float) -> Array:
 

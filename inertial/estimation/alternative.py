@@ -10,14 +10,12 @@ from dataclasses import replace
 from typing import ClassVar, Literal, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array, Places
 from inertial.design import of_axes
 from inertial.effects.base import Effect
 from inertial.estimation.lot import Lot
 from inertial.state import State
-
-Array = NDArray[np.float64]
 
 
 class Misfit(Protocol):
@@ -42,6 +40,7 @@ class Handling(Effect):
     of_one_axis : whether it concerns the bias of one axis of one unit, at an ``axis``
     several : whether an axis may have many of them, each from a ``dwell`` on, which are searched together
     in_part : whether some units of a large lot stand for it: it is the same for all, and mended without a look at each
+    of_one : factor within which the coefficient must be one, where a part of the change has another cause; infinite elsewhere
     """
 
     scope: ClassVar[Literal["sensor", "station", "slot", "data"]] = "data"  # pyright: ignore[reportIncompatibleVariableOverride]
@@ -52,6 +51,7 @@ class Handling(Effect):
     in_part: ClassVar[bool] = True
     of_one_axis: ClassVar[bool] = False
     several: ClassVar[bool] = False
+    of_one: ClassVar[float] = float("inf")
 
     @abstractmethod
     def places(self, lot: "Lot") -> list[dict[str, float]]:
@@ -74,9 +74,17 @@ class Handling(Effect):
     def describe(self, lot: "Lot", size: Array, **place: float) -> str:
         """The description for people; ``size`` (k,) are the coefficients."""
 
+    def instead(self, lot: "Lot", **place: float) -> list[dict[str, float]]:
+        """Other places that may explain the same dwells equally well."""
+        return []
+
+    def short(self, size: Array, **place: float) -> str:
+        """A short text for one of :meth:`instead`."""
+        return self.id
+
     def possible(self, size: Array) -> bool:
         """Whether coefficients (k,) are possible for the alternative; others have another cause of the same shape."""
-        return True
+        return bool(np.isinf(self.of_one) or 1.0 / self.of_one < size[0] < self.of_one)
 
     def near(self, lot: "Lot", **place: float) -> list[dict[str, float]]:
         """The place and those between it and its neighbours in :meth:`places`."""
@@ -124,18 +132,6 @@ class OfOneDwell(Handling):
     @abstractmethod
     def every_dwell(self, lot: "Lot") -> Array:
         """Columns (units or 1, n, 3, k) for each dwell in turn."""
-
-
-class Exchangeable(Handling):
-    """A handling error that another place may explain equally well."""
-
-    @abstractmethod
-    def instead(self, lot: "Lot", **place: float) -> list[dict[str, float]]:
-        """Other places that may explain the same dwells equally well."""
-
-    @abstractmethod
-    def short(self, size: Array, **place: float) -> str:
-        """A short text for one of :meth:`instead`."""
 
 
 def of_outputs(lot: "Lot", change: Array) -> Array:
@@ -198,18 +194,18 @@ def tilts(state: State) -> Array:
     return np.stack([by_outer, by_inner], axis=-1)
 
 
-def poses(lot: "Lot") -> NDArray[np.intp]:
+def poses(lot: "Lot") -> Places:
     """Number of the pose of each dwell, (n,)."""
     force = lot.state.force.reshape(-1, *lot.state.force.shape[-2:])[0]
     return np.unique(np.round(force, 3), axis=0, return_inverse=True)[1].reshape(-1)
 
 
-def soaks(state: State) -> NDArray[np.intp]:
+def soaks(state: State) -> Places:
     """Number of the soak of each dwell, (n,); all zero at constant temperature."""
     return state.remember(("soaks",), lambda: _soaks(state).astype(np.float64)).astype(np.intp)
 
 
-def _soaks(state: State) -> NDArray[np.intp]:
+def _soaks(state: State) -> Places:
     if state.temperature is None:
         return np.zeros(state.time.shape[-1], dtype=np.intp)
     typical = np.median(state.temperature.reshape(-1, state.temperature.shape[-1]), axis=0)

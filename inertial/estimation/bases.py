@@ -1,9 +1,8 @@
 """Bases of what columns span, eigenvalues of their products, and what is visible of a column."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from inertial.arrays import Array, Places
 
 SEEN = 0.01
 """Share of a column, after the base model, below which it is not visible (noise of the drivers has this size)."""
@@ -39,21 +38,32 @@ def _eigen_of_two(gram: Array) -> tuple[Array, Array]:
     return values, vectors
 
 
-def orthonormal(columns: Array) -> tuple[Array, NDArray[np.intp]]:
+def inverse_roots(values: Array, least: float) -> Array:
+    """One over the roots of eigenvalues (...); zero where they are not above the least that counts."""
+    seen = values > least
+    return np.where(seen, 1.0 / np.sqrt(np.where(seen, values, 1.0)), 0.0)
+
+
+def unit_columns(columns: Array) -> tuple[Array, Array]:
+    """Columns (blocks, n, p) of unit length, and their lengths (blocks, p); those that are zero stay so, of length one."""
+    size = np.sqrt(np.einsum("bnp,bnp->bp", columns, columns))
+    size = np.where(size > 0.0, size, 1.0)
+    return columns / size[:, None, :], size
+
+
+def orthonormal(columns: Array) -> tuple[Array, Places]:
     """Orthonormal bases (blocks, n, p) of what the columns span, directions below the tolerance zeroed; ranks (blocks,)."""
     return basis(columns)[:2]
 
 
-def basis(columns: Array) -> tuple[Array, NDArray[np.intp], float]:
+def basis(columns: Array) -> tuple[Array, Places, float]:
     """Bases and ranks as of :func:`orthonormal`, and the logarithm of the determinant of the columns' products over all blocks.
 
     Directions that vanish count with a limit.
     """
     if columns.shape[-1] == 0:
         return columns, np.zeros(len(columns), dtype=np.intp), 0.0
-    size = np.sqrt(np.einsum("bnp,bnp->bp", columns, columns))
-    size = np.where(size > 0.0, size, 1.0)
-    q = columns / size[:, None, :]
+    q, size = unit_columns(columns)
     keep = np.ones((1, 1), dtype=bool)
     determinant: float | None = None
     for tolerance in (1e-9, 0.5):  # the second turn removes rounding errors of the first
@@ -61,8 +71,7 @@ def basis(columns: Array) -> tuple[Array, NDArray[np.intp], float]:
         if determinant is None:
             determinant = float(np.sum(np.log(np.maximum(values, SEEN**2))) + 2.0 * np.sum(np.log(size)))
         keep = values > tolerance
-        scale = np.where(keep, 1.0 / np.sqrt(np.where(keep, values, 1.0)), 0.0)
-        q = q @ (vectors * scale[:, None, :])
+        q = q @ (vectors * inverse_roots(values, tolerance)[:, None, :])
     return q, keep.sum(axis=-1), determinant or 0.0
 
 

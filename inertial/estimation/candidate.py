@@ -4,9 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from inertial.arrays import Array, Places
 
 
 @dataclass(frozen=True)
@@ -23,8 +22,8 @@ class Candidate:
 
     columns: Array
     shared: bool
-    rows: NDArray[np.intp] | None = None
-    units: NDArray[np.intp] | None = None
+    rows: Places | None = None
+    units: Places | None = None
     key: object = None
     per_unit: int = 3
 
@@ -34,12 +33,12 @@ class Candidate:
         return self.columns if self.rows is None else self.columns[self.rows]
 
     @property
-    def blocks(self) -> NDArray[np.intp] | None:
+    def blocks(self) -> Places | None:
         """The blocks of the units that the columns are of; None for all."""
         return None if self.units is None else blocks_of_units(self.units, self.per_unit)
 
 
-def blocks_of_units(units: NDArray[np.intp], per_unit: int) -> NDArray[np.intp]:
+def blocks_of_units(units: Places, per_unit: int) -> Places:
     """The blocks of some units, (units · axes,)."""
     return (per_unit * units[:, None] + np.arange(per_unit)).reshape(-1)
 
@@ -66,7 +65,7 @@ def times_rows(rows: Array, candidate: Candidate) -> Array:
     return np.swapaxes(product, -1, -2).reshape(blocks, grid, p, k)
 
 
-def shared_rows(columns: Array, per_unit: int) -> NDArray[np.intp] | None:
+def shared_rows(columns: Array, per_unit: int) -> Places | None:
     """The row of each block where columns (blocks, ...) are equal: of all blocks, by axis, or in each unit; else None.
 
     Parameters
@@ -88,7 +87,7 @@ def shared_rows(columns: Array, per_unit: int) -> NDArray[np.intp] | None:
     return unit * (1 if axes else per_unit) + axis + np.zeros(blocks, dtype=np.intp)
 
 
-def finest_rows(rows_of: Sequence[NDArray[np.intp] | None], per_unit: int) -> NDArray[np.intp] | None:
+def finest_rows(rows_of: Sequence[Places | None], per_unit: int) -> Places | None:
     """The rows of blocks for the columns of several values: where they differ at one, they differ."""
     known = [rows for rows in rows_of if rows is not None]
     if len(known) < len(rows_of):

@@ -4,28 +4,28 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array, Flags
+from inertial.estimation.bases import unit_columns
 from inertial.estimation.model import Model
 from inertial.estimation.problem import Problem
 from inertial.estimation.term import Term
 from inertial.state import History
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Estimate:
     """Coefficients of a model's terms in the blocks of a problem, from data whitened for white noise and wander.
 
-    local : (blocks, p), shared : (q,), g per unit of the column; standard errors likewise. The coefficients of the unknown state
-    before the first dwell follow those of the terms; a run of the same plan is assumed to start in the same state.
+    local : (blocks, p), shared : (q,), g per unit of the column; shared_error : (q,), standard errors
+
+    The coefficients of the unknown state before the first dwell follow those of the terms; a run of the same plan is assumed to
+    start in the same state.
     """
 
     terms: tuple[Term, ...]
     local: Array
     shared: Array
-    local_error: Array
     shared_error: Array
 
 
@@ -34,9 +34,7 @@ def estimate(model: Model) -> Estimate:
     space = model.space
     x, z = space.local, space.whiten(model.shared)
     y = space.whiten(model.problem.y[..., None])[..., 0]
-    size = np.sqrt(np.einsum("bnp,bnp->bp", x, x))
-    size = np.where(size > 0.0, size, 1.0)
-    unit = x / size[:, None, :]
+    unit, size = unit_columns(x)
     inverse: Array = np.linalg.pinv(np.swapaxes(unit, -1, -2) @ unit, rcond=CONDITION, hermitian=True).astype(
         np.float64
     )
@@ -54,8 +52,7 @@ def estimate(model: Model) -> Estimate:
     right = np.einsum("bnp,bn->bp", unit, y)
     scaled = np.einsum("bpr,br->bp", inverse, right)
     scaled = _pooled(model, unit, right, scaled, variance * inverse, size)
-    errors = np.sqrt(variance * np.diagonal(inverse, axis1=-2, axis2=-1)) / size
-    return Estimate(model.terms, scaled / size, shared, errors, shared_error)
+    return Estimate(model.terms, scaled / size, shared, shared_error)
 
 
 CONDITION = 1e-8
@@ -99,7 +96,7 @@ def _pooled(model: Model, unit: Array, right: Array, scaled: Array, covariance: 
     return drawn[..., 0].astype(np.float64)
 
 
-def _shrinkable(model: Model, count: int) -> NDArray[np.bool_]:
+def _shrinkable(model: Model, count: int) -> Flags:
     """The local coefficients that are shrunk: those of the effects beyond bias, scale and misalignment."""
     flags: list[bool] = []
     for term in model.terms:
@@ -118,7 +115,7 @@ def residuals_of(problem: Problem, fit: Estimate) -> Array:
     """Residuals (blocks, n) in g of a problem under given coefficients; NaN where a dwell is missing."""
     local = [t for t in fit.terms if not t.shared]
     shared = [t for t in fit.terms if t.shared]
-    left = problem.series - np.einsum("bnp,bp->bn", _with_start(problem, local), fit.local)
+    left = problem.y - np.einsum("bnp,bp->bn", _with_start(problem, local), fit.local)
     if shared:
         left -= _with_start(problem, shared) @ fit.shared
     return np.where(np.isfinite(problem.error), left, np.nan)
@@ -141,14 +138,14 @@ def rms(values: Array) -> float:
     return float(np.sqrt(np.nanmean(values**2)))
 
 
-def residuals(problem: Problem, terms: Sequence[Term], train: NDArray[np.bool_]) -> Array:
+def residuals(problem: Problem, terms: Sequence[Term], train: Flags) -> Array:
     """Residuals (blocks, n) in g of least squares on some dwells, weighted by the white standard errors.
 
     Parameters
     ----------
     train : (n,), dwells that are fitted; all are predicted
     """
-    left = Fitting(problem, terms).left(problem.series[..., None], train)[..., 0]
+    left = Fitting(problem, terms).left(problem.y[..., None], train)[..., 0]
     return np.where(np.isfinite(problem.error), left, np.nan)
 
 
@@ -164,7 +161,7 @@ class Fitting:
         self._z = of_terms(problem, [t for t in terms if t.shared])
         self._weight = np.where(np.isfinite(problem.error), 1.0 / problem.error, 0.0)
 
-    def left(self, series: Array, train: NDArray[np.bool_]) -> Array:
+    def left(self, series: Array, train: Flags) -> Array:
         """Residuals of a fit to the dwells ``train`` (n,) on series (blocks, n, m), on all dwells."""
         x, z, weight = self._x, self._z, self._weight * train
         solve = _solver(x, weight)
@@ -187,16 +184,14 @@ def fitted_residuals(model: Model) -> Array:
     if problem.lot.radial:
         return residuals_of(problem, estimate(model))
     fitting = Fitting(problem, model.terms, start=True)
-    left = fitting.left(problem.series[..., None], np.ones(problem.n, dtype=bool))[..., 0]
+    left = fitting.left(problem.y[..., None], np.ones(problem.n, dtype=bool))[..., 0]
     return np.where(np.isfinite(problem.error), left, np.nan)
 
 
 def _solver(x: Array, weight: Array) -> Callable[[Array], Array]:
     """What gives the coefficients (blocks, p, m) of weighted least squares on columns (blocks, n, p) for targets (..., m)."""
-    weighted = x * weight[..., None]
-    size = np.sqrt(np.einsum("bnp,bnp->bp", weighted, weighted))
-    size = np.where(size > 0.0, size, 1.0)
-    across = np.swapaxes(weighted / size[:, None, :], -1, -2)
+    unit, size = unit_columns(x * weight[..., None])
+    across = np.swapaxes(unit, -1, -2)
     inverse = np.linalg.pinv(across @ np.swapaxes(across, -1, -2), rcond=1e-9, hermitian=True)
     return lambda target: (inverse @ (across @ (target * weight[..., None]))) / size[..., None]
 

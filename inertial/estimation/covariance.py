@@ -14,16 +14,14 @@ from collections.abc import Callable, Iterable, Iterator
 from functools import cached_property, lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array, Places
 from inertial.decisions import SHARE_STEP
 from inertial.estimation.candidate import Candidate
 from inertial.estimation.noise_shares import LONGEST, Noise, Shares
 from inertial.estimation.whitener import Whitener, grouped, whitener_of
 from inertial.noise.flicker import flicker_kernel
 from inertial.noise.measurands import walk_kernel
-
-Array = NDArray[np.float64]
 
 PIECE = 1_000_000
 """Largest number of columns' values that are whitened at a time."""
@@ -43,6 +41,12 @@ that a pass goes through in turn, and each would be gone before it is used again
 def _lattice(shares: Shares) -> tuple[int | None, ...]:
     """The steps of the lattice at which shares stand; None for none."""
     return tuple(None if s <= 0.0 else round(SHARE_STEP * np.log10(s)) for s in (shares.flicker, shares.walk))
+
+
+def _pieces(members: Places, size: int) -> list[Places]:
+    """Members in pieces whose values, each of some size, are worked on at a time."""
+    few = max(PIECE // max(size, 1), 1)
+    return np.split(members, range(few, members.size, few))
 
 
 def _about_mean(covariance: Array) -> float:
@@ -129,7 +133,7 @@ class Covariance:
                 variance[blocks] += share * 10.0 ** (steps / SHARE_STEP) * variance_of(own)
         return variance
 
-    def _groups_at(self, shares: Shares) -> list[tuple[int, int, NDArray[np.intp], Shares]]:
+    def _groups_at(self, shares: Shares) -> list[tuple[int, int, Places, Shares]]:
         """Groups of blocks that have a whitener in common at shares: place of the profile, steps, blocks, and their shares."""
         common = shares.common
         if not shares.own:
@@ -169,9 +173,7 @@ class Covariance:
         self._whiteners.move_to_end(key)
         return self._whiteners[key]
 
-    def _by_whitener(
-        self, shares: Shares, blocks: NDArray[np.intp] | None = None
-    ) -> Iterator[tuple[NDArray[np.intp], Whitener]]:
+    def _by_whitener(self, shares: Shares, blocks: Places | None = None) -> Iterator[tuple[Places, Whitener]]:
         """Places, among all or some blocks, of those that share a whitener, and it."""
         where = np.arange(len(self.level))
         if blocks is not None:
@@ -183,25 +185,23 @@ class Covariance:
             if own.size:
                 yield own, self._whitener(place, steps, common)
 
-    def whiten(self, columns: Array, shares: Shares, blocks: NDArray[np.intp] | None = None) -> Array:
+    def whiten(self, columns: Array, shares: Shares, blocks: Places | None = None) -> Array:
         """Columns (blocks, n, m) of all or some blocks with white noise of variance s² in them; zero where a dwell is missing."""
         level = self.level if blocks is None else self.level[blocks]
         out = np.empty(columns.shape)
-        few = max(PIECE // max(columns[0].size, 1), 1)
         for members, whitener in self._by_whitener(shares, blocks):
-            for some in np.split(members, range(few, members.size, few)):
+            for some in _pieces(members, columns[0].size):
                 out[some] = whitener.columns(columns[some] / level[some, None, None])
         return out
 
-    def whiteners(self, shares: Shares) -> Iterator[tuple[NDArray[np.intp], Array]]:
+    def whiteners(self, shares: Shares) -> Iterator[tuple[Places, Array]]:
         """Blocks that share a whitener, and the whitener (n, n), lower triangle, for white noise of variance one."""
         return ((members, whitener.matrix) for members, whitener in self._by_whitener(shares))
 
     def coloured(self, noise: Noise, drawn: Array) -> Array:
         """Series (blocks, m, n), g, with this noise, in place of independent normal numbers; zero where a dwell is missing."""
-        few = max(PIECE // max(drawn[0].size, 1), 1)
         for members, whitener in self._by_whitener(noise.shares):
-            for some in np.split(members, range(few, members.size, few)):
+            for some in _pieces(members, drawn[0].size):
                 drawn[some] = whitener.coloured(drawn[some]) * (self.level * noise.scale)[some, None, None]
         return drawn
 
@@ -213,18 +213,15 @@ class Covariance:
             rows[own] = whitener.rows(rows[own], overwrite=True)
         return rows
 
-    def back(self, rows: Array, shares: Shares, blocks: NDArray[np.intp] | None = None) -> Array:
+    def back(self, rows: Array, shares: Shares, blocks: Places | None = None) -> Array:
         """Rows (blocks, k, n) of whitened series of all or some blocks times the whiteners, for white noise of variance one."""
         out = np.empty(rows.shape)
-        few = max(PIECE // max(rows[0].size, 1), 1)
         for own, whitener in self._by_whitener(shares, blocks):
-            for some in np.split(own, range(few, own.size, few)):
+            for some in _pieces(own, rows[0].size):
                 out[some] = whitener.back(rows[some])
         return out
 
-    def solved(
-        self, columns: Array, places: NDArray[np.intp], shares: Shares
-    ) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp], Array]]:
+    def solved(self, columns: Array, places: Places, shares: Shares) -> Iterator[tuple[Places, Places, Array]]:
         """V⁻¹ times columns, for white noise of variance one: blocks that share a whitener, their columns, and rows (k, n).
 
         Parameters
@@ -268,7 +265,7 @@ class Covariance:
             logdets[members] = whitener.logdet
         return logdets
 
-    def of_dwells(self, block: int, noise: Noise, dwells: NDArray[np.intp]) -> Array:
+    def of_dwells(self, block: int, noise: Noise, dwells: Places) -> Array:
         """Covariance (k, k), g², of some dwells of a block."""
         place, steps = self._group_of[block]
         kernel = self._kernels[place]
@@ -287,7 +284,7 @@ class Covariance:
         return Noise(noise.shares.times(factor, factor * self.span / other.span), noise.scale, noise.prior)
 
 
-def _products_of(candidate: Candidate, level: Array, groups: Iterable[tuple[NDArray[np.intp], Whitener]]) -> Array:
+def _products_of(candidate: Candidate, level: Array, groups: Iterable[tuple[Places, Whitener]]) -> Array:
     """Products cᵀV⁻¹c (b, grid, p, p) of a candidate's columns; rows that blocks share are whitened once.
 
     Parameters
@@ -300,9 +297,8 @@ def _products_of(candidate: Candidate, level: Array, groups: Iterable[tuple[NDAr
     out = np.empty((level.size, grid, p, p))
     for own, whitener in groups:
         rows, back = np.unique(row_of[own], return_inverse=True)
-        few = max(PIECE // columns[0].size, 1)
-        parts = np.split(rows, range(few, rows.size, few))
-        out[own] = np.concatenate([_squares(columns[some], whitener) for some in parts])[back]
+        parts = [_squares(columns[some], whitener) for some in _pieces(rows, columns[0].size)]
+        out[own] = np.concatenate(parts)[back]
     return out / level[:, None, None, None] ** 2
 
 

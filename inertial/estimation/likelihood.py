@@ -9,12 +9,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.decisions import TOGETHER, UNITS_TOGETHER
 from inertial.design import of_axes
 from inertial.distributions import chi2_quantile
 from inertial.estimation.alternative import Handling, by_block, tilts
+from inertial.estimation.bases import unit_columns
 from inertial.estimation.comparison import estimate, residuals
 from inertial.estimation.model import Model
 from inertial.estimation.noise_shares import Noise, deviance_of
@@ -22,8 +23,6 @@ from inertial.estimation.penalty import freedom, price
 from inertial.estimation.space import Space
 from inertial.estimation.term import Term
 from inertial.probability import log_chi2_tail
-
-Array = NDArray[np.float64]
 
 _MEDIAN = float(chi2_quantile(0.5, 1.0))
 _FEWEST_POSES = 10
@@ -168,8 +167,7 @@ def along_mean(model: Model, noise: Noise, term: Term) -> float:
         return 1.0
     space = model.at(noise)
     columns = space.project(space.whiten(term.candidate(model.problem).of_blocks[:, :, 0, :]))
-    size = np.sqrt(np.einsum("bnp,bnp->bp", columns, columns))
-    unit = columns / np.where(size > 0.0, size, 1.0)[:, None, :]
+    unit = unit_columns(columns)[0]
     inverse = np.linalg.pinv(np.swapaxes(unit, -1, -2) @ unit, rcond=1e-4, hermitian=True)
     fitted = (unit @ (inverse @ (np.swapaxes(unit, -1, -2) @ space.residual[..., None])))[..., 0]
     fitted = fitted.reshape(units, model.problem.per_unit, -1)

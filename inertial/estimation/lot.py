@@ -4,11 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.state import State
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

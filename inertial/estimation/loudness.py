@@ -10,16 +10,14 @@ robust scatter does not see single bad dwells. What all units do together at a d
 from itertools import combinations_with_replacement
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array, Places
 from inertial.decisions import LOUDER_BELOW
 from inertial.distributions import f_tail
 from inertial.estimation.alternative import soaks
 from inertial.estimation.comparison import estimate
 from inertial.estimation.model import Model
 from inertial.estimation.noise_shares import LONGEST
-
-Array = NDArray[np.float64]
 
 _LEFT = 0.25
 """Share of the dwells of a soak that the model of a soak must leave as degrees of freedom."""
@@ -38,7 +36,7 @@ _DRAWN = 40_000
 mean, and by less where there are more, so that soaks of unequal length would differ without a reason."""
 
 
-def loudness_of(model: Model, soak: NDArray[np.intp] | None = None) -> Array | None:
+def loudness_of(model: Model, soak: Places | None = None) -> Array | None:
     """Standard deviation of the noise of each dwell over the lot's, (n,), mean square one; None where soaks do not differ.
 
     Parameters
@@ -74,7 +72,7 @@ def loudness_of(model: Model, soak: NDArray[np.intp] | None = None) -> Array | N
     return loud / np.sqrt(np.mean(loud**2))
 
 
-def _of_soak(model: Model, series: Array, places: NDArray[np.intp]) -> Array:
+def _of_soak(model: Model, series: Array, places: Places) -> Array:
     """Logarithm (blocks,) of the robust variance of a soak's residuals, less its mean for the model's noise; NaN if none."""
     problem, covariance = model.problem, model.problem.covariance
     there = covariance.there[:, places]

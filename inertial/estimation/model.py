@@ -4,8 +4,8 @@ from collections.abc import Callable, Sequence
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.errors import NotIdentified
 from inertial.estimation.candidate import Candidate
 from inertial.estimation.covariance import LARGE
@@ -15,8 +15,6 @@ from inertial.estimation.share_statistics import ShareStatistics
 from inertial.estimation.shares import best_shares, own_shares, plausible_shares
 from inertial.estimation.space import Space
 from inertial.estimation.term import Term
-
-Array = NDArray[np.float64]
 
 _LONG = 400
 """Number of dwells above which shares are searched by half decades, because each whitener takes time and memory."""
@@ -83,8 +81,7 @@ class Model:
         return np.concatenate(columns, axis=-1)
 
     def _of(self, term: Term) -> Array:
-        columns = self.problem.columns(term.effect, term.keywords)
-        return columns if term.first is None else columns[..., : term.first]
+        return self.problem.columns(term.effect, term.keywords)[..., : term.first]
 
     def _start(self, term: Term) -> Array:
         """Columns of the unknown state of a term's memory before the first dwell; none where it was at rest."""
@@ -168,13 +165,11 @@ class Model:
     @cached_property
     def _weights(self) -> Array:
         """Standard deviations by which the blocks weigh while the shares are searched, (blocks,)."""
-        if self._near is None and self._joined:
-            return self._own_scale
-        return np.ones(self.problem.blocks) if self._near is None else self._near.scale
-
-    @cached_property
-    def _own_scale(self) -> Array:
-        """Standard deviations of the blocks under white noise: weights for columns that all share."""
+        if self._near is not None:
+            return self._near.scale
+        if not self._joined:
+            return np.ones(self.problem.blocks)
+        # those under white noise, for columns that all share
         space = self._space(self.problem.covariance.white_noise())
         return np.sqrt(moderated(space.squares, space.by_block)[0])
 
@@ -246,7 +241,9 @@ class Model:
     def _known(self) -> KnownDeviances:
         """The deviances that are known."""
         return (
-            self.problem.deviances_of(frozenset(term.key for term in self.terms)) if self._alike else KnownDeviances()
+            self.problem.deviances.setdefault(frozenset(term.key for term in self.terms), KnownDeviances())
+            if self._alike
+            else KnownDeviances()
         )
 
     @cached_property

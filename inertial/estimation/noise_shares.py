@@ -8,12 +8,10 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import gammaln
 
+from inertial.arrays import Array
 from inertial.decisions import PRIOR_BETTER, PRIOR_DOF
-
-Array = NDArray[np.float64]
 
 LONGEST = 1500
 """Largest number of dwells with a model of wander: its covariance must fit into memory. Long runs are averaged before."""

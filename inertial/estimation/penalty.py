@@ -14,11 +14,6 @@ PER_COLUMN = 6.0
 """Price, in chi-square, for each coefficient and each column where whole models are compared, curves among them."""
 
 
-def cost_of(rank: int, columns: int, nonlinear: int) -> float:
-    """Price, in chi-square, of an effect whose size is unknown before the fit."""
-    return PER_COEFFICIENT * (rank + nonlinear) + PER_COLUMN * columns
-
-
 def price(deviance: float, coefficients: float) -> float:
     """Price of coefficients by their reduction D, in chi-square: k·(1 + ln(D/k)), and all of it where D is below k.
 
@@ -56,7 +51,7 @@ def cost_of_model(model: Model) -> float:
     rank = space.local_rank + space.shared_rank
     count = model.problem.covariance.count.astype(np.float64)
     deviance = space.logdet + deviance_of(space.squares, count)
-    return deviance + cost_of(rank, columns, nonlinear)
+    return deviance + (PER_COEFFICIENT * (rank + nonlinear) + PER_COLUMN * columns)
 
 
 def freedom(term: Term) -> int:

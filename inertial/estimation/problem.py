@@ -6,8 +6,8 @@ from functools import cached_property
 from itertools import groupby
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array, Places
 from inertial.design import of_axes
 from inertial.effects import SensorEffect
 from inertial.effects.base import AnyEffect, excited, has_start
@@ -16,8 +16,6 @@ from inertial.estimation.candidate import Candidate, blocks_of_units, finest_row
 from inertial.estimation.covariance import Covariance
 from inertial.estimation.lot import Lot
 from inertial.estimation.noise_shares import Shares
-
-Array = NDArray[np.float64]
 
 SHARED = ("station", "data")
 """Scopes of effects whose coefficients all blocks share."""
@@ -83,16 +81,8 @@ class Problem:
         self._kept: dict[tuple[object, ...], Candidate] = {}
         self._terms: dict[tuple[object, ...], Array] = {}
         self._room = _CACHE
-        self._deviances: dict[frozenset[tuple[object, ...]], KnownDeviances] = {}
-
-    def deviances_of(self, terms: frozenset[tuple[object, ...]]) -> KnownDeviances:
-        """What is known of the models whose terms have these keys."""
-        return self._deviances.setdefault(terms, KnownDeviances())
-
-    @property
-    def series(self) -> Array:
-        """Measurements (blocks, n), g."""
-        return self.y
+        self.deviances: dict[frozenset[tuple[object, ...]], KnownDeviances] = {}
+        """What is known of models, by the keys of their terms."""
 
     @cached_property
     def covariance(self) -> Covariance:
@@ -211,7 +201,7 @@ class Problem:
         first : how many columns an axis; all if None
         """
         key = (effect.id, len(grid), tuple(grid[0].items()), tuple(grid[-1].items()), first)
-        return self._stored(key, lambda: self._made(effect, grid, first, key))
+        return self._stored(key, lambda: self.varied(effect, grid, first=first, key=key))
 
     def _stored(self, key: tuple[object, ...], make: Callable[[], Candidate]) -> Candidate:
         """A candidate, made where it is not kept, and kept where its columns have room."""
@@ -229,29 +219,24 @@ class Problem:
         return max(1, _WIDE // (1 + self.blocks * self.n * _WIDEST))
 
     def varied(
-        self, effect: AnyEffect | Handling, grid: Sequence[Values], *, first: int | None = None, start: bool = False
+        self,
+        effect: AnyEffect | Handling,
+        grid: Sequence[Values],
+        *,
+        first: int | None = None,
+        start: bool = False,
+        key: object = None,
     ) -> Candidate:
-        """The same for values that are tried once: nothing of them is kept.
+        """The same for values that are tried once: nothing of them is kept. Rows that blocks share are stored once.
 
         Parameters
         ----------
         start : whether columns of the unknown state of a memory follow
+        key : of the candidate
         """
-        return self._made(effect, grid, first, None, start=start)
-
-    def _made(
-        self,
-        effect: AnyEffect | Handling,
-        grid: Sequence[Values],
-        first: int | None,
-        key: object,
-        *,
-        start: bool = False,
-    ) -> Candidate:
-        """Columns over values, those of one value after another: rows that blocks share are stored once."""
         shared = effect.scope in SHARED
         every: list[Array] = []
-        rows_of: list[NDArray[np.intp] | None] = []
+        rows_of: list[Places | None] = []
         for values in grid:
             known = self._terms.get((effect.id, *values.items()))
             own = (self._columns(effect, values) if known is None else known)[..., :first]
@@ -298,9 +283,7 @@ class Problem:
             size = max(1, _PIECE // (len(self.axes) * self.n * _WIDEST * len(places)))
             yield from self._of_units(effect, units, [dict(place) for place in places], size)
 
-    def _of_units(
-        self, effect: Handling, units: NDArray[np.intp], places: Sequence[Values], size: int
-    ) -> Iterator[Candidate]:
+    def _of_units(self, effect: Handling, units: Places, places: Sequence[Values], size: int) -> Iterator[Candidate]:
         """The places of an alternative of one unit, for some units; at most ``size`` units at a time if their columns differ."""
         key = (effect.id, units.size, int(units[0]), len(places), *places[0].items(), *places[-1].items())
 

@@ -8,21 +8,19 @@ from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.decisions import AXES_DIFFER
 from inertial.design import grid_of
 from inertial.effects.base import Nonlinear
 from inertial.estimation.alternative import Handling
-from inertial.estimation.bases import eigen
+from inertial.estimation.bases import eigen, inverse_roots
 from inertial.estimation.candidate import Candidate, times_rows
 from inertial.estimation.model import Model
 from inertial.estimation.noise_shares import Noise
 from inertial.estimation.problem import Values
 from inertial.estimation.refinement import around, cell, on_scale
 from inertial.estimation.term import Term
-
-Array = NDArray[np.float64]
 
 Place = tuple[tuple[str, float | tuple[float, ...]], ...]
 
@@ -162,8 +160,7 @@ class LikelihoodProfile:
         gram = found.left / (size[..., :, None] * size[..., None, :])
         inside = times_rows(self._rows, candidate) / size[..., None]
         values, vectors = eigen(gram)
-        scale = np.where(values > _JITTER, 1.0 / np.sqrt(np.where(values > _JITTER, values, 1.0)), 0.0)
-        along = np.einsum("bgps,bgpt->bgst", vectors, inside, optimize=True) * scale[..., None]
+        along = np.einsum("bgps,bgpt->bgst", vectors, inside, optimize=True) * inverse_roots(values, _JITTER)[..., None]
         if not self.shared.shape[-1]:
             own = np.einsum("bnt,bnt->bt", both, both)[:, None, :] - np.sum(along**2, axis=2)
             own = np.maximum(own, 0.0)

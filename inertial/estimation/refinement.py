@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inertial import decisions
+from inertial.arrays import Array
 from inertial.design import grid_of
 from inertial.effects.base import AnyEffect, Nonlinear
 from inertial.estimation.alternative import Handling
@@ -17,9 +17,6 @@ from inertial.estimation.space import Gain, Space
 from inertial.estimation.term import Term
 from inertial.state import ALL_AXES
 
-Array = NDArray[np.float64]
-
-
 _NEAR = 3
 """Dwells on either side of a change of handling that are tried once more with all other terms in the model."""
 
@@ -27,7 +24,7 @@ _CLEARLY = 1.0
 """Chi-square by which another of them must be better."""
 
 
-def refine(model: Model, term: Term, noise: Noise, *, axes: bool = True) -> Term:
+def refine(model: Model, term: Term, noise: Noise) -> Term:
     """A term with its continuous nonlinear parameters moved to the best fit near their grid values.
 
     One value serves all units and axes, unless one per axis reduces the residual far more than noise can.
@@ -42,7 +39,7 @@ def refine(model: Model, term: Term, noise: Noise, *, axes: bool = True) -> Term
     continuous = [p for p in parameters if not p.choices]
     for parameter in continuous:
         term = _refine_one(space, model.problem, term, parameter)
-    if not axes or term.shared or model.problem.lot.radial:
+    if term.shared or model.problem.lot.radial:
         return term
     for parameter in continuous:
         term = _per_axis(space, model.problem, term, parameter)
@@ -162,6 +159,11 @@ def _with_value(term: Term, parameter: Nonlinear, value: float | tuple[float, ..
     return replace(term, values=tuple({**term.keywords, parameter.name: value}.items()))
 
 
+def _beside(model: Model, terms: Sequence[Term], place: int) -> Model:
+    """A model of all terms but one, at the noise of another model."""
+    return Model(model.problem, [t for k, t in enumerate(terms) if k != place], near=model.noise)
+
+
 def terms_of(effects: Sequence[AnyEffect], problem: Problem) -> list[Term]:
     """Terms of a given model, nonlinear parameters estimated one after the other."""
     terms = [Term(e, tuple(grid_of(e, problem.lot.state)[0].items())) for e in effects]
@@ -186,7 +188,7 @@ def replaced(model: Model) -> Model:
         if isinstance(term.effect, Handling):
             continue
         found = [p for p in term.effect.parameters(model.problem.lot.state) if p.choices]
-        rest = Model(model.problem, [t for k, t in enumerate(terms) if k != place], near=model.noise)
+        rest = _beside(model, terms, place)
         for parameter in found:
             drop = _varied(rest.at(model.noise), model.problem, terms[place], parameter, parameter.grid()).drop
             best = _with_value(terms[place], parameter, float(parameter.grid()[int(np.argmax(drop))]))
@@ -205,8 +207,7 @@ def settled(model: Model) -> Model:
     for place, original in enumerate(model.terms):
         term = original
         for parameter in _continuous(model.problem, original):
-            rest = Model(model.problem, [t for k, t in enumerate(terms) if k != place], near=model.noise)
-            values, drop = _profile(rest.at(model.noise), model.problem, term, parameter)
+            values, drop = _profile(_beside(model, terms, place).at(model.noise), model.problem, term, parameter)
             term = _with_value(term, parameter, float(values[int(np.argmax(drop))]))
         terms[place] = term
     return Model(model.problem, terms, near=model.noise) if terms != list(model.terms) else model
@@ -221,8 +222,7 @@ def intervals(model: Model) -> dict[str, dict[str, tuple[float, float]]]:
     by_effect: dict[str, dict[str, tuple[float, float]]] = {}
     for place, term in enumerate(model.terms):
         for parameter in _continuous(model.problem, term):
-            rest = Model(model.problem, [t for k, t in enumerate(model.terms) if k != place], near=model.noise)
-            space = rest.at(model.noise)
+            space = _beside(model, model.terms, place).at(model.noise)
             values, drop = _profile(space, model.problem, term, parameter)
             inside = values[drop >= drop.max() - space.variance]
             own = by_effect.setdefault(term.effect.id, {})
@@ -237,9 +237,8 @@ _PLACES = 81
 def _profile(space: Space, problem: Problem, term: Term, parameter: Nonlinear) -> tuple[Array, Array]:
     """Values of a parameter over its range, closer together around the best and its own, and the reduction of χ² at each."""
     low, high = sorted((on_scale(parameter, parameter.low), on_scale(parameter, parameter.high)))
-    coarse = np.append(
-        np.linspace(low, high, _PLACES), on_scale(parameter, float(np.mean(term.keywords[parameter.name])))
-    )
+    own = on_scale(parameter, float(np.mean(term.keywords[parameter.name])))
+    coarse = np.append(np.linspace(low, high, _PLACES), own)
 
     def drop(places: Array) -> Array:
         values = np.array([_off_scale(parameter, float(v)) for v in places])

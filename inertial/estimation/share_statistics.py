@@ -4,15 +4,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from inertial.estimation.bases import SEEN
+from inertial.arrays import Array, Places
+from inertial.estimation.bases import SEEN, unit_columns
 from inertial.estimation.candidate import shared_rows
 from inertial.estimation.covariance import PIECE
 from inertial.estimation.noise_shares import Shares
 from inertial.estimation.problem import Problem
-
-Array = NDArray[np.float64]
 
 VANISHING = 3e-5
 """Singular value of columns of unit length, over the largest, below which a combination of them vanishes."""
@@ -119,9 +117,7 @@ class ShareStatistics:
     def _after_plain_fit(self, series: Array) -> Array:
         """What the columns with coefficients by block leave of series (blocks, n, k) in a fit of equal weights."""
         there = self.problem.covariance.there[..., None]
-        own = self._determined * there
-        size = np.sqrt(np.einsum("bnp,bnp->bp", own, own))
-        unit = own / np.where(size > 0.0, size, 1.0)[:, None, :]
+        unit = unit_columns(self._determined * there)[0]
         across = np.swapaxes(unit, -1, -2)
         fitted = unit @ (np.linalg.pinv(across @ unit, rcond=1e-12, hermitian=True) @ (across @ series))
         return (series - fitted) * there
@@ -142,11 +138,11 @@ class ShareStatistics:
         return left[:, seen].reshape(*self._shared.shape[:2], -1)
 
     @cached_property
-    def _distinct(self) -> tuple[Array, NDArray[np.intp]]:
+    def _distinct(self) -> tuple[Array, Places]:
         """The columns that differ, (rows, n), and where each column of each block is among them, (blocks, r + q + 1)."""
         blocks = self.problem.blocks
         few: list[Array] = []
-        places: list[NDArray[np.intp]] = []
+        places: list[Places] = []
         count = 0
         for column in np.swapaxes(self._rows, 0, 1):
             rows = shared_rows(column, self.problem.per_unit)

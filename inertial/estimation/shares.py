@@ -10,14 +10,13 @@ the block, its residuals no longer deviate, and the block has the lot's shares a
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.decisions import LARGEST_SHARE, LEAST_SHARE, OWN_SHARES, OWN_SUSPECT, SHARE_STEP
 from inertial.estimation.noise_shares import LONGEST, Shares
 from inertial.estimation.problem import Problem
 from inertial.estimation.space import Space
 
-Array = NDArray[np.float64]
 Place = tuple[int | None, int | None]
 
 _STRIDES = (4, 2, 1)
@@ -122,27 +121,17 @@ def _around(place: Place, stride: int) -> list[Place]:
     first, second = place
     near: list[Place] = [*((first, k) for k in _moved(second, stride)), *((k, second) for k in _moved(first, stride))]
     if first is not None and second is not None:
-        near += [
-            (_inside(first - stride), _inside(second + stride)),
-            (_inside(first + stride), _inside(second - stride)),
-        ]
-        near += [
-            (_inside(first - stride), _inside(second - stride)),
-            (_inside(first + stride), _inside(second + stride)),
-        ]
+        ways = ((-stride, stride), (stride, -stride), (-stride, -stride), (stride, stride))
+        near += [(_inside(first + one), _inside(second + other)) for one, other in ways]
     if stride == _STRIDES[0]:
         near += [(first, None), (None, second)]
         # a new share is visible only if it is as large as the other
         if second is None:
-            near += [
-                (first, LEAST_SHARE + 8),
-                *([] if first is None else [(first, first), (_inside(first - 8), first)]),
-            ]
+            near += [(first, LEAST_SHARE + 8)]
+            near += [] if first is None else [(first, first), (_inside(first - 8), first)]
         if first is None:
-            near += [
-                (LEAST_SHARE + 8, second),
-                *([] if second is None else [(second, second), (second, _inside(second - 8))]),
-            ]
+            near += [(LEAST_SHARE + 8, second)]
+            near += [] if second is None else [(second, second), (second, _inside(second - 8))]
     return [p for p in dict.fromkeys(near) if p != place]
 
 

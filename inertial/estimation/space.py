@@ -9,14 +9,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from inertial.estimation.bases import SEEN, basis, eigen, schur
+from inertial.arrays import Array, Flags, Places
+from inertial.estimation.bases import SEEN, basis, eigen, inverse_roots, schur
 from inertial.estimation.candidate import Candidate, times_rows
 from inertial.estimation.covariance import Covariance
 from inertial.estimation.noise_shares import Noise
-
-Array = NDArray[np.float64]
 
 _PIECE = 500_000
 """Largest number of columns' values that are whitened at a time."""
@@ -56,7 +54,7 @@ class Gain:
     """
 
     drop: Array
-    rank: NDArray[np.intp]
+    rank: Places
     by_block: Array
 
     @staticmethod
@@ -177,7 +175,7 @@ class Space:
         scale = float(self.covariance.level[block] * self.noise.scale[block])
         return self.covariance.back(np.swapaxes(left, -1, -2), self.noise.shares, np.array([block]))[0, 0] / scale
 
-    def project(self, columns: Array, blocks: NDArray[np.intp] | None = None) -> Array:
+    def project(self, columns: Array, blocks: Places | None = None) -> Array:
         """Whitened columns (blocks, n, m) without the part that the local columns explain."""
         q = self.q if blocks is None else self.q[blocks]
         return columns - q @ (np.swapaxes(q, -1, -2) @ columns)
@@ -214,12 +212,10 @@ class Space:
         size = np.sqrt(found.squares)
         size = np.where(size > 0.0, size, 1.0)
         values, vectors = eigen(found.left / (size[..., :, None] * size[..., None, :]))
-        seen = values > SEEN**2
-        scale = np.where(seen, 1.0 / np.sqrt(np.where(seen, values, 1.0)), 0.0)
         along = np.swapaxes(vectors, -1, -2) @ (found.inside / size[..., None])
-        return self._gain_along(along * scale[..., None], seen)
+        return self._gain_along(along * inverse_roots(values, SEEN**2)[..., None], values > SEEN**2)
 
-    def gain_of_dwells(self, columns: Array, places: NDArray[np.intp]) -> Gain:
+    def gain_of_dwells(self, columns: Array, places: Places) -> Gain:
         """Gain of columns of one dwell each, for every dwell separately; all blocks share their coefficients.
 
         With P as in :mod:`inertial.criticism.left_out` a column t at dwell k has the product t²·P_kk with itself and t·(Py)_k
@@ -245,7 +241,7 @@ class Space:
         size = np.sqrt(np.where(size > 0.0, size, 1.0))
         return self._solved((own / size[:, :, None] / size[:, None, :])[places], (inside / size[..., None])[places])
 
-    def _gain_along(self, along: Array, seen: NDArray[np.bool_]) -> Gain:
+    def _gain_along(self, along: Array, seen: Flags) -> Gain:
         rank = seen.sum(axis=(0, 2))
         if self.targets.shape[-1] == 1:
             by_block = np.einsum("bgr,bgr->bg", along[..., 0], along[..., 0])

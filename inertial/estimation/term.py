@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 
@@ -56,12 +55,12 @@ class Term:
 class TurnOnBias(SensorEffect):
     """Bias that differs from one power-on to the next: not an effect to search for, but one to allow for."""
 
-    id: ClassVar[str] = "turn_on_bias"
-    symbol: ClassVar[str] = "kP"
-    equation: ClassVar[str] = "kP·[since the n-th power-on]"
-    source: ClassVar[str] = "repeatability of the bias, IEEE Std 1293-1998"
-    typical_ug: ClassVar[tuple[float, float]] = (1.0, 1000.0)
-    breaker: ClassVar[str] = "the same pose before and after"
+    id = "turn_on_bias"
+    symbol = "kP"
+    equation = "kP·[since the n-th power-on]"
+    source = "repeatability of the bias, IEEE Std 1293-1998"
+    typical_ug = (1.0, 1000.0)
+    breaker = "the same pose before and after"
 
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
         """A step at every power-on but the first, (..., n, p)."""

@@ -3,12 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import get_blas_funcs, get_lapack_funcs
 
+from inertial.arrays import Array, Flags, Places
 from inertial.decisions import SHARE_STEP
-
-Array = NDArray[np.float64]
 
 _factor, _invert = get_lapack_funcs(("potrf", "trtri"), dtype=np.float64)
 _times, _solve = get_blas_funcs(("trmm", "trsm"), dtype=np.float64)
@@ -25,7 +23,7 @@ class DwellProfile:
     """
 
     time: Array
-    there: NDArray[np.bool_]
+    there: Flags
     profile: Array
     direction: Array | None = None
     loudness: Array | float = 1.0
@@ -41,7 +39,7 @@ class DwellProfile:
             return kernel
         return kernel * (self.loudness[:, None] * self.loudness)
 
-    def fits(self, time: Array, there: NDArray[np.bool_], profile: Array) -> bool:
+    def fits(self, time: Array, there: Flags, profile: Array) -> bool:
         """Whether a block with these dwells can have the same whitener."""
         if self.direction is not None:
             return False
@@ -52,7 +50,7 @@ class DwellProfile:
 
 def grouped(
     time: Array, error: Array, direction: Array | None, level: Array, white: float, loudness: Array | None = None
-) -> tuple[list[DwellProfile], list[tuple[int, int, NDArray[np.intp]]]]:
+) -> tuple[list[DwellProfile], list[tuple[int, int, Places]]]:
     """Profiles of dwells that whiteners are made for, and groups of blocks that have a whitener in common.
 
     A group is the place of its profile, the steps of the lattice by which its shares are larger than the lot's, and its blocks.
@@ -92,7 +90,7 @@ class Whitener:
     lower : (n, n), lower triangle where the noise wanders; None where it is white
     """
 
-    there: NDArray[np.bool_]
+    there: Flags
     white: Array
     logdet: float
     lower: Array | None = None

@@ -4,15 +4,15 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from inertial.arrays import Array, Index
 from inertial.errors import NotIdentified
 from inertial.estimation.noise_shares import LONGEST
 from inertial.fits.descent import descended
 from inertial.fits.norm_noise import WALK_ABOUT_MEAN, NormNoise, norm_noise
 from inertial.fits.wander import student
 
-Array = NDArray[np.float64]
 Shape = Literal["nine", "six"]
 
 _ROUNDS = 3  # of the noise, which depends on the directions of the force
@@ -104,15 +104,19 @@ def fit_ellipsoid(
     free = 6 if shape == "six" else 9
     free_heat = 0 if temperature is None else 3
     if n <= free + free_heat:
-        msg = f"sphere fit: {n} dwell{'s' * (n != 1)}, more than {free + free_heat} are needed; add poses"
-        raise NotIdentified(msg)
+        raise NotIdentified(
+            f"sphere fit: {n} dwell{'s' * (n != 1)}, more than {free + free_heat} are needed; add poses"
+        )
     if not (np.all(np.isfinite(a)) and np.all(np.isfinite(heat))):
         where = np.argwhere(~np.isfinite(a) if not np.all(np.isfinite(a)) else ~np.isfinite(heat))[0].tolist()
-        msg = f"sphere fit: dwell {where[len(lead)]} is not finite, every output and temperature must be; leave it out"
-        raise NotIdentified(msg)
+        raise NotIdentified(
+            f"sphere fit: dwell {where[len(lead)]} is not finite, every output and temperature must be; leave it out"
+        )
     flat = a.reshape(-1, n, 3)
     rise = np.broadcast_to(heat - reference[..., None], (*lead, n)).reshape(-1, n)
-    problem = _Sphere(flat, rise, norm, _which(free, free_heat))
+    # of bias (3), C (6) and temperature offset (3)
+    chosen = np.concatenate([np.arange(free), 9 + np.arange(free_heat)]).astype(np.int64)
+    problem = _Sphere(flat, rise, norm, chosen)
     theta = problem.solve(problem.algebraic())
     dof = n - free - free_heat
     noises: tuple[NormNoise, ...] = ()
@@ -166,11 +170,6 @@ def _with_wander(problem: "_Sphere", theta: Array, time: Array, error: Array) ->
     return theta, noises
 
 
-def _which(free: int, free_heat: int) -> NDArray[np.int64]:
-    """Indices of the free parameters among bias (3), C (6), temperature offset (3)."""
-    return np.concatenate([np.arange(free), 9 + np.arange(free_heat)]).astype(np.int64)
-
-
 def _unpack(theta: Array) -> tuple[Array, Array, Array]:
     """Bias (u, 3), C (u, 3, 3), temperature offset (u, 3) of parameters (u, 12)."""
     c = np.zeros((theta.shape[0], 3, 3))
@@ -182,7 +181,7 @@ def _unpack(theta: Array) -> tuple[Array, Array, Array]:
 class _Sphere:
     """Residuals |f| - norm of a batch (u, n, 3) and their derivatives."""
 
-    def __init__(self, output: Array, rise: Array, norm: float, free: NDArray[np.int64]) -> None:
+    def __init__(self, output: Array, rise: Array, norm: float, free: Index) -> None:
         self.output, self.rise, self.norm, self.free = output, rise, norm, free
         self.whiten: Array | None = None
 
@@ -192,8 +191,7 @@ class _Sphere:
         span = 0.5 * (self.output.max(axis=1) - self.output.min(axis=1))
         if not np.all(span > 0.0):
             axis = "xyz"[int(np.argwhere(~(span > 0.0))[0][1])]
-            msg = f"sphere fit: output {axis} never changes, all axes must be turned; check the channel"
-            raise NotIdentified(msg)
+            raise NotIdentified(f"sphere fit: output {axis} never changes, all axes must be turned; check the channel")
         scaled = (self.output - centre[:, None, :]) / span[:, None, :]
         columns = np.concatenate([scaled**2, scaled], axis=-1)
         p = np.einsum("upn,un->up", np.linalg.pinv(columns), np.ones(self.output.shape[:2]))
@@ -251,11 +249,10 @@ def _scaled(rows: Array) -> tuple[Array, Array]:
     unit = rows / np.where(size > 0.0, size, 1.0)[:, None, :]
     smallest = np.linalg.eigvalsh(np.swapaxes(unit, -1, -2) @ unit)[:, 0]
     if not np.all(smallest >= _SINGULAR):
-        msg = (
+        raise NotIdentified(
             f"sphere fit: unit {int(np.argmin(smallest))} of the batch: the orientations leave a coefficient undetermined; "
             "add poses in between, with every axis up and down"
         )
-        raise NotIdentified(msg)
     return unit, size
 
 

@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.stats import f as f_distribution
 
-Array = NDArray[np.float64]
+from inertial.arrays import Array
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ def ferraris(up: ArrayLike, down: ArrayLike, gravity: float) -> Ferraris:
     up, down : (3, 3), output unit; [j, i] is output i while axis j points up, down
     gravity : the specific force of a face, in the unit wanted (g or m/s²)
     """
-    plus, minus = _outputs_by_face(up), _outputs_by_face(down)
+    plus, minus = (np.asarray(means, dtype=np.float64).T for means in (up, down))  # U, as published
     response = (plus - minus) / (2.0 * gravity)
     size = np.linalg.norm(response, axis=1)
     return Ferraris(np.diag(size), response / size[:, None], np.diagonal(0.5 * (plus + minus)).copy())
@@ -92,11 +92,6 @@ def faces(up: ArrayLike, down: ArrayLike, gravity: float, standard_error: ArrayL
     # the samples' own degrees of freedom are many: chi-square over 2 is F with 2 and infinity
     p_value = np.where(np.isnan(pure), np.nan, f_distribution.sf((rms / pure) ** 2, 2, 1e9))
     return Faces(theta[0], theta[1:].T, errors[0], errors[1:].T, residuals, rms, pure, p_value)
-
-
-def _outputs_by_face(means: ArrayLike) -> Array:
-    """U (3, 3): output by face, as published."""
-    return np.asarray(means, dtype=np.float64).T
 
 
 @dataclass(frozen=True)
@@ -135,8 +130,9 @@ def six_position(up: ArrayLike, down: ArrayLike, local_gravity: float) -> SixPos
     """
     plus, minus = np.asarray(up, dtype=np.float64), np.asarray(down, dtype=np.float64)
     if plus.shape[-2:] != (3, 3) or minus.shape != plus.shape:
-        msg = f"six position: means of shape {plus.shape} and {minus.shape}, (..., 3, 3) each is needed: face by output"
-        raise ValueError(msg)
+        raise ValueError(
+            f"six position: means of shape {plus.shape} and {minus.shape}, (..., 3, 3) each is needed: face by output"
+        )
     centre = 0.5 * (plus + minus)
     response = np.swapaxes(plus - minus, -1, -2) / (2.0 * local_gravity)
     return SixPosition(

@@ -4,15 +4,14 @@ Blocks are the series of one unit and axis, each with coefficients of its own; f
 blocks share. All series are in units of their white standard error.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
-Array = NDArray[np.float64]
+from inertial.arrays import Array
 
 _STEP = 10.0
 SHARES = (0.0, *(0.1 * _STEP ** np.arange(7)).tolist())
@@ -66,7 +65,7 @@ class Series:
         self._s = s / self._size
         self.white = np.diag(profile**2)
         self.sound = np.ones(z.shape[:-1], dtype=bool)
-        self._grids: dict[bytes, Callable[[Array, Array], Array]] = {}
+        self._grids: dict[bytes, Restricted] = {}
 
     @property
     def dof(self) -> int:
@@ -121,23 +120,15 @@ class Series:
         return variance, float(deviance)
 
     def deviances(self, first: Array, second: Array) -> Array:
-        """Restricted deviance on a grid, (k, l), for shares (k,) of the first kernel and (l,) of the second."""
-        return self._likelihood()(first, second)
-
-    def _likelihood(self) -> Callable[[Array, Array], Array]:
-        """What gives the restricted deviance of the sound blocks on a grid."""
+        """Restricted deviance of the sound blocks, (k, l), for shares (k,) of the first kernel and (l,) of the second."""
         if self._s.shape[-1]:
-            return self._pair_by_pair
+            grid = [self.solve(pair).deviance for pair in product(first.tolist(), second.tolist())]
+            return np.reshape(grid, (len(first), len(second)))
         blocks = self.sound.tobytes()
         if blocks not in self._grids:
             h = np.broadcast_to(self._h, (*self._z.shape, self._h.shape[-1]))
-            restricted = Restricted(h[self.sound], self._z[self.sound], self.white, self.kernels)
-            self._grids = {blocks: restricted.on_grid}
-        return self._grids[blocks]
-
-    def _pair_by_pair(self, first: Array, second: Array) -> Array:
-        grid = [self.solve(pair).deviance for pair in product(first.tolist(), second.tolist())]
-        return np.reshape(grid, (len(first), len(second)))
+            self._grids = {blocks: Restricted(h[self.sound], self._z[self.sound], self.white, self.kernels)}
+        return self._grids[blocks].on_grid(first, second)
 
     def best_shares(self) -> tuple[float, float]:
         """Shares of flicker and walk: their mean over the restricted likelihood; zero where the lot shows no wander.
@@ -145,16 +136,16 @@ class Series:
         A slow drift within one record may be either, and the likelihood is flat between the two: its peak jumps from one
         answer to the other, its mean does not.
         """
-        shares, deviances = np.array(SHARES), self._likelihood()
-        coarse = deviances(shares, shares)
+        shares = np.array(SHARES)
+        coarse = self.deviances(shares, shares)
         if coarse[0, 0] - coarse.min() < _CHARGE:
             return 0.0, 0.0
         rows, columns = np.nonzero(coarse - coarse.min() < _FAR)
         flicker, walk = (_around(shares[places]) for places in (rows, columns))
-        deviance = deviances(flicker**2, walk**2)
+        deviance = self.deviances(flicker**2, walk**2)
         rows, columns = np.nonzero(deviance - deviance.min() < _FAR)
         flicker, walk = _between(flicker[rows] ** 2), _between(walk[columns] ** 2)
-        deviance = deviances(flicker**2, walk**2)
+        deviance = self.deviances(flicker**2, walk**2)
         # half of the belief beforehand is that a kind of wander is not there at all
         belief = np.outer(*(np.where(one > 0.0, 1.0, _FINE - 1.0) for one in (flicker, walk)))
         weight = belief * np.exp(-0.5 * (deviance - deviance.min()))
@@ -244,13 +235,11 @@ class Restricted:
         Kept, since the grids of one likelihood share some of their strengths.
         """
         if share not in self._bases:
-            self._bases[share] = self._basis_at(share)
+            shrink = 1.0 / np.sqrt(1.0 + share * self._second)
+            values, vectors = np.linalg.eigh(shrink[:, None] * self._first * shrink)
+            volume = self._volume - 2.0 * float(np.log(shrink).sum())
+            self._bases[share] = np.maximum(values, 0.0), (shrink[:, None] * vectors).T, volume
         return self._bases[share]
-
-    def _basis_at(self, share: float) -> tuple[Array, Array, float]:
-        shrink = 1.0 / np.sqrt(1.0 + share * self._second)
-        values, vectors = np.linalg.eigh(shrink[:, None] * self._first * shrink)
-        return np.maximum(values, 0.0), (shrink[:, None] * vectors).T, self._volume - 2.0 * float(np.log(shrink).sum())
 
     def _products(self, piece: Array, turn: Array, weight: Array) -> Array:
         """Products (k, pairs, b) of the columns (m, p + 1, b) of some blocks, weighted for every share."""

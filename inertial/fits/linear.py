@@ -9,15 +9,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inertial import design
+from inertial.arrays import Array
 from inertial.design import Values
 from inertial.errors import NotIdentified
 from inertial.frames import shown_force
 from inertial.state import ALL_AXES, State
-
-Array = NDArray[np.float64]
 
 _SINGULAR = 1e-11
 """Smallest eigenvalue of the scaled normal matrix: below, a coefficient is not determined."""

@@ -9,14 +9,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
+from inertial.arrays import Array
 from inertial.fits.wander import student
 from inertial.noise.flicker import flicker_kernel
 from inertial.noise.measurands import walk_kernel
-
-Array = NDArray[np.float64]
 
 _SHARES = np.concatenate([[0.0], 10.0 ** np.arange(-1.0, 5.0)])
 WALK_ABOUT_MEAN = 1.0 / 6.0

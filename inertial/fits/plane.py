@@ -10,15 +10,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.distributions import f_tail
 from inertial.errors import NotIdentified
 from inertial.fits.descent import descended
 from inertial.fits.norm_noise import norm_noise
 from inertial.fits.wander import student
-
-Array = NDArray[np.float64]
 
 FLAT = 0.05
 """Singular value of the directions across a plane, over the largest, below which they lie in the plane: 3° of wobble."""
@@ -158,7 +156,9 @@ def fit_plane_norm(output: Array, across: int, norm: float, time: Array, error: 
         whiten = norm_noise(left, rows, force / np.linalg.norm(force, axis=1, keepdims=True), time, white).whiten
     theta = _descended(flat, theta, norm, whiten)
     force, rows, left = _state(flat, theta, norm)
-    _refuse_collapsed(theta, force, norm)
+    along = np.ptp(force, axis=0) / norm
+    if not (np.all(_matrix(theta).diagonal() > 0.0) and np.all(along > ARC)):
+        raise NotIdentified(_NO_ELLIPSE)  # the norm is right because all forces are alike, not because of an ellipse
     ellipse = _Series.of(rows, left, whiten)
     columns = np.column_stack([np.ones(len(flat)), force])
     other = _solved(columns, output[:, across], np.ones((len(flat), 1)), time, error[:, across])
@@ -225,13 +225,6 @@ def _refuse_few(dwells: int, coefficients: int) -> None:
         raise NotIdentified(
             f"plane: {dwells} dwells, more than {coefficients} are needed for the axes in the plane; add poses"
         )
-
-
-def _refuse_collapsed(theta: Array, force: Array, norm: float) -> None:
-    """Refuse a fit whose norm is right because all its forces are alike, not because the outputs lie on an ellipse."""
-    along = np.ptp(force, axis=0) / norm
-    if not (np.all(_matrix(theta).diagonal() > 0.0) and np.all(along > ARC)):
-        raise NotIdentified(_NO_ELLIPSE)
 
 
 def _typical(output: Array, seen: Array, inside: tuple[int, int]) -> float:

@@ -4,14 +4,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.polynomial import chebyshev
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from inertial.arrays import Array
 from inertial.distributions import chi2_tail
 from inertial.errors import NotIdentified
 from inertial.probability import passes
 from inertial.state import T_REFERENCE
-
-Array = NDArray[np.float64]
 
 _SINGULAR = 1e-12  # eigenvalue of the scaled normal matrix below which a power is not determined
 _FEWEST = 3  # samples in a block
@@ -64,14 +63,16 @@ def fit_axis_polynomial(
     columns = _columns(raw, temperature, degree, origin)
     count, unknowns = columns.shape[-2:]
     if count <= unknowns:
-        msg = f"polynomial: {count} dwells, more than {unknowns} are needed for degree {degree}; add poses"
-        raise NotIdentified(msg)
+        raise NotIdentified(
+            f"polynomial: {count} dwells, more than {unknowns} are needed for degree {degree}; add poses"
+        )
     size = np.sqrt(np.einsum("...np,...np->...p", columns, columns))
     unit = columns / np.where(size > 0.0, size, 1.0)[..., None, :]
     gram = np.swapaxes(unit, -1, -2) @ unit
     if not np.all(np.linalg.eigvalsh(gram)[..., 0] >= _SINGULAR):
-        msg = f"polynomial: the poses do not determine degree {degree} on every axis; add levels of specific force"
-        raise NotIdentified(msg)
+        raise NotIdentified(
+            f"polynomial: the poses do not determine degree {degree} on every axis; add levels of specific force"
+        )
     z = np.swapaxes(np.broadcast_to(target, raw.shape), -1, -2)
     theta = np.linalg.solve(gram, np.einsum("...np,...n->...p", unit, z)[..., None])[..., 0] / size
     residual = z - np.einsum("...np,...p->...n", columns, theta)
@@ -127,8 +128,9 @@ def fit_temperature_curve(output: ArrayLike, temperature: ArrayLike, *, degree: 
     x, t = np.asarray(output, dtype=np.float64), np.asarray(temperature, dtype=np.float64)
     span = float(np.ptp(t))
     if x.shape[0] < _FEWEST * _BLOCKS or span <= 0.0:
-        msg = f"temperature curve: {x.shape[0]} samples over {span:.3g} °C, at least {_FEWEST * _BLOCKS} over a ramp needed"
-        raise NotIdentified(msg)
+        raise NotIdentified(
+            f"temperature curve: {x.shape[0]} samples over {span:.3g} °C, at least {_FEWEST * _BLOCKS} over a ramp needed"
+        )
     centre = float(0.5 * (t.max() + t.min()))
     columns = chebyshev.chebvander((t - centre) / (0.5 * span), degree)
     theta = np.asarray(np.linalg.lstsq(columns, x, rcond=None)[0], dtype=np.float64)

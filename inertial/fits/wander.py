@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array, Flags
 from inertial.design import Values
 from inertial.distributions import chi2_quantile, chi2_upper, normal_tail, student_upper
 from inertial.errors import NotIdentified
@@ -23,8 +23,6 @@ from inertial.fits.wander_columns import LotColumns
 from inertial.noise.flicker import SLOWEST_FITTED, flicker_kernel
 from inertial.noise.measurands import walk_kernel
 from inertial.state import State
-
-Array = NDArray[np.float64]
 
 _LACKING = 1e-4
 """Probability, over all units and axes, below which the scatter of one is lack of fit and not noise."""
@@ -85,7 +83,7 @@ class WanderFit:
         return self.white * float(np.sqrt(self.walk_share))
 
 
-def wander_kernels(time: Array, used: NDArray[np.bool_] | None = None) -> tuple[Array, Array]:
+def wander_kernels(time: Array, used: Flags | None = None) -> tuple[Array, Array]:
     """Covariances (n, n) of 1/f wander and random walk of variance one at times (n,), s.
 
     Wander slower than the record is, for the record, the bias itself. Those of a short record are kept, because fit and budget of
@@ -113,7 +111,7 @@ def fit_lot_with_wander(
     standard_error: Array,
     *,
     nonlinear: Values | None = None,
-    used: NDArray[np.bool_] | None = None,
+    used: Flags | None = None,
     plain: LotFit | None = None,
 ) -> WanderFit:
     """Generalised least-squares fit of a model to the dwells of a lot.
@@ -237,7 +235,7 @@ def _solve(series: Series) -> tuple[tuple[float, float], Solved]:
     The scatter of the samples is a lower bound: where less than it is left, the fit is the weighted one.
     """
     shares, solved = _prudent(series, series.best_shares())
-    middle = _median(series.dof) / np.median(solved.squares)
+    middle = float(chi2_quantile(0.5, series.dof)) / np.median(solved.squares)
     lacking = lack_of_fit(solved.squares * middle, series.dof) > 1.0
     if lacking.any() and not lacking.all():
         series.sound = ~lacking
@@ -286,12 +284,6 @@ def _exceeded(probability: float, dof: int) -> float:
     return float(chi2_upper(probability, dof))
 
 
-@lru_cache(maxsize=1024)
-def _median(dof: int) -> float:
-    """The median χ² of ``dof`` degrees of freedom."""
-    return float(chi2_quantile(0.5, dof))
-
-
 def _known(series: Series, shares: tuple[float, float], solved: Solved) -> float:
     """What errors are widened by where the noise is known from the scatter of a few dwells; one where the samples give it."""
     if not any(shares) and not _scattered(series, solved):
@@ -325,7 +317,7 @@ class _ResidualCovariance:
     s: Array
     solved: Solved
     covariance: Array
-    there: NDArray[np.bool_]
+    there: Flags
 
     def spread(self) -> Array:
         """Standard deviations of the residuals of all dwells, (..., 3, n)."""

@@ -3,15 +3,13 @@
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inertial import design
+from inertial.arrays import Array
 from inertial.design import Values
 from inertial.fits.generalised import Solved
 from inertial.fits.linear import LotFit
 from inertial.state import State
-
-Array = NDArray[np.float64]
 
 _STEP = 1e-3
 """Relative step for the derivative by a nonlinear parameter."""

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array, Flags
 from inertial.decisions import CLASS_WIDTH
 from inertial.estimation.comparison import Fitting
 from inertial.estimation.model import Model
@@ -23,8 +23,6 @@ from inertial.next_measurement.separation import (
     widened,
 )
 from inertial.planning.sequences import SequenceStep, StationPace
-
-Array = NDArray[np.float64]
 
 UNLUCKY = 1.65
 """Standard deviations of chance against which the measurement must still separate."""
@@ -52,7 +50,7 @@ class Promise:
     remaining: tuple[str, ...] = ()
 
 
-Score = Callable[[NDArray[np.bool_]], Array]
+Score = Callable[[Flags], Array]
 """Gain of each step of a grid, (grid,), after the dwells that are marked."""
 
 
@@ -106,9 +104,7 @@ class RivalDiscrimination(Objective):
 
     least = 0.03
 
-    def __init__(
-        self, rivals: Rivals, scores: Array, every: Rivals | None = None, never: NDArray[np.bool_] | None = None
-    ) -> None:
+    def __init__(self, rivals: Rivals, scores: Array, every: Rivals | None = None, never: Flags | None = None) -> None:
         super().__init__(rivals, rivals.terms)
         self.every = every or rivals
         # (r, r): pairs that no measurement separates do not count
@@ -144,7 +140,7 @@ class RivalDiscrimination(Objective):
         fits = [Fitting(problem, [*rest, wrong]) for wrong in rivals.terms]
         error = _error(problem, rivals)[:, grid, None]
 
-        def separation(train: NDArray[np.bool_]) -> Array:
+        def separation(train: Flags) -> Array:
             total = np.zeros(error.shape[1])
             for column, fit in enumerate(fits):
                 left = fit.left(truths, train)[:, grid] / error
@@ -202,7 +198,7 @@ class Sighting(Objective):
         fit = Fitting(problem, with_turn_on(problem.lot.state, rivals.rest))
         error = _error(problem, rivals)[:, grid, None]
 
-        def shown(train: NDArray[np.bool_]) -> Array:
+        def shown(train: Flags) -> Array:
             left = fit.left(columns, train)[:, grid] / error
             gained = np.sum(left**2, axis=0) * rivals.weight / rivals.variance / problem.blocks
             return np.sum(np.minimum(gained / _SHOWN, 1.0), axis=1)

@@ -10,15 +10,14 @@ from itertools import product
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inertial import frames, poses
+from inertial.arrays import Array
 from inertial.planning.drivers import first_unit
 from inertial.planning.features import levels
 from inertial.planning.sequences import SequenceStep, StationPace, n_of, standing
 from inertial.state import T_REFERENCE, State
 
-Array = NDArray[np.float64]
 Kind = Literal["poses", "soaks", "waits", "approach", "excursion", "ramp", "later", "power"]
 
 _DETOUR = np.radians(20.0)
@@ -126,7 +125,8 @@ def courses(state: State, reach: TableReach, best: Sequence[SequenceStep], here:
     best : poses that separate the rivals by their directions; some are used if any pose is suitable
     here : °C, present temperature of the chamber
     """
-    chosen = _spread(best, reach, here)
+    faces = [SequenceStep(0.0, 0.0, here, reach.settle), SequenceStep(np.pi, 0.0, here, reach.settle)]
+    chosen = [*faces, *(replace(s, temperature=here) for s in best[:2])]
     sequences = [
         *_waits(here),
         *_approaches(state, reach, here, chosen),
@@ -142,12 +142,6 @@ def courses(state: State, reach: TableReach, best: Sequence[SequenceStep], here:
     return [c for c in sequences if c.steps and all(reach.allows(s) for s in c.steps)]
 
 
-def _spread(best: Sequence[SequenceStep], reach: TableReach, here: float) -> list[SequenceStep]:
-    """Two opposed faces, and the two best poses."""
-    faces = [SequenceStep(0.0, 0.0, here, reach.settle), SequenceStep(np.pi, 0.0, here, reach.settle)]
-    return [*faces, *(replace(s, temperature=here) for s in best[:2])]
-
-
 def _waits(here: float) -> list[StepSequence]:
     """Opposed poses in turn, with longer and longer waits after the move."""
     pairs = (
@@ -157,16 +151,12 @@ def _waits(here: float) -> list[StepSequence]:
     )
     sequences: list[StepSequence] = []
     for waits in ((0.0, 20.0, 60.0), (0.0, 10.0, 30.0, 100.0, 300.0), (0.0, 0.0, 0.0, 120.0), (0.0, 600.0)):
-        steps = [SequenceStep(o, i, here, w) for w in waits for pair in pairs for o, i in pair]
-        sequences.append(StepSequence("waits", tuple(steps)))
-        short = [SequenceStep(o, i, here, w) for w in waits for o, i in pairs[0]]
-        sequences.append(StepSequence("waits", tuple(short)))
-    stay = [0.0, *[0.0] * 7]
-    dwell_on = [SequenceStep(o, i, here, w) for pair in pairs for o, i in pair for w in stay]
-    sequences.append(
-        StepSequence("waits", tuple(dwell_on))
-    )  # dwell after dwell at one pose: the whole settling is measured
-    return sequences
+        for some in (pairs, pairs[:1]):
+            steps = [SequenceStep(o, i, here, w) for w in waits for pair in some for o, i in pair]
+            sequences.append(StepSequence("waits", tuple(steps)))
+    # dwell after dwell at one pose: the whole settling is measured
+    stay = [SequenceStep(o, i, here, 0.0) for pair in pairs for o, i in pair for _ in range(8)]
+    return [*sequences, StepSequence("waits", tuple(stay))]
 
 
 def _approaches(state: State, reach: TableReach, here: float, chosen: Sequence[SequenceStep]) -> list[StepSequence]:

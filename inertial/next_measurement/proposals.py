@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inertial import effects as catalogue
+from inertial.arrays import Flags
 from inertial.criticism.classes import EffectClass
 from inertial.design import grid_of
 from inertial.errors import MissingInput
@@ -128,7 +128,7 @@ def _everything(state: State, reach: TableReach, pace: StationPace) -> list[Sequ
     return steps
 
 
-def _never_apart(rivals: Rivals, around: Circumstances) -> NDArray[np.bool_]:
+def _never_apart(rivals: Rivals, around: Circumstances) -> Flags:
     """Whether (r, r) the rival of a column explains the prediction of the rival of a row, under every step of the station."""
     state = rivals.lot.state
     steps = _everything(state, around.reach or reach_of(state), around.pace)

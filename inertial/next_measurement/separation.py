@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.decisions import AXES_DIFFER
 from inertial.estimation.alternative import Handling
 from inertial.estimation.candidate import blocks_of_units
@@ -25,8 +25,6 @@ from inertial.estimation.profile import LikelihoodProfile
 from inertial.estimation.space import Space
 from inertial.estimation.term import Term, with_turn_on
 from inertial.planning.sequences import SequenceStep, StationPace, extended
-
-Array = NDArray[np.float64]
 
 FEW, MANY = 3, 16
 """Units that stand for the lot, as all have the same steps: during the search, and for the expected result."""

@@ -5,13 +5,13 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from inertial.arrays import Array, Index
 from inertial.distributions import chi2_quantile
 from inertial.noise import mixture
 
-Array = NDArray[np.float64]
-Spacing = Literal["octave", "decade"] | Sequence[int] | NDArray[np.int64]
+Spacing = Literal["octave", "decade"] | Sequence[int] | Index
 
 FEWEST_SAMPLES = 8
 CONFIDENCE = 0.6827
@@ -37,7 +37,7 @@ class AllanCurve:
     """Samples of the record."""
     rate_hz: float
     """Sampling rate, Hz."""
-    m: NDArray[np.int64]
+    m: Index
     """(t,) averaging times in samples."""
 
 
@@ -85,12 +85,12 @@ def overlapping(
     )
 
 
-def octaves(n: int) -> NDArray[np.int64]:
+def octaves(n: int) -> Index:
     """Averaging times 1, 2, 4, … samples up to a third of `n`."""
     return 2 ** np.arange(int(np.log2(max(n // 3, 1))) + 1, dtype=np.int64)
 
 
-def decades(n: int) -> NDArray[np.int64]:
+def decades(n: int) -> Index:
     """Averaging times 1, 2, 5, 10, 20, … samples up to a third of `n`."""
     powers = 10 ** np.arange(int(np.log10(n)) + 1, dtype=np.int64)
     times = np.outer(powers, np.array([1, 2, 5], dtype=np.int64)).ravel()
@@ -100,33 +100,31 @@ def decades(n: int) -> NDArray[np.int64]:
 def _checked(data: Array, rate_hz: float) -> int:
     n = data.shape[-1] if data.ndim else 0
     if n < FEWEST_SAMPLES:
-        msg = f"allan: record of {n} samples, at least {FEWEST_SAMPLES} are needed; record longer"
-        raise ValueError(msg)
+        raise ValueError(f"allan: record of {n} samples, at least {FEWEST_SAMPLES} are needed; record longer")
     if not np.isfinite(rate_hz) or rate_hz <= 0.0:
-        msg = f"allan: sampling rate {rate_hz} Hz, a positive rate is needed; give the rate of the record"
-        raise ValueError(msg)
+        raise ValueError(f"allan: sampling rate {rate_hz} Hz, a positive rate is needed; give the rate of the record")
     bad = np.argwhere(~np.isfinite(data))
     if bad.size:
-        msg = (
+        raise ValueError(
             f"allan: sample {int(bad[0][-1])} is {data[tuple(bad[0])]}, finite values are needed; remove the gap first"
         )
-        raise ValueError(msg)
     return n
 
 
-def _spacings(n: int, m: Spacing | None) -> NDArray[np.int64]:
+def _spacings(n: int, m: Spacing | None) -> Index:
     if m is None or (isinstance(m, str) and m == "octave"):
         return octaves(n)
     if isinstance(m, str):
         return decades(n)
     spacings = np.unique(np.asarray(m, dtype=np.int64))
     if spacings.size == 0 or spacings[0] < 1 or 2 * spacings[-1] > n - 1:
-        msg = f"allan: averaging times {spacings.tolist()} samples, 1 to {(n - 1) // 2} are possible with {n} samples"
-        raise ValueError(msg)
+        raise ValueError(
+            f"allan: averaging times {spacings.tolist()} samples, 1 to {(n - 1) // 2} are possible with {n} samples"
+        )
     return spacings
 
 
-def _variances(data: Array, spacings: NDArray[np.int64]) -> Array:
+def _variances(data: Array, spacings: Index) -> Array:
     """Allan variances (..., t). The mean is taken out first: it does not count, and sums of raw counts lose digits."""
     n = data.shape[-1]
     phase = np.zeros((*data.shape[:-1], n + 1))

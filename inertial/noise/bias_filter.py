@@ -12,13 +12,11 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
+from inertial.arrays import Array, Flags
 from inertial.distributions import chi2_quantile
 from inertial.noise.gauss_markov import BiasModel, StepOfProcess, step_of_process, step_of_walk
-
-Array = NDArray[np.float64]
 
 AXES = 3
 GATE_SIGMA = 5.0
@@ -97,15 +95,11 @@ class BiasFilter:
         if key not in self._steps:
             if len(self._steps) >= _MOST_STEPS:
                 self._steps.clear()
-            self._steps[key] = self._transition(seconds, mean=averaged_s > 0.0)
+            transitions, added = transitions_by_axis(self.model, seconds, mean=averaged_s > 0.0)
+            self._steps[key] = _blocks(list(transitions)), _blocks(list(added))
         phi, grown = self._steps[key]
         self._x = phi @ self._x
         self._p = phi @ self._p @ phi.T + grown
-
-    def _transition(self, seconds: float, *, mean: bool) -> tuple[Array, Array]:
-        """Transition and added covariance, both (3w, 3w), of a time, whose mean or whose end is the bias."""
-        transitions, added = transitions_by_axis(self.model, seconds, mean=mean)
-        return _blocks(list(transitions)), _blocks(list(added))
 
     def known_force(self, difference: Array, seconds: float) -> None:
         """Updates with corrected output minus true force (3,), g, each a mean over ``seconds``."""
@@ -232,7 +226,7 @@ class Track:
     covariance: Array
     expected: Array
     expected_covariance: Array
-    updated: NDArray[np.bool_]
+    updated: Flags
     consistency: Consistency
     rejected: int
     end: BiasState

@@ -14,9 +14,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from inertial.arrays import Array, Index
 
 NOISES = ("Q", "N", "B", "K")
 """Terms that are random; the ramp R is deterministic and enters as the mean of z."""
@@ -51,7 +50,7 @@ def autocovariance(lag: Array) -> Array:
 class Sums:
     """Moments of the Allan variances of one record length: everything but the strengths of the noises."""
 
-    m: NDArray[np.int64]
+    m: Index
     """(t,) spacings, samples."""
     quadratic: Array
     """(t, t, 4, 4): Cov[v1, v2] is the quadratic form of the strengths of `NOISES`."""
@@ -85,7 +84,9 @@ def _pair(n: int, m1: int, m2: int) -> tuple[Array, Array]:
     """Quadratic form (4, 4) and ramp vector (4,) of Cov[v(m1), v(m2)], m1 <= m2."""
     count1, count2 = n + 1 - 2 * m1, n + 1 - 2 * m2
     lags = _lags(m1, m2, (-(count1 - 1), count2 - 1))
-    weights = _pairs_at(lags, count1, count2) * _widths(lags)
+    gaps = np.diff(lags)
+    widths = 0.5 * (np.concatenate([[1.0], gaps]) + np.concatenate([gaps, [1.0]]))  # lags that each stands for
+    weights = _pairs_at(lags, count1, count2) * widths
     smooth = np.concatenate([np.zeros((1, lags.size)), _cross(lags, m1, m2)])
     form = np.einsum("cl,dl,l->cd", smooth, smooth, weights)
     line = smooth @ weights
@@ -106,12 +107,6 @@ def _lags(m1: int, m2: int, ends: tuple[int, int]) -> Array:
     offsets = np.concatenate([-far, -near, near, far])
     lags = np.rint(np.concatenate([m1 - j * m2 + offsets for j in range(3)]))
     return np.unique(np.clip(lags, *ends))
-
-
-def _widths(lags: Array) -> Array:
-    """Number of whole lags (l,) that each of `lags` stands for: half the gap on each side."""
-    gaps = np.diff(lags)
-    return 0.5 * (np.concatenate([[1.0], gaps]) + np.concatenate([gaps, [1.0]]))
 
 
 def _cross(lags: Array, m1: int, m2: int) -> Array:

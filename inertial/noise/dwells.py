@@ -3,12 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
+from inertial.arrays import Array
 from inertial.noise.flicker import FLICKER_FLOOR, flicker_of_means
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -8,9 +8,8 @@ diagnosis look at the correlation, for which v is one over the number of process
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from inertial.arrays import Array
 
 FLICKER_FLOOR = float(np.sqrt(2.0 * np.log(2.0) / np.pi))
 """sigma = 0.664·B on the flat part of the Allan curve: IEEE Std 952-1997, C.1.1.3."""

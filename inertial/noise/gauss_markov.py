@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.optimize import nnls
 
-Array = NDArray[np.float64]
+from inertial.arrays import Array
 
 AT_MAXIMUM = 1.8927
 """Averaging time over T at which the Allan deviation of one process is largest."""
@@ -105,8 +105,7 @@ def flicker_terms(shortest_s: float, longest_s: float, count: int | None = None)
         The range is empty.
     """
     if not 0.0 < shortest_s < longest_s:
-        msg = f"flicker: averaging times from {shortest_s} to {longest_s} s, a range above 0 is needed"
-        raise ValueError(msg)
+        raise ValueError(f"flicker: averaging times from {shortest_s} to {longest_s} s, a range above 0 is needed")
     low, high = np.log10([shortest_s, longest_s])
     number = count or (3 if high - low <= _FEW_DECADES else 4)
     tau = np.logspace(low, high, _POINTS)
@@ -119,8 +118,7 @@ def flicker_terms(shortest_s: float, longest_s: float, count: int | None = None)
         if best is None or off < best[0]:
             best = off, constants, weights
     if best is None:  # the grid of insets begins below every range
-        msg = "flicker: no time constants"
-        raise ValueError(msg)
+        raise ValueError("flicker: no time constants")
     off, constants, weights = best
     return FlickerTerms(np.sqrt(weights), constants, shortest_s, longest_s, off)
 
@@ -163,12 +161,6 @@ class BiasModel:
     correlation_s: Array
     walk: Array
     turn_on: Array
-
-    def allan_variance(self, tau: ArrayLike) -> Array:
-        """Allan variance (3, t), g², of white noise, processes and walk together."""
-        times = np.asarray(tau, dtype=np.float64)
-        processes = self.sd**2 @ allan_variance(times[None, :], self.correlation_s[:, None])
-        return self.white[:, None] ** 2 / times + processes + self.walk[:, None] ** 2 * times / 3.0
 
 
 def bias_model(

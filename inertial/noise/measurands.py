@@ -3,9 +3,9 @@
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from inertial.arrays import Array, Flags
+
 _Time = TypeVar("_Time", float, Array)
 
 DAY_S = 86_400.0
@@ -52,7 +52,7 @@ def instability(deviation: Array, time: Array, *, slowest: float = 1.0) -> Array
     return deviation * np.sqrt(np.pi / (octaves * _OCTAVE))
 
 
-def walk_kernel(time: Array, fitted: NDArray[np.bool_] | None = None) -> Array:
+def walk_kernel(time: Array, fitted: Flags | None = None) -> Array:
     """Covariance (..., n, n) of a random walk about its mean over its record, which gathers a variance of one over all times.
 
     About a walk that is zero at the first dwell, the bias of a fit would be that of the first dwell. Where a bias is fitted,

@@ -5,14 +5,12 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 from scipy.optimize import nnls
 from scipy.special import digamma, polygamma
 
+from inertial.arrays import Array, Flags, Index
 from inertial.noise.covariance import Sums, sums
-
-Array = NDArray[np.float64]
 
 TERMS = ("Q", "N", "B", "K", "R")
 _ROUNDS = 4  # of weights from the strengths before
@@ -22,7 +20,7 @@ _FEWEST_DOF = 1.0
 _FLOOR = 1e-6  # of the eigenvalues of a covariance, over the largest
 
 
-def basis(m: NDArray[np.int64]) -> Array:
+def basis(m: Index) -> Array:
     """Allan variances (t, 5) of unit Q, N, B, K, R at averaging times of `m` samples, tau = m.
 
     3/tau^2, 1/tau, 2 ln2/pi, tau/3, tau^2/2: IEEE Std 952-1997, annex C.
@@ -41,7 +39,7 @@ def _basis(times: bytes) -> Array:
     return columns
 
 
-def degrees_of_freedom(variance: Array, m: NDArray[np.int64], n: int) -> Array:
+def degrees_of_freedom(variance: Array, m: Index, n: int) -> Array:
     """Equivalent degrees of freedom 2 v^2 / Var[v], (..., t), under the mixture that fits each curve (..., t)."""
     moments = sums(n, tuple(m.tolist()))
     flat = variance.reshape(-1, m.size)
@@ -101,7 +99,7 @@ class MixtureFit:
         """Logarithm of the determinant of the covariance of the log-variances."""
         return -2.0 * float(np.log(np.diagonal(self.whiten)).sum())
 
-    def solve(self, free: NDArray[np.bool_], start: Array) -> tuple[Array, float]:
+    def solve(self, free: Flags, start: Array) -> tuple[Array, float]:
         """Best strengths and their chi-square: those not `free` stay at `start`, none falls below zero."""
         strengths = start.copy()
         cost = self.cost(strengths)
@@ -120,7 +118,7 @@ class MixtureFit:
                 break
         return strengths, cost
 
-    def _gauss_newton(self, free: NDArray[np.bool_], strengths: Array) -> Array:
+    def _gauss_newton(self, free: Flags, strengths: Array) -> Array:
         expected = self.model @ strengths
         if not expected.min() > 0.0:
             expected = np.where(expected > 0.0, expected, np.exp(self.target))
@@ -155,7 +153,7 @@ def problem(variance: Array, moments: Sums, strengths: Array) -> MixtureFit:
 
 
 def settled(
-    variance: Array, moments: Sums, free: NDArray[np.bool_], start: Array, *, rounds: int = 3
+    variance: Array, moments: Sums, free: Flags, start: Array, *, rounds: int = 3
 ) -> tuple[MixtureFit, Array, float]:
     """The problem whose covariance is that of its own solution, the solution and its chi-square."""
     strengths = start
@@ -165,9 +163,7 @@ def settled(
     return task, *task.solve(free, strengths)
 
 
-def deviance(
-    variance: Array, moments: Sums, free: NDArray[np.bool_], start: Array, *, rounds: int = 3
-) -> tuple[float, Array]:
+def deviance(variance: Array, moments: Sums, free: Flags, start: Array, *, rounds: int = 3) -> tuple[float, Array]:
     """Twice the negative log-likelihood of a curve (t,) with the terms that are `free`, and their strengths (5,).
 
     The covariance is that of the strengths at which it is taken: a ramp, which scatters nothing, then has to agree with the last

@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from inertial.arrays import Array
+
 HOUR_S = 3600.0
 PER_G = 9.80665
 TO_M_S2: Mapping[str, float] = {"g": PER_G, "mg": 1e-3 * PER_G, "µg": 1e-6 * PER_G, "m/s^2": 1.0, "m/s²": 1.0}

@@ -5,15 +5,13 @@ from functools import cache
 from typing import NamedTuple, cast
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from inertial.arrays import Array, Flags
 from inertial.distributions import chi2_quantile
 from inertial.noise import mixture
 from inertial.noise.covariance import Sums
 from inertial.noise.mixture import MixtureFit
-
-Array = NDArray[np.float64]
 
 _KEPT_AT = 6.635
 """Chi-square (1 % for one term) that a term must be worth to be called identified."""
@@ -118,10 +116,8 @@ class _Curve:
         starts += [np.where(np.arange(free.size) == k, self._ceiling, self.strengths) for k in (2, 3, 4) if k != j]
         for start in starts:
             start[j] = strength
-        return min(self._deviance(free, self._seeded(start)) for start in starts) - self.best
-
-    def _deviance(self, free: NDArray[np.bool_], start: Array) -> float:
-        return mixture.deviance(self.variance, self.moments, free, start)[0]
+        tried = (mixture.deviance(self.variance, self.moments, free, self._seeded(start))[0] for start in starts)
+        return min(tried) - self.best
 
     def worth(self, j: int) -> float:
         """Chi-square that the curve is worse without term j; computed once, whichever other terms are allowed meanwhile."""
@@ -143,9 +139,7 @@ class _Curve:
         return _crossing(excess, outside, inside, _ROUGH)
 
 
-def _needed(
-    task: MixtureFit, strengths: Array, best: float, allowed: NDArray[np.bool_]
-) -> tuple[NDArray[np.bool_], Array, float]:
+def _needed(task: MixtureFit, strengths: Array, best: float, allowed: Flags) -> tuple[Flags, Array, float]:
     """Terms that stay after dropping, one by one, the one whose loss costs least, while that is little."""
     kept = (strengths > 0.0) & allowed
     current, cost = np.where(kept, strengths, 0.0), best

@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from inertial.arrays import Array
 
 
 @dataclass(frozen=True)
@@ -37,8 +37,9 @@ def one_sided(x: ArrayLike, rate_hz: float, *, segment: int | None = None) -> Sp
     data = np.asarray(x, dtype=np.float64)
     length = data.shape[-1] // 8 if segment is None else segment
     if not 8 <= length <= data.shape[-1]:
-        msg = f"psd: segment of {length} samples in a record of {data.shape[-1]}, 8 or more must fit; record longer"
-        raise ValueError(msg)
+        raise ValueError(
+            f"psd: segment of {length} samples in a record of {data.shape[-1]}, 8 or more must fit; record longer"
+        )
     window = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(length) / length)
     density = np.zeros((*data.shape[:-1], length // 2 + 1))
     starts = range(0, data.shape[-1] - length + 1, length - length // 2)

@@ -1,11 +1,9 @@
 """What the last digit of an output does to the figure of its white noise."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.distributions import normal_upper
-
-Array = NDArray[np.float64]
 
 FINE = 0.45
 """Noise of a sample over the step from which on rounding adds q²/12 and nothing else (W. F. Sheppard 1898; B. Widrow, IRE Trans.

@@ -1,18 +1,22 @@
-"""Noise coefficients Q, N, B, K, R under an Allan curve, fitted together, each with an interval or an upper limit."""
+"""Noise coefficients Q, N, B, K, R under an Allan curve, fitted together, each with an interval or an upper limit.
+
+For a filter, a term that the curve does not identify has its likeliest strength. An upper limit in place of a value is right
+where somebody asks how large a term may be. In a filter it is not: the limits of N, B and K cannot hold all at once, and the
+limit of K from a record of half an hour is ten times the usual K, so that a filter stated five times the true deviation after an
+hour without an update.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array, Index
 from inertial.distributions import chi2_quantile, chi2_tail
 from inertial.noise import mixture, profiles
 from inertial.noise.allan import AllanCurve
-from inertial.noise.covariance import sums
+from inertial.noise.covariance import Sums, sums
 from inertial.noise.flicker import FLICKER_FLOOR
-
-Array = NDArray[np.float64]
 
 NAMES: Mapping[str, str] = {
     "Q": "quantisation",
@@ -62,7 +66,7 @@ class NoiseTerms:
     """Coefficients of every channel of a curve (leading dimensions), the last axis in the order of `symbols`.
 
     N is the coefficient of IEEE Std 952 (two-sided density; sigma = N/√tau, a sample has N·√rate). Data sheets give the
-    one-sided density `density_one_sided` = N·√2.
+    one-sided density N·√2.
     """
 
     symbols: tuple[str, ...]
@@ -83,30 +87,14 @@ class NoiseTerms:
     """(...,) min sigma / 0.664: an upper bound of B, reached only on a flat part: N and K alone report √(2.617·N·K)."""
 
     @property
-    def density_one_sided(self) -> Array:
-        """n_d = N·√2 (...,), the one-sided noise density of data sheets, output unit/√Hz; NaN where not identified."""
-        return self.value[..., self.symbols.index("N")] * np.sqrt(2.0)
-
-    @property
     def p_value(self) -> Array:
         """Probability (...,) of a worse agreement if these terms were the whole truth."""
         return chi2_tail(self.chi2, self.dof)
 
     def one(self, *index: int) -> dict[str, NoiseTerm]:
         """Terms of one channel by symbol."""
-        where = tuple(index)
-        rows = (self.value[where], self.low[where], self.high[where])
-        return {
-            s: NoiseTerm(
-                s,
-                NAMES[s],
-                None if np.isnan(v) else float(v),
-                float(a),
-                float(b),
-                UNITS[s],
-            )
-            for s, v, a, b in zip(self.symbols, *rows, strict=True)
-        }
+        rows = zip(self.symbols, *(of[index].tolist() for of in (self.value, self.low, self.high)), strict=True)
+        return {s: NoiseTerm(s, NAMES[s], None if np.isnan(v) else v, a, b, UNITS[s]) for s, v, a, b in rows}
 
 
 def fit_terms(curve: AllanCurve, *, confidence: float = 0.95) -> NoiseTerms:
@@ -130,17 +118,20 @@ def fit_terms(curve: AllanCurve, *, confidence: float = 0.95) -> NoiseTerms:
     """
     count = len(mixture.TERMS)
     if curve.m.size <= count:
-        msg = f"noise: {curve.m.size} averaging times, at least {count + 1} are needed for {count} terms; record longer"
-        raise ValueError(msg)
+        raise ValueError(
+            f"noise: {curve.m.size} averaging times, at least {count + 1} are needed for {count} terms; record longer"
+        )
     if not np.all(curve.deviation > 0.0):
         where = np.argwhere(~(curve.deviation > 0.0))[0]
-        msg = f"noise: channel {tuple(where[:-1].tolist())} has zero Allan deviation; a constant output says nothing"
-        raise ValueError(msg)
+        raise ValueError(
+            f"noise: channel {tuple(where[:-1].tolist())} has zero Allan deviation; a constant output says nothing"
+        )
     moments = sums(curve.n, tuple(curve.m.tolist()))
     variances = (curve.deviation**2).reshape(-1, curve.m.size)
     rows = [profiles.fit_terms(variance, moments, float(chi2_quantile(confidence, 1))) for variance in variances]
     lead = curve.deviation.shape[:-1]
-    scale = np.sqrt(_per_sample(curve.rate_hz))
+    rate = curve.rate_hz
+    scale = np.sqrt(np.array([1.0 / rate**2, 1.0 / rate, 1.0, rate, rate**2]))  # per unit strength in samples
 
     def coefficients(strengths: list[Array]) -> Array:
         return np.sqrt(np.stack(strengths)).reshape(*lead, count) * scale
@@ -165,6 +156,57 @@ def model_deviation(terms: NoiseTerms, tau: Array) -> Array:
     return np.sqrt(3.0 * q**2 / tau**2 + n**2 / tau + flat + k**2 * tau / 3.0 + r**2 * tau**2 / 2.0)
 
 
-def _per_sample(rate_hz: float) -> Array:
-    """Squares of the coefficients Q, N, B, K, R per unit strength in samples."""
-    return np.array([1.0 / rate_hz**2, 1.0 / rate_hz, 1.0, rate_hz, rate_hz**2])
+SYMBOLS = ("N", "B", "K")
+_FREE = np.array([symbol not in {"K", "R"} for symbol in mixture.TERMS])
+"""A filter knows no ramp: what looks like one is the end of a walk. The walk is searched."""
+_SHARES = np.concatenate([[0.0], np.logspace(-4.0, 0.5, 19)])
+"""Walks that are tried, as variances over that of the longest averaging times."""
+_WORTH = 2.0  # fall of the deviance that one more parameter must bring (Akaike)
+_SPREAD = 3.0  # n times the relative variance of the Allan variance of adjacent samples, for white noise
+_LAST = 4  # averaging times that give the scale of a walk
+_N, _B, _K = (mixture.TERMS.index(symbol) for symbol in SYMBOLS)
+
+
+@dataclass(frozen=True)
+class LikelyTerms:
+    """N, B and K of the channels of a unit, in the unit of the output: (c,) each."""
+
+    white: Array
+    instability: Array
+    walk: Array
+
+
+def likely_terms(deviation: Array, m: Index, n: int, rate_hz: float) -> LikelyTerms:
+    """The likeliest mixture of Q, N, B and K of every channel, with one walk for all of them.
+
+    The walk of a record is the least known term: alone, the likeliest one of a channel is zero in half of the cases and several
+    times the true one in others. So the channels of a unit share it, as the share of a walk in the variance at the longest
+    averaging times, at which the likelihood of all of them together is largest.
+
+    Parameters
+    ----------
+    deviation : (c, t), Allan deviation of the channels of a unit, at ``m`` (t,) samples, of ``n`` at ``rate_hz``
+    """
+    moments = sums(n, tuple(m.tolist()))
+    variance = np.asarray(deviation, dtype=np.float64) ** 2
+    walk_at_one = np.exp(np.mean(np.log(variance[:, -_LAST:]), axis=1)) * 3.0 / float(m[-1])
+    fits = [
+        [_at(one, moments, share * scale) for share in _SHARES]
+        for one, scale in zip(variance, walk_at_one, strict=True)
+    ]
+    deviances = np.sum([[deviance for deviance, _ in own] for own in fits], axis=0)
+    best = int(np.argmin(deviances))
+    best = best if deviances[0] - deviances[best] > _WORTH else 0
+    strengths = np.stack([own[best][1] for own in fits])
+    # what the curve cannot tell from no white noise: one standard deviation of its first point
+    white = np.maximum(strengths[:, _N], variance[:, 0] * np.sqrt(_SPREAD / n))
+    return LikelyTerms(np.sqrt(white / rate_hz), np.sqrt(strengths[:, _B]), np.sqrt(strengths[:, _K] * rate_hz))
+
+
+def _at(variance: Array, moments: Sums, walk: float) -> tuple[float, Array]:
+    """Deviance of one curve (t,) with a given walk, and the likeliest strengths (5,) of the others, per sample."""
+    start = np.where(_FREE, mixture.first_guess(variance, moments), 0.0)
+    if not np.any(start > 0.0):
+        start = np.where(np.arange(start.size) == _B, variance.min(), 0.0)
+    start[_K] = walk
+    return mixture.deviance(variance, moments, _FREE, start)

@@ -5,14 +5,12 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inertial import poses
+from inertial.arrays import Array
 from inertial.planning.features import levels
 from inertial.planning.sequences import SequenceStep, StationPace, extended, n_of
 from inertial.state import State
-
-Array = NDArray[np.float64]
 
 _STEPS_K = 20.0
 

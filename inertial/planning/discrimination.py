@@ -11,9 +11,8 @@ Biometrika 62 (1975) 57.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from inertial.arrays import Array
 
 _SINGULAR, _RIDGE, _TINY = 1e-11, 1e-12, 1e-300
 """Smallest eigenvalue of a determined, scaled normal matrix; ridge added to its diagonal; smallest diagonal before scaling."""

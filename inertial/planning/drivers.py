@@ -4,18 +4,16 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inertial import design, frames
 from inertial import effects as catalogue
+from inertial.arrays import Array
 from inertial.effects import SensorEffect
 from inertial.effects.base import AnyEffect, excited
 from inertial.planning.remedies import Driver
 from inertial.planning.sequences import SequenceStep, StationPace, extended
 from inertial.quantities import LEFT_ALONE, RECORDED
 from inertial.state import State
-
-Array = NDArray[np.float64]
 
 _OFF_S = 600.0
 """Time without power of the trial power cycle, s."""

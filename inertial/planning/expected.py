@@ -4,14 +4,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inertial import design
+from inertial.arrays import Array
+from inertial.effects import SensorEffect
 from inertial.errors import NotIdentified
 from inertial.noise.dwells import whitener
 from inertial.state import State
-
-Array = NDArray[np.float64]
 
 _SINGULAR = 1e-11
 """Smallest eigenvalue of the scaled normal matrix; below it a coefficient is not determined, as in a fit."""
@@ -52,8 +51,7 @@ def expected_errors(effects: Sequence[str], state: State, covariance: Array, *, 
     sensor, station = design.split(effects)
     values = design.starting_values([*sensor, *station], state)
     white = whitener(covariance)
-    h = white @ design.local_columns(sensor, state, values)
-    inverse = np.stack([inverted(part, design.local_names(sensor, axis, values)) for axis, part in enumerate(h)])
+    h, inverse = _whitened(sensor, state, values, white)
     shared = np.zeros(0)
     if station:
         s = white @ design.shared_columns(station, state, values, np.eye(3))
@@ -79,11 +77,15 @@ def expected_gain(effects: Sequence[str], state: State, covariance: Array) -> Ar
     effects, state, covariance : as in :func:`expected_errors`
     """
     sensor, _ = design.split(effects)
-    values = design.starting_values(sensor, state)
     white = whitener(covariance)
-    h = white @ design.local_columns(sensor, state, values)
-    inverse = np.stack([inverted(part, design.local_names(sensor, axis, values)) for axis, part in enumerate(h)])
+    h, inverse = _whitened(sensor, state, design.starting_values(sensor, state), white)
     return inverse @ (np.swapaxes(h, -1, -2) @ white)
+
+
+def _whitened(sensor: Sequence[SensorEffect], state: State, values: design.Values, white: Array) -> tuple[Array, Array]:
+    """Whitened columns (3, n, p) of the sensor's effects, and the inverses (3, p, p) of their products."""
+    h = white @ design.local_columns(sensor, state, values)
+    return h, np.stack([inverted(part, design.local_names(sensor, axis, values)) for axis, part in enumerate(h)])
 
 
 def inverted(columns: Array, names: Sequence[tuple[str, str]]) -> Array:

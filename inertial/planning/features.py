@@ -1,12 +1,10 @@
 """Features of a plan that make effects invisible: a single value, direction or order of a quantity."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.planning.sequences import n_of
 from inertial.state import State
-
-Array = NDArray[np.float64]
 
 _STEP_TOLERANCE = np.radians(0.05)
 _FLAT_K = 2.0

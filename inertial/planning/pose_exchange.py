@@ -14,10 +14,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Choice = NDArray[np.intp]
+from inertial.arrays import Array, Flags, Places
+
 Criterion = Literal["D", "A", "worst"]
 
 _SHARPNESS = 12.0
@@ -54,15 +53,15 @@ class PlanSlots:
     weight: Array
     travel: Array
     seconds: float
-    group: Choice
-    fixed: NDArray[np.bool_]
+    group: Places
+    fixed: Flags
 
-    def matrix(self, choice: Choice) -> Array:
+    def matrix(self, choice: Places) -> Array:
         """Normal matrices (3, p, p) of a plan; the diagonal of the inverse is variance over required variance."""
         h = np.swapaxes(self.rows[np.arange(choice.size), choice], 0, 1)
         return np.swapaxes(h, -1, -2) @ (self.weight @ h)
 
-    def duration(self, choice: Choice) -> float:
+    def duration(self, choice: Places) -> float:
         """Station time, s."""
         return self.seconds + float(np.sum(self.travel[choice[:-1], choice[1:]]))
 
@@ -100,7 +99,7 @@ def _worst(matrix: Array) -> Array:
 CRITERIA: dict[Criterion, Callable[[Array], Array]] = {"D": _d, "A": _a, "worst": _worst}
 
 
-def exchanged(slots: PlanSlots, choice: Choice, criterion: Criterion | Callable[[Array], Array] = "worst") -> Choice:
+def exchanged(slots: PlanSlots, choice: Places, criterion: Criterion | Callable[[Array], Array] = "worst") -> Places:
     """A plan (n,) that no exchange of one pose and no swap of two within a soak improves in information per station time.
 
     Parameters
@@ -122,12 +121,12 @@ def exchanged(slots: PlanSlots, choice: Choice, criterion: Criterion | Callable[
     return best
 
 
-def _cost(slots: PlanSlots, choice: Choice, value: Callable[[Array], Array]) -> float:
+def _cost(slots: PlanSlots, choice: Places, value: Callable[[Array], Array]) -> float:
     """Log of variance times station time: halving either has the same effect."""
     return float(value(slots.matrix(choice))) + float(np.log(slots.duration(choice)))
 
 
-def _replaced(slots: PlanSlots, choice: Choice, slot: int, value: Callable[[Array], Array]) -> Choice:
+def _replaced(slots: PlanSlots, choice: Places, slot: int, value: Callable[[Array], Array]) -> Places:
     """The plan with the best candidate in one slot."""
     h = slots.rows[np.arange(choice.size), choice]
     matrix = slots.matrix(choice)
@@ -144,7 +143,7 @@ def _replaced(slots: PlanSlots, choice: Choice, slot: int, value: Callable[[Arra
     return changed
 
 
-def _detours(slots: PlanSlots, choice: Choice, slot: int) -> Array:
+def _detours(slots: PlanSlots, choice: Places, slot: int) -> Array:
     """Change of travel time (c,), s, for every candidate in a slot."""
     total = np.zeros(len(slots.travel))
     if slot > 0:
@@ -154,7 +153,7 @@ def _detours(slots: PlanSlots, choice: Choice, slot: int) -> Array:
     return total - total[choice[slot]]
 
 
-def _swapped(slots: PlanSlots, choice: Choice, slot: int, value: Callable[[Array], Array]) -> Choice:
+def _swapped(slots: PlanSlots, choice: Places, slot: int, value: Callable[[Array], Array]) -> Places:
     """The plan with one slot's pose swapped with the best other slot of its soak."""
     others = np.flatnonzero((slots.group == slots.group[slot]) & ~slots.fixed & (choice != choice[slot]))
     if not others.size:

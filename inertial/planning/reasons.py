@@ -9,10 +9,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inertial import design
 from inertial import effects as catalogue
+from inertial.arrays import Array
 from inertial.effects import SensorEffect
 from inertial.effects.base import AXES, AnyEffect, others
 from inertial.errors import MissingInput
@@ -23,8 +23,6 @@ from inertial.quantities import column_of
 from inertial.state import State
 
 __all__ = ["Cause", "begins_again", "cause", "confounding_feature", "constant_feature", "drivers_of", "reason"]
-
-Array = NDArray[np.float64]
 
 ENOUGH = 0.05
 """Remaining fraction v from which a remedy counts as effective."""

@@ -7,14 +7,12 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inertial import frames
+from inertial.arrays import Array
 from inertial.quantities import LEFT_ALONE
 from inertial.state import T_REFERENCE, History, State
 from inertial.timing import Air, Drive, SoakRule, followed, settling_s, soaked
-
-Array = NDArray[np.float64]
 
 _GRAIN_S = 15.0
 """Time step of the air and device temperatures between dwells, s."""

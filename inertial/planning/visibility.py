@@ -7,10 +7,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inertial import design
 from inertial import effects as catalogue
+from inertial.arrays import Array
 from inertial.design import of_axes
 from inertial.effects import SensorEffect
 from inertial.effects.base import AnyEffect, excited
@@ -18,8 +18,6 @@ from inertial.errors import MissingInput
 from inertial.noise.dwells import whitener
 from inertial.planning.ranges import UnseenRange, unseen_ranges
 from inertial.state import State
-
-Array = NDArray[np.float64]
 
 SEEN = 0.01
 """Remaining fraction v up to which an effect counts as not visible."""
@@ -85,29 +83,31 @@ def visibilities(
     candidates : ids of the effects; the whole catalogue where None
     covariance : (n, n), of the dwell means, g², for the floors of a generalised fit; white noise of ``error`` where None
     """
-    span = _span(state, base)
     noise = None if covariance is None else _Noise(state, base, whitener(covariance))
     names = [n for n in (candidates or catalogue.catalogue()) if n not in set(base)]
-    remainders = {name: _remainder(catalogue.get(name), state, span) for name in names}
-    aliases = alias_cosines({n: r for n, r in remainders.items() if r is not None and r.remaining_fraction > SEEN})
+    remainders, aliases = _beside(state, base, names)
     return [_visibility(n, remainders[n], error if noise is None else noise, aliases.get(n, {})) for n in names]
 
 
-def confounding(
-    state: State, base: Sequence[str], candidates: Sequence[str] | None = None
-) -> tuple[tuple[str, ...], Array]:
+def confounding(state: State, base: Sequence[str]) -> tuple[tuple[str, ...], Array]:
     """The visible effects, and the cosines (m, m) of their remaining columns with the span of the others', 0 … 1.
 
     Row by column: cosine of the row's effect with the span of the column's; the smallest over the axes where it is visible.
     """
-    span = _span(state, base)
-    names = [n for n in (candidates or catalogue.catalogue()) if n not in set(base)]
-    remainders = {n: _remainder(catalogue.get(n), state, span) for n in names}
-    cosines = alias_cosines({n: r for n, r in remainders.items() if r is not None and r.remaining_fraction > SEEN})
+    cosines = _beside(state, base, [n for n in catalogue.catalogue() if n not in set(base)])[1]
     seen = tuple(cosines)
-    return seen, np.array([[1.0 if a == b else cosines[a][b] for b in seen] for a in seen]).reshape(
-        len(seen), len(seen)
-    )
+    square = np.array([[1.0 if a == b else cosines[a][b] for b in seen] for a in seen])
+    return seen, square.reshape(len(seen), len(seen))
+
+
+def _beside(
+    state: State, base: Sequence[str], names: Sequence[str]
+) -> tuple[dict[str, "_Remainder | None"], dict[str, dict[str, float]]]:
+    """What the base model leaves of effects, and the cosines of those that are visible."""
+    span = _span(state, base)
+    remainders = {name: _remainder(catalogue.get(name), state, span) for name in names}
+    seen = {n: r for n, r in remainders.items() if r is not None and r.remaining_fraction > SEEN}
+    return remainders, alias_cosines(seen)
 
 
 class _Noise:
@@ -190,17 +190,19 @@ def _measured(columns: Array, after: Array) -> _Remainder:
 def _start(effect: AnyEffect, state: State, values: Mapping[str, float]) -> Array:
     """Columns (3, n, k) of the unknown state of a memory before the first dwell."""
     if isinstance(effect, SensorEffect):
-        axes = [effect.start_columns(state, axis, **values) for axis in state.axes]
-        return np.stack([np.broadcast_to(c, (*state.time.shape, c.shape[-1])) for c in axes])
+        return _stacked(state, [effect.start_columns(state, axis, **values) for axis in state.axes])
     return np.moveaxis(of_axes(effect.start_change(state, **values), state.axes, -2), -2, 0)
 
 
 def _columns(effect: AnyEffect, state: State, values: Mapping[str, float]) -> Array:
     """Columns per axis, (3, n, p)."""
     if isinstance(effect, SensorEffect):
-        axes = [excited(effect, effect.columns(state, axis, **values)) for axis in state.axes]
-        return np.stack([np.broadcast_to(c, (*state.time.shape, c.shape[-1])) for c in axes])
+        return _stacked(state, [excited(effect, effect.columns(state, axis, **values)) for axis in state.axes])
     return np.moveaxis(of_axes(effect.force_change(state, **values), state.axes, -2), -2, 0)
+
+
+def _stacked(state: State, axes: Sequence[Array]) -> Array:
+    return np.stack([np.broadcast_to(c, (*state.time.shape, c.shape[-1])) for c in axes])
 
 
 def _visibility(
@@ -210,15 +212,8 @@ def _visibility(
     alias = tuple(other for other, cosine in cosines.items() if cosine > ALIAS)
     exact = tuple(other for other in alias if cosines[other] > EXACT)
     if remainder is None or remainder.remaining_fraction <= SEEN:
-        return Visibility(
-            name,
-            False,
-            0.0 if remainder is None else remainder.remaining_fraction,
-            (0.0, 0.0, 0.0),
-            float("inf"),
-            alias,
-            breaker,
-        )
+        fraction = 0.0 if remainder is None else remainder.remaining_fraction
+        return Visibility(name, False, fraction, (0.0, 0.0, 0.0), float("inf"), alias, breaker)
     if isinstance(noise, _Noise):
         information = noise.information(remainder.columns)
     else:

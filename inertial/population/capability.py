@@ -3,11 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import binomtest, norm
 
-Array = NDArray[np.float64]
-Codes = NDArray[np.int64]
+from inertial.arrays import Array
+from inertial.arrays import Index as Codes
 
 CONFIDENCE = 0.95
 HALF_NORMAL, PRIOR_VALUES = (0.9953, 3.8692), 30.0

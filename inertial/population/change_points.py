@@ -3,12 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import t as student
 
+from inertial.arrays import Array
 from inertial.population.memory import TO_SIGMA, drawn_in, innovations, memories_of, memory_of
-
-Array = NDArray[np.float64]
 
 FEWEST = 4  # points on either side
 LIKELY = 7.35  # −2·ln(1 − √0.95): twice the log-likelihood within which the place lies with 95 % (Hansen 2000, table 1)

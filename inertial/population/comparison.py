@@ -1,19 +1,16 @@
-"""Groups compared, and what stands out of a population."""
+"""Groups compared, what stands out of a population, and the agreement of two results."""
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import chi2, median_abs_deviation, norm, rankdata, tiecorrect
 from scipy.stats import f as f_distribution
 from scipy.stats import t as student
 
+from inertial.arrays import Array, Index
 from inertial.population.memory import TO_SIGMA
 
-Array = NDArray[np.float64]
-Codes = NDArray[np.int64]
-Flags = NDArray[np.bool_]
-
+COVERAGE = 2.0
 MAD_EFFICIENCY = 0.37  # Rousseeuw and Croux 1993, J. Am. Stat. Assoc. 88, 1273
 
 
@@ -31,7 +28,7 @@ class Comparison:
     effect: float
 
 
-def compare(values: Array, groups: Codes) -> Comparison | None:
+def compare(values: Array, groups: Index) -> Comparison | None:
     """Analysis of variance and its rank form (Kruskal and Wallis 1952, ties corrected); None with less than two groups.
 
     Parameters
@@ -52,7 +49,7 @@ def compare(values: Array, groups: Codes) -> Comparison | None:
     return Comparison(k, n, float(f_distribution.sf(f, k - 1, n - k)), _rank_p(values, groups, counts, k), effect)
 
 
-def _rank_p(values: Array, groups: Codes, counts: Codes, k: int) -> float:
+def _rank_p(values: Array, groups: Index, counts: Index, k: int) -> float:
     n, ranks = values.size, rankdata(values)
     sums = np.bincount(groups, ranks)
     used = counts > 0
@@ -107,3 +104,17 @@ def outlier_limit(n: int, known_from: int | None = None, level: float = 0.01) ->
     """
     tail = 0.5 * level / max(n, 1)
     return float(norm.isf(tail) if known_from is None else student.isf(tail, max(MAD_EFFICIENCY * known_from, 1.0)))
+
+
+def e_n(new: Array, old: Array, new_error: Array, old_error: Array, dof: Array | float = np.inf) -> Array:
+    """The E_n number of two results: their difference over the root sum of squares of their expanded uncertainties.
+
+    |E_n| ≤ 1 agrees (ISO/IEC 17043:2010, B.3.1.3; ISO 13528:2015, 9.7). Standard uncertainties are given. Their coverage factor
+    is 2, or larger where they are known from few values: Student's for the same 95.45 % (JCGM 100, G.4).
+
+    Parameters
+    ----------
+    dof : effective degrees of freedom of the combined uncertainty, infinite where it is known
+    """
+    coverage = np.where(np.isinf(dof), COVERAGE, student.isf(norm.sf(COVERAGE), np.maximum(dof, 1.0)))
+    return (new - old) / (coverage * np.sqrt(new_error**2 + old_error**2))

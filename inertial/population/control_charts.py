@@ -4,13 +4,10 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from inertial.arrays import Array, Flags, Index
 from inertial.population.memory import MOST, drawn_in, memories_of, memory_of, tail_of
-
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 D2_OF_TWO = 1.128  # mean range of two normal values over their σ (NIST/SEMATECH e-Handbook 6.3.2.2)
 RULES = (
@@ -19,9 +16,6 @@ RULES = (
     "four of five points beyond 1σ on one side",
     "eight points in a row on one side",
 )
-IN_CONTROL_RUN_LENGTH = (
-    91.75  # points between false signals of the four rules together (Champ and Woodall 1987, table 1)
-)
 CHARTS_SIMULATED = 6000
 IN_THE_TAIL = 0.02  # share of the simulated charts that the tail is known from
 SURELY_BELOW = 0.8
@@ -29,7 +23,6 @@ SURELY_BELOW = 0.8
 0.92 (500 series in control with ρ = 0.6; 40, 100 and 150 points): at most 1.4 % have p < 0.01. With 0.8: at most 1.0 % (10, 20
 and 40 points of the baseline)."""
 EWMA_WEIGHT, EWMA_WIDTH = 0.2, 2.962
-EWMA_RUN_LENGTH = 500.0  # of these two (Lucas and Saccucci 1990; Montgomery, table 9.11)
 
 
 @dataclass(frozen=True)
@@ -68,7 +61,7 @@ class FalseAlarms:
     """How many alarms charts in control give: their mean, and of simulated charts the sorted numbers (charts,)."""
 
     mean: float
-    numbers: NDArray[np.int64]
+    numbers: Index
 
     def p_value(self, number: int) -> float:
         """Probability of as many alarms by chance: the share of simulated charts, beyond their 98 % with a geometric tail.
@@ -108,7 +101,7 @@ def false_alarms(n: int, first: int, counted: int, memory: float = 0.0, tail: fl
     """
     code = [n, first, counted, round(100.0 * memory), 0 if np.isinf(tail) else round(tail)]
     rng = np.random.default_rng(np.random.SeedSequence(code[:3] if code[3:] == [0, 0] else code))
-    counts: list[NDArray[np.int64]] = []
+    counts: list[Index] = []
     for _ in range(10):
         values = _in_control(rng, (CHARTS_SIMULATED // 10, n), memory, tail)
         sigma = np.mean(np.abs(np.diff(values)), axis=-1, keepdims=True) / D2_OF_TWO

@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from scipy.optimize import nnls
 from scipy.stats import norm
 
-Array = NDArray[np.float64]
-Codes = NDArray[np.int64]
+from inertial.arrays import Array, Flags
 
 ROUNDS = 4
 CLIP = 4.0  # pairs further out than so many σ tell of a unit, not of its kind
@@ -125,8 +124,8 @@ def seating_of(kind: DeviceDrift, change: Array, years: Array, known: Array, pai
 
 
 def _moments(
-    change: Array, years: Array, known: Array, expected: Array, keep: NDArray[np.bool_]
-) -> tuple[float, NDArray[np.bool_], Array, Array]:
+    change: Array, years: Array, known: Array, expected: Array, keep: Flags
+) -> tuple[float, Flags, Array, Array]:
     """Mean slope, pairs that are no outliers, and their weighted squares with the columns that make them."""
     weight = np.where(years >= SHORTEST_Y, years, 0.0) / expected
     mean = float(np.sum(weight[keep] * change[keep]) / max(float(np.sum((weight * years)[keep])), 1e-300))
@@ -231,7 +230,7 @@ def in_tolerance(mean: Array, deviation: Array, tolerance: float) -> Array:
     return norm.cdf((tolerance - mean) / spread) - norm.cdf((-tolerance - mean) / spread)
 
 
-def first_time(condition: NDArray[np.bool_], ahead: Array) -> Array:
+def first_time(condition: Flags, ahead: Array) -> Array:
     """The first of the times (times,) at which a condition (units, times) holds; infinity where it never does."""
     first = np.argmax(condition, axis=1)
     return np.where(condition.any(axis=1), ahead[first], np.inf)

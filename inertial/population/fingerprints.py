@@ -3,13 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import chi2
 
+from inertial.arrays import Array, Flags, Index
 from inertial.population.comparison import sigma_of
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 FEWEST = 10  # pairs of calibrations that a usual change is known from
 FOREIGN_P = 1e-9  # probability of a distance at which a calibration counts as not of its unit
@@ -30,7 +27,7 @@ class ChangeScale:
 
     years: Array
     change: Array
-    telling: NDArray[np.bool_]
+    telling: Flags
 
     @property
     def count(self) -> int:

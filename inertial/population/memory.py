@@ -1,12 +1,11 @@
 """Series whose values hang together, or whose tails are heavier than normal: how much, by the series itself."""
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 from scipy.stats import norm
 from scipy.stats import t as student
 
-Array = NDArray[np.float64]
+from inertial.arrays import Array
 
 MOST = 0.9  # correlation of neighbours beyond which a level and a wander are the same thing
 LARGEST = 0.97  # correlation that is considered at all

@@ -1,16 +1,14 @@
 """Values that belong to a unit and to a place at once: the parts of both, apart."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Codes = NDArray[np.int64]
+from inertial.arrays import Array, Index
 
 ROUNDS = 60
 SETTLED = 1e-6
 
 
-def unit_and_place(values: Array, units: Codes, places: Codes) -> tuple[Array, Array]:
+def unit_and_place(values: Array, units: Index, places: Index) -> tuple[Array, Array]:
     """Parts of the units and of the places, by medians in turn: single wild values move neither.
 
     Parameters
@@ -34,18 +32,18 @@ def unit_and_place(values: Array, units: Codes, places: Codes) -> tuple[Array, A
     return unit, place
 
 
-def group_medians(values: Array, codes: Codes) -> Array:
+def group_medians(values: Array, codes: Index) -> Array:
     """Median of every group, (groups,), zero where it is empty; values (n,), codes (n,) from 0."""
     return _medians(values, _groups(codes))
 
 
-def _groups(codes: Codes) -> tuple[Codes, Codes, Codes]:
-    """Codes, and where each group begins and how long it is."""
+def _groups(codes: Index) -> tuple[Index, Index, Index]:
+    """Index, and where each group begins and how long it is."""
     counts = np.bincount(codes)
     return codes, np.concatenate([[0], np.cumsum(counts)[:-1]]), counts
 
 
-def _medians(values: Array, groups: tuple[Codes, Codes, Codes]) -> Array:
+def _medians(values: Array, groups: tuple[Index, Index, Index]) -> Array:
     """Median of every group, zero where it is empty."""
     codes, starts, counts = groups
     ordered = values[np.lexsort((values, codes))]

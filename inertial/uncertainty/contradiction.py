@@ -10,13 +10,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import gammaincc, gammainccinv
 
+from inertial.arrays import Array, Places
 from inertial.noise.dwells import whitener
-
-Array = NDArray[np.float64]
-Places = NDArray[np.intp]
 
 LEVEL = 0.005
 """p over all groups below which a contradiction is told.

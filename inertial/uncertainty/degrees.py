@@ -1,16 +1,16 @@
 """Effective degrees of freedom and coverage factors (JCGM 100:2008, G.4, G.6.4)."""
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtri, stdtrit
+
+from inertial.arrays import Array
 
 PROBABILITY = 0.9545
 """Of k = 2 for a normal distribution."""
 _LARGEST = 1e9
-FloatArray = NDArray[np.float64]
 
 
-def effective_degrees(u: FloatArray, dof: FloatArray) -> FloatArray:
+def effective_degrees(u: Array, dof: Array) -> Array:
     """ν_eff of every row, by Welch and Satterthwaite (JCGM 100, G.2b): contributions u and dof (n, c), result (n,)."""
     parts = np.ascontiguousarray(u, dtype=float)
     below = np.sum(np.ascontiguousarray(parts**4 / np.asarray(dof, dtype=float)), axis=1)
@@ -18,15 +18,8 @@ def effective_degrees(u: FloatArray, dof: FloatArray) -> FloatArray:
     return np.divide(whole, below, out=np.full_like(below, np.inf), where=below > 0.0)
 
 
-def coverage_factors(dof: FloatArray, probability: float = PROBABILITY) -> FloatArray:
-    """:func:`coverage_factor` of every element."""
+def coverage_factors(dof: Array, probability: float = PROBABILITY) -> Array:
+    """K of Student's distribution for ν_eff truncated to a whole number (JCGM 100, G.4.1, table G.2); 2 for 95.45 % and ν = ∞."""
     finite = dof < _LARGEST
     whole = np.maximum(np.where(finite, dof, 1.0).astype(np.int64), 1)
     return np.where(finite, stdtrit(whole, 0.5 * (1.0 + probability)), ndtri(0.5 * (1.0 + probability)))
-
-
-def coverage_factor(dof: float, probability: float = PROBABILITY) -> float:
-    """K of Student's distribution for ν_eff truncated to a whole number (JCGM 100, G.4.1, table G.2); 2 for 95.45 % and ν = ∞."""
-    if not dof < _LARGEST:
-        return float(ndtri(0.5 * (1.0 + probability)))
-    return float(stdtrit(max(int(dof), 1), 0.5 * (1.0 + probability)))

@@ -6,16 +6,15 @@ encoder errors add to the angles; the seat turns the fixture's slot; the thermom
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.correction import predict
 from inertial.design import Values
 from inertial.frames import rotation_x, rotation_z
 from inertial.state import T_REFERENCE, State
-
-Array = NDArray[np.float64]
 
 STEP = 1e-6
 """Of the central differences: rad, or relative."""
@@ -45,19 +44,11 @@ class Errors:
 
     def times(self, size: float) -> "Errors":
         """The same errors, scaled."""
-        x, y, z = self.seat
-        a, b, c = self.offset
-        return Errors(
-            gravity=size * self.gravity,
-            level=(size * self.level[0], size * self.level[1]),
-            orthogonality=size * self.orthogonality,
-            outer=size * self.outer,
-            inner=size * self.inner,
-            temperature=size * self.temperature,
-            seat=(size * x, size * y, size * z),
-            gain=size * self.gain,
-            offset=(size * a, size * b, size * c),
-        )
+        scaled: dict[str, Any] = {
+            name: tuple(size * v for v in value) if isinstance(value, tuple) else size * value
+            for name, value in vars(self).items()
+        }
+        return Errors(**scaled)
 
 
 @dataclass(frozen=True)
@@ -95,12 +86,11 @@ class Sensitivity:
     """Change of the outputs per standard uncertainty of every influence.
 
     changes : (..., n, 3, q), output unit: J·u
-    contributions, scopes, dof, seen : of the q columns
+    contributions, dof, seen : of the q columns
     """
 
     changes: Array
     contributions: tuple[str, ...]
-    scopes: tuple[str, ...]
     dof: tuple[float, ...]
     seen: tuple[bool, ...]
 
@@ -189,7 +179,6 @@ def sensitivity(
     return Sensitivity(
         changes,
         tuple(one.contribution for one in sources),
-        tuple(one.scope for one in sources),
         tuple(one.dof for one in sources),
         tuple(one.seen for one in sources),
     )

@@ -8,16 +8,14 @@ such as a table that is not level, is across u and has no effect.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inertial import design
+from inertial.arrays import Array, Flags
 from inertial.fits.linear import response_matrix
 from inertial.norm_fit import is_free
 from inertial.state import State
 from inertial.uncertainty.influences import MeasurementModel, Sensitivity
 from inertial.uncertainty.propagation import Propagated
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -32,8 +30,8 @@ class NormDesign:
     rows: Array
     along: Array
     gain: Array
-    used: NDArray[np.bool_]
-    free: NDArray[np.bool_]
+    used: Flags
+    free: Flags
     names: tuple[tuple[tuple[str, str], ...], ...]
 
     def coefficient_errors(self, changes: Array) -> Array:
@@ -61,7 +59,7 @@ class NormDesign:
         return np.einsum("nj,njq->nq", self.along, changes)
 
 
-def norm_design(model: MeasurementModel, state: State, covariance: Array, used: NDArray[np.bool_]) -> NormDesign:
+def norm_design(model: MeasurementModel, state: State, covariance: Array, used: Flags) -> NormDesign:
     """The map of a norm fit of one unit.
 
     Parameters

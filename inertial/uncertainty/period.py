@@ -30,8 +30,8 @@ def flicker_later(windows: Windows, slowest: float | None = None) -> float:
     a, b, gap = windows.calibration, windows.use, windows.gap
     if slowest is None:
         return float(np.sqrt(between_means(a, b, gap)))
-    apart = _between(gap + 0.5 * (a + b), b, slowest)
-    return float(np.sqrt(max(_mean(a, slowest) + _mean(b, slowest) - 2.0 * apart, 0.0)))
+    apart = _covariance(gap + 0.5 * (a + b), b, slowest)
+    return float(np.sqrt(max(_covariance(0.0, a, slowest) + _covariance(0.0, b, slowest) - 2.0 * apart, 0.0)))
 
 
 def flicker_within(windows: Windows, slowest: float | None = None) -> float:
@@ -39,14 +39,11 @@ def flicker_within(windows: Windows, slowest: float | None = None) -> float:
     a, b = windows.calibration, windows.use
     if slowest is None:
         return float(np.sqrt(max(np.log(a / b), 0.0) / np.pi))
-    return float(np.sqrt(max(_mean(b, slowest) - _mean(a, slowest), 0.0)))
+    return float(np.sqrt(max(_covariance(0.0, b, slowest) - _covariance(0.0, a, slowest), 0.0)))
 
 
-def _mean(length: float, slowest: float) -> float:
-    return float(flicker_of_means(np.zeros(1), length, max(slowest, 0.03 * length))[0])
-
-
-def _between(apart: float, length: float, slowest: float) -> float:
+def _covariance(apart: float, length: float, slowest: float) -> float:
+    """Of the means over two windows of a length that are so far apart, for B = 1."""
     return float(flicker_of_means(np.array([apart]), length, max(slowest, 0.03 * length))[0])
 
 

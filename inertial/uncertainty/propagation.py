@@ -7,15 +7,13 @@ them by −K⁻¹·H·G·J·δ, and a verification on the same station shows K�
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inertial import design
+from inertial.arrays import Array, Flags
 from inertial.fits.linear import response_matrix
 from inertial.noise.dwells import whitener
 from inertial.state import State
 from inertial.uncertainty.influences import MeasurementModel, Sensitivity
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -74,9 +72,7 @@ def _turned(matrix: Array, columns: Array) -> Array:
     return np.moveaxis(np.matmul(matrix, flat).reshape(*flat.shape[:-1], *columns.shape[-2:]), -3, -2)
 
 
-def fit_design(
-    model: MeasurementModel, state: State, covariance: Array, used: NDArray[np.bool_] | None = None
-) -> FitDesign:
+def fit_design(model: MeasurementModel, state: State, covariance: Array, used: Flags | None = None) -> FitDesign:
     """The map of a generalised least-squares fit.
 
     Parameters

@@ -7,10 +7,10 @@ measured as Y = X + N(0, u) and accepted where A_L ≤ Y ≤ A_U.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtr
 
-Array = NDArray[np.float64]
+from inertial.arrays import Array
+
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(64)
 _REACH = 9.0
 """Standard deviations beyond which a normal density is nothing."""
@@ -20,13 +20,12 @@ _REACH = 9.0
 class GlobalRisk:
     """Probabilities over a production.
 
-    pfa : accepted although outside its limits; pfr : rejected although inside; accepted, conforming : in all
+    pfa : accepted although outside its limits; pfr : rejected although inside; accepted : in all
     """
 
     pfa: float
     pfr: float
     accepted: float
-    conforming: float
 
 
 def outside(value: float, u: float, lower: float, upper: float) -> float:
@@ -62,7 +61,6 @@ def lot_risk(
         float(weight @ ((1.0 - good) * taken)),
         float(weight @ (good * (1.0 - taken))),
         float(weight @ taken),
-        float(weight @ good),
     )
 
 

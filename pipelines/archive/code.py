@@ -9,7 +9,7 @@ _SAMPLES = (
     *("schemas.errors", "schemas.table", "schemas.tables", "schemas.units", "schemas.version"),
     *("inertial.frames", "pipelines.tables"),
 )
-_TABLES = (*_SAMPLES, "inertial.errors", "inertial.quantities", "inertial.state")
+_TABLES = (*_SAMPLES, "inertial.arrays", "inertial.errors", "inertial.quantities", "inertial.state")
 _MODEL = (
     *("inertial.design", "inertial.effects", "inertial.expressions", "inertial.fits"),
     *("inertial.operators", "inertial.power"),

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial.arrays import Array, Flags, Index
-from inertial.population.agreement import e_n
+from inertial.population.comparison import e_n
 from pipelines.audit.calibrations import Calibrations
 
 YEAR_D = 365.25

@@ -16,7 +16,7 @@ from inertial.correction import correct, output_covariance, remaining_step
 from inertial.design import carried_over
 from inertial.noise.bias_filter import BiasState, Track, track
 from inertial.noise.gauss_markov import FlickerTerms, bias_model, flicker_of_steps
-from inertial.noise.likely_terms import LikelyTerms, likely_terms
+from inertial.noise.terms import LikelyTerms, likely_terms
 from pipelines.archive import Run
 from pipelines.export.polynomials import UnitCalibration, refuse_fewer_axes, unit_calibrations
 from pipelines.export.recording import CorrectableRecording

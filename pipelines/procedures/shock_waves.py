@@ -9,11 +9,10 @@ import numpy as np
 import pandas as pd
 from scipy.interpolate import CubicSpline
 
-from inertial.dynamics.pulses import low_passed
+from inertial.dynamics.pulses import low_passed, octave_frequencies, shock_spectrum
 from inertial.dynamics.shock_diagnosis import ShockDiagnosis, diagnose_shock
 from inertial.dynamics.shock_effects import EFFECTS
 from inertial.dynamics.shock_fit import ShockRecord, Waves
-from inertial.dynamics.shock_spectrum import octave_frequencies, shock_spectrum
 from inertial.errors import NotIdentified
 from pipelines.procedures.columns import numbers, point_rows
 from pipelines.procedures.recorded import UnitRecord

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from pydantic import Field, model_validator
 
-from inertial.dynamics import exciter
+from inertial.dynamics import spectra
 from inertial.dynamics.frequency_response import frequency_response
 from inertial.dynamics.sine_fit import HARMONICS, fit_tone, fit_tone_and_frequency, harmonic_distortion
 from inertial.dynamics.transfer_effects import EFFECTS, Conditions
@@ -72,7 +72,7 @@ class SweepPart(Part):
         """Frequency in Hz and level in g of every point, in order of frequency; those at other levels last."""
         count = int(np.floor(self.per_octave * np.log2(self.high_hz / self.low_hz) + 1e-9)) + 1
         grid = self.frequencies_hz or [float(self.low_hz * 2.0 ** (k / self.per_octave)) for k in range(count)]
-        reach = exciter.largest_level(
+        reach = spectra.largest_level(
             grid, displacement_m=1e-3 * self.stroke_mm, velocity_m_s=self.velocity_m_s, acceleration_g=self.level_g
         )
         return [*zip(grid, reach.tolist(), strict=True), *((self.level_frequency_hz, g) for g in self.other_levels_g)]

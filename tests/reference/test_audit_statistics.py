@@ -4,14 +4,11 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from inertial.population.agreement import e_n
 from inertial.population.capability import cpk, fraction_interval
-from inertial.population.comparison import compare, holm, sigma_of
+from inertial.population.comparison import compare, e_n, holm, sigma_of
 from inertial.population.control_charts import (
-    EWMA_RUN_LENGTH,
     EWMA_WEIGHT,
     EWMA_WIDTH,
-    IN_CONTROL_RUN_LENGTH,
     Baseline,
     baseline,
     ewma,
@@ -37,6 +34,11 @@ C = [[0.04, -1.38, 0.88, 0.14, -1.46, -0.29, 0.02, -0.46, 1.77, -1.49],
      [-0.11, -1.13, 1.09, 0.20, -1.07, -0.67, 0.01, -0.56, 1.45, -1.77],
      [-0.15, -0.96, 0.67, 0.11, -1.45, -0.49, 0.21, -0.49, 1.87, -2.16]]  # fmt: skip
 STUDY = np.moveaxis(np.array([A, B, C]), -1, 0)
+
+IN_CONTROL_RUN_LENGTH = (
+    91.75  # points between false signals of the four rules together (Champ and Woodall 1987, table 1)
+)
+EWMA_RUN_LENGTH = 500.0  # of the chart's own weight and width (Lucas and Saccucci 1990; Montgomery, table 9.11)
 
 
 def test_individuals_chart_of_the_handbook():

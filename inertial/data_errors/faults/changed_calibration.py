@@ -14,24 +14,15 @@ def changed_units(readings: Readings) -> Iterator[Fault]:
         u: s for u in range(len(readings.force)) if (s := find_split(readings.force[u], readings.output[u])) is not None
     }
     for unit, split in splits.items():
-        places = tuple(range(split.place, _length(readings, unit)))
+        places = tuple(range(split.place, int(np.flatnonzero(readings.there[unit])[-1]) + 1))
         partner = next((v for v, other in splits.items() if v != unit and exchanged(split, other)), None)
         if partner is not None:
-            yield Fault(
-                "units_swapped",
-                unit,
-                places,
-                f"from dwell {split.place} on it has the calibration of unit {partner}",
-            )
+            evidence = f"from dwell {split.place} on it has the calibration of unit {partner}"
+            yield Fault("units_swapped", unit, places, evidence)
         elif not 0.75 < split.ratio < 1.33:
             yield Fault(
                 "wrong_range", unit, places, f"scale changes by a factor {split.ratio:.3g} at dwell {split.place}"
             )
-
-
-def _length(readings: Readings, unit: int) -> int:
-    """Number of dwells up to the last one a unit has."""
-    return int(np.flatnonzero(readings.there[unit])[-1]) + 1
 
 
 LOOK = Look(changed_units, ("units_swapped", "wrong_range"), order=50)

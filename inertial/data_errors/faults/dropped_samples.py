@@ -24,13 +24,8 @@ def dropped(readings: Readings) -> Iterator[Fault]:
     for unit, row in enumerate(readings.count / np.maximum(expected, 1e-9)):
         places = np.flatnonzero(row < 0.85)
         if places.size:
-            worst = float(np.nanmin(row))
-            yield Fault(
-                "dropped_samples",
-                unit,
-                places_of(places),
-                f"{places.size} dwells hold as little as {worst:.0%} of the samples",
-            )
+            evidence = f"{places.size} dwells hold as little as {float(np.nanmin(row)):.0%} of the samples"
+            yield Fault("dropped_samples", unit, places_of(places), evidence)
 
 
 def _of_own_lengths(readings: Readings) -> bool:

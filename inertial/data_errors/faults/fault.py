@@ -4,8 +4,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Places
 from inertial.data_errors.readings import Readings
 
 
@@ -37,7 +37,7 @@ class Look:
     of_missing: bool = False
 
 
-def places_of(places: NDArray[np.intp]) -> tuple[int, ...]:
+def places_of(places: Places) -> tuple[int, ...]:
     """Places of dwells, as listed in a fault."""
     return tuple(int(place) for place in places)
 

@@ -3,8 +3,8 @@
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Flags
 from inertial.data_errors.faults.fault import Fault, Look, places_of
 from inertial.data_errors.readings import Readings
 
@@ -16,7 +16,7 @@ def noisy(readings: Readings) -> Iterator[Fault]:
     typical = np.nanmedian(readings.spread, axis=1, keepdims=True)
     ratio = readings.spread / np.where(typical > 0.0, typical, np.inf)
     common = np.nanmedian(ratio, axis=0, keepdims=True) if len(ratio) > 2 else np.ones((1, *ratio.shape[1:]))
-    loud: NDArray[np.bool_] = np.logical_and(ratio > 5.0, ratio > 3.0 * common)
+    loud: Flags = np.logical_and(ratio > 5.0, ratio > 3.0 * common)
     few = np.count_nonzero(loud.any(axis=-1), axis=1) < 3
     loud &= ~(few[:, None, None] & (ratio < 10.0))  # one noisy dwell is a transient, not a fault of the reading
     if readings.vibration is not None:

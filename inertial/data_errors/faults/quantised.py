@@ -3,9 +3,9 @@
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inertial import decisions
+from inertial.arrays import Flags
 from inertial.data_errors.faults.fault import Fault, Look
 from inertial.data_errors.readings import Array, Readings
 
@@ -79,7 +79,7 @@ def _coarse_step(readings: Readings, unit: int, axis: int) -> float | None:
     return step if best > decisions.STEPS_FOLLOW else None
 
 
-def _without_drivers(readings: Readings, unit: int, there: NDArray[np.bool_], values: Array) -> Array:
+def _without_drivers(readings: Readings, unit: int, there: Flags, values: Array) -> Array:
     """Values of the dwells that are there, less their mean and what follows the temperature or the time."""
     warm = readings.temperature if readings.temperature is not None else readings.chamber
     drivers = [readings.time[unit], *([] if warm is None else [warm[unit]])]

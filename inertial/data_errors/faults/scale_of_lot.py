@@ -16,12 +16,11 @@ def scale_units(readings: Readings) -> Iterator[Fault]:
         others = float(np.median(np.delete(scale, unit))) if scale.size > 2 else alone
         ratio = float(scale[unit]) / others
         if not 0.75 < ratio < 1.33:
-            yield Fault(_kind(ratio), unit, (), f"scale is {ratio:.4g} times that of the lot")
-
-
-def _kind(ratio: float) -> str:
-    octaves = np.log2(ratio)
-    return "wrong_range" if abs(octaves - round(octaves)) < 0.06 and abs(round(octaves)) <= 4 else "wrong_units"
+            octaves = np.log2(ratio)
+            whole = abs(octaves - round(octaves)) < 0.06 and abs(round(octaves)) <= 4
+            yield Fault(
+                "wrong_range" if whole else "wrong_units", unit, (), f"scale is {ratio:.4g} times that of the lot"
+            )
 
 
 LOOK = Look(scale_units, ("wrong_range", "wrong_units"), order=70)

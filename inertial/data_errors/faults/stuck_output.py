@@ -3,8 +3,8 @@
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Places
 from inertial.data_errors.faults.fault import Fault, Look, places_of
 from inertial.data_errors.readings import Readings
 
@@ -26,7 +26,7 @@ def stuck(readings: Readings) -> Iterator[Fault]:
             )
 
 
-def _still(readings: Readings, unit: int) -> NDArray[np.intp]:
+def _still(readings: Readings, unit: int) -> Places:
     """Dwells in which an axis has no scatter although it has in most: the means of equal samples differ by rounding."""
     if readings.spread is None or readings.count is None:
         return np.zeros(0, dtype=np.intp)

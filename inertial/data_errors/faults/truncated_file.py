@@ -37,13 +37,8 @@ def truncated(readings: Readings) -> Iterator[Fault]:
             continue
         yield Fault(name, unit, places_of(missing), f"{missing.size} of {row.size} dwells of the lot are missing")
     if _cut_off(readings):
-        for unit in range(len(there)):
-            yield Fault(
-                "truncated_file",
-                unit,
-                (),
-                "the record of temperature continues, and the last round of poses is incomplete",
-            )
+        evidence = "the record of temperature continues, and the last round of poses is incomplete"
+        yield from (Fault("truncated_file", unit, (), evidence) for unit in range(len(there)))
 
 
 def _after_end(readings: Readings, unit: int) -> float:

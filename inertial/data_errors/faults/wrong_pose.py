@@ -3,8 +3,8 @@
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Places
 from inertial.data_errors.exchanged import PlainFit
 from inertial.data_errors.faults.fault import Fault, Look, places_of
 from inertial.data_errors.readings import Array, Readings
@@ -47,13 +47,13 @@ def _exchanged_from_a_dwell_on(readings: Readings) -> Iterator[int]:
             yield from pair
 
 
-def _felt(readings: Readings, unit: int, places: NDArray[np.intp]) -> Array:
+def _felt(readings: Readings, unit: int, places: Places) -> Array:
     """Specific force that the outputs at some dwells stand for, (k, 3), g."""
     fit = readings.fits[unit]
     return np.linalg.solve(fit[:, 1:], (readings.output[unit, places] - fit[:, 0]).T).T
 
 
-def _which_pose(force: Array, places: NDArray[np.intp], felt: Array) -> tuple[str, str]:
+def _which_pose(force: Array, places: Places, felt: Array) -> tuple[str, str]:
     for i, a in enumerate(places):
         for j in range(i + 1, len(places)):
             b = places[j]

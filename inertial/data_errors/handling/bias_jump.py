@@ -1,5 +1,3 @@
-"""The bias of one axis of one unit changed during the run."""
-
 from inertial.data_errors.changes import AXES, OfOneAxis, axes_of_units, every_dwell
 from inertial.estimation.alternative import Array, after
 from inertial.estimation.lot import Lot
@@ -20,14 +18,11 @@ class BiasJump(OfOneAxis):
     several = True
 
     def places(self, lot: Lot) -> list[dict[str, float]]:
-        """Every axis of every unit at every place in time."""
         return [{**axis, "dwell": float(k)} for axis in axes_of_units(lot) for k in every_dwell(lot)]
 
     def levels(self, lot: Lot, **place: float) -> Array:
-        """One from the dwell on."""
         return after(lot, place["dwell"])[:, None]
 
     def describe(self, lot: Lot, size: Array, **place: float) -> str:
-        """The axis and the change."""
         axis = AXES[lot.state.axes[int(place["axis"])]]
         return f"the bias of axis {axis} of the unit changed by {1e6 * size[0]:+.0f} µg; measure the unit once more"

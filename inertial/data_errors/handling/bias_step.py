@@ -1,5 +1,3 @@
-"""The bias of one unit changed on all of its axes during the run."""
-
 import numpy as np
 
 from inertial.data_errors.changes import AXES, Change, OfOneUnit, every_dwell
@@ -21,16 +19,13 @@ class BiasStep(OfOneUnit, Change):
     hides_behind = ("step_change",)
 
     def moments(self, lot: Lot) -> list[int]:
-        """Every dwell of a run of usual length."""
         return every_dwell(lot)
 
     def addition(self, lot: Lot) -> Array:
-        """One in each axis."""
         axes = len(lot.state.axes)
         return np.broadcast_to(np.eye(axes), (1, lot.state.time.shape[1], axes, axes))
 
     def describe(self, lot: Lot, size: Array, **place: float) -> str:
-        """The change of each axis."""
         changes = ", ".join(
             f"{axis} {1e6 * v:+.0f}" for axis, v in zip((AXES[k] for k in lot.state.axes), size, strict=True)
         )

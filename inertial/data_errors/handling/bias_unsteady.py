@@ -1,5 +1,3 @@
-"""The bias of one axis of one unit is another in every soak."""
-
 import numpy as np
 
 from inertial.data_errors.changes import AXES, OfOneAxis, axes_of_units
@@ -27,13 +25,14 @@ class BiasUnsteady(OfOneAxis):
         return axes_of_units(lot) if int(soaks(lot.state).max(initial=0)) + 1 >= _FEWEST else []
 
     def levels(self, lot: Lot, **place: float) -> Array:
-        """One in each soak after the first."""
         soak = soaks(lot.state)
         return (soak[:, None] == np.arange(1, int(soak.max()) + 1)).astype(np.float64)
 
     def describe(self, lot: Lot, size: Array, **place: float) -> str:
         """The axis and its changes: what is linear in the temperature belongs to the bias and its temperature coefficient."""
-        levels, warm = np.concatenate([[0.0], size]), _temperatures(lot)
+        soak = soaks(lot.state)
+        read = np.zeros(soak.size) if lot.state.temperature is None else lot.state.temperature.mean(axis=0)
+        levels, warm = np.concatenate([[0.0], size]), np.bincount(soak, weights=read) / np.bincount(soak)
         line = np.stack([np.ones(levels.size), warm - warm.mean()], axis=-1)
         levels = levels - line @ np.linalg.lstsq(line, levels, rcond=None)[0]
         by_soak = ", ".join(f"{1e6 * v:+.0f}" for v in levels)
@@ -41,10 +40,3 @@ class BiasUnsteady(OfOneAxis):
         return (
             f"the bias of axis {axis} of the unit differs from soak to soak ({by_soak} µg from a line over temperature)"
         )
-
-
-def _temperatures(lot: Lot) -> Array:
-    """Mean temperature of each soak, °C."""
-    soak = soaks(lot.state)
-    warm = np.zeros(soak.size) if lot.state.temperature is None else lot.state.temperature.mean(axis=0)
-    return np.bincount(soak, weights=warm) / np.bincount(soak)

@@ -1,5 +1,3 @@
-"""The fixture moved with all its units during the run."""
-
 import numpy as np
 
 from inertial.data_errors.changes import Change
@@ -16,11 +14,9 @@ class FixtureMoved(Change):
     breaker = "tighten the fixture, and measure a pose of the first half once more"
 
     def addition(self, lot: Lot) -> Array:
-        """Three rotations."""
         return rotated_force(lot)
 
     def describe(self, lot: Lot, size: Array, **place: float) -> str:
-        """The angle and its axis."""
         return f"all units {turned(size)}; tighten it and repeat"
 
 

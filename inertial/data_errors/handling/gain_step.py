@@ -1,5 +1,3 @@
-"""One unit's gain changed during the run: its reading, its supply, its connector."""
-
 from inertial.data_errors.changes import OfOneUnit
 from inertial.data_errors.handling.reference_step import ReferenceStep
 from inertial.estimation.alternative import Array
@@ -16,5 +14,4 @@ class GainStep(OfOneUnit, ReferenceStep):
     fewest_units = 1
 
     def describe(self, lot: Lot, size: Array, **place: float) -> str:
-        """The change."""
         return f"all scale factors of the unit changed by {1e6 * size[0]:+.0f} ppm; look at its supply and reader"

@@ -1,5 +1,3 @@
-"""The devices were behind the temperature that was read: they had not soaked, and the reading is the chamber's."""
-
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +11,6 @@ _FASTEST, _SLOWEST, _GRID = 30.0, 3000.0, 12  # s, s, values of the time constan
 _BETWEEN = 9  # values between two of the grid
 _SPREAD = 3.0  # factor within which each unit's own time constant is looked for
 _EXACT = 1e-3  # of the logarithm of a time constant
-_OF_ONE = 3.0  # factor within which the coefficient must be one: the output follows by the coefficients that it has
 
 
 class NotSoaked(Handling):
@@ -29,6 +26,9 @@ class NotSoaked(Handling):
     hides_behind = ("thermal_lag",)
     fewest_units = 1
     in_part = False
+    # the output follows by the coefficients that it has: a delay in a fiftieth of them, or against them, is an effect with a lag
+    # of its own; with the temperatures delayed after that the residuals would grow
+    of_one = 3.0
 
     def places(self, lot: Lot) -> list[dict[str, float]]:
         """Time constants, where the temperature changes."""
@@ -50,16 +50,7 @@ class NotSoaked(Handling):
         behind = _temperature(lot.state, place["tau"]) - _temperature(lot.state, 0.0)
         return (slope * behind[..., None])[..., None]
 
-    def possible(self, size: Array) -> bool:
-        """Whether the output changes by about what its own coefficients make of the delay.
-
-        A delay in a fiftieth of them, or against them, is an effect with a lag of its own; with the temperatures delayed after
-        that the residuals would grow.
-        """
-        return bool(1.0 / _OF_ONE < size[0] < _OF_ONE)
-
     def describe(self, lot: Lot, size: Array, **place: float) -> str:
-        """The time constant."""
         behind = np.abs(_temperature(lot.state, place["tau"]) - _temperature(lot.state, 0.0))
         alone = "unit" in place
         behind = behind[int(place["unit"])] if alone else behind

@@ -1,5 +1,3 @@
-"""The poses of two successive dwells stand in each other's row."""
-
 from dataclasses import replace
 
 import numpy as np
@@ -10,9 +8,6 @@ from inertial.estimation.lot import Lot
 _APART = 0.05
 """Distance of two forces, g, from which on their poses are different ones."""
 
-_OF_ONE = 1.25
-"""Factor within which the coefficient must be one: a part of the way between two poses is no exchange."""
-
 
 class PosesExchanged(Handling):
     """Poses of two successive dwells that were written down in the wrong order, for all units: no coefficient but one."""
@@ -21,6 +16,7 @@ class PosesExchanged(Handling):
     symbol = "a ↔ b"
     equation = "f_b − f_a in dwell a, the opposite in dwell b"
     breaker = "the log of the table, or both poses once more"
+    of_one = 1.25  # a part of the way between two poses is no exchange
 
     def places(self, lot: Lot) -> list[dict[str, float]]:
         """Each dwell whose successor has another pose."""
@@ -29,26 +25,19 @@ class PosesExchanged(Handling):
         return [{"at": float(k)} for k in np.flatnonzero(step > _APART) if {k, k + 1} <= there]
 
     def change(self, lot: Lot, slope: Array | None, **place: float) -> Array:
-        """What each of the two dwells has in place of its own force."""
         first, force = int(place["at"]), common_force(lot)
         column = np.zeros((*force.shape, 1))
         column[:, first, :, 0] = force[:, first + 1] - force[:, first]
         column[:, first + 1, :, 0] = force[:, first] - force[:, first + 1]
         return column
 
-    def possible(self, size: Array) -> bool:
-        """Whether the two poses changed places entirely."""
-        return bool(1.0 / _OF_ONE < size[0] < _OF_ONE)
-
     def describe(self, lot: Lot, size: Array, **place: float) -> str:
-        """Which poses."""
         force = common_force(lot)[0]
         first = int(place["at"])
         apart = np.degrees(np.arccos(np.clip(float(force[first] @ force[first + 1]), -1.0, 1.0)))
         return f"the poses of this dwell and the next, {apart:.0f}° apart, were exchanged for all units; they are exchanged back"
 
     def mended(self, lot: Lot, size: Array, **place: float) -> Lot | None:
-        """With the poses exchanged back."""
         first = int(place["at"])
         state = lot.state
         order = np.arange(state.time.shape[1])
@@ -71,5 +60,4 @@ class PosesExchanged(Handling):
         )
 
     def dwells(self, lot: Lot, **place: float) -> list[int]:
-        """Both."""
         return [int(place["at"]), int(place["at"]) + 1]

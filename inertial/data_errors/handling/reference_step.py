@@ -1,5 +1,3 @@
-"""The reference of all units changed during the run: the reader's, or what the outputs are ratioed to."""
-
 from inertial.data_errors.changes import Change
 from inertial.estimation.alternative import Array, common_force
 from inertial.estimation.lot import Lot
@@ -14,9 +12,7 @@ class ReferenceStep(Change):
     breaker = "another reader, or its reference measured"
 
     def addition(self, lot: Lot) -> Array:
-        """The force."""
         return common_force(lot)[..., None]
 
     def describe(self, lot: Lot, size: Array, **place: float) -> str:
-        """The change."""
         return f"the scale factors of all units changed by {1e6 * size[0]:+.0f} ppm; look at the reader's reference"

@@ -1,15 +1,13 @@
-"""All thermometers have the same offset in one soak."""
-
 from dataclasses import replace
 
 import numpy as np
 
-from inertial.estimation.alternative import Array, Exchangeable, soaks
+from inertial.estimation.alternative import Array, Handling, soaks
 from inertial.estimation.lot import Lot
 from inertial.state import History
 
 
-class SoakThermometer(Exchangeable):
+class SoakThermometer(Handling):
     """An offset of the temperature reading in one soak, for all units."""
 
     id = "soak_thermometer"
@@ -30,7 +28,6 @@ class SoakThermometer(Exchangeable):
         return -(slope * (soaks(lot.state) == int(place["soak"]))[:, None])[..., None]
 
     def describe(self, lot: Lot, size: Array, **place: float) -> str:
-        """The offset."""
         return f"the thermometers read {self.short(size, **place)}; the readings are corrected by it"
 
     def instead(self, lot: Lot, **place: float) -> list[dict[str, float]]:
@@ -39,7 +36,6 @@ class SoakThermometer(Exchangeable):
         return [{**place, "soak": float(k)} for k in range(number) if k != int(place["soak"])]
 
     def short(self, size: Array, **place: float) -> str:
-        """The offset and the soak."""
         return f"{size[0]:+.2f} K off in soak {int(place['soak']) + 1}"
 
     def mended(self, lot: Lot, size: Array, **place: float) -> Lot | None:
@@ -57,5 +53,4 @@ class SoakThermometer(Exchangeable):
         return replace(lot, state=replace(state, temperature=temperature, history=history, memory={}))
 
     def dwells(self, lot: Lot, **place: float) -> list[int]:
-        """The dwells of the soak."""
         return np.flatnonzero(soaks(lot.state) == int(place["soak"])).tolist()

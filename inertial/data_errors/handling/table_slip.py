@@ -1,5 +1,3 @@
-"""The table slipped on its drives during the run."""
-
 from inertial.data_errors.changes import Change
 from inertial.estimation.alternative import Array, tilts
 from inertial.estimation.lot import Lot
@@ -20,10 +18,8 @@ class TableSlip(Change):
         return [] if lot.state.outer is None or lot.state.inner is None else super().moments(lot)
 
     def addition(self, lot: Lot) -> Array:
-        """Errors of the two angles."""
         return tilts(lot.state)
 
     def describe(self, lot: Lot, size: Array, **place: float) -> str:
-        """The two angles."""
         off = f"{1e3 * size[0]:+.3f} mrad (outer) and {1e3 * size[1]:+.3f} mrad (inner)"
         return f"the table's angles changed by {off}; home it and repeat"

@@ -1,5 +1,3 @@
-"""One unit turned in its seat during the run."""
-
 from inertial.data_errors.changes import OfOneUnit
 from inertial.data_errors.handling.fixture_moved import FixtureMoved, turned
 from inertial.estimation.alternative import Array
@@ -17,5 +15,4 @@ class UnitMoved(OfOneUnit, FixtureMoved):
     fewest_units = 1
 
     def describe(self, lot: Lot, size: Array, **place: float) -> str:
-        """The angle and its axis."""
         return f"the unit {turned(size)}; seat it again and repeat"

@@ -1,5 +1,3 @@
-"""One unit lagged the temperature reading: it had not soaked, or its contact with the plate is poor."""
-
 from inertial.data_errors.changes import OfOneUnit
 from inertial.data_errors.handling.not_soaked import NotSoaked
 

@@ -1,5 +1,3 @@
-"""The thermometer of one unit has an offset in one soak."""
-
 from inertial.data_errors.changes import OfOneUnit
 from inertial.data_errors.handling.soak_thermometer import SoakThermometer
 from inertial.estimation.alternative import Array
@@ -14,5 +12,4 @@ class UnitThermometer(OfOneUnit, SoakThermometer):
     fewest_units = 1
 
     def describe(self, lot: Lot, size: Array, **place: float) -> str:
-        """The offset."""
         return f"the thermometer of the unit reads {self.short(size, **place)}; its readings are corrected by it"

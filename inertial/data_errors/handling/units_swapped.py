@@ -1,17 +1,12 @@
-"""Two units were exchanged during the run: from a dwell on, each has the readings of the other."""
-
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Flags
 from inertial.data_errors.exchanged import EDGE, PlainFit
 from inertial.estimation.alternative import Array, Handling, Misfit, by_block
 from inertial.estimation.lot import Lot
 from inertial.state import History, State
-
-_OF_ONE = 1.25
-"""Factor within which the coefficient must be one: part of a difference between two units is no exchange."""
 
 
 class UnitsSwapped(Handling):
@@ -23,6 +18,7 @@ class UnitsSwapped(Handling):
     breaker = "the serial numbers of both units in their seats, and a pose of the first half once more"
     hides_behind = ("misalignment_temperature", "scale_temperature_quadratic")
     in_part = False
+    of_one = 1.25  # part of a difference between two units is no exchange
 
     def places(self, lot: Lot) -> list[dict[str, float]]:
         """Pairs whose residuals by a plain fit are opposite to each other and vanish with an exchange, at the best dwells."""
@@ -52,12 +48,7 @@ class UnitsSwapped(Handling):
         """The same by block: two units are affected."""
         return by_block(self.change(lot, slope, **place))
 
-    def possible(self, size: Array) -> bool:
-        """Whether the readings changed by the whole difference of the two units."""
-        return bool(1.0 / _OF_ONE < size[0] < _OF_ONE)
-
     def describe(self, lot: Lot, size: Array, **place: float) -> str:
-        """What was exchanged and what becomes of it."""
         one, other, after = _places(lot, **place)
         apart = 1e6 * float(np.sqrt(np.mean((lot.output[one, after] - _of_other(lot, one, other)[0, after]) ** 2)))
         return f"exchanged before this dwell, readings {apart:.0f} µg apart; they are exchanged back"
@@ -71,7 +62,7 @@ class UnitsSwapped(Handling):
         return outputs if misfits[0] <= misfits[1] else whole
 
 
-def _places(lot: Lot, **place: float) -> tuple[int, int, NDArray[np.bool_]]:
+def _places(lot: Lot, **place: float) -> tuple[int, int, Flags]:
     """The two units, and the dwells (n,) from which on both were measured as the other."""
     one, other = int(place["unit"]), int(place["other"])
     there = np.isfinite(lot.error[[one, other]]).all(axis=(0, 2))
@@ -113,7 +104,7 @@ def _temperatures_exchanged(state: State, **place: float) -> State:
     return replace(state, temperature=_exchanged(state.temperature, pair, after), history=history, memory={})
 
 
-def _exchanged(values: Array, pair: list[int], after: NDArray[np.bool_]) -> Array:
+def _exchanged(values: Array, pair: list[int], after: Flags) -> Array:
     """Values (units, m) with two rows exchanged in some columns (m,)."""
     changed = values.copy()
     changed[pair] = np.where(after, values[pair[::-1]], values[pair])

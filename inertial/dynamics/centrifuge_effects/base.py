@@ -5,9 +5,8 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from inertial.arrays import Array, Flags
 
 
 @dataclass(frozen=True)
@@ -27,7 +26,7 @@ class Spins:
     slowing: Array
     radius_error_m: float = 0.0
 
-    def picked(self, rows: NDArray[np.bool_]) -> "Spins":
+    def picked(self, rows: Flags) -> "Spins":
         """The points of the selected rows (n,)."""
         return Spins(
             self.acceleration[rows], self.radius_m[rows], self.order[rows], self.slowing[rows], self.radius_error_m

@@ -14,16 +14,8 @@ class AcCoupledReference(ShockEffect):
     breaker = "shocks in the other direction, and a longer record after the pulse: the output returns with RC"
 
     def parameters(self, duration_s: float) -> tuple[Parameter, ...]:
-        return (
-            Parameter(
-                "coupling_s",
-                "s",
-                1.5 * duration_s,
-                3000.0 * duration_s,
-                (10.0 * duration_s, 100.0 * duration_s),
-                log=True,
-            ),
-        )
+        starts = (10.0 * duration_s, 100.0 * duration_s)
+        return (Parameter("coupling_s", "s", 1.5 * duration_s, 3000.0 * duration_s, starts, log=True),)
 
     def changed(self, wave: Array, rate_hz: float, values: Array) -> Array:
         whole = np.concatenate([[0.0], np.cumsum(0.5 * (wave[1:] + wave[:-1]))]) / rate_hz

@@ -4,12 +4,10 @@ from functools import lru_cache
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import cont2discrete, lfilter
 
+from inertial.arrays import Array
 from inertial.dynamics.transfer_effects.base import Parameter
-
-Array = NDArray[np.float64]
 
 
 class ShockEffect:

@@ -14,15 +14,9 @@ class MountingResonance(ShockEffect):
     breaker = "another torque, adhesive or fixture"
 
     def parameters(self, duration_s: float) -> tuple[Parameter, ...]:
+        starts = (2.0 / duration_s, 4.0 / duration_s, 7.0 / duration_s)
         return (
-            Parameter(
-                "mounting_hz",
-                "Hz",
-                1.0 / duration_s,
-                12.0 / duration_s,
-                (2.0 / duration_s, 4.0 / duration_s, 7.0 / duration_s),
-                log=True,
-            ),
+            Parameter("mounting_hz", "Hz", 1.0 / duration_s, 12.0 / duration_s, starts, log=True),
             Parameter("mounting_damping", "1", 0.002, 0.5, (0.03,), log=True),
         )
 

@@ -6,10 +6,8 @@ from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from inertial.arrays import Array, Complex, Flags
 
 
 class Parameter(NamedTuple):
@@ -58,7 +56,7 @@ class Conditions:
     temperature: Array
     record_s: Array
 
-    def picked(self, rows: NDArray[np.bool_]) -> "Conditions":
+    def picked(self, rows: Flags) -> "Conditions":
         """Some of the points."""
         return Conditions(self.frequency[rows], self.level[rows], self.temperature[rows], self.record_s[rows])
 

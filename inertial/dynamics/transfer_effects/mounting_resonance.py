@@ -12,23 +12,14 @@ class MountingResonance(TransferEffect):
     breaker = "another torque, adhesive or fixture"
 
     def parameters(self, points: Conditions) -> tuple[Parameter, ...]:
+        top = float(points.frequency.max())
+        starts = tuple(float(top * share) for share in (*np.geomspace(0.15, 1.0, 12), 2.0, 5.0))
         return (
-            Parameter("mount_hz", "Hz", *_reach(points), _starts(points), log=True),
+            Parameter("mount_hz", "Hz", 0.05 * top, 20.0 * top, starts, log=True),
             Parameter("mount_damping", "1", 2e-3, 0.5, (0.03,), log=True),
         )
 
     def factor(self, points: Conditions, values: Array) -> Complex:
         ratio = points.frequency / values[0]
-        return np.asarray(
-            (1.0 + 2j * values[1] * ratio) / (1.0 - ratio**2 + 2j * values[1] * ratio), dtype=np.complex128
-        )
-
-
-def _reach(points: Conditions) -> tuple[float, float]:
-    top = float(points.frequency.max())
-    return 0.05 * top, 20.0 * top
-
-
-def _starts(points: Conditions) -> tuple[float, ...]:
-    top = float(points.frequency.max())
-    return tuple(float(top * share) for share in (*np.geomspace(0.15, 1.0, 12), 2.0, 5.0))
+        damped = 2j * values[1] * ratio
+        return np.asarray((1.0 + damped) / (1.0 - ratio**2 + damped), dtype=np.complex128)

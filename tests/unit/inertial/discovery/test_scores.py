@@ -68,13 +68,15 @@ def test_an_error_of_the_table_leaves_the_scores_beside_free_errors_of_the_stati
 def _moved(before: LotScores, after: LotScores) -> float:
     """Largest change of a lot's sums, in standard deviations."""
     sigma = np.sqrt(np.diagonal(before.lot, axis1=1, axis2=2))
-    return float((np.abs(after.sums - before.sums) / np.where(sigma > 0.0, sigma, np.inf)).max())
+    return float(
+        (np.abs(after.score.sum(axis=0) - before.score.sum(axis=0)) / np.where(sigma > 0.0, sigma, np.inf)).max()
+    )
 
 
 def test_a_hardening_spring_is_a_cubic_of_all_units_and_falls_behind() -> None:
     scores = scores_of(lot_of(13, Hidden("W01", 300e-6)), EFFECTS)
     at = scores.columns.index(("third_order", 0))
-    z = scores.sums[:, at] / np.sqrt(scores.lot[:, at, at])
+    z = scores.score.sum(axis=0)[:, at] / np.sqrt(scores.lot[:, at, at])
     assert (z < -20.0).all()
 
 

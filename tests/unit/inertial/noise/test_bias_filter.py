@@ -14,7 +14,7 @@ from inertial.noise.gauss_markov import (
     flicker_of_steps,
     flicker_terms,
 )
-from inertial.noise.likely_terms import LikelyTerms, likely_terms
+from inertial.noise.terms import LikelyTerms, likely_terms
 from pipelines.export.corrected import _within_a_step
 
 

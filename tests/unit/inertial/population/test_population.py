@@ -4,9 +4,8 @@ import independent_noise as made
 import numpy as np
 import pytest
 
-from inertial.population.agreement import e_n
 from inertial.population.capability import cpk, shape_of
-from inertial.population.comparison import holm, outlier_limit, robust_z
+from inertial.population.comparison import e_n, holm, outlier_limit, robust_z
 from inertial.population.control_charts import alarms, baseline, chance_of_alarms, signals
 from inertial.population.fingerprints import alike_below, change_scale, distance, foreign_above, nearest
 from inertial.population.gauge import gauge_study
