@@ -9,9 +9,8 @@ import numpy as np
 from inertial.arrays import Flags
 from pipelines.archive import Archive
 from pipelines.audit.calibrations import Calibrations, captures_of, dated_runs, day_of, first_runs, left_out, load
-from pipelines.audit.certificates import Certificates, certificates_of
 from pipelines.audit.drifts import KindDrift, kind_drifts
-from pipelines.audit.due import Due, due, last_measured
+from pipelines.audit.due import Certificates, Due, certificates_of, due, last_measured
 from pipelines.audit.exchanged_serials import Stranger, strangers
 from pipelines.audit.gauge_mounts import Study, studies
 from pipelines.audit.index import up_to_date

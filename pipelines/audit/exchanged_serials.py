@@ -160,8 +160,9 @@ def exchanged_pairs(
     for run in np.unique(calibrations.run[own[before >= 0]].astype(str)):
         here = np.flatnonzero((calibrations.run[own] == run) & (before >= 0))
         far = [int(k) for k in here if not _within(calibrations, own[k], past[k], bound)]
+        apart = {k: (calibrations.values[own[k]] - calibrations.values[past[k]]) / bound for k in far}
         pairs += [
-            (k, other, _distance(calibrations, own[k], past[k], bound))
+            (k, other, float(np.sqrt(np.nanmean(apart[k][np.isfinite(bound)] ** 2))))
             for k in far
             for other in far
             if k != other
@@ -178,9 +179,3 @@ def _within(calibrations: Calibrations, row: int, past: int, bound: Array) -> bo
         bound
     )  # parameters outside the model are NaN and are ignored; without any parameter nothing fits
     return bool(known.any() and np.all(change[known] <= (bound + expanded)[known]))
-
-
-def _distance(calibrations: Calibrations, row: int, past: int, bound: Array) -> float:
-    return float(
-        np.sqrt(np.nanmean(((calibrations.values[row] - calibrations.values[past]) / bound)[np.isfinite(bound)] ** 2))
-    )

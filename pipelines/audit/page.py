@@ -14,7 +14,7 @@ from pipelines.audit.calibrations import date_of
 from pipelines.audit.document import counts, furthest
 from pipelines.audit.finding import WHO, AuditFinding, date_or_never
 from pipelines.audit.parameters import unit_text
-from pipelines.audit.stations_over_time import ControlChart, StationSeries
+from pipelines.audit.stations_over_time import StationSeries
 from pipelines.audit.unit_drifts import UnitDrift
 from pipelines.drawing import svg_text
 from pipelines.report.numbers import THIN, significant
@@ -26,7 +26,8 @@ MOST_SERIES, MOST_CHARTS, MOST_HISTORIES, MOST_ROWS, MOST_OF_KIND = 8, 4, 4, 25,
 def render(audit: Audit, listed: list[AuditFinding], archive: str) -> str:
     """The page as one HTML text without other files."""
     months = [share for share in audit.yields if share.of == "month"]
-    series, charts, drifts = _telling_series(audit), _telling_charts(audit), _telling_drifts(audit)
+    series, drifts = _telling_series(audit), _telling_drifts(audit)
+    charts = sorted(audit.charts, key=lambda chart: (chart.p_value, chart.station, chart.parameter))[:MOST_CHARTS]
     return template("audit.html").render(
         archive=archive,
         since=date_of(audit.scope.since) if audit.scope.since > _BEGINNING else "",
@@ -59,8 +60,8 @@ def render(audit: Audit, listed: list[AuditFinding], archive: str) -> str:
         signed=_signed,
         chance=chance,
         date=partial(date_or_never, never="–"),
-        percent=_percent,
-        whole=_whole,
+        percent=lambda share: f"{significant(100.0 * share)} %",
+        whole=lambda count: f"{count:,}".replace(",", THIN),
     )
 
 
@@ -101,23 +102,11 @@ def _telling_series(audit: Audit) -> list[StationSeries]:
     return [one for one in audit.stations if one.where == "level_error"][:MOST_SERIES]
 
 
-def _telling_charts(audit: Audit) -> list[ControlChart]:
-    return sorted(audit.charts, key=lambda chart: (chart.p_value, chart.station, chart.parameter))[:MOST_CHARTS]
-
-
 def _telling_drifts(audit: Audit) -> list[UnitDrift]:
     """The histories that differ most from their kind."""
     worst = [max(drifts, key=lambda d: abs(d.odd)) for drifts in audit.units.values()]
     several = [drift for drift in worst if drift.calibrations > 2]
     return sorted(several, key=lambda d: (-abs(d.odd), d.unit))[:MOST_HISTORIES]
-
-
-def _whole(count: int) -> str:
-    return f"{count:,}".replace(",", THIN)
-
-
-def _percent(share: float) -> str:
-    return f"{significant(100.0 * share)} %"
 
 
 def _signed(value: float) -> str:

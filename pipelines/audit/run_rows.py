@@ -13,8 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
-from numpy.typing import NDArray
 
+from inertial.arrays import Index
 from pipelines.archive.parquet import SCHEMA_MARK, TABLE_MARK
 from pipelines.archive.store import first_line
 from pipelines.audit.parameters import NAMES, parameters_of
@@ -226,7 +226,7 @@ def _from_rows(rows: Sequence[tuple[Any, ...]], schema: pa.Schema) -> pa.Table:
     return pa.table([pa.array(c, f.type) for c, f in zip(columns, schema, strict=True)], schema=schema)
 
 
-def _coded(table: pa.Table, name: str) -> tuple[list[str], NDArray[np.int64]]:
+def _coded(table: pa.Table, name: str) -> tuple[list[str], Index]:
     """The different texts of a column, and the number of each row's."""
     column = table.column(name).combine_chunks()
     return column.dictionary.to_pylist(), column.indices.to_numpy().astype(np.int64)

@@ -20,7 +20,6 @@ from pipelines.archive.store import Place, first_line
 from pipelines.audit.index import AuditIndex, up_to_date
 from pipelines.audit.run_rows import SCHEMAS
 from pipelines.audit.tables_in_memory import QueryResult, rows_of_index
-from pipelines.certificates.validity import Calibration
 from schemas.errors import ArchiveUnusable, WrongUse, did_you_mean
 from schemas.library import library
 
@@ -157,26 +156,17 @@ def _of_runs(archive: Archive, name: str) -> Any:
     return datasets_of_runs(places)
 
 
-LEDGER: Mapping[str, Callable[[Calibration], str]] = {  # columns of the view, with the keys of a calibration's document
-    "certificate": lambda one: one.certificate,
-    "serial": lambda one: one.serial,
-    "device": lambda one: one.event.device,
-    "from": lambda one: one.start,
-    "until": lambda one: one.until,
-    "state": lambda one: one.state,
-    "stated_until": lambda one: one.stated_until,
-    "run": lambda one: one.run,
-    "grade": lambda one: one.event.grade,
-    "station": lambda one: one.event.station,
-    "recipe": lambda one: one.event.recipe,
-}
+LEDGER = (  # columns of the view: keys of a calibration's document
+    *("certificate", "serial", "device", "from", "until", "state", "stated_until"),
+    *("run", "grade", "station", "recipe"),
+)
 
 
 def _of_ledger(archive: Archive) -> pa.Table:
     from pipelines.certificates.ledger import Ledger
 
-    known = list(Ledger(archive).all())
-    return pa.table({name: pa.array([of(one) for one in known], pa.string()) for name, of in LEDGER.items()})
+    known = [dict(one.document()) for one in Ledger(archive).all()]
+    return pa.table({name: pa.array([one[name] for one in known], pa.string()) for name in LEDGER})
 
 
 def datasets_of_runs(places: Sequence[Path]) -> ds.Dataset:

@@ -73,7 +73,7 @@ def _out_of_tolerance(audit: Audit) -> Iterator[AuditFinding]:
         message = (
             f"{drift.unit}: {drift.parameter} changed by {drift.change:+.4g} {text} in {_after(drift)}, "
             f"tolerance {drift.tolerance:g} {text}, U {_expanded(drift):.3g}, E_n {drift.e_n:+.1f}{_besides(outside)}; its "
-            f"measurements since {_before(drift)} are doubtful: inform its users"
+            f"measurements since {date_of(drift.day - YEAR_D * drift.years)} are doubtful: inform its users"
         )
         evidence = {**_numbers(drift), "parameters": [d.parameter for d in outside]}
         yield AuditFinding("quality", "found_outside", drift.unit, message, (drift.unit,), evidence)
@@ -166,10 +166,6 @@ def _after(drift: UnitDrift) -> str:
     if months >= 1.5:
         return f"{months:.0f} months"
     return f"{days:.0f} days" if days >= 1.5 else f"{24.0 * days:.2g} hours"
-
-
-def _before(drift: UnitDrift) -> str:
-    return date_of(drift.day - YEAR_D * drift.years)
 
 
 def _signed(value: float) -> str:

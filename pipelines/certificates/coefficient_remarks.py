@@ -33,7 +33,8 @@ def signature_remarks(run: Run, serials: Iterable[str] = ()) -> list[str]:
     if not keys:
         return []
     by_state: dict[str, list[str]] = {}
-    for place in (*_manifests(run), *_certificates(run, serials)):
+    manifests = (run.path / f"{name}.json" for name in ("run", *TABLES))
+    for place in (*(one for one in manifests if one.is_file()), *_certificates(run, serials)):
         state = check(files.read_json(place), keys)
         name = str(place)[len(str(run.archive.root)) :].lstrip("/\\")
         if state == BAD:
@@ -52,11 +53,6 @@ def library_remarks(run: Run) -> list[str]:
     """Libraries with more than one version among the tables of the run."""
     there = [name for name in run.tables() if (run.path / f"{name}.json").is_file()]
     return differing_libraries(run.id, {name: run.manifest(name) for name in there})
-
-
-def _manifests(run: Run) -> list[Place]:
-    places = [run.path / f"{name}.json" for name in ("run", *TABLES)]
-    return [place for place in places if place.is_file()]
 
 
 def _certificates(run: Run, serials: Iterable[str]) -> list[Place]:
@@ -88,15 +84,13 @@ def differing_libraries(run: str, manifests: Mapping[str, Mapping[str, Any]]) ->
         if name != REPORT and isinstance(libraries, dict):
             for library, number in libraries.items():
                 versions.setdefault(str(library), {}).setdefault(str(number), []).append(name)
-    return [
-        f"run {run}: tables made with {library} {_versions_text(by)}; check the numbers with 'tumbleline rerun {run} --check'"
-        for library, by in sorted(versions.items())
-        if len(by) > 1
-    ]
-
-
-def _versions_text(by: Mapping[str, list[str]]) -> str:
-    return " and ".join(f"{number} ({', '.join(names)})" for number, names in sorted(by.items()))
+    remarks: list[str] = []
+    for library, by in sorted(versions.items()):
+        if len(by) > 1:
+            made = " and ".join(f"{number} ({', '.join(names)})" for number, names in sorted(by.items()))
+            check = f"check the numbers with 'tumbleline rerun {run} --check'"
+            remarks.append(f"run {run}: tables made with {library} {made}; {check}")
+    return remarks
 
 
 def coefficients_of(run: Run, calibration: Calibration) -> list[dict[str, Any]]:

@@ -5,8 +5,11 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
+from pathlib import Path
 from typing import Any, Literal, get_args
 
+from pipelines.archive.hash_chain import is_number
+from pipelines.archive.store import Place
 from schemas.errors import ArchiveUnusable
 
 SCHEMA = 1
@@ -95,3 +98,11 @@ def folder_of(serial: str) -> str:
     """Folder of a unit's events below the archive's root."""
     name = hashlib.sha256(serial.encode("utf-8", "surrogateescape")).hexdigest()
     return f"{FOLDER}/{name[:2]}/{name[:16]}"
+
+
+def numbered_files(folder: Place) -> list[Place]:
+    """The files ``<number>.json`` of a unit's folder in order; none where there is no folder."""
+    if isinstance(folder, Path) and not folder.is_dir():
+        return []
+    files = {place.name: place for place in folder.iterdir() if place.name.endswith(".json")}
+    return [files[name] for name in sorted(files) if is_number(name.removesuffix(".json"))]

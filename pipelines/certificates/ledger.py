@@ -12,14 +12,13 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import nullcontext
 from dataclasses import replace
 from datetime import datetime, timedelta
-from pathlib import Path
 
-from pipelines.archive import Archive, files, hash_chain
+from pipelines.archive import Archive, Run, files, hash_chain
 from pipelines.archive.keys import provenance
 from pipelines.archive.locks import alone
 from pipelines.archive.store import ObjectPath, Place
 from pipelines.certificates.days import LAST, today
-from pipelines.certificates.entries import LedgerEntry, event_of, folder_of
+from pipelines.certificates.entries import LedgerEntry, event_of, folder_of, numbered_files
 from pipelines.certificates.refusals import nothing_to_revoke, refuse_other_device, refuse_serial
 from pipelines.certificates.validity import Calibration, calibrations_of, overlapped
 from schemas.errors import ArchiveUnusable, WrongUse
@@ -182,19 +181,14 @@ class Ledger:
 
 def _events(folder: Place) -> list[tuple[LedgerEntry, str]]:
     """Events of a unit's folder with the hashes of their files; refused where one between them is missing."""
-    if isinstance(folder, Path):
-        names = sorted(path.name for path in folder.iterdir()) if folder.is_dir() else []
-    else:
-        names = sorted(path.name for path in folder.iterdir())
-    names = [name for name in names if name.endswith(".json") and hash_chain.is_number(name.removesuffix(".json"))]
     events: list[tuple[LedgerEntry, str]] = []
-    for count, name in enumerate(names, 1):
-        place = folder / name
+    for count, place in enumerate(numbered_files(folder), 1):
         data = place.read_bytes()
         event = event_of(files.parsed(data, place), str(place))
-        if event.sequence != count or name != f"{count:06d}.json":
+        if event.sequence != count or place.name != f"{count:06d}.json":
             raise ArchiveUnusable(
-                f"calibrations: {folder} has event {name} where number {count} is needed; restore the missing file from a copy"
+                f"calibrations: {folder} has event {place.name} where number {count} is needed; restore the missing file from a "
+                "copy"
             )
         events.append((event, hashlib.sha256(data).hexdigest()))
     return events
@@ -218,3 +212,27 @@ def _same(one: Calibration, event: LedgerEntry) -> bool:
     """Whether an event would certify a valid calibration again."""
     old = (one.run, one.event.coefficients, one.start, one.until)
     return old == (event.run, event.coefficients, event.start, event.until)
+
+
+def stated(run: Run, serials: Iterable[str]) -> dict[str, Calibration]:
+    """The calibrations in the ledger that a run's units have by it, by serial: of each that is not ended, else the last.
+
+    Raises
+    ------
+    ArchiveUnusable
+        A certificate is for other coefficients than those of the run; a revoked one is not checked.
+    """
+    ledger, out = Ledger(run.archive.root), dict[str, Calibration]()
+    for serial in serials:
+        own = [one for one in ledger.calibrations(serial) if one.run == run.id]
+        if not own:
+            continue
+        chosen = out[serial] = next((one for one in own if one.state == "valid"), own[-1])
+        present = run.manifest("coefficients")["sha256"]
+        if chosen.state != "revoked" and present != chosen.event.coefficients:
+            raise ArchiveUnusable(
+                f"certificate {chosen.certificate} is for other coefficients than those of run {run.id}: their hash is "
+                f"{present[:12]}…, that in the certificate {chosen.event.coefficients[:12]}…; restore the table from a copy, or "
+                f"find the changes with 'tumbleline rerun {run.id} --check' and certify the run again"
+            )
+    return out

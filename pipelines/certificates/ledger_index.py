@@ -138,7 +138,6 @@ def _read(top: Place, name: str) -> LedgerEntry | str:
 
 def indexed_events(place: Place) -> tuple[dict[str, IndexedEvent], str]:
     """The index by the place of the event's file, and the state of its seal; empty where the seal is not sound."""
-    import pyarrow as pa
     import pyarrow.parquet as pq
 
     try:
@@ -168,7 +167,6 @@ def _tuples(value: Any) -> Any:
 
 
 def _encoded(known: Mapping[str, IndexedEvent]) -> bytes:
-    import pyarrow as pa
     import pyarrow.parquet as pq
 
     order = sorted(known)

@@ -13,7 +13,7 @@ from typing import Any, Literal
 from pipelines.archive import files, hash_chain
 from pipelines.archive.keys import provenance
 from pipelines.archive.store import Place
-from pipelines.certificates.entries import folder_of
+from pipelines.certificates.entries import folder_of, numbered_files
 from schemas.errors import ArchiveUnusable, WrongUse
 
 TOP = "programming"
@@ -35,16 +35,13 @@ def programming(root: Place, serial: str) -> list[dict[str, Any]]:
         An entry is missing or belongs to another unit.
     """
     folder = root / place_of_unit(serial)
-    if not folder.is_dir():
-        return []
-    numbered = [place.name.removesuffix(".json") for place in folder.iterdir() if place.name.endswith(".json")]
-    names = sorted(name for name in numbered if hash_chain.is_number(name))
-    entries = [files.read_json(folder / f"{name}.json") for name in names]
-    for count, (name, entry) in enumerate(zip(names, entries, strict=True), 1):
-        if name != f"{count:06d}" or entry.get("serial") != serial:
+    places = numbered_files(folder)
+    entries = [files.read_json(place) for place in places]
+    for count, (place, entry) in enumerate(zip(places, entries, strict=True), 1):
+        if place.name != f"{count:06d}.json" or entry.get("serial") != serial:
             raise ArchiveUnusable(
-                f"programming: {folder} has entry {name} of unit {entry.get('serial')!r} where entry {count} of {serial!r} is "
-                "needed; restore it from a copy"
+                f"programming: {folder} has entry {place.stem} of unit {entry.get('serial')!r} where entry {count} of {serial!r} "
+                "is needed; restore it from a copy"
             )
     return entries
 

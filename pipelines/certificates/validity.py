@@ -7,8 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
+from pipelines.certificates.days import today
 from pipelines.certificates.entries import LedgerEntry
 from schemas.errors import WrongUse
 
@@ -63,9 +64,30 @@ class Calibration:
             return "valid"
         return "revoked" if self.ended_by.action == "revoke" else "superseded"
 
+    @property
+    def reason(self) -> str:
+        """Why it ended earlier than certified: the reason of the event, else its certificate; empty where it did not."""
+        return "" if self.ended_by is None else self.ended_by.reason or f"by {self.ended_by.certificate}"
+
     def holds(self, day: str) -> bool:
         """Whether it is valid on a day."""
         return self.start <= day < self.until
+
+    def stated(self) -> list[str]:
+        """What exports and reports state of it: certificate, first day, the day after the last, state, reason of its end."""
+        return [self.certificate, self.start, self.until, self.state, self.reason]
+
+    def sentence(self) -> str:
+        """The statement of exports and reports in one line, independent of the present date."""
+        if self.state == "revoked":
+            return f"certificate {self.certificate} REVOKED ({self.reason})"
+        ended = "" if self.state == "valid" else f", {self.state} {self.reason}"
+        return f"certificate {self.certificate}, valid from {self.start} until {self.until}{ended}"
+
+    def statement(self) -> dict[str, Any]:
+        """The statement of exports for JSON, with its validity today."""
+        keys = ("certificate", "from", "until", "state", "reason")
+        return {**dict(zip(keys, self.stated(), strict=True)), "valid_now": self.holds(today())}
 
     def document(self) -> CalibrationDocument:
         """The calibration for JSON."""

@@ -143,8 +143,7 @@ def _firmware(
     low_pass : kind, cut-off and rate, Hz · tracking : whether, step in s, change of the bias from switch-on to switch-on in µg
     """
     from pipelines.export.filtering import chosen_filter
-    from pipelines.export.firmware import Firmware
-    from pipelines.export.tracked_units import bias_models
+    from pipelines.export.firmware import Firmware, bias_models
 
     kind, cutoff, rate = low_pass
     if form != "c":

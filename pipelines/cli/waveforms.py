@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from pkgutil import iter_modules
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -24,8 +23,7 @@ EXAMPLES = (
     "tumbleline waveforms latest --record 0 --unit SN1 --format csv --output first.csv",
 )
 
-_FOLDER = Path(__file__).parent.parent / "export" / "waveforms"
-_NAMES = ", ".join(found.name for found in iter_modules([str(_FOLDER)]) if found.name != "channel")
+FORMATS = "csv, hdf5, lvm, mat, tdms, uff58, wav"  # names of the writers, which help does not import
 
 
 def command(
@@ -34,7 +32,7 @@ def command(
     unit: Annotated[
         str, typer.Option("--unit", metavar="SN", help="Serial number; default: the first unit of the record.")
     ] = "",
-    form: Annotated[str, typer.Option("--format", help=f"{_NAMES}.")] = "csv",
+    form: Annotated[str, typer.Option("--format", help=f"{FORMATS}.")] = "csv",
     output: Annotated[
         Path | None,
         typer.Option(
@@ -47,10 +45,9 @@ def command(
 
     A format that holds only one clock gets one file for each clock: ``…_units`` and ``…_reference``.
     """
-    from pipelines.export.recorded_channels import channels_of
-    from pipelines.export.waveforms import write_waveforms, writer_of
+    from pipelines.export.waveforms import channels_of, write_waveforms, writer_of
 
-    suffix = writer_of(form).SUFFIX
+    suffix = writer_of(form).suffix
     stored = Archive(archive).run(run)
     channels = channels_of(stored, record, unit)
     if is_standard_output(output, "waveforms"):

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
 from inertial import static_intervals
+from inertial.arrays import Array, Flags
 from inertial.correction import correct, output_covariance, remaining_step
 from inertial.design import carried_over
 from inertial.noise.bias_filter import BiasState, Track, track
@@ -25,8 +25,6 @@ from pipelines.importers.exchange import refuse_other_procedures
 from pipelines.tables.calibration import read_calibration
 from schemas.errors import DataRejected, WrongUse, did_you_mean
 from schemas.units import AXES, MICRO
-
-Array = NDArray[np.float64]
 
 PAIRS = ((0, 1), (0, 2), (1, 2))
 CONVERGED_G = 1e-6
@@ -101,7 +99,7 @@ class Corrected:
     track: Track | None = None
     bias: Array | None = None
     bias_covariance: Array | None = None
-    updated: NDArray[np.bool_] | None = None
+    updated: Flags | None = None
     flicker: FlickerTerms | None = None
     at_limits: Track | None = None
     kept: KeptTrack | None = None
@@ -262,7 +260,7 @@ def terms_of_unit(fit: FitOfUnit) -> tuple[LikelyTerms, LikelyTerms]:
     return (limits if fit.curve is None else _likely(fit.curve, limits, noise.identified["B"])), limits
 
 
-def _likely(curve: UnitCurve, limits: LikelyTerms, identified: NDArray[np.bool_]) -> LikelyTerms:
+def _likely(curve: UnitCurve, limits: LikelyTerms, identified: Flags) -> LikelyTerms:
     """The likeliest terms in g; where white noise hides B, what is to be expected below its limit, as no bias is constant."""
     likely = likely_terms(curve.deviation / MICRO, curve.m, curve.n, curve.rate_hz)
     return replace(likely, instability=np.where(identified, likely.instability, HIDDEN * limits.instability))
@@ -277,7 +275,7 @@ def _within_a_step(terms: LikelyTerms, per: int, rate: float) -> Array:
     return terms.white**2 * rate + terms.instability**2 * np.log(per) / np.pi + terms.walk**2 * per / rate / 6.0
 
 
-def rate_and_gaps(time: Array) -> tuple[float, NDArray[np.bool_]]:
+def rate_and_gaps(time: Array) -> tuple[float, Flags]:
     """Rate of the samples, Hz, and which samples (n,) follow a gap: over the whole time, a gap would count as a lower rate."""
     step = np.diff(time)
     usual = step <= GAP * np.median(step)

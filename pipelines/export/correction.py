@@ -68,7 +68,7 @@ def correction_document(
         "file": recording.name,
         "run": fit.run,
         "unit": fit.exported.unit,
-        "certificate": None if certificate is None else certificate.document(),
+        "certificate": None if certificate is None else certificate.statement(),
         "samples": len(recording.time),
         "outside_temperature": done.outside,
         "temperatures_C": list(fit.exported.temperatures),
@@ -99,13 +99,9 @@ def correction_document(
         "nis_bounds": [check.low, check.high],
         "lag_1": check.lag_1,
         "lag_1_bound": check.lag_1_bound,
-        "stated_uncertainty": "too small" if _many(track.rejected, check.count) else check.stated,
+        # more than 1 % of the updates were rejected, beyond five standard deviations
+        "stated_uncertainty": "too small" if track.rejected > 1 + 0.01 * check.count else check.stated,
         "processes_s": done.flicker.correlation_s.tolist(),
         "processes_flat": done.flicker.flatness,
     }
     return document
-
-
-def _many(rejected: int, used: int) -> bool:
-    """Whether more than 1 % of the updates were rejected, beyond five standard deviations."""
-    return rejected > 1 + 0.01 * used

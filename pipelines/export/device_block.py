@@ -27,13 +27,11 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from pipelines.export.fixed_point import FixedPoint, fixed_point, thousandths
 from pipelines.export.polynomials import ORDER, UnitCalibration, corrected_output
 from schemas.errors import WrongUse
-
-Array = NDArray[np.float64]
 
 Form = Literal["float32", "q24"]
 FORMS: dict[Form, int] = {"float32": 1, "q24": 2}

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.dynamics.output_filter import HIGHEST, KINDS, Kind, OutputFilter, designed
 from inertial.noise.bias_filter import BiasState
 from inertial.noise.gauss_markov import FlickerTerms
@@ -20,8 +20,6 @@ from pipelines.export.documents import FilterDocument
 from pipelines.export.recording import CorrectableRecording
 from schemas.errors import DataRejected, WrongUse, did_you_mean
 from schemas.foreign import shown
-
-Array = NDArray[np.float64]
 
 FIGURES = ("sweep_bandwidth_hz", "random_bandwidth_hz")
 _SAME_RATE = 1e-3
@@ -152,20 +150,14 @@ def read_state(path: Path, unit: str) -> Kept | None:
 
 def _kept(content: dict[str, Any]) -> Kept:
     own, track = content["filter"], content["track"]
-    passed = None
+    passed = followed = None
     if own is not None:
         taps = (np.array(own[name], dtype=np.float64) for name in ("numerator", "denominator"))
         passed = OutputFilter(own["kind"], float(own["rate_hz"]), *taps), np.array(own["state"], dtype=np.float64)
-    followed = None
     if track is not None:
-        state = BiasState(np.array(track["x"], dtype=np.float64), np.array(track["p"], dtype=np.float64))
-        flicker = FlickerTerms(
-            np.array(track["sd"]),
-            np.array(track["correlation_s"]),
-            track["shortest_s"],
-            track["longest_s"],
-            track["flatness"],
-        )
+        state = BiasState(*(np.array(track[name], dtype=np.float64) for name in ("x", "p")))
+        arrays = {name: np.array(track[name]) for name in ("sd", "correlation_s")}
+        flicker = FlickerTerms(**arrays, **{name: track[name] for name in ("shortest_s", "longest_s", "flatness")})
         followed = KeptTrack(state, float(track["time_s"]), flicker)
     return Kept(str(content["unit"]), float(content["time_s"]), passed, followed)
 
@@ -176,29 +168,15 @@ def write_state(path: Path, kept: Kept) -> None:
     content = {
         "unit": kept.unit,
         "time_s": kept.time_s,
-        "filter": None
-        if own is None
-        else {
-            "kind": own[0].kind,
-            "rate_hz": own[0].rate_hz,
-            "numerator": own[0].numerator.tolist(),
-            "denominator": own[0].denominator.tolist(),
-            "state": own[1].tolist(),
-        },
-        "track": None
-        if track is None
-        else {
-            "time_s": track.time_s,
-            "x": track.state.x.tolist(),
-            "p": track.state.p.tolist(),
-            "sd": track.flicker.sd.tolist(),
-            "correlation_s": track.flicker.correlation_s.tolist(),
-            "shortest_s": track.flicker.shortest_s,
-            "longest_s": track.flicker.longest_s,
-            "flatness": track.flicker.flatness,
-        },
+        "filter": None if own is None else _plain(vars(own[0]) | {"state": own[1]}),
+        "track": None if track is None else _plain({"time_s": track.time_s} | vars(track.state) | vars(track.flicker)),
     }
     files.publish(path, files.json_bytes(content), "correct", files.ELSEWHERE)
+
+
+def _plain(content: dict[str, Any]) -> dict[str, Any]:
+    """Values for JSON: arrays as lists."""
+    return {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in content.items()}
 
 
 def filter_rate(recording: CorrectableRecording, begin: Kept | None) -> float:

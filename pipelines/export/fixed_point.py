@@ -8,13 +8,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array, Index
 from pipelines.export.polynomials import ORDER, UnitCalibration
 from schemas.errors import WrongUse
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 BITS = 24
 ONE = 1 << BITS
@@ -33,8 +30,8 @@ class FixedPoint:
     """
 
     scale: float
-    bias: Integers
-    inverse: Integers
+    bias: Index
+    inverse: Index
     range_mC: tuple[int, int]
 
     def correct(self, output: Array, temperature: float) -> Array:
@@ -81,14 +78,14 @@ def thousandths(temperatures: tuple[float, float]) -> tuple[int, int]:
     return low, high
 
 
-def _horner(coefficients: Integers, x: np.int64) -> Integers:
+def _horner(coefficients: Index, x: np.int64) -> Index:
     value = coefficients[-1]
     for lower in coefficients[-2::-1]:
         value = lower + _shifted(value * x)
     return value
 
 
-def _shifted(product: Integers) -> Integers:
+def _shifted(product: Index) -> Index:
     """A product of two numbers in units of 2⁻²⁴, rounded to units of 2⁻²⁴."""
     return (product + (ONE >> 1)) >> BITS
 

@@ -7,13 +7,12 @@ from dataclasses import replace
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from pipelines.export.polynomials import UnitCalibration
 from pipelines.export.unit_noise import UnitNoise
 from schemas.units import MICRO
 
-Array = NDArray[np.float64]
 Applied = Callable[[Array, float], Array]
 
 TEMPERATURES = 33  # what is left of a fitted cubic has its largest values between the ends

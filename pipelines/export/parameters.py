@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from pipelines.export.omissions import (
     ACROSS,
     ACROSS_T,
@@ -21,8 +21,6 @@ from pipelines.export.omissions import (
 )
 from pipelines.export.polynomials import UnitCalibration
 from schemas.units import STANDARD_GRAVITY_M_S2
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -8,13 +8,14 @@ from typing import TypeAlias
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.effects.base import AXES, others
 from inertial.fits.linear import axis_rows, of_every_axis
 from inertial.state import ALL_AXES, T_REFERENCE
 from pipelines.archive import Run
-from pipelines.certificates.statement import Stated, stated
+from pipelines.certificates import validity
+from pipelines.certificates.ledger import stated
 from pipelines.export.unit_noise import UnitNoise, noise_of_units
 from pipelines.importers.exchange import refuse_other_procedures
 from pipelines.tables.calibration import Calibration, read_calibration
@@ -45,11 +46,11 @@ class UnitCalibration:
     outcome: str
     grade: str
     out_unit: str
-    bias: NDArray[np.float64]
-    response: NDArray[np.float64]
+    bias: Array
+    response: Array
     temperatures: tuple[float, float]
     left_out: tuple[str, ...]
-    certificate: Stated | None = None
+    certificate: validity.Calibration | None = None
     noise: UnitNoise | None = None
     full_scale: float | None = None
     nominal: float | None = None
@@ -65,14 +66,12 @@ class UnitCalibration:
         """State of the certificate, in one line."""
         return "not certified" if self.certificate is None else self.certificate.sentence()
 
-    def correct(self, output: NDArray[np.float64], temperature: float) -> NDArray[np.float64]:
+    def correct(self, output: Array, temperature: float) -> Array:
         """Specific force (n, 3) in g for outputs (n, 3), as firmware computes it."""
         return corrected_output(self.bias, self.response, output, temperature)
 
 
-def corrected_output(
-    bias: NDArray[np.float64], response: NDArray[np.float64], output: NDArray[np.float64], temperature: float
-) -> NDArray[np.float64]:
+def corrected_output(bias: Array, response: Array, output: Array, temperature: float) -> Array:
     """Specific force (n, 3) in g for outputs (n, 3), by coefficients (4, 3) and (4, 3, 3) of θ⁰ … θ³."""
     powers = (temperature - T_REFERENCE) ** np.arange(ORDER)
     matrix = np.einsum("k,kij->ij", powers, response)
@@ -123,7 +122,7 @@ def refuse_fewer_axes(units: Sequence[UnitCalibration], what: str) -> None:
 UNGRADED = "no limits"
 """The outcome of a unit that was fitted and compared with no limits: that of an import."""
 
-Chosen: TypeAlias = "tuple[Sequence[str], dict[str, tuple[str, str]], Mapping[str, Stated]]"
+Chosen: TypeAlias = "tuple[Sequence[str], dict[str, tuple[str, str]], Mapping[str, validity.Calibration]]"
 """Units to export; outcome and grade, and certificate by unit."""
 
 
@@ -195,7 +194,7 @@ def _temperatures(dwells: pd.DataFrame, unit: str) -> tuple[float, float]:
     return (float(values.min()), float(values.max())) if values.size else (T_REFERENCE, T_REFERENCE)
 
 
-def revoked_units(run: Run) -> dict[str, Stated]:
+def revoked_units(run: Run) -> dict[str, validity.Calibration]:
     """Units of a run whose calibration was revoked; they are exported only on request."""
     if "grades" not in run.tables():
         return {}
@@ -203,7 +202,9 @@ def revoked_units(run: Run) -> dict[str, Stated]:
     return {unit: one for unit, one in states.items() if one.state == "revoked"}
 
 
-def _not_revoked(run: Run, chosen: list[str], certificates: Mapping[str, Stated], *, named: bool) -> list[str]:
+def _not_revoked(
+    run: Run, chosen: list[str], certificates: Mapping[str, validity.Calibration], *, named: bool
+) -> list[str]:
     """Units whose calibration was not revoked; refused where one is named, or none is left."""
     gone = [unit for unit in chosen if unit in certificates and certificates[unit].state == "revoked"]
     if gone and (named or len(gone) == len(chosen)):
@@ -237,7 +238,7 @@ def effects_left_out(calibration: Calibration) -> tuple[str, ...]:
     return tuple(effect for effect in calibration.effects if effect not in {*BIAS, *SCALE, *ACROSS})
 
 
-def polynomials(calibration: Calibration, unit: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def polynomials(calibration: Calibration, unit: str) -> tuple[Array, Array]:
     """Bias (4, 3) and response (4, 3, 3) of a unit as coefficients of θ⁰ … θ³."""
     u = calibration.units.index(unit)
     axes = calibration.axes

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.quantities import BY_COLUMN, FORCE_COLUMNS
 from inertial.state import State
 from pipelines.importers import files
@@ -18,8 +18,6 @@ from pipelines.importers.values import as_numbers, finite_column
 from pipelines.stages.reduce import FollowedSupply
 from schemas.errors import DataRejected, WrongUse
 from schemas.foreign import shown
-
-Array = NDArray[np.float64]
 
 TIME = "time_s"
 USUAL = (("x", "y", "z"), ("out_x", "out_y", "out_z"))

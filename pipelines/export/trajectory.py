@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 from scipy.io import savemat
 
+from inertial.arrays import Array
 from inertial.correction import predict
 from inertial.dynamics.output_filter import OutputFilter
 from inertial.noise.gauss_markov import BiasModel, bias_model
@@ -22,8 +22,6 @@ from pipelines.export.documents import SimulateDocument
 from pipelines.export.recording import CorrectableRecording
 from schemas.errors import DataRejected, WrongUse
 from schemas.units import AXES, MICRO, STANDARD_GRAVITY_M_S2
-
-Array = NDArray[np.float64]
 
 UNITS = {"g": 1.0, "m/s^2": 1.0 / STANDARD_GRAVITY_M_S2}
 _ABOUT_ZERO = 0.1

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array, Flags, Index
 from pipelines.archive import Run
 from pipelines.tables.frames import rows_of
 from schemas.errors import WrongUse
@@ -25,8 +25,8 @@ class UnitNoise:
     rate_hz : of the static record
     """
 
-    value: Mapping[str, NDArray[np.float64]]
-    identified: Mapping[str, NDArray[np.bool_]]
+    value: Mapping[str, Array]
+    identified: Mapping[str, Flags]
     rate_hz: float
 
     def remark(self, symbol: str) -> str:
@@ -57,8 +57,8 @@ def noise_of_units(run: Run) -> dict[str, UnitNoise]:
 class UnitCurve:
     """Allan deviation (3, t) of x, y and z in µg, at ``m`` (t,) samples, of ``n`` at ``rate_hz``."""
 
-    deviation: NDArray[np.float64]
-    m: NDArray[np.int64]
+    deviation: Array
+    m: Index
     n: int
     rate_hz: float
 

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from pipelines.importers import values
 from pipelines.importers.mapping import TIME_UNITS
 from schemas.errors import DataRejected, WrongUse
@@ -41,7 +41,7 @@ _DAY_S, _HOUR_S = 86_400.0, 3600.0
 class RecordingClock:
     """Seconds (n,) from any beginning, and how the column was read."""
 
-    seconds: NDArray[np.float64]
+    seconds: Array
     unit: str
     remarks: tuple[str, ...]
 
@@ -68,7 +68,7 @@ def unit_stated(text: str) -> str:
     return "s" if word in {"s", "sec", "secs", "second", "seconds"} else ""
 
 
-def recognised(numbers: NDArray[np.float64], name: str, stated: str = "") -> Recognised:
+def recognised(numbers: Array, name: str, stated: str = "") -> Recognised:
     """The unit of a column of time.
 
     Parameters
@@ -90,7 +90,7 @@ def recognised(numbers: NDArray[np.float64], name: str, stated: str = "") -> Rec
     return _by_steps(numbers)
 
 
-def _by_steps(numbers: NDArray[np.float64]) -> Recognised:
+def _by_steps(numbers: Array) -> Recognised:
     step = typical_step(numbers)
     if not step > 0.0:
         return Recognised("", "time does not increase", ())
@@ -104,7 +104,7 @@ def _by_steps(numbers: NDArray[np.float64]) -> Recognised:
     return Recognised(possible[0] if len(possible) == 1 else "", reason, possible)
 
 
-def typical_step(numbers: NDArray[np.float64]) -> float:
+def typical_step(numbers: Array) -> float:
     """Median of the steps; where most are zero (stamps coarser than the rate), the mean step."""
     if numbers.size < 2:
         return 0.0
@@ -112,7 +112,7 @@ def typical_step(numbers: NDArray[np.float64]) -> float:
     return step if step > 0.0 else float(numbers[-1] - numbers[0]) / (numbers.size - 1)
 
 
-def _epoch(numbers: NDArray[np.float64]) -> str:
+def _epoch(numbers: Array) -> str:
     middle, step = float(np.median(numbers)), typical_step(numbers)
     for unit, factor in TIME_UNITS.items():
         if EPOCH_S[0] <= middle * factor <= EPOCH_S[1] and 1e-3 <= 1.0 / max(step * factor, 1e-30) <= 1e7:
@@ -120,7 +120,7 @@ def _epoch(numbers: NDArray[np.float64]) -> str:
     return ""
 
 
-def stamps(column: pd.Series, where: str) -> NDArray[np.float64]:
+def stamps(column: pd.Series, where: str) -> Array:
     """Seconds since the first of stamps of date and time, or of the time of day.
 
     Raises
@@ -143,8 +143,10 @@ def stamps(column: pd.Series, where: str) -> NDArray[np.float64]:
         parsed = _parsed(text, form)
         if parsed is not None:
             return values.seconds(parsed, where)
-    first = [one for one in (_first(text, forms) for forms in (_DAY_FIRST, _MONTH_FIRST)) if one is not None]
-    candidates = [values.seconds(one, where) for one in first]
+    candidates: list[Array] = []
+    for forms in (_DAY_FIRST, _MONTH_FIRST):
+        read = next((one for one in (_parsed(text, form) for form in forms) if one is not None), None)
+        candidates += [] if read is None else [values.seconds(read, where)]
     if len(candidates) == 2 and not np.allclose(candidates[0], candidates[1]):
         raise DataRejected(
             f"{where}: column '{name}': '{shown(column.iloc[0])}': day and month are ambiguous, and the date changes; "
@@ -159,14 +161,10 @@ def stamps(column: pd.Series, where: str) -> NDArray[np.float64]:
     )
 
 
-def _unwrapped(seconds: NDArray[np.float64], period_s: float) -> NDArray[np.float64]:
+def _unwrapped(seconds: Array, period_s: float) -> Array:
     """Seconds since the first of a clock that begins again after each period."""
     periods = np.cumsum(np.concatenate([[0.0], np.diff(seconds) < -0.5 * period_s]))
     return seconds + period_s * periods - seconds[0]
-
-
-def _first(text: pd.Series, forms: tuple[str, ...]) -> pd.Series | None:
-    return next((one for one in (_parsed(text, form) for form in forms) if one is not None), None)
 
 
 def _parsed(text: pd.Series, form: str) -> pd.Series | None:
@@ -192,7 +190,7 @@ def is_stamps(column: pd.Series) -> bool:
     return bool(len(some)) and bool(pd.to_numeric(some, errors="coerce").isna().mean() > 0.5)
 
 
-def clock(numbers: NDArray[np.float64], name: str, claimed: str, stated: str, where: str) -> RecordingClock:
+def clock(numbers: Array, name: str, claimed: str, stated: str, where: str) -> RecordingClock:
     """Seconds of a column of numbers.
 
     Parameters

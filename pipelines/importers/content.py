@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import pandas as pd
 
-from schemas.errors import WrongUse, did_you_mean
+from schemas.errors import DataRejected, WrongUse, did_you_mean
 from schemas.foreign import shown
 
 _BRACKETS = re.compile(r"[\[(]\s*([^\[\]()]{1,12}?)\s*[\])]\s*$")
@@ -49,23 +49,33 @@ def unit_in(name: str) -> str:
     return match[1] if match else ""
 
 
+def begins_with(magic: bytes) -> Callable[[bytes], bool]:
+    """What recognises the files of a format by their first bytes."""
+    return lambda data: data.startswith(magic)
+
+
 INERTIAL = ("acc", "imu")
 """Words of the groups that are listed first: they may hold an accelerometer."""
 
 
-def chosen(groups: Sequence[tuple[str, int]], group: str, where: str) -> str:
+def chosen(groups: Sequence[tuple[str, int]], group: str, where: str, missing: str = "") -> str:
     """The group of channels to read: the one given, or the only one.
 
     Parameters
     ----------
     groups : name and count of samples of each group, whose channels share a clock.
     group : its name; empty if not given.
+    missing : what the file lacks where there is no group.
 
     Raises
     ------
+    DataRejected
+        There is no group.
     WrongUse
         There are several and none is named, or none has the name.
     """
+    if not groups:
+        raise DataRejected(f"{where}: {missing}, one is needed; check the file")
     names = [name for name, _ in groups]
     if group:
         if group not in names:

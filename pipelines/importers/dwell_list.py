@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from pipelines.importers.judged import FitAnswer
 from pipelines.importers.mapping import Mapping
 from pipelines.importers.record import Imported
@@ -55,7 +55,7 @@ def _ends(data: Imported, dwell: Mapping_[Any, Any], half: float) -> tuple[float
 
 def _norm_influence(
     dwells: pd.DataFrame, judged: FitAnswer | None, mapping: Mapping
-) -> tuple[NDArray[np.float64] | None, NDArray[np.float64] | None]:
+) -> tuple[Array | None, Array | None]:
     """Residual of the norm, g, and Cook's distance of every dwell, from the coefficients of the fit."""
     if judged is None or judged.method != "norm" or mapping.norm_g is None:
         return None, None

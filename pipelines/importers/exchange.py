@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from inertial.arrays import Array, Index
 from inertial.quantities import ANGLE_COLUMNS, FORCE_COLUMNS, KNOWN_COLUMNS, OUTPUT_COLUMNS, SPREAD_COLUMNS
 from pipelines.archive import Archive, Run
 from pipelines.importers import files, values
@@ -174,7 +174,7 @@ def _units(frame: pd.DataFrame, where: str, *, foreign: bool) -> list[str]:
     return names
 
 
-def _numbers(frame: pd.DataFrame, column: str, where: str) -> NDArray[np.float64]:
+def _numbers(frame: pd.DataFrame, column: str, where: str) -> Array:
     if column == "time_s" and values.is_moment(frame[column]):
         return values.seconds(frame[column], where)
     numbers = values.as_numbers(frame[column], where, flags=column not in KNOWN_COLUMNS)
@@ -190,7 +190,7 @@ def _numbers(frame: pd.DataFrame, column: str, where: str) -> NDArray[np.float64
     return numbers
 
 
-def _whole(frame: pd.DataFrame, column: str, where: str) -> NDArray[np.int64]:
+def _whole(frame: pd.DataFrame, column: str, where: str) -> Index:
     numbers = np.asarray(frame[column], dtype=np.float64)
     bad = np.flatnonzero((numbers != np.rint(numbers)) | (numbers < 0) | (numbers > values.BOUNDS[column][1]))
     if bad.size:

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.fits.faces import Faces, faces, ferraris
 from inertial.probability import passes
 from inertial.quantities import OUTPUT_COLUMNS, SPREAD_COLUMNS
 from inertial.uncertainty.rounding import equal
-from pipelines.importers.judged import FitAnswer, coefficient, gravity_of, imported_dwells
+from pipelines.importers.judged import FitAnswer, bias_row, gravity_of, imported_dwells, response_row
 from pipelines.importers.mapping import FACES, Mapping
 from pipelines.importers.record import Imported
 from schemas.errors import DataRejected
@@ -77,7 +77,7 @@ def _covariance(rows: list[dict[str, Any]]) -> pd.DataFrame:
     return pd.DataFrame(entries)
 
 
-def _verdict(fit: Faces, size: NDArray[np.float64]) -> tuple[bool | None, str]:
+def _verdict(fit: Faces, size: Array) -> tuple[bool | None, str]:
     """Whether the fit describes six faces, and the reason if that cannot be judged or needs no probability.
 
     Parameters
@@ -98,7 +98,7 @@ def _verdict(fit: Faces, size: NDArray[np.float64]) -> tuple[bool | None, str]:
     )
 
 
-def _exchanged(up: NDArray[np.float64], down: NDArray[np.float64], gravity: float) -> str:
+def _exchanged(up: Array, down: Array, gravity: float) -> str:
     """The two labels whose exchange makes the faces agree; empty where there are none.
 
     The response has to be that of axes that read themselves, or an exchange of a whole axis would fit as well.
@@ -117,9 +117,7 @@ def _exchanged(up: NDArray[np.float64], down: NDArray[np.float64], gravity: floa
     return f"; with {agreeing[0]} exchanged they agree" if len(agreeing) == 1 else ""
 
 
-def _by_face(
-    dwells: pd.DataFrame, mapping: Mapping
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+def _by_face(dwells: pd.DataFrame, mapping: Mapping) -> tuple[Array, Array, Array]:
     """Means (3, 3) with each axis up and down, and the standard error of a mean by output."""
     faces_there = {mapping.poses.get(str(label), ""): k for k, label in enumerate(dwells["pose"])}
     missing = [face for face in FACES if face not in faces_there]
@@ -145,11 +143,11 @@ def _face_line(k: int, fit: Faces, published: float, unit: str) -> str:
 
 
 def _face_coefficients(unit: str, fit: Faces, data: Imported) -> list[dict[str, Any]]:
-    per_g, rows = f"{data.out_unit}/g", []
+    rows: list[dict[str, Any]] = []
     for i in range(3):
-        rows.append(coefficient(unit, i, "bias", "K0", fit.bias[i], fit.bias_error[i], data.out_unit))
-        rows.append(coefficient(unit, i, "scale", "K1", fit.response[i, i], fit.response_error[i, i], per_g))
-        for j in ((i + 1) % 3, (i + 2) % 3):
-            name = f"K{AXES[i]}{AXES[j]}"
-            rows.append(coefficient(unit, i, "misalignment", name, fit.response[i, j], fit.response_error[i, j], per_g))
+        rows.append(bias_row(unit, i, fit.bias[i], fit.bias_error[i], data.out_unit))
+        rows += [
+            response_row(unit, i, j, fit.response[i, j], fit.response_error[i, j], data.out_unit)
+            for j in (i, (i + 1) % 3, (i + 2) % 3)
+        ]
     return rows

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.quantities import ANGLE_COLUMNS, FORCE_COLUMNS, KNOWN_COLUMNS, LARGEST, SPREAD_COLUMNS
 from pipelines.importers import clocks, triads, unit_check, values
 from pipelines.importers.clocks import typical_step
@@ -96,7 +96,7 @@ def guesses(content: Content) -> Guesses:
     return Guesses(guessed, _time_unit(content, numeric, guessed), output, sheet or positions, found)
 
 
-def _sheet(table: pd.DataFrame, numeric: dict[str, NDArray[np.float64]], guessed: dict[str, Guess]) -> bool:
+def _sheet(table: pd.DataFrame, numeric: dict[str, Array], guessed: dict[str, Guess]) -> bool:
     """Whether the rows are positions, each with a label of its own; the labels are then those of the dwells."""
     if _column(guessed, "time") or not all(_column(guessed, axis) for axis in "xyz") or len(table) > _MOST_POSITIONS:
         return False
@@ -107,24 +107,24 @@ def _sheet(table: pd.DataFrame, numeric: dict[str, NDArray[np.float64]], guessed
     return False
 
 
-def measurable(numbers: NDArray[np.float64]) -> NDArray[np.float64]:
+def measurable(numbers: Array) -> Array:
     """Numbers without those too large to be measured: their squares would overflow."""
     return np.where(np.abs(numbers) <= LARGEST, numbers, np.nan)
 
 
-def _numbers(column: pd.Series) -> NDArray[np.float64] | None:
+def _numbers(column: pd.Series) -> Array | None:
     if column.dtype.kind in "mM" or isinstance(column.dtype, pd.DatetimeTZDtype) or column.dtype.kind == "b":
         return None
     numbers = measurable(np.asarray(pd.to_numeric(column, errors="coerce"), dtype=np.float64))
     return numbers if np.mean(np.isfinite(numbers)) > 0.5 else None
 
 
-def _grows(numbers: NDArray[np.float64]) -> bool:
+def _grows(numbers: Array) -> bool:
     steps = np.diff(numbers[np.isfinite(numbers)])
     return steps.size > 1 and bool(np.mean(steps >= 0.0) > 0.99) and bool(np.any(steps > 0.0))
 
 
-def _time(table: pd.DataFrame, numeric: dict[str, NDArray[np.float64]], guessed: dict[str, Guess]) -> None:
+def _time(table: pd.DataFrame, numeric: dict[str, Array], guessed: dict[str, Guess]) -> None:
     for name in guessed:
         if values.is_moment(table[name]) or (name not in numeric and _reads_as_time(table[name])):
             guessed[name] = Guess("time", "stamps of date or time")
@@ -162,7 +162,7 @@ _FOLLOWS = 0.99
 """Correlation of an output with its reference from which a table is that of one axis."""
 
 
-def _single_axis(numeric: dict[str, NDArray[np.float64]], guessed: dict[str, Guess]) -> bool:
+def _single_axis(numeric: dict[str, Array], guessed: dict[str, Guess]) -> bool:
     """Whether a table is that of a device with one axis: one output follows one force, or the sine or cosine of one angle."""
     forces = [name for name in numeric if _REFERENCE.search(name)]
     angles = [name for name in numeric if _TILT.search(name)]
@@ -186,7 +186,7 @@ def _single_axis(numeric: dict[str, NDArray[np.float64]], guessed: dict[str, Gue
     return True
 
 
-def _axes(content: Content, numeric: dict[str, NDArray[np.float64]], guessed: dict[str, Guess]) -> triads.Triad:
+def _axes(content: Content, numeric: dict[str, Array], guessed: dict[str, Guess]) -> triads.Triad:
     free = {name: numbers for name, numbers in numeric.items() if not guessed[name].meaning and not _is_index(numbers)}
     found = triads.triad(free, content.units)
     for axis, name in zip("xyz", found.names, strict=False):
@@ -194,14 +194,12 @@ def _axes(content: Content, numeric: dict[str, NDArray[np.float64]], guessed: di
     return found
 
 
-def _is_index(numbers: NDArray[np.float64]) -> bool:
+def _is_index(numbers: Array) -> bool:
     """Whether a column numbers the rows, or only grows as a clock does: no output of a sensor."""
     return triads.is_row_number(numbers) or (numbers.size > _FEW and _grows(numbers))
 
 
-def _others(
-    content: Content, table: pd.DataFrame, numeric: dict[str, NDArray[np.float64]], guessed: dict[str, Guess]
-) -> None:
+def _others(content: Content, table: pd.DataFrame, numeric: dict[str, Array], guessed: dict[str, Guess]) -> None:
     warm = _temperature(content, numeric, guessed)
     if warm:
         guessed[warm] = Guess("temperature", "its name or unit")
@@ -217,7 +215,7 @@ def _others(
                 guessed[name] = Guess("dwell", f"{distinct} labels")
 
 
-def _temperature(content: Content, numeric: dict[str, NDArray[np.float64]], guessed: dict[str, Guess]) -> str:
+def _temperature(content: Content, numeric: dict[str, Array], guessed: dict[str, Guess]) -> str:
     """The column of the sensor's temperature: one by its name before others, and one that changes before one that does not."""
 
     def rank(name: str) -> tuple[bool, bool]:
@@ -233,7 +231,7 @@ def _temperature(content: Content, numeric: dict[str, NDArray[np.float64]], gues
     return max(warm, key=rank, default="")
 
 
-def _time_unit(content: Content, numeric: dict[str, NDArray[np.float64]], guessed: dict[str, Guess]) -> Guess:
+def _time_unit(content: Content, numeric: dict[str, Array], guessed: dict[str, Guess]) -> Guess:
     name = _column(guessed, "time")
     if not name or name not in numeric:
         return Guess("", "")
@@ -260,7 +258,7 @@ def _time_unit(content: Content, numeric: dict[str, NDArray[np.float64]], guesse
 
 def _output(
     content: Content,
-    numeric: dict[str, NDArray[np.float64]],
+    numeric: dict[str, Array],
     guessed: dict[str, Guess],
     sphere: triads.Sphere | None,
 ) -> Guess:

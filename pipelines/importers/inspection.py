@@ -2,28 +2,37 @@
 
 from __future__ import annotations
 
+import re
 import shlex
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from inertial import change_of_level, record_faults
+from inertial.arrays import Array
 from inertial.counts import number_of
 from inertial.quantities import ANGLE_COLUMNS, FORCE_COLUMNS
-from pipelines.importers.content import Content
-from pipelines.importers.documents import ColumnDocument, InspectDocument, IntervalDocument
-from pipelines.importers.dynamic_guess import dynamic_guess
+from pipelines.importers import values
+from pipelines.importers.content import Content, unit_in
+from pipelines.importers.documents import ColumnDocument, InspectDocument, IntervalDocument, SampleFaultDocument
 from pipelines.importers.exchange import read_dwells
 from pipelines.importers.guesses import EXCHANGE, Guesses, measurable
+from pipelines.importers.proposal import serial_of
 from pipelines.importers.recognition import Recognition, recognise
 from pipelines.importers.stretches import Stops
 from schemas.errors import TumblelineError
 
 _MOST_INTERVALS = 2000
+_REFERENCE = re.compile(r"(?:^|[^a-z])(?:ref\w*|input|drive|base|shaker|exciter|std)(?:[^a-z]|$)", re.IGNORECASE)
+_SLOWEST_HZ = 200.0
+"""Least rate of a dynamic recording: slower ones are of a unit at rest or turned by hand."""
+_PULSE = 0.2
+"""Part of the time beyond a tenth of the largest excursion, below which a motion is a shock: of a sine it is 0.94, of random
+vibration 0.6."""
 
 
 @dataclass(frozen=True)
@@ -31,8 +40,8 @@ class Inspection:
     """The result of an inspection: the document, and the record (time in s or samples, output (n, 3)); None without axes."""
 
     document: InspectDocument
-    time: NDArray[np.float64] | None
-    output: NDArray[np.float64] | None
+    time: Array | None
+    output: Array | None
 
 
 def inspect(paths: Sequence[Path], *, join: str = "", group: str = "") -> Inspection:
@@ -46,32 +55,22 @@ def inspect(paths: Sequence[Path], *, join: str = "", group: str = "") -> Inspec
     seen = recognise(paths, join=join, group=group)
     if seen.is_exchange:
         return Inspection(_of_dwells(paths[0], seen), None, None)
-    time, output, open_ = seen.time, seen.output, list(seen.open)
-    dynamic = (
-        dynamic_guess(paths[0], seen.content, seen.guessed, seen.rate_hz)
-        if output is None and len(paths) == 1
-        else None
-    )
-    if dynamic is not None:
-        open_ = list(dynamic.open)
-    document: InspectDocument = {
-        **_document(seen),
-        "rate_hz": seen.rate_hz,
-        "duration_s": float(time[-1] - time[0]) if time is not None and len(time) > 1 else None,
-        "gaps": seen.gaps,
-        "faults": [] if seen.faults is None or output is None else seen.faults.rows(_clock_of(output, time)),
-        "intervals": [] if output is None or time is None else _intervals(output, time, seen.stops),
-        "open": open_,
-        "command": seen.import_command if dynamic is None else dynamic.command,
-    }
-    if dynamic is not None:
+    dynamic = None
+    if seen.output is None and len(paths) == 1:
+        dynamic = _dynamic_guess(paths[0], seen.content, seen.guessed, seen.rate_hz)
+    if dynamic is None:
+        document = _document(seen, list(seen.open), seen.import_command)
+    else:
+        document = _document(seen, list(dynamic.open), dynamic.command)
         dynamic.mark(document["columns"])
-    return Inspection(document, time, output)
+    return Inspection(document, seen.time, seen.output)
 
 
-def _document(seen: Recognition) -> InspectDocument:
-    """The document with what is known of the columns, and nothing of a record in them."""
-    content, guessed = seen.content, seen.guessed
+def _document(seen: Recognition, open_: list[str], command: str) -> InspectDocument:
+    content, guessed, time, output = seen.content, seen.guessed, seen.time, seen.output
+    faults: list[SampleFaultDocument] = []
+    if seen.faults is not None and output is not None:  # without a time the numbers of the samples stand for it
+        faults = seen.faults.rows(np.arange(len(output), dtype=np.float64) if time is None else time)
     return {
         "files": [str(path) for path in seen.paths],
         "form": seen.source.form,
@@ -82,27 +81,27 @@ def _document(seen: Recognition) -> InspectDocument:
         "time_reason": guessed.time_unit.reason,
         "output_unit": guessed.output.meaning,
         "output_reason": guessed.output.reason,
-        "rate_hz": None,
-        "duration_s": None,
-        "gaps": 0,
-        "faults": [],
-        "intervals": [],
-        "open": [],
-        "command": "",
+        "rate_hz": seen.rate_hz,
+        "duration_s": float(time[-1] - time[0]) if time is not None and len(time) > 1 else None,
+        "gaps": seen.gaps,
+        "faults": faults,
+        "intervals": [] if output is None or time is None else _intervals(output, time, seen.stops),
+        "open": open_,
+        "command": command,
     }
 
 
 def _of_dwells(path: Path, seen: Recognition) -> InspectDocument:
     """The document about a table of dwells in the exchange format, which ``diagnose`` reads as it is, without an import."""
-    document = _document(seen)
-    for column in document["columns"]:
-        column |= {"resolution": None, "clipped": 0}
-    document["remarks"].append(_content_of_dwells(seen.content.table))
-    document["command"] = shlex.join(["tumbleline", "diagnose", str(path)])
+    open_: list[str] = []
     try:
         read_dwells(path)
     except TumblelineError as problem:
-        document["open"] = [str(problem)]
+        open_ = [str(problem)]
+    document = _document(seen, open_, shlex.join(["tumbleline", "diagnose", str(path)]))
+    for column in document["columns"]:
+        column |= {"resolution": None, "clipped": 0}
+    document["remarks"].append(_content_of_dwells(seen.content.table))
     return document
 
 
@@ -119,12 +118,7 @@ def _content_of_dwells(table: pd.DataFrame) -> str:
     return f"a table of dwells in {EXCHANGE}: {units}, {number_of(len(table), 'dwell')}; reference: {reference}"
 
 
-def _clock_of(output: NDArray[np.float64], time: NDArray[np.float64] | None) -> NDArray[np.float64]:
-    """Seconds, or the numbers of the samples if there is no time."""
-    return np.arange(len(output), dtype=np.float64) if time is None else time
-
-
-def _intervals(output: NDArray[np.float64], time: NDArray[np.float64], stops: Stops | None) -> list[IntervalDocument]:
+def _intervals(output: Array, time: Array, stops: Stops | None) -> list[IntervalDocument]:
     if stops is None:
         return []
     pairs = list(zip(stops.found.first, stops.found.last, strict=True))[:_MOST_INTERVALS]
@@ -168,3 +162,61 @@ def _columns(content: Content, guessed: Guesses) -> list[ColumnDocument]:
             }
         )
     return columns
+
+
+class _DynamicGuess(NamedTuple):
+    """The command that imports a dynamic recording, the columns of reference and unit, and what the user has to add."""
+
+    command: str
+    reference: str
+    output: str
+    open: list[str]
+
+    def mark(self, columns: Iterable[ColumnDocument]) -> None:
+        """Put the meanings of the two columns into the document of an inspection."""
+        meanings = {self.reference: ("reference", "its name"), self.output: ("z", "the column beside the reference")}
+        for column in columns:
+            column["meaning"], column["reason"] = meanings.get(column["name"], (column["meaning"], column["reason"]))
+
+
+def _dynamic_guess(path: Path, content: Content, guessed: Guesses, rate_hz: float | None) -> _DynamicGuess | None:
+    """What a file with a time and two columns, of which one is named as the reference, may be; None for others."""
+    if rate_hz is None or rate_hz < _SLOWEST_HZ:
+        return None
+    free = [
+        name
+        for name, one in guessed.columns.items()
+        if one.meaning != "time" and content.table[name].dtype.kind in "fi"
+    ]
+    driven = [name for name in free if _REFERENCE.search(name)]
+    if len(free) != 2 or len(driven) != 1:
+        return None
+    reference = driven[0]
+    output = next(name for name in free if name != reference)
+    motion = measurable(values.as_numbers(content.table[reference], reference))
+    procedure = "shock" if _lasting(motion) < _PULSE else "sweep"
+    names = list(guessed.columns)
+    pairs = [("time", guessed.column("time")), ("reference", reference), ("z", output)]
+    mapped = ",".join(f"{what}={names.index(name) + 1}" for what, name in pairs if name)
+    missing = {
+        what: f"the unit of column '{name}': --units {what}=…"
+        for what, name in (("output", output), ("reference", reference))
+        if not (content.units.get(name, "") or unit_in(name))
+    }
+    stated = [f"{what}=UNIT" for what in missing]
+    if guessed.time_unit.meaning and not content.units.get(guessed.column("time"), ""):
+        stated.append(f"time={guessed.time_unit.meaning}")
+    words = ["tumbleline", "import", str(path), "--procedure", procedure, "--map", mapped]
+    words += ["--units", ",".join(stated)] if stated else []
+    open_ = list(missing.values())
+    if procedure == "shock" and (content.units.get(output, "") or unit_in(output)) in {"V", "mV"}:
+        words += ["--part", "SHOCK.toml"]
+        open_.append(f"the scale of column '{output}': a file SHOCK.toml with the line scale = … (output per g)")
+    words += ["--unit", serial_of(path)]
+    return _DynamicGuess(shlex.join(words), reference, output, open_)
+
+
+def _lasting(wave: Array) -> float:
+    """Part of the samples that are further from the median than a tenth of the furthest."""
+    apart = np.abs(wave[np.isfinite(wave)] - np.nanmedian(wave))
+    return float(np.mean(apart > 0.1 * apart.max())) if apart.size else 1.0

@@ -61,7 +61,17 @@ def gravity_of(mapping: Mapping) -> float:
     return mapping.norm_g
 
 
-def coefficient(unit: str, axis: int, effect: str, name: str, value: float, error: float, text: str) -> dict[str, Any]:
-    """A row of the archive's table of coefficients."""
+def bias_row(unit: str, axis: int, value: float, error: float, out_unit: str) -> dict[str, Any]:
+    """The row of an axis's bias in the archive's table of coefficients."""
+    return _row(unit, axis, "bias", "K0", value, error, out_unit)
+
+
+def response_row(unit: str, axis: int, to: int, value: float, error: float, out_unit: str) -> dict[str, Any]:
+    """The row of an axis's response to the force along an axis: its scale, or a misalignment."""
+    effect, name = ("scale", "K1") if to == axis else ("misalignment", f"K{AXES[axis]}{AXES[to]}")
+    return _row(unit, axis, effect, name, value, error, f"{out_unit}/g")
+
+
+def _row(unit: str, axis: int, effect: str, name: str, value: float, error: float, text: str) -> dict[str, Any]:
     row = {"unit": unit, "axis": AXES[axis], "effect": effect, "name": name}
     return {**row, "value": float(value), "standard_error": float(error), "unit_text": text}

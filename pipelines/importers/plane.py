@@ -6,21 +6,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.counts import number_of
 from inertial.errors import NotIdentified
 from inertial.fits.plane import FEWEST_DOF, PlaneFit, fit_plane, fit_plane_norm, inside_of, plane_across, quiet_axis
 from inertial.probability import passes
 from inertial.quantities import OUTPUT_COLUMNS, SPREAD_COLUMNS
 from inertial.uncertainty.rounding import equal
-from pipelines.importers.judged import FitAnswer, coefficient, gravity_of, imported_dwells
+from pipelines.importers.judged import FitAnswer, bias_row, gravity_of, imported_dwells, response_row
 from pipelines.importers.mapping import Mapping
 from pipelines.tables.dwells import measured
 from schemas.errors import DataRejected
 from schemas.units import AXES, MICRO, STANDARD_GRAVITY_M_S2
-
-Array = NDArray[np.float64]
 
 if TYPE_CHECKING:
     from pipelines.importers.record import Imported
@@ -209,15 +207,11 @@ def _line(fit: PlaneFit, axis: int, unit: str) -> str:
 
 def _rows(fit: PlaneFit, unit: str, out_unit: str, *, known: bool) -> list[dict[str, Any]]:
     """Rows of coefficients: only those that the plane determines."""
-    per_g = f"{out_unit}/g"
     rows: list[dict[str, Any]] = []
     for axis in range(3):
-        rows.append(coefficient(unit, axis, "bias", "K0", fit.bias[axis], fit.bias_error[axis], out_unit))
+        rows.append(bias_row(unit, axis, fit.bias[axis], fit.bias_error[axis], out_unit))
         for column, other in enumerate(inside_of(fit.across)):
             value, error = fit.response[axis, column], fit.response_error[axis, column]
-            if other == axis:
-                rows.append(coefficient(unit, axis, "scale", "K1", value, error, per_g))
-            elif known or error > 0.0:
-                name = f"K{AXES[axis]}{AXES[other]}"
-                rows.append(coefficient(unit, axis, "misalignment", name, value, error, per_g))
+            if other == axis or known or error > 0.0:
+                rows.append(response_row(unit, axis, other, value, error, out_unit))
     return rows

@@ -10,15 +10,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from pipelines.importers import guesses, stretches
 from pipelines.importers.content import Content
-from pipelines.importers.dynamic_guess import serial_of
 from pipelines.importers.stated_units import TEMPERATURE
 from schemas.units import STANDARD_GRAVITY_M_S2
-
-Array = NDArray[np.float64]
 
 MAPPED = ("time", "x", "y", "z", "sd_x", "sd_y", "sd_z", "n", "force_x", "tilt", "temperature", "dwell")
 ASSUMED_HZ = 100.0
@@ -179,6 +176,12 @@ def _still(
     warm = heat is not None and float(np.ptp(heat[np.isfinite(heat)])) > _WARMS_C
     remark = () if warm else ("temperature does not change: only bias, noise and drift can be seen",)
     return Proposal(keys | {"face": face, "block_s": block}, "", (*assumed, tilt), remark)
+
+
+def serial_of(path: Path) -> str:
+    """A serial number from the name of a file."""
+    stem = re.sub(r"[^A-Za-z0-9._+-]", "-", path.name.split(".")[0]).strip("._+-")
+    return stem[:64] or "UNIT-1"
 
 
 def _mapped(name: str, names: list[str]) -> str:

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inertial import change_of_level
+from inertial.arrays import Array
 from pipelines.importers import clocks, files, guesses, sample_faults, sources, stretches, unit_check, values
 from pipelines.importers.content import Content
 from pipelines.importers.exchange import is_exchange
@@ -19,8 +19,6 @@ from pipelines.importers.mapping import TIME_UNITS
 from pipelines.importers.proposal import ASSUMED_HZ, Proposal, columns_and_units, for_fit, of_stops
 from pipelines.importers.record_time import gap_limit
 from schemas.units import AXES
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -221,14 +219,12 @@ def _stops(output: Array, time: Array) -> stretches.Stops | None:
 
 
 def _handling(stops: stretches.Stops, time: Array) -> str:
-    """A sentence on the motion before the first stop and after the last, which no dwell has; empty where there is none."""
+    """A sentence on the motion before the first stop and after the last, longer than a window; empty where there is none."""
     if not len(stops.found):
         return ""
-    first, last = float(time[stops.found.first[0]] - time[0]), float(time[stops.found.last[-1] - 1] - time[0])
-    ends = [f"0 to {first:.1f} s"] if first > stops.window_s else []
-    span = float(time[-1] - time[0])
-    ends += [f"{last:.1f} to {span:.1f} s"] if span - last > stops.window_s else []
-    return f"handling at the ends left out: {' and '.join(ends)}" if ends else ""
+    first, last = (float(time[k] - time[0]) for k in (stops.found.first[0], stops.found.last[-1] - 1))
+    ends = first > stops.window_s, float(time[-1] - time[0]) - last > stops.window_s
+    return stretches.handling_left_out(stops.found, time, ends)
 
 
 def _with_stops(keys: dict[str, Any], output: Array, stops: stretches.Stops | None) -> dict[str, Any]:

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from inertial import frames
+from inertial.arrays import Array, Index
 from inertial.quantities import FORCE_COLUMNS
 from pipelines.importers import clocks, exchange, pose_check, sample_faults, unit_check, values
 from pipelines.importers.content import Content
@@ -141,7 +141,7 @@ def _columns(table: pd.DataFrame, mapping: Mapping, where: str) -> dict[str, pd.
 
 def _with_numbers(
     columns: dict[str, pd.Series], mapping: Mapping, where: str, content: Content
-) -> tuple[NDArray[np.int64], dict[str, pd.Series], tuple[str, ...]]:
+) -> tuple[Index, dict[str, pd.Series], tuple[str, ...]]:
     """Rows that are kept (k,), the columns with these rows, and a remark on the others, which lack a number."""
     count = len(next(iter(columns.values())))
     if mapping.gaps == "refuse":
@@ -166,7 +166,7 @@ def _with_numbers(
     return kept, {name: one.iloc[kept].reset_index(drop=True) for name, one in columns.items()}, (remark,)
 
 
-def _twice(time: NDArray[np.float64], raw: NDArray[np.float64]) -> tuple[str, ...]:
+def _twice(time: Array, raw: Array) -> tuple[str, ...]:
     """A remark on rows that repeat the row before, with its time: they count twice in the means and their noise."""
     same = (np.diff(time) == 0.0) & np.all(np.diff(raw, axis=0) == 0.0, axis=1)
     if not same.any():
@@ -190,11 +190,9 @@ def _serials(columns: dict[str, pd.Series], mapping: Mapping, where: str) -> lis
     return [mapping.unit] * len(next(iter(columns.values())))
 
 
-def _extras(
-    columns: dict[str, pd.Series], mapping: Mapping, where: str, content: Content
-) -> dict[str, NDArray[np.float64]]:
+def _extras(columns: dict[str, pd.Series], mapping: Mapping, where: str, content: Content) -> dict[str, Array]:
     """Temperature, other known columns and covariates by the names of the tables."""
-    extras: dict[str, NDArray[np.float64]] = {}
+    extras: dict[str, Array] = {}
     for meaning, column in columns.items():
         if meaning in ("time", *AXES, "unit", "dwell"):
             continue
@@ -207,7 +205,7 @@ def _extras(
     return extras
 
 
-def _celsius(values: NDArray[np.float64], unit: str) -> NDArray[np.float64]:
+def _celsius(values: Array, unit: str) -> Array:
     if unit == "K":
         return values - 273.15
     return (values - 32.0) / 1.8 if unit == "degF" else values
@@ -244,9 +242,9 @@ def _means(samples: pd.DataFrame, intervals: Stretches, extras: tuple[str, ...],
 
 def _as_dwells(
     columns: dict[str, pd.Series],
-    output: NDArray[np.float64],
+    output: Array,
     serials: list[str],
-    extras: dict[str, NDArray[np.float64]],
+    extras: dict[str, Array],
     mapping: Mapping,
     content: Content,
     where: str,

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.counts import number_of
 from pipelines.importers import clocks, values
 from pipelines.importers.clocks import RecordingClock
@@ -115,7 +115,7 @@ def _clock(
     return clocks.clock(numbers, name, mapping.units.time, stated, where)
 
 
-def backwards(time: NDArray[np.float64], group: Sequence[Any], where: str, *, together: bool) -> None:
+def backwards(time: Array, group: Sequence[Any], where: str, *, together: bool) -> None:
     """Refuse times that run back within a group.
 
     Parameters
@@ -134,7 +134,7 @@ def backwards(time: NDArray[np.float64], group: Sequence[Any], where: str, *, to
         )
 
 
-def gap_limit(steps: NDArray[np.float64]) -> float:
+def gap_limit(steps: Array) -> float:
     """The step of a clock, s, above which samples are missing.
 
     A logger that writes in bursts has a long step after each; steps that one in a hundred has are those of its clock.
@@ -148,7 +148,7 @@ def gap_limit(steps: NDArray[np.float64]) -> float:
 
 
 def gaps_of(
-    time: NDArray[np.float64], labels: pd.Series | None, breaks: Sequence[int], mapping: Mapping, where: str
+    time: Array, labels: pd.Series | None, breaks: Sequence[int], mapping: Mapping, where: str
 ) -> tuple[list[int], tuple[str, ...]]:
     """Rows before which samples are missing, with the breaks that were known before; a remark on them.
 
@@ -176,8 +176,8 @@ def gaps_of(
 
 
 def time_doubts(
-    time: NDArray[np.float64],
-    heat: NDArray[np.float64] | None,
+    time: Array,
+    heat: Array | None,
     intervals: Stretches,
     mapping: Mapping,
     *,

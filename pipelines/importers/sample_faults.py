@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inertial import record_faults
+from inertial.arrays import Array, Flags, Index
 from pipelines.importers.documents import SampleFaultDocument
 from pipelines.importers.mapping import Mapping
 from pipelines.importers.stretches import Stretches
@@ -26,13 +26,13 @@ class SampleFaults:
 
     frozen: tuple[record_faults.Frozen, ...]
     torn: tuple[record_faults.Torn, ...]
-    bad: NDArray[np.bool_]
+    bad: Flags
 
     def __bool__(self) -> bool:
         """Whether there are faults."""
         return bool(self.frozen or self.torn)
 
-    def sentences(self, time: NDArray[np.float64]) -> list[str]:
+    def sentences(self, time: Array) -> list[str]:
         """The faults as text."""
         texts = [
             f"axis {AXES[one.axis]} is constant for {one.count} samples from row {one.start + 1} on ({time[one.start]:.6g} s)"
@@ -46,7 +46,7 @@ class SampleFaults:
             for one in self.torn
         ]
 
-    def rows(self, time: NDArray[np.float64]) -> list[SampleFaultDocument]:
+    def rows(self, time: Array) -> list[SampleFaultDocument]:
         """The faults for JSON."""
         still: list[SampleFaultDocument] = [
             {"fault": "stuck_output", "axis": AXES[one.axis], "first_row": one.start + 1, "samples": one.count,
@@ -61,7 +61,7 @@ class SampleFaults:
         return still + torn
 
 
-def look(output: NDArray[np.float64]) -> SampleFaults:
+def look(output: Array) -> SampleFaults:
     """The faults of the samples of a record (n, 3)."""
     frozen, torn = tuple(record_faults.frozen(output)), tuple(record_faults.torn(output))
     bad = np.zeros(len(output), dtype=bool)
@@ -72,7 +72,7 @@ def look(output: NDArray[np.float64]) -> SampleFaults:
     return SampleFaults(frozen, torn, bad)
 
 
-def mended(output: NDArray[np.float64], faults: SampleFaults, bad: NDArray[np.bool_]) -> NDArray[np.float64]:
+def mended(output: Array, faults: SampleFaults, bad: Flags) -> Array:
     """The record (n, 3) for the search for dwells: torn words that are left out are replaced by the running median."""
     if not bad.any() or not faults.torn:
         return output
@@ -82,9 +82,7 @@ def mended(output: NDArray[np.float64], faults: SampleFaults, bad: NDArray[np.bo
     return clean
 
 
-def without_short(
-    intervals: Stretches, record: NDArray[np.int64]
-) -> tuple[Stretches, NDArray[np.int64], tuple[str, ...]]:
+def without_short(intervals: Stretches, record: Index) -> tuple[Stretches, Index, tuple[str, ...]]:
     """The dwells that keep at least half of their samples, renumbered, and a remark on the others."""
     left = [int(np.count_nonzero(record[a:b])) for a, b in zip(intervals.first, intervals.last, strict=True)]
     kept = [k for k, count in enumerate(left) if 2 * count > intervals.last[k] - intervals.first[k]]
@@ -98,8 +96,8 @@ def without_short(
 
 
 def sound_dwells(
-    columns: dict[str, NDArray[np.float64]], labels: list[str], mapping: Mapping, where: str
-) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
+    columns: dict[str, Array], labels: list[str], mapping: Mapping, where: str
+) -> tuple[Flags, tuple[str, ...]]:
     """Which rows that are dwells already are used (n,), and a remark: those with an axis without scatter are faulty.
 
     Raises
@@ -130,9 +128,7 @@ def sound_dwells(
     return sound, (f"{rows.size} dwells with a constant axis {'kept' if sound.all() else 'left out'}: {found}",)
 
 
-def refuse_or_remark(
-    faults: SampleFaults, output: NDArray[np.float64], time: NDArray[np.float64], mapping: Mapping, where: str
-) -> tuple[str, ...]:
+def refuse_or_remark(faults: SampleFaults, output: Array, time: Array, mapping: Mapping, where: str) -> tuple[str, ...]:
     """Remarks on the faults that are left out or kept.
 
     Raises

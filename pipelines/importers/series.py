@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from pipelines.archive import Run
 from pipelines.importers import files
 from pipelines.importers.mapping import TIME_UNITS
@@ -17,8 +17,6 @@ from pipelines.importers.values import finite_column
 from schemas.errors import DataRejected, WrongUse
 from schemas.foreign import shown
 from schemas.units import AXES
-
-Array = NDArray[np.float64]
 
 UNEVEN = 0.5
 """Largest deviation of a time from the even grid, in steps; above it a sample is missing or duplicated."""

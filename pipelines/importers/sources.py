@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from pipelines.importers import clocks, files, values
 from pipelines.importers.content import Content
 from pipelines.importers.stated_units import column_name
@@ -105,7 +105,7 @@ def _beside(contents: Sequence[Content], names: list[str], time: str) -> Content
     return replace(first, table=pd.DataFrame(columns), units=units, remarks=tuple(remarks), lines=())
 
 
-def _at(times: pd.Series, own: pd.Series, data: pd.Series, where: str) -> NDArray[np.float64]:
+def _at(times: pd.Series, own: pd.Series, data: pd.Series, where: str) -> Array:
     """A column read at other times; NaN outside its own times."""
     at, given = _instants(times, where), _instants(own, where)
     if np.any(np.diff(given) < 0.0):
@@ -116,7 +116,7 @@ def _at(times: pd.Series, own: pd.Series, data: pd.Series, where: str) -> NDArra
     return np.where((at < given[0] - slack) | (at > given[-1] + slack), np.nan, inside)
 
 
-def _instants(column: pd.Series, where: str) -> NDArray[np.float64]:
+def _instants(column: pd.Series, where: str) -> Array:
     """Numbers that grow with time, the same for the same instant in every file."""
     if column.dtype.kind in "fiu":
         return column.to_numpy(dtype=np.float64)

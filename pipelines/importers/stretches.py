@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inertial import change_of_level, static_intervals
+from inertial.arrays import Array
 from pipelines.importers.mapping import Mapping
 from schemas.errors import DataRejected, did_you_mean
 
@@ -69,8 +69,8 @@ class _SearchOptions:
 
 def stretches(
     labels: Sequence[str] | None,
-    output: NDArray[np.float64],
-    time: NDArray[np.float64],
+    output: Array,
+    time: Array,
     breaks: Sequence[int],
     mapping: Mapping,
     where: str,
@@ -103,7 +103,7 @@ def stretches(
     return _named(intervals, mapping, where)
 
 
-def found_stops(output: NDArray[np.float64], time: NDArray[np.float64], edges: Sequence[int]) -> Stops:
+def found_stops(output: Array, time: Array, edges: Sequence[int]) -> Stops:
     """The stops of a record that was turned by hand, with the longest window that takes none of several positions for one.
 
     Parameters
@@ -130,14 +130,14 @@ def found_stops(output: NDArray[np.float64], time: NDArray[np.float64], edges: S
     )  # the longest window that finds nearly all
 
 
-def _stops(output: NDArray[np.float64], time: NDArray[np.float64], edges: Sequence[int], how: _SearchOptions) -> Stops:
+def _stops(output: Array, time: Array, edges: Sequence[int], how: _SearchOptions) -> Stops:
     found = _searched(output, time, edges, how)
     pairs = zip(found.first, found.last, strict=True)
     several = tuple(k for k, (a, b) in enumerate(pairs) if change_of_level.several_levels(output[a:b]) > 1)
     return Stops(how.window_s, found, several, how.threshold)
 
 
-def _limits(output: NDArray[np.float64], time: NDArray[np.float64]) -> list[tuple[float, float]]:
+def _limits(output: Array, time: Array) -> list[tuple[float, float]]:
     """The windows of the search, s, and the scatter in the quietest stretch of each."""
     rate = (len(time) - 1) / float(time[-1] - time[0])
     usable = [window for window in WINDOWS_S if len(output) >= 3 * max(3, round(window * rate))]
@@ -151,14 +151,14 @@ def _by_labels(labels: Sequence[str], edges: list[int]) -> Stretches:
     return Stretches(tuple(first), tuple(last), tuple(str(names[k]) for k in first))
 
 
-def _by_blocks(time: NDArray[np.float64], edges: list[int], block_s: float) -> Stretches:
+def _by_blocks(time: Array, edges: list[int], block_s: float) -> Stretches:
     number = np.floor((time - time[0]) / block_s).astype(np.int64)
     first = sorted({*(np.flatnonzero(np.diff(number)) + 1).tolist(), *edges[:-1]})
     last = [*first[1:], time.size]
     return Stretches(tuple(first), tuple(last), tuple(f"block {k}" for k in range(len(first))))
 
 
-def _without_handled_ends(intervals: Stretches, output: NDArray[np.float64], time: NDArray[np.float64]) -> Stretches:
+def _without_handled_ends(intervals: Stretches, output: Array, time: Array) -> Stretches:
     """The blocks of a still record without those at its ends in which a hand still holds the sensor; a remark on these."""
     pairs = list(zip(intervals.first, intervals.last, strict=True))
     scatter = np.array([float(np.linalg.norm(output[a:b].std(axis=0))) for a, b in pairs])
@@ -166,13 +166,24 @@ def _without_handled_ends(intervals: Stretches, output: NDArray[np.float64], tim
     kept = intervals.only(range(int(calm[0]), int(calm[-1]) + 1)) if calm.size else intervals
     if len(kept) == len(intervals):
         return intervals
+    remark = handling_left_out(kept, time, (bool(calm[0] > 0), bool(calm[-1] + 1 < len(intervals))))
+    return replace(kept, remarks=(remark,))
+
+
+def handling_left_out(kept: Stretches, time: Array, ends: tuple[bool, bool]) -> str:
+    """A sentence on the motion before the first stretch and after the last, which no dwell has; empty where there is none.
+
+    Parameters
+    ----------
+    ends : whether there is such motion at the beginning, and at the end
+    """
     first, last, end = (float(time[k] - time[0]) for k in (kept.first[0], kept.last[-1] - 1, len(time) - 1))
-    ends = [f"0 to {first:.1f} s"] if calm[0] > 0 else []
-    ends += [f"{last:.1f} to {end:.1f} s"] if calm[-1] + 1 < len(intervals) else []
-    return replace(kept, remarks=(f"handling at the ends left out: {' and '.join(ends)}",))
+    spans = [f"0 to {first:.1f} s"] if ends[0] else []
+    spans += [f"{last:.1f} to {end:.1f} s"] if ends[1] else []
+    return f"handling at the ends left out: {' and '.join(spans)}" if spans else ""
 
 
-def by_positions(output: NDArray[np.float64], count: int, where: str) -> Stretches:
+def by_positions(output: Array, count: int, where: str) -> Stretches:
     """The positions of a record without moves between them, divided at the ``count`` − 1 largest changes."""
     try:
         levels = change_of_level.levels(output, count)
@@ -185,9 +196,7 @@ def by_positions(output: NDArray[np.float64], count: int, where: str) -> Stretch
     return Stretches(tuple(start.tolist()), tuple(stop.tolist()), names, (remark,))
 
 
-def _searched(
-    output: NDArray[np.float64], time: NDArray[np.float64], edges: Sequence[int], how: _SearchOptions
-) -> Stretches:
+def _searched(output: Array, time: Array, edges: Sequence[int], how: _SearchOptions) -> Stretches:
     first: list[int] = []
     last: list[int] = []
     if len(edges) > 2 and how.threshold is None and time[-1] > time[0]:  # one limit for all parts of a record
@@ -208,9 +217,7 @@ def _searched(
     return Stretches(tuple(first), tuple(last), tuple(f"dwell {k}" for k in range(len(first))))
 
 
-def _of_one_position(
-    intervals: Stretches, output: NDArray[np.float64], time: NDArray[np.float64], edges: Sequence[int], where: str
-) -> Stretches:
+def _of_one_position(intervals: Stretches, output: Array, time: Array, edges: Sequence[int], where: str) -> Stretches:
     """The stretches without a few that have more scatter than noise, as where a hand shifted the sensor; a remark on these.
 
     Raises

@@ -151,13 +151,10 @@ def _read(body: Sequence[str], detected: Layout, names: list[str]) -> pd.DataFra
             parts = [
                 pd.read_csv(io.StringIO("\n".join(body[k : k + _BLOCK])), **how) for k in range(0, len(body), _BLOCK)
             ]
-            if all(len(kinds) == 1 or kinds <= {"i", "u", "f"} for kinds in _kinds(parts)):
+            kinds_of_columns = [{part.dtypes.iloc[k].kind for part in parts} for k in range(len(names))]
+            if all(len(kinds) == 1 or kinds <= {"i", "u", "f"} for kinds in kinds_of_columns):
                 return pd.concat(parts, ignore_index=True)
     return pd.read_csv(io.StringIO("\n".join(body)), **how)
-
-
-def _kinds(parts: Sequence[pd.DataFrame]) -> list[set[str]]:
-    return [{part.dtypes.iloc[k].kind for part in parts} for k in range(len(parts[0].columns))]
 
 
 def _fortran(table: pd.DataFrame) -> pd.DataFrame:

@@ -11,13 +11,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.static_intervals import moving_variance
 from pipelines.importers import unit_check
 from pipelines.importers.stated_units import TEMPERATURE, output_unit
-
-Array = NDArray[np.float64]
 
 REFERENCE = re.compile(r"^(?:force|ref|true|applied|expected|nominal|g)(?:[_ ]?in)?(?:[_ .].*)?$", re.IGNORECASE)
 """Names of what a sensor should read; never an output."""
@@ -107,7 +105,7 @@ def triad(columns: Mapping[str, Array], units: Mapping[str, str]) -> Triad:
     units : as the file states them
     """
     live = [name for name in columns if _may_be_output(name, units.get(name, "")) and _changes(columns[name])][:_MOST]
-    groups = dict(_lettered([name for name in columns if _plain(columns[name])][:_MOST]))
+    groups = dict(_lettered([name for name in columns if np.isfinite(columns[name]).any()][:_MOST]))
     of_other = {name for stem, names in groups.items() for name in names if OTHER.search(stem)}
     usable = {stem: names for stem, names in groups.items() if all(name in live for name in names)}
     stated = {
@@ -254,10 +252,6 @@ def _may_be_output(name: str, unit: str) -> bool:
         return False
     own = _OF_MATRIX.sub("", name)  # the name of a matrix is that of all its columns
     return not ((OTHER.search(name) and not stated) or HEAT.search(own) or (COUNT.search(own) and not stated))
-
-
-def _plain(numbers: Array) -> bool:
-    return bool(np.isfinite(numbers).any())
 
 
 def _changes(numbers: Array) -> bool:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from schemas.errors import DataRejected
 from schemas.units import STANDARD_GRAVITY_M_S2
 
@@ -28,7 +28,7 @@ _END, _OFTEN, _SELDOM = 1 / 16, 0.03, 0.005
 without force lies at both ends if its sign was lost, and in the middle if the converter's zero is there."""
 
 
-def size_of(output: NDArray[np.float64]) -> float:
+def size_of(output: Array) -> float:
     """Size of gravity in a record (n, 3), as its median norm."""
     return float(np.median(np.linalg.norm(output[:_MOST], axis=1)))
 
@@ -38,7 +38,7 @@ def looks_like(size: float) -> str:
     return next((unit for unit, one in GRAVITY.items() if LIKELY[0] < size / one < LIKELY[1]), "")
 
 
-def unit_of(output: NDArray[np.float64], size: float) -> tuple[str, str]:
+def unit_of(output: Array, size: float) -> tuple[str, str]:
     """The probable unit of a record (n, 3) in which gravity has a size, and the reason; it ends in DOUBT where it is a guess."""
     whole = bool(np.all(output[:1000] == np.rint(output[:1000])))
     likely = looks_like(size)
@@ -55,7 +55,7 @@ def unit_of(output: NDArray[np.float64], size: float) -> tuple[str, str]:
     return "LSB", f"its norm is {size:.5g}, neither gravity nor volts{DOUBT}"
 
 
-def unsigned_bits(output: NDArray[np.float64]) -> int:
+def unsigned_bits(output: Array) -> int:
     """Bits of signed words that were read as unsigned in a record of counts (n, 3): −1 reads as 65535; 0 if there are none.
 
     Shown by the norm, which is that of gravity only after 2^bits is subtracted from the upper half of the numbers; where the
@@ -79,18 +79,18 @@ def unsigned_bits(output: NDArray[np.float64]) -> int:
     )
 
 
-def _jumps(x: NDArray[np.float64], size: float) -> float:
+def _jumps(x: Array, size: float) -> float:
     """Share of neighbouring samples (n, 3) that are further apart than a size: words about zero jump by the whole range."""
     return float(np.mean(np.abs(np.diff(x, axis=0)).max(axis=1) > size)) if len(x) > 1 else 0.0
 
 
-def _scatter(x: NDArray[np.float64]) -> float:
+def _scatter(x: Array) -> float:
     """Half-width of the middle half of the norms of samples (n, 3) over their median."""
     low, middle, high = np.quantile(np.linalg.norm(x, axis=1), (0.25, 0.5, 0.75))
     return float(0.5 * (high - low) / middle) if middle > 0.0 else np.inf
 
 
-def refuse_other_unit(output: NDArray[np.float64], claimed: str, where: str) -> tuple[str, ...]:
+def refuse_other_unit(output: Array, claimed: str, where: str) -> tuple[str, ...]:
     """Refuse a record whose norm contradicts the unit; remarks if it is only unusual.
 
     Parameters
@@ -127,7 +127,7 @@ def refuse_other_unit(output: NDArray[np.float64], claimed: str, where: str) -> 
     return ()
 
 
-def _counts(output: NDArray[np.float64], size: float, close: str, where: str) -> tuple[str, ...]:
+def _counts(output: Array, size: float, close: str, where: str) -> tuple[str, ...]:
     whole = bool(np.all(output[:1000] == np.rint(output[:1000])))
     bits = unsigned_bits(output)
     if bits:

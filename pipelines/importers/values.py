@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.quantities import BY_COLUMN, FORCE_COLUMNS, LARGEST, LARGEST_TIME_S, RECORDED, SPREAD_COLUMNS
 from pipelines.importers.content import Content
 from schemas.errors import DataRejected, did_you_mean
@@ -38,7 +38,7 @@ def is_moment(values: pd.Series) -> bool:
     return values.dtype.kind in "mM" or isinstance(values.dtype, pd.DatetimeTZDtype)
 
 
-def seconds(values: pd.Series, where: str) -> NDArray[np.float64]:
+def seconds(values: pd.Series, where: str) -> Array:
     """Seconds since the first of points in time, or of spans of it, whatever unit the column has them in."""
     missing = np.flatnonzero(values.isna())
     if missing.size:
@@ -53,7 +53,7 @@ def seconds(values: pd.Series, where: str) -> NDArray[np.float64]:
     return np.asarray(steps, dtype=np.float64)
 
 
-def as_numbers(values: pd.Series, where: str, *, flags: bool = False) -> NDArray[np.float64]:
+def as_numbers(values: pd.Series, where: str, *, flags: bool = False) -> Array:
     """The values of a column, NaN for others.
 
     Parameters
@@ -75,7 +75,7 @@ def as_numbers(values: pd.Series, where: str, *, flags: bool = False) -> NDArray
 
 def finite(
     values: pd.Series, where: str, content: Content, *, flags: bool = False, needed: str = "a finite number"
-) -> NDArray[np.float64]:
+) -> Array:
     """The numbers of a column; others are refused with row, and line if ``content`` knows it."""
     numbers = as_numbers(values, where, flags=flags)
     bad = np.flatnonzero(~np.isfinite(numbers))
@@ -95,7 +95,7 @@ def finite_column(
     name: str,
     where: str,
     remedy: str = "remove the gap, or cut the recording there",
-) -> NDArray[np.float64]:
+) -> Array:
     """The numbers of a column of samples or points; a missing column and a value that is no finite number are refused."""
     if name not in table.columns:
         raise DataRejected(f"{where}: column '{shown(name)}' is not there; {did_you_mean(name, list(table.columns))}")
@@ -115,9 +115,7 @@ def _has_flags(values: pd.Series) -> bool:
     return values.dtype == object and any(isinstance(value, bool | np.bool_) for value in values)
 
 
-def refuse_outside(
-    values: NDArray[np.float64], column: str, where: str, *, label: str = "", first_row: int = 1
-) -> None:
+def refuse_outside(values: Array, column: str, where: str, *, label: str = "", first_row: int = 1) -> None:
     """Refuse impossible values, with row, value and bounds; gaps count as possible.
 
     Parameters

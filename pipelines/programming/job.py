@@ -77,7 +77,7 @@ def program_run(
 
     def end_certificate(serial: str) -> int:
         held[serial] = _held(ledger, serial, run.id, day)
-        if _ends(ledger, serial, day):
+        if any(one.until > day and one.start < one.until for one in ledger.calibrations(serial)):
             ledger.revoke(serial, REASON, day=day)
         return len(ledger.events(serial)) + 1 if held[serial] is not None else 0
 
@@ -147,11 +147,6 @@ def _held(ledger: Ledger, serial: str, run: str, day: str) -> Calibration | None
     if last is None or last.holds(day):
         return last
     return last if last.ended_by is not None and last.ended_by.reason == REASON else None
-
-
-def _ends(ledger: Ledger, serial: str, day: str) -> bool:
-    """Whether a unit has a certificate that the programming ends."""
-    return any(one.until > day and one.start < one.until for one in ledger.calibrations(serial))
 
 
 @contextmanager

@@ -7,15 +7,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from pipelines.export.device_block import CoefficientBlock, Form, unpack
 from pipelines.export.polynomials import UnitCalibration
 from schemas.errors import StationRefused
 from schemas.units import MICRO
 from stations.devices.memory import Copy, UnitMemory
-
-Array = NDArray[np.float64]
 
 RESOLUTION_UG = 2.0
 TEMPERATURE_SLACK_K = 2.0

@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.frames import force_from_angles
 from pipelines.archive.store import Place
 from pipelines.certificates.programmed import add
@@ -32,8 +32,6 @@ from schemas.units import STANDARD_GRAVITY_M_S2
 from stations.devices.memory import COPIES, UnitMemory
 from stations.safety.suspenders import require_released
 from stations.station import Station
-
-Array = NDArray[np.float64]
 
 OFF_S, BOOT_S = 2.0, 1.0
 POSES = 2

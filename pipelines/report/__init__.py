@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from pipelines.archive import Run, code_hash, stage_key
-from pipelines.certificates.statement import Stated, stated
+from pipelines.certificates.ledger import stated
+from pipelines.certificates.validity import Calibration
 from pipelines.report.context import OPTIONAL, TABLES, ReportContext
 from pipelines.report.interactive import interactive as with_scripts
 from pipelines.report.panel import rendered
@@ -18,7 +19,7 @@ __all__ = ["TABLES", "make_report", "render"]
 PANELS = "pipelines.report.panels"
 
 
-def render(run: Run, certificates: Mapping[str, Stated] | None = None) -> str:
+def render(run: Run, certificates: Mapping[str, Calibration] | None = None) -> str:
     """The report of a run as one HTML text that needs no other file, of the panels that are found.
 
     Parameters
@@ -39,7 +40,7 @@ def make_report(run: Run) -> bool:
     certificates = stated(run, run.table("grades")["unit"])
     parameters: dict[str, Any] = {"page": page_hash()}  # the code's hash has no templates
     if certificates:
-        parameters["certificates"] = {unit: list(one) for unit, one in sorted(certificates.items())}
+        parameters["certificates"] = {unit: one.stated() for unit, one in sorted(certificates.items())}
     key = stage_key("report", inputs, parameters, code)
     if run.has_report(key):
         run.seal()  # a killed writer may not have written it

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from pipelines.archive import Run
-from pipelines.certificates.statement import Stated
+from pipelines.certificates.validity import Calibration
 from pipelines.report.reasons import plain_reason
 from pipelines.tables.frames import rows_of
 
@@ -35,7 +35,7 @@ class ReportContext:
     not_needed: tuple[str, ...] = ()
     """Entries of [uncertainty] that nothing of the run depends on."""
 
-    def __init__(self, run: Run, certificates: Mapping[str, Stated]) -> None:
+    def __init__(self, run: Run, certificates: Mapping[str, Calibration]) -> None:
         self.run = run
         self.certificates = certificates
         self.about: dict[str, Any] = run.about

@@ -7,7 +7,8 @@ from typing import Any
 
 from inertial.quantities import ANGLE_COLUMNS, FORCE_COLUMNS
 from pipelines.archive import Run, code_hash, stage_key
-from pipelines.certificates.statement import Stated, stated
+from pipelines.certificates.ledger import stated
+from pipelines.certificates.validity import Calibration
 from pipelines.diagnosis.diagnose import examination
 from pipelines.jobs.model_files import use_formulas_of
 from pipelines.report.context import ReportContext
@@ -43,7 +44,7 @@ magnitude, weighted by how far the force points along the axis.{% endif %}</p>{%
 class ImportContext(ReportContext):
     """An import that was graded, as the panels of a report read it."""
 
-    def __init__(self, run: Run, certificates: Mapping[str, Stated]) -> None:
+    def __init__(self, run: Run, certificates: Mapping[str, Calibration]) -> None:
         super().__init__(run, certificates)
         if self.tables["grades"]["unit"].nunique() < FEWEST_OF_A_LOT:
             self.tables.pop("lot_risks", None)
@@ -54,7 +55,7 @@ class ImportContext(ReportContext):
             self.not_needed = OF_ENCODERS
 
 
-def certificates_of(run: Run) -> dict[str, Stated]:
+def certificates_of(run: Run) -> dict[str, Calibration]:
     """The certificates of the units of an import; none where it has no grades."""
     return stated(run, run.table("grades")["unit"]) if "grades" in run.tables() else {}
 
@@ -102,7 +103,7 @@ def make_imported_report(run: Run) -> bool:
     inputs, code = {name: run.manifest(name)["sha256"] for name in (*names, *judged)}, code_hash("report of an import")
     parameters: dict[str, Any] = {"effects": effects}
     if given := certificates_of(run):
-        parameters["certificates"] = {unit: list(one) for unit, one in sorted(given.items())}
+        parameters["certificates"] = {unit: one.stated() for unit, one in sorted(given.items())}
     key = stage_key("report", inputs, parameters, code)
     if run.has_report(key):
         run.seal()

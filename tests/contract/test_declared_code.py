@@ -30,7 +30,7 @@ STARTS = {
     "import of waveforms": "pipelines.importers.waveforms pipelines.procedures",
     "import of a transfer function": "pipelines.importers.transfer",
     "report": "pipelines.report.context pipelines.report.interactive pipelines.report.panel pipelines.report.panels "
-    "pipelines.report.templates pipelines.report.unit_panels pipelines.certificates.statement pipelines.procedures",
+    "pipelines.report.templates pipelines.report.unit_panels pipelines.certificates.ledger pipelines.procedures",
     "report of an import": "pipelines.report.diagnosis pipelines.report.imported pipelines.diagnosis.diagnose",
     "inquiry": "pipelines.diagnosis.diagnose inertial",
 }

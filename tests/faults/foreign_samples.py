@@ -172,10 +172,10 @@ def recordings_of_others():
             rdata.write_rda(path, {"imu": frame.astype("float64")}, compression=None)
             recordings.append((".rda", path.read_bytes()))
         for form, writer in WRITERS.items():
-            path = path.with_suffix(writer.SUFFIX)
+            path = path.with_suffix(writer.suffix)
             with contextlib.suppress(ImportError, TumblelineError):  # its library is not installed
                 write_waveforms(form, channels, path)
-                recordings.append((writer.SUFFIX, path.read_bytes()))
+                recordings.append((writer.suffix, path.read_bytes()))
     return recordings
 
 

@@ -16,8 +16,7 @@ from pipelines.certificates.document.compose import compose
 from pipelines.certificates.document.content import CertificateContent
 from pipelines.certificates.document.dcc import dcc, statements_of
 from pipelines.certificates.document.laboratory import LaboratoryFile
-from pipelines.certificates.document.signature_check import canonical, parsed
-from pipelines.certificates.document.xml_facts import CertificateFacts, first, statements
+from pipelines.certificates.document.signature_check import CertificateFacts, canonical, first, parsed, statements
 from schemas.errors import ArchiveUnusable, TumblelineError
 
 SHOWN = 3  # different places that are named

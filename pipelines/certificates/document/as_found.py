@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.correction import correct
 from inertial.design import carried_over
 from pipelines.archive import Run
@@ -56,11 +56,11 @@ def adjustment(run: Run, calibration: Calibration, known: list[Calibration]) -> 
     )  # fmt: skip
 
 
-def _rms(values: NDArray[np.float64]) -> float:
+def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-def _errors(run: Run, source: Run, unit: str) -> NDArray[np.float64]:
+def _errors(run: Run, source: Run, unit: str) -> Array:
     """| |a| − g | of a run's dwells, (n,), µg, with the coefficients of another run; verification dwells where there are any."""
     dwells, coefficients, covariance = run.table("dwells"), source.table("coefficients"), source.table("covariance")
     history = run.table("history") if "history" in run.tables() else None

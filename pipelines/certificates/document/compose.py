@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import isfinite, nan
 from typing import Any
 
 from inertial.counts import number_of
@@ -21,15 +22,16 @@ from pipelines.certificates.document.content import (
 )
 from pipelines.certificates.document.laboratory import LaboratoryFile
 from pipelines.certificates.document.numbers import probability, significant
+from pipelines.certificates.ledger import stated
 from pipelines.certificates.measured import measured_on, measured_span
-from pipelines.certificates.stated_budget import StatedBudget, StatedQuantity, stated_budget
-from pipelines.certificates.statement import stated
+from pipelines.certificates.stated_budget import Row, StatedBudget, edge, stated_budget
 from pipelines.stages.figures import FIGURES
 from pipelines.stages.uncertainty.contributions import left_out
 from pipelines.stages.uncertainty.tables import LABELS
 from pipelines.tables.frames import rows_of
 from schemas.decisions import BOUND, GRADES, LARGEST_ERROR, MEDIAN, exceedance
 from schemas.errors import ArchiveUnusable, WrongUse
+from schemas.reference import Reference
 from schemas.uncertainty import Uncertainty
 
 QUANTITIES = {
@@ -90,7 +92,6 @@ def compose(run: Run, calibration: Calibration, known: list[Calibration], who: L
     recipe, station = about.get("recipe") or {}, about.get("station") or {}
     coefficients = [_coefficient(row) for row in rows_of(run.table("coefficients")) if row["unit"] == serial]
     first, last = measured_span(run) or (measured_on(run), measured_on(run))
-    references = tuple(_reference(one) for one in budget["references"])
     return CertificateContent(
         number=calibration.certificate,
         issued=event.when[:10],
@@ -104,20 +105,22 @@ def compose(run: Run, calibration: Calibration, known: list[Calibration], who: L
         who=who,
         method=_method(run, recipe, who),
         norms=NORMS,
-        frame=FRAMES.get(budget["frame"], budget["frame"]),
+        frame=FRAMES.get(budget.frame, budget.frame),
         conditions=tuple(_conditions(run, serial, recipe)),
-        references=references,
+        references=tuple(_reference(one) for one in budget.references),
         traceability=_traceability(budget, {**(station.get("uncertainty") or {}), **(recipe.get("uncertainty") or {})}),
-        results=tuple(_result(one, coefficients) for one in budget["quantities"] if one["quantity"] != LARGEST_ERROR),
-        budgets=tuple(_budget(one) for one in budget["quantities"] if one["quantity"] in BUDGETS),
+        results=tuple(_result(row, coefficients) for row, _ in budget.quantities if row["quantity"] != LARGEST_ERROR),
+        budgets=tuple(_budget(row, parts) for row, parts in budget.quantities if row["quantity"] in BUDGETS),
         coefficients=tuple(coefficients),
-        conformity=tuple(_conformity(one) for one in budget["decisions"]),
-        decision_rule="; ".join(dict.fromkeys(one["rule"] for one in budget["decisions"])),
+        conformity=tuple(_conformity(row) for row in budget.decisions),
+        decision_rule="; ".join(dict.fromkeys(row["rule"] for row in budget.decisions)),
         limits=str((about.get("limits") or {}).get("name", "")),
         grade_statement=_grade_statement(budget, event.grade),
         adjustment=adjustment(run, calibration, known),
         amendment=_amendment(calibration, known),
-        interval=_interval(calibration, agreed=budget["customer_agreed"]),
+        interval=f"As agreed with the customer, the next calibration is due on {calibration.stated_until}."
+        if budget.customer_agreed
+        else "",
         adequacy=event.adequacy,
         left_out=_left_out(run),
         uncertainty_note=UNCERTAINTY,
@@ -141,62 +144,50 @@ def _refuse(run: Run, one: Calibration) -> None:
         )
 
 
-def _coefficient(row: dict[str, Any]) -> Coefficient:
-    return Coefficient(
-        effect=row["effect"],
-        name=row["name"],
-        axis=row["axis"],
-        value=float(row["value"]),
-        standard_error=float(row["standard_error"]),
-        unit=row["unit_text"],
-    )
+def _coefficient(row: Row) -> Coefficient:
+    own = {name: row[name] for name in ("effect", "name", "axis", "value", "standard_error")}
+    return Coefficient(**own, unit=row["unit_text"])
 
 
-def _result(one: StatedQuantity, coefficients: list[Coefficient]) -> Result:
+def _quantity(row: Row) -> str:
+    return QUANTITIES.get(row["quantity"], str(row["quantity"]))
+
+
+def _result(row: Row, coefficients: list[Coefficient]) -> Result:
     """A quantity of the budget; the scale, which the budget has relative to itself, as a sensitivity in units of the output."""
-    name, value, unit, expanded = (
-        QUANTITIES.get(one["quantity"], one["quantity"]),
-        one["value"],
-        one["unit"],
-        one["expanded"],
-    )
-    own = [c for c in coefficients if c.effect == "scale" and c.axis == one["axis"]]
-    if one["quantity"] == "scale" and own:
-        value, unit, expanded = own[0].value, own[0].unit, abs(own[0].value) * 1e-6 * expanded
-    bare = one["quantity"] in {"output", "scale"} and not (one["quantity"] == "scale" and own)
+    value, unit, expanded = row["value"], row["unit_text"], row["expanded"]
+    scale = [c for c in coefficients if c.effect == row["quantity"] == "scale" and c.axis == row["axis"]]
+    if scale:
+        value, unit, expanded = scale[0].value, scale[0].unit, abs(scale[0].value) * 1e-6 * expanded
+    bare = row["quantity"] in {"output", "scale"} and not scale
     return Result(
-        quantity=name,
-        axis=one["axis"],
+        quantity=_quantity(row),
+        axis=row["axis"],
         unit=unit,
         value=None if bare else value,
         expanded=expanded,
-        k=one["k"],
-        dof=one["dof"],
+        k=row["k"],
+        dof=row["dof"] if isfinite(row["dof"]) else None,
     )
 
 
-def _budget(one: StatedQuantity) -> BudgetTable:
-    rows = sorted(one["contributions"], key=lambda row: -row["share"])
-    deviation = (
-        one["quantity"] == "bias_error_period"
-    )  # its contributions add up to the result, not to the result's own u
+def _budget(row: Row, parts: list[Row]) -> BudgetTable:
+    # contributions to the error over the period add up to the result, not to the result's own u
+    deviation = row["quantity"] == "bias_error_period"
     return BudgetTable(
-        quantity=f"{QUANTITIES.get(one['quantity'], one['quantity'])}, {one['axis']}",
-        unit=one["unit"],
-        u=one["value"] if deviation else one["u"],
-        k=None if deviation else one["k"],
-        expanded=None if deviation else one["expanded"],
+        quantity=f"{_quantity(row)}, {row['axis']}",
+        unit=row["unit_text"],
+        u=row["value"] if deviation else row["u"],
+        k=None if deviation else row["k"],
+        expanded=None if deviation else row["expanded"],
         rows=tuple(
             Contribution(
-                name=LABELS.get(row["name"], row["name"]),
-                type=row["type"],
-                distribution=row["distribution"],
-                u=row["u"],
-                unit=one["unit"],
-                share=row["share"],
-                source=_source(row["source"]),
+                name=LABELS.get(one["contribution"], str(one["contribution"])),
+                unit=row["unit_text"],
+                source=_source(one["source"]),
+                **{name: one[name] for name in ("type", "distribution", "u", "share")},
             )
-            for row in rows
+            for one in sorted(parts, key=lambda one: -one["share"])
         ),
     )
 
@@ -208,40 +199,46 @@ def _source(text: str) -> str:
     return text
 
 
-def _conformity(one: Any) -> Conformity:
-    label = FIGURES[one["figure"]].label if one["figure"] in FIGURES else one["figure"]
+def _conformity(row: Row) -> Conformity:
+    label = FIGURES[row["figure"]].label if row["figure"] in FIGURES else row["figure"]
+    least = isfinite(row.get("least", nan))
     return Conformity(
-        figure=f"{label} (least value, accepted from)" if one.get("least") else label,
-        **{name: one[name] for name in ("value", "expanded", "limit", "accept", "unit", "outcome", "pfa")},
+        figure=f"{label} (least value, accepted from)" if least else label,
+        expanded=row["uncertainty"],
+        limit=edge(row),
+        unit=row["unit_text"],
+        **{name: row[name] for name in ("value", "accept", "outcome", "pfa")},
     )
 
 
 def _grade_statement(budget: StatedBudget, grade: str) -> str:
     """What the grade says of the item: a probability, by the distribution of its largest error."""
-    quantiles = {one["axis"]: one["value"] for one in budget["quantities"] if one["quantity"] == LARGEST_ERROR}
+    quantiles = {row["axis"]: row["value"] for row, _ in budget.quantities if row["quantity"] == LARGEST_ERROR}
     if not quantiles or grade not in GRADES:
         return ""
     risk = probability(exceedance(quantiles[MEDIAN], quantiles[BOUND], GRADES[grade]))
     return (
-        f"Grade {grade}: in a use at the end of the stated period of {budget['validity_months']} months, switched on anew, the "
+        f"Grade {grade}: in a use at the end of the stated period of {budget.validity_months} months, switched on anew, the "
         f"RMS error of the corrected output exceeds {GRADES[grade]:g} µg on any axis with a probability of {risk} (95 % bound of "
         f"the largest axis: {significant(quantiles[BOUND])} µg)."
     )
 
 
-def _reference(one: Any) -> ReferenceStandard:
-    accreditation = f" ({one['accreditation']})" if one["accreditation"] else ""
-    uncertainty = "" if one["U"] is None else f"U = {one['U']:g} {one['unit'] or ''} (k = {one['k']:g})"
+def _reference(one: Reference) -> ReferenceStandard:
+    accreditation = f" ({one.accreditation})" if one.accreditation else ""
     return ReferenceStandard(
-        id=one["id"], what=one["what"], certificate=one["certificate"], laboratory=one["laboratory"] + accreditation,
-        date=one["date"] or "", due=one["due"], uncertainty=uncertainty, sha256=one["sha256"],
-    )  # fmt: skip
+        laboratory=one.laboratory + accreditation,
+        date="" if one.date is None else one.date.isoformat(),
+        due=one.due.isoformat(),
+        uncertainty="" if one.U is None else f"U = {one.U:g} {one.unit or ''} (k = {one.k:g})",
+        **{name: getattr(one, name) for name in ("id", "what", "certificate", "sha256")},
+    )
 
 
 def _traceability(budget: StatedBudget, stated_entries: dict[str, Any]) -> str:
     """What is traceable and what is not: an entry of the budget that names no standard is said to rest on its source."""
-    source = budget["grade_source"].replace("_", " ")
-    if not budget["references"]:
+    source = budget.grade_source.replace("_", " ")
+    if not budget.references:
         return (
             "No reference standard with a certificate is stated for this calibration; metrological traceability to the SI is not "
             f"claimed. The uncertainties of the references are taken from: {source}."
@@ -303,9 +300,3 @@ def _amendment(one: Calibration, known: list[Calibration]) -> Amendment:
     ended = [old.certificate for old in known if old.event.sequence in one.event.ends and old.run == one.run]
     after = one.ended_by.certificate if one.ended_by is not None and one.ended_by.action != "revoke" else ""
     return Amendment(replaces=tuple(ended), reason=one.event.reason if ended else "", replaced_by=after)
-
-
-def _interval(one: Calibration, *, agreed: bool) -> str:
-    if not agreed:
-        return ""
-    return f"As agreed with the customer, the next calibration is due on {one.stated_until}."

@@ -15,15 +15,16 @@ from pipelines.certificates.document.dcc import DocumentInvalid, validate
 from pipelines.certificates.document.laboratory import LaboratoryFile
 from pipelines.certificates.document.signature_check import (
     ATTACHMENT,
+    CertificateFacts,
     SignatureBroken,
     attachments,
     canonical,
+    facts_of,
     parsed,
     pdf_signers,
     xml_signature,
 )
 from pipelines.certificates.document.signers import WHERE, Signer, not_trusted, time_of
-from pipelines.certificates.document.xml_facts import CertificateFacts, facts_of
 from schemas.errors import WrongUse
 
 State = Literal["good", "bad", "not checked"]

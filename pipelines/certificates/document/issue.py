@@ -110,16 +110,12 @@ def issue(
     for one, parts in made:
         stem = one.certificate.replace("/", "_")
         paths = {end: folder / f"{stem}.{end}" for end in parts}
-        _write({paths[end]: data for end, data in parts.items()})
+        for end, data in parts.items():
+            files.publish(paths[end], data, WHERE, "give another folder with --output")
         done.written.append(
             Written(one.certificate, one.serial, one.run, paths["pdf"], paths["xml"], paths.get("xml.sig"))
         )
     return done
-
-
-def _write(parts: dict[Path, bytes]) -> None:
-    for path, data in parts.items():
-        files.publish(path, data, WHERE, "give another folder with --output")
 
 
 def _chosen(archive: Archive, names: Sequence[str]) -> tuple[list[tuple[Calibration, list[Calibration]]], Issued]:
@@ -131,7 +127,7 @@ def _chosen(archive: Archive, names: Sequence[str]) -> tuple[list[tuple[Calibrat
         if known:
             one = _of_unit(serial, known, number)
             chosen[one.certificate] = one, known
-        elif number or name in _units(archive):
+        elif number or any(name in info.units for info in archive.runs()):
             raise WrongUse(f"certificate: unit {serial} has no certificate, one is needed; {_why(archive, serial)}")
         else:
             chosen |= _of_run(ledger, archive.run(name), done)
@@ -173,10 +169,6 @@ def _reasons(run: Run) -> dict[str, str]:
         str(row["unit"]): "" if row["outcome"] == "pass" else f"{row['outcome']}, no certificate: {row['reasons']}"
         for row in rows
     }
-
-
-def _units(archive: Archive) -> set[str]:
-    return {serial for info in archive.runs() for serial in info.units}
 
 
 def _why(archive: Archive, serial: str) -> str:

@@ -48,6 +48,7 @@ def _notices(c: CertificateContent) -> list[str]:
 def _head(c: CertificateContent) -> list[list[Any]]:
     who, item = c.who, c.who.item
     accreditation = who.laboratory.accreditation
+    period = " to ".join(dict.fromkeys((c.measured_from, c.measured_to)))
     rows: list[list[Any]] = [
         ["Certificate number", c.number, True],
         ["Laboratory", f"{who.laboratory.name}\n{who.laboratory.address}\n{who.laboratory.email}"],
@@ -58,7 +59,7 @@ def _head(c: CertificateContent) -> list[list[Any]]:
         ["Serial number", c.serial, True],
         ["Condition of the item", item.condition],
         ["Date of receipt", "" if item.received is None else item.received.isoformat()],
-        ["Date of calibration", _period(c.measured_from, c.measured_to)],
+        ["Date of calibration", period],
         ["Place of calibration", PLACES[who.laboratory.place]],
         ["Date of issue", c.issued],
     ]
@@ -70,10 +71,6 @@ PLACES = {
     "laboratoryBranch": "branch of the laboratory", "customerBranch": "branch of the customer",
     "other": "elsewhere, see the remarks",
 }  # fmt: skip
-
-
-def _period(first: str, last: str) -> str:
-    return first if first == last else f"{first} to {last}"
 
 
 def _table(

@@ -28,12 +28,8 @@ class Format(Protocol):
         ...
 
 
-def _formats_by_name() -> dict[str, Format]:
-    modules = (import_module(f"{__name__}.{info.name}") for info in iter_modules(__path__))
-    return {module.NAME: cast("Format", module) for module in modules}
-
-
-FORMATS: dict[str, Format] = _formats_by_name()
+_MODULES = (cast("Format", import_module(f"{__name__}.{info.name}")) for info in iter_modules(__path__))
+FORMATS: dict[str, Format] = {module.NAME: module for module in _MODULES}
 
 
 def export_files(
@@ -47,8 +43,11 @@ def export_files(
         The model has an effect that the format cannot hold, or the format needs a setting that is missing.
     """
     form, chosen = FORMATS[name], settings or ExportSettings()
-    if not getattr(form, "COMPLETE", False):
-        _refuse_left_out(name, units)
+    if (left := units[0].left_out) and not getattr(form, "COMPLETE", False):
+        raise WrongUse(
+            f"export: effect {', '.join(left)} has no place in format {name}, which knows bias, scale, misalignment and "
+            "their temperature; export json, or fit a model without it"
+        )
     if not getattr(form, "FEWER_AXES", False):
         refuse_fewer_axes(units, f"export: format {name}")
     groups = [[unit] for unit in units] if getattr(form, "ONE_UNIT", False) else [list(units)]
@@ -68,12 +67,3 @@ def export_files(
 def export_text(name: str, units: Sequence[UnitCalibration], run: str, settings: ExportSettings | None = None) -> str:
     """The calibrations in a format of text, the files of several units one after another; see :func:`export_files`."""
     return b"".join(export_files(name, units, run, settings).values()).decode()
-
-
-def _refuse_left_out(name: str, units: Sequence[UnitCalibration]) -> None:
-    left = units[0].left_out
-    if left:
-        raise WrongUse(
-            f"export: effect {', '.join(left)} has no place in format {name}, which knows bias, scale, misalignment and "
-            "their temperature; export json, or fit a model without it"
-        )

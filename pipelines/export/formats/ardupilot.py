@@ -5,14 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from pipelines.export.parameters import Offsets, bias_m_s2, heading, in_g, number, rounded, scales
 from pipelines.export.polynomials import UnitCalibration
 from pipelines.export.settings import ExportSettings
-
-Array = NDArray[np.float64]
-
 
 NAME = "ardupilot"
 SUFFIX = ".param"

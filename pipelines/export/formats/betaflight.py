@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from pipelines.export.omissions import (
     ACROSS,
     ACROSS_T,
@@ -20,9 +20,6 @@ from pipelines.export.omissions import (
 )
 from pipelines.export.polynomials import UnitCalibration
 from pipelines.export.settings import ExportSettings
-
-Array = NDArray[np.float64]
-
 
 NAME = "betaflight"
 SUFFIX = ".txt"

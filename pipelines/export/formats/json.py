@@ -31,7 +31,7 @@ def write(units: Sequence[UnitCalibration], run: str, settings: ExportSettings) 
                 "unit": c.unit, "outcome": c.outcome, "grade": c.grade, "out_unit": c.out_unit,
                 "temperatures_C": list(c.temperatures), "bias": c.bias.tolist(), "response": c.response.tolist(),
                 "not_included": list(c.left_out),
-                "certificate": None if c.certificate is None else c.certificate.document(),
+                "certificate": None if c.certificate is None else c.certificate.statement(),
             }
             for c in units
         ],

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from pipelines.export.omissions import largest_error_ug, noise_heading
 from pipelines.export.polynomials import UnitCalibration
 from pipelines.export.settings import ExportSettings
@@ -53,7 +53,7 @@ def _without_calibration(unit: UnitCalibration) -> str:
     """Error of the uncorrected output where the driver divides by the unit's own mean scale."""
     scale = float(np.mean(np.diag(unit.response[0])))
 
-    def applied(output: NDArray[np.float64], temperature: float) -> NDArray[np.float64]:
+    def applied(output: Array, temperature: float) -> Array:
         return output / scale
 
     size = largest_error_ug(unit, applied)

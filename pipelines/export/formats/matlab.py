@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from pipelines.export.omissions import (
     ACROSS_T,
     SCALE,
@@ -21,9 +21,6 @@ from pipelines.export.polynomials import UnitCalibration
 from pipelines.export.settings import ExportSettings
 from schemas.errors import WrongUse
 from schemas.units import MICRO, STANDARD_GRAVITY_M_S2
-
-Array = NDArray[np.float64]
-
 
 NAME = "matlab"
 SUFFIX = ".mat"

@@ -9,24 +9,18 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from pipelines.importers.content import Content, chosen
-from schemas.errors import DataRejected
+from pipelines.importers.content import Content, begins_with, chosen
 from schemas.foreign import foreign
 from schemas.library import library
 
 NAME, TITLE, EXTRA, ORDER = "dataflash", "DataFlash log of ArduPilot (.bin)", "autopilot", 74
-MAGIC = b"\xa3\x95\x80"  # every log begins with the format of its formats
+recognised = begins_with(b"\xa3\x95\x80")  # every log begins with the format of its formats
 REMEDY = "download it again from the vehicle, or export the message with mavlogdump.py"
 CLOCKS = {"TimeUS": 1e-6, "TimeMS": 1e-3}
 """The time of a message and its unit, s; milliseconds before ArduPilot 3.4."""
 UNITS = {"m/s/s": "m/s^2", "rad/s": "rad/s", "degC": "degC", "deg/s": "deg/s", "m": "m", "V": "V"}
 STATED = {"Acc": "m/s^2", "Gyr": "rad/s", "T": "degC"}
 """Units of the fields of IMU and ACC where a log of an older firmware states none, by how their names begin."""
-
-
-def recognised(data: bytes) -> bool:
-    """Whether the file begins with a DataFlash message of formats."""
-    return data.startswith(MAGIC)
 
 
 def read(name: str, data: bytes, group: str) -> Content:
@@ -42,13 +36,10 @@ def read(name: str, data: bytes, group: str) -> Content:
             finally:
                 log.data_map.close()
                 log.filehandle.close()
-    if not rows:
-        raise DataRejected(
-            f"{name}: no message with a time and numbers in this DataFlash log, one is needed; check the file"
-        )
     if f"{group} 0" in rows:
         group = f"{group} 0"
-    title = chosen([(label, len(own)) for label, own in rows.items()], group, name)
+    counts = [(label, len(own)) for label, own in rows.items()]
+    title = chosen(counts, group, name, "no message with a time and numbers in this DataFlash log")
     table = pd.DataFrame(rows[title])
     clock = next(one for one in CLOCKS if one in table)
     table.insert(0, "time", table.pop(clock).to_numpy(float) * CLOCKS[clock])

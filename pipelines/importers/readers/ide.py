@@ -42,11 +42,10 @@ def read(name: str, data: bytes, group: str) -> Content:
         channels = {f"{key}": channel for key, channel in dataset.channels.items()}
         lengths = {key: len(channel.getSession()) for key, channel in channels.items()}
         titles = {f"{key} {channels[key].name}".strip(): key for key, count in lengths.items() if count > 0}
-        if not titles:
-            raise DataRejected(f"{name}: no channel with samples in this IDE recording, one is needed; check the file")
         if group in titles.values():
             titles[group] = group
-        title = chosen([(title, lengths[key]) for title, key in titles.items()], group, name)
+        counts = [(title, lengths[key]) for title, key in titles.items()]
+        title = chosen(counts, group, name, "no channel with samples in this IDE recording")
         return _content(channels[titles[title]])
 
 

@@ -7,20 +7,15 @@ import json
 from collections.abc import Callable
 from typing import Any
 
-from pipelines.importers.content import Content, chosen
+from pipelines.importers.content import Content, begins_with, chosen
 from pipelines.importers.ros_messages import content_of, flattened
 from schemas.errors import DataRejected
 from schemas.foreign import foreign
 from schemas.library import library
 
 NAME, TITLE, EXTRA, ORDER = "mcap", "MCAP (ROS 1, ROS 2, JSON)", "ros", 76
-MAGIC = b"\x89MCAP0\r\n"
+recognised = begins_with(b"\x89MCAP0\r\n")
 REMEDY = "record it again, or run 'mcap recover' on it"
-
-
-def recognised(data: bytes) -> bool:
-    """Whether the file begins as MCAP does."""
-    return data.startswith(MAGIC)
 
 
 def read(name: str, data: bytes, group: str) -> Content:
@@ -42,9 +37,7 @@ def read(name: str, data: bytes, group: str) -> Content:
             for channel in summary.channels.values()
             if channel.schema_id in summary.schemas
         }
-        if not counts:
-            raise DataRejected(f"{name}: no topic with messages in this MCAP recording, one is needed; check the file")
-        topic = chosen([(f"{one}", count) for one, count in counts.items()], group, name)
+        topic = chosen([*counts.items()], group, name, "no topic with messages in this MCAP recording")
         rows = [
             (int(message.log_time), flattened(decoded))
             for _, _, message, decoded in source.iter_decoded_messages(topics=[topic])

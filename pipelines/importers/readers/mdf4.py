@@ -8,20 +8,15 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from pipelines.importers.content import Content, chosen
+from pipelines.importers.content import Content, begins_with, chosen
 from pipelines.importers.unpacking import refuse_larger
 from schemas.errors import DataRejected
 from schemas.foreign import foreign
 from schemas.library import library
 
 NAME, TITLE, EXTRA, ORDER = "mdf4", "MDF 3 and 4 (.mf4, .mdf)", "mdf", 64
-MAGIC = b"MDF     "
+recognised = begins_with(b"MDF     ")
 REMEDY = "copy it again, or export the group as CSV"
-
-
-def recognised(data: bytes) -> bool:
-    """Whether the file begins as MDF does."""
-    return data.startswith(MAGIC)
 
 
 def read(name: str, data: bytes, group: str) -> Content:
@@ -33,13 +28,12 @@ def read(name: str, data: bytes, group: str) -> Content:
             for number, one in enumerate(file.groups)
             if one.channel_group.cycles_nr
         }
-        if not counts:
-            raise DataRejected(f"{name}: no channel group with samples in this MDF file, one is needed; check the file")
         refuse_larger(
             8 * sum(len(one.channels) * int(one.channel_group.cycles_nr) for one in file.groups), len(data), name
         )
         by_number = {str(number): label for label, (number, _) in counts.items()}
-        title = chosen([(label, count) for label, (_, count) in counts.items()], by_number.get(group, group), name)
+        samples = [(label, count) for label, (_, count) in counts.items()]
+        title = chosen(samples, by_number.get(group, group), name, "no channel group with samples in this MDF file")
         signals = [_signal(file, counts[title][0], k) for k in range(len(file.groups[counts[title][0]].channels))]
     own = [signal for signal in signals if signal is not None]
     if not own:

@@ -7,20 +7,15 @@ import io
 import numpy as np
 import pandas as pd
 
-from pipelines.importers.content import Content
+from pipelines.importers.content import Content, begins_with
 from pipelines.importers.unpacking import refuse_larger
 from schemas.errors import DataRejected
 from schemas.foreign import foreign
 
 NAME, TITLE, EXTRA, ORDER = "numpy", "NumPy .npy", "", 95
-MAGIC = b"\x93NUMPY"
+recognised = begins_with(b"\x93NUMPY")
 REMEDY = "save an array of numbers, samples by columns, with numpy.save(…, allow_pickle=False)"
 _KINDS = frozenset("fiubUM")
-
-
-def recognised(data: bytes) -> bool:
-    """Whether the file begins as a NumPy array does."""
-    return data.startswith(MAGIC)
 
 
 def read(name: str, data: bytes, group: str) -> Content:
@@ -37,13 +32,11 @@ def read(name: str, data: bytes, group: str) -> Content:
         columns = {str(k + 1): tall[:, k] for k in range(tall.shape[1])}
     else:
         columns = {}
-    kept = {label: _native(column) for label, column in columns.items() if column.ndim == 1}
+    # the table needs the byte order of this machine
+    kept = {
+        label: column.astype(column.dtype.newbyteorder("=")) for label, column in columns.items() if column.ndim == 1
+    }
     if not kept or any(column.dtype.kind not in _KINDS for column in kept.values()):
         found = f"{array.ndim} dimensions of type {array.dtype}"
         raise DataRejected(f"{name}: an array of {found}, a matrix or records of numbers are needed; {REMEDY}")
     return Content(pd.DataFrame(kept))
-
-
-def _native(column: np.ndarray) -> np.ndarray:
-    """A column in the byte order of this machine, which the table needs."""
-    return column.astype(column.dtype.newbyteorder("="))

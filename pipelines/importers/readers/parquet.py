@@ -9,22 +9,17 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
-from pipelines.importers.content import Content
+from pipelines.importers.content import Content, begins_with
 from pipelines.importers.unpacking import refuse_larger
 from schemas.errors import DataRejected
 from schemas.foreign import foreign, shown
 
 NAME, TITLE, EXTRA, ORDER = "parquet", "Parquet", "", 10
-MAGIC = b"PAR1"
+recognised = begins_with(b"PAR1")
 REMEDY = "copy it again"
 VALUE_BYTES = 8
 BATCH_ROWS = 2**16
 _INDEX = re.compile(r"__index_level_\d+__")
-
-
-def recognised(data: bytes) -> bool:
-    """Whether the file begins as Parquet does."""
-    return data.startswith(MAGIC)
 
 
 def read(name: str, data: bytes, group: str) -> Content:
@@ -53,7 +48,7 @@ def table_of(name: str, data: bytes) -> pd.DataFrame:
         pieces: list[pa.RecordBatch] = []
         size = 0
         for piece in reader.iter_batches(BATCH_ROWS, columns=labels):
-            size += _unpacked(piece)
+            size += sum(VALUE_BYTES * len(column) + _text_bytes(column) for column in piece.columns)
             refuse_larger(size, len(data), name)
             pieces.append(piece)
         table = pa.Table.from_batches(pieces, reader.schema_arrow.empty_table().select(labels).schema)
@@ -68,11 +63,6 @@ def _claimed(file: pq.ParquetFile) -> int:
     about = file.metadata
     groups = sum(about.row_group(k).total_byte_size for k in range(about.num_row_groups))
     return max(about.num_rows * about.num_columns * VALUE_BYTES, groups)
-
-
-def _unpacked(piece: pa.RecordBatch) -> int:
-    """Bytes of the values of a batch, texts as often as they occur."""
-    return sum(VALUE_BYTES * len(column) + _text_bytes(column) for column in piece.columns)
 
 
 def _text_bytes(column: pa.Array) -> int:

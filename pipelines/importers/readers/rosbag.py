@@ -5,20 +5,14 @@ from __future__ import annotations
 import tempfile
 from pathlib import Path
 
-from pipelines.importers.content import Content, chosen
+from pipelines.importers.content import Content, begins_with, chosen
 from pipelines.importers.ros_messages import content_of, flattened
-from schemas.errors import DataRejected
 from schemas.foreign import foreign
 from schemas.library import library
 
 NAME, TITLE, EXTRA, ORDER = "rosbag", "bag of ROS 1 (.bag)", "ros", 78
-MAGIC = b"#ROSBAG V2.0\n"
+recognised = begins_with(b"#ROSBAG V2.0\n")
 REMEDY = "record it again, or run 'rosbag reindex' on it"
-
-
-def recognised(data: bytes) -> bool:
-    """Whether the file begins as a bag of ROS 1 does."""
-    return data.startswith(MAGIC)
 
 
 def read(name: str, data: bytes, group: str) -> Content:
@@ -29,9 +23,7 @@ def read(name: str, data: bytes, group: str) -> Content:
         path.write_bytes(data)
         with foreign(f"{name}: a bag of ROS that cannot be read", REMEDY), rosbags.AnyReader([path]) as bag:
             counts = {topic: info.msgcount for topic, info in bag.topics.items() if info.msgcount}
-            if not counts:
-                raise DataRejected(f"{name}: no topic with messages in this bag, one is needed; check the file")
-            topic = chosen([*counts.items()], group, name)
+            topic = chosen([*counts.items()], group, name, "no topic with messages in this bag")
             kind = str(bag.topics[topic].msgtype)
             own = [connection for connection in bag.connections if connection.topic == topic]
             rows = [

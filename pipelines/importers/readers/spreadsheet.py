@@ -11,7 +11,6 @@ from typing import Any
 from pipelines.importers import text_table
 from pipelines.importers.content import Content, chosen
 from pipelines.importers.unpacking import refuse_larger
-from schemas.errors import DataRejected
 from schemas.foreign import foreign
 from schemas.library import library
 
@@ -39,9 +38,8 @@ def read(name: str, data: bytes, group: str) -> Content:
             title: book.get_sheet_by_name(title).to_python() for title in book.sheet_names
         }
     sheets = {title: rows for title, rows in sheets.items() if len(rows) > 1}
-    if not sheets:
-        raise DataRejected(f"{name}: no sheet with rows in this spreadsheet, one is needed; check the file")
-    title = chosen([(one, len(rows)) for one, rows in sheets.items()], group, name)
+    counts = [(one, len(rows)) for one, rows in sheets.items()]
+    title = chosen(counts, group, name, "no sheet with rows in this spreadsheet")
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerows([[_cell(value) for value in row] for row in sheets[title]])
     return text_table.content(text.getvalue(), name, "utf-8")

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from pipelines.importers.content import Content, chosen
+from pipelines.importers.content import Content, begins_with, chosen
 from pipelines.importers.unpacking import refuse_larger
 from schemas.errors import DataRejected
 from schemas.foreign import foreign, shown
@@ -20,13 +20,8 @@ from schemas.library import library
 
 _MOST_MESSAGES = 4
 NAME, TITLE, EXTRA, ORDER = "tdms", "TDMS", "tdms", 60
-MAGIC = b"TDSm"
+recognised = begins_with(b"TDSm")
 REMEDY = "copy it again, or export the group as CSV"
-
-
-def recognised(data: bytes) -> bool:
-    """Whether the file begins as TDMS does."""
-    return data.startswith(MAGIC)
 
 
 def read(name: str, data: bytes, group: str) -> Content:
@@ -38,11 +33,13 @@ def read(name: str, data: bytes, group: str) -> Content:
         claimed = sum(8 * len(channel) for one in about.groups() for channel in one.channels())
         refuse_larger(claimed, len(data), name)
         file = nptdms.TdmsFile.read(io.BytesIO(data))
-        groups = {one.name: [c for c in one.channels() if len(c) and _numeric(c)] for one in file.groups()}
+        groups = {
+            one.name: [c for c in one.channels() if len(c) and np.asarray(c[:1]).dtype.kind in "fiubM"]
+            for one in file.groups()
+        }
         groups = {label: channels for label, channels in groups.items() if channels}
-        if not groups:
-            raise DataRejected(f"{name}: no channel with numbers in this TDMS file, one is needed; check the file")
-        label = chosen([(label, len(channels[0])) for label, channels in groups.items()], group, name)
+        counts = [(label, len(channels[0])) for label, channels in groups.items()]
+        label = chosen(counts, group, name, "no channel with numbers in this TDMS file")
         content = _content(groups[label], name)
     return replace(content, remarks=(*content.remarks, *(f"message of the reader: {text}" for text in messages.texts)))
 
@@ -76,11 +73,6 @@ class _LibraryLog(logging.Handler):
         finally:
             for one, handlers, propagate in before:
                 one.handlers, one.propagate = handlers, propagate
-
-
-def _numeric(channel: Any) -> bool:
-    kind = np.asarray(channel[:1]).dtype.kind
-    return kind in "fiubM"
 
 
 def _content(channels: list[Any], name: str) -> Content:

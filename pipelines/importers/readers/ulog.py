@@ -8,13 +8,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from pipelines.importers.content import Content, chosen
-from schemas.errors import DataRejected
+from pipelines.importers.content import Content, begins_with, chosen
 from schemas.foreign import foreign
 from schemas.library import library
 
 NAME, TITLE, EXTRA, ORDER = "ulog", "ULog of PX4", "autopilot", 72
-MAGIC = b"ULog\x01\x12\x35"
+recognised = begins_with(b"ULog\x01\x12\x35")
 REMEDY = "copy it again from the vehicle, or export the message with ulog2csv"
 UNITS = {
     "sensor_accel": {"x": "m/s^2", "y": "m/s^2", "z": "m/s^2", "temperature": "degC"},
@@ -23,11 +22,6 @@ UNITS = {
     "vehicle_acceleration": {f"xyz[{k}]": "m/s^2" for k in range(3)},
 }
 """Units of the fields, by message, from PX4's message definitions: a log itself states none."""
-
-
-def recognised(data: bytes) -> bool:
-    """Whether the file begins as ULog does."""
-    return data.startswith(MAGIC)
 
 
 def read(name: str, data: bytes, group: str) -> Content:
@@ -39,11 +33,10 @@ def read(name: str, data: bytes, group: str) -> Content:
         messages: dict[str, Any] = {
             f"{one.name} {one.multi_id}": one for one in log.data_list if len(one.data["timestamp"])
         }
-        if not messages:
-            raise DataRejected(f"{name}: no message with samples in this ULog, one is needed; check the file")
         if f"{group} 0" in messages:
             group = f"{group} 0"
-        title = chosen([(label, len(one.data["timestamp"])) for label, one in messages.items()], group, name)
+        counts = [(label, len(one.data["timestamp"])) for label, one in messages.items()]
+        title = chosen(counts, group, name, "no message with samples in this ULog")
         message = messages[title]
         fields = {key: np.asarray(values) for key, values in message.data.items() if key != "timestamp"}
         stamp = np.asarray(message.data["timestamp"], dtype=np.float64)

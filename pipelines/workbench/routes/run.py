@@ -5,7 +5,7 @@ from __future__ import annotations
 from fastapi import APIRouter, Request
 from starlette.responses import Response
 
-from pipelines.certificates.statement import stated
+from pipelines.certificates.ledger import stated
 from pipelines.tables.frames import rows_of
 from pipelines.workbench.pages import Workbench, page, run_table, saved_as, state_of, table_csv, workbench_of
 from pipelines.workbench.services import requests

@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 from ledger_events import event
 
 from pipelines.audit.calibrations import Calibrations, date_of, day_of
-from pipelines.audit.certificates import Certificates, certificates_of
-from pipelines.audit.due import due, uncertified
+from pipelines.audit.due import Certificates, certificates_of, due, uncertified
 from pipelines.audit.parameters import NAMES
 from pipelines.audit.rules import load_rules
 from pipelines.certificates import Ledger, LedgerEntry

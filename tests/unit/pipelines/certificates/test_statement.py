@@ -54,7 +54,7 @@ def test_an_export_names_the_certificate_and_whether_it_holds(run: Run, typed: T
 
 def test_a_certificate_that_has_ended_is_told(run: Run, typed: Typed, monkeypatch: pytest.MonkeyPatch) -> None:
     typed("certify", run.id, "--until", day(30))
-    for place in ("pipelines.certificates.days.today", "pipelines.certificates.statement.today"):
+    for place in ("pipelines.certificates.days.today", "pipelines.certificates.validity.today"):
         monkeypatch.setattr(place, lambda: day(31))
     assert units(typed, run)["A1"]["certificate"]["valid_now"] is False
     assert f"A1: certificate A1/1, valid from {day()} until {day(30)}" in typed("export", run.id).stderr

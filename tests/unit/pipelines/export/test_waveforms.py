@@ -9,6 +9,7 @@ from typer.testing import CliRunner
 
 from pipelines.archive import Archive
 from pipelines.cli import app
+from pipelines.cli.waveforms import FORMATS
 from pipelines.export.waveforms import WRITERS, Channel, write_waveforms
 from pipelines.importers import files
 from pipelines.importers.waveforms import RecordingLayout, import_waveforms
@@ -36,17 +37,18 @@ def shock(sign: float, rng: np.random.Generator, unit_gain: float = 1.01) -> lis
 
 def test_two_clocks_are_two_files_where_a_format_has_one(tmp_path: Path, rng: np.random.Generator) -> None:
     unit, reference = shock(1.0, rng)
-    slow = Channel(unit.name, unit.unit, unit.group, unit.values[::5], 5.0 / RATE, 2)
+    slow = Channel(unit.name, unit.unit, unit.group, unit.samples[::5], 5.0 / RATE, 2)
     written = write_waveforms("csv", [slow, reference], tmp_path / "two.csv")
     assert [path.name for path in written] == ["two_units.csv", "two_reference.csv"]
     assert write_waveforms("uff58", [slow, reference], tmp_path / "two.uff") == [tmp_path / "two.uff"]
+    assert ", ".join(WRITERS) == FORMATS
     with pytest.raises(WrongUse, match="no format is called"):
         write_waveforms("udf", [reference], tmp_path / "x")
 
 
 @pytest.mark.parametrize("form", ["csv", "uff58", "tdms", "lvm", "mat", "hdf5", "wav"])
 def test_shocks_of_others_give_figures_and_a_verdict(form: str, tmp_path: Path, rng: np.random.Generator) -> None:
-    paths = [tmp_path / f"shock{k}{WRITERS[form].SUFFIX}" for k in range(4)]
+    paths = [tmp_path / f"shock{k}{WRITERS[form].suffix}" for k in range(4)]
     for k, path in enumerate(paths):
         write_waveforms(form, shock((-1.0) ** k, rng), path)
     part = tmp_path / "part.toml"
@@ -74,7 +76,7 @@ def test_shocks_of_others_give_figures_and_a_verdict(form: str, tmp_path: Path, 
 
 def test_a_file_without_unit_or_sample_interval_is_refused(tmp_path: Path, rng: np.random.Generator) -> None:
     unit, reference = shock(1.0, rng)
-    rows = "\n".join(f"{a:.9g},{b:.9g}" for a, b in zip(unit.values, reference.values, strict=True))
+    rows = "\n".join(f"{a:.9g},{b:.9g}" for a, b in zip(unit.samples, reference.samples, strict=True))
     bare = tmp_path / "bare.csv"
     bare.write_text(f"dut,ref\n{rows}\n")
     (part := tmp_path / "part.toml").write_text("scale = 0.3\n")
@@ -125,7 +127,7 @@ def test_the_same_files_at_another_rate_are_another_run(tmp_path: Path, rng: np.
     paths = [tmp_path / f"shock{k}.csv" for k in range(4)]
     for k, path in enumerate(paths):
         channels = shock((-1.0) ** k, rng)
-        rows = np.column_stack([one.values for one in channels])
+        rows = np.column_stack([one.samples for one in channels])
         np.savetxt(path, rows, delimiter=",", header="dut,ref", comments="")
     part, archive = tmp_path / "part.toml", str(tmp_path / "archive")
     part.write_text(SHOCK)

@@ -6,6 +6,7 @@ import re
 import shutil
 import tomllib
 from collections.abc import Callable
+from dataclasses import replace
 from datetime import date
 from io import BytesIO
 from pathlib import Path
@@ -28,10 +29,12 @@ from pipelines.certificates.document.laboratory import LaboratoryFile, read_labo
 from pipelines.certificates.document.numbers import si_unit, with_uncertainty
 from pipelines.certificates.document.pages import page_content
 from pipelines.certificates.documents import CertificateDocument
+from pipelines.certificates.stated_budget import StatedBudget
 from pipelines.chain.certify import certify
 from pipelines.cli import app
 from pipelines.report.numbers import with_uncertainty as report_rounding
 from schemas.errors import RecipeInvalid, WrongUse
+from schemas.reference import Reference
 
 etree = pytest.importorskip("lxml.etree")
 pytest.importorskip("typst")
@@ -224,7 +227,7 @@ def test_an_interval_is_printed_only_where_the_customer_agreed(
     due = Ledger(made.archive).calibrations("A1")[-1].until
     assert due not in " ".join(text_of(paper))
     real = composing.stated_budget
-    monkeypatch.setattr(composing, "stated_budget", lambda *a: {**real(*a), "customer_agreed": True})
+    monkeypatch.setattr(composing, "stated_budget", lambda *a: replace(real(*a), customer_agreed=True))
     agreed = content(made)
     assert f"As agreed with the customer, the next calibration is due on {due}" in " ".join(
         text_of(pdf(agreed, b"<a/>"))
@@ -348,10 +351,12 @@ def test_traceability_is_claimed_for_what_names_a_standard_only() -> None:
     from pipelines.certificates.document.compose import _traceability
 
     entries = {"grade_source": "certificates", "gravity": {"u_ppm": 1.0, "reference": "G-1"}, "seat": {"u_urad": 9.0}}
-    text = _traceability({"references": [{"id": "G-1"}], "grade_source": "certificates"}, entries)
+    own = {"frame": "fixture", "validity_months": 12, "customer_agreed": False, "quantities": (), "decisions": ()}
+    standard = Reference(id="G-1", certificate="C-1", due=date(2027, 1, 1))
+    text = _traceability(StatedBudget(**own, references=(standard,), grade_source="certificates"), entries)
     assert "of the standards listed: gravity." in text
     assert text.endswith("by the sources in the budgets (certificates): seat.")
-    assert "not claimed" in _traceability({"references": [], "grade_source": "data_sheet"}, entries)
+    assert "not claimed" in _traceability(StatedBudget(**own, references=(), grade_source="data_sheet"), entries)
 
 
 def test_the_certificate_states_the_verdict_with_p_and_what_u_does_not_contain(
