@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from importlib import import_module
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -32,8 +31,7 @@ def page() -> str:
 
 
 def _row(kind: FigureKind) -> str:
-    meaning = (import_module(f"{figures.__name__}.{kind.name.lower()}").__doc__ or "").partition("\n")[0]
-    return f"| `{kind.name}` | {kind.unit} | {meaning} | {kind.missing(EMPTY)} |"
+    return f"| `{kind.name}` | {kind.unit} | {kind.meaning} | {kind.missing(EMPTY)} |"
 
 
 if __name__ == "__main__":

@@ -41,7 +41,7 @@ def add(
     as_json: options.JsonOption = False,
 ) -> None:
     """Add a table of attributes."""
-    from pipelines.discovery.attribute_files import added_from
+    from pipelines.discovery.attributes import added_from
 
     added, lines = added_from(Archive(archive), table, by)
     give_lines(added, lines, as_json=as_json)
@@ -54,7 +54,7 @@ def add(
 )
 def list_(archive: options.ArchiveOption = None, *, as_json: options.JsonOption = False) -> None:
     """List the attributes."""
-    from pipelines.discovery.attribute_files import listed
+    from pipelines.discovery.attributes import listed
 
     store = Archive(archive)
     store.refuse_none()

@@ -106,7 +106,7 @@ def _show(audited: Audit, audit_findings: list[AuditFinding], root: str) -> None
     from pipelines.audit.calibrations import date_of
     from pipelines.audit.document import counts
     from pipelines.audit.finding import WHO
-    from pipelines.discovery.kept_findings import discovered_before
+    from pipelines.discovery.nights import discovered_before
 
     number, until = counts(audited), date_of(audited.scope.until - 1)
     everything = audited.scope.since <= BEGINNING

@@ -10,7 +10,8 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from pathlib import Path
+from typing import Any, Literal, cast
 
 import numpy as np
 import pandas as pd
@@ -19,7 +20,7 @@ from inertial.counts import number_of
 from pipelines.archive import Archive, files
 from pipelines.archive.keys import provenance
 from pipelines.archive.locks import alone
-from pipelines.discovery.documents import AddedAttributes
+from pipelines.discovery.documents import AddedAttributes, KnownAttribute, ListedAttributes
 from schemas.errors import WrongUse, did_you_mean
 
 By = Literal["serial", "run"]
@@ -89,16 +90,16 @@ def add_attributes(archive: Archive, table: pd.DataFrame, by: By, source: str) -
             counts[kind] += 1
             if kind != "unchanged":
                 new.setdefault(one, {})[name] = value
-    place = archive.root / FOLDER / "-"
-    if new:
-        place = _append(archive, {"by": by, "source": source, "values": new, **provenance()})
+    file = _append(archive, {"by": by, "source": source, "values": new, **provenance()}) if new else ""
+    infos = archive.runs()
+    there = {info.id for info in infos} if by == "run" else {unit for info in infos for unit in info.units}
     return {
         **counts,  # type: ignore[typeddict-item]  # the three counts
         "by": by,
         "names": names,
-        "unknown": _unknown(archive, by, list(values)),
+        "unknown": [one for one in values if one not in there],
         "refused": refused,
-        "file": place.name if new else "",
+        "file": file,
     }
 
 
@@ -122,12 +123,12 @@ def _places(archive: Archive) -> list[Any]:
     return sorted((one for one in folder.iterdir() if one.name.endswith(".json")), key=lambda one: one.name)
 
 
-def _append(archive: Archive, content: Mapping[str, Any]) -> Any:
-    """Write the next file; of two processes one waits."""
+def _append(archive: Archive, content: Mapping[str, Any]) -> str:
+    """Write the next file, and its name; of two processes one waits."""
     with alone(archive.root / FOLDER, wait=True):
         place = archive.root / FOLDER / f"{len(_places(archive)) + 1:06d}.json"
         files.publish(place, files.manifest_bytes(content))
-    return place
+    return place.name
 
 
 def _key_column(table: pd.DataFrame, by: By, source: str) -> str:
@@ -174,12 +175,6 @@ def _text(value: object) -> str:
     return str(value).strip()
 
 
-def _unknown(archive: Archive, by: By, keys: list[str]) -> list[str]:
-    infos = archive.runs()
-    there = {info.id for info in infos} if by == "run" else {unit for info in infos for unit in info.units}
-    return [one for one in keys if one not in there]
-
-
 def sentences(added: AddedAttributes) -> list[str]:
     """What was added, for people."""
     what = ", ".join(added["names"])
@@ -194,3 +189,45 @@ def sentences(added: AddedAttributes) -> list[str]:
     if added["refused"]:
         lines.append(f"not taken, because they follow from the result: {', '.join(added['refused'])}")
     return lines
+
+
+_EXAMPLES = 4
+
+
+def added_from(archive: Archive, path: Path, by: str) -> tuple[AddedAttributes, list[str]]:
+    """What a file adds, and the same in sentences.
+
+    Raises
+    ------
+    WrongUse
+        The file is none, or not a table.
+    """
+    if by not in {"serial", "run"}:
+        raise WrongUse(f"attributes: --by is '{by}', serial or run is needed")
+    if not path.is_file():
+        raise WrongUse(f"attributes: there is no file {path}; give a .csv or .parquet file")
+    try:
+        if path.suffix.lower() == ".parquet":
+            table = pd.read_parquet(path)
+        else:
+            table = pd.read_csv(path, dtype=str, keep_default_na=False)
+    except (ValueError, OSError) as problem:  # pandas' and Arrow's errors of a file are of these kinds
+        raise WrongUse(
+            f"attributes: {path} is no table ({str(problem).splitlines()[0]}); give a .csv or .parquet file"
+        ) from None
+    added = add_attributes(archive, table, cast("By", by), path.name)
+    return added, sentences(added)
+
+
+def listed(archive: Archive) -> ListedAttributes:
+    """Every attribute: of units or runs, for how many it is known, how many levels it has, some of them."""
+    known = known_attributes(archive)
+    rows: list[KnownAttribute] = []
+    for kind, of in (("units", known.serial), ("runs", known.run)):
+        names = dict.fromkeys(name for values in of.values() for name in values)
+        for name in names:
+            values = [own[name] for own in of.values() if name in own]
+            levels = sorted(set(values))
+            some = ", ".join(levels[:_EXAMPLES]) + (", …" if len(levels) > _EXAMPLES else "")
+            rows.append({"attribute": name, "of": kind, "known": len(values), "levels": len(levels), "such_as": some})
+    return {"attributes": rows}

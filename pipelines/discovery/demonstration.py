@@ -10,7 +10,7 @@ import numpy as np
 from pipelines.archive import Archive
 from pipelines.demo.archive_lots import Hidden, Line
 from pipelines.demo.lot_archive import DemoArchive, write_lots
-from pipelines.discovery.attribute_files import added_from
+from pipelines.discovery.attributes import added_from
 from pipelines.discovery.discover import Look, discovered
 from pipelines.discovery.documents import DiscoveryDemo
 from schemas.errors import WrongUse

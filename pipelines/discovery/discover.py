@@ -4,21 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import reduce
 
+import numpy as np
 from threadpoolctl import threadpool_limits
 
 from inertial import effects as catalogue
-from inertial.discovery.evidence import INSIDE, ScoredLot
-from inertial.discovery.naming import Pool
+from inertial.discovery.evidence import INSIDE
+from inertial.discovery.populations import two_populations
 from pipelines.archive import Archive
-from pipelines.discovery.documents import ComparedAlarm, DiscoverDocument, DiscoveryRow
+from pipelines.audit.calibrations import dated_runs, first_runs, load
+from pipelines.audit.index import up_to_date
+from pipelines.audit.parameters import FAMILIES, FAMILY_OF, NAMES, unit_text
+from pipelines.discovery.documents import ComparedAlarm, DiscoverDocument, DiscoveryRow, PopulationRow
+from pipelines.discovery.evidence_state import ALPHA
 from pipelines.discovery.figures_of_name import size_of
 from pipelines.discovery.findings import Findings
-from pipelines.discovery.kept_findings import remembered, rows_of_before
 from pipelines.discovery.lot_source import DiscoveryArchive
-from pipelines.discovery.nights import brought_up, fresh, grown_by_days
-from pipelines.discovery.population import populations
+from pipelines.discovery.nights import brought_up, fresh, grown_by_days, remembered, rows_of_before
 from pipelines.parallel import Distributor
 from schemas.errors import WrongUse, did_you_mean
 from schemas.units import MICRO
@@ -100,19 +103,12 @@ def _with_effects(
             f"discover: none of {', '.join(effects)} is beyond the model of the lots, one at least is needed; "
             f"{did_you_mean(effects[0], pool.effects)}"
         )
-    change = partial(_changed, pool, tuple(added))
-    changed = source.with_change(change)
+    changed = source.with_change(lambda lot: reduce(pool.with_effect, added, lot))
     after = Findings(changed, grown_by_days(changed, fresh(changed), before.state.order))
     extended = after.document(looking_back=True)
     extended["model"] = [*document["model"], *added]
     extended["compared"] = [_compared(row, before, after) for row in document["discoveries"] if row["axes"]]
     return after, extended
-
-
-def _changed(pool: Pool, effects: tuple[str, ...], lot: ScoredLot) -> ScoredLot:
-    for effect in effects:
-        lot = pool.with_effect(lot, effect)
-    return lot
 
 
 def _compared(row: DiscoveryRow, before: Findings, after: Findings) -> ComparedAlarm:
@@ -123,7 +119,10 @@ def _compared(row: DiscoveryRow, before: Findings, after: Findings) -> ComparedA
         "log_e_before": round(_largest(before, row), 2),
         "log_e_after": round(_largest(after, row), 2),
         "size_ug_before": row["size_ug"],
-        "size_ug_after": _size_left(after, row),
+        # of the largest effect that is still named for the driver
+        "size_ug_after": next(
+            (MICRO * size_of(one.name)[0] for one in after.discoveries if one.drivers[0] == row["driver"]), 0.0
+        ),
     }
 
 
@@ -132,14 +131,6 @@ def _largest(findings: Findings, row: DiscoveryRow) -> float:
     drivers = findings.state.sensor.drivers
     values = [float(sums.log_e.max()) for name, sums in drivers.items() if name.removesuffix(INSIDE) == row["driver"]]
     return max(values, default=0.0)
-
-
-def _size_left(findings: Findings, row: DiscoveryRow) -> float:
-    """Size of the largest effect that is still named for a driver, µg."""
-    sizes = [one.name for one in findings.discoveries if one.drivers[0] == row["driver"]]
-    if not sizes:
-        return 0.0
-    return MICRO * size_of(sizes[0])[0]
 
 
 def _of_drivers(document: DiscoverDocument, drivers: Sequence[str]) -> DiscoverDocument:
@@ -169,3 +160,37 @@ def explained(document: DiscoverDocument, name: str) -> DiscoveryRow:
             + (did_you_mean(name, ids) if ids else "there is none in this archive")
         )
     return found
+
+
+_SEED = 20
+
+
+def populations(archive: Archive, device: str, workers: int = 1) -> list[PopulationRow]:
+    """Coefficients whose units are two populations: each unit once, by its first calibration."""
+    index = up_to_date(archive, workers=workers)
+    every = load(index, first_runs(dated_runs(index), np.inf))
+    own = every.chosen(every.device.astype(str) == device)
+    order = np.argsort(own.day, kind="stable")
+    first = own.chosen(order[np.unique(own.unit[order].astype(str), return_index=True)[1]])
+    judged = [name for name in NAMES if FAMILIES[FAMILY_OF[name]].own]
+    needed = float(np.log(len(judged) / ALPHA))
+    rows: list[PopulationRow] = []
+    for name in judged:
+        found = two_populations(first.column(name), np.random.default_rng(_SEED))
+        if found is None or found.log_e < needed:
+            continue
+        rows.append(
+            {
+                "figure": name,
+                "kind": "two_populations",
+                "log_e": round(found.log_e, 2),
+                "detail": {
+                    "means": list(found.means),
+                    "widths": list(found.widths),
+                    "share": found.share,
+                    "unit": unit_text(name),
+                    "units": len(first),
+                },
+            }
+        )
+    return rows

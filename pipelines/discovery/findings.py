@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -11,7 +10,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from inertial.counts import number_of
-from inertial.discovery.evidence import DATE, FIRST, INSIDE, MEAN, SLOT, STATION, UNIT, ScoredLot, Sums
+from inertial.discovery.evidence import DATE, FIRST, INSIDE, MEAN, SLOT, STATION, UNIT, ScoredLot
 from inertial.discovery.naming import Name, Pool
 from pipelines.discovery.documents import (
     DiscoverDocument,
@@ -43,6 +42,12 @@ LATER = 20  # lots after an alarm from which on they confirm or do not
 MOST_NAMED = 3000  # lots that the names are found with: evenly spread ones of a larger archive
 _CONFIRMED = 2.05  # standard errors beyond none (two sided 4 %), as for a fresh run
 _SOME = 50
+_BY_DRIVER: dict[str, tuple[Scope, str]] = {
+    STATION: ("station", "it differs from station to station for units of the same kind, for good or by slow wander"),
+    SLOT: ("station", "it stays with the slot of the fixture while the units change"),
+    UNIT: ("sensor", "the same unit shows it again, beside other units of its lot"),
+}
+"""Whose a discovery is by its driver alone, and why."""
 
 
 @dataclass(frozen=True)
@@ -67,28 +72,23 @@ class Findings:
         """Alarms that are discoveries."""
         return [alarm for alarm in self.state.alarms if not held(self.state, alarm)]
 
-    @cached_property
-    def _picked(self) -> NDArray[np.intp]:
-        """Places of the lots that names are found with, in the order of arrival."""
+    def _spread(self, most: int) -> NDArray[np.intp]:
+        """Places of lots that are evenly spread over the order of arrival, at most so many."""
         count = len(self.state.order)
-        return (
-            np.unique(np.linspace(0, count - 1, min(count, MOST_NAMED)).round().astype(np.intp))
-            if count
-            else np.zeros(0, dtype=np.intp)
-        )
+        return np.unique(np.linspace(0, max(count - 1, 0), min(count, most)).round().astype(np.intp))
+
+    def _lots(self, most: int) -> list[ScoredLot]:
+        return [sensor for sensor, _ in self.source.lots([self.state.order[k] for k in self._spread(most)])]
 
     @cached_property
     def some(self) -> list[ScoredLot]:
         """Some dozen lots, evenly spread: what all have in common is seen in them."""
-        order = self.state.order
-        pick = np.unique(np.linspace(0, len(order) - 1, min(len(order), _SOME)).round().astype(int)) if order else []
-        return [sensor for sensor, _ in self.source.lots([order[k] for k in pick])]
+        return self._lots(_SOME)
 
     @cached_property
     def lots(self) -> list[ScoredLot]:
         """The lots that names are found with."""
-        pick = [self.state.order[k] for k in self._picked]
-        return [sensor for sensor, _ in self.source.lots(pick)]
+        return self._lots(MOST_NAMED)
 
     @cached_property
     def pool(self) -> Pool:
@@ -129,10 +129,15 @@ class Findings:
     def _effect(self, alarm: Alarm) -> str:
         return hypothesis(self.state, alarm.place)[0]
 
+    def _places(self, effect: str) -> NDArray[np.intp]:
+        """Places of the hypotheses of an effect, of every axis."""
+        k = len(self.state.columns)
+        return np.concatenate([axis * k + self.pool.places(effect) for axis in range(AXES)])
+
     def _carried(self, name: Name, since: Alarm) -> tuple[Array, tuple[float, float] | None]:
         driver, effect = name.drivers[0], name.effects[0]
         carried = self.pool.carried(self.lots, driver, effect)
-        first = int(np.searchsorted(self._picked, since.lots))
+        first = int(np.searchsorted(self._spread(MOST_NAMED), since.lots))
         if len(self.lots) - first < LATER or first < LATER:
             return carried, None
         factor, error, able = self.pool.confirmed(self.lots[:first], self.lots[first:], driver, effect)
@@ -167,7 +172,7 @@ class Findings:
             },
             "discoveries": rows,
             "held": self._held(),
-            "unexplained": self._unexplained(rows),
+            "unexplained": [] if rows else self._unexplained(),
             "population": [],
             "reach": self.reach(),
             "unseen": self._unseen(),
@@ -187,26 +192,32 @@ class Findings:
     def _day_of(self, alarm: Alarm) -> str:
         return str(self.source.store.head(self.state.order[min(alarm.lots, len(self.state.order)) - 1])["when"])[:10]
 
+    def _floors(self, size: float) -> float | None:
+        """A size over the noise of a dwell of one lot."""
+        floor = float(np.median([self.source.store.head(run)["floor"] for run in self.state.order]))
+        return size / floor if floor > 0.0 else None
+
     def _row(self, found: Discovery) -> DiscoveryRow:
         name = found.name
         size, low, high = size_of(name)
-        floor = float(np.median([self.source.store.head(run)["floor"] for run in self.state.order]))
         scope, because = self._scope(found)
         driver = found.drivers[0] if name.drivers[0] not in found.drivers else name.drivers[0]
-        log_e = max(float(s.log_e[p]) for s, p in self._evidence_of(name, found.drivers))
+        sums = [of for one, of in self.state.sensor.drivers.items() if plain(one) in found.drivers]
+        log_e = max(float(of.log_e[self._places(name.effects[0])].max()) for of in sums)
+        sizes = by_axis(name)
         row: DiscoveryRow = {
             "id": "",
             "since": self._day_of(found.since),
             "lots_then": found.since.lots,
             "effects": list(name.effects),
             "recommended": name.effects[0],
-            "axes": [a for a, of_axis in zip("xyz", by_axis(name), strict=True) if of_axis > 0.25 * max(by_axis(name))],
+            "axes": [a for a, of_axis in zip("xyz", sizes, strict=True) if of_axis > 0.25 * max(sizes)],
             "driver": driver,
             "drivers": list(found.drivers),
             "kind": "mean" if driver == MEAN else "slope" if name.labels == ("slope",) else "levels",
             "size_ug": MICRO * size,
             "interval_ug": [MICRO * low, MICRO * high],
-            "size_floors": size / floor if floor > 0.0 else None,
+            "size_floors": self._floors(size),
             "log_e": round(log_e, 2),
             "scope": scope,
             "because": because,
@@ -215,52 +226,30 @@ class Findings:
                 "lots_for": float(np.mean(found.carried > 0.0)),
                 "log_e_without_largest_2_percent": round(without_largest(found.carried), 2),
             },
-            "confirmed": None
-            if found.confirmed is None
-            else bool(found.confirmed[0] > _CONFIRMED * found.confirmed[1]),
+            "confirmed": None,
             "next": next_of(driver, scope),
         }
         if found.confirmed is not None:
-            row["confirmed_factor"] = [round(value, 3) for value in found.confirmed]
+            factor, error = found.confirmed
+            row["confirmed"] = bool(factor > _CONFIRMED * error)
+            row["confirmed_factor"] = [round(factor, 3), round(error, 3)]
         return row
-
-    def _evidence_of(self, name: Name, drivers: Sequence[str]) -> list[tuple[Sums, int]]:
-        """Sums and places of the hypotheses of a name."""
-        state, k = self.state, len(self.state.columns)
-        at = [axis * k + int(p) for axis in range(AXES) for p in self.pool.places(name.effects[0])]
-        sums = [state.sensor.drivers[one] for one in state.sensor.drivers if plain(one) in drivers]
-        return [(each, place) for each in sums for place in at]
 
     def _scope(self, found: Discovery) -> tuple[Scope, str]:
         """Whether the sensor or the station has it, and why that is said."""
-        driver, stations = found.drivers[0], self.state.sensor.wander.stations
-        inside = any(a.driver.endswith(INSIDE) for a in self.open_alarms if plain(a.driver) == driver)
-        if driver == STATION:
-            return (
-                "station",
-                "it differs from station to station for units of the same kind, for good or by slow wander",
-            )
-        if driver == SLOT:
-            return "station", "it stays with the slot of the fixture while the units change"
-        if driver == UNIT:
-            return "sensor", "the same unit shows it again, beside other units of its lot"
-        if inside:
+        driver, stations = found.drivers[0], len(self.state.sensor.wander.stations)
+        if driver in _BY_DRIVER:
+            return _BY_DRIVER[driver]
+        if any(a.driver.endswith(INSIDE) for a in self.open_alarms if plain(a.driver) == driver):
             return "sensor", "units of one lot differ by it; whatever the station does to a lot cancels"
-        if driver in {MEAN, DATE, SEASON} or len(stations) < 2:
-            return self._mean_scope(found, len(stations))
-        return "sensor", "lots of other stations predict it; a station's own wander is no news there"
-
-    def _mean_scope(self, found: Discovery, count: int) -> tuple[Scope, str]:
-        if count < 2:
-            return (
-                "sensor_or_station",
-                "one station: permanent errors of its references look the same, or its own wander",
-            )
-        k, effect = len(self.state.columns), found.name.effects[0]
-        at = [axis * k + int(p) for axis in range(AXES) for p in self.pool.places(effect)]
-        if self.state.sensor.shared_by_stations()[at].any():
-            return "sensor", f"all {count} stations show it, and they differ by less than it"
-        return "sensor_or_station", f"{count} stations are too few to exclude permanent errors of their references"
+        if stations < 2:
+            why = "one station: permanent errors of its references look the same, or its own wander"
+            return "sensor_or_station", why
+        if driver not in {MEAN, DATE, SEASON}:
+            return "sensor", "lots of other stations predict it; a station's own wander is no news there"
+        if self.state.sensor.shared_by_stations()[self._places(found.name.effects[0])].any():
+            return "sensor", f"all {stations} stations show it, and they differ by less than it"
+        return "sensor_or_station", f"{stations} stations are too few to exclude permanent errors of their references"
 
     @cached_property
     def _of_station(self) -> list[Alarm]:
@@ -293,8 +282,7 @@ class Findings:
         ]
         scale = float(station.noise[0][at])
         values = np.array([value for value, _ in sizes.values()])
-        errors = np.array([scale * error for _, error in sizes.values()])
-        size = float(np.sqrt(np.mean(values**2)))
+        size, reach = float(np.sqrt(np.mean(values**2))), 2.0 * max(scale * error for _, error in sizes.values())
         return {
             "id": "",
             "since": self._day_of(alarm),
@@ -306,11 +294,8 @@ class Findings:
             "drivers": [alarm.driver],
             "kind": "mean" if alarm.driver == MEAN else "slope" if alarm.driver == DATE else "levels",
             "size_ug": MICRO * size,
-            "interval_ug": [
-                MICRO * max(size - 2.0 * float(errors.max()), 0.0),
-                MICRO * (size + 2.0 * float(errors.max())),
-            ],
-            "size_floors": size / float(np.median([self.source.store.head(run)["floor"] for run in self.state.order])),
+            "interval_ug": [MICRO * max(size - reach, 0.0), MICRO * (size + reach)],
+            "size_floors": self._floors(size),
             "log_e": round(self._log_e(alarm), 2),
             "scope": "station",
             "because": f"the force itself is changed, for all units of a lot alike (column {column + 1} of {effect})",
@@ -324,40 +309,26 @@ class Findings:
         }
 
     def _held(self) -> list[HeldAlarm]:
+        reason = "the stations differ or wander in this effect by themselves, and it is the same for a whole lot"
+        if len(self.state.sensor.wander.stations) < 2:
+            reason = "one station: its references may be it"
         rows: list[HeldAlarm] = []
         for alarm in self.state.alarms:
             if held(self.state, alarm):
                 effect, _, axis = hypothesis(self.state, alarm.place)
-                rows.append(
-                    {
-                        "effect": effect,
-                        "axis": axis,
-                        "driver": alarm.driver,
-                        "log_e": round(self._log_e(alarm), 2),
-                        "reason": "one station: its references may be it"
-                        if len(self.state.sensor.wander.stations) < 2
-                        else "the stations differ or wander in this effect by themselves, and it is the same for a whole lot",
-                    }
-                )
+                log_e = round(self._log_e(alarm), 2)
+                rows.append({"effect": effect, "axis": axis, "driver": alarm.driver, "log_e": log_e, "reason": reason})
         return sorted(rows, key=lambda row: -row["log_e"])
 
-    def _unexplained(self, rows: Sequence[DiscoveryRow]) -> list[UnexplainedRow]:
-        """Drivers with an alarm that no name accounts for."""
-        told = {driver for row in rows for driver in row["drivers"]} | ({MEAN} if rows else set())
+    def _unexplained(self) -> list[UnexplainedRow]:
+        """Drivers with an alarm, where no name accounts for any."""
         out: dict[str, UnexplainedRow] = {}
         for alarm in sorted(self.open_alarms, key=self._log_e, reverse=True):
-            if alarm.place < self.state.sensor.count and plain(alarm.driver) not in told and not rows:
+            driver = plain(alarm.driver)
+            if alarm.place < self.state.sensor.count and driver not in out:
                 effect, _, axis = hypothesis(self.state, alarm.place)
-                out.setdefault(
-                    plain(alarm.driver),
-                    {
-                        "driver": plain(alarm.driver),
-                        "nearest": effect,
-                        "axes": [axis],
-                        "map": [],
-                        "log_e": round(self._log_e(alarm), 2),
-                    },
-                )
+                log_e = round(self._log_e(alarm), 2)
+                out[driver] = {"driver": driver, "nearest": effect, "axes": [axis], "map": [], "log_e": log_e}
         return list(out.values())
 
     def reach(self) -> list[ReachRow]:
@@ -373,53 +344,37 @@ class Findings:
             seen = information > 0.0
             sizes = np.where(seen, times * noise / np.sqrt(np.where(seen, information, 1.0)) * self.pool.size, np.nan)
             for effect in self.pool.effects:
-                at = np.concatenate([axis * len(state.columns) + self.pool.places(effect) for axis in range(AXES)])
-                there = sizes[at][np.isfinite(sizes[at]) & (sizes[at] > 0.0)]
-                if not there.size:
-                    continue
-                smallest = MICRO * float(np.median(there))
-                rows.append(
-                    {
-                        "effect": effect,
-                        "driver": driver,
-                        "smallest_ug": smallest,
-                        "lots_to_1_ug": max(FIRST, int(np.ceil(lots * smallest**2))),
-                    }
-                )
+                own_sizes = sizes[self._places(effect)]
+                there = own_sizes[np.isfinite(own_sizes) & (own_sizes > 0.0)]
+                if there.size:
+                    smallest = MICRO * float(np.median(there))
+                    needed = max(FIRST, int(np.ceil(lots * smallest**2)))
+                    rows.append({"effect": effect, "driver": driver, "smallest_ug": smallest, "lots_to_1_ug": needed})
         return rows
 
     def _unseen(self) -> list[UntoldEffect]:
         information = self.state.sensor.information.reshape(AXES, -1)
         own = sum((lot.own.sum(axis=0) for lot in self.some), np.zeros(self.state.sensor.count)).reshape(AXES, -1)
-        rows: list[UntoldEffect] = []
         if len(self.state.order) < FIRST:
-            return rows
-        for effect in self.pool.effects:
-            at = self.pool.places(effect)
-            if not information[:, at].any():
-                alone = bool(own[:, at].any())
-                reason = "the errors of the station have the same columns" if alone else "no lot excites it"
-                rows.append({"effect": effect, "reason": reason})
-        return rows
+            return []
+        alone, nowhere = "the errors of the station have the same columns", "no lot excites it"
+        places = {effect: self.pool.places(effect) for effect in self.pool.effects}
+        return [
+            {"effect": effect, "reason": alone if own[:, at].any() else nowhere}
+            for effect, at in places.items()
+            if not information[:, at].any()
+        ]
 
     def _drivers(self) -> list[DriverRow]:
-        rows = [{"name": name, "status": "judged"} for name in dict.fromkeys(map(plain, self.state.sensor.drivers))]
-        known = {row["name"] for row in rows}
-        labels = {
-            name: {
-                value
-                for one in (self.source.attributes.serial, self.source.attributes.run)
-                for of in one.values()
-                if (value := of.get(name))
-            }
-            for name in self.source.attributes.names()
-        }
-        rows += [
-            {"name": name, "status": "one level" if len(of) < 2 else "no unit of a pooled lot has it"}
-            for name, of in labels.items()
-            if name not in known
-        ]
-        return [{"name": row["name"], "status": row["status"]} for row in rows]
+        judged = list(dict.fromkeys(map(plain, self.state.sensor.drivers)))
+        rows: list[DriverRow] = [{"name": name, "status": "judged"} for name in judged]
+        known = [of for by in (self.source.attributes.serial, self.source.attributes.run) for of in by.values()]
+        for name in self.source.attributes.names():
+            if name not in judged:
+                levels = {value for of in known if (value := of.get(name))}
+                status = "one level" if len(levels) < 2 else "no unit of a pooled lot has it"
+                rows.append({"name": name, "status": status})
+        return rows
 
     def _warnings(self) -> list[str]:
         out: list[str] = []

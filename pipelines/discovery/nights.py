@@ -7,6 +7,7 @@ the scores.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from itertools import groupby
@@ -16,11 +17,14 @@ import numpy as np
 
 from inertial.discovery.evidence import INSIDE, MEAN, SLOT, STATION, UNIT, Evidence
 from inertial.discovery.station_wander import WALK_FROM
-from pipelines.archive import derived, files
+from pipelines.archive import Archive, derived, files
 from pipelines.archive.locks import alone
 from pipelines.archive.store import Place
+from pipelines.discovery.documents import DiscoverDocument, DiscoveryRow
 from pipelines.discovery.evidence_state import STATION_DRIVERS, Alarm, Evidences, hypothesis, state_bytes, stored_state
 from pipelines.discovery.lot_source import AXES, DiscoveryArchive
+from pipelines.discovery.score_store import FOLDER
+from pipelines.tables.json_values import json_value
 
 
 def fresh(source: DiscoveryArchive) -> Evidences:
@@ -31,26 +35,19 @@ def fresh(source: DiscoveryArchive) -> Evidences:
     return Evidences(source.device, sensor, station, made, Evidence(len(station)), order)
 
 
-def grown(source: DiscoveryArchive, state: Evidences, runs: Sequence[str]) -> Evidences:
-    """Evidence with further lots as one night."""
-    state.night += 1
-    for sensor, station in source.lots(runs):
-        state.sensor.add(sensor)
-        state.station.add(station)
-        state.order.append(sensor.run)
-    generation = 1 + max(state.generations.values(), default=-1)
-    for driver in state.sensor.drivers:
-        state.generations.setdefault(driver, generation)
-    known = {(alarm.driver, alarm.place) for alarm in state.alarms}
-    state.alarms += [one for one in _beyond(state) if (one.driver, one.place) not in known]
-    return state
-
-
 def grown_by_days(source: DiscoveryArchive, state: Evidences, runs: Sequence[str]) -> Evidences:
     """Evidence with further lots, a night for each day on which they were measured: years are caught up in one go."""
-    days = groupby(runs, key=lambda run: str(source.store.head(run)["when"])[:10])
-    for _, of_day in days:
-        state = grown(source, state, list(of_day))
+    for _, of_day in groupby(runs, key=lambda run: str(source.store.head(run)["when"])[:10]):
+        state.night += 1
+        for sensor, station in source.lots(of_day):
+            state.sensor.add(sensor)
+            state.station.add(station)
+            state.order.append(sensor.run)
+        generation = 1 + max(state.generations.values(), default=-1)
+        for driver in state.sensor.drivers:
+            state.generations.setdefault(driver, generation)
+        known = {(alarm.driver, alarm.place) for alarm in state.alarms}
+        state.alarms += [one for one in _beyond(state) if (one.driver, one.place) not in known]
     return state
 
 
@@ -168,3 +165,71 @@ def _write(
 def _text_of(state: Evidences, place: int) -> str:
     effect, column, axis = hypothesis(state, place)
     return f"{effect}.{column}" + (f".{axis}" if axis else "")
+
+
+_GROWN = 1.05  # more lots than this factor: the names are found again
+
+
+def alarm_key(state: Evidences) -> list[str]:
+    """The alarms of a state as text: while they are the same, so are the names."""
+    return sorted(f"{alarm.driver} {alarm.place}" for alarm in state.alarms if not held(state, alarm))
+
+
+def rows_of_before(source: DiscoveryArchive, state: Evidences) -> list[DiscoveryRow] | None:
+    """The discoveries of the last night, where no alarm is new and few lots came in since; None where they are found again."""
+    before = _stored(source)
+    if before is None or before["alarms"] != alarm_key(state) or len(state.order) > _GROWN * before["lots"]:
+        return None
+    return before["discoveries"]
+
+
+def discovered_before(archive: Archive) -> list[tuple[str, int]]:
+    """Kinds of devices with discoveries of an earlier look, and their number; nothing is judged."""
+    top = archive.root / FOLDER
+    names = (
+        sorted(place.name for place in top.iterdir() if place.name not in {"scores", "lock"}) if top.is_dir() else []
+    )
+    found = ((name, _read_found(top / name / "found")) for name in names)
+    return [
+        (name, len(stored["discoveries"])) for name, stored in found if stored is not None and stored["discoveries"]
+    ]
+
+
+def _stored(source: DiscoveryArchive) -> dict[str, Any] | None:
+    return _read_found(source.folder() / "found")
+
+
+def _read_found(place: Place) -> dict[str, Any] | None:
+    if not place.is_file():
+        return None
+    data, standing = derived.unframed(place)
+    return json.loads(data) if standing == derived.SOUND else None
+
+
+def remembered(source: DiscoveryArchive, state: Evidences, document: DiscoverDocument) -> DiscoverDocument:
+    """Keep a document beside the evidence, so that discoveries have the same ids the next time."""
+    stored = _stored(source) or {"discoveries": [], "lots": 0}
+    before: list[dict[str, Any]] = stored["discoveries"]
+    used, free = {row["id"] for row in before}, list(before)
+    numbers = (f"D{n}" for n in range(1, 10_000))
+    for row in document["discoveries"]:
+        same = next(
+            (old for old in free if old["driver"] == row["driver"] and set(old["effects"]) & set(row["effects"])), None
+        )
+        if same is not None:
+            free.remove(same)
+            row["id"], row["since"], row["lots_then"] = same["id"], same["since"], same["lots_then"]
+        else:
+            row["id"] = next(one for one in numbers if one not in used)
+            used.add(row["id"])
+    known = {row["id"] for row in before}
+    document["new"] = [row["id"] for row in document["discoveries"] if row["id"] not in known]
+    kept = {
+        "discoveries": document["discoveries"],
+        "lots": len(state.order),
+        "alarms": alarm_key(state),
+        "when": datetime.now(UTC).isoformat(timespec="seconds"),
+    }
+    if stored.get("alarms") != kept["alarms"] or len(state.order) > _GROWN * stored["lots"]:
+        files.publish(source.folder() / "found", derived.framed(json.dumps(json_value(kept), sort_keys=True).encode()))
+    return document

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from inertial.discovery.evidence import INSIDE, MEAN, STATION, Sums
 from inertial.uncertainty.rounding import short
 from pipelines.discovery.documents import DiscoverDocument, DiscoveryRow
-from pipelines.discovery.findings import Discovery, Findings
-from pipelines.discovery.sentences import headline, scope_text
+from pipelines.discovery.figures_of_name import headline, scope_text
+from pipelines.discovery.findings import Findings
 from pipelines.drawing import Chart, Plot, PlotAxis, Trace, svg_text
 from pipelines.drawing.chart import Role, level
 from pipelines.report.templates import template
@@ -56,29 +56,27 @@ def levels_chart(row: DiscoveryRow) -> Chart:
 
 
 def growth_charts(findings: Findings, document: DiscoverDocument) -> dict[str, Chart]:
-    """How the evidence of each discovery came together, by ``grown-<id>``."""
-    known = {(one.name.effects[0], one.drivers[0]): one for one in findings.discoveries}
-    found = {row["id"]: known.get((row["recommended"], row["driver"])) for row in document["discoveries"]}
-    return {f"grown-{name}": _growth(one) for name, one in found.items() if one is not None and one.carried.size > 1}
-
-
-def _growth(found: Discovery) -> Chart:
-    """Evidence of a discovery from lot to lot."""
-    x = found.carried / max(float(np.sqrt(np.mean(found.carried**2))), 1e-300)
-    s, v = np.cumsum(x), np.cumsum(x**2)
-    lots = np.arange(1, x.size + 1, dtype=np.float64)
-    evidence = np.array([float(_sums(a, b)) for a, b in zip(s, v, strict=True)])
-    traces = (
-        Trace("evidence", lots, evidence / np.log(10.0), "line", "accent", width=2.0),
-        level(lots, 0.0),
-    )
-    plot = Plot("", PlotAxis("lots"), PlotAxis("evidence / powers of ten"), traces)
-    note = "each lot against what the other half of the lots predicts of it"
-    return Chart("How the evidence came together", (plot,), height=240, note=note)
-
-
-def _sums(s: float, v: float) -> float:
-    return float(Sums(np.array([s]), np.array([v]), np.ones(1), two_sided=False).log_e[0])
+    """How the evidence of each discovery came together from lot to lot, by ``grown-<id>``."""
+    known = {(one.name.effects[0], one.drivers[0]): one.carried for one in findings.discoveries}
+    charts: dict[str, Chart] = {}
+    for row in document["discoveries"]:
+        carried = known.get((row["recommended"], row["driver"]))
+        if carried is None or carried.size < 2:
+            continue
+        x = carried / max(float(np.sqrt(np.mean(carried**2))), 1e-300)
+        evidence = [
+            float(Sums(np.array([s]), np.array([v]), np.ones(1), two_sided=False).log_e[0])
+            for s, v in zip(np.cumsum(x), np.cumsum(x**2), strict=True)
+        ]
+        lots = np.arange(1, x.size + 1, dtype=np.float64)
+        traces = (
+            Trace("evidence", lots, np.array(evidence) / np.log(10.0), "line", "accent", width=2.0),
+            level(lots, 0.0),
+        )
+        plot = Plot("", PlotAxis("lots"), PlotAxis("evidence / powers of ten"), traces)
+        note = "each lot against what the other half of the lots predicts of it"
+        charts[f"grown-{row['id']}"] = Chart("How the evidence came together", (plot,), height=240, note=note)
+    return charts
 
 
 def strongest_chart(findings: Findings) -> Chart:

@@ -12,7 +12,7 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pyarrow as pa
@@ -46,18 +46,15 @@ class Products:
     runs: int
 
 
-class ScoreFile:
+class ScoreFile(NamedTuple):
     """One file of scores: rows stay packed until they are asked for.
 
     names : columns of the sensor and of the station by their mark
     """
 
-    def __init__(self, rows: list[dict[str, Any]], names: dict[str, Any], products: list[Products]) -> None:
-        self.rows, self.names, self.products = rows, names, products
-
-    def run(self, place: int) -> ScoredRun:
-        """A run, unpacked."""
-        return _run_of(self.rows[place], self.names)
+    rows: list[dict[str, Any]]
+    names: dict[str, Any]
+    products: list[Products]
 
 
 class ScoreStore:
@@ -96,7 +93,7 @@ class ScoreStore:
     def run(self, run: str) -> ScoredRun:
         """The scores of a run."""
         number, row = self.place[run]
-        return self.files[number].run(row)
+        return _run_of(self.files[number].rows[row], self.files[number].names)
 
     def products(self) -> list[Products]:
         """Products of columns, of every file."""
@@ -108,9 +105,8 @@ class ScoreStore:
         if not new:
             return 0
         parts = [(self.archive.address, new[at : at + BATCH]) for at in range(0, len(new), BATCH)]
-        scored = [
-            run for part in map_partitions(_of_part, parts, distribute, workers=workers, name="scores") for run in part
-        ]
+        parts_scored = map_partitions(scored_runs, parts, distribute, workers=workers, name="scores")
+        scored = [run for part in parts_scored for run in part]
         if not scored:
             return 0
         number = 1 + max((int(place.name.split(".")[0]) for place in self._places()), default=0)
@@ -121,10 +117,6 @@ class ScoreStore:
 
     def _places(self) -> list[Place]:
         return [one for one in self.folder.iterdir() if one.name.endswith(".scores")] if self.folder.is_dir() else []
-
-
-def _of_part(part: tuple[str, Sequence[str]]) -> list[ScoredRun]:
-    return scored_runs(*part)
 
 
 def written(runs: Sequence[ScoredRun]) -> bytes:
@@ -167,21 +159,14 @@ def _packed(name: str, run: ScoredRun) -> bytes:
         return (run.score / root).astype(np.float16).tobytes()
     mean = run.own.mean(axis=0)
     if name == "own":
-        return _coded(run.own / np.where(mean > 0.0, mean, 1.0)).tobytes()
+        # ratios between a quarter and four in steps of one per cent; zero is zero
+        ratio = run.own / np.where(mean > 0.0, mean, 1.0)
+        steps = np.round(_STEPS * np.log2(np.clip(ratio, 1e-30, None))) + 128
+        return np.where(ratio > 0.0, np.clip(steps, 1, 255), 0).astype(np.uint8).tobytes()
     if name == "information":
         share = run.information / np.where(mean > 0.0, mean, 1.0)
         return mean.astype(np.float32).tobytes() + share.astype(np.float16).tobytes()
     return run.station_scores.astype(np.float32).tobytes()
-
-
-def _coded(ratio: Array) -> NDArray[np.uint8]:
-    """Ratios between a quarter and four in steps of one per cent; zero is zero."""
-    steps = np.round(_STEPS * np.log2(np.clip(ratio, 1e-30, None))) + 128
-    return np.where(ratio > 0.0, np.clip(steps, 1, 255), 0).astype(np.uint8)
-
-
-def _decoded(code: NDArray[np.uint8]) -> Array:
-    return np.where(code > 0, 2.0 ** ((code.astype(np.float64) - 128.0) / _STEPS), 0.0)
 
 
 def _products_of(runs: Sequence[ScoredRun]) -> dict[str, Array]:
@@ -235,7 +220,9 @@ def _run_of(row: dict[str, Any], names: dict[str, Any]) -> ScoredRun:
     packed, count = row["information"], len(row["information"]) // 6
     mean = np.frombuffer(packed[: 4 * count], dtype=np.float32).astype(np.float64)
     information = mean * np.frombuffer(packed[4 * count :], dtype=np.float16).astype(np.float64)
-    own = _decoded(np.frombuffer(row["own"], dtype=np.uint8)).reshape(len(units), -1) * mean
+    code = np.frombuffer(row["own"], dtype=np.uint8)
+    ratio = np.where(code > 0, 2.0 ** ((code.astype(np.float64) - 128.0) / _STEPS), 0.0)
+    own = ratio.reshape(len(units), -1) * mean
     z = np.frombuffer(row["score"], dtype=np.float16).astype(np.float64).reshape(own.shape)
     return ScoredRun(
         **texts,

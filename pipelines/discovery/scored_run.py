@@ -52,9 +52,15 @@ class ScoredRun:
     floor: float = 0.0
 
 
-def scored_runs(address: str, ids: Sequence[str]) -> list[ScoredRun]:
-    """The scores of some runs, with the reason for what is not pooled; a damaged run has none, and is tried again."""
-    archive, out = Archive(address), list[ScoredRun]()
+def scored_runs(part: tuple[str, Sequence[str]]) -> list[ScoredRun]:
+    """The scores of some runs of an archive, with the reason for what is not pooled; a damaged run has none, and is tried again.
+
+    Parameters
+    ----------
+    part : address of the archive, and ids of its runs
+    """
+    (address, ids), out = part, list[ScoredRun]()
+    archive = Archive(address)
     with threadpool_limits(1):
         for one in ids:
             try:

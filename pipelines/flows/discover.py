@@ -13,8 +13,8 @@ from inertial.counts import number_of
 from pipelines.archive.files import ELSEWHERE, json_bytes, publish
 from pipelines.discovery.discover import Look, discovered
 from pipelines.discovery.documents import DiscoverDocument
+from pipelines.discovery.figures_of_name import headline, scope_text
 from pipelines.discovery.page import render
-from pipelines.discovery.sentences import headline, scope_text
 from pipelines.orchestrator.archive_address import archive_of
 from pipelines.tables.json_values import json_value
 

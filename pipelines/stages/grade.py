@@ -10,7 +10,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from pipelines.procedures import PROCEDURES, figures_of_recipe
-from pipelines.stages.figures import FIGURES, Figure, LotCoefficients, UnitTables, figures_of
+from pipelines.stages.figures import FIGURES, Figure, LotCoefficients, UnitTables, Value, figures_of
 from pipelines.stages.figures.base import BudgetRow
 from pipelines.stages.uncertainty.decision_budget import DecisionBudget
 from pipelines.stages.uncertainty.lot_risks import lot_risks
@@ -132,14 +132,14 @@ def grade(
             own_figures += figures_of(own)
         own_figures += _of_procedures(evidence.procedure_figures, unit, limits)
         decisions = [
-            decide(limits, f.name, f.value, f.uncertainty, f.law, f.median)
+            decide(limits, f.name, f.of.value, f.of.uncertainty, f.of.law, f.of.median)
             for f in own_figures
-            if f.name in limits.figures and not f.why_not
+            if f.name in limits.figures and not f.of.why_not
         ]
         if figures:
-            figure_rows += [_figure_row(unit, one, decisions, limits) for one in own_figures if not one.why_not]
+            figure_rows += [_figure_row(unit, one, decisions, limits) for one in own_figures if not one.of.why_not]
             for one in own_figures:
-                squares.setdefault(one.name, []).append(one.shared**2)
+                squares.setdefault(one.name, []).append(one.of.shared**2)
         grade_rows.append(_decided(verdict, own_figures, decisions, limits, evidence.basis))
     grades = _table(grade_rows).assign(rule=rule, basis=evidence.basis)
     if not figures:
@@ -190,23 +190,20 @@ def _of_procedures(table: pd.DataFrame | None, unit: str, limits: Limits) -> lis
         why = "" if row["identified"] else f"axis {row['axis']}: {row['note']}"
         value = float(row["value"]) if row["identified"] else np.inf
         name = str(row["figure"])
-        one = Figure(
-            name,
-            str(row["unit_text"]),
-            value,
-            float(row["uncertainty"]) if not why else 0.0,
-            why,
-            dof=float(row.get("dof", np.nan)),  # runs of earlier versions have none
-            removed=float(row.get("removed", 0.0)),
-        )
+        dof, removed = (
+            float(row.get("dof", np.nan)),
+            float(row.get("removed", 0.0)),
+        )  # runs of earlier versions have none
+        error = float(row["uncertainty"]) if not why else 0.0
+        one = Figure(name, str(row["unit_text"]), Value(value, error, why, dof=dof, removed=removed))
         before = figures.get(name)
         least = name in limits.figures and limits.figures[name].min is not None
-        if before is None or _badness(one, guard, least=least) > _badness(before, guard, least=least):
+        if before is None or _badness(one.of, guard, least=least) > _badness(before.of, guard, least=least):
             figures[name] = one
     return list(figures.values())
 
 
-def _badness(figure: Figure, guard: float, *, least: bool) -> float:
+def _badness(figure: Value, guard: float, *, least: bool) -> float:
     """How far a figure lies towards its limit, with its guard band; infinite where it is not determined, or no number."""
     if figure.why_not:
         return float("inf")
@@ -235,17 +232,17 @@ def _decided(
     best, risk = NO_GRADE, float("nan")
     reasons = [decision.sentence for decision in decisions if not decision.passed]
     reasons += [
-        f"{figure.name}: not determined ({figure.why_not}), limit {limits.figures[figure.name].text}"
+        f"{figure.name}: not determined ({figure.of.why_not}), limit {limits.figures[figure.name].text}"
         for figure in figures
-        if figure.why_not and figure.name in limits.figures
+        if figure.of.why_not and figure.name in limits.figures
     ]
     by_name = {figure.name: figure for figure in figures}
     figure = by_name.get(PERIOD_FIGURE, by_name.get(GRADE_FIGURE))
     if figure is not None:
         known = figure.name == PERIOD_FIGURE
-        best = grade_with(figure.value, limits.guard_factor * figure.uncertainty) or NO_GRADE
+        best = grade_with(figure.of.value, limits.guard_factor * figure.of.uncertainty) or NO_GRADE
         if known and best in GRADES:
-            risk = exceedance(figure.median, figure.value, GRADES[best])
+            risk = exceedance(figure.of.median, figure.of.value, GRADES[best])
         if not known and _good_enough(best, BEST_OF_NOISE):
             best = BEST_OF_NOISE
         if limits.grade != NO_GRADE and not _good_enough(best, limits.grade):
@@ -256,7 +253,7 @@ def _decided(
 def _why(figure: Figure, best: str, basis: str) -> str:
     """The reason that limits a grade, in brackets."""
     if figure.name == PERIOD_FIGURE:
-        return f" (95 % bound of the largest error over the period of validity {float(f'{figure.value:.3g}'):g} µg)"
+        return f" (95 % bound of the largest error over the period of validity {float(f'{figure.of.value:.3g}'):g} µg)"
     if best != BEST_OF_NOISE:
         return ""
     if basis == NOISE_ONLY:
@@ -286,8 +283,8 @@ def _figure_row(unit: str, figure: Figure, decisions: list[Decision], limits: Li
     return {
         "unit": unit,
         "figure": figure.name,
-        "value": figure.value,
-        "uncertainty": limits.coverage_factor * figure.uncertainty,
+        "value": figure.of.value,
+        "uncertainty": limits.coverage_factor * figure.of.uncertainty,
         "limit": decision.limit if decision and not decision.least else np.nan,
         "unit_text": figure.unit,
         "outcome": decision.outcome if decision else "no limit",

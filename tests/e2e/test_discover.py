@@ -8,8 +8,8 @@ from each import each
 from in_process import document_of, given, refused, text_of
 
 from pipelines.archive import Archive
-from pipelines.discovery.kept_findings import discovered_before
 from pipelines.discovery.lot_source import DiscoveryArchive
+from pipelines.discovery.nights import discovered_before
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from inertial.counts import number_of
 from pipelines.cli.printing import print_table, say, short
 from pipelines.discovery.documents import DiscoverDocument, DiscoveryRow
-from pipelines.discovery.sentences import headline, scope_text
+from pipelines.discovery.figures_of_name import headline, scope_text
 
 _SHOWN_HELD, _SHOWN_LEVELS, _SHOWN_OUT, _SHOWN_REACH = 3, 12, 3, 40
 

@@ -1,4 +1,4 @@
-"""The figures of merit of a calibrated unit, which limits apply to: each is one module of this package and is found here.
+"""The figures of merit of a calibrated unit, which limits apply to: the modules of this package define them.
 
 Nothing else names a figure: limits files, tables, the report and the reference read :data:`FIGURES`.
 """
@@ -11,9 +11,8 @@ from importlib import import_module
 from pkgutil import iter_modules
 from typing import NamedTuple
 
-from inertial.uncertainty.deviation_law import DeviationLaw
 from pipelines.procedures import FIGURES as PROCEDURE_FIGURES
-from pipelines.stages.figures.base import FigureKind, LotCoefficients, UnitTables
+from pipelines.stages.figures.base import FigureKind, LotCoefficients, UnitTables, Value
 
 __all__ = [
     "FIGURES",
@@ -23,6 +22,7 @@ __all__ = [
     "IncompleteFigure",
     "LotCoefficients",
     "UnitTables",
+    "Value",
     "figures_of",
 ]
 
@@ -30,32 +30,15 @@ SHARED = "base"
 
 
 class IncompleteFigure(Exception):
-    """A module without a figure, or with a name or order that another figure has: its author must correct it."""
+    """A module without figures, or with a name or order that another figure has: its author must correct it."""
 
 
 class Figure(NamedTuple):
-    """Value and standard uncertainty of one figure of one unit, in the figure's unit.
-
-    why_not : why there is no value, where there is none; the value is then infinite and passes no limit
-    dof, removed : degrees of freedom of a standard deviation, nan of other figures, and the known part that was taken out of it
-    shared : part of the uncertainty that the units of a lot have in common
-    median : of a value that is a 95 % bound of an error, the median of that error
-    """
+    """One figure of one unit."""
 
     name: str
     unit: str
-    value: float
-    uncertainty: float
-    why_not: str = ""
-    dof: float = float("nan")
-    shared: float = 0.0
-    median: float = float("nan")
-    removed: float = 0.0
-
-    @property
-    def law(self) -> DeviationLaw | None:
-        """The law of a standard deviation; None of other figures, which are normal."""
-        return DeviationLaw(self.value, self.dof, self.removed) if self.dof > 0.0 else None
+    of: Value
 
 
 def find_figures(package: str, path: Iterable[str]) -> dict[str, FigureKind]:
@@ -64,16 +47,18 @@ def find_figures(package: str, path: Iterable[str]) -> dict[str, FigureKind]:
     Raises
     ------
     IncompleteFigure
-        A module has no FIGURE, or two figures have one name or one order.
+        A module has no FIGURES, or two figures have one name or one order.
     """
     kinds: list[FigureKind] = []
     for info in iter_modules(path):
         if info.name == SHARED:
             continue
-        kind = getattr(import_module(f"{package}.{info.name}"), "FIGURE", None)
-        if not isinstance(kind, FigureKind):
-            raise IncompleteFigure(f"{package}.{info.name}: no FIGURE, one is needed; define FIGURE = FigureKind(…)")
-        kinds.append(kind)
+        own = getattr(import_module(f"{package}.{info.name}"), "FIGURES", ())
+        if not own or not all(isinstance(kind, FigureKind) for kind in own):
+            raise IncompleteFigure(
+                f"{package}.{info.name}: no FIGURES, one is needed; define FIGURES = (FigureKind(…),)"
+            )
+        kinds += own
     for attribute in ("name", "order"):
         value, count = Counter(getattr(kind, attribute) for kind in kinds).most_common(1)[0]
         if count > 1:
@@ -96,4 +81,4 @@ def figures_of(tables: UnitTables) -> Iterator[Figure]:
     for kind in FIGURES.values():
         value = kind.value(tables)
         if value is not None:
-            yield Figure(kind.name, kind.unit, *value)
+            yield Figure(kind.name, kind.unit, value)

@@ -14,20 +14,17 @@ from inertial.design import of_axes
 from inertial.distributions import normal_tail
 from inertial.fits.linear import own_terms
 from inertial.state import ALL_AXES
-from inertial.uncertainty.deviation_law import DeviationLaw, dof_of_upper
-from pipelines.stages.noise import B_BOUND
+from inertial.uncertainty.deviation_law import DeviationLaw
 from pipelines.tables.calibration import Calibration
 from pipelines.tables.frames import UnitRows
 from schemas.recipe import Recipe
-
-NORMAL_95 = 1.959964
 
 
 class Value(NamedTuple):
     """Value and standard uncertainty of a figure of one unit, in the figure's unit.
 
     why_not : why there is no value, where there is none; the value is then infinite and passes no limit
-    dof : degrees of freedom of a standard deviation, nan of other figures
+    dof, removed : degrees of freedom of a standard deviation, nan of other figures, and the known part that was taken out of it
     shared : part of the uncertainty that the units of a lot have in common, that of the references
     median : of a value that is a 95 % bound of an error, the median of that error
     """
@@ -38,6 +35,12 @@ class Value(NamedTuple):
     dof: float = float("nan")
     shared: float = 0.0
     median: float = float("nan")
+    removed: float = 0.0
+
+    @property
+    def law(self) -> DeviationLaw | None:
+        """The law of a standard deviation; None of other figures, which are normal."""
+        return DeviationLaw(self.value, self.dof, self.removed) if self.dof > 0.0 else None
 
     def reach(self, guard: float) -> float:
         """Magnitude with the guard band: the value that is compared with a limit."""
@@ -181,16 +184,6 @@ def nothing(recipe: Recipe) -> str:
     return ""
 
 
-def static_record(recipe: Recipe) -> str:
-    """The requirement of figures of noise."""
-    return "" if recipe.static_record_s > 0.0 else "a static record (static_record_s > 0)"
-
-
-def verification_poses(recipe: Recipe) -> str:
-    """The requirement of figures of verification."""
-    return "" if recipe.verification else "verification poses"
-
-
 def effect_in_model(effect: str) -> Callable[[Recipe], str]:
     """The requirement of figures of one effect's coefficients."""
     return lambda recipe: "" if effect in recipe.effects else f"effect {effect} in the model"
@@ -198,12 +191,13 @@ def effect_in_model(effect: str) -> Callable[[Recipe], str]:
 
 @dataclass(frozen=True)
 class FigureKind:
-    """A figure of merit: every module of this package defines one as FIGURE.
+    """A figure of merit: the modules of this package define theirs as FIGURES.
 
     Parameters
     ----------
     name : key in limits files and tables; ends in the unit where it has one.
     unit : unit of the value, "1" for a ratio.
+    meaning : of the value, a sentence of the reference.
     label : heading in the report.
     order : place in tables, ascending.
     value : the figure of a unit, None where its tables do not yield one.
@@ -212,45 +206,8 @@ class FigureKind:
 
     name: str
     unit: str
+    meaning: str
     label: str
     order: int
     value: Callable[[UnitTables], Value | None]
     missing: Callable[[Recipe], str] = nothing
-
-
-def rms(errors: NDArray[np.float64]) -> Value:
-    """Root mean square, with the standard uncertainty rms/√(2n) of one from n normal values."""
-    value = float(np.sqrt(np.mean(errors**2)))
-    return Value(value, value / np.sqrt(2.0 * errors.size))
-
-
-def largest_error(rows: UnitRows, uncertainty: str, guard: float) -> Value:
-    """The error that is closest to a limit under a guard band, as a magnitude."""
-    errors, spread = rows["error_ug"], rows[uncertainty]
-    worst = int(np.argmax(np.abs(errors) + guard * spread))
-    return Value(abs(float(errors[worst])), float(spread[worst]))
-
-
-def worst_axis(rows: UnitRows, term: str, guard: float) -> Value | None:
-    """A noise term of the worst axis; a term that is not identified counts with its upper limit.
-
-    A unit with a silent axis has no figure: a value that was not measured is not within a limit.
-    """
-    if not len(rows):
-        return None
-    by_axis = [_noise_term(place, rows) for place in np.flatnonzero(rows["term"] == term).tolist()]
-    return max(by_axis, key=lambda figure: figure.reach(guard))
-
-
-def _noise_term(place: int, rows: UnitRows) -> Value:
-    value, low, high = (float(rows[column][place]) for column in ("value", "low", "high"))
-    axis = rows["axis"][place]
-    if rows["identified"][place]:
-        return Value(value, (high - low) / (2.0 * NORMAL_95), dof=dof_of_upper(high / value) if value > 0.0 else np.nan)
-    if rows["term"][place] == "B":  # two upper bounds: the smaller holds
-        bound = rows["high"][(rows["term"] == B_BOUND) & (rows["axis"] == axis)]
-        high = float(np.fmin(high, bound[0]))
-    if not np.isfinite(high):
-        why = str(rows["note"][place]) if "note" in rows else "no upper limit"
-        return Value(np.inf, 0.0, f"axis {axis}: {why}")
-    return Value(high, 0.0)

@@ -259,7 +259,7 @@ def discovered(request: Mapping[str, Any], report_progress: ReportProgress) -> d
     from pipelines.discovery import page
     from pipelines.discovery.discover import Look
     from pipelines.discovery.discover import discovered as looked_at
-    from pipelines.discovery.sentences import headline, scope_text
+    from pipelines.discovery.figures_of_name import headline, scope_text
 
     looked = looked_at(Archive(request["archive"]), Look(device=str(request["device"])))
     report_progress(1, 2, "drawing")

@@ -34,4 +34,4 @@ def test_a_figure_an_axis_or_a_repetition_that_is_no_number_does_not_pass() -> N
     for place in range(2):
         rows = [row | {"value": np.nan if k == place else 1.0 + k, "uncertainty": 0.1} for k in range(2)]
         [figure] = _of_procedures(pd.DataFrame(rows), "A", limits)
-        assert decide(limits, figure.name, figure.value, figure.uncertainty).outcome != "pass"
+        assert decide(limits, figure.name, figure.of.value, figure.of.uncertainty).outcome != "pass"

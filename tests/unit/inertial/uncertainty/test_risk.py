@@ -62,10 +62,10 @@ def test_the_table_of_a_procedure_brings_the_law_to_the_decision() -> None:
         "unit_text": "µg", "note": "", "dof": 9.0, "removed": 5.0,
     }  # fmt: skip
     [figure] = _of_procedures(pd.DataFrame([row]), "A", limited(TURN_ON, 100.0))
-    assert figure.law == DeviationLaw(60.0, 9.0, 5.0)
+    assert figure.of.law == DeviationLaw(60.0, 9.0, 5.0)
     earlier = {name: value for name, value in row.items() if name not in {"dof", "removed"}}
     [figure] = _of_procedures(pd.DataFrame([earlier]), "A", limited(TURN_ON, 100.0))
-    assert figure.law is None
+    assert figure.of.law is None
 
 
 def test_an_error_of_the_references_moves_the_whole_lot(rng: np.random.Generator) -> None:

@@ -170,7 +170,7 @@ def test_two_populations_in_a_coefficient_are_told_with_their_means(
     archive: Archive, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from pipelines.audit.parameters import NAMES
-    from pipelines.discovery import population
+    from pipelines.discovery import discover
 
     units = 400
     rng = np.random.default_rng(3)
@@ -187,7 +187,7 @@ def test_two_populations_in_a_coefficient_are_told_with_their_means(
         values=values,
         errors=np.ones_like(values),
     )
-    monkeypatch.setattr(population, "load", lambda *_: every)
+    monkeypatch.setattr(discover, "load", lambda *_: every)
     (row,) = discovered(archive, Look(populations=True)).document["population"]
     assert (row["figure"], row["kind"], row["detail"]["units"]) == ("bias_y", "two_populations", units)
     assert row["detail"]["share"] == pytest.approx(0.15, abs=0.02)

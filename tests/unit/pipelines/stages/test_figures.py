@@ -104,6 +104,7 @@ def test_the_rms_error_carries_the_uncertainty_of_its_covariance_where_the_run_h
         tables = UnitTables(*(ByUnit(t).of("A") for t in (residuals, table, poses, none)), without, 2.0)
         return next(f for f in figures_of(tables) if f.name == "bias_error_ug")
 
-    assert figure(rows).uncertainty == pytest.approx(np.sqrt(1250.0) / 2.0)
+    assert figure(rows).of.uncertainty == pytest.approx(np.sqrt(1250.0) / 2.0)
     told = rows.assign(rms_uncertainty_x_ug=7.0, rms_uncertainty_y_ug=1.0, rms_uncertainty_z_ug=1.0)
-    assert figure(told)[:5] == ("bias_error_ug", "µg", pytest.approx(np.sqrt(1250.0)), 7.0, "")
+    one = figure(told)
+    assert (one.unit, *one.of[:3]) == ("µg", pytest.approx(np.sqrt(1250.0)), 7.0, "")

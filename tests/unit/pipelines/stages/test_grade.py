@@ -108,7 +108,7 @@ def test_a_least_value_says_its_side_its_margin_and_its_risk() -> None:
          "unit_text": "Hz", "note": ""}
         for axis, value in (("x", 950.0), ("y", 805.0), ("z", 990.0))
     ]  # fmt: skip
-    assert [one.value for one in _of_procedures(pd.DataFrame(rows), "A", own)] == [805.0]  # the smallest of the axes
+    assert [one.of.value for one in _of_procedures(pd.DataFrame(rows), "A", own)] == [805.0]  # the smallest of the axes
 
 
 def test_a_least_value_of_a_figure_of_which_the_largest_axis_is_kept_is_refused(tmp_path) -> None:
