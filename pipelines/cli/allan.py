@@ -5,10 +5,9 @@ from __future__ import annotations
 from math import isnan
 from typing import Annotated, Any
 
-import typer
-
 from pipelines.archive import Archive
 from pipelines.cli import options
+from pipelines.cli.options import option
 from pipelines.cli.printing import error_console, give, print_table, say, short
 from schemas.errors import WrongUse, did_you_mean
 
@@ -35,15 +34,13 @@ def command(
     rate: options.RateOption = None,
     unit: options.SeriesUnitOption = "",
     spacing: Annotated[
-        str,
-        typer.Option("--spacing", metavar="octave|decade", help="Averaging times: 1, 2, 4 … or 1, 2, 5, 10 … samples."),
+        str, option("--spacing octave|decade", "Averaging times: 1, 2, 4 … or 1, 2, 5, 10 … samples.")
     ] = "octave",
     statistic: Annotated[
         str,
-        typer.Option(
-            "--statistic",
-            metavar="|".join(STATISTICS),
-            help="Overlapping Allan, modified Allan, overlapping Hadamard, total or time deviation; RMS or maximum time "
+        option(
+            f"--statistic {'|'.join(STATISTICS)}",
+            "Overlapping Allan, modified Allan, overlapping Hadamard, total or time deviation; RMS or maximum time "
             "interval error.",
         ),
     ] = STATISTICS[0],

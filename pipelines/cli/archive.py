@@ -10,7 +10,7 @@ import typer
 
 from inertial.counts import number_of, size_text
 from pipelines.archive import Archive
-from pipelines.cli import options
+from pipelines.cli.options import ArchiveOption, JsonOption, argument, option
 from pipelines.cli.printing import give_lines, refuse_standard_output
 from schemas.errors import DONE, PART_FAILED, WrongUse
 
@@ -52,12 +52,10 @@ app = typer.Typer(
 
 @app.command()
 def clean(
-    archive: options.ArchiveOption = None,
+    archive: ArchiveOption = None,
     *,
-    only_look: Annotated[
-        bool, typer.Option("--dry-run", help="Show what would be removed, and change nothing.")
-    ] = False,
-    as_json: options.JsonOption = False,
+    only_look: Annotated[bool, option("--dry-run", "Show what would be removed, and change nothing.")] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Remove temporary files of killed writers and add finished runs to the chain; files in use are not touched."""
     from pipelines.archive.cleaning import clean as cleaned
@@ -80,16 +78,11 @@ def clean(
 @app.command()
 def key(
     output: Annotated[
-        Path | None,
-        typer.Option(
-            "--output", metavar="FILE", help="File of the private key; default: in the user's configuration folder."
-        ),
+        Path | None, option("--output FILE", "File of the private key; default: in the user's configuration folder.")
     ] = None,
     *,
-    public: Annotated[
-        bool, typer.Option("--public", help="Show the public key of the existing key; make no key.")
-    ] = False,
-    as_json: options.JsonOption = False,
+    public: Annotated[bool, option("--public", "Show the public key of the existing key; make no key.")] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Make the key that signs manifests, outside the archive, and show its public key."""
     from pipelines.archive import signatures
@@ -116,17 +109,14 @@ def key(
 
 @app.command()
 def backup(
-    target: Annotated[
-        str, typer.Argument(metavar="COPY", help="Folder or address of the copy: empty, or an earlier copy.")
-    ],
-    archive: options.ArchiveOption = None,
+    target: Annotated[str, argument("COPY", "Folder or address of the copy: empty, or an earlier copy.")],
+    archive: ArchiveOption = None,
     database: Annotated[
-        Path | None,
-        typer.Option("--database", metavar="DIR", help="Also copy the database of the orchestrator into this folder."),
+        Path | None, option("--database DIR", "Also copy the database of the orchestrator into this folder.")
     ] = None,
-    keep: Annotated[int, typer.Option("--keep", min=1, help="Number of copies of the database to keep.")] = 14,
+    keep: Annotated[int, option("--keep", "Number of copies of the database to keep.", min=1)] = 14,
     *,
-    as_json: options.JsonOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Copy the archive to another disk or store, also during runs; a repeated copy adds only what is new.
 
@@ -147,12 +137,10 @@ def backup(
 
 @app.command()
 def compact(
-    archive: options.ArchiveOption = None,
-    before: Annotated[
-        str, typer.Option("--before", metavar="DATE", help="Only runs that began before this day; default: all.")
-    ] = "",
+    archive: ArchiveOption = None,
+    before: Annotated[str, option("--before DATE", "Only runs that began before this day; default: all.")] = "",
     *,
-    as_json: options.JsonOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Put the files of finished runs, their captures and the calibrations into a few large files, one for each month.
 
@@ -184,16 +172,13 @@ def compact(
 
 @app.command()
 def restore(
-    source: Annotated[str, typer.Argument(metavar="COPY", help="Folder or address of the copy.")],
-    archive: options.ArchiveOption = None,
+    source: Annotated[str, argument("COPY", "Folder or address of the copy.")],
+    archive: ArchiveOption = None,
     database: Annotated[
-        Path | None,
-        typer.Option(
-            "--database", metavar="FILE", help="Also restore the database of the orchestrator from this file."
-        ),
+        Path | None, option("--database FILE", "Also restore the database of the orchestrator from this file.")
     ] = None,
     *,
-    as_json: options.JsonOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Copy an archive back into an empty folder and verify it; exit 1 where the verification has findings.
 

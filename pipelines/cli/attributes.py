@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from pipelines.archive import Archive
-from pipelines.cli import options
+from pipelines.cli.options import ArchiveOption, JsonOption, argument, option
 from pipelines.cli.printing import give, give_lines, print_table, say
 
 if TYPE_CHECKING:
@@ -32,13 +32,11 @@ app = typer.Typer(no_args_is_help=True, help=SUMMARY)
     help="Add a table of attributes; a changed value is a new row, the old one is kept.",
 )
 def add(
-    table: Annotated[
-        Path, typer.Argument(metavar="FILE", help="A .csv or .parquet file with a column serial, or run.")
-    ],
-    by: Annotated[str, typer.Option("--by", metavar="serial|run", help="What a row is about.")] = "serial",
-    archive: options.ArchiveOption = None,
+    table: Annotated[Path, argument("FILE", "A .csv or .parquet file with a column serial, or run.")],
+    by: Annotated[str, option("--by serial|run", "What a row is about.")] = "serial",
+    archive: ArchiveOption = None,
     *,
-    as_json: options.JsonOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Add a table of attributes."""
     from pipelines.discovery.attribute_files import added_from
@@ -52,7 +50,7 @@ def add(
     epilog="\n\n".join(EXAMPLES_OF["list"]),
     help="List the attributes with their levels, and of how many units they are known.",
 )
-def list_(archive: options.ArchiveOption = None, *, as_json: options.JsonOption = False) -> None:
+def list_(archive: ArchiveOption = None, *, as_json: JsonOption = False) -> None:
     """List the attributes."""
     from pipelines.discovery.attribute_files import listed
 

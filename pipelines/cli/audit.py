@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from pipelines.archive import Archive
-from pipelines.cli import options
+from pipelines.cli.options import ArchiveOption, JsonOption, option
 from pipelines.cli.printing import print_json, remark, say, short
 from schemas.errors import DONE, PART_FAILED, WrongUse, did_you_mean
 
@@ -29,33 +29,27 @@ BEGINNING = -700000.0  # days before any calibration
 
 
 def command(
-    archive: options.ArchiveOption = None,
+    archive: ArchiveOption = None,
     since: Annotated[
-        str,
-        typer.Option("--since", metavar="DATE", help="Changes, signals and figures from this day on; all by default."),
+        str, option("--since DATE", "Changes, signals and figures from this day on; all by default.")
     ] = "",
     until: Annotated[
-        str,
-        typer.Option("--until", metavar="DATE", help="State of the archive at the end of this day; today by default."),
+        str, option("--until DATE", "State of the archive at the end of this day; today by default.")
     ] = "",
-    device: Annotated[str, typer.Option("--device", metavar="KIND", help="Only units of this kind.")] = "",
-    station: Annotated[str, typer.Option("--station", metavar="NAME", help="Only what this station measured.")] = "",
+    device: Annotated[str, option("--device KIND", "Only units of this kind.")] = "",
+    station: Annotated[str, option("--station NAME", "Only what this station measured.")] = "",
     rules: Annotated[
-        Path | None,
-        typer.Option(
-            "--rules", metavar="FILE", help="Intervals, tolerances, check standards; built-in ones by default."
-        ),
+        Path | None, option("--rules FILE", "Intervals, tolerances, check standards; built-in ones by default.")
     ] = None,
     page: Annotated[
-        Path | None,
-        typer.Option("--page", metavar="FILE.html", help="Write the report as one page that opens without a network."),
+        Path | None, option("--page FILE.html", "Write the report as one page that opens without a network.")
     ] = None,
-    dask: Annotated[str, typer.Option("--dask", metavar="ADDRESS|local", help="Read runs on Dask workers.")] = "",
+    dask: Annotated[str, option("--dask ADDRESS|local", "Read runs on Dask workers.")] = "",
     workers: Annotated[
-        int | None, typer.Option("--workers", min=1, help="Processes that read runs; as many as cores by default.")
+        int | None, option("--workers", "Processes that read runs; as many as cores by default.", min=1)
     ] = None,
     *,
-    as_json: options.JsonOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Audit the archive: re-calibrations due, drift, stations, check standards, population. Exit status 1: there are findings."""
     from pipelines.audit.audit import audit, scope_of
@@ -88,13 +82,13 @@ def _refuse_nothing(audited: Audit, root: str) -> None:
     """Refuse an unknown name, and an archive without calibrations before the day."""
     import numpy as np
 
-    for option, name, there in (
+    for switch, name, there in (
         ("--device", audited.scope.device.upper(), audited.all.device),
         ("--station", audited.scope.station, audited.all.station),
     ):
         if name and len(audited.all) and name not in there:
             known = [str(one) for one in np.unique(there.astype(str))]
-            raise WrongUse(f"audit: {option} '{name}' has no calibration in {root}; {did_you_mean(name, known)}")
+            raise WrongUse(f"audit: {switch} '{name}' has no calibration in {root}; {did_you_mean(name, known)}")
     if not len(audited.all) and not audited.problems:
         raise WrongUse(
             f"audit: {root} has no calibration in this time, one at least is needed; make a run, or give another --until"

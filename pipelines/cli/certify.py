@@ -8,7 +8,7 @@ import typer
 
 from inertial.counts import number_of
 from pipelines.archive import Archive, Run
-from pipelines.cli import options
+from pipelines.cli.options import ArchiveOption, JsonOption, RunArgument, option
 from pipelines.cli.printing import error_console, give, print_table, remark, say
 from schemas.errors import DONE, PART_FAILED, ArchiveUnusable
 
@@ -25,35 +25,21 @@ EXAMPLES = (
 
 
 def command(
-    run: options.RunArgument = "latest",
-    units: Annotated[
-        str, typer.Option("--units", metavar="SN,…", help="Certify only these units; default: all that passed.")
-    ] = "",
-    start: Annotated[
-        str, typer.Option("--from", metavar="DATE", help="First day of validity, UTC; default: today.")
-    ] = "",
-    until: Annotated[str, typer.Option("--until", metavar="DATE", help="The day after the last day of validity.")] = "",
+    run: RunArgument = "latest",
+    units: Annotated[str, option("--units SN,…", "Certify only these units; default: all that passed.")] = "",
+    start: Annotated[str, option("--from DATE", "First day of validity, UTC; default: today.")] = "",
+    until: Annotated[str, option("--until DATE", "The day after the last day of validity.")] = "",
     months: Annotated[
-        int,
-        typer.Option(
-            "--months", min=0, max=120, help="Validity without --until, months; 0: as long as the limits allow."
-        ),
+        int, option("--months", "Validity without --until, months; 0: as long as the limits allow.", min=0, max=120)
     ] = 0,
-    reason: Annotated[
-        str, typer.Option("--reason", help="Reason, written into the certificate's entry of the ledger.")
-    ] = "",
+    reason: Annotated[str, option("--reason", "Reason, written into the certificate's entry of the ledger.")] = "",
     key: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--key", metavar="FILE|HEX", help="Another public key that is accepted for the signatures of the run."
-        ),
+        list[str] | None, option("--key FILE|HEX", "Another public key that is accepted for the signatures of the run.")
     ] = None,
-    archive: options.ArchiveOption = None,
+    archive: ArchiveOption = None,
     *,
-    supersede: Annotated[
-        bool, typer.Option("--supersede", help="Also end calibrations that begin later and overlap.")
-    ] = False,
-    as_json: options.JsonOption = False,
+    supersede: Annotated[bool, option("--supersede", "Also end calibrations that begin later and overlap.")] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Certify the units of a run that passed, with first and last day of validity.
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pipelines.cli import options
+from pipelines.cli.options import JsonOption, option
 from pipelines.cli.printing import give, print_table, say, short
 from schemas.errors import DONE, PART_FAILED
 
@@ -23,17 +23,15 @@ EXAMPLES = (
 
 
 def command(
-    span: Annotated[str, typer.Option("--range", metavar="G", help="Largest specific force, such as 4g.")],
-    error: Annotated[str, typer.Option("--error", metavar="MG", help="Error that is allowed (k = 2), such as 2mg.")],
-    temperature: Annotated[
-        str, typer.Option("--temperature", metavar="LOW..HIGH", help="Temperatures of use, °C.")
-    ] = "25..25",
+    span: Annotated[str, option("--range G", "Largest specific force, such as 4g.")],
+    error: Annotated[str, option("--error MG", "Error that is allowed (k = 2), such as 2mg.")],
+    temperature: Annotated[str, option("--temperature LOW..HIGH", "Temperatures of use, °C.")] = "25..25",
     bandwidth: Annotated[
-        float, typer.Option("--bandwidth", metavar="HZ", help="Bandwidth of use, Hz: it sets noise and what must pass.")
+        float, option("--bandwidth HZ", "Bandwidth of use, Hz: it sets noise and what must pass.")
     ] = 10.0,
-    device: Annotated[str, typer.Option("--device", metavar="A,B", help="Presets to compare; all by default.")] = "",
+    device: Annotated[str, option("--device A,B", "Presets to compare; all by default.")] = "",
     *,
-    as_json: options.JsonOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Compare presets and calibrations with a need: an uncertainty budget at the end of the range, with its largest term.
 

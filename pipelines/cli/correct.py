@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from pipelines.archive import Archive
-from pipelines.cli import options
+from pipelines.cli.options import ArchiveOption, JsonOption, RateOption, TimeColumnOption, argument, option
 from pipelines.cli.printing import (
     STANDARD_OUTPUT,
     error_console,
@@ -39,71 +39,41 @@ EXAMPLES = (
 
 
 def command(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="Raw output over time, with a column of temperature.")],
+    file: Annotated[Path, argument("FILE", "Raw output over time, with a column of temperature.")],
     calibration: Annotated[
-        str, typer.Option("--calibration", metavar="RUN:UNIT", help="The calibration: a run and one of its units.")
+        str, option("--calibration RUN:UNIT", "The calibration: a run and one of its units.")
     ] = "latest",
     output: Annotated[
-        Path | None,
-        typer.Option(
-            "--output",
-            "-o",
-            metavar="FILE",
-            help="Corrected samples, as .csv or .parquet; -: as CSV on standard output.",
-        ),
+        Path | None, option("--output -o FILE", "Corrected samples, as .csv or .parquet; -: as CSV on standard output.")
     ] = None,
-    columns: Annotated[
-        str, typer.Option("--columns", metavar="x,y,z", help="Columns of the output; x,y,z or out_x,… by default.")
-    ] = "",
-    time: options.TimeColumnOption = "",
-    rate: options.RateOption = None,
-    force: Annotated[
-        str, typer.Option("--force", metavar="X,Y,Z", help="True specific force, g, the same for all samples.")
-    ] = "",
+    columns: Annotated[str, option("--columns x,y,z", "Columns of the output; x,y,z or out_x,… by default.")] = "",
+    time: TimeColumnOption = "",
+    rate: RateOption = None,
+    force: Annotated[str, option("--force X,Y,Z", "True specific force, g, the same for all samples.")] = "",
     gravity: Annotated[
-        float | None,
-        typer.Option(
-            "--gravity", metavar="M_S2", help="Local gravity with --at-rest, m/s²; that of the run by default."
-        ),
+        float | None, option("--gravity M_S2", "Local gravity with --at-rest, m/s²; that of the run by default.")
     ] = None,
     turn_on: Annotated[
         float | None,
-        typer.Option(
-            "--turn-on",
-            metavar="UG",
-            min=0.0,
-            help="Change of the bias from switch-on to switch-on, µg (standard deviation).",
-        ),
+        option("--turn-on UG", "Change of the bias from switch-on to switch-on, µg (standard deviation).", min=0.0),
     ] = None,
-    step: Annotated[
-        float, typer.Option("--step", metavar="S", min=1e-3, help="Time between updates of the bias.")
-    ] = 1.0,
-    low_pass: Annotated[
-        str, typer.Option("--filter", metavar="butterworth|fir|moving-average", help="Low-pass behind the correction.")
-    ] = "",
+    step: Annotated[float, option("--step S", "Time between updates of the bias.", min=1e-3)] = 1.0,
+    low_pass: Annotated[str, option("--filter butterworth|fir|moving-average", "Low-pass behind the correction.")] = "",
     cutoff: Annotated[
         float | None,
-        typer.Option(
-            "--cutoff",
-            metavar="HZ",
-            min=1e-9,
-            help="Its -3 dB frequency; the unit's bandwidth that a run measured by default.",
-        ),
+        option("--cutoff HZ", "Its -3 dB frequency; the unit's bandwidth that a run measured by default.", min=1e-9),
     ] = None,
     state: Annotated[
-        Path | None,
-        typer.Option(
-            "--state", metavar="FILE", help="Go on with filter and bias as kept in this file, and keep them in it."
-        ),
+        Path | None, option("--state FILE", "Go on with filter and bias as kept in this file, and keep them in it.")
     ] = None,
-    archive: options.ArchiveOption = None,
+    archive: ArchiveOption = None,
     *,
     at_rest: Annotated[
-        bool, typer.Option("--at-rest", help="Find where the unit is at rest and use the magnitude of gravity there.")
+        bool, option("--at-rest", "Find where the unit is at rest and use the magnitude of gravity there.")
     ] = False,
-    failed: Annotated[bool, typer.Option("--failed", help="Also use a unit that failed its limits.")] = False,
-    revoked: Annotated[bool, typer.Option("--revoked", help="Also use a revoked calibration.")] = False,
-    as_json: options.JsonOption = False,
+    failed: Annotated[bool, option("--failed", "Also use a unit that failed its limits.")] = False,
+    revoked: Annotated[bool, option("--revoked", "Also use a revoked calibration.")] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Correct a recording: a = K⁻¹(ã − b) with all effects of the model, and the covariance of each sample.
 

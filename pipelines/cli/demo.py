@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pipelines.cli import options
 from pipelines.cli.next_commands import command_line, extension, judged_data
+from pipelines.cli.options import JsonOption, option
 from pipelines.cli.printing import error_console, give_lines, print_json, publish, remark, say
 from pipelines.cli.text.demo_text import print_ending
 from schemas.progress import Progress
@@ -31,28 +31,22 @@ EXAMPLES = (
 
 def command(
     effect: Annotated[
-        str,
-        typer.Option("--effect", metavar="NAME|random", help="Hidden effect, by the name of its physics or its id."),
+        str, option("--effect NAME|random", "Hidden effect, by the name of its physics or its id.")
     ] = "random",
     seed: Annotated[
-        int | None, typer.Option("--seed", min=0, help="Seed of the simulation; the same seed gives the same data.")
+        int | None, option("--seed", "Seed of the simulation; the same seed gives the same data.", min=0)
     ] = None,
-    folder: Annotated[
-        Path, typer.Option("--folder", metavar="DIR", help="Folder for measurements, model and report.")
-    ] = Path("demo"),
-    lots: Annotated[int, typer.Option("--lots", min=60, help="Lots of the archive of --archive.")] = 400,
+    folder: Annotated[Path, option("--folder DIR", "Folder for measurements, model and report.")] = Path("demo"),
+    lots: Annotated[int, option("--lots", "Lots of the archive of --archive.", min=60)] = 400,
     *,
     archive: Annotated[
-        bool,
-        typer.Option(
-            "--archive", help="Hide something in a wafer of an archive of many lots, and find it with discover."
-        ),
+        bool, option("--archive", "Hide something in a wafer of an archive of many lots, and find it with discover.")
     ] = False,
-    auto: Annotated[bool, typer.Option("--auto", help="Run without questions.")] = False,
+    auto: Annotated[bool, option("--auto", "Run without questions.")] = False,
     by_hand: Annotated[
-        bool, typer.Option("--by-hand", help="Only measure and write the files; continue with the commands yourself.")
+        bool, option("--by-hand", "Only measure and write the files; continue with the commands yourself.")
     ] = False,
-    as_json: options.JsonOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Hide an effect in the simulated station and find it from the measurements: compare, diagnose, extend, compare.
 

@@ -11,6 +11,7 @@ import typer
 
 from pipelines.archive import Archive
 from pipelines.cli import options
+from pipelines.cli.options import option
 from pipelines.cli.printing import error_console, print_json, publish
 from schemas.errors import DONE, PART_FAILED, WrongUse
 
@@ -37,20 +38,13 @@ def command(
     formula: options.FormulaOption = None,
     leave_out: options.LeaveOutOption = "",
     report: Annotated[
-        Path | None,
-        typer.Option(
-            "--report", "--page", metavar="FILE.html", help="Write the diagnosis with pictures, as one HTML file."
-        ),
+        Path | None, option("--report --page FILE.html", "Write the diagnosis with pictures, as one HTML file.")
     ] = None,
     following: Annotated[
-        Path | None,
-        typer.Option("--next", metavar="FILE.toml", help="Write a recipe: the measured one with the proposed steps."),
+        Path | None, option("--next FILE.toml", "Write a recipe: the measured one with the proposed steps.")
     ] = None,
     recipe: Annotated[
-        str,
-        typer.Option(
-            "--recipe", metavar="RECIPE", help="Recipe of the dwells, for --next; a run of the archive has its own."
-        ),
+        str, option("--recipe RECIPE", "Recipe of the dwells, for --next; a run of the archive has its own.")
     ] = "",
     archive: options.ArchiveOption = None,
     *,

@@ -5,11 +5,9 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
 from inertial.counts import number_of
 from pipelines.archive import Archive
-from pipelines.cli import options
+from pipelines.cli.options import ArchiveOption, JsonOption, argument, option
 from pipelines.cli.printing import STYLES, print_json, print_table, say, short
 
 if TYPE_CHECKING:
@@ -27,12 +25,12 @@ SHOWN = 12
 
 
 def command(
-    run_a: Annotated[str, typer.Argument(metavar="RUN_A", help="Name of a run, the beginning of it, or 'latest'.")],
-    run_b: Annotated[str, typer.Argument(metavar="RUN_B", help="The run to compare with.")],
-    archive: options.ArchiveOption = None,
+    run_a: Annotated[str, argument("RUN_A", "Name of a run, the beginning of it, or 'latest'.")],
+    run_b: Annotated[str, argument("RUN_B", "The run to compare with.")],
+    archive: ArchiveOption = None,
     *,
-    everything: Annotated[bool, typer.Option("--all", help="Show all changes; default: only the largest.")] = False,
-    as_json: options.JsonOption = False,
+    everything: Annotated[bool, option("--all", "Show all changes; default: only the largest.")] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Show which grades, coefficients and figures differ between two runs, relative to their uncertainty, and the causes."""
     from pipelines.rerun.diff import diff

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from pipelines.archive import Archive
-from pipelines.cli import options
+from pipelines.cli.options import ArchiveOption, JsonOption, option
 from pipelines.cli.printing import give, publish
 from schemas.errors import DONE, PART_FAILED, WrongUse
 
@@ -22,53 +22,33 @@ EXAMPLES = (
 
 
 def command(
-    archive: options.ArchiveOption = None,
-    device: Annotated[
-        str, typer.Option("--device", metavar="KIND", help="Kind of device; that of most runs by default.")
-    ] = "",
+    archive: ArchiveOption = None,
+    device: Annotated[str, option("--device KIND", "Kind of device; that of most runs by default.")] = "",
     since: Annotated[
-        str,
-        typer.Option(
-            "--since", metavar="DATE", help="Only lots from this day on; the nightly evidence stays as it is."
-        ),
+        str, option("--since DATE", "Only lots from this day on; the nightly evidence stays as it is.")
     ] = "",
-    driver: Annotated[
-        str, typer.Option("--driver", metavar="a,b", help="Only discoveries of these drivers, such as wafer,station.")
-    ] = "",
+    driver: Annotated[str, option("--driver a,b", "Only discoveries of these drivers, such as wafer,station.")] = "",
     explain: Annotated[
-        str,
-        typer.Option(
-            "--explain", metavar="ID", help="One discovery with its levels, what carries it, and what to measure next."
-        ),
+        str, option("--explain ID", "One discovery with its levels, what carries it, and what to measure next.")
     ] = "",
     model: Annotated[
-        Path | None,
-        typer.Option(
-            "--model", metavar="FILE", help="A model file: what is left with its effects in the model of every lot."
-        ),
+        Path | None, option("--model FILE", "A model file: what is left with its effects in the model of every lot.")
     ] = None,
-    html: Annotated[
-        Path | None, typer.Option("--html", metavar="FILE", help="Write the findings with pictures as one page.")
-    ] = None,
+    html: Annotated[Path | None, option("--html FILE", "Write the findings with pictures as one page.")] = None,
     workers: Annotated[
-        int | None, typer.Option("--workers", min=1, help="Processes that score new runs; as many as cores by default.")
+        int | None, option("--workers", "Processes that score new runs; as many as cores by default.", min=1)
     ] = None,
-    dask: Annotated[str, typer.Option("--dask", metavar="ADDRESS|local", help="Score runs on Dask workers.")] = "",
+    dask: Annotated[str, option("--dask ADDRESS|local", "Score runs on Dask workers.")] = "",
     *,
-    reach: Annotated[
-        bool, typer.Option("--reach", help="Print the smallest effects that this archive could have shown.")
-    ] = False,
+    reach: Annotated[bool, option("--reach", "Print the smallest effects that this archive could have shown.")] = False,
     populations: Annotated[
-        bool,
-        typer.Option("--populations", help="Look for two populations in each coefficient, too: a second for each."),
+        bool, option("--populations", "Look for two populations in each coefficient, too: a second for each.")
     ] = False,
     looking_back: Annotated[
         bool,
-        typer.Option(
-            "--looking-back", help="Judge all lots again with the attributes known now; the nightly evidence stays."
-        ),
+        option("--looking-back", "Judge all lots again with the attributes known now; the nightly evidence stays."),
     ] = False,
-    as_json: options.JsonOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Pool the lots of an archive: effects that differ by wafer, station, slot, firmware or date, or that all lots have.
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pipelines.cli import options
+from pipelines.cli.options import ArchiveOption, JsonOption, StationOption, option
 from pipelines.cli.printing import give, print_table, say
 from schemas.errors import DONE, PART_FAILED
 
@@ -25,13 +25,11 @@ COLOURS = {"good": "green", "warning": "yellow", "fault": "bold red", "not confi
 
 
 def command(
-    archive: options.ArchiveOption = None,
-    station: options.StationOption = None,
-    free_gb: Annotated[
-        float, typer.Option("--free-gb", min=0.0, metavar="GB", help="Free space that the archive needs.")
-    ] = 1.0,
+    archive: ArchiveOption = None,
+    station: StationOption = None,
+    free_gb: Annotated[float, option("--free-gb GB", "Free space that the archive needs.", min=0.0)] = 1.0,
     *,
-    as_json: options.JsonOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Check the installation and its connections, with a remedy for each fault.
 

@@ -5,10 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any
 
-import typer
-
 from pipelines.cli import options
 from pipelines.cli.next_commands import command_line, print_next
+from pipelines.cli.options import argument, option
 from pipelines.cli.printing import error_console, give, print_table, publish, say, short
 from schemas.errors import WrongUse
 
@@ -22,16 +21,12 @@ EXAMPLES = (
 
 
 def command(
-    model: Annotated[Path, typer.Argument(metavar="MODEL", help="A model file.")],
-    dwells: Annotated[
-        str, typer.Option("--dwells", metavar="DWELLS", help="A file in the exchange format, or a run of the archive.")
-    ] = "",
+    model: Annotated[Path, argument("MODEL", "A model file.")],
+    dwells: Annotated[str, option("--dwells DWELLS", "A file in the exchange format, or a run of the archive.")] = "",
     fresh: options.FreshOption = "",
     history: options.HistoryOption = "",
     fresh_history: options.FreshHistoryOption = "",
-    picture: Annotated[
-        Path | None, typer.Option("--picture", metavar="FILE.png", help="Draw it, as PNG, SVG or PDF.")
-    ] = None,
+    picture: Annotated[Path | None, option("--picture FILE.png", "Draw it, as PNG, SVG or PDF.")] = None,
     effect_file: options.EffectFileOption = None,
     archive: options.ArchiveOption = None,
     *,

@@ -11,6 +11,7 @@ import typer
 
 from pipelines.archive import Archive, Run
 from pipelines.cli import options
+from pipelines.cli.options import argument, option
 from pipelines.cli.printing import error_console, give, refuse_standard_output, remark, say
 from pipelines.improvement.improvement import ImprovedTables, Improvement
 from schemas.errors import DONE, PART_FAILED, WrongUse
@@ -37,25 +38,17 @@ MEASURES = "y or Enter measures them, n leaves it; Ctrl-C stops, and the same co
 
 def command(
     data: Annotated[
-        str,
-        typer.Argument(
-            metavar="DATA|RUN", help="A recording in any format that import reads, a table of dwells, or a run."
-        ),
+        str, argument("DATA|RUN", "A recording in any format that import reads, a table of dwells, or a run.")
     ],
     effects: options.EffectsOption = "",
     model: Annotated[
-        Path | None,
-        typer.Option("--model", metavar="FILE", help="Model file to judge; its next versions are written to it."),
+        Path | None, option("--model FILE", "Model file to judge; its next versions are written to it.")
     ] = None,
     output: Annotated[
-        Path | None,
-        typer.Option("--out", "-o", metavar="FILE", help="Model file to write; --model or model.toml by default."),
+        Path | None, option("--out -o FILE", "Model file to write; --model or model.toml by default.")
     ] = None,
     choose: Annotated[
-        str,
-        typer.Option(
-            "--effect", metavar="a,b", help="Effects to add, one per class of the diagnosis, without a question."
-        ),
+        str, option("--effect a,b", "Effects to add, one per class of the diagnosis, without a question.")
     ] = "",
     history: options.HistoryOption = "",
     fresh: options.FreshOption = "",
@@ -66,15 +59,12 @@ def command(
     group: options.GroupOption = "",
     archive: options.ArchiveOption = None,
     *,
-    yes: Annotated[
-        bool,
-        typer.Option("--yes", "-y", help="Answer yes; a class of several effects needs --effect."),
-    ] = False,
+    yes: Annotated[bool, option("--yes -y", "Answer yes; a class of several effects needs --effect.")] = False,
     measure: Annotated[
         bool | None,
-        typer.Option(
+        option(
             "--measure/--no-measure",
-            help="Let the station of a run measure its units again as the fresh run; default: ask at a terminal.",
+            "Let the station of a run measure its units again as the fresh run; default: ask at a terminal.",
         ),
     ] = None,
     show_all: options.AllOption = False,

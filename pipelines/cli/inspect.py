@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from inertial.counts import number_of
-from pipelines.cli import options
+from pipelines.cli.options import GroupOption, JoinOption, JsonOption, argument, option
 from pipelines.cli.printing import error_console, print_json, print_table, say
 from schemas.errors import DONE, PART_FAILED, WrongUse
 
@@ -31,17 +31,13 @@ PICTURES = (".svg", ".png", ".pdf")
 
 
 def command(
-    files: Annotated[list[Path], typer.Argument(metavar="FILE…", help="Recordings in any format that import reads.")],
-    join: options.JoinOption = "",
-    group: options.GroupOption = "",
-    picture: Annotated[
-        Path | None, typer.Option("--picture", metavar="FILE", help="Draw the record: .svg, .png or .pdf.")
-    ] = None,
-    page: Annotated[
-        Path | None, typer.Option("--page", metavar="FILE.html", help="Write the result as an HTML page.")
-    ] = None,
+    files: Annotated[list[Path], argument("FILE…", "Recordings in any format that import reads.")],
+    join: JoinOption = "",
+    group: GroupOption = "",
+    picture: Annotated[Path | None, option("--picture FILE", "Draw the record: .svg, .png or .pdf.")] = None,
+    page: Annotated[Path | None, option("--page FILE.html", "Write the result as an HTML page.")] = None,
     *,
-    as_json: options.JsonOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Show the content of a file and its probable meaning, with reasons: columns, units, rate, gaps, faults, static intervals.
 

@@ -11,6 +11,7 @@ import typer
 from pipelines.archive import Archive
 from pipelines.cli import options
 from pipelines.cli.next_commands import command_line, judged_data, print_extension, print_next
+from pipelines.cli.options import option
 from pipelines.cli.printing import error_console, give, print_table, remark, say, short
 from pipelines.cli.run import shown
 from pipelines.cli.text.verdict_text import print_verdict
@@ -35,38 +36,29 @@ SETTLED = frozenset({"adequate", "told_apart"})
 def command(
     recipe: options.RecipeArgument = "production",
     station: options.StationOption = None,
-    units: Annotated[
-        str, typer.Option("--units", metavar="SN,…|FILE", help="Serial numbers slot by slot, or a slot map.")
-    ] = "",
+    units: Annotated[str, option("--units SN,…|FILE", "Serial numbers slot by slot, or a slot map.")] = "",
     archive: options.ArchiveOption = None,
     seed: options.SeedOption = None,
     repeat: options.RepeatOption = 0,
     effects: Annotated[
-        str,
-        typer.Option("--effects", metavar="a,b,c", help="Effects of the model to diagnose; the recipe's by default."),
+        str, option("--effects a,b,c", "Effects of the model to diagnose; the recipe's by default.")
     ] = "",
     budget: Annotated[
         float | None,
-        typer.Option(
-            "--budget",
-            min=0.0,
-            metavar="MIN",
-            help="Station time for follow-ups, min; 30 % of the first run by default.",
-        ),
+        option("--budget MIN", "Station time for follow-ups, min; 30 % of the first run by default.", min=0.0),
     ] = None,
     *,
     yes: Annotated[
         bool | None,
-        typer.Option(
+        option(
             "--yes/--ask",
-            help="Approval of extra station time: automatic, or ask, at the terminal or through a paused flow run.",
+            "Approval of extra station time: automatic, or ask, at the terminal or through a paused flow run.",
         ),
     ] = None,
     unseen: Annotated[
-        bool,
-        typer.Option("--unseen", help="Also measure follow-ups for effects that are not visible in the first run."),
+        bool, option("--unseen", "Also measure follow-ups for effects that are not visible in the first run.")
     ] = False,
-    direct: Annotated[bool, typer.Option("--direct", help="Run without the orchestrator.")] = False,
+    direct: Annotated[bool, option("--direct", "Run without the orchestrator.")] = False,
     as_json: options.JsonOption = False,
 ) -> None:
     """Measure a lot, diagnose it, and measure follow-ups that discriminate between the effects that may be missing.

@@ -6,7 +6,7 @@ from dataclasses import asdict
 
 from inertial.counts import number_of
 from pipelines.archive import Archive, RunInfo
-from pipelines.cli import options
+from pipelines.cli.options import ArchiveOption, JsonOption
 from pipelines.cli.printing import give, print_table, say
 from schemas.tables import ADEQUATE
 
@@ -19,7 +19,7 @@ EXAMPLES = (
 )
 
 
-def command(archive: options.ArchiveOption = None, *, as_json: options.JsonOption = False) -> None:
+def command(archive: ArchiveOption = None, *, as_json: JsonOption = False) -> None:
     """List the runs of the archive in the order of their start."""
     store = Archive(archive)
     infos = store.runs()

@@ -5,10 +5,8 @@ from __future__ import annotations
 import os
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from pipelines.archive import Archive
-from pipelines.cli import options
+from pipelines.cli.options import ArchiveOption, JsonOption, argument, option
 from pipelines.cli.printing import give, print_table, say
 from schemas.errors import WrongUse
 
@@ -26,16 +24,12 @@ EXAMPLES = (
 
 
 def command(
-    run: Annotated[
-        str, typer.Argument(metavar="[FLOW-RUN]", help="The run to answer: the beginning of its name or id.")
-    ] = "",
-    archive: options.ArchiveOption = None,
+    run: Annotated[str, argument("[FLOW-RUN]", "The run to answer: the beginning of its name or id.")] = "",
+    archive: ArchiveOption = None,
     *,
-    go: Annotated[bool, typer.Option("--go", help="Confirm: the run continues.")] = False,
-    stop: Annotated[
-        bool, typer.Option("--stop", help="Stop the run; the same 'tumbleline run' continues it later.")
-    ] = False,
-    as_json: options.JsonOption = False,
+    go: Annotated[bool, option("--go", "Confirm: the run continues.")] = False,
+    stop: Annotated[bool, option("--stop", "Stop the run; the same 'tumbleline run' continues it later.")] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Show the runs that wait for the operator and their questions; answer with --go or --stop."""
     if go and stop:

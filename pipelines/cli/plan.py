@@ -10,6 +10,7 @@ from typer.core import TyperGroup
 
 from pipelines.archive import Archive
 from pipelines.cli import options
+from pipelines.cli.options import argument, option
 from pipelines.cli.plan_files import save, write_page, write_pictures
 from pipelines.cli.printing import give, is_standard_output, print_json, print_text, remark
 from pipelines.cli.text.plan_text import print_plan, print_procedures
@@ -45,29 +46,21 @@ RECIPE = "recipe"
 
 
 DeviceOption = Annotated[
-    str,
-    typer.Option(
-        "--device", metavar="PRESET", help="Preset with the noise of the device; the recipe's device by default."
-    ),
+    str, option("--device PRESET", "Preset with the noise of the device; the recipe's device by default.")
 ]
 NoiseOption = Annotated[
-    float | None,
-    typer.Option("--noise", min=0.0, help="White noise density of the device, µg/√Hz; the preset's by default."),
+    float | None, option("--noise", "White noise density of the device, µg/√Hz; the preset's by default.", min=0.0)
 ]
 WanderOption = Annotated[
     float | None,
-    typer.Option(
+    option(
         "--wander",
+        "Flicker floor of the Allan deviation, µg, without random walk; flicker and random walk of the preset by default.",
         min=0.0,
-        help="Flicker floor of the Allan deviation, µg, without random walk; flicker and random walk of the preset by default.",
     ),
 ]
-EffectsOption = Annotated[
-    str, typer.Option("--effects", metavar="a,b,c", help="Effects of the model; the recipe's by default.")
-]
-PageOption = Annotated[
-    Path | None, typer.Option("--page", metavar="FILE.html", help="Also write an HTML page with pictures to this file.")
-]
+EffectsOption = Annotated[str, option("--effects a,b,c", "Effects of the model; the recipe's by default.")]
+PageOption = Annotated[Path | None, option("--page FILE.html", "Also write an HTML page with pictures to this file.")]
 
 
 class _RecipeFirst(TyperGroup):
@@ -103,18 +96,16 @@ def command(
     wander: WanderOption = None,
     pose: Annotated[
         list[str] | None,
-        typer.Option(
-            "--pose",
-            metavar="NAME=OUTER,INNER",
-            help="Plan with a pose at other angles, in degrees: p05 is the fifth of the fit, v1 the first of the "
+        option(
+            "--pose NAME=OUTER,INNER",
+            "Plan with a pose at other angles, in degrees: p05 is the fifth of the fit, v1 the first of the "
             "verification; may be repeated.",
         ),
     ] = None,
     page: PageOption = None,
     archive: options.ArchiveOption = None,
     pictures: Annotated[
-        Path | None,
-        typer.Option("--pictures", metavar="DIR", help="Also write the pictures to this folder, as RECIPE-NAME.svg."),
+        Path | None, option("--pictures DIR", "Also write the pictures to this folder, as RECIPE-NAME.svg.")
     ] = None,
     *,
     as_json: options.JsonOption = False,
@@ -164,86 +155,57 @@ def command(
 @app.command()
 def optimise(
     recipe: Annotated[
-        str,
-        typer.Argument(
-            metavar="[RECIPE]", help="Recipe to start from: device, sample rate, soak, temperature range, limits."
-        ),
+        str, argument("[RECIPE]", "Recipe to start from: device, sample rate, soak, temperature range, limits.")
     ] = "production",
     output: Annotated[
         Path | None,
-        typer.Option(
-            "--output",
-            "-o",
-            metavar="FILE.toml",
-            help="File of the new recipe; - prints it; NAME-optimal.toml by default.",
-        ),
+        option("--output -o FILE.toml", "File of the new recipe; - prints it; NAME-optimal.toml by default."),
     ] = None,
     device: DeviceOption = "",
     station: options.StationOption = None,
     effects: EffectsOption = "",
     model: options.ModelOption = None,
     see: Annotated[
-        str,
-        typer.Option(
-            "--see",
-            metavar="a,b,c",
-            help="Further effects that must be visible; those of the textbook plan by default.",
-        ),
+        str, option("--see a,b,c", "Further effects that must be visible; those of the textbook plan by default.")
     ] = "",
     required_errors: Annotated[
         list[str] | None,
-        typer.Option(
-            "--wanted", metavar="EFFECT=µg", help="Required error (1σ) of an effect's coefficients; may be repeated."
-        ),
+        option("--wanted EFFECT=µg", "Required error (1σ) of an effect's coefficients; may be repeated."),
     ] = None,
     factor: Annotated[
-        float, typer.Option("--factor", min=0.01, help="Required errors as a multiple of the textbook plan's.")
+        float, option("--factor", "Required errors as a multiple of the textbook plan's.", min=0.01)
     ] = 1.0,
     temperatures: Annotated[
         str,
-        typer.Option(
-            "--temperatures",
-            metavar="a,b,c",
-            help="Required temperatures, °C; by default the ends of the recipe's range, and others between as needed.",
+        option(
+            "--temperatures a,b,c",
+            "Required temperatures, °C; by default the ends of the recipe's range, and others between as needed.",
         ),
     ] = "",
     poses: Annotated[
-        str,
-        typer.Option(
-            "--poses",
-            metavar="PLAN",
-            help="Named plan of candidate poses; a Fibonacci lattice of directions by default.",
-        ),
+        str, option("--poses PLAN", "Named plan of candidate poses; a Fibonacci lattice of directions by default.")
     ] = "",
     criterion: Annotated[
         str,
-        typer.Option(
+        option(
             "--criterion",
-            help="worst (coefficient), A (mean variance), D (volume), or T (discrimination between effects, see --part).",
+            "worst (coefficient), A (mean variance), D (volume), or T (discrimination between effects, see --part).",
         ),
     ] = "worst",
-    part: Annotated[
-        str, typer.Option("--part", metavar="a,b", help="With --criterion T: effects to discriminate between.")
-    ] = "",
+    part: Annotated[str, option("--part a,b", "With --criterion T: effects to discriminate between.")] = "",
     size: Annotated[
         float | None,
-        typer.Option(
-            "--size", min=1e-3, help="With --criterion T: largest contribution of each effect, µg; 100 by default."
-        ),
+        option("--size", "With --criterion T: largest contribution of each effect, µg; 100 by default.", min=1e-3),
     ] = None,
     separation: Annotated[
         float | None,
-        typer.Option(
-            "--separation",
-            min=1.0,
-            help="With --criterion T: required χ² of the wrong effect over the lot; 50 by default.",
+        option(
+            "--separation", "With --criterion T: required χ² of the wrong effect over the lot; 50 by default.", min=1.0
         ),
     ] = None,
     verification: Annotated[
         int | None,
-        typer.Option(
-            "--verification", min=1, help="Repetitions of each verification pose; as in the recipe by default."
-        ),
+        option("--verification", "Repetitions of each verification pose; as in the recipe by default.", min=1),
     ] = None,
     noise: NoiseOption = None,
     wander: WanderOption = None,
@@ -251,10 +213,7 @@ def optimise(
     archive: options.ArchiveOption = None,
     *,
     ramp: Annotated[
-        bool,
-        typer.Option(
-            "--ramp", help="Measure while the chamber ramps, without soaks; the device's temperature is read."
-        ),
+        bool, option("--ramp", "Measure while the chamber ramps, without soaks; the device's temperature is read.")
     ] = False,
     as_json: options.JsonOption = False,
 ) -> None:

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-import typer
-
 from pipelines.cli import options
+from pipelines.cli.options import option
 from pipelines.cli.printing import error_console, give, print_table, say, short
 from schemas.errors import WrongUse
 
@@ -27,8 +26,7 @@ def command(
     rate: options.RateOption = None,
     unit: options.SeriesUnitOption = "",
     segment: Annotated[
-        int | None,
-        typer.Option("--segment", metavar="N", help="Samples of a segment; an eighth of the record by default."),
+        int | None, option("--segment N", "Samples of a segment; an eighth of the record by default.")
     ] = None,
     stretch: options.StretchOption = None,
     plot: options.PlotOption = None,

@@ -5,10 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
 from pipelines.archive import Archive
-from pipelines.cli import options
+from pipelines.cli.options import ArchiveOption, EffectFileOption, JsonOption, argument, option
 from pipelines.cli.printing import give, give_lines, print_table, say
 from schemas.errors import WrongUse
 
@@ -25,19 +23,17 @@ EXAMPLES = (
 
 
 def command(
-    model: Annotated[Path | None, typer.Argument(metavar="[MODEL]", help="A model file.")] = None,
-    since: Annotated[str, typer.Option("--from", metavar="DATE", help="First day of use (UTC).")] = "",
-    device: Annotated[str, typer.Option("--device", metavar="KIND", help="For this kind of device only.")] = "",
-    station: Annotated[str, typer.Option("--station", metavar="NAME", help="For this station only.")] = "",
-    reason: Annotated[str, typer.Option("--reason", metavar="TEXT", help="Reason for the release.")] = "",
-    effect_file: options.EffectFileOption = None,
-    archive: options.ArchiveOption = None,
+    model: Annotated[Path | None, argument("[MODEL]", "A model file.")] = None,
+    since: Annotated[str, option("--from DATE", "First day of use (UTC).")] = "",
+    device: Annotated[str, option("--device KIND", "For this kind of device only.")] = "",
+    station: Annotated[str, option("--station NAME", "For this station only.")] = "",
+    reason: Annotated[str, option("--reason TEXT", "Reason for the release.")] = "",
+    effect_file: EffectFileOption = None,
+    archive: ArchiveOption = None,
     *,
-    force: Annotated[
-        bool, typer.Option("--force", help="Release the model without a what-if with the verdict 'better'.")
-    ] = False,
-    listed: Annotated[bool, typer.Option("--list", help="List the releases.")] = False,
-    as_json: options.JsonOption = False,
+    force: Annotated[bool, option("--force", "Release the model without a what-if with the verdict 'better'.")] = False,
+    listed: Annotated[bool, option("--list", "List the releases.")] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Release a model to the line from a date, or list the releases.
 

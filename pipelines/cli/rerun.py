@@ -13,6 +13,7 @@ from pipelines.archive import Archive
 from pipelines.cli import options
 from pipelines.cli.inputs import distribution
 from pipelines.cli.next_commands import archive_words, command_line, print_next
+from pipelines.cli.options import option
 from pipelines.cli.printing import error_console, give, print_table, say
 from schemas.errors import WrongUse
 
@@ -45,9 +46,9 @@ def command(
     workers: options.WorkersOption = None,
     *,
     check: Annotated[
-        bool, typer.Option("--check", help="Write nothing; check that every table is reproduced byte for byte.")
+        bool, option("--check", "Write nothing; check that every table is reproduced byte for byte.")
     ] = False,
-    report: Annotated[bool, typer.Option("--report", help="Also make the report of every re-run.")] = False,
+    report: Annotated[bool, option("--report", "Also make the report of every re-run.")] = False,
     as_json: options.JsonOption = False,
 ) -> None:
     """Re-analyse archived runs with the present code, another model or other limits; only stages with a changed key are computed.

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from typing import Annotated
 
-import typer
-
 from pipelines.archive import Archive, Run
-from pipelines.cli import options
+from pipelines.cli.options import ArchiveOption, JsonOption, argument, option
 from pipelines.cli.printing import give_lines
 
 PART = "Certificates, trace, audit"
@@ -20,23 +18,17 @@ EXAMPLES = (
 
 
 def command(
-    serial: Annotated[str, typer.Argument(metavar="SERIAL", help="The unit.")],
-    reason: Annotated[str, typer.Option("--reason", help="Reason, for the users of the calibration.")] = "",
+    serial: Annotated[str, argument("SERIAL", "The unit.")],
+    reason: Annotated[str, option("--reason", "Reason, for the users of the calibration.")] = "",
     day: Annotated[
-        str,
-        typer.Option(
-            "--from", metavar="DATE", help="First day without validity; default: the first day of the calibration."
-        ),
+        str, option("--from DATE", "First day without validity; default: the first day of the calibration.")
     ] = "",
     certificate: Annotated[
-        int,
-        typer.Option(
-            "--certificate", min=0, help="Number after the serial; default: all that are valid today or later."
-        ),
+        int, option("--certificate", "Number after the serial; default: all that are valid today or later.", min=0)
     ] = 0,
-    archive: options.ArchiveOption = None,
+    archive: ArchiveOption = None,
     *,
-    as_json: options.JsonOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Revoke a unit's calibration, with the reason. Nothing is deleted: the revocation is added to the ledger of the unit."""
     from pipelines.certificates import Ledger

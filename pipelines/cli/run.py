@@ -11,6 +11,7 @@ import typer
 
 from pipelines.archive import Archive, Run
 from pipelines.cli import options
+from pipelines.cli.options import option
 from pipelines.cli.printing import error_console, print_json, remark
 from schemas.errors import WrongUse
 from schemas.progress import Progress
@@ -33,34 +34,27 @@ def command(
     station: options.StationOption = None,
     units: Annotated[
         str,
-        typer.Option(
-            "--units",
-            metavar="SN,…|FILE|scan",
-            help="Serial numbers in the order of the slots, a slot map (CSV or TOML), or 'scan' to scan them.",
+        option(
+            "--units SN,…|FILE|scan",
+            "Serial numbers in the order of the slots, a slot map (CSV or TOML), or 'scan' to scan them.",
         ),
     ] = "",
     archive: options.ArchiveOption = None,
     seed: options.SeedOption = None,
     repeat: options.RepeatOption = 0,
     fault: Annotated[
-        list[str] | None,
-        typer.Option("--fault", metavar="KIND[:KEY=VALUE…]", help="Fault of the simulated station; may be repeated."),
+        list[str] | None, option("--fault KIND[:KEY=VALUE…]", "Fault of the simulated station; may be repeated.")
     ] = None,
     *,
     prompts: Annotated[
         bool | None,
-        typer.Option(
-            "--prompts/--no-prompts", help="Ask the operator to load and unload; default: on hardware, at a terminal."
-        ),
+        option("--prompts/--no-prompts", "Ask the operator to load and unload; default: on hardware, at a terminal."),
     ] = None,
     record: options.RecordOption = None,
     replay: Annotated[
-        Path | None,
-        typer.Option(
-            "--replay", metavar="FILE", help="Answer from this recording of the same run; no station is opened."
-        ),
+        Path | None, option("--replay FILE", "Answer from this recording of the same run; no station is opened.")
     ] = None,
-    direct: Annotated[bool, typer.Option("--direct", help="Run the same chain without the orchestrator.")] = False,
+    direct: Annotated[bool, option("--direct", "Run the same chain without the orchestrator.")] = False,
     as_json: options.JsonOption = False,
 ) -> None:
     """Measure and calibrate a lot, from recipe to report: the main job.

@@ -8,7 +8,7 @@ import typer
 
 from inertial.counts import number_of
 from pipelines.archive import Archive, Run
-from pipelines.cli import options
+from pipelines.cli.options import ArchiveOption, JsonOption, argument, option
 from pipelines.cli.printing import print_json, print_table, say, short
 from pipelines.cli.validity import print_remarks, show_validity
 from schemas.errors import DONE, PART_FAILED
@@ -26,21 +26,14 @@ MANY = 40
 
 def command(
     run: Annotated[
-        str,
-        typer.Argument(metavar="RUN|UNIT", help="Name of a run, the beginning of it, or 'latest'; or a serial number."),
+        str, argument("RUN|UNIT", "Name of a run, the beginning of it, or 'latest'; or a serial number.")
     ] = "latest",
-    table: Annotated[
-        str, typer.Argument(metavar="[TABLE]", help="A table of the run, for instance coefficients.")
-    ] = "",
-    at: Annotated[
-        str, typer.Option("--at", metavar="DATE", help="Show the calibration of UNIT that is valid on this day.")
-    ] = "",
-    known: Annotated[
-        str, typer.Option("--known", metavar="DATE", help="With --at: as the archive was on this day.")
-    ] = "",
-    archive: options.ArchiveOption = None,
+    table: Annotated[str, argument("[TABLE]", "A table of the run, for instance coefficients.")] = "",
+    at: Annotated[str, option("--at DATE", "Show the calibration of UNIT that is valid on this day.")] = "",
+    known: Annotated[str, option("--known DATE", "With --at: as the archive was on this day.")] = "",
+    archive: ArchiveOption = None,
     *,
-    as_json: options.JsonOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Show the result of a run, one of its tables, or the calibration of a unit that is valid on a date (default: today).
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pipelines.cli import options
+from pipelines.cli.options import JsonOption, StationOption, argument, option
 from pipelines.cli.printing import give, print_json, print_table, say
 from pipelines.cli.station_bring_up import bring_up
 from pipelines.cli.station_check import check
@@ -87,23 +87,20 @@ app.command()(watch)
 
 @app.command()
 def serve(
-    station: options.StationOption = None,
-    host: Annotated[str, typer.Option("--host", help="Interface to listen on.")] = "127.0.0.1",
-    port: Annotated[int, typer.Option("--port", min=0, max=65535, help="TCP port; 0: any free port.")] = 5020,
+    station: StationOption = None,
+    host: Annotated[str, option("--host", "Interface to listen on.")] = "127.0.0.1",
+    port: Annotated[int, option("--port", "TCP port; 0: any free port.", min=0, max=65535)] = 5020,
     speed: Annotated[
-        float, typer.Option("--speed", min=0.001, max=1000.0, help="Simulated seconds per second of real time.")
+        float, option("--speed", "Simulated seconds per second of real time.", min=0.001, max=1000.0)
     ] = 1.0,
     device: DeviceOption = "ADXL355",
     units: UnitsOption = 8,
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Random seed of the simulated units.")] = 1,
+    seed: Annotated[int, option("--seed", "Random seed of the simulated units.", min=0)] = 1,
     silence: Annotated[
-        float,
-        typer.Option(
-            "--silence", min=0.0, help="Seconds without a request after which drives and reader stop; 0: never."
-        ),
+        float, option("--silence", "Seconds without a request after which drives and reader stop; 0: never.", min=0.0)
     ] = 30.0,
     *,
-    as_json: options.JsonOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Serve the simulated station over Modbus TCP until interrupted, for any Modbus client."""
     import signal
@@ -133,9 +130,9 @@ def serve(
 
 @app.command()
 def profiles(
-    name: Annotated[str, typer.Argument(metavar="[PROFILE]", help="Show the registers of this profile.")] = "",
+    name: Annotated[str, argument("[PROFILE]", "Show the registers of this profile.")] = "",
     *,
-    as_json: options.JsonOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """List the register-map profiles, or the registers of one profile."""
     from stations.profile_files import load_profile, profile_names

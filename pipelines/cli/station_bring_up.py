@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, get_args
 
 import typer
 
-from pipelines.cli import options
+from pipelines.cli.options import JsonOption, argument, option
 from pipelines.cli.printing import print_json, print_table, publish, remark, say
 from schemas.errors import STATION, StationError, WrongUse
 
@@ -22,34 +22,24 @@ ON = "What is at the other end: hardware, simulator or replay? (Enter: not state
 
 def bring_up(
     profile: Annotated[
-        str,
-        typer.Argument(metavar="PROFILE", help="The profile of the device; 'tumbleline station profiles' lists them."),
+        str, argument("PROFILE", "The profile of the device; 'tumbleline station profiles' lists them.")
     ],
     link: Annotated[
-        str,
-        typer.Option(
-            "--link",
-            metavar="LINK",
-            help="tcp://HOST[:PORT], serial:DEVICE[,BAUD[,PARITY[,STOP]]] or visa:RESOURCE.",
-        ),
+        str, option("--link LINK", "tcp://HOST[:PORT], serial:DEVICE[,BAUD[,PARITY[,STOP]]] or visa:RESOURCE.")
     ],
-    device_id: Annotated[
-        int, typer.Option("--device-id", min=0, max=255, help="Unit id of the device; 0: look for it.")
-    ] = 0,
-    out: Annotated[
-        Path | None, typer.Option("--out", metavar="DIR", help="New folder for page, recording and profile.")
-    ] = None,
-    timeout: Annotated[float, typer.Option("--timeout", min=0.05, max=60.0, help="Longest answer, s.")] = 2.0,
+    device_id: Annotated[int, option("--device-id", "Unit id of the device; 0: look for it.", min=0, max=255)] = 0,
+    out: Annotated[Path | None, option("--out DIR", "New folder for page, recording and profile.")] = None,
+    timeout: Annotated[float, option("--timeout", "Longest answer, s.", min=0.05, max=60.0)] = 2.0,
     silence: Annotated[
-        float, typer.Option("--silence", min=1.0, max=600.0, help="How long the link is cut in that step, s.")
+        float, option("--silence", "How long the link is cut in that step, s.", min=1.0, max=600.0)
     ] = 40.0,
     watch: Annotated[
-        float, typer.Option("--watch", min=0.0, max=3600.0, help="How long the air of a chamber is watched, s.")
+        float, option("--watch", "How long the air of a chamber is watched, s.", min=0.0, max=3600.0)
     ] = 20.0,
-    by: Annotated[str, typer.Option("--by", metavar="NAME", help="Who does it, for the page.")] = "",
+    by: Annotated[str, option("--by NAME", "Who does it, for the page.")] = "",
     *,
-    readings: Annotated[bool, typer.Option("--readings", help="Read only: no order is offered.")] = False,
-    as_json: options.JsonOption = False,
+    readings: Annotated[bool, option("--readings", "Read only: no order is offered.")] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Connect one real device step by step, and say for every register and promise: held, differs, or not tried.
 

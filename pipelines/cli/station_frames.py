@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pipelines.cli import options
+from pipelines.cli.options import JsonOption, argument, option
 from pipelines.cli.printing import print_json, print_table, publish, remark, say
 from schemas.errors import STATION, WrongUse
 
@@ -16,26 +16,20 @@ if TYPE_CHECKING:
 
 FrameFileArgument = Annotated[
     Path,
-    typer.Argument(
-        metavar="FILE",
-        help="A recording of --record or of a bring-up, a pcap or pcapng file, or a log of a Modbus tool.",
-    ),
+    argument("FILE", "A recording of --record or of a bring-up, a pcap or pcapng file, or a log of a Modbus tool."),
 ]
 SHOWN = 200
 
 
 def frames(
     file: FrameFileArgument,
-    limit: Annotated[int, typer.Option("--limit", min=1, help="Number of frames, the last ones.")] = 40,
-    page: Annotated[
-        Path | None, typer.Option("--page", metavar="FILE", help="Write the time line as a page (HTML).")
-    ] = None,
+    limit: Annotated[int, option("--limit", "Number of frames, the last ones.", min=1)] = 40,
+    page: Annotated[Path | None, option("--page FILE", "Write the time line as a page (HTML).")] = None,
     as_test: Annotated[
-        Path | None,
-        typer.Option("--as-test", metavar="FILE", help="Write a test for pytest, with the recording beside it."),
+        Path | None, option("--as-test FILE", "Write a test for pytest, with the recording beside it.")
     ] = None,
     *,
-    as_json: options.JsonOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Show a recording of a station's links: every request with its time, meaning and answer.
 
@@ -63,14 +57,13 @@ def frames(
 
 def replay(
     file: FrameFileArgument,
-    host: Annotated[str, typer.Option("--host", help="Interface to listen on.")] = "127.0.0.1",
-    port: Annotated[int, typer.Option("--port", min=0, max=65535, help="TCP port; 0: any free port.")] = 5020,
+    host: Annotated[str, option("--host", "Interface to listen on.")] = "127.0.0.1",
+    port: Annotated[int, option("--port", "TCP port; 0: any free port.", min=0, max=65535)] = 5020,
     speed: Annotated[
-        float,
-        typer.Option("--speed", min=0.001, max=1e6, help="Recorded seconds per second: answers come sooner above 1."),
+        float, option("--speed", "Recorded seconds per second: answers come sooner above 1.", min=0.001, max=1e6)
     ] = 1.0,
     *,
-    as_json: options.JsonOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Answer as the recorded devices did, over Modbus TCP, until interrupted: same values, delays, exceptions and silences.
 

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-import typer
-
 from pipelines.archive import Archive
-from pipelines.cli import options
+from pipelines.cli.options import ArchiveOption, JsonOption, argument, option
 from pipelines.cli.printing import print_json, say
 
 STYLES = {
@@ -28,12 +26,12 @@ QUIET = {"reference", "soak"}  # shown only with --all, because they occur in ev
 
 
 def log(
-    run: Annotated[str, typer.Argument(metavar="[RUN]", help="Show only this run of the archive.")] = "",
-    archive: options.ArchiveOption = None,
-    limit: Annotated[int, typer.Option("--limit", min=1, help="Number of events, newest last.")] = 50,
+    run: Annotated[str, argument("[RUN]", "Show only this run of the archive.")] = "",
+    archive: ArchiveOption = None,
+    limit: Annotated[int, option("--limit", "Number of events, newest last.", min=1)] = 50,
     *,
-    everything: Annotated[bool, typer.Option("--all", help="Also show soaks and reference readings.")] = False,
-    as_json: options.JsonOption = False,
+    everything: Annotated[bool, option("--all", "Also show soaks and reference readings.")] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Show events that paused or ended runs (from the archive) and events of stations (from the log of this computer)."""
     recorded = [*_of_runs(Archive(archive), run), *([] if run else _of_machine())]

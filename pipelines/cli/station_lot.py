@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated
 
-import typer
+from pipelines.cli.options import option
 
 if TYPE_CHECKING:
     from schemas.lot import Lot
 
-DeviceOption = Annotated[str, typer.Option("--device", help="Preset of the simulated devices under test.")]
-UnitsOption = Annotated[int, typer.Option("--units", min=1, max=32, help="Number of simulated devices in the slots.")]
+DeviceOption = Annotated[str, option("--device", "Preset of the simulated devices under test.")]
+UnitsOption = Annotated[int, option("--units", "Number of simulated devices in the slots.", min=1, max=32)]
 
 
 def made_up(device: str, units: int, seed: int, repeat: int = 0) -> Lot:

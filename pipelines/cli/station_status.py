@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pipelines.cli import options
+from pipelines.cli.options import JsonOption, StationOption, option
 from pipelines.cli.printing import console, print_json, remark, say
 from pipelines.cli.station_lot import DeviceOption, UnitsOption, made_up
 from schemas.errors import STATION
@@ -22,13 +22,13 @@ GOOD, BAD = "green", "bold red"
 
 
 def status(
-    station: options.StationOption = None,
+    station: StationOption = None,
     device: DeviceOption = "ADXL355",
     units: UnitsOption = 8,
-    every: Annotated[float, typer.Option("--every", min=0.1, help="Seconds between two readings with --watch.")] = 1.0,
+    every: Annotated[float, option("--every", "Seconds between two readings with --watch.", min=0.1)] = 1.0,
     *,
-    watch: Annotated[bool, typer.Option("--watch", help="Repeat until Ctrl-C.")] = False,
-    as_json: options.JsonOption = False,
+    watch: Annotated[bool, option("--watch", "Repeat until Ctrl-C.")] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Show angles, temperatures, states, slots and the run that drives the station.
 

@@ -10,11 +10,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
 from pipelines.archive import Archive, Records
-from pipelines.cli import options
 from pipelines.cli.chart import Line, chart, clock
+from pipelines.cli.options import ArchiveOption, JsonOption, StationOption, argument, option
 from pipelines.cli.printing import console, print_json, say
 from pipelines.cli.station_lot import made_up
 from schemas.errors import WrongUse
@@ -52,16 +50,16 @@ class ChartData:
 
 
 def watch(
-    run: Annotated[str, typer.Argument(metavar="[RUN]", help="A run of the archive; default: the newest.")] = "latest",
-    station: options.StationOption = None,
-    archive: options.ArchiveOption = None,
+    run: Annotated[str, argument("[RUN]", "A run of the archive; default: the newest.")] = "latest",
+    station: StationOption = None,
+    archive: ArchiveOption = None,
     minutes: Annotated[
-        float, typer.Option("--minutes", min=0.1, help="Time span, minutes before now; default: the whole run.")
+        float, option("--minutes", "Time span, minutes before now; default: the whole run.", min=0.1)
     ] = math.inf,
-    every: Annotated[float, typer.Option("--every", min=0.1, help="Seconds between two readings.")] = 1.0,
+    every: Annotated[float, option("--every", "Seconds between two readings.", min=0.1)] = 1.0,
     *,
-    once: Annotated[bool, typer.Option("--once", help="Draw once and exit.")] = False,
-    as_json: options.JsonOption = False,
+    once: Annotated[bool, option("--once", "Draw once and exit.")] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Draw temperatures and angles over time, live: of a run in the archive, or with --station of a station."""
     with _source(run, station, archive) as look:

@@ -9,7 +9,7 @@ import typer
 
 from inertial.counts import number_of
 from pipelines.archive import Archive
-from pipelines.cli import options
+from pipelines.cli.options import ArchiveOption, JsonOption, argument, option
 from pipelines.cli.printing import console, error_console, give
 from pipelines.integrity import Report
 from schemas.errors import DONE, PART_FAILED, WrongUse
@@ -29,42 +29,36 @@ EXAMPLES = (
 def command(
     runs: Annotated[
         list[str] | None,
-        typer.Argument(
-            metavar="[RUN…|FILE…]",
-            help="Only these runs and their captures, or files of certificates (.pdf, .xml, .sig); default: the whole archive.",
+        argument(
+            "[RUN…|FILE…]",
+            "Only these runs and their captures, or files of certificates (.pdf, .xml, .sig); default: the whole archive.",
         ),
     ] = None,
     trust: Annotated[
         list[Path] | None,
-        typer.Option(
-            "--trust",
-            metavar="FILE.pem",
-            help="Certificate of a laboratory's key, or of its authority, that vouches for the signatures of FILE.",
+        option(
+            "--trust FILE.pem",
+            "Certificate of a laboratory's key, or of its authority, that vouches for the signatures of FILE.",
         ),
     ] = None,
     laboratory: Annotated[
         Path | None,
-        typer.Option(
-            "--laboratory",
-            metavar="FILE.toml",
-            help="The laboratory's file, as for 'certificate': with --archive it proves names and addresses of FILE.",
+        option(
+            "--laboratory FILE.toml",
+            "The laboratory's file, as for 'certificate': with --archive it proves names and addresses of FILE.",
         ),
     ] = None,
     key: Annotated[
         list[str] | None,
-        typer.Option(
-            "--key",
-            metavar="FILE|HEX",
-            help="A public key; each manifest must have a signature of one of these keys. Default: the own key.",
+        option(
+            "--key FILE|HEX",
+            "A public key; each manifest must have a signature of one of these keys. Default: the own key.",
         ),
     ] = None,
-    head: Annotated[
-        str,
-        typer.Option("--head", metavar="HASH", help="Hash of an entry of the chain from an earlier verification."),
-    ] = "",
-    archive: options.ArchiveOption = None,
+    head: Annotated[str, option("--head HASH", "Hash of an entry of the chain from an earlier verification.")] = "",
+    archive: ArchiveOption = None,
     *,
-    as_json: options.JsonOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Compute every hash again: find changed bytes, missing files, edited manifests, foreign tables, false signatures.
 

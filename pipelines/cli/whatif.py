@@ -11,6 +11,7 @@ from inertial.counts import number_of
 from pipelines.archive import Archive
 from pipelines.cli import options
 from pipelines.cli.inputs import distribution
+from pipelines.cli.options import argument
 from pipelines.cli.printing import error_console, give, print_table, say, short
 
 PART = "Old data, new models"
@@ -25,10 +26,9 @@ SHOWN = 12
 
 
 def command(
-    model: Annotated[Path, typer.Argument(metavar="MODEL", help="A model file.")],
+    model: Annotated[Path, argument("MODEL", "A model file.")],
     selection: Annotated[
-        list[str] | None,
-        typer.Argument(metavar="[SELECTION…]", help="Runs as for 'tumbleline rerun'; default: all."),
+        list[str] | None, argument("[SELECTION…]", "Runs as for 'tumbleline rerun'; default: all.")
     ] = None,
     limits: options.OtherLimitsOption = "",
     effect_file: options.EffectFileOption = None,
