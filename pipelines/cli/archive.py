@@ -11,8 +11,8 @@ import typer
 from inertial.counts import number_of, size_text
 from pipelines.archive import Archive
 from pipelines.cli.options import ArchiveOption, JsonOption, argument, option
-from pipelines.cli.printing import give_lines, refuse_standard_output
-from schemas.errors import DONE, PART_FAILED, WrongUse
+from pipelines.cli.printing import conclude, give, refuse_standard_output
+from schemas.errors import WrongUse
 
 PART = "Certificates, trace, audit"
 ORDER = 460
@@ -72,7 +72,7 @@ def clean(
     ]
     if done.anchored:
         lines.append(f"{number_of(done.anchored, 'calibration')} added to the chain")
-    give_lines({"archive": str(store.root), "only_looked": only_look, **asdict(done)}, lines, as_json=as_json)
+    give({"archive": str(store.root), "only_looked": only_look, **asdict(done)}, lines, as_json=as_json)
 
 
 @app.command()
@@ -104,7 +104,7 @@ def key(
     lines = [f"key      {name}", f"public   {hexadecimal}", f"private  {path}"]
     if output is not None and not public:
         lines.append(f"to sign with this key, set TUMBLELINE_SIGNING_KEY={path}")
-    give_lines({"name": name, "public": hexadecimal, "private_file": str(path)}, lines, as_json=as_json)
+    give({"name": name, "public": hexadecimal, "private_file": str(path)}, lines, as_json=as_json)
 
 
 @app.command()
@@ -132,7 +132,7 @@ def backup(
     file = None if made is None else str(made)
     document = {"archive": str(source.root), "copy": str(copy.root), "database": file, **asdict(done)}
     lines = [f"{number_of(done.files, 'file')} copied ({size_text(done.bytes)}), {done.present} already there"]
-    give_lines(document, [*lines, *([f"database  {file}"] if file else [])], as_json=as_json)
+    give(document, [*lines, *([f"database  {file}"] if file else [])], as_json=as_json)
 
 
 @app.command()
@@ -167,7 +167,7 @@ def compact(
         *(f"open     {name}: not finished, left as it is" for name in done.unfinished),
         f"{packed}, {number_of(done.freed, 'single file')} removed",
     ]
-    give_lines({"archive": str(store.root), **asdict(done)}, lines, as_json=as_json)
+    give({"archive": str(store.root), **asdict(done)}, lines, as_json=as_json)
 
 
 @app.command()
@@ -200,5 +200,4 @@ def restore(
         f"{number_of(done.files, 'file')} copied ({size_text(done.bytes)}), {done.present} already there",
         f"verified: {number_of(report.runs, 'run')}, {state}",
     ]
-    give_lines({**document, **asdict(done)}, lines, as_json=as_json)
-    raise typer.Exit(DONE if report.whole else PART_FAILED)
+    conclude({**document, **asdict(done)}, lines, as_json=as_json, passed=report.whole)

@@ -9,7 +9,7 @@ import typer
 
 from pipelines.archive import Archive
 from pipelines.cli.options import ArchiveOption, JsonOption, argument, option
-from pipelines.cli.printing import give_lines, refuse_standard_output, remark
+from pipelines.cli.printing import give, refuse_standard_output, remark
 from schemas.errors import DONE, PART_FAILED
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ def command(
     key = None if sign_with is None else read_key(sign_with, password_file)
     done = issue(Archive(archive), names, who, output, key=key, address=address)
     lines = [f"certificate {one.number}: {one.pdf}, {one.xml}" for one in done.written]
-    give_lines(_document(done), lines, as_json=as_json)
+    give(_document(done), lines, as_json=as_json)
     for serial, why in done.left_out.items():
         remark(f"certificate: {serial}: {why}")
     raise typer.Exit(PART_FAILED if done.left_out else DONE)

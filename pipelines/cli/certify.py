@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
-
-import typer
+from typing import Annotated, Any
 
 from inertial.counts import number_of
 from pipelines.archive import Archive, Run
 from pipelines.cli.options import ArchiveOption, JsonOption, RunArgument, option
-from pipelines.cli.printing import error_console, give, print_table, remark, say
-from schemas.errors import DONE, PART_FAILED, ArchiveUnusable
-
-if TYPE_CHECKING:
-    from pipelines.chain.certify import Certified
+from pipelines.cli.printing import conclude, error_console, print_table, remark, say
+from schemas.errors import ArchiveUnusable
 
 PART = "Certificates, trace, audit"
 ORDER = 410
@@ -64,8 +59,12 @@ def command(
             renew_report(source)
     except ArchiveUnusable as problem:  # the certificates are written; the old report may show other coefficients
         remark(f"certify: the report was not made again: {problem}")
-    give(_document(source.id, done), _print, as_json=as_json)
-    raise typer.Exit(PART_FAILED if done.left_out else DONE)
+    there = {event.certificate for event in done.there}
+    certified = [
+        {"certificate": e.certificate, **e.document(), "was_there": e.certificate in there} for e in done.events
+    ]
+    document = {"run": source.id, "certified": certified, "left_out": done.left_out}
+    conclude(document, _print, as_json=as_json, passed=not done.left_out)
 
 
 def _print_run(run: Run) -> None:
@@ -81,17 +80,6 @@ def _print_run(run: Run) -> None:
     ]
     for line in lines:
         remark(f"certify: {line}")
-
-
-def _document(run: str, done: Certified) -> dict[str, Any]:
-    there = {event.certificate for event in done.there}
-    return {
-        "run": run,
-        "certified": [
-            {"certificate": e.certificate, **e.document(), "was_there": e.certificate in there} for e in done.events
-        ],
-        "left_out": done.left_out,
-    }
 
 
 def _print(document: dict[str, Any]) -> None:

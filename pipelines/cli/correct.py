@@ -5,28 +5,27 @@ from __future__ import annotations
 import io
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
-
-import typer
 
 from pipelines.archive import Archive
 from pipelines.cli.options import ArchiveOption, JsonOption, RateOption, TimeColumnOption, argument, option
 from pipelines.cli.printing import (
     STANDARD_OUTPUT,
+    conclude,
     error_console,
-    give,
     is_standard_output,
     print_text,
     remark,
     say,
     short,
 )
-from schemas.errors import DONE, PART_FAILED, WrongUse
+from schemas.errors import WrongUse
 
 if TYPE_CHECKING:
     from pipelines.export.corrected import Corrected
-    from pipelines.export.documents import CorrectDocument, FilterDocument, TrackedBiasDocument
+    from pipelines.export.documents import CorrectDocument, TrackedBiasDocument
     from pipelines.export.recording import CorrectableRecording
 
 PART = "Results"
@@ -130,9 +129,8 @@ def command(
         passed = None if chosen is None or end is None else (chosen, end)
         write_state(state, Kept(serial, float(recording.time[-1]), passed, done.kept))
         document["state"] = str(state)
-    give(document, lambda _: _print(document, remark if printed else say), as_json=as_json)
     consistent = document["bias"] is None or document["bias"]["stated_uncertainty"] != "too small"
-    raise typer.Exit(DONE if consistent else PART_FAILED)
+    conclude(document, partial(_print, remark if printed else say), as_json=as_json, passed=consistent)
 
 
 def _write(recording: CorrectableRecording, done: Corrected, output: Path) -> None:
@@ -161,7 +159,7 @@ VERDICTS = {
 }
 
 
-def _print(document: CorrectDocument, show: Callable[..., None]) -> None:
+def _print(show: Callable[..., None], document: CorrectDocument) -> None:
     certificate = document["certificate"]
     show(
         f"{document['file']}: {document['samples']} samples corrected with unit {document['unit']} of run {document['run']}"
@@ -171,22 +169,17 @@ def _print(document: CorrectDocument, show: Callable[..., None]) -> None:
     if document["outside_temperature"]:
         low, high = document["temperatures_C"]
         show(f"{document['outside_temperature']} samples are outside the measured {low:.1f} to {high:.1f} °C", "yellow")
-    if document["filter"] is not None:
-        _print_filter(document["filter"], show)
+    if (one := document["filter"]) is not None:
+        show(
+            f"filter: {one['kind']}, {len(one['numerator'])} coefficients, -3 dB at {one['cutoff_hz']:.4g} Hz "
+            f"({one['cutoff_from']}), delay {1e3 * one['delay_s']:.3g} ms, noise bandwidth {one['noise_bandwidth_hz']:.4g} Hz"
+        )
     if document["bias"] is not None:
         _print_bias(document["bias"], show)
     if document["output"]:
         show(f"written: {document['output']}")
     if document["state"]:
         show(f"kept for the next recording: {document['state']}")
-
-
-def _print_filter(one: FilterDocument, show: Callable[..., None]) -> None:
-    """Print cut-off, delay and noise bandwidth of the filter."""
-    show(
-        f"filter: {one['kind']}, {len(one['numerator'])} coefficients, -3 dB at {one['cutoff_hz']:.4g} Hz "
-        f"({one['cutoff_from']}), delay {1e3 * one['delay_s']:.3g} ms, noise bandwidth {one['noise_bandwidth_hz']:.4g} Hz"
-    )
 
 
 def _print_bias(bias: TrackedBiasDocument, show: Callable[..., None]) -> None:

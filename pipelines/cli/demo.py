@@ -12,7 +12,7 @@ import typer
 
 from pipelines.cli.next_commands import command_line, extension, judged_data
 from pipelines.cli.options import JsonOption, option
-from pipelines.cli.printing import error_console, give_lines, print_json, publish, remark, say
+from pipelines.cli.printing import error_console, give, print_json, publish, remark, say
 from pipelines.cli.text.demo_text import print_ending
 from schemas.progress import Progress
 
@@ -90,10 +90,7 @@ def _archive(folder: Path, seed: int, lots: int, *, as_json: bool) -> None:
         written, hidden = made(folder, seed, lots, lambda done: progress(done, lots, ""))
     with error_console().status("judging the archive night by night"):
         document = played(written, hidden, processors(), seed)
-    if as_json:
-        print_json(document)
-    else:
-        print_discovery_demo(document)
+    give(document, print_discovery_demo, as_json=as_json)
 
 
 def _put_aside(model: Path) -> Path | None:
@@ -125,7 +122,7 @@ def _hand_over(folder: Path, hidden: Scene, *, as_json: bool) -> None:
         "Begin with",
         f"  {_command('diagnose', folder, hidden.model)}",
     ]
-    give_lines({"folder": str(folder), "files": files, "effects": list(hidden.model)}, lines, as_json=as_json)
+    give({"folder": str(folder), "files": files, "effects": list(hidden.model)}, lines, as_json=as_json)
 
 
 def _command(name: str, folder: Path, model: tuple[str, ...] | None) -> str:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any
 
 from inertial.counts import number_of
 from pipelines.archive import Archive
 from pipelines.cli.options import ArchiveOption, JsonOption, argument, option
-from pipelines.cli.printing import STYLES, print_json, print_table, say, short
+from pipelines.cli.printing import STYLES, give, print_table, say, short
 
 if TYPE_CHECKING:
     from rich.text import Text
@@ -37,13 +38,10 @@ def command(
 
     store = Archive(archive)
     document = diff(store.run(run_a), store.run(run_b))
-    if as_json:
-        print_json(document)
-        return
-    _print(document, None if everything else SHOWN)
+    give(document, partial(_print, None if everything else SHOWN), as_json=as_json)
 
 
-def _print(document: dict[str, Any], most: int | None) -> None:
+def _print(most: int | None, document: dict[str, Any]) -> None:
     say(f"a  {document['a']}\nb  {document['b']}")
     if document["same"]:
         say("no coefficient, figure or grade differs", style="bold green")

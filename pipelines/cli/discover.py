@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 from pipelines.archive import Archive
 from pipelines.cli.options import ArchiveOption, JsonOption, option
-from pipelines.cli.printing import give, publish
-from schemas.errors import DONE, PART_FAILED, WrongUse
+from pipelines.cli.printing import conclude, give, publish
+from schemas.errors import WrongUse
 
 PART = "Certificates, trace, audit"
 ORDER = 452
@@ -54,7 +53,7 @@ def command(
 
     Evidence is valid every night. Exit status 1: there is a new discovery.
     """
-    from pipelines.cli.text.discovery_text import print_discoveries, print_explained, print_reach
+    from pipelines.cli.text.discovery_text import print_discoveries, print_explained
     from pipelines.discovery.discover import Look, discovered, explained
     from pipelines.flows.dask_cluster import on_dask
     from pipelines.parallel import processors
@@ -81,10 +80,7 @@ def command(
     if explain:
         give(explained(document, explain), print_explained, as_json=as_json)
         return
-    give(document, print_discoveries, as_json=as_json)
-    if reach and not as_json:
-        print_reach(document)
-    raise typer.Exit(PART_FAILED if document["new"] else DONE)
+    conclude(document, partial(print_discoveries, reach=reach), as_json=as_json, passed=not document["new"])
 
 
 def _day(since: str) -> str:

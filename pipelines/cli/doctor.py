@@ -4,11 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from pipelines.cli.options import ArchiveOption, JsonOption, StationOption, option
-from pipelines.cli.printing import give, print_table, say
-from schemas.errors import DONE, PART_FAILED
+from pipelines.cli.printing import conclude, print_table, say
 
 if TYPE_CHECKING:
     from pipelines.doctor.documents import DoctorDocument
@@ -39,8 +36,7 @@ def command(
     from pipelines.doctor.examine import examine
 
     document = examine(archive, station, free_gb)
-    give(document, _show, as_json=as_json)
-    raise typer.Exit(DONE if document["ok"] else PART_FAILED)
+    conclude(document, _show, as_json=as_json, passed=document["ok"])
 
 
 def _show(document: DoctorDocument) -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from pipelines.cli.options import ByOption, EffectFileOption, JsonOption, argument, option
-from pipelines.cli.printing import give_lines, is_standard_output, print_text, remark, say
+from pipelines.cli.printing import give, is_standard_output, print_text, remark, say
 from schemas.errors import WrongUse
 
 if TYPE_CHECKING:
@@ -83,7 +83,7 @@ def command(
     if begun:
         first = ", ".join(e for e in after.model.effects if e != effect)
         lines.insert(0, f"{target}: created with version 1: {first}")
-    give_lines(document, lines, as_json=as_json, show=remark if printed else say)
+    give(document, lambda _: [(remark if printed else say)(line) for line in lines], as_json=as_json)
 
 
 def _refuse_contradiction(model: Path, effect: str, remove: str, why: str) -> None:

@@ -9,7 +9,7 @@ import typer
 
 from pipelines.archive import Archive
 from pipelines.cli import options
-from pipelines.cli.printing import give, remark
+from pipelines.cli.printing import conclude, remark
 from schemas.errors import WrongUse
 from schemas.foreign import shown
 
@@ -38,7 +38,7 @@ def command(
     cannot be judged, or a unit did not pass.
     """
     from pipelines.chain.runner import Runner
-    from pipelines.cli.summary import exit_status, print_result, summary
+    from pipelines.cli.summary import all_passed, print_result, summary
     from pipelines.cli.text.verdict_text import judged
     from pipelines.jobs.job import job_of_run
 
@@ -66,5 +66,4 @@ def command(
         runner.abandon()  # the measurements are the old run's: nothing is lost, and no empty run becomes the latest
         raise
     document = judged(summary(runner.run), runner.run)
-    give(document, print_result, as_json=as_json)
-    raise typer.Exit(exit_status(document))
+    conclude(document, print_result, as_json=as_json, passed=all_passed(document))

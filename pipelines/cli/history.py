@@ -8,7 +8,7 @@ from typing import Annotated, Any
 from pipelines.cli import options
 from pipelines.cli.next_commands import command_line, print_next
 from pipelines.cli.options import argument, option
-from pipelines.cli.printing import error_console, give, print_table, publish, say, short
+from pipelines.cli.printing import error_console, give, print_table, publish, say, short, warn
 from schemas.errors import WrongUse
 
 PART = "Is the model good enough, and what is missing?"
@@ -97,8 +97,7 @@ def _print(rows: list[dict[str, Any]], name: str, file: Path) -> None:
         "of each unit included · assumed noise: of the fit of each version, missing effects included",
         style="dim",
     )
-    for text in dict.fromkeys(text for row in rows for text in row["warnings"]):
-        say(f"warning: {text}", style="yellow")
+    warn(dict.fromkeys(text for row in rows for text in row["warnings"]))
     refuted = [name for row in rows if row["confirmed"] is False for name in row["added"]]
     if refuted:
         say(

@@ -7,14 +7,12 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
 from pipelines.archive import Archive, Run
 from pipelines.cli import options
 from pipelines.cli.options import argument, option
-from pipelines.cli.printing import error_console, give, refuse_standard_output, remark, say
+from pipelines.cli.printing import conclude, error_console, refuse_standard_output, remark, say
 from pipelines.improvement.improvement import ImprovedTables, Improvement
-from schemas.errors import DONE, PART_FAILED, WrongUse
+from schemas.errors import WrongUse
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -107,8 +105,8 @@ def command(
     if recording is not None:
         document["recording"] = recording
         document["next"] = document["next"] or next_of_recording(document, archive)
-    give(document, print_recording if brief else print_improvement, as_json=as_json)
-    raise typer.Exit(DONE if document["adequate"] and not document["refuted"] else PART_FAILED)
+    show = print_recording if brief else print_improvement
+    conclude(document, show, as_json=as_json, passed=bool(document["adequate"] and not document["refuted"]))
 
 
 def _brought_in(data: str, archive: str | None, group: str) -> RecordingDocument | None:

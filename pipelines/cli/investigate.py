@@ -6,16 +6,13 @@ import sys
 from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
 from pipelines.archive import Archive
 from pipelines.cli import options
 from pipelines.cli.next_commands import command_line, judged_data, print_extension, print_next
 from pipelines.cli.options import option
-from pipelines.cli.printing import error_console, give, print_table, remark, say, short
+from pipelines.cli.printing import conclude, error_console, print_table, remark, say, short
 from pipelines.cli.run import shown
 from pipelines.cli.text.verdict_text import print_verdict
-from schemas.errors import DONE, PART_FAILED
 
 if TYPE_CHECKING:
     from pipelines.inquiry.inquiry import FollowUp, Inquiry
@@ -95,9 +92,10 @@ def command(
 
             paused = yes is False and not at_terminal
             document = investigate_locally(request, store, settings, participants, ask=paused)
-    document["command"] = _continue_command() if document["ended"] in {"asked", "declined"} else None
-    give(document, lambda _: print_inquiry(document, archive), as_json=as_json)
-    raise typer.Exit(DONE if document["ended"] in SETTLED else PART_FAILED)
+    again = [word for word in sys.argv[1:] if word not in {"--ask", "--json"}]
+    document["command"] = command_line(*again, "--yes") if document["ended"] in {"asked", "declined"} else None
+    show = partial(print_inquiry, archive=archive)
+    conclude(document, show, as_json=as_json, passed=document["ended"] in SETTLED)
 
 
 def _answer(inquiry: Inquiry, follow_up: FollowUp) -> Consent:
@@ -119,12 +117,6 @@ def _print_diagnosis(joint: JointDiagnosis) -> None:
 
     runs = len(joint.lineage.runs)
     remark(f"diagnosis of {runs} run{'s' if runs > 1 else ''}: {verdict(joint.document)}")
-
-
-def _continue_command() -> str:
-    """The command that measures the proposed follow-up."""
-    given = [a for a in sys.argv[1:] if a not in {"--ask", "--json"}]
-    return command_line(*given, "--yes")
 
 
 def print_inquiry(document: dict[str, Any], archive: str | None = None) -> None:

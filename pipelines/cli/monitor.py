@@ -8,12 +8,10 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from pipelines.archive import Archive
 from pipelines.cli.options import ArchiveOption, JsonOption, option
-from pipelines.cli.printing import give_lines, say
-from schemas.errors import DONE, PART_FAILED, WrongUse
+from pipelines.cli.printing import conclude, print_text, say
+from schemas.errors import WrongUse
 
 if TYPE_CHECKING:
     from pipelines.monitoring.alerts import Poster
@@ -68,12 +66,11 @@ def command(
         return
     snapshot = monitor.snapshot()
     if metrics:
-        typer.echo(text(snapshot).decode(), nl=False)
+        print_text(text(snapshot).decode())
         return
     document = snapshot.document()
     verdict = "healthy" if document["ok"] else f"{len(document['problems'])} problems"
-    give_lines(document, [*document["problems"], verdict], as_json=as_json)
-    raise typer.Exit(DONE if document["ok"] else PART_FAILED)
+    conclude(document, [*document["problems"], verdict], as_json=as_json, passed=document["ok"])
 
 
 def _serve(monitor: Monitor, host: str, port: int, poster: Poster | None, audits: Path | None) -> None:

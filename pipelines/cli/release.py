@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from pipelines.archive import Archive
 from pipelines.cli.options import ArchiveOption, EffectFileOption, JsonOption, argument, option
-from pipelines.cli.printing import give, give_lines, print_table, say
+from pipelines.cli.printing import give, print_table, say
 from schemas.errors import WrongUse
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ def command(
         f"  {', '.join(record.effects)}",
         f"  evidence: {record.evidence or 'none'}{', forced' if record.forced else ''}",
     ]
-    give_lines({"archive": str(store.root), **record.document()}, lines, as_json=as_json)
+    give({"archive": str(store.root), **record.document()}, lines, as_json=as_json)
 
 
 def _released(

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import asdict
+from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
-
-import typer
 
 from inertial.counts import number_of
 from pipelines.archive import Archive
@@ -14,7 +13,7 @@ from pipelines.cli import options
 from pipelines.cli.inputs import distribution
 from pipelines.cli.next_commands import archive_words, command_line, print_next
 from pipelines.cli.options import option
-from pipelines.cli.printing import error_console, give, print_table, say
+from pipelines.cli.printing import conclude, error_console, print_table, say
 from schemas.errors import WrongUse
 
 if TYPE_CHECKING:
@@ -76,8 +75,7 @@ def command(
         _give_check(store, done, as_json=as_json)
     add_runs(store, [outcome.new for outcome in done if outcome.new])
     document = {"archive": str(store.root), "runs": [asdict(outcome) for outcome in done], **_counts(done)}
-    give(document, lambda _: _print(done, document, archive), as_json=as_json)
-    raise typer.Exit(1 if document["failed"] else 0)
+    conclude(document, partial(_print, done, archive), as_json=as_json, passed=not document["failed"])
 
 
 def _mapped(
@@ -106,7 +104,7 @@ def _counts(outcomes: list[RerunOutcome]) -> dict[str, int]:
     return {"selected": len(outcomes), "rerun": anew, "unchanged": len(outcomes) - anew - failed, "failed": failed}
 
 
-def _print(outcomes: list[RerunOutcome], document: dict[str, Any], archive: str | None) -> None:
+def _print(outcomes: list[RerunOutcome], archive: str | None, document: dict[str, Any]) -> None:
     lines = [_line(one) for one in outcomes[:SHOWN] if not one.error]
     if lines:
         print_table(["run", "re-run", "changed", "stages computed"], lines, whole=2)
@@ -133,8 +131,7 @@ def _give_check(store: Archive, results: list[Reproduction], *, as_json: bool) -
     same = sum(result.same for result in results)
     rows = [{**asdict(result), "same": result.same} for result in results]
     document = {"archive": str(store.root), "selected": len(results), "same": same, "runs": rows}
-    give(document, lambda _: _print_check(results), as_json=as_json)
-    raise typer.Exit(1 if same < len(results) else 0)
+    conclude(document, lambda _: _print_check(results), as_json=as_json, passed=same == len(results))
 
 
 def _print_check(results: list[Reproduction]) -> None:

@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pipelines.archive import Archive, Run
 from pipelines.cli.options import ArchiveOption, JsonOption, argument, option
-from pipelines.cli.printing import give_lines
+from pipelines.cli.printing import give
 
 PART = "Certificates, trace, audit"
 ORDER = 420
@@ -42,4 +42,4 @@ def command(
     for run in dict.fromkeys(one.run for one in ledger.calibrations(serial) if one.certificate in ended):
         renew_report(Run(store, run))
     lines = [f"revoked {', '.join(ended)} from {event.start} on: {event.reason}"]
-    give_lines({"unit": serial, "revoked": ended, **event.document()}, lines, as_json=as_json)
+    give({"unit": serial, "revoked": ended, **event.document()}, lines, as_json=as_json)

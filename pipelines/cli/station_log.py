@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 from pipelines.archive import Archive
 from pipelines.cli.options import ArchiveOption, JsonOption, argument, option
-from pipelines.cli.printing import print_json, say
+from pipelines.cli.printing import give, say
 
 STYLES = {
     "spoilt": "yellow",
@@ -37,31 +37,27 @@ def log(
     recorded = [*_of_runs(Archive(archive), run), *([] if run else _of_machine())]
     events = [event for event in recorded if everything or event["kind"] not in QUIET]
     events = sorted(events, key=lambda event: event["when"])[-limit:]
-    if as_json:
-        print_json({"events": events})
-        return
-    if not events:
-        say("no events")
-        return
-    for event in events:
-        _print(event)
+    give({"events": events}, _print, as_json=as_json)
 
 
-def _print(event: dict[str, Any]) -> None:
-    """One event as text: time, place and kind; below it the cause and the action."""
+def _print(document: dict[str, Any]) -> None:
+    """Every event as text: time, place and kind; below it the cause and the action."""
     from rich.padding import Padding
     from rich.text import Text
 
-    record = f", record {event['record']}" if event.get("record", -1) >= 0 else ""
-    head = Text.assemble(
-        (event["when"][:19].replace("T", " "), "dim"),
-        f"  {event['where']}{record}  ",
-        (event["kind"].replace("_", " "), STYLES.get(event["kind"], "")),
-    )
-    say(head)
-    cause_and_action = " → ".join(part for part in (event["reason"], event["action"]) if part)
-    if cause_and_action:
-        say(Padding(Text(cause_and_action), (0, 0, 0, 4)))
+    for event in document["events"]:
+        record = f", record {event['record']}" if event.get("record", -1) >= 0 else ""
+        head = Text.assemble(
+            (event["when"][:19].replace("T", " "), "dim"),
+            f"  {event['where']}{record}  ",
+            (event["kind"].replace("_", " "), STYLES.get(event["kind"], "")),
+        )
+        say(head)
+        cause_and_action = " → ".join(part for part in (event["reason"], event["action"]) if part)
+        if cause_and_action:
+            say(Padding(Text(cause_and_action), (0, 0, 0, 4)))
+    if not document["events"]:
+        say("no events")
 
 
 def _of_runs(store: Archive, run: str) -> list[dict[str, Any]]:

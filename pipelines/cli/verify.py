@@ -10,7 +10,7 @@ import typer
 from inertial.counts import number_of
 from pipelines.archive import Archive
 from pipelines.cli.options import ArchiveOption, JsonOption, argument, option
-from pipelines.cli.printing import console, error_console, give
+from pipelines.cli.printing import conclude, console, error_console
 from pipelines.integrity import Report
 from schemas.errors import DONE, PART_FAILED, WrongUse
 
@@ -92,8 +92,7 @@ def command(
             also=[check_index],
             progress=lambda done, total: status.update(f"reading {done}/{total}"),
         )
-    give(report.document(), lambda _: _print(report), as_json=as_json)
-    raise typer.Exit(DONE if report.whole else PART_FAILED)
+    conclude(report.document(), lambda _: _print(report), as_json=as_json, passed=report.whole)
 
 
 def _print(report: Report) -> None:

@@ -10,8 +10,8 @@ from pipelines.discovery.sentences import headline, scope_text
 _SHOWN_HELD, _SHOWN_LEVELS, _SHOWN_OUT, _SHOWN_REACH = 3, 12, 3, 40
 
 
-def print_discoveries(document: DiscoverDocument) -> None:
-    """The screen of ``discover``."""
+def print_discoveries(document: DiscoverDocument, *, reach: bool = False) -> None:
+    """The screen of ``discover``; with ``reach`` also what the archive could have shown."""
     pooled, control = document["pooled"], document["error_control"]
     period = f", {pooled['from']} to {pooled['until']}" if pooled["from"] else ""
     say(
@@ -38,6 +38,8 @@ def print_discoveries(document: DiscoverDocument) -> None:
         say(text, style="yellow")
     if document["discoveries"] and not document["looking_back"]:
         say(f"\nNext\n  tumbleline discover --explain {document['discoveries'][0]['id']}")
+    if reach:
+        _reach(document)
 
 
 def _beside(document: DiscoverDocument) -> None:
@@ -95,7 +97,7 @@ def print_explained(row: DiscoveryRow) -> None:
     say(f"next: {row['next']}")
 
 
-def print_reach(document: DiscoverDocument) -> None:
+def _reach(document: DiscoverDocument) -> None:
     """What the archive could have shown, by effect."""
     if not document["reach"]:
         return  # the warnings say how many lots are needed

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from pipelines.cli.next_commands import FindData, command_line, fresh_measurement, print_next
-from pipelines.cli.printing import print_table, say, short
+from pipelines.cli.printing import print_table, say, short, warn
 
 ERRORS = {
     "fitted_ug": "fitted to these dwells",
@@ -20,8 +20,7 @@ def print_improvement(document: dict[str, Any]) -> None:
     """Print what was added, the ladder of errors, and the next command; the diagnoses are printed as they are made."""
     _choices(document)
     _ladder(document["ladder"])
-    for text in document["warnings"]:
-        say(f"warning: {text}", style="yellow")
+    warn(document["warnings"])
     print_next(document["next"])
 
 
