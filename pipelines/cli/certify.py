@@ -45,7 +45,7 @@ def command(
     from pipelines.archive.signatures import public_keys
     from pipelines.certificates import Ledger
     from pipelines.chain.certify import certify
-    from pipelines.report.any_run import renew_report
+    from pipelines.report import renew_report
 
     store = Archive(archive)
     serials = tuple(serial.strip() for serial in units.split(",")) if units else ()

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
-
-import typer
+from typing import Annotated, Any, NoReturn
 
 from pipelines.cli.options import ArchiveOption, GroupOption, JoinOption, JsonOption, argument, option
-from pipelines.cli.printing import error_console, print_json, print_table, say, short
-from pipelines.cli.text.import_text import print_import, print_transfers
-from schemas.errors import DONE, PART_FAILED, WrongUse, did_you_mean
+from pipelines.cli.printing import conclude, error_console
+from pipelines.cli.text.import_text import print_imports, print_transfers, print_waveforms
+from schemas.errors import WrongUse, did_you_mean
 from schemas.foreign import shown
 
 PART = "Measure"
@@ -104,10 +103,9 @@ def command(
 
     limited.start()
     if procedure and (columns or procedure != "sweep"):
-        stated = (columns, units, rate, group)
-        raise typer.Exit(import_and_print(files, procedure, part, unit, stated, archive, as_json=as_json))
+        _waveforms(files, procedure, part, unit, (columns, units, rate, group), archive, as_json=as_json)
     if procedure:
-        raise typer.Exit(_transfer(files, procedure, unit, effects, archive, as_json=as_json))
+        _transfer(files, unit, effects, archive, as_json=as_json)
     from pipelines.diagnosis.import_document import import_document
     from pipelines.importers import mapping as mapped
 
@@ -138,7 +136,10 @@ def command(
         "zero_output": zero_output,
     }
     keys = given | {key: value for key, value in options.items() if value not in ("", None, {}, [])}  # 0 is a value
-    _refuse_unknown_fit(fit)
+    if fit and fit not in METHODS:
+        raise WrongUse(
+            f"--fit: found '{shown(fit)}', one of {', '.join(METHODS)} is needed; {did_you_mean(fit, METHODS)}"
+        )
     stated = None
     if references is not None:
         from pipelines.importers.stated_references import stated_references
@@ -149,41 +150,25 @@ def command(
     imports = [import_document(paths, keys, where, fit, archive, stated, working) for paths in sets]
     verdicts = [one["adequate"] for one in imports if one["fit"]]
     adequate = False if False in verdicts else None if None in verdicts else True
-    if as_json:
-        print_json(imports[0] if len(imports) == 1 else {"imports": imports, "adequate": adequate})
-    else:
-        for one in imports:
-            print_import(one, archive, list_dwells=list_dwells)
-    raise typer.Exit(DONE if adequate is True else PART_FAILED)
+    document = imports[0] if len(imports) == 1 else {"imports": imports, "adequate": adequate}
+    show = partial(print_imports, imports, archive, list_dwells=list_dwells)
+    conclude(document, show, as_json=as_json, passed=adequate is True)
 
 
-def _transfer(files: list[Path], procedure: str, unit: str, effects: str, archive: str | None, *, as_json: bool) -> int:
-    """Judge and store transfer functions; the exit status is 1 if one is not adequate or cannot be judged."""
+def _transfer(files: list[Path], unit: str, effects: str, archive: str | None, *, as_json: bool) -> NoReturn:
+    """Judge, store and print transfer functions; a part failed where one is not adequate or cannot be judged."""
     from pipelines.importers.transfer import import_transfer
 
-    if procedure != "sweep":
-        raise WrongUse(
-            f"--procedure: found '{shown(procedure)}', sweep is what can be imported; measure others with a recipe"
-        )
     if not unit:
         raise WrongUse("import: no serial number, a transfer function needs one; add --unit SN")
     model = [part.strip() for part in effects.split(",")] if effects else ["second_order", "delay"]
     imported = [import_transfer(path, unit, model, archive) for path in files]
-    if as_json:
-        print_json(dict(imported[0]) if len(imported) == 1 else {"imports": imported})
-    else:
-        print_transfers(imported)
-    return DONE if all(one["adequate"] is True for one in imported) else PART_FAILED
+    document = dict(imported[0]) if len(imported) == 1 else {"imports": imported}
+    passed = all(one["adequate"] is True for one in imported)
+    conclude(document, lambda _: print_transfers(imported), as_json=as_json, passed=passed)
 
 
-def _refuse_unknown_fit(fit: str) -> None:
-    if fit and fit not in METHODS:
-        raise WrongUse(
-            f"--fit: found '{shown(fit)}', one of {', '.join(METHODS)} is needed; {did_you_mean(fit, METHODS)}"
-        )
-
-
-def import_and_print(
+def _waveforms(
     paths: list[Path],
     procedure: str,
     part: Path | None,
@@ -192,8 +177,8 @@ def import_and_print(
     archive: str | None,
     *,
     as_json: bool,
-) -> int:
-    """Reduce, keep and print the recordings of one unit; the exit status: part failed where a figure is not determined.
+) -> NoReturn:
+    """Reduce, keep and print the recordings of one unit; a part failed where a figure is not determined.
 
     Parameters
     ----------
@@ -207,15 +192,5 @@ def import_and_print(
     columns, units, rate, group = stated
     layout = RecordingLayout(pairs(columns, "--map"), pairs(units, "--units"), rate, group)
     imported = import_waveforms(paths, procedure, part, unit, layout, archive)
-    if as_json:
-        print_json(dict(imported))
-    else:
-        say(f"{imported['unit']}: {imported['records']} recordings, kept as run {imported['run']}")
-        rows = [
-            [one["figure"], one["axis"], short(one["value"]), short(one["uncertainty"]), one["unit"], one["note"]]
-            for one in imported["figures"]
-        ]
-        print_table(["figure", "axis", "value", "standard uncertainty", "unit", "remark"], rows, whole=2)
-        for line in imported["text"]:
-            say(f"  {line}")
-    return DONE if all(one["identified"] for one in imported["figures"]) else PART_FAILED
+    passed = all(one["identified"] for one in imported["figures"])
+    conclude(dict(imported), print_waveforms, as_json=as_json, passed=passed)

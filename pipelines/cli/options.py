@@ -27,6 +27,11 @@ def argument(notation: str, text: str) -> Any:
     return typer.Argument(metavar=notation, help=text)
 
 
+def names_in(listed: str) -> tuple[str, ...]:
+    """The names that an option lists, divided by commas, each once."""
+    return tuple(dict.fromkeys(part.strip() for part in listed.split(",") if part.strip()))
+
+
 ArchiveOption = Annotated[
     str | None,
     option("--archive DIR", "Folder or address (s3://…) of the archive; TUMBLELINE_ARCHIVE or ./archive by default."),
@@ -95,3 +100,5 @@ DaskOption = Annotated[
 WorkersOption = Annotated[
     int | None, option("--workers", "Processes on this machine; as many as it has cores by default.", min=1)
 ]
+SimulatedDeviceOption = Annotated[str, option("--device", "Preset of the simulated devices under test.")]
+SimulatedUnitsOption = Annotated[int, option("--units", "Number of simulated devices in the slots.", min=1, max=32)]

@@ -2,25 +2,23 @@
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from typer.core import TyperGroup
 
-from pipelines.archive import Archive
 from pipelines.cli import options
 from pipelines.cli.options import argument, option
-from pipelines.cli.plan_files import save, write_page, write_pictures
-from pipelines.cli.printing import give, is_standard_output, print_json, print_text, remark
-from pipelines.cli.text.plan_text import print_plan, print_procedures
-from schemas.errors import PART_FAILED, RecipeInvalid
-from schemas.limits import Limits
-from schemas.recipe import Recipe
+from pipelines.cli.printing import conclude, give, is_standard_output, print_text, remark
+from pipelines.cli.text.plan_text import print_optimum, print_plan, print_procedures
+from schemas.errors import RecipeInvalid
 
 if TYPE_CHECKING:
     from typer._click import Context
 
+    from pipelines.planning.context import PlanContext
 
 PART = "Measure"
 ORDER = 120
@@ -117,7 +115,8 @@ def command(
     """
     from pipelines.jobs.moved_poses import moves_of, with_moved_poses
     from pipelines.jobs.range_of_station import refused_by_run
-    from pipelines.jobs.recipes import folder_of
+    from pipelines.jobs.recipes import folder_of, load_limits
+    from pipelines.jobs.releases import planned_recipe
     from pipelines.jobs.terms import planned_terms
     from pipelines.planning.context import noise_of, plan_context
     from pipelines.planning.plan import plan
@@ -125,31 +124,27 @@ def command(
     from schemas.station import load_station
 
     config = load_station(station)
-    planned_recipe = with_moved_poses(
-        with_model(recipe, effects, model, archive, config.name), moves_of(pose or (), "plan"), "plan"
-    )
-    for message in refused_by_run(planned_recipe, config, folder_of(recipe)):
+    planned = planned_recipe(recipe, effects, model, archive, config.name)
+    planned = with_moved_poses(planned, moves_of(pose or (), "plan"), "plan")
+    for message in refused_by_run(planned, config, folder_of(recipe)):
         remark(f"warning: 'tumbleline run' refuses this recipe: {message}", style="yellow")
-    limits = _limits(planned_recipe, folder_of(recipe))
-    if not planned_recipe.tumbles and page is None and pictures is None:
-        document = plan_of_procedures(planned_recipe, config, limits)
-        print_json(document) if as_json else print_procedures(document)
+    try:
+        limits = load_limits(planned, folder_of(recipe))
+    except RecipeInvalid:
+        limits = None  # a plan does not need them
+    if not planned.tumbles and page is None and pictures is None:
+        give(plan_of_procedures(planned, config, limits), print_procedures, as_json=as_json)
         return
-    context = plan_context(
-        planned_recipe, config, noise_of(planned_recipe, device or planned_recipe.device, noise, wander)
-    )
-    document = plan(context, planned_terms(planned_recipe, config, limits), limits)
-    if planned_recipe.procedures:
-        document["procedures"] = procedure_rows(planned_recipe, config, limits)
+    context = plan_context(planned, config, noise_of(planned, device or planned.device, noise, wander))
+    document = plan(context, planned_terms(planned, config, limits), limits)
+    if planned.procedures:
+        document["procedures"] = procedure_rows(planned, config, limits)
     if page is not None:
         write_page(page, document, context)
         document["page"] = str(page)
     if pictures is not None:
         write_pictures(pictures, document, context)
-    give(document, print_plan, as_json=as_json)
-    stated = document.get("uncertainty")
-    if stated is not None and stated["unreachable"]:
-        raise typer.Exit(PART_FAILED)
+    conclude(document, print_plan, as_json=as_json, passed=not (document.get("uncertainty") or {}).get("unreachable"))
 
 
 @app.command()
@@ -223,31 +218,20 @@ def optimise(
     10 s) over the same temperatures, and every effect that is visible under it stays visible. With --criterion T --part a,b: the
     recipe with the least station time that discriminates between these effects.
     """
-    from pipelines.cli.optimal import cheapest_recipe, missing_limits, print_optimum, written
-    from pipelines.cli.optimise_options import OptimiseOptions
+    from pipelines.cli.optimal import OptimiseOptions, cheapest_recipe, missing_limits, written
     from pipelines.jobs.recipes import folder_of
+    from pipelines.jobs.releases import planned_recipe
     from pipelines.planning.context import noise_of
     from schemas.station import load_station
 
     printed = is_standard_output(output, "plan optimise", as_json=as_json)
     config = load_station(station)
-    base = with_model(recipe, effects, model, archive, config.name)
-    options = OptimiseOptions(
-        see,
-        tuple(required_errors or ()),
-        factor,
-        temperatures,
-        poses,
-        criterion,
-        verification,
-        part,
-        size,
-        separation,
-        ramp,
+    base = planned_recipe(recipe, effects, model, archive, config.name)
+    wanted = OptimiseOptions(
+        see, required_errors or (), factor, temperatures, poses, criterion, verification, part, size, separation, ramp
     )
-    optimum, document = cheapest_recipe(
-        base, Path(recipe).name, config, noise_of(base, device or base.device, noise, wander), options
-    )
+    noise_of_device = noise_of(base, device or base.device, noise, wander)
+    optimum, document = cheapest_recipe(base, Path(recipe).name, config, noise_of_device, wanted)
     target = output or Path(f"{optimum.planned.recipe.name}.toml")
     document["file"] = str(target)
     home = folder_of(recipe)
@@ -260,37 +244,36 @@ def optimise(
         document["page"] = str(page)
     if printed:  # the recipe alone: its first comments say what it reaches
         print_text(text)
-    elif as_json:
-        print_json(document)
     else:
-        print_optimum(document)
+        give(document, print_optimum, as_json=as_json)
 
 
-def _limits(recipe: Recipe, home: Path) -> Limits | None:
-    """The limits that a recipe names; None where they are not there, which a plan does not need."""
-    from pipelines.jobs.recipes import load_limits
+def save(path: Path, text: str) -> None:
+    """Write a file; a folder that does not exist or cannot be written to is wrong use."""
+    from schemas.errors import WrongUse
 
     try:
-        return load_limits(recipe, home)
-    except RecipeInvalid:
-        return None
+        path.write_text(text, encoding="utf-8")
+    except OSError as problem:
+        raise WrongUse(
+            f"plan: {path} cannot be written ({problem.strerror}); give a file in a folder that exists and is writable"
+        ) from None
 
 
-def with_model(recipe: str, effects: str, model: Path | None, archive: str | None, station: str) -> Recipe:
-    """The recipe, with another model where one is given; the archive is read only for a recipe with the line's model."""
-    from pipelines.jobs.model_files import chosen_effects, use_formulas
-    from pipelines.jobs.recipes import load_recipe
+def write_page(page: Path, document: dict[str, Any], context: PlanContext) -> None:
+    """Write the page."""
+    from pipelines.report.plan import render_plan
 
-    chosen = chosen_effects(effects, model, "plan")
+    save(page, render_plan(document, context))
 
-    def line(device: str) -> dict[str, Any]:
-        from pipelines.jobs.releases import line_model
 
-        if chosen:
-            return {"effects": chosen}
-        keys = line_model(Archive(archive), device, station)
-        use_formulas(keys["formulas"], "the line's model")
-        return keys
+def write_pictures(folder: Path, document: dict[str, Any], context: PlanContext) -> None:
+    """Write each picture to a file."""
+    from pipelines.drawing.vector import alone
+    from pipelines.report.plan import pictures
 
-    loaded = load_recipe(recipe, line)
-    return loaded.model_copy(update={"effects": list(chosen)}) if chosen else loaded
+    with contextlib.suppress(OSError):  # what is wrong with the folder is said where a picture cannot be written to it
+        folder.mkdir(parents=True, exist_ok=True)
+    for name, text in pictures(document, context).items():
+        if text:
+            save(folder / f"{document['recipe']}-{name}.svg", alone(text))

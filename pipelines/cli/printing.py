@@ -221,6 +221,11 @@ def refuse_standard_output(path: Path | None, command: str, why: str) -> None:
         raise WrongUse(f"{command}: output '-' is standard output, a file is needed: {why}; name one")
 
 
+def cell(value: object) -> str:
+    """A value of a stored table as an entry of a printed one."""
+    return short(value, 5) if isinstance(value, float) else str(value)
+
+
 def print_text(text: str) -> None:
     """A file's text on standard output, byte for byte."""
     typer.echo(text, nl=False)

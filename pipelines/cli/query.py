@@ -9,7 +9,7 @@ from typing import Annotated
 from inertial.counts import number_of
 from pipelines.archive import Archive
 from pipelines.cli.options import ArchiveOption, JsonOption, argument, option
-from pipelines.cli.printing import print_json, print_table, say, short
+from pipelines.cli.printing import cell, print_json, print_table, say
 from schemas.errors import WrongUse
 
 PART = "Results"
@@ -53,12 +53,8 @@ def command(
         writer.writerow(answer.columns)
         writer.writerows(answer.rows)
         return
-    print_table(list(answer.columns), [[_cell(value) for value in row] for row in answer.rows[:MANY]])
+    print_table(
+        list(answer.columns), [["" if value is None else cell(value) for value in row] for row in answer.rows[:MANY]]
+    )
     if len(answer.rows) > MANY:
         say(f"{number_of(len(answer.rows) - MANY, 'more row')}; print all rows with --json or --csv")
-
-
-def _cell(value: object) -> str:
-    if value is None:
-        return ""
-    return short(value, 5) if isinstance(value, float) else str(value)

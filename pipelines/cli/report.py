@@ -19,7 +19,7 @@ EXAMPLES = (
 
 def command(run: RunArgument = "latest", archive: ArchiveOption = None, *, as_json: JsonOption = False) -> None:
     """Print the path of a run's report; write the report if it is missing or older than the run's tables."""
-    from pipelines.report.any_run import make_report
+    from pipelines.report import make_report
 
     stored = Archive(archive).run(run)
     with error_console().status("drawing the report"):

@@ -33,7 +33,7 @@ def command(
     """Revoke a unit's calibration, with the reason. Nothing is deleted: the revocation is added to the ledger of the unit."""
     from pipelines.certificates import Ledger
     from pipelines.certificates.days import day_of
-    from pipelines.report.any_run import renew_report
+    from pipelines.report import renew_report
 
     store = Archive(archive)
     ledger = Ledger(store)

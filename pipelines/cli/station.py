@@ -7,15 +7,21 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pipelines.cli.options import JsonOption, StationOption, argument, option
+from pipelines.cli.inputs import made_up
+from pipelines.cli.options import (
+    JsonOption,
+    SimulatedDeviceOption,
+    SimulatedUnitsOption,
+    StationOption,
+    argument,
+    option,
+)
 from pipelines.cli.printing import give, print_json, print_table, say
 from pipelines.cli.station_bring_up import bring_up
 from pipelines.cli.station_check import check
 from pipelines.cli.station_frames import frames, replay
 from pipelines.cli.station_log import log
-from pipelines.cli.station_lot import DeviceOption, UnitsOption, made_up
-from pipelines.cli.station_status import status
-from pipelines.cli.station_watch import watch
+from pipelines.cli.station_watch import status, watch
 
 if TYPE_CHECKING:
     from schemas.profile import Profile
@@ -68,6 +74,8 @@ EXAMPLES_OF = {
 """Of the subcommands."""
 
 SHORT = {"read": "r", "write": "w", "read_write": "rw"}
+SETTINGS = re.compile(r"[,:;(]| with | behind ")
+"""What stands between the name of a model and the required settings of the device."""
 
 app = typer.Typer(
     help=SUMMARY,
@@ -93,8 +101,8 @@ def serve(
     speed: Annotated[
         float, option("--speed", "Simulated seconds per second of real time.", min=0.001, max=1000.0)
     ] = 1.0,
-    device: DeviceOption = "ADXL355",
-    units: UnitsOption = 8,
+    device: SimulatedDeviceOption = "ADXL355",
+    units: SimulatedUnitsOption = 8,
     seed: Annotated[int, option("--seed", "Random seed of the simulated units.", min=0)] = 1,
     silence: Annotated[
         float, option("--silence", "Seconds without a request after which drives and reader stop; 0: never.", min=0.0)
@@ -144,16 +152,17 @@ def profiles(
     loaded = [load_profile(one) for one in profile_names()]
     heads = ["profile", "kind", "device", "links", "verified"]
     lines = [
-        [p.name, p.kind, f"{p.maker} {_first_words(p.model)}", " ".join(p.links), "yes" if p.verified else "no"]
+        [
+            p.name,
+            p.kind,
+            f"{p.maker} {SETTINGS.split(p.model)[0].strip()}",
+            " ".join(p.links),
+            "yes" if p.verified else "no",
+        ]
         for p in loaded
     ]
     rows = [p.model_dump(mode="json", exclude={"registers", "commands", "groups", "fifo"}) for p in loaded]
     give({"profiles": rows}, lambda _: print_table(heads, lines), as_json=as_json)
-
-
-def _first_words(model: str) -> str:
-    """The name of a model without the required settings of the device."""
-    return re.split(r"[,:;(]| with | behind ", model)[0].strip()
 
 
 def _print_profile(profile: Profile) -> None:

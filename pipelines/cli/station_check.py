@@ -7,9 +7,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from inertial.counts import number_of
-from pipelines.cli.options import JsonOption, RecordOption, StationOption, option
+from pipelines.cli.inputs import made_up
+from pipelines.cli.options import (
+    JsonOption,
+    RecordOption,
+    SimulatedDeviceOption,
+    SimulatedUnitsOption,
+    StationOption,
+    option,
+)
 from pipelines.cli.printing import print_json, print_table, remark
-from pipelines.cli.station_lot import DeviceOption, UnitsOption, made_up
 from schemas.errors import STATION
 
 if TYPE_CHECKING:
@@ -21,8 +28,8 @@ if TYPE_CHECKING:
 
 def check(
     station: StationOption = None,
-    device: DeviceOption = "ADXL355",
-    units: UnitsOption = 8,
+    device: SimulatedDeviceOption = "ADXL355",
+    units: SimulatedUnitsOption = 8,
     *,
     registers: Annotated[bool, option("--registers", "Only read every register once; no motion.")] = False,
     record: RecordOption = None,

@@ -25,13 +25,14 @@ from pipelines.drawing.chart import shortened
 from pipelines.drawing.csv_rows import safe_cell
 from pipelines.drawing.picture import picture
 from pipelines.report.numbers import significant
-from pipelines.report.reasons import plain_reason
+from pipelines.report.templates import plain_reason
 from pipelines.report.unit_panels.budget import without_nothing
+from pipelines.workbench.services import requests
 from pipelines.workbench.services.index import RecentIndex
-from pipelines.workbench.services.jobs import Jobs
+from pipelines.workbench.services.jobs import BackgroundJob, Jobs
 from pipelines.workbench.settings import WorkbenchSettings
 from pipelines.workbench.state import PageState
-from schemas.errors import WrongUse
+from schemas.errors import TumblelineError, WrongUse
 from schemas.foreign import shown
 from schemas.units import MICRO
 
@@ -76,6 +77,26 @@ class Workbench:
         """The archive of the workbench."""
         return Archive(self.settings.archive)
 
+    def work(self, kind: str, state: PageState, problems: list[str]) -> tuple[Any, BackgroundJob | None]:
+        """Result and job of the work that a page needs, None while there is none; what refuses it is added to ``problems``."""
+        try:
+            _, content = requests.KINDS[kind][1](self.settings, state)
+        except TumblelineError as problem:
+            problems.append(str(problem))
+            return None, None
+        return self.jobs.result(kind, content), self.jobs.known(kind, content)
+
+    def done(self, kind: str, state: PageState) -> Any:
+        """The result of the work that a page needs; None while there is none."""
+        return self.jobs.result(kind, requests.KINDS[kind][1](self.settings, state)[1])
+
+    def finished(self, kind: str, state: PageState) -> Any:
+        """The result of the work that a page needs; refused while there is none."""
+        found = self.done(kind, state)
+        if found is None:
+            raise WrongUse(f"{kind}: not finished; wait until it is done")
+        return found
+
 
 def workbench_of(request: Request) -> Workbench:
     """The workbench of a request."""
@@ -83,9 +104,9 @@ def workbench_of(request: Request) -> Workbench:
     return bench
 
 
-def state_of(request: Request, kind: type[State]) -> tuple[State, list[str]]:
-    """The state of an address, and messages on invalid parts."""
-    return kind.parse(request.query_params.multi_items())
+def asked(request: Request, kind: type[State]) -> tuple[Workbench, State, list[str]]:
+    """The workbench of a request, the state of its address, and messages on invalid parts."""
+    return workbench_of(request), *kind.parse(request.query_params.multi_items())
 
 
 def state_at(body: Mapping[str, Any], kind: type[State]) -> State:
@@ -144,6 +165,11 @@ def figure(chart: Chart | None, ending: str, name: str) -> Response:
     raise WrongUse(f"figure {name}: '{ending[:10]}', one of json, csv, png is needed")
 
 
+def no_figure(name: str) -> WrongUse:
+    """The refusal of a figure that a page does not have."""
+    return WrongUse(f"figure: none of this page is called '{name[:40]}'")
+
+
 def saved_as(name: str) -> dict[str, str]:
     """Headers of a download with a file name."""
     safe = "".join(letter if letter.isascii() and (letter.isalnum() or letter in "._-") else "_" for letter in name)
@@ -199,15 +225,14 @@ def _environment() -> Environment:
     environment = Environment(
         loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
-    environment.filters["short"] = short
-    environment.filters["plain_reason"] = plain_reason
-    environment.filters["tuple_of"] = _tuple_of
-    environment.filters["without_nothing"] = without_nothing
+    own: dict[str, Any] = {
+        "short": short,
+        "plain_reason": plain_reason,
+        "tuple_of": tuple,
+        "without_nothing": without_nothing,
+    }
+    environment.filters.update(own)
     return environment
-
-
-def _tuple_of(values: Any) -> tuple[Any, ...]:
-    return tuple(values)
 
 
 def short(text: object, most: int = 28) -> str:

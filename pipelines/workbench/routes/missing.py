@@ -16,13 +16,14 @@ from pipelines.report.run_pictures import samples_chart
 from pipelines.workbench.pages import (
     RequestBody,
     Workbench,
+    asked,
     figure,
+    no_figure,
     page,
     page_part,
     part_of,
     run_table,
     state_at,
-    state_of,
     table_csv,
     workbench_of,
 )
@@ -40,8 +41,7 @@ CANDIDATES, INFLUENCE = 12, 12
 @router.get("/missing")
 def missing(request: Request) -> Response:
     """The page; the page itself requests missing results."""
-    bench = workbench_of(request)
-    state, problems = state_of(request, MissingPage)
+    bench, state, problems = asked(request, MissingPage)
     if part_of(request) == "samples" and state.source and not problems:
         state = requests.settled(bench.settings, state)
         return page_part(request, "missing_samples.html", state, is_file=sources.is_file(bench.settings, state.source))
@@ -50,8 +50,7 @@ def missing(request: Request) -> Response:
         try:
             state = requests.settled(bench.settings, state)
             work = {kind: requests.KINDS[kind][1](bench.settings, state) for kind in ("diagnose", "ladder")}
-            diagnosed = bench.jobs.result("diagnose", work["diagnose"][1])
-            rows = bench.jobs.result("ladder", work["ladder"][1])
+            diagnosed, rows = (bench.jobs.result(kind, content) for kind, (_, content) in work.items())
         except TumblelineError as problem:
             problems, work = [*problems, str(problem)], {}
     return page(
@@ -70,16 +69,14 @@ def missing(request: Request) -> Response:
 @router.get("/missing/figure/{name}.{ending}")
 def drawn(request: Request, name: str, ending: str) -> Response:
     """A figure of the page."""
-    bench = workbench_of(request)
-    state, _ = state_of(request, MissingPage)
+    bench, state, _ = asked(request, MissingPage)
     return figure(_chart(bench, state, name), ending, f"missing-{name}")
 
 
 @router.get("/missing/candidates.csv")
 def candidates(request: Request) -> Response:
     """The candidates of the first step."""
-    bench = workbench_of(request)
-    state, _ = state_of(request, MissingPage)
+    bench, state, _ = asked(request, MissingPage)
     diagnosed = _diagnosed(bench, state)
     return table_csv([] if diagnosed is None else list(diagnosed.ladder), "candidates")
 
@@ -114,9 +111,7 @@ def formula(body: RequestBody) -> JSONResponse:
 
 
 def _diagnosed(bench: Workbench, state: MissingPage) -> Diagnosed | None:
-    _, content = requests.diagnosis(bench.settings, state)
-    diagnosed: Diagnosed | None = bench.jobs.result("diagnose", content)
-    return diagnosed
+    return bench.done("diagnose", state)
 
 
 def _chart(bench: Workbench, state: MissingPage, name: str) -> Chart | None:
@@ -126,11 +121,10 @@ def _chart(bench: Workbench, state: MissingPage, name: str) -> Chart | None:
         )
         return samples_chart(samples, title, out_unit)
     if name == "ladder":
-        _, content = requests.ladder(bench.settings, state)
-        rows = bench.jobs.result("ladder", content)
+        rows = bench.done("ladder", state)
         return None if rows is None else evolution_chart(rows)
     if name not in {"sphere", "drivers", "slots"}:
-        raise WrongUse(f"figure: none of this page is called '{name[:40]}'")
+        raise no_figure(name)
     diagnosed = _diagnosed(bench, state)
     if diagnosed is None or diagnosed.table is None:
         return None
@@ -140,11 +134,8 @@ def _chart(bench: Workbench, state: MissingPage, name: str) -> Chart | None:
         return slot_chart(table)
     if name == "drivers":
         return quantity_chart(table, before, _quantity(diagnosed, state), unit, state.colour)
-    models = (
-        [("after", table.residual[unit])]
-        if before is None
-        else [("before", before[unit]), ("after", table.residual[unit])]
-    )
+    shown = [("before", before), ("after", table.residual)]
+    models = [(name, residual[unit]) for name, residual in shown if residual is not None]
     return pose_chart(table.units[unit], table.axes, table.force[unit], models, partial(table.pick, unit))
 
 
