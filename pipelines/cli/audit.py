@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
 from pipelines.archive import Archive
 from pipelines.cli.options import ArchiveOption, JsonOption, option
-from pipelines.cli.printing import print_json, remark, say, short
-from schemas.errors import DONE, PART_FAILED, WrongUse, did_you_mean
+from pipelines.cli.printing import conclude, remark, say, short
+from schemas.errors import WrongUse, did_you_mean
 
 if TYPE_CHECKING:
     from pipelines.audit.audit import Audit
@@ -69,13 +68,9 @@ def command(
         from pipelines.audit.page import render
 
         publish(page, render(audited, audit_findings, str(store.root)).encode(), "audit", ELSEWHERE)
-    if as_json:
-        print_json(document(audited, audit_findings, str(store.root)))
-    else:
-        _show(audited, audit_findings, str(store.root))
-        if page is not None:
-            remark(f"page    {page}")
-    raise typer.Exit(PART_FAILED if audit_findings else DONE)
+    show = partial(_show, audited, audit_findings, str(store.root), page)
+    made = document(audited, audit_findings, str(store.root)) if as_json else {}
+    conclude(made, show, as_json=as_json, passed=not audit_findings)
 
 
 def _refuse_nothing(audited: Audit, root: str) -> None:
@@ -95,7 +90,7 @@ def _refuse_nothing(audited: Audit, root: str) -> None:
         )
 
 
-def _show(audited: Audit, audit_findings: list[AuditFinding], root: str) -> None:
+def _show(audited: Audit, audit_findings: list[AuditFinding], root: str, page: Path | None, _: object) -> None:
     from inertial.counts import number_of
     from pipelines.audit.calibrations import date_of
     from pipelines.audit.document import counts
@@ -128,6 +123,8 @@ def _show(audited: Audit, audit_findings: list[AuditFinding], root: str) -> None
             f"{number_of(count, 'discovery', 'discoveries')} of many lots of {device}: 'tumbleline discover'",
             style="dim",
         )
+    if page is not None:
+        remark(f"page    {page}")
 
 
 def _certificates(audited: Audit) -> str:

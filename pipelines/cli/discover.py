@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from datetime import date
 from functools import partial
 from pathlib import Path
 from typing import Annotated
 
 from pipelines.archive import Archive
-from pipelines.cli.options import ArchiveOption, JsonOption, option
+from pipelines.cli.options import ArchiveOption, JsonOption, names_in, option
 from pipelines.cli.printing import conclude, give, publish
 from schemas.errors import WrongUse
 
@@ -56,22 +57,25 @@ def command(
     from pipelines.cli.text.discovery_text import print_discoveries, print_explained
     from pipelines.discovery.discover import Look, discovered, explained
     from pipelines.flows.dask_cluster import on_dask
+    from pipelines.jobs.model_files import chosen_effects
     from pipelines.parallel import processors
 
     count = workers or processors()
-    looked = discovered(
-        Archive(archive),
-        Look(
-            device=device,
-            since=_day(since),
-            drivers=tuple(part.strip() for part in driver.split(",") if part.strip()),
-            effects=_effects(model),
-            looking_back=looking_back,
-            populations=populations,
-            workers=count,
-            distribute=on_dask(dask, count),
-        ),
+    try:
+        day = date.fromisoformat(since).isoformat() if since else ""
+    except ValueError:
+        raise WrongUse(f"discover: --since is '{since}', a day as 2026-03-14 is needed") from None
+    look = Look(
+        device=device,
+        since=day,
+        drivers=names_in(driver),
+        effects=() if model is None else tuple(chosen_effects("", model, "discover") or ()),
+        looking_back=looking_back,
+        populations=populations,
+        workers=count,
+        distribute=on_dask(dask, count),
     )
+    looked = discovered(Archive(archive), look)
     document = looked.document
     if html is not None:
         from pipelines.discovery.page import render
@@ -81,20 +85,3 @@ def command(
         give(explained(document, explain), print_explained, as_json=as_json)
         return
     conclude(document, partial(print_discoveries, reach=reach), as_json=as_json, passed=not document["new"])
-
-
-def _day(since: str) -> str:
-    from datetime import date
-
-    try:
-        return date.fromisoformat(since).isoformat() if since else ""
-    except ValueError:
-        raise WrongUse(f"discover: --since is '{since}', a day as 2026-03-14 is needed") from None
-
-
-def _effects(model: Path | None) -> tuple[str, ...]:
-    if model is None:
-        return ()
-    from pipelines.jobs.model_files import chosen_effects
-
-    return tuple(chosen_effects("", model, "discover") or ())

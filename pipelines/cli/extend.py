@@ -10,7 +10,7 @@ from pipelines.cli.printing import give, is_standard_output, print_text, remark,
 from schemas.errors import WrongUse
 
 if TYPE_CHECKING:
-    from pipelines.cli.documents.archive import ExtendDocument
+    from pipelines.cli.documents.decisions import ExtendDocument
     from pipelines.jobs.model_files import ModelStep
 
 PART = "Is the model good enough, and what is missing?"

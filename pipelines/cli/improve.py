@@ -11,7 +11,7 @@ from pipelines.archive import Archive, Run
 from pipelines.cli import options
 from pipelines.cli.options import argument, names_in, option
 from pipelines.cli.printing import conclude, error_console, refuse_standard_output, remark, say
-from pipelines.improvement.improvement import ImprovedTables, Improvement
+from pipelines.improvement.improvement import Attendant, ImprovedTables, Improvement
 from schemas.errors import WrongUse
 
 if TYPE_CHECKING:
@@ -111,7 +111,7 @@ def command(
     conclude(document, show, as_json=as_json, passed=bool(document["adequate"] and not document["refuted"]))
 
 
-class _Terminal:
+class _Terminal(Attendant):
     """Shows an improvement at the terminal and asks its questions there.
 
     quiet : no diagnosis is printed · measure : whether the station measures a fresh run; None: it is asked

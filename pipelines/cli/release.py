@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from pipelines.archive import Archive
 from pipelines.cli.options import ArchiveOption, EffectFileOption, JsonOption, argument, option
@@ -40,39 +40,31 @@ def command(
     Recipes with model = "line" use the model from this date on. It needs a what-if in the archive with the verdict 'better' (see
     'tumbleline whatif'), or --force and a reason. Releases are never changed; a later release replaces an earlier one.
     """
+    from pipelines.jobs.model_change import change_from_options
+    from pipelines.jobs.releases import release as publish
+    from pipelines.rerun.selection import moment
+
     store = Archive(archive)
     if listed:
         if model is not None:
             raise WrongUse(f"release: --list and the model {model.name} are both given, one is needed; leave one out")
         _list(store, as_json=as_json)
         return
-    record = _released(
-        store, model, since, effect_file, {"device": device, "station": station, "reason": reason, "force": force}
-    )
-    lines = [
-        f"release {record.number}: {_name(record)} for {_where(record)} from {record.since:%Y-%m-%d %H:%M} UTC",
-        f"  {', '.join(record.effects)}",
-        f"  evidence: {record.evidence or 'none'}{', forced' if record.forced else ''}",
-    ]
-    give({"archive": str(store.root), **record.document()}, lines, as_json=as_json)
-
-
-def _released(
-    store: Archive, model: Path | None, since: str, effect_file: list[Path] | None, how: dict[str, Any]
-) -> Release:
-    from pipelines.jobs.model_change import change_from_options
-    from pipelines.jobs.releases import release
-    from pipelines.rerun.selection import moment
-
     if model is None or not since:
         missing = ["a model file"] * (model is None) + ["--from DATE"] * (not since)
         are = "are" if len(missing) > 1 else "is"
         raise WrongUse(
             f"release: {' and '.join(missing)} {are} missing; give 'tumbleline release MODEL --from DATE', or --list"
         )
-    return release(
-        store, change_from_options("", model, "", effect_file, where="release"), moment(since, "--from"), **how
-    )
+    change = change_from_options("", model, "", effect_file, where="release")
+    first = moment(since, "--from")
+    record = publish(store, change, first, device=device, station=station, reason=reason, force=force)
+    lines = [
+        f"release {record.number}: {_name(record)} for {_where(record)} from {record.since:%Y-%m-%d %H:%M} UTC",
+        f"  {', '.join(record.effects)}",
+        f"  evidence: {record.evidence or 'none'}{', forced' if record.forced else ''}",
+    ]
+    give({"archive": str(store.root), **record.document()}, lines, as_json=as_json)
 
 
 def _list(store: Archive, *, as_json: bool) -> None:

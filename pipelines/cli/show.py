@@ -13,7 +13,7 @@ from inertial.counts import number_of
 from pipelines.archive import Archive, Run
 from pipelines.certificates import Calibration
 from pipelines.cli.options import ArchiveOption, JsonOption, argument, option
-from pipelines.cli.printing import cell, print_json, print_table, remark, say
+from pipelines.cli.printing import cell, give, print_json, print_table, remark, say
 from schemas.errors import DONE, PART_FAILED, WrongUse
 
 PART = "Results"
@@ -71,22 +71,18 @@ def _show_run(run: Run, *, as_json: bool) -> None:
         "tables": tables,
         "provenance": {key: run.about.get(key) for key in ("who", "where", "when", "libraries", "capture", "source")},
     }
-    if as_json:
-        print_json(document)
-        return
-    if document["units"]:
-        print_summary(document)
-    else:
-        say(_unfinished(run))
-    say(f"tables  {', '.join(tables)}")
 
+    def show(_: object) -> None:
+        if document["units"]:
+            print_summary(document)
+        elif run.records is None:
+            say(f"run {run.id} was imported: it has no grades")
+        else:
+            stored = number_of(len(run.records.finished()), "record")
+            say(f"run {run.id} is not finished ({stored} stored); give its 'tumbleline run' again to continue")
+        say(f"tables  {', '.join(tables)}")
 
-def _unfinished(run: Run) -> str:
-    """Why a run has no grades: it was imported, or it was stopped."""
-    if run.records is None:
-        return f"run {run.id} was imported: it has no grades"
-    done = len(run.records.finished())
-    return f"run {run.id} is not finished ({number_of(done, 'record')} stored); give its 'tumbleline run' again to continue"
+    give(document, show, as_json=as_json)
 
 
 def _show_table(run: Run, name: str, *, as_json: bool) -> None:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from pipelines.cli.options import JsonOption, argument, option
-from pipelines.cli.printing import print_json, print_table, publish, remark, say
+from pipelines.cli.printing import give, print_json, print_table, publish, remark, say
 from schemas.errors import STATION, WrongUse
 
 if TYPE_CHECKING:
@@ -49,10 +50,7 @@ def frames(
         publish(beside, file.read_bytes(), "recording")
         publish(as_test, text_of(file, beside.name), "test")
     document = frames_document(recording, None if as_json else limit)
-    if as_json:
-        print_json(document)
-    else:
-        _print(document, len(recording.exchanges))
+    give(document, partial(_print, len(recording.exchanges)), as_json=as_json)
 
 
 def replay(
@@ -100,7 +98,7 @@ def replay(
     raise typer.Exit(STATION if told else 0)
 
 
-def _print(document: FramesDocument, total: int) -> None:
+def _print(total: int, document: FramesDocument) -> None:
     _print_devices(document["devices"], document["purpose"])
     lines = [
         [f"{f['at_s']:.3f}", f"{1e3 * f['seconds']:.1f}", f["place"], f["kind"], f["what"], f["answer"][:SHOWN]]

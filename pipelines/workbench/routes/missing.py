@@ -53,6 +53,7 @@ def missing(request: Request) -> Response:
             diagnosed, rows = (bench.jobs.result(kind, content) for kind, (_, content) in work.items())
         except TumblelineError as problem:
             problems, work = [*problems, str(problem)], {}
+    table = None if diagnosed is None else diagnosed.table
     return page(
         request, "missing.html", state, problems, sources=chosen, diagnosed=diagnosed, rows=rows,
         worded=None if diagnosed is None else worded(diagnosed.document),
@@ -60,8 +61,9 @@ def missing(request: Request) -> Response:
         twin=sources.twin(bench.settings, state.source) if state.source and not state.fresh else "",
         models=models.models(bench.settings),
         ladder_command=state.ladder_command(bench.settings.archive),
-        unit=_unit(diagnosed, state), against="" if diagnosed is None else _quantity(diagnosed, state),
-        candidates=CANDIDATES, influence=INFLUENCE, drivers=_drivers(diagnosed),
+        unit=state.unit if table is None else table.units[table.place_of(state.unit)],
+        against="" if diagnosed is None else _quantity(diagnosed, state), candidates=CANDIDATES, influence=INFLUENCE,
+        drivers=[] if table is None else [(name, label) for name, (label, _) in table.drivers.items()],
         is_file=any(one.is_file and one.name == state.source for one in chosen),
     )  # fmt: skip
 
@@ -145,15 +147,3 @@ def _quantity(diagnosed: Diagnosed, state: MissingPage) -> str:
     first = "" if diagnosed.table is None else diagnosed.table.first
     followed = [first, *(str(one["driver"]) for one in diagnosed.document["where"])]
     return next((name for name in (state.against, *followed) if name in known), "force")
-
-
-def _unit(diagnosed: Diagnosed | None, state: MissingPage) -> str:
-    if diagnosed is None or diagnosed.table is None:
-        return state.unit
-    return diagnosed.table.units[diagnosed.table.place_of(state.unit)]
-
-
-def _drivers(diagnosed: Diagnosed | None) -> list[tuple[str, str]]:
-    if diagnosed is None or diagnosed.table is None:
-        return []
-    return [(name, label) for name, (label, _) in diagnosed.table.drivers.items()]
