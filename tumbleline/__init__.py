@@ -22,8 +22,7 @@ if TYPE_CHECKING:
     from schemas.errors import DataRejected, TumblelineError, WrongUse
     from tumbleline.archives import ArchiveView, archive
     from tumbleline.calibrations import Calibration, fit
-    from tumbleline.catalogue import effects
-    from tumbleline.diagnoses import ModelDiagnosis, diagnose
+    from tumbleline.diagnoses import ModelDiagnosis, diagnose, effects
     from tumbleline.examples import Example, example
     from tumbleline.improvements import ImprovedModel, improve
     from tumbleline.pictures import Picture
@@ -52,8 +51,7 @@ __all__ = [
 _HOMES = {
     "tumbleline.archives": ("ArchiveView", "archive"),
     "tumbleline.calibrations": ("Calibration", "fit"),
-    "tumbleline.catalogue": ("effects",),
-    "tumbleline.diagnoses": ("ModelDiagnosis", "diagnose"),
+    "tumbleline.diagnoses": ("ModelDiagnosis", "diagnose", "effects"),
     "tumbleline.examples": ("Example", "example"),
     "tumbleline.improvements": ("ImprovedModel", "improve"),
     "tumbleline.pictures": ("Picture",),

@@ -44,9 +44,9 @@ def error_console() -> Console:
     return WordConsole(stderr=True, highlight=False, markup=False, emoji=False)
 
 
-def say(what: object = "", style: str = "", end: str = "\n") -> None:
+def say(what: object = "", style: str = "") -> None:
     """Print a text, or another thing that rich shows, on standard output."""
-    console().print(what, style=style, end=end)
+    console().print(what, style=style)
 
 
 def publish(path: Path, content: str | bytes, what: str) -> None:

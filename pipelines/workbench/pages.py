@@ -22,8 +22,7 @@ from starlette.responses import HTMLResponse, JSONResponse, Response
 from pipelines.archive import Archive
 from pipelines.drawing import Chart, csv_text, plotly_figure
 from pipelines.drawing.chart import shortened
-from pipelines.drawing.csv_rows import safe_cell
-from pipelines.drawing.picture import picture
+from pipelines.drawing.picture import picture, safe_cell
 from pipelines.report.numbers import significant
 from pipelines.report.templates import plain_reason
 from pipelines.report.unit_panels.budget import without_nothing

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fastapi import APIRouter, Request
+from starlette.exceptions import HTTPException
 from starlette.responses import JSONResponse, Response
 
 from pipelines.jobs.job import Request as LotRequest
@@ -142,24 +143,13 @@ def answer(request: Request, name: str, body: RequestBody) -> JSONResponse:
     return JSONResponse({"address": OperatorPage(lot=name).address()})
 
 
-@router.post("/operator/{name}/stop")
-def stop(request: Request, name: str) -> JSONResponse:
-    """Stop the lot's process after the safe state."""
-    lots.stop(workbench_of(request).settings, name)
-    return JSONResponse({"address": OperatorPage(lot=name).address()})
-
-
-@router.post("/operator/{name}/pause")
-def pause(request: Request, name: str) -> JSONResponse:
-    """Stop the lot's process after the safe state; the lot keeps the station."""
-    lots.pause(workbench_of(request).settings, name)
-    return JSONResponse({"address": OperatorPage(lot=name).address()})
-
-
-@router.post("/operator/{name}/continue")
-def again(request: Request, name: str) -> JSONResponse:
-    """Continue a stopped lot."""
-    lot = lots.again(workbench_of(request).settings, name)
+@router.post("/operator/{name}/{action}")
+def act(request: Request, name: str, action: str) -> JSONResponse:
+    """Stop the lot's process after the safe state, pause it so that the lot keeps the station, or continue the lot."""
+    actions = {"stop": lots.stop, "pause": lots.pause, "continue": lots.again}
+    if action not in actions:
+        raise HTTPException(404)
+    lot = actions[action](workbench_of(request).settings, name)
     return JSONResponse({"address": OperatorPage(lot=lot.id).address()})
 
 
