@@ -23,10 +23,9 @@ if TYPE_CHECKING:
     from tumbleline.archives import ArchiveView, archive
     from tumbleline.calibrations import Calibration, fit
     from tumbleline.diagnoses import ModelDiagnosis, diagnose, effects
-    from tumbleline.examples import Example, example
     from tumbleline.improvements import ImprovedModel, improve
     from tumbleline.pictures import Picture
-    from tumbleline.recordings import Recording, read
+    from tumbleline.recordings import Example, Recording, example, read
 
 __all__ = [
     "ArchiveView",
@@ -52,10 +51,9 @@ _HOMES = {
     "tumbleline.archives": ("ArchiveView", "archive"),
     "tumbleline.calibrations": ("Calibration", "fit"),
     "tumbleline.diagnoses": ("ModelDiagnosis", "diagnose", "effects"),
-    "tumbleline.examples": ("Example", "example"),
     "tumbleline.improvements": ("ImprovedModel", "improve"),
     "tumbleline.pictures": ("Picture",),
-    "tumbleline.recordings": ("Recording", "read"),
+    "tumbleline.recordings": ("Example", "Recording", "example", "read"),
     "schemas.errors": ("DataRejected", "TumblelineError", "WrongUse"),
 }
 _MODULES = {name: module for module, names in _HOMES.items() for name in names}

@@ -88,7 +88,16 @@ def _print_changes(rows: list[dict[str, Any]], key: tuple[str, ...], what: str, 
     if not rows:
         return
     both = [row for row in rows if not (math.isnan(row["a"]) or math.isnan(row["b"]))]
-    lines = [_change_line(row, key) for row in both[:most]]
+    lines = [
+        [
+            str(row["unit"]),
+            " ".join(str(row[name]) for name in key),
+            *(short(row[side], 5) for side in ("a", "b")),
+            f"{short(row['change'])} {row['unit_text']}",
+            *(short(row[over], 2) for over in ("over_a", "over_b")),
+        ]
+        for row in both[:most]
+    ]
     if lines:
         heads = ["unit", what, "a", "b", "change", "over\nu(a)", "over\nu(b)"]
         title = f"{what}: {len(both)} differ, largest change relative to the uncertainty first"
@@ -97,12 +106,6 @@ def _print_changes(rows: list[dict[str, Any]], key: tuple[str, ...], what: str, 
     for side, names in (("only in b", new), ("only in a", gone)):
         if names:
             say(f"{what} {side}: {', '.join(names)}")
-
-
-def _change_line(row: dict[str, Any], key: tuple[str, ...]) -> list[str]:
-    named = [str(row["unit"]), " ".join(str(row[name]) for name in key)]
-    change = f"{short(row['change'])} {row['unit_text']}"
-    return [*named, short(row["a"], 5), short(row["b"], 5), change, short(row["over_a"], 2), short(row["over_b"], 2)]
 
 
 def _apart(rows: list[dict[str, Any]], side: str) -> list[str]:

@@ -43,7 +43,12 @@ def command(
 
     add_effects(effect_file)
     model_file = read_model(model)
-    _refuse_picture(picture, dwells)
+    if picture is not None:
+        from pipelines.drawing.picture import refuse_ending
+
+        if not dwells:
+            raise WrongUse("history: --picture shows errors, they need --dwells; name the dwells too")
+        refuse_ending(picture, "--picture")
     if dwells:
         tables = ImprovedTables(*both_runs(dwells, history, fresh, fresh_history, archive))
         rows = errors_by_version(versions(model_file), tables, lambda: error_console().status("fitting"))
@@ -54,22 +59,12 @@ def command(
         ]
     if picture is not None:
         from pipelines.drawing.picture import picture as drawn
-        from pipelines.report.evolution import evolution_chart
+        from pipelines.report.diagnosis_pictures import evolution_chart
 
         chart = evolution_chart(rows, model_file.model.name)
         publish(picture, drawn(chart, picture.suffix.lower()), "picture")
     document = {"model": model_file.model.name, "file": str(model), "versions": rows}
     give(document, lambda _: _print(rows, model_file.model.name, model), as_json=as_json)
-
-
-def _refuse_picture(picture: Path | None, dwells: str) -> None:
-    from pipelines.drawing.picture import refuse_ending
-
-    if picture is None:
-        return
-    if not dwells:
-        raise WrongUse("history: --picture shows errors, they need --dwells; name the dwells too")
-    refuse_ending(picture, "--picture")
 
 
 def _print(rows: list[dict[str, Any]], name: str, file: Path) -> None:

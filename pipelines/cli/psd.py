@@ -40,7 +40,7 @@ def command(
     σ²(τ) = 2·∫ S(f)·sin⁴(πfτ)/(πfτ)² df (IEEE Std 952). Where the two differ, the record holds lines, jumps or a drift.
     """
     from pipelines.chain.noise_documents import psd_document
-    from pipelines.cli.series_options import even_series, write_pictures
+    from pipelines.cli.allan import even_series, write_pictures
 
     series = even_series(source, columns, (time, time_unit, rate), unit, archive, stretch)
     if series is None:

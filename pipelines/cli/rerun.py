@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import asdict
 from functools import partial
-from typing import TYPE_CHECKING, Annotated, Any, NoReturn
+from typing import TYPE_CHECKING, Annotated, Any
 
 from inertial.counts import number_of
 from pipelines.archive import Archive
@@ -72,7 +72,10 @@ def command(
         checked if check else run_again, store, runs, change, distribution(store, runs, dask, workers), report=report
     )
     if check:
-        _give_check(store, done, as_json=as_json)
+        same = sum(result.same for result in done)
+        rows = [{**asdict(result), "same": result.same} for result in done]
+        checks = {"archive": str(store.root), "selected": len(done), "same": same, "runs": rows}
+        conclude(checks, lambda _: _print_check(done), as_json=as_json, passed=same == len(done))
     add_runs(store, [outcome.new for outcome in done if outcome.new])
     document = {"archive": str(store.root), "runs": [asdict(outcome) for outcome in done], **_counts(done)}
     conclude(document, partial(_print, done, archive), as_json=as_json, passed=not document["failed"])
@@ -125,13 +128,6 @@ def _line(one: RerunOutcome) -> list[str]:
     whats = dict.fromkeys("code" if change["what"] == "code" else change["what"] for change in one.because)
     worked = [name for name, how in one.stages.items() if how == "computed"]
     return [one.run, one.new if one.new != one.run else "—", ", ".join(whats) or "nothing", ", ".join(worked) or "none"]
-
-
-def _give_check(store: Archive, results: list[Reproduction], *, as_json: bool) -> NoReturn:
-    same = sum(result.same for result in results)
-    rows = [{**asdict(result), "same": result.same} for result in results]
-    document = {"archive": str(store.root), "selected": len(results), "same": same, "runs": rows}
-    conclude(document, lambda _: _print_check(results), as_json=as_json, passed=same == len(results))
 
 
 def _print_check(results: list[Reproduction]) -> None:

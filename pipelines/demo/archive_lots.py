@@ -70,7 +70,8 @@ class Line:
         wafers = rng.integers(1, self.wafers + 1, self.units)
         about = pd.DataFrame({"unit": serials, "slot": range(self.units), "wafer": [f"W{w:02d}" for w in wafers]})
         about["station"] = station
-        angles, soak = self._plan()
+        angles = np.concatenate([self._angles[rng.permutation(POSES)] for _ in SOAKS_C])  # another order in each soak
+        soak = np.repeat(np.arange(len(SOAKS_C)), POSES)
         time = self._times(soak)
         rest = angles + np.degrees(self.rests) * rng.standard_normal(angles.shape)  # where the table really rests
         force = _force(rest)
@@ -95,11 +96,6 @@ class Line:
         dwells = pd.concat(tables, ignore_index=True)
         dwells["n"], dwells["out_unit"] = 1000, "g"
         return dwells, about
-
-    def _plan(self) -> tuple[Array, NDArray[np.intp]]:
-        """Angles of every dwell, the poses in another order in each soak, and the soaks' numbers."""
-        order = [self._rng.permutation(POSES) for _ in SOAKS_C]
-        return np.concatenate([self._angles[each] for each in order]), np.repeat(np.arange(len(SOAKS_C)), POSES)
 
     def _times(self, soak: NDArray[np.intp]) -> Array:
         step = np.full(soak.size, DWELL_S + MOVE_S)

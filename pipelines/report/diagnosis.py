@@ -57,14 +57,12 @@ def render_diagnosis(
 def _members(group: dict[str, Any], document: dict[str, Any]) -> list[dict[str, Any]]:
     """The effects of a class, or its handling errors, each with symbol and equation, and which one is recommended."""
     simplest = next((name for name in document["recommended"] if name in group["effects"]), group["effects"][0])
-    return [{**_member(name), "recommended": name == simplest} for name in group["effects"]]
-
-
-def _member(name: str) -> dict[str, str]:
-    known = handled(name) or (effects.get(name) if name in effects.catalogue() or ":" in name else None)
-    if known is None:
-        return {"id": name, "symbol": "", "equation": "one dwell of one unit"}
-    return {"id": name, "symbol": known.symbol, "equation": known.equation}
+    members: list[dict[str, Any]] = []
+    for name in group["effects"]:
+        known = handled(name) or (effects.get(name) if name in effects.catalogue() or ":" in name else None)
+        symbol, equation = ("", "one dwell of one unit") if known is None else (known.symbol, known.equation)
+        members.append({"id": name, "symbol": symbol, "equation": equation, "recommended": name == simplest})
+    return members
 
 
 def _pictures(diagnosis: Diagnosis, units: tuple[str, ...]) -> dict[str, Any]:

@@ -201,6 +201,38 @@ def _table(archive: str, run: str, name: str, when: int) -> pd.DataFrame:
     return Archive(archive).run(run).table(name)
 
 
+def samples_of(bench: Workbench, run: str, dwell: str) -> tuple[pd.DataFrame, str, str]:
+    """Samples of a dwell ``UNIT:DWELL``, from the capture of a run or an imported record, the unit of their values, and a title.
+
+    Raises
+    ------
+    WrongUse
+        There is no such dwell, or its samples were not recorded.
+    """
+    stored = bench.archive.run(run)
+    unit, _, number = dwell.rpartition(":")
+    table = run_table(bench, run, "dwells")
+    rows = table[(table["unit"] == unit) & (table["dwell"].astype(str) == number)]
+    if rows.empty:
+        raise WrongUse(f"run {stored.id} has no dwell '{dwell[:80]}'; click a residual")
+    row = rows.iloc[0]
+    record = int(row["record"]) if "record" in rows.columns else int(number)
+    if stored.records is not None:
+        tables = list(stored.records.samples({record}))
+    elif "samples" in stored.tables():
+        samples = run_table(bench, run, "samples")
+        tables = [samples[samples["record"] == record]]
+    else:
+        raise WrongUse(f"run {stored.id} was imported as dwells: its samples were not recorded")
+    kept = [own for one in tables if len(own := one[one["unit"] == unit])]
+    if not kept:
+        raise WrongUse(f"run {stored.id}: no samples of dwell {number} of unit {unit} are stored")
+    out_unit = str(row["out_unit"]) if "out_unit" in rows.columns else ""
+    pose = str(row["pose"]) if "pose" in rows.columns else ""
+    title = f"Unit {unit}, dwell {number}{', pose ' + pose if pose else ''}"
+    return pd.concat(kept, ignore_index=True), out_unit, title
+
+
 @cache
 def static_version() -> str:
     """Part of the addresses of scripts and styles that changes with their content, so that browsers can cache them."""

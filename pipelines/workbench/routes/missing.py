@@ -10,8 +10,7 @@ from starlette.responses import JSONResponse, Response
 from pipelines.diagnosis.inputs import use_written_formulas
 from pipelines.diagnosis.sections import worded
 from pipelines.drawing import Chart
-from pipelines.report.diagnosis_pictures import pose_chart, quantity_chart, slot_chart
-from pipelines.report.evolution import evolution_chart
+from pipelines.report.diagnosis_pictures import evolution_chart, pose_chart, quantity_chart, slot_chart
 from pipelines.report.run_pictures import samples_chart
 from pipelines.workbench.pages import (
     RequestBody,
@@ -22,13 +21,12 @@ from pipelines.workbench.pages import (
     page,
     page_part,
     part_of,
-    run_table,
+    samples_of,
     state_at,
     table_csv,
     workbench_of,
 )
 from pipelines.workbench.services import models, requests, sources
-from pipelines.workbench.services.samples import samples_of
 from pipelines.workbench.services.work import Diagnosed
 from pipelines.workbench.state import MissingPage
 from schemas.errors import TumblelineError, WrongUse
@@ -118,9 +116,7 @@ def _diagnosed(bench: Workbench, state: MissingPage) -> Diagnosed | None:
 
 def _chart(bench: Workbench, state: MissingPage, name: str) -> Chart | None:
     if name == "samples":
-        samples, out_unit, title = samples_of(
-            bench.archive, state.source, state.dwell, partial(run_table, bench, state.source)
-        )
+        samples, out_unit, title = samples_of(bench, state.source, state.dwell)
         return samples_chart(samples, title, out_unit)
     if name == "ladder":
         rows = bench.done("ladder", state)

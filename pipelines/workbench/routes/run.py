@@ -7,7 +7,7 @@ from starlette.responses import Response
 
 from pipelines.certificates.statement import stated
 from pipelines.tables.frames import rows_of
-from pipelines.workbench.pages import Workbench, asked, page, run_table, saved_as, table_csv
+from pipelines.workbench.pages import asked, page, run_table, saved_as, table_csv
 from pipelines.workbench.state import MissingPage, RunPage
 from schemas.errors import TumblelineError, WrongUse
 
@@ -41,16 +41,13 @@ def run(request: Request) -> Response:
         certificates = {}
         problems.append(str(problem))
     events = rows_of(run_table(bench, stored.id, "events")) if "events" in tables else []
+    diagnosed, _ = bench.work(
+        "diagnose", MissingPage(source=stored.id), []
+    )  # where it was judged since the server began
     return page(
         request, "run.html", state, problems, run=stored, about=about, grades=grades, cells=cells, shown=SHOWN, tables=tables,
-        certificates=certificates, events=events, adequate=_adequate(bench, stored.id),
+        certificates=certificates, events=events, adequate=None if diagnosed is None else diagnosed.document["adequate"],
     )  # fmt: skip
-
-
-def _adequate(bench: Workbench, run: str) -> bool | None:
-    """The verdict on the run's own model, where it was judged since the server began; None else."""
-    diagnosed, _ = bench.work("diagnose", MissingPage(source=run), [])
-    return None if diagnosed is None else diagnosed.document["adequate"]
 
 
 @router.get("/run/table/{name}.csv")

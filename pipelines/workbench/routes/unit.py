@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import partial
 from typing import Any
 
 import pandas as pd
@@ -26,9 +25,9 @@ from pipelines.workbench.pages import (
     page_part,
     part_of,
     run_table,
+    samples_of,
     table_csv,
 )
-from pipelines.workbench.services.samples import samples_of
 from pipelines.workbench.state import UnitPage, quoted
 from schemas.errors import WrongUse
 
@@ -87,9 +86,7 @@ def drawn(request: Request, name: str, ending: str) -> Response:
 
 def _chart(bench: Workbench, state: UnitPage, name: str) -> Chart:
     if name == "samples":
-        samples, out_unit, title = samples_of(
-            bench.archive, state.run, state.dwell, partial(run_table, bench, state.run)
-        )
+        samples, out_unit, title = samples_of(bench, state.run, state.dwell)
         return run_pictures.samples_chart(samples, title, out_unit)
     if name == "history":
         rows = [row for row in _history(bench, state.unit) if _parameter(row) == state.parameter]
