@@ -122,6 +122,7 @@ class Chart:
     columns: int = 1
     scale: ColourScale | None = None
     height: int = 320
+    note: str = ""
 
     @property
     def rows(self) -> int:
