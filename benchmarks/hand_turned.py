@@ -2,8 +2,8 @@
 
 39 dwells in directions that nobody knows, so that the magnitude of gravity is the only reference. The effects are made by
 physics: two heated masses, a band-gap reference, an element behind its case, a die attach that sticks and slips, Preisach's
-operator over the temperature, a transfer curve that saturates. Prints for each effect how often it is in a class, recommended by dwells left out, and named
-beside another one.
+operator over the temperature, a transfer curve that saturates. Prints for each effect how often it is in a class, recommended
+by dwells left out, and named beside another one.
 """
 
 from __future__ import annotations

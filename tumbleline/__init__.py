@@ -22,12 +22,10 @@ if TYPE_CHECKING:
     from schemas.errors import DataRejected, TumblelineError, WrongUse
     from tumbleline.archives import ArchiveView, archive
     from tumbleline.calibrations import Calibration, fit
-    from tumbleline.catalogue import effects
-    from tumbleline.diagnoses import ModelDiagnosis, diagnose
-    from tumbleline.examples import Example, example
+    from tumbleline.diagnoses import ModelDiagnosis, diagnose, effects
     from tumbleline.improvements import ImprovedModel, improve
     from tumbleline.pictures import Picture
-    from tumbleline.recordings import Recording, read
+    from tumbleline.recordings import Example, Recording, example, read
 
 __all__ = [
     "ArchiveView",
@@ -52,12 +50,10 @@ __all__ = [
 _HOMES = {
     "tumbleline.archives": ("ArchiveView", "archive"),
     "tumbleline.calibrations": ("Calibration", "fit"),
-    "tumbleline.catalogue": ("effects",),
-    "tumbleline.diagnoses": ("ModelDiagnosis", "diagnose"),
-    "tumbleline.examples": ("Example", "example"),
+    "tumbleline.diagnoses": ("ModelDiagnosis", "diagnose", "effects"),
     "tumbleline.improvements": ("ImprovedModel", "improve"),
     "tumbleline.pictures": ("Picture",),
-    "tumbleline.recordings": ("Recording", "read"),
+    "tumbleline.recordings": ("Example", "Recording", "example", "read"),
     "schemas.errors": ("DataRejected", "TumblelineError", "WrongUse"),
 }
 _MODULES = {name: module for module, names in _HOMES.items() for name in names}

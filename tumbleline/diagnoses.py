@@ -144,3 +144,12 @@ def diagnose(
     dwells = without(given.dwells, named) if named else given.dwells
     made = examination(dwells, given.history, judged, [f"{unit}:{dwell}" for unit, dwell in named])
     return ModelDiagnosis(made.document, given.run.id, made)
+
+
+def effects() -> pd.DataFrame:
+    """One row per effect: id, symbol, equation, scope (sensor or station), and what to measure so that it shows."""
+    from inertial.effects import catalogue
+
+    columns = ("symbol", "equation", "scope", "breaker")
+    rows = [{"id": name, **{column: getattr(one, column) for column in columns}} for name, one in catalogue().items()]
+    return pd.DataFrame(rows)

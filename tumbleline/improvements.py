@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from getpass import getuser
 from pathlib import Path
@@ -13,11 +12,11 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from pipelines.improvement.improvement import ImprovedTables, Improvement
+from pipelines.improvement.improvement import Attendant, ImprovedTables, Improvement
 from tumbleline.calibrations import Calibration, fit
 from tumbleline.diagnoses import ModelDiagnosis
 from tumbleline.pictures import as_html, as_text
-from tumbleline.recordings import Recording, read, session_folder, silent
+from tumbleline.recordings import Recording, read, session_folder
 
 
 @dataclass(frozen=True)
@@ -88,25 +87,6 @@ class ImprovedModel:
         return as_text("Improved model", self._lines(), self.ladder.drop(columns="confirmed"))
 
 
-class _Alone:
-    """Nobody is asked and nothing is shown; ``fresh``: that judges the change."""
-
-    def working(self, what: str) -> AbstractContextManager[Any]:
-        return silent(what)
-
-    def begins_again(self, added: list[str]) -> None:
-        """Nothing is shown."""
-
-    def diagnosed(self, document: dict[str, Any], *, first: bool) -> None:
-        """Nothing is shown."""
-
-    def agrees(self, effect: str, others: list[str], target: Path) -> bool:
-        return not others
-
-    def fresh_run(self) -> tuple[str, pd.DataFrame, pd.DataFrame | None] | None:
-        return None
-
-
 def improve(
     recording: Recording | str | Path | pd.DataFrame,
     effects: Sequence[str] | None = None,
@@ -139,9 +119,8 @@ def improve(
         raise WrongUse(
             f"improve: {target} exists; name another model_file, or extend it with 'tumbleline improve --model'"
         )
-    loop = Improvement(
-        given.run.id, tables, None, target, "", getuser(), "" if again is None else again.run.id, _Alone()
-    )
+    fresh_name = "" if again is None else again.run.id
+    loop = Improvement(given.run.id, tables, None, target, "", getuser(), fresh_name, Attendant())
     named = [effect] if isinstance(effect, str) and effect else list(effect)
     document = loop.run(list(effects) if effects else None, named, yes=not named)
     return ImprovedModel(document, fit(given, document["effects"]))

@@ -59,11 +59,7 @@ def rounded_table(rows: pd.DataFrame) -> pd.DataFrame:
     )
 
 
-def _four_digits(value: float) -> str:
-    return f"{value:.4g}"
-
-
-_SHORT: dict[str, Any] = {"max_rows": MOST_ROWS, "float_format": _four_digits}
+_SHORT: dict[str, Any] = {"max_rows": MOST_ROWS, "float_format": "{:.4g}".format}
 
 
 def as_html(title: str, lines: list[str], *tables: pd.DataFrame, picture: Picture | None = None) -> str:
@@ -76,10 +72,4 @@ def as_html(title: str, lines: list[str], *tables: pd.DataFrame, picture: Pictur
 
 def as_text(title: str, lines: list[str], *tables: pd.DataFrame) -> str:
     """The same as text."""
-    return "\n".join(
-        [
-            title,
-            *lines,
-            *(table.to_string(index=False, **_SHORT) for table in tables if len(table)),
-        ]
-    )
+    return "\n".join([title, *lines, *(table.to_string(index=False, **_SHORT) for table in tables if len(table))])

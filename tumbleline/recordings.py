@@ -129,11 +129,12 @@ def read(
     DataRejected
         The recording cannot be used; the message says why.
     """
-    from pipelines.importers.exchange import is_exchange
+    from pipelines.importers.exchange import checked, checked_history, is_exchange, read_history
 
     if isinstance(source, pd.DataFrame):
         if is_exchange(source.columns) and not columns:
-            return _kept(*_checked(source, history), "DataFrame", archive)
+            past = history if isinstance(history, pd.DataFrame) else None if history is None else read_history(history)
+            return _kept(checked(source, where="DataFrame", foreign=True), past, "DataFrame", archive)
         return replace(_imported(_as_file(source), columns, units, serial or "A", archive, stated), command="")
     from pipelines.importers.files import is_file
 
@@ -145,9 +146,8 @@ def read(
 
         beside = history if isinstance(history, str | Path) else ""
         dwells, past, _ = dwells_and_history(str(path), str(beside), None)
-        return _kept(
-            dwells, _checked_history(history) if isinstance(history, pd.DataFrame) else past, path.name, archive
-        )
+        past = checked_history(history, "history", foreign=True) if isinstance(history, pd.DataFrame) else past
+        return _kept(dwells, past, path.name, archive)
     return _imported(path, columns, units, serial, archive, stated)
 
 
@@ -156,19 +156,6 @@ def _is_table_of_dwells(path: Path) -> bool:
     from pipelines.importers.exchange import is_exchange
 
     return is_exchange(files.read(path)[0].columns)
-
-
-def _checked(source: pd.DataFrame, history: Source | None) -> tuple[pd.DataFrame, pd.DataFrame | None]:
-    from pipelines.importers.exchange import checked, read_history
-
-    past = history if isinstance(history, pd.DataFrame) else None if history is None else read_history(history)
-    return checked(source, where="DataFrame", foreign=True), past
-
-
-def _checked_history(history: pd.DataFrame) -> pd.DataFrame:
-    from pipelines.importers.exchange import checked_history
-
-    return checked_history(history, "history", foreign=True)
 
 
 def _kept(dwells: pd.DataFrame, history: pd.DataFrame | None, name: str, archive: str | Path | None) -> Recording:
@@ -209,6 +196,7 @@ def _imported(
     """A recording of another system, with what was stated of it and what is recognised beyond that."""
     from pipelines.diagnosis.import_document import import_document
     from pipelines.importers.mapping import build
+    from pipelines.importers.proposal import Proposal
     from pipelines.importers.recognition import recognise
     from schemas.errors import WrongUse
 
@@ -227,7 +215,7 @@ def _imported(
     build(keys, path.name)
     done = import_document([path], keys, path.name, "", _place(archive), None, silent)
     run = Archive(_place(archive)).run(done["run"])
-    return Recording(run, _told(seen, proposal, done["remarks"]), _command(keys, path))
+    return Recording(run, _told(seen, proposal, done["remarks"]), Proposal(keys).command([path]))
 
 
 def _open(keys: dict[str, Any], seen: Recognition, *, decided: bool) -> list[str]:
@@ -250,7 +238,36 @@ def _told(seen: Recognition, proposal: Proposal | None, remarks: Sequence[str]) 
     return (*told, *(() if proposal is None else (*proposal.assumed, *proposal.remarks)), *remarks)
 
 
-def _command(keys: dict[str, Any], path: Path) -> str:
-    from pipelines.importers.proposal import Proposal
+@dataclass(frozen=True)
+class Example:
+    """Four units that were measured twice; an effect is hidden in them.
 
-    return Proposal(keys).command([path])
+    run, fresh : the first and the second measurement · model : to begin with
+    """
+
+    run: Recording
+    fresh: Recording
+    model: list[str]
+    _truth: tuple[str, str] = field(repr=False)
+
+    def reveal(self) -> str:
+        """The hidden effect and its physics."""
+        effect, physics = self._truth
+        return f"{effect}: {physics}"
+
+
+def example(effect: str = "random", *, seed: int = 11) -> Example:
+    """A lot with a hidden effect, measured twice on the simulated station, as ``tumbleline demo``.
+
+    Parameters
+    ----------
+    effect : an effect that ``tumbleline demo`` knows, or ``random``
+    seed : the same seed gives the same data
+    """
+    from pipelines.demo.measure import measure
+    from pipelines.demo.scenes import scene
+
+    hidden = scene(effect, seed)
+    lot = measure(hidden, seed)
+    runs = read(lot.dwells, history=lot.history), read(lot.fresh, history=lot.fresh_history)
+    return Example(*runs, list(hidden.model), (hidden.effect, hidden.truth))

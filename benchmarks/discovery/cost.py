@@ -13,8 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from pipelines.archive import Archive, derived, files
-from pipelines.demo.archive_lots import Line
-from pipelines.demo.lot_archive import write_lots, write_run
+from pipelines.demo.archive_lots import Line, write_lots, write_run
 from pipelines.discovery.discover import Look, discovered
 from pipelines.discovery.lot_source import DiscoveryArchive
 from pipelines.discovery.score_store import written

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from inertial.discovery.scores import LotScores, scores_of
-from pipelines.demo.archive_lots import WHITE_UG, Line
-from pipelines.demo.lot_archive import EFFECTS
+from pipelines.demo.archive_lots import EFFECTS, WHITE_UG, Line
 from pipelines.tables.sound_lot import sound_lot
 
 Array = NDArray[np.float64]

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from math import isnan
-from typing import Annotated, Any
-
-import typer
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
 
 from pipelines.archive import Archive
 from pipelines.cli import options
-from pipelines.cli.printing import error_console, give, print_table, say, short
+from pipelines.cli.options import option
+from pipelines.cli.printing import error_console, give, print_table, publish, say, short
 from schemas.errors import WrongUse, did_you_mean
+
+if TYPE_CHECKING:
+    from pipelines.importers.series import EvenSeries
 
 PART = "Results"
 ORDER = 370
@@ -35,15 +38,13 @@ def command(
     rate: options.RateOption = None,
     unit: options.SeriesUnitOption = "",
     spacing: Annotated[
-        str,
-        typer.Option("--spacing", metavar="octave|decade", help="Averaging times: 1, 2, 4 … or 1, 2, 5, 10 … samples."),
+        str, option("--spacing octave|decade", "Averaging times: 1, 2, 4 … or 1, 2, 5, 10 … samples.")
     ] = "octave",
     statistic: Annotated[
         str,
-        typer.Option(
-            "--statistic",
-            metavar="|".join(STATISTICS),
-            help="Overlapping Allan, modified Allan, overlapping Hadamard, total or time deviation; RMS or maximum time "
+        option(
+            f"--statistic {'|'.join(STATISTICS)}",
+            "Overlapping Allan, modified Allan, overlapping Hadamard, total or time deviation; RMS or maximum time "
             "interval error.",
         ),
     ] = STATISTICS[0],
@@ -63,7 +64,6 @@ def command(
     of the output without its mean: the error of a velocity, in m/s for an output in g.
     """
     from pipelines.chain.noise_documents import allan_document, allan_of_run, statistic_of_run
-    from pipelines.cli.series_options import even_series, write_pictures
 
     if spacing not in SPACINGS:
         raise WrongUse(f"--spacing: found '{spacing[:40]}', octave or decade is needed; correct it")
@@ -137,3 +137,52 @@ def _print_curves(document: dict[str, Any]) -> None:
     name, unit = document["statistic_name"], document["deviation_unit"] or "unit"
     level = round(100.0 * document["confidence"])
     print_table(["channel", "τ\ns", f"{name}\n{unit}", f"interval, {level} %\n{unit}"], lines)
+
+
+def even_series(
+    source: str,
+    columns: str,
+    clock: tuple[str, str, float | None],
+    unit: str,
+    archive: str | None,
+    stretch: int | None,
+) -> EvenSeries | None:
+    """The samples of a file or an import; None for a captured run, which has figures of its own.
+
+    Parameters
+    ----------
+    clock : column and unit of the time, and rate in Hz, as they were given
+
+    Raises
+    ------
+    WrongUse
+        An option of files was given for a run.
+    """
+    from pipelines.importers.files import is_file
+    from pipelines.importers.series import series_of_file, series_of_run
+
+    time, time_unit, rate = clock
+    if is_file(source):
+        named = [name.strip() for name in columns.split(",") if name.strip()]
+        with error_console().status(f"reading {Path(source).name}"):
+            return series_of_file(Path(source), named, time=time, time_unit=time_unit, rate_hz=rate, unit=unit)
+    if columns or time or rate is not None or unit:
+        raise WrongUse(
+            f"{source}: --columns, --time, --rate and --unit are for files, and there is no such file; correct one"
+        )
+    run = Archive(archive).run(source)
+    return None if run.about.get("capture") else series_of_run(run, stretch)
+
+
+def write_pictures(document: dict[str, Any], plot: Path | None, page: Path | None) -> None:
+    """Draw a document of ``allan`` or ``psd`` as a picture, and as a page with its tables."""
+    if plot is None and page is None:
+        return
+    from pipelines.drawing.picture import picture, refuse_ending
+    from pipelines.report.noise_page import noise_chart, noise_page
+
+    if plot is not None:
+        refuse_ending(plot, "--plot")
+        publish(plot, picture(noise_chart(document), plot.suffix.lower()), "plot")
+    if page is not None:
+        publish(page, noise_page(document), "page")

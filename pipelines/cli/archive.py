@@ -10,9 +10,9 @@ import typer
 
 from inertial.counts import number_of, size_text
 from pipelines.archive import Archive
-from pipelines.cli import options
-from pipelines.cli.printing import give_lines, refuse_standard_output
-from schemas.errors import DONE, PART_FAILED, WrongUse
+from pipelines.cli.options import ArchiveOption, JsonOption, argument, option
+from pipelines.cli.printing import conclude, give, refuse_standard_output
+from schemas.errors import WrongUse
 
 PART = "Certificates, trace, audit"
 ORDER = 460
@@ -52,12 +52,10 @@ app = typer.Typer(
 
 @app.command()
 def clean(
-    archive: options.ArchiveOption = None,
+    archive: ArchiveOption = None,
     *,
-    only_look: Annotated[
-        bool, typer.Option("--dry-run", help="Show what would be removed, and change nothing.")
-    ] = False,
-    as_json: options.JsonOption = False,
+    only_look: Annotated[bool, option("--dry-run", "Show what would be removed, and change nothing.")] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Remove temporary files of killed writers and add finished runs to the chain; files in use are not touched."""
     from pipelines.archive.cleaning import clean as cleaned
@@ -74,22 +72,17 @@ def clean(
     ]
     if done.anchored:
         lines.append(f"{number_of(done.anchored, 'calibration')} added to the chain")
-    give_lines({"archive": str(store.root), "only_looked": only_look, **asdict(done)}, lines, as_json=as_json)
+    give({"archive": str(store.root), "only_looked": only_look, **asdict(done)}, lines, as_json=as_json)
 
 
 @app.command()
 def key(
     output: Annotated[
-        Path | None,
-        typer.Option(
-            "--output", metavar="FILE", help="File of the private key; default: in the user's configuration folder."
-        ),
+        Path | None, option("--output FILE", "File of the private key; default: in the user's configuration folder.")
     ] = None,
     *,
-    public: Annotated[
-        bool, typer.Option("--public", help="Show the public key of the existing key; make no key.")
-    ] = False,
-    as_json: options.JsonOption = False,
+    public: Annotated[bool, option("--public", "Show the public key of the existing key; make no key.")] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Make the key that signs manifests, outside the archive, and show its public key."""
     from pipelines.archive import signatures
@@ -111,22 +104,19 @@ def key(
     lines = [f"key      {name}", f"public   {hexadecimal}", f"private  {path}"]
     if output is not None and not public:
         lines.append(f"to sign with this key, set TUMBLELINE_SIGNING_KEY={path}")
-    give_lines({"name": name, "public": hexadecimal, "private_file": str(path)}, lines, as_json=as_json)
+    give({"name": name, "public": hexadecimal, "private_file": str(path)}, lines, as_json=as_json)
 
 
 @app.command()
 def backup(
-    target: Annotated[
-        str, typer.Argument(metavar="COPY", help="Folder or address of the copy: empty, or an earlier copy.")
-    ],
-    archive: options.ArchiveOption = None,
+    target: Annotated[str, argument("COPY", "Folder or address of the copy: empty, or an earlier copy.")],
+    archive: ArchiveOption = None,
     database: Annotated[
-        Path | None,
-        typer.Option("--database", metavar="DIR", help="Also copy the database of the orchestrator into this folder."),
+        Path | None, option("--database DIR", "Also copy the database of the orchestrator into this folder.")
     ] = None,
-    keep: Annotated[int, typer.Option("--keep", min=1, help="Number of copies of the database to keep.")] = 14,
+    keep: Annotated[int, option("--keep", "Number of copies of the database to keep.", min=1)] = 14,
     *,
-    as_json: options.JsonOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Copy the archive to another disk or store, also during runs; a repeated copy adds only what is new.
 
@@ -142,17 +132,15 @@ def backup(
     file = None if made is None else str(made)
     document = {"archive": str(source.root), "copy": str(copy.root), "database": file, **asdict(done)}
     lines = [f"{number_of(done.files, 'file')} copied ({size_text(done.bytes)}), {done.present} already there"]
-    give_lines(document, [*lines, *([f"database  {file}"] if file else [])], as_json=as_json)
+    give(document, [*lines, *([f"database  {file}"] if file else [])], as_json=as_json)
 
 
 @app.command()
 def compact(
-    archive: options.ArchiveOption = None,
-    before: Annotated[
-        str, typer.Option("--before", metavar="DATE", help="Only runs that began before this day; default: all.")
-    ] = "",
+    archive: ArchiveOption = None,
+    before: Annotated[str, option("--before DATE", "Only runs that began before this day; default: all.")] = "",
     *,
-    as_json: options.JsonOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Put the files of finished runs, their captures and the calibrations into a few large files, one for each month.
 
@@ -179,21 +167,18 @@ def compact(
         *(f"open     {name}: not finished, left as it is" for name in done.unfinished),
         f"{packed}, {number_of(done.freed, 'single file')} removed",
     ]
-    give_lines({"archive": str(store.root), **asdict(done)}, lines, as_json=as_json)
+    give({"archive": str(store.root), **asdict(done)}, lines, as_json=as_json)
 
 
 @app.command()
 def restore(
-    source: Annotated[str, typer.Argument(metavar="COPY", help="Folder or address of the copy.")],
-    archive: options.ArchiveOption = None,
+    source: Annotated[str, argument("COPY", "Folder or address of the copy.")],
+    archive: ArchiveOption = None,
     database: Annotated[
-        Path | None,
-        typer.Option(
-            "--database", metavar="FILE", help="Also restore the database of the orchestrator from this file."
-        ),
+        Path | None, option("--database FILE", "Also restore the database of the orchestrator from this file.")
     ] = None,
     *,
-    as_json: options.JsonOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Copy an archive back into an empty folder and verify it; exit 1 where the verification has findings.
 
@@ -215,5 +200,4 @@ def restore(
         f"{number_of(done.files, 'file')} copied ({size_text(done.bytes)}), {done.present} already there",
         f"verified: {number_of(report.runs, 'run')}, {state}",
     ]
-    give_lines({**document, **asdict(done)}, lines, as_json=as_json)
-    raise typer.Exit(DONE if report.whole else PART_FAILED)
+    conclude({**document, **asdict(done)}, lines, as_json=as_json, passed=report.whole)

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from pipelines.archive import Archive
-from pipelines.cli import options
-from pipelines.cli.printing import give, give_lines, print_table, say
+from pipelines.cli.options import ArchiveOption, JsonOption, argument, option
+from pipelines.cli.printing import give, print_table, say
 
 if TYPE_CHECKING:
     from pipelines.discovery.documents import ListedAttributes
@@ -26,34 +26,23 @@ EXAMPLES_OF = {
 app = typer.Typer(no_args_is_help=True, help=SUMMARY)
 
 
-@app.command(
-    "add",
-    epilog="\n\n".join(EXAMPLES_OF["add"]),
-    help="Add a table of attributes; a changed value is a new row, the old one is kept.",
-)
+@app.command()
 def add(
-    table: Annotated[
-        Path, typer.Argument(metavar="FILE", help="A .csv or .parquet file with a column serial, or run.")
-    ],
-    by: Annotated[str, typer.Option("--by", metavar="serial|run", help="What a row is about.")] = "serial",
-    archive: options.ArchiveOption = None,
+    table: Annotated[Path, argument("FILE", "A .csv or .parquet file with a column serial, or run.")],
+    by: Annotated[str, option("--by serial|run", "What a row is about.")] = "serial",
+    archive: ArchiveOption = None,
     *,
-    as_json: options.JsonOption = False,
+    as_json: JsonOption = False,
 ) -> None:
-    """Add a table of attributes."""
+    """Add a table of attributes; a changed value is a new row, the old one is kept."""
     from pipelines.discovery.attributes import added_from
 
-    added, lines = added_from(Archive(archive), table, by)
-    give_lines(added, lines, as_json=as_json)
+    give(*added_from(Archive(archive), table, by), as_json=as_json)
 
 
-@app.command(
-    "list",
-    epilog="\n\n".join(EXAMPLES_OF["list"]),
-    help="List the attributes with their levels, and of how many units they are known.",
-)
-def list_(archive: options.ArchiveOption = None, *, as_json: options.JsonOption = False) -> None:
-    """List the attributes."""
+@app.command("list")
+def list_(archive: ArchiveOption = None, *, as_json: JsonOption = False) -> None:
+    """List the attributes with their levels, and of how many units they are known."""
     from pipelines.discovery.attributes import listed
 
     store = Archive(archive)

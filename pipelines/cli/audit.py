@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
 from pipelines.archive import Archive
-from pipelines.cli import options
-from pipelines.cli.printing import print_json, remark, say, short
-from schemas.errors import DONE, PART_FAILED, WrongUse, did_you_mean
+from pipelines.cli.options import ArchiveOption, JsonOption, option
+from pipelines.cli.printing import conclude, remark, say, short
+from schemas.errors import WrongUse, did_you_mean
 
 if TYPE_CHECKING:
     from pipelines.audit.audit import Audit
@@ -29,33 +28,27 @@ BEGINNING = -700000.0  # days before any calibration
 
 
 def command(
-    archive: options.ArchiveOption = None,
+    archive: ArchiveOption = None,
     since: Annotated[
-        str,
-        typer.Option("--since", metavar="DATE", help="Changes, signals and figures from this day on; all by default."),
+        str, option("--since DATE", "Changes, signals and figures from this day on; all by default.")
     ] = "",
     until: Annotated[
-        str,
-        typer.Option("--until", metavar="DATE", help="State of the archive at the end of this day; today by default."),
+        str, option("--until DATE", "State of the archive at the end of this day; today by default.")
     ] = "",
-    device: Annotated[str, typer.Option("--device", metavar="KIND", help="Only units of this kind.")] = "",
-    station: Annotated[str, typer.Option("--station", metavar="NAME", help="Only what this station measured.")] = "",
+    device: Annotated[str, option("--device KIND", "Only units of this kind.")] = "",
+    station: Annotated[str, option("--station NAME", "Only what this station measured.")] = "",
     rules: Annotated[
-        Path | None,
-        typer.Option(
-            "--rules", metavar="FILE", help="Intervals, tolerances, check standards; built-in ones by default."
-        ),
+        Path | None, option("--rules FILE", "Intervals, tolerances, check standards; built-in ones by default.")
     ] = None,
     page: Annotated[
-        Path | None,
-        typer.Option("--page", metavar="FILE.html", help="Write the report as one page that opens without a network."),
+        Path | None, option("--page FILE.html", "Write the report as one page that opens without a network.")
     ] = None,
-    dask: Annotated[str, typer.Option("--dask", metavar="ADDRESS|local", help="Read runs on Dask workers.")] = "",
+    dask: Annotated[str, option("--dask ADDRESS|local", "Read runs on Dask workers.")] = "",
     workers: Annotated[
-        int | None, typer.Option("--workers", min=1, help="Processes that read runs; as many as cores by default.")
+        int | None, option("--workers", "Processes that read runs; as many as cores by default.", min=1)
     ] = None,
     *,
-    as_json: options.JsonOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Audit the archive: re-calibrations due, drift, stations, check standards, population. Exit status 1: there are findings."""
     from pipelines.audit.audit import audit, scope_of
@@ -75,33 +68,29 @@ def command(
         from pipelines.audit.page import render
 
         publish(page, render(audited, audit_findings, str(store.root)).encode(), "audit", ELSEWHERE)
-    if as_json:
-        print_json(document(audited, audit_findings, str(store.root)))
-    else:
-        _show(audited, audit_findings, str(store.root))
-        if page is not None:
-            remark(f"page    {page}")
-    raise typer.Exit(PART_FAILED if audit_findings else DONE)
+    show = partial(_show, audited, audit_findings, str(store.root), page)
+    made = document(audited, audit_findings, str(store.root)) if as_json else {}
+    conclude(made, show, as_json=as_json, passed=not audit_findings)
 
 
 def _refuse_nothing(audited: Audit, root: str) -> None:
     """Refuse an unknown name, and an archive without calibrations before the day."""
     import numpy as np
 
-    for option, name, there in (
+    for switch, name, there in (
         ("--device", audited.scope.device.upper(), audited.all.device),
         ("--station", audited.scope.station, audited.all.station),
     ):
         if name and len(audited.all) and name not in there:
             known = [str(one) for one in np.unique(there.astype(str))]
-            raise WrongUse(f"audit: {option} '{name}' has no calibration in {root}; {did_you_mean(name, known)}")
+            raise WrongUse(f"audit: {switch} '{name}' has no calibration in {root}; {did_you_mean(name, known)}")
     if not len(audited.all) and not audited.problems:
         raise WrongUse(
             f"audit: {root} has no calibration in this time, one at least is needed; make a run, or give another --until"
         )
 
 
-def _show(audited: Audit, audit_findings: list[AuditFinding], root: str) -> None:
+def _show(audited: Audit, audit_findings: list[AuditFinding], root: str, page: Path | None, _: object) -> None:
     from inertial.counts import number_of
     from pipelines.audit.calibrations import date_of
     from pipelines.audit.document import counts
@@ -134,6 +123,8 @@ def _show(audited: Audit, audit_findings: list[AuditFinding], root: str) -> None
             f"{number_of(count, 'discovery', 'discoveries')} of many lots of {device}: 'tumbleline discover'",
             style="dim",
         )
+    if page is not None:
+        remark(f"page    {page}")
 
 
 def _certificates(audited: Audit) -> str:

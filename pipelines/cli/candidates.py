@@ -69,14 +69,6 @@ def _runs_and_units(ctx: Context) -> list[str]:
     return ["latest", *(info.id for info in infos), *(unit for info in infos for unit in info.units)]
 
 
-def _selections(ctx: Context) -> list[str]:
-    return ["all", *_runs(ctx)]
-
-
-def _tables(ctx: Context) -> list[str]:
-    return _archive(ctx).run(str(ctx.params.get("run") or "latest")).tables()
-
-
 def _recipes(ctx: Context) -> list[str]:
     from pipelines.jobs.recipes import recipe_names
 
@@ -85,28 +77,11 @@ def _recipes(ctx: Context) -> list[str]:
     return [*recipe_names(), *beside, *_files("*.toml")]
 
 
-def _limits(ctx: Context) -> list[str]:
-    from pipelines.jobs.recipes import limits_names
-
-    return [*limits_names(), *_files("*.toml")]
-
-
 def _stations(ctx: Context) -> list[str]:
     from schemas.own_files import own_names
     from schemas.station import BUILT_IN
 
     return [BUILT_IN, *own_names("stations"), *_files("*.toml")]
-
-
-def _effects_with_value(ctx: Context) -> list[str]:
-    """The beginning of EFFECT=µg; the value has no candidates."""
-    return [f"{name}=" for name in _effects(ctx)]
-
-
-def _hidden(ctx: Context) -> list[str]:
-    from pipelines.demo.scenes import SCENES
-
-    return ["random", *(scene.kind for scene in SCENES)]
 
 
 def _files(pattern: str) -> list[str]:
@@ -118,7 +93,7 @@ def _data(ctx: Context) -> list[str]:
     return [*_runs(ctx), *_files("*.parquet"), *_files("*.csv")]
 
 
-def _of(module: str, name: str) -> Callable[[Context], Iterable[str]]:
+def _of(module: str, name: str) -> Callable[[Context], Iterable[Any]]:
     """The names in a registry, or those that a function returns; its module is imported when they are asked for."""
 
     def names(_ctx: Context) -> Any:
@@ -129,11 +104,13 @@ def _of(module: str, name: str) -> Callable[[Context], Iterable[str]]:
 
 
 _effects = _of("inertial.effects", "catalogue")
+_limits = _of("pipelines.jobs.recipes", "limits_names")
+_scenes = _of("pipelines.demo.scenes", "SCENES")
 
 SOURCES: dict[tuple[str, str], Callable[[Context], Iterable[str]]] = {
     ("recipe", "RECIPE"): _recipes,
     ("station", "FILE"): _stations,
-    ("limits", "FILE"): _limits,
+    ("limits", "FILE"): lambda ctx: [*_limits(ctx), *_files("*.toml")],
     ("run", "RUN|UNIT"): _runs_and_units,
     ("run", "RUN"): _runs,
     ("run_a", "RUN"): _runs,
@@ -142,18 +119,18 @@ SOURCES: dict[tuple[str, str], Callable[[Context], Iterable[str]]] = {
     ("calibration", "RUN"): _runs,
     ("names", "RUN|UNIT"): _runs_and_units,
     ("target", "UNIT|RUN"): _runs_and_units,
-    ("selection", "SELECTION"): _selections,
+    ("selection", "SELECTION"): lambda ctx: ["all", *_runs(ctx)],
     ("dwells", "DWELLS"): _data,
     ("data", "RUN"): _data,
     ("source", "RUN"): _data,
     ("fresh", "DWELLS2"): _data,
     ("units", "SN"): _units,
     ("serial", "SERIAL"): _units,
-    ("effect", "NAME|random"): _hidden,
+    ("effect", "NAME|random"): lambda ctx: ["random", *(scene.kind for scene in _scenes(ctx))],
     ("effect", ""): _effects,
     ("effects", ""): _effects,
     ("remove", "EFFECT"): _effects,
-    ("required_errors", "EFFECT="): _effects_with_value,
+    ("required_errors", "EFFECT="): lambda ctx: [f"{name}=" for name in _effects(ctx)],
     ("see", ""): _effects,
     ("part", ""): _effects,
     ("name", "PROFILE"): _of("stations.profile_files", "profile_names"),
@@ -161,7 +138,7 @@ SOURCES: dict[tuple[str, str], Callable[[Context], Iterable[str]]] = {
     ("device", "PRESET"): _of("stations.plant.preset", "preset_names"),
     ("fault", "KIND"): _of("stations.plant.faults.catalogue", "kinds"),
     ("form", ""): _of("pipelines.export", "FORMATS"),
-    ("table", "TABLE"): _tables,
+    ("table", "TABLE"): lambda ctx: _archive(ctx).run(str(ctx.params.get("run") or "latest")).tables(),
     ("subject", "SUBJECT"): _of("pipelines.cli.keys", "SUBJECTS"),
 }
 """The source of candidates by the name of a parameter and a part of its notation, the narrower notation first."""

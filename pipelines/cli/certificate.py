@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from pipelines.archive import Archive
-from pipelines.cli import options
-from pipelines.cli.printing import give_lines, refuse_standard_output, remark
+from pipelines.cli.options import ArchiveOption, JsonOption, argument, option
+from pipelines.cli.printing import give, refuse_standard_output, remark
 from schemas.errors import DONE, PART_FAILED
 
 if TYPE_CHECKING:
@@ -25,31 +25,21 @@ EXAMPLES = (
 
 
 def command(
-    names: Annotated[
-        list[str], typer.Argument(metavar="RUN|UNIT…", help="Runs, serial numbers or numbers of certificates (A1/2).")
-    ],
+    names: Annotated[list[str], argument("RUN|UNIT…", "Runs, serial numbers or numbers of certificates (A1/2).")],
     laboratory: Annotated[
-        Path,
-        typer.Option(
-            "--laboratory", metavar="FILE.toml", help="TOML file with laboratory, customer, signatory and item."
-        ),
+        Path, option("--laboratory FILE.toml", "TOML file with laboratory, customer, signatory and item.")
     ] = Path("laboratory.toml"),
-    output: Annotated[
-        Path, typer.Option("--output", "-o", metavar="DIR", help="Folder for the files; the current one.")
-    ] = Path(),
+    output: Annotated[Path, option("--output -o DIR", "Folder for the files; the current one.")] = Path(),
     sign_with: Annotated[
-        Path | None,
-        typer.Option("--sign-with", metavar="KEY", help="Sign PDF and XML: PKCS#12, or PEM with key and certificates."),
+        Path | None, option("--sign-with KEY", "Sign PDF and XML: PKCS#12, or PEM with key and certificates.")
     ] = None,
     password_file: Annotated[
-        Path | None, typer.Option("--password-file", metavar="FILE", help="Password of the key, on the first line.")
+        Path | None, option("--password-file FILE", "Password of the key, on the first line.")
     ] = None,
-    address: Annotated[
-        str, typer.Option("--address", metavar="URL", help="Print a QR code of this address; {number} is filled in.")
-    ] = "",
-    archive: options.ArchiveOption = None,
+    address: Annotated[str, option("--address URL", "Print a QR code of this address; {number} is filled in.")] = "",
+    archive: ArchiveOption = None,
     *,
-    as_json: options.JsonOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Write, for every certified unit, SERIAL_N.pdf and SERIAL_N.xml with the content of ISO/IEC 17025, 7.8.2 and 7.8.4.
 
@@ -65,7 +55,7 @@ def command(
     key = None if sign_with is None else read_key(sign_with, password_file)
     done = issue(Archive(archive), names, who, output, key=key, address=address)
     lines = [f"certificate {one.number}: {one.pdf}, {one.xml}" for one in done.written]
-    give_lines(_document(done), lines, as_json=as_json)
+    give(_document(done), lines, as_json=as_json)
     for serial, why in done.left_out.items():
         remark(f"certificate: {serial}: {why}")
     raise typer.Exit(PART_FAILED if done.left_out else DONE)

@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
-
-import typer
+from typing import Annotated, Any
 
 from inertial.counts import number_of
 from pipelines.archive import Archive, Run
-from pipelines.cli import options
-from pipelines.cli.printing import error_console, give, print_table, remark, say
-from schemas.errors import DONE, PART_FAILED, ArchiveUnusable
-
-if TYPE_CHECKING:
-    from pipelines.chain.certify import Certified
+from pipelines.cli.options import ArchiveOption, JsonOption, RunArgument, option
+from pipelines.cli.printing import conclude, error_console, print_table, remark, say
+from schemas.errors import ArchiveUnusable
 
 PART = "Certificates, trace, audit"
 ORDER = 410
@@ -25,35 +20,21 @@ EXAMPLES = (
 
 
 def command(
-    run: options.RunArgument = "latest",
-    units: Annotated[
-        str, typer.Option("--units", metavar="SN,…", help="Certify only these units; default: all that passed.")
-    ] = "",
-    start: Annotated[
-        str, typer.Option("--from", metavar="DATE", help="First day of validity, UTC; default: today.")
-    ] = "",
-    until: Annotated[str, typer.Option("--until", metavar="DATE", help="The day after the last day of validity.")] = "",
+    run: RunArgument = "latest",
+    units: Annotated[str, option("--units SN,…", "Certify only these units; default: all that passed.")] = "",
+    start: Annotated[str, option("--from DATE", "First day of validity, UTC; default: today.")] = "",
+    until: Annotated[str, option("--until DATE", "The day after the last day of validity.")] = "",
     months: Annotated[
-        int,
-        typer.Option(
-            "--months", min=0, max=120, help="Validity without --until, months; 0: as long as the limits allow."
-        ),
+        int, option("--months", "Validity without --until, months; 0: as long as the limits allow.", min=0, max=120)
     ] = 0,
-    reason: Annotated[
-        str, typer.Option("--reason", help="Reason, written into the certificate's entry of the ledger.")
-    ] = "",
+    reason: Annotated[str, option("--reason", "Reason, written into the certificate's entry of the ledger.")] = "",
     key: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--key", metavar="FILE|HEX", help="Another public key that is accepted for the signatures of the run."
-        ),
+        list[str] | None, option("--key FILE|HEX", "Another public key that is accepted for the signatures of the run.")
     ] = None,
-    archive: options.ArchiveOption = None,
+    archive: ArchiveOption = None,
     *,
-    supersede: Annotated[
-        bool, typer.Option("--supersede", help="Also end calibrations that begin later and overlap.")
-    ] = False,
-    as_json: options.JsonOption = False,
+    supersede: Annotated[bool, option("--supersede", "Also end calibrations that begin later and overlap.")] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Certify the units of a run that passed, with first and last day of validity.
 
@@ -64,7 +45,7 @@ def command(
     from pipelines.archive.signatures import public_keys
     from pipelines.certificates import Ledger
     from pipelines.chain.certify import certify
-    from pipelines.report.any_run import renew_report
+    from pipelines.report import renew_report
 
     store = Archive(archive)
     serials = tuple(serial.strip() for serial in units.split(",")) if units else ()
@@ -78,8 +59,12 @@ def command(
             renew_report(source)
     except ArchiveUnusable as problem:  # the certificates are written; the old report may show other coefficients
         remark(f"certify: the report was not made again: {problem}")
-    give(_document(source.id, done), _print, as_json=as_json)
-    raise typer.Exit(PART_FAILED if done.left_out else DONE)
+    there = {event.certificate for event in done.there}
+    certified = [
+        {"certificate": e.certificate, **e.document(), "was_there": e.certificate in there} for e in done.events
+    ]
+    document = {"run": source.id, "certified": certified, "left_out": done.left_out}
+    conclude(document, _print, as_json=as_json, passed=not done.left_out)
 
 
 def _print_run(run: Run) -> None:
@@ -95,17 +80,6 @@ def _print_run(run: Run) -> None:
     ]
     for line in lines:
         remark(f"certify: {line}")
-
-
-def _document(run: str, done: Certified) -> dict[str, Any]:
-    there = {event.certificate for event in done.there}
-    return {
-        "run": run,
-        "certified": [
-            {"certificate": e.certificate, **e.document(), "was_there": e.certificate in there} for e in done.events
-        ],
-        "left_out": done.left_out,
-    }
 
 
 def _print(document: dict[str, Any]) -> None:

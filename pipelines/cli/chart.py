@@ -42,7 +42,8 @@ def chart(title: str, lines: Sequence[Line], width: int, height: int, span: tupl
     text.append("\n")
     if not values:
         return text.append("no data yet\n")
-    low, high = _round(min(values), max(values))
+    room = 0.05 * (max(values) - min(values)) or 0.5  # the ends of the axis always differ
+    low, high = min(values) - room, max(values) + room
     columns = max(10, width - MARGIN - 2)
     cells = _drawn(lines, shown, (columns, height), span, (low, high))
     for row in range(height):
@@ -87,12 +88,6 @@ def _joined(dots: Sequence[tuple[int, int]]) -> list[tuple[int, int]]:
         steps = max(abs(u - x), abs(v - y))
         joined += [(round(x + (u - x) * k / steps), round(y + (v - y) * k / steps)) for k in range(1, steps + 1)]
     return joined
-
-
-def _round(low: float, high: float) -> tuple[float, float]:
-    """Limits of the value axis with a margin; they always differ."""
-    room = 0.05 * (high - low) or 0.5
-    return low - room, high + room
 
 
 def _times(span: tuple[float, float], columns: int) -> str:

@@ -4,11 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
-from pipelines.cli import options
-from pipelines.cli.printing import give, print_table, say, short
-from schemas.errors import DONE, PART_FAILED
+from pipelines.cli.options import JsonOption, option
+from pipelines.cli.printing import conclude, print_table, say, short
 
 if TYPE_CHECKING:
     from pipelines.planning.documents import ChoiceDocument, ChoiceRow
@@ -23,17 +20,15 @@ EXAMPLES = (
 
 
 def command(
-    span: Annotated[str, typer.Option("--range", metavar="G", help="Largest specific force, such as 4g.")],
-    error: Annotated[str, typer.Option("--error", metavar="MG", help="Error that is allowed (k = 2), such as 2mg.")],
-    temperature: Annotated[
-        str, typer.Option("--temperature", metavar="LOW..HIGH", help="Temperatures of use, °C.")
-    ] = "25..25",
+    span: Annotated[str, option("--range G", "Largest specific force, such as 4g.")],
+    error: Annotated[str, option("--error MG", "Error that is allowed (k = 2), such as 2mg.")],
+    temperature: Annotated[str, option("--temperature LOW..HIGH", "Temperatures of use, °C.")] = "25..25",
     bandwidth: Annotated[
-        float, typer.Option("--bandwidth", metavar="HZ", help="Bandwidth of use, Hz: it sets noise and what must pass.")
+        float, option("--bandwidth HZ", "Bandwidth of use, Hz: it sets noise and what must pass.")
     ] = 10.0,
-    device: Annotated[str, typer.Option("--device", metavar="A,B", help="Presets to compare; all by default.")] = "",
+    device: Annotated[str, option("--device A,B", "Presets to compare; all by default.")] = "",
     *,
-    as_json: options.JsonOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Compare presets and calibrations with a need: an uncertainty budget at the end of the range, with its largest term.
 
@@ -43,8 +38,7 @@ def command(
 
     need = need_of(span, temperature, error, bandwidth)
     document = choice(need, [name.strip() for name in device.split(",") if name.strip()])
-    give(document, _print, as_json=as_json)
-    raise typer.Exit(DONE if any(row["reaches"] for row in document["candidates"]) else PART_FAILED)
+    conclude(document, _print, as_json=as_json, passed=any(row["reaches"] for row in document["candidates"]))
 
 
 def _print(document: ChoiceDocument) -> None:
@@ -60,9 +54,10 @@ def _print(document: ChoiceDocument) -> None:
             "yes" if row["reaches"] else "no",
             short(row["error_ug"]),
             short(row["range_over_noise_dB"]),
-            "; ".join(row["why"]) or _largest(row["terms_ug"]),
+            "; ".join(row["why"]) or f"{largest}: {short(2.0 * row['terms_ug'][largest])} µg",
         ]
         for row in _shown(document["candidates"])
+        for largest in [max(row["terms_ug"], key=row["terms_ug"].__getitem__)]
     ]
     print_table(
         ["device", "calibration", "reaches", "error\nµg", "range\nover\nnoise\ndB", "largest term, or why not"], rows
@@ -93,8 +88,3 @@ def _shown(rows: list[ChoiceRow]) -> list[ChoiceRow]:
             told.add(row["device"])
             shown.append({**row, "calibration": "any"})
     return shown
-
-
-def _largest(terms: dict[str, float]) -> str:
-    name = max(terms, key=lambda one: terms[one])
-    return f"{name}: {short(2.0 * terms[name])} µg"

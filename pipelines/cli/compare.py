@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from pipelines.cli import options
-from pipelines.cli.printing import error_console, give, print_table, say, short, short_values
+from pipelines.cli.printing import error_console, give, print_table, say, short, short_values, warn
 
 PART = "Is the model good enough, and what is missing?"
 ORDER = 240
@@ -75,8 +75,7 @@ def print_comparison(document: dict[str, Any], poses: int = POSES) -> None:
     if worst:
         print_table(["force x y z\ng", "dwells", "rms\nµg"], worst, title="Worst poses")
     _parameters(document)
-    for text in document["warnings"]:
-        say(f"warning: {text}", style="yellow")
+    warn(document["warnings"])
 
 
 def _parameters(document: dict[str, Any]) -> None:

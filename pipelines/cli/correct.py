@@ -5,28 +5,27 @@ from __future__ import annotations
 import io
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from pipelines.archive import Archive
-from pipelines.cli import options
+from pipelines.cli.options import ArchiveOption, JsonOption, RateOption, TimeColumnOption, argument, option
 from pipelines.cli.printing import (
     STANDARD_OUTPUT,
+    conclude,
     error_console,
-    give,
     is_standard_output,
     print_text,
     remark,
     say,
     short,
 )
-from schemas.errors import DONE, PART_FAILED, WrongUse
+from schemas.errors import WrongUse
 
 if TYPE_CHECKING:
     from pipelines.export.corrected import Corrected
-    from pipelines.export.documents import CorrectDocument, FilterDocument, TrackedBiasDocument
+    from pipelines.export.documents import CorrectDocument, TrackedBiasDocument
     from pipelines.export.recording import CorrectableRecording
 
 PART = "Results"
@@ -39,71 +38,41 @@ EXAMPLES = (
 
 
 def command(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="Raw output over time, with a column of temperature.")],
+    file: Annotated[Path, argument("FILE", "Raw output over time, with a column of temperature.")],
     calibration: Annotated[
-        str, typer.Option("--calibration", metavar="RUN:UNIT", help="The calibration: a run and one of its units.")
+        str, option("--calibration RUN:UNIT", "The calibration: a run and one of its units.")
     ] = "latest",
     output: Annotated[
-        Path | None,
-        typer.Option(
-            "--output",
-            "-o",
-            metavar="FILE",
-            help="Corrected samples, as .csv or .parquet; -: as CSV on standard output.",
-        ),
+        Path | None, option("--output -o FILE", "Corrected samples, as .csv or .parquet; -: as CSV on standard output.")
     ] = None,
-    columns: Annotated[
-        str, typer.Option("--columns", metavar="x,y,z", help="Columns of the output; x,y,z or out_x,… by default.")
-    ] = "",
-    time: options.TimeColumnOption = "",
-    rate: options.RateOption = None,
-    force: Annotated[
-        str, typer.Option("--force", metavar="X,Y,Z", help="True specific force, g, the same for all samples.")
-    ] = "",
+    columns: Annotated[str, option("--columns x,y,z", "Columns of the output; x,y,z or out_x,… by default.")] = "",
+    time: TimeColumnOption = "",
+    rate: RateOption = None,
+    force: Annotated[str, option("--force X,Y,Z", "True specific force, g, the same for all samples.")] = "",
     gravity: Annotated[
-        float | None,
-        typer.Option(
-            "--gravity", metavar="M_S2", help="Local gravity with --at-rest, m/s²; that of the run by default."
-        ),
+        float | None, option("--gravity M_S2", "Local gravity with --at-rest, m/s²; that of the run by default.")
     ] = None,
     turn_on: Annotated[
         float | None,
-        typer.Option(
-            "--turn-on",
-            metavar="UG",
-            min=0.0,
-            help="Change of the bias from switch-on to switch-on, µg (standard deviation).",
-        ),
+        option("--turn-on UG", "Change of the bias from switch-on to switch-on, µg (standard deviation).", min=0.0),
     ] = None,
-    step: Annotated[
-        float, typer.Option("--step", metavar="S", min=1e-3, help="Time between updates of the bias.")
-    ] = 1.0,
-    low_pass: Annotated[
-        str, typer.Option("--filter", metavar="butterworth|fir|moving-average", help="Low-pass behind the correction.")
-    ] = "",
+    step: Annotated[float, option("--step S", "Time between updates of the bias.", min=1e-3)] = 1.0,
+    low_pass: Annotated[str, option("--filter butterworth|fir|moving-average", "Low-pass behind the correction.")] = "",
     cutoff: Annotated[
         float | None,
-        typer.Option(
-            "--cutoff",
-            metavar="HZ",
-            min=1e-9,
-            help="Its -3 dB frequency; the unit's bandwidth that a run measured by default.",
-        ),
+        option("--cutoff HZ", "Its -3 dB frequency; the unit's bandwidth that a run measured by default.", min=1e-9),
     ] = None,
     state: Annotated[
-        Path | None,
-        typer.Option(
-            "--state", metavar="FILE", help="Go on with filter and bias as kept in this file, and keep them in it."
-        ),
+        Path | None, option("--state FILE", "Go on with filter and bias as kept in this file, and keep them in it.")
     ] = None,
-    archive: options.ArchiveOption = None,
+    archive: ArchiveOption = None,
     *,
     at_rest: Annotated[
-        bool, typer.Option("--at-rest", help="Find where the unit is at rest and use the magnitude of gravity there.")
+        bool, option("--at-rest", "Find where the unit is at rest and use the magnitude of gravity there.")
     ] = False,
-    failed: Annotated[bool, typer.Option("--failed", help="Also use a unit that failed its limits.")] = False,
-    revoked: Annotated[bool, typer.Option("--revoked", help="Also use a revoked calibration.")] = False,
-    as_json: options.JsonOption = False,
+    failed: Annotated[bool, option("--failed", "Also use a unit that failed its limits.")] = False,
+    revoked: Annotated[bool, option("--revoked", "Also use a revoked calibration.")] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Correct a recording: a = K⁻¹(ã − b) with all effects of the model, and the covariance of each sample.
 
@@ -160,9 +129,8 @@ def command(
         passed = None if chosen is None or end is None else (chosen, end)
         write_state(state, Kept(serial, float(recording.time[-1]), passed, done.kept))
         document["state"] = str(state)
-    give(document, lambda _: _print(document, remark if printed else say), as_json=as_json)
     consistent = document["bias"] is None or document["bias"]["stated_uncertainty"] != "too small"
-    raise typer.Exit(DONE if consistent else PART_FAILED)
+    conclude(document, partial(_print, remark if printed else say), as_json=as_json, passed=consistent)
 
 
 def _write(recording: CorrectableRecording, done: Corrected, output: Path) -> None:
@@ -191,7 +159,7 @@ VERDICTS = {
 }
 
 
-def _print(document: CorrectDocument, show: Callable[..., None]) -> None:
+def _print(show: Callable[..., None], document: CorrectDocument) -> None:
     certificate = document["certificate"]
     show(
         f"{document['file']}: {document['samples']} samples corrected with unit {document['unit']} of run {document['run']}"
@@ -201,22 +169,17 @@ def _print(document: CorrectDocument, show: Callable[..., None]) -> None:
     if document["outside_temperature"]:
         low, high = document["temperatures_C"]
         show(f"{document['outside_temperature']} samples are outside the measured {low:.1f} to {high:.1f} °C", "yellow")
-    if document["filter"] is not None:
-        _print_filter(document["filter"], show)
+    if (one := document["filter"]) is not None:
+        show(
+            f"filter: {one['kind']}, {len(one['numerator'])} coefficients, -3 dB at {one['cutoff_hz']:.4g} Hz "
+            f"({one['cutoff_from']}), delay {1e3 * one['delay_s']:.3g} ms, noise bandwidth {one['noise_bandwidth_hz']:.4g} Hz"
+        )
     if document["bias"] is not None:
         _print_bias(document["bias"], show)
     if document["output"]:
         show(f"written: {document['output']}")
     if document["state"]:
         show(f"kept for the next recording: {document['state']}")
-
-
-def _print_filter(one: FilterDocument, show: Callable[..., None]) -> None:
-    """Print cut-off, delay and noise bandwidth of the filter."""
-    show(
-        f"filter: {one['kind']}, {len(one['numerator'])} coefficients, -3 dB at {one['cutoff_hz']:.4g} Hz "
-        f"({one['cutoff_from']}), delay {1e3 * one['delay_s']:.3g} ms, noise bandwidth {one['noise_bandwidth_hz']:.4g} Hz"
-    )
 
 
 def _print_bias(bias: TrackedBiasDocument, show: Callable[..., None]) -> None:

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pipelines.cli import options
 from pipelines.cli.next_commands import command_line, extension, judged_data
-from pipelines.cli.printing import error_console, give_lines, print_json, publish, remark, say
-from pipelines.cli.text.demo_text import print_ending
+from pipelines.cli.options import JsonOption, option
+from pipelines.cli.printing import error_console, give, print_json, publish, remark, say
+from pipelines.cli.text.discovery_text import print_ending
 from schemas.progress import Progress
 
 if TYPE_CHECKING:
@@ -31,28 +31,22 @@ EXAMPLES = (
 
 def command(
     effect: Annotated[
-        str,
-        typer.Option("--effect", metavar="NAME|random", help="Hidden effect, by the name of its physics or its id."),
+        str, option("--effect NAME|random", "Hidden effect, by the name of its physics or its id.")
     ] = "random",
     seed: Annotated[
-        int | None, typer.Option("--seed", min=0, help="Seed of the simulation; the same seed gives the same data.")
+        int | None, option("--seed", "Seed of the simulation; the same seed gives the same data.", min=0)
     ] = None,
-    folder: Annotated[
-        Path, typer.Option("--folder", metavar="DIR", help="Folder for measurements, model and report.")
-    ] = Path("demo"),
-    lots: Annotated[int, typer.Option("--lots", min=60, help="Lots of the archive of --archive.")] = 400,
+    folder: Annotated[Path, option("--folder DIR", "Folder for measurements, model and report.")] = Path("demo"),
+    lots: Annotated[int, option("--lots", "Lots of the archive of --archive.", min=60)] = 400,
     *,
     archive: Annotated[
-        bool,
-        typer.Option(
-            "--archive", help="Hide something in a wafer of an archive of many lots, and find it with discover."
-        ),
+        bool, option("--archive", "Hide something in a wafer of an archive of many lots, and find it with discover.")
     ] = False,
-    auto: Annotated[bool, typer.Option("--auto", help="Run without questions.")] = False,
+    auto: Annotated[bool, option("--auto", "Run without questions.")] = False,
     by_hand: Annotated[
-        bool, typer.Option("--by-hand", help="Only measure and write the files; continue with the commands yourself.")
+        bool, option("--by-hand", "Only measure and write the files; continue with the commands yourself.")
     ] = False,
-    as_json: options.JsonOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Hide an effect in the simulated station and find it from the measurements: compare, diagnose, extend, compare.
 
@@ -88,7 +82,7 @@ def command(
 def _archive(folder: Path, seed: int, lots: int, *, as_json: bool) -> None:
     """An archive with something hidden in a wafer: written, judged, explained, and judged again with the effect in the model."""
     from pipelines.archive.files import ELSEWHERE, writing
-    from pipelines.cli.text.demo_text import print_discovery_demo
+    from pipelines.cli.text.discovery_text import print_discovery_demo
     from pipelines.discovery.demonstration import made, played
     from pipelines.parallel import processors
 
@@ -96,10 +90,7 @@ def _archive(folder: Path, seed: int, lots: int, *, as_json: bool) -> None:
         written, hidden = made(folder, seed, lots, lambda done: progress(done, lots, ""))
     with error_console().status("judging the archive night by night"):
         document = played(written, hidden, processors(), seed)
-    if as_json:
-        print_json(document)
-    else:
-        print_discovery_demo(document)
+    give(document, print_discovery_demo, as_json=as_json)
 
 
 def _put_aside(model: Path) -> Path | None:
@@ -131,7 +122,7 @@ def _hand_over(folder: Path, hidden: Scene, *, as_json: bool) -> None:
         "Begin with",
         f"  {_command('diagnose', folder, hidden.model)}",
     ]
-    give_lines({"folder": str(folder), "files": files, "effects": list(hidden.model)}, lines, as_json=as_json)
+    give({"folder": str(folder), "files": files, "effects": list(hidden.model)}, lines, as_json=as_json)
 
 
 def _command(name: str, folder: Path, model: tuple[str, ...] | None) -> str:

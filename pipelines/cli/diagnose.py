@@ -7,12 +7,11 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
 from pipelines.archive import Archive
 from pipelines.cli import options
-from pipelines.cli.printing import error_console, print_json, publish
-from schemas.errors import DONE, PART_FAILED, WrongUse
+from pipelines.cli.options import option
+from pipelines.cli.printing import conclude, error_console, publish
+from schemas.errors import WrongUse
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -37,20 +36,13 @@ def command(
     formula: options.FormulaOption = None,
     leave_out: options.LeaveOutOption = "",
     report: Annotated[
-        Path | None,
-        typer.Option(
-            "--report", "--page", metavar="FILE.html", help="Write the diagnosis with pictures, as one HTML file."
-        ),
+        Path | None, option("--report --page FILE.html", "Write the diagnosis with pictures, as one HTML file.")
     ] = None,
     following: Annotated[
-        Path | None,
-        typer.Option("--next", metavar="FILE.toml", help="Write a recipe: the measured one with the proposed steps."),
+        Path | None, option("--next FILE.toml", "Write a recipe: the measured one with the proposed steps.")
     ] = None,
     recipe: Annotated[
-        str,
-        typer.Option(
-            "--recipe", metavar="RECIPE", help="Recipe of the dwells, for --next; a run of the archive has its own."
-        ),
+        str, option("--recipe RECIPE", "Recipe of the dwells, for --next; a run of the archive has its own.")
     ] = "",
     archive: options.ArchiveOption = None,
     *,
@@ -72,8 +64,9 @@ def command(
     table, temperatures = dwells_and_history(dwells, history, archive)
     table, left_out = without_dwells(table, leave_out)
     beside = history or (history_beside(dwells) if is_file(dwells) else "")
+    kept_name = dwells if is_file(dwells) else Archive(archive).run(dwells).id  # what 'latest' means changes
     document, report_text = diagnosed(
-        table, temperatures, judged, _kept_name(dwells, archive), with_report=report is not None, left_out=left_out
+        table, temperatures, judged, kept_name, with_report=report is not None, left_out=left_out
     )
     document["history"] = beside or None
     if report is not None:
@@ -82,21 +75,11 @@ def command(
         from pipelines.jobs.recipes import folder_of
 
         write_next(following, document, base, folder_of(recipe) if recipe else Path(), dwells)
-    if as_json:
-        print_json(document)
-    else:
-        from pipelines.cli.next_commands import judged_data
-        from pipelines.cli.text.diagnosis_text import print_diagnosis
+    from pipelines.cli.next_commands import judged_data
+    from pipelines.cli.text.diagnosis_text import print_diagnosis
 
-        print_diagnosis(document, data=partial(judged_data, dwells, beside, archive), model=model, brief=not show_all)
-    raise typer.Exit(DONE if document["adequate"] else PART_FAILED)
-
-
-def _kept_name(dwells: str, archive: str | None) -> str:
-    """The name of the data for a page that is kept: what 'latest' means changes."""
-    from pipelines.importers.files import is_file
-
-    return dwells if is_file(dwells) else Archive(archive).run(dwells).id
+    show = partial(print_diagnosis, data=partial(judged_data, dwells, beside, archive), model=model, brief=not show_all)
+    conclude(document, show, as_json=as_json, passed=bool(document["adequate"]))
 
 
 def diagnosed(

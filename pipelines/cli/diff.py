@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any
-
-import typer
 
 from inertial.counts import number_of
 from pipelines.archive import Archive
-from pipelines.cli import options
-from pipelines.cli.printing import STYLES, print_json, print_table, say, short
+from pipelines.cli.options import ArchiveOption, JsonOption, argument, option
+from pipelines.cli.printing import STYLES, give, print_table, say, short
 
 if TYPE_CHECKING:
     from rich.text import Text
@@ -27,25 +26,22 @@ SHOWN = 12
 
 
 def command(
-    run_a: Annotated[str, typer.Argument(metavar="RUN_A", help="Name of a run, the beginning of it, or 'latest'.")],
-    run_b: Annotated[str, typer.Argument(metavar="RUN_B", help="The run to compare with.")],
-    archive: options.ArchiveOption = None,
+    run_a: Annotated[str, argument("RUN_A", "Name of a run, the beginning of it, or 'latest'.")],
+    run_b: Annotated[str, argument("RUN_B", "The run to compare with.")],
+    archive: ArchiveOption = None,
     *,
-    everything: Annotated[bool, typer.Option("--all", help="Show all changes; default: only the largest.")] = False,
-    as_json: options.JsonOption = False,
+    everything: Annotated[bool, option("--all", "Show all changes; default: only the largest.")] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Show which grades, coefficients and figures differ between two runs, relative to their uncertainty, and the causes."""
     from pipelines.rerun.diff import diff
 
     store = Archive(archive)
     document = diff(store.run(run_a), store.run(run_b))
-    if as_json:
-        print_json(document)
-        return
-    _print(document, None if everything else SHOWN)
+    give(document, partial(_print, None if everything else SHOWN), as_json=as_json)
 
 
-def _print(document: dict[str, Any], most: int | None) -> None:
+def _print(most: int | None, document: dict[str, Any]) -> None:
     say(f"a  {document['a']}\nb  {document['b']}")
     if document["same"]:
         say("no coefficient, figure or grade differs", style="bold green")
@@ -92,7 +88,16 @@ def _print_changes(rows: list[dict[str, Any]], key: tuple[str, ...], what: str, 
     if not rows:
         return
     both = [row for row in rows if not (math.isnan(row["a"]) or math.isnan(row["b"]))]
-    lines = [_change_line(row, key) for row in both[:most]]
+    lines = [
+        [
+            str(row["unit"]),
+            " ".join(str(row[name]) for name in key),
+            *(short(row[side], 5) for side in ("a", "b")),
+            f"{short(row['change'])} {row['unit_text']}",
+            *(short(row[over], 2) for over in ("over_a", "over_b")),
+        ]
+        for row in both[:most]
+    ]
     if lines:
         heads = ["unit", what, "a", "b", "change", "over\nu(a)", "over\nu(b)"]
         title = f"{what}: {len(both)} differ, largest change relative to the uncertainty first"
@@ -101,12 +106,6 @@ def _print_changes(rows: list[dict[str, Any]], key: tuple[str, ...], what: str, 
     for side, names in (("only in b", new), ("only in a", gone)):
         if names:
             say(f"{what} {side}: {', '.join(names)}")
-
-
-def _change_line(row: dict[str, Any], key: tuple[str, ...]) -> list[str]:
-    named = [str(row["unit"]), " ".join(str(row[name]) for name in key)]
-    change = f"{short(row['change'])} {row['unit_text']}"
-    return [*named, short(row["a"], 5), short(row["b"], 5), change, short(row["over_a"], 2), short(row["over_b"], 2)]
 
 
 def _apart(rows: list[dict[str, Any]], side: str) -> list[str]:

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
+from datetime import date
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 from pipelines.archive import Archive
-from pipelines.cli import options
-from pipelines.cli.printing import give, publish
-from schemas.errors import DONE, PART_FAILED, WrongUse
+from pipelines.cli.options import ArchiveOption, JsonOption, names_in, option
+from pipelines.cli.printing import conclude, give, publish
+from schemas.errors import WrongUse
 
 PART = "Certificates, trace, audit"
 ORDER = 452
@@ -22,77 +22,60 @@ EXAMPLES = (
 
 
 def command(
-    archive: options.ArchiveOption = None,
-    device: Annotated[
-        str, typer.Option("--device", metavar="KIND", help="Kind of device; that of most runs by default.")
-    ] = "",
+    archive: ArchiveOption = None,
+    device: Annotated[str, option("--device KIND", "Kind of device; that of most runs by default.")] = "",
     since: Annotated[
-        str,
-        typer.Option(
-            "--since", metavar="DATE", help="Only lots from this day on; the nightly evidence stays as it is."
-        ),
+        str, option("--since DATE", "Only lots from this day on; the nightly evidence stays as it is.")
     ] = "",
-    driver: Annotated[
-        str, typer.Option("--driver", metavar="a,b", help="Only discoveries of these drivers, such as wafer,station.")
-    ] = "",
+    driver: Annotated[str, option("--driver a,b", "Only discoveries of these drivers, such as wafer,station.")] = "",
     explain: Annotated[
-        str,
-        typer.Option(
-            "--explain", metavar="ID", help="One discovery with its levels, what carries it, and what to measure next."
-        ),
+        str, option("--explain ID", "One discovery with its levels, what carries it, and what to measure next.")
     ] = "",
     model: Annotated[
-        Path | None,
-        typer.Option(
-            "--model", metavar="FILE", help="A model file: what is left with its effects in the model of every lot."
-        ),
+        Path | None, option("--model FILE", "A model file: what is left with its effects in the model of every lot.")
     ] = None,
-    html: Annotated[
-        Path | None, typer.Option("--html", metavar="FILE", help="Write the findings with pictures as one page.")
-    ] = None,
+    html: Annotated[Path | None, option("--html FILE", "Write the findings with pictures as one page.")] = None,
     workers: Annotated[
-        int | None, typer.Option("--workers", min=1, help="Processes that score new runs; as many as cores by default.")
+        int | None, option("--workers", "Processes that score new runs; as many as cores by default.", min=1)
     ] = None,
-    dask: Annotated[str, typer.Option("--dask", metavar="ADDRESS|local", help="Score runs on Dask workers.")] = "",
+    dask: Annotated[str, option("--dask ADDRESS|local", "Score runs on Dask workers.")] = "",
     *,
-    reach: Annotated[
-        bool, typer.Option("--reach", help="Print the smallest effects that this archive could have shown.")
-    ] = False,
+    reach: Annotated[bool, option("--reach", "Print the smallest effects that this archive could have shown.")] = False,
     populations: Annotated[
-        bool,
-        typer.Option("--populations", help="Look for two populations in each coefficient, too: a second for each."),
+        bool, option("--populations", "Look for two populations in each coefficient, too: a second for each.")
     ] = False,
     looking_back: Annotated[
         bool,
-        typer.Option(
-            "--looking-back", help="Judge all lots again with the attributes known now; the nightly evidence stays."
-        ),
+        option("--looking-back", "Judge all lots again with the attributes known now; the nightly evidence stays."),
     ] = False,
-    as_json: options.JsonOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Pool the lots of an archive: effects that differ by wafer, station, slot, firmware or date, or that all lots have.
 
     Evidence is valid every night. Exit status 1: there is a new discovery.
     """
-    from pipelines.cli.text.discovery_text import print_discoveries, print_explained, print_reach
+    from pipelines.cli.text.discovery_text import print_discoveries, print_explained
     from pipelines.discovery.discover import Look, discovered, explained
     from pipelines.flows.dask_cluster import on_dask
+    from pipelines.jobs.model_files import chosen_effects
     from pipelines.parallel import processors
 
     count = workers or processors()
-    looked = discovered(
-        Archive(archive),
-        Look(
-            device=device,
-            since=_day(since),
-            drivers=tuple(part.strip() for part in driver.split(",") if part.strip()),
-            effects=_effects(model),
-            looking_back=looking_back,
-            populations=populations,
-            workers=count,
-            distribute=on_dask(dask, count),
-        ),
+    try:
+        day = date.fromisoformat(since).isoformat() if since else ""
+    except ValueError:
+        raise WrongUse(f"discover: --since is '{since}', a day as 2026-03-14 is needed") from None
+    look = Look(
+        device=device,
+        since=day,
+        drivers=names_in(driver),
+        effects=() if model is None else tuple(chosen_effects("", model, "discover") or ()),
+        looking_back=looking_back,
+        populations=populations,
+        workers=count,
+        distribute=on_dask(dask, count),
     )
+    looked = discovered(Archive(archive), look)
     document = looked.document
     if html is not None:
         from pipelines.discovery.page import render
@@ -101,24 +84,4 @@ def command(
     if explain:
         give(explained(document, explain), print_explained, as_json=as_json)
         return
-    give(document, print_discoveries, as_json=as_json)
-    if reach and not as_json:
-        print_reach(document)
-    raise typer.Exit(PART_FAILED if document["new"] else DONE)
-
-
-def _day(since: str) -> str:
-    from datetime import date
-
-    try:
-        return date.fromisoformat(since).isoformat() if since else ""
-    except ValueError:
-        raise WrongUse(f"discover: --since is '{since}', a day as 2026-03-14 is needed") from None
-
-
-def _effects(model: Path | None) -> tuple[str, ...]:
-    if model is None:
-        return ()
-    from pipelines.jobs.model_files import chosen_effects
-
-    return tuple(chosen_effects("", model, "discover") or ())
+    conclude(document, partial(print_discoveries, reach=reach), as_json=as_json, passed=not document["new"])

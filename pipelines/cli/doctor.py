@@ -4,11 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
-from pipelines.cli import options
-from pipelines.cli.printing import give, print_table, say
-from schemas.errors import DONE, PART_FAILED
+from pipelines.cli.options import ArchiveOption, JsonOption, StationOption, option
+from pipelines.cli.printing import conclude, print_table, say
 
 if TYPE_CHECKING:
     from pipelines.doctor.documents import DoctorDocument
@@ -25,13 +22,11 @@ COLOURS = {"good": "green", "warning": "yellow", "fault": "bold red", "not confi
 
 
 def command(
-    archive: options.ArchiveOption = None,
-    station: options.StationOption = None,
-    free_gb: Annotated[
-        float, typer.Option("--free-gb", min=0.0, metavar="GB", help="Free space that the archive needs.")
-    ] = 1.0,
+    archive: ArchiveOption = None,
+    station: StationOption = None,
+    free_gb: Annotated[float, option("--free-gb GB", "Free space that the archive needs.", min=0.0)] = 1.0,
     *,
-    as_json: options.JsonOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Check the installation and its connections, with a remedy for each fault.
 
@@ -41,8 +36,7 @@ def command(
     from pipelines.doctor.examine import examine
 
     document = examine(archive, station, free_gb)
-    give(document, _show, as_json=as_json)
-    raise typer.Exit(DONE if document["ok"] else PART_FAILED)
+    conclude(document, _show, as_json=as_json, passed=document["ok"])
 
 
 def _show(document: DoctorDocument) -> None:

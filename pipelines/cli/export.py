@@ -8,10 +8,8 @@ from pathlib import Path
 from pkgutil import iter_modules
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from pipelines.archive import Archive, Run
-from pipelines.cli import options
+from pipelines.cli.options import ArchiveOption, JsonOption, RunArgument, option
 from pipelines.cli.printing import STANDARD_OUTPUT, print_text, remark
 from schemas.errors import WrongUse, did_you_mean
 
@@ -39,68 +37,46 @@ if TYPE_CHECKING:
 
 
 def command(
-    run: options.RunArgument = "latest",
-    form: Annotated[str, typer.Option("--format", help=f"{', '.join(_FORMATS)}; described below.")] = "json",
-    units: Annotated[
-        str, typer.Option("--units", metavar="SN,…", help="Export only these units; default: all that passed.")
-    ] = "",
+    run: RunArgument = "latest",
+    form: Annotated[str, option("--format", f"{', '.join(_FORMATS)}; described below.")] = "json",
+    units: Annotated[str, option("--units SN,…", "Export only these units; default: all that passed.")] = "",
     output: Annotated[
         Path | None,
-        typer.Option(
-            "--output",
-            "-o",
-            metavar="FILE|DIR",
-            help="Output file, or a folder where each unit has a file of its own; default, or -: standard output.",
+        option(
+            "--output -o FILE|DIR",
+            "Output file, or a folder where each unit has a file of its own; default, or -: standard output.",
         ),
     ] = None,
     nominal: Annotated[
         float | None,
-        typer.Option(
+        option(
             "--nominal",
-            help="ardupilot, betaflight, px4: output per g by which the driver divides; that of the device's preset.",
+            "ardupilot, betaflight, px4: output per g by which the driver divides; that of the device's preset.",
         ),
     ] = None,
     device_id: Annotated[
         str,
-        typer.Option(
-            "--device-id",
-            metavar="ID|SN=ID,…",
-            help="px4 (CAL_ACC0_ID), ardupilot (INS_ACC_ID): number of the sensor in the autopilot.",
+        option(
+            "--device-id ID|SN=ID,…",
+            "px4 (CAL_ACC0_ID), ardupilot (INS_ACC_ID): number of the sensor in the autopilot.",
         ),
     ] = "",
-    sensor: Annotated[
-        int,
-        typer.Option("--sensor", metavar="0…3", help="ardupilot, px4: place of the accelerometer in the autopilot."),
-    ] = 0,
-    arithmetic: Annotated[
-        str, typer.Option("--arithmetic", metavar="double|float|q24", help="c: arithmetic of the code.")
-    ] = "double",
+    sensor: Annotated[int, option("--sensor 0…3", "ardupilot, px4: place of the accelerometer in the autopilot.")] = 0,
+    arithmetic: Annotated[str, option("--arithmetic double|float|q24", "c: arithmetic of the code.")] = "double",
     rate: Annotated[
-        float | None,
-        typer.Option(
-            "--rate", metavar="HZ", min=1e-9, help="kalibr, ros: rate of the receiver; that of the static record."
-        ),
+        float | None, option("--rate HZ", "kalibr, ros: rate of the receiver; that of the static record.", min=1e-9)
     ] = None,
-    counts_per_g: Annotated[int, typer.Option("--counts-per-g", help="betaflight: counts of 1 g (acc_1G).")] = 2048,
-    low_pass: Annotated[
-        str, typer.Option("--filter", metavar="KIND", help="c: low-pass of the force, as in correct; with --rate.")
-    ] = "",
-    cutoff: Annotated[
-        float | None, typer.Option("--cutoff", metavar="HZ", min=1e-9, help="c: its -3 dB frequency, as in correct.")
-    ] = None,
-    turn_on: Annotated[
-        float | None,
-        typer.Option("--turn-on", metavar="UG", min=0.0, help="c, with --track: as in correct."),
-    ] = None,
-    step: Annotated[float, typer.Option("--step", metavar="S", min=1e-3, help="c, with --track: as in correct.")] = 1.0,
-    archive: options.ArchiveOption = None,
+    counts_per_g: Annotated[int, option("--counts-per-g", "betaflight: counts of 1 g (acc_1G).")] = 2048,
+    low_pass: Annotated[str, option("--filter KIND", "c: low-pass of the force, as in correct; with --rate.")] = "",
+    cutoff: Annotated[float | None, option("--cutoff HZ", "c: its -3 dB frequency, as in correct.", min=1e-9)] = None,
+    turn_on: Annotated[float | None, option("--turn-on UG", "c, with --track: as in correct.", min=0.0)] = None,
+    step: Annotated[float, option("--step S", "c, with --track: as in correct.", min=1e-3)] = 1.0,
+    archive: ArchiveOption = None,
     *,
-    track: Annotated[bool, typer.Option("--track", help="c: with the filter of the bias, as in correct.")] = False,
-    failed: Annotated[bool, typer.Option("--failed", help="Also export units that failed their limits.")] = False,
-    revoked: Annotated[
-        bool, typer.Option("--revoked", help="Also export units whose calibration was revoked.")
-    ] = False,
-    as_json: options.JsonOption = False,
+    track: Annotated[bool, option("--track", "c: with the filter of the bias, as in correct.")] = False,
+    failed: Annotated[bool, option("--failed", "Also export units that failed their limits.")] = False,
+    revoked: Annotated[bool, option("--revoked", "Also export units whose calibration was revoked.")] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Write coefficients: bias b and response K as polynomials in temperature, to apply as a = K⁻¹(ã − b).
 

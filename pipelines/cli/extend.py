@@ -5,14 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
-from pipelines.cli import options
-from pipelines.cli.printing import give_lines, is_standard_output, print_text, remark, say
+from pipelines.cli.options import ByOption, EffectFileOption, JsonOption, argument, option
+from pipelines.cli.printing import give, is_standard_output, print_text, remark, say
 from schemas.errors import WrongUse
 
 if TYPE_CHECKING:
-    from pipelines.cli.documents.models import ExtendDocument
+    from pipelines.cli.documents.decisions import ExtendDocument
     from pipelines.jobs.model_files import ModelStep
 
 PART = "Is the model good enough, and what is missing?"
@@ -25,43 +23,29 @@ EXAMPLES = (
 
 
 def command(
-    model: Annotated[
-        Path, typer.Argument(metavar="MODEL", help="A model file; a new file starts with a starting model.")
-    ],
+    model: Annotated[Path, argument("MODEL", "A model file; a new file starts with a starting model.")],
     effect: Annotated[
         str,
-        typer.Argument(
-            metavar="[EFFECT]",
-            help="Effect to add: an id of the catalogue, covariate:<column>, or a formula of the file.",
-        ),
+        argument("[EFFECT]", "Effect to add: an id of the catalogue, covariate:<column>, or a formula of the file."),
     ] = "",
     remove: Annotated[
-        str,
-        typer.Option("--remove", metavar="EFFECT", help="Effect to remove instead; earlier versions stay in the file."),
+        str, option("--remove EFFECT", "Effect to remove instead; earlier versions stay in the file.")
     ] = "",
-    why: Annotated[
-        str, typer.Option("--why", metavar="TEXT", help="Reason for the change; needed with --remove.")
-    ] = "",
-    by: options.ByOption = "",
-    run: Annotated[str, typer.Option("--run", metavar="RUN", help="Run or file with the evidence.")] = "",
+    why: Annotated[str, option("--why TEXT", "Reason for the change; needed with --remove.")] = "",
+    by: ByOption = "",
+    run: Annotated[str, option("--run RUN", "Run or file with the evidence.")] = "",
     output: Annotated[
         Path | None,
-        typer.Option(
-            "--out",
-            "-o",
-            metavar="FILE",
-            help="Write the new version to this file, or with - to standard output; MODEL is not changed.",
+        option(
+            "--out -o FILE", "Write the new version to this file, or with - to standard output; MODEL is not changed."
         ),
     ] = None,
     effects: Annotated[
-        str,
-        typer.Option(
-            "--effects", metavar="a,b,c", help="The starting model of a new file; default: bias to scale_temperature."
-        ),
+        str, option("--effects a,b,c", "The starting model of a new file; default: bias to scale_temperature.")
     ] = "",
-    effect_file: options.EffectFileOption = None,
+    effect_file: EffectFileOption = None,
     *,
-    as_json: options.JsonOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Write the next version of a model with one effect more or less, and who changed it, when and why.
 
@@ -99,7 +83,7 @@ def command(
     if begun:
         first = ", ".join(e for e in after.model.effects if e != effect)
         lines.insert(0, f"{target}: created with version 1: {first}")
-    give_lines(document, lines, as_json=as_json, show=remark if printed else say)
+    give(document, lambda _: [(remark if printed else say)(line) for line in lines], as_json=as_json)
 
 
 def _refuse_contradiction(model: Path, effect: str, remove: str, why: str) -> None:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import shlex
 from pathlib import Path
+from typing import Any, NoReturn
 
-import typer
-
-from pipelines.archive import Archive
+from pipelines.archive import Archive, Run
 from pipelines.cli import options
-from pipelines.cli.printing import give, remark
+from pipelines.cli.printing import conclude, error_console, remark, say
+from pipelines.cli.text.verdict_text import print_verdict_of_fit
 from schemas.errors import WrongUse
 from schemas.foreign import shown
 
@@ -38,7 +38,7 @@ def command(
     cannot be judged, or a unit did not pass.
     """
     from pipelines.chain.runner import Runner
-    from pipelines.cli.summary import exit_status, print_result, summary
+    from pipelines.cli.summary import all_passed, print_result, summary
     from pipelines.cli.text.verdict_text import judged
     from pipelines.jobs.job import job_of_run
 
@@ -51,9 +51,7 @@ def command(
     store = Archive(archive)
     stored = store.run(run)
     if not stored.about.get("capture"):
-        from pipelines.cli.imported_fit import fit_import
-
-        raise typer.Exit(fit_import(stored, (effects, model, limits), leave_out, as_json=as_json))
+        _fit_import(stored, (effects, model, limits), leave_out, as_json=as_json)
     if leave_out:
         raise WrongUse(f"run {stored.id}: --leave-out is for imports, this run was captured; measure the dwell again")
     listed = [name.strip() for name in effects.split(",")] if effects else []
@@ -66,5 +64,37 @@ def command(
         runner.abandon()  # the measurements are the old run's: nothing is lost, and no empty run becomes the latest
         raise
     document = judged(summary(runner.run), runner.run)
-    give(document, print_result, as_json=as_json)
-    raise typer.Exit(exit_status(document))
+    conclude(document, print_result, as_json=as_json, passed=all_passed(document))
+
+
+def _fit_import(run: Run, change: tuple[str, Path | None, str], leave_out: str, *, as_json: bool) -> NoReturn:
+    """Fit a model to an import, keep it as a run of its own and print it.
+
+    Parameters
+    ----------
+    change : effects, model file and limits; empty or None if not given
+    leave_out : dwells as UNIT:DWELL,…
+    """
+    from pipelines.jobs.model_change import change_from_options
+    from pipelines.rerun.imported_fit import fit_document
+    from pipelines.rerun.rerun import again
+    from pipelines.tables.leave_out import named_dwells
+
+    store = Archive(run.archive.root)
+    with error_console().status("fitting and judging"):
+        outcome = again(store, run.id, change_from_options(*change, where="fit"), left_out=named_dwells(leave_out))
+        document = fit_document(store.run(outcome.new), run.id)
+    passed = document["adequate"] is True and all(unit["outcome"] == "pass" for unit in document["units"])
+    conclude(document, _print_imported, as_json=as_json, passed=passed)
+
+
+def _print_imported(document: dict[str, Any]) -> None:
+    left = f", without {', '.join(document['left_out'])}" if document["left_out"] else ""
+    model = ", ".join(document["effects"]) or "axes in the plane"
+    say(f"{model}{left}: kept as run {document['run']}")
+    for line in document["lines"]:
+        say(f"  {line}")
+    for unit in document["units"]:
+        reasons = f" ({unit['reasons']})" if unit["reasons"] else ""
+        say(f"  {unit['unit']}: {unit['outcome']}, grade {unit['grade']}{reasons}")
+    print_verdict_of_fit(document["adequate"], "this model does not describe these data")

@@ -5,11 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any
 
-import typer
-
 from pipelines.cli import options
 from pipelines.cli.next_commands import command_line, print_next
-from pipelines.cli.printing import error_console, give, print_table, publish, say, short
+from pipelines.cli.options import argument, option
+from pipelines.cli.printing import error_console, give, print_table, publish, say, short, warn
 from schemas.errors import WrongUse
 
 PART = "Is the model good enough, and what is missing?"
@@ -22,16 +21,12 @@ EXAMPLES = (
 
 
 def command(
-    model: Annotated[Path, typer.Argument(metavar="MODEL", help="A model file.")],
-    dwells: Annotated[
-        str, typer.Option("--dwells", metavar="DWELLS", help="A file in the exchange format, or a run of the archive.")
-    ] = "",
+    model: Annotated[Path, argument("MODEL", "A model file.")],
+    dwells: Annotated[str, option("--dwells DWELLS", "A file in the exchange format, or a run of the archive.")] = "",
     fresh: options.FreshOption = "",
     history: options.HistoryOption = "",
     fresh_history: options.FreshHistoryOption = "",
-    picture: Annotated[
-        Path | None, typer.Option("--picture", metavar="FILE.png", help="Draw it, as PNG, SVG or PDF.")
-    ] = None,
+    picture: Annotated[Path | None, option("--picture FILE.png", "Draw it, as PNG, SVG or PDF.")] = None,
     effect_file: options.EffectFileOption = None,
     archive: options.ArchiveOption = None,
     *,
@@ -48,7 +43,12 @@ def command(
 
     add_effects(effect_file)
     model_file = read_model(model)
-    _refuse_picture(picture, dwells)
+    if picture is not None:
+        from pipelines.drawing.picture import refuse_ending
+
+        if not dwells:
+            raise WrongUse("history: --picture shows errors, they need --dwells; name the dwells too")
+        refuse_ending(picture, "--picture")
     if dwells:
         tables = ImprovedTables(*both_runs(dwells, history, fresh, fresh_history, archive))
         rows = errors_by_version(versions(model_file), tables, lambda: error_console().status("fitting"))
@@ -59,22 +59,12 @@ def command(
         ]
     if picture is not None:
         from pipelines.drawing.picture import picture as drawn
-        from pipelines.report.evolution import evolution_chart
+        from pipelines.report.diagnosis_pictures import evolution_chart
 
         chart = evolution_chart(rows, model_file.model.name)
         publish(picture, drawn(chart, picture.suffix.lower()), "picture")
     document = {"model": model_file.model.name, "file": str(model), "versions": rows}
     give(document, lambda _: _print(rows, model_file.model.name, model), as_json=as_json)
-
-
-def _refuse_picture(picture: Path | None, dwells: str) -> None:
-    from pipelines.drawing.picture import refuse_ending
-
-    if picture is None:
-        return
-    if not dwells:
-        raise WrongUse("history: --picture shows errors, they need --dwells; name the dwells too")
-    refuse_ending(picture, "--picture")
 
 
 def _print(rows: list[dict[str, Any]], name: str, file: Path) -> None:
@@ -102,8 +92,7 @@ def _print(rows: list[dict[str, Any]], name: str, file: Path) -> None:
         "of each unit included · assumed noise: of the fit of each version, missing effects included",
         style="dim",
     )
-    for text in dict.fromkeys(text for row in rows for text in row["warnings"]):
-        say(f"warning: {text}", style="yellow")
+    warn(dict.fromkeys(text for row in rows for text in row["warnings"]))
     refuted = [name for row in rows if row["confirmed"] is False for name in row["added"]]
     if refuted:
         say(

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NoReturn
 
-import typer
-
-from pipelines.cli import options
-from pipelines.cli.printing import error_console, print_json, print_table, say, short
-from pipelines.cli.text.import_text import print_import, print_transfers
-from schemas.errors import DONE, PART_FAILED, WrongUse, did_you_mean
+from pipelines.cli.options import ArchiveOption, GroupOption, JoinOption, JsonOption, argument, option
+from pipelines.cli.printing import conclude, error_console
+from pipelines.cli.text.import_text import print_imports, print_transfers, print_waveforms
+from schemas.errors import WrongUse, did_you_mean
 from schemas.foreign import shown
 
 PART = "Measure"
@@ -27,115 +26,73 @@ METHODS = ("norm", "plane", "faces", "temperature")
 def command(
     files: Annotated[
         list[Path],
-        typer.Argument(
-            metavar="FILE…",
-            help="Text, Parquet, MATLAB, NumPy, WAV, LVM; with an extra spreadsheets, HDF5, UFF58, TDMS, IDE, R, ULog, "
+        argument(
+            "FILE…",
+            "Text, Parquet, MATLAB, NumPy, WAV, LVM; with an extra spreadsheets, HDF5, UFF58, TDMS, IDE, R, ULog, "
             "DataFlash, MCAP, ROS bags, MDF, miniSEED. Also .gz.",
         ),
     ],
-    columns: Annotated[
-        str, typer.Option("--map", metavar="time=…,x=…,y=…,z=…", help="Meaning of the columns of the file.")
-    ] = "",
+    columns: Annotated[str, option("--map time=…,x=…,y=…,z=…", "Meaning of the columns of the file.")] = "",
     mapping: Annotated[
-        Path | None,
-        typer.Option(
-            "--mapping", metavar="TOML", help="TOML file with these options; options given here have priority."
-        ),
+        Path | None, option("--mapping TOML", "TOML file with these options; options given here have priority.")
     ] = None,
-    units: Annotated[
-        str, typer.Option("--units", metavar="output=LSB,time=s,temperature=degC", help="Units of the columns.")
-    ] = "",
-    unit: Annotated[str, typer.Option("--unit", metavar="SN", help="Serial number, if no column has it.")] = "",
-    rows: Annotated[
-        str, typer.Option("--rows", metavar="samples|dwells", help="Content of a row; samples by default.")
-    ] = "",
-    rate: Annotated[float | None, typer.Option("--rate", metavar="HZ", help="Rate of samples without a time.")] = None,
-    axes: Annotated[str, typer.Option("--axes", metavar="x,y,z", help="Order of the mapped axes.")] = "",
-    signs: Annotated[str, typer.Option("--signs", metavar="+,+,+", help="Signs of the axes in that order.")] = "",
-    poses: Annotated[
-        str, typer.Option("--poses", metavar="LABEL=+x,…", help="Dwells to keep by label, with the face that is up.")
-    ] = "",
+    units: Annotated[str, option("--units output=LSB,time=s,temperature=degC", "Units of the columns.")] = "",
+    unit: Annotated[str, option("--unit SN", "Serial number, if no column has it.")] = "",
+    rows: Annotated[str, option("--rows samples|dwells", "Content of a row; samples by default.")] = "",
+    rate: Annotated[float | None, option("--rate HZ", "Rate of samples without a time.")] = None,
+    axes: Annotated[str, option("--axes x,y,z", "Order of the mapped axes.")] = "",
+    signs: Annotated[str, option("--signs +,+,+", "Signs of the axes in that order.")] = "",
+    poses: Annotated[str, option("--poses LABEL=+x,…", "Dwells to keep by label, with the face that is up.")] = "",
     headings: Annotated[
-        str,
-        typer.Option(
-            "--headings", metavar="LABEL=deg,…", help="Direction of x in each pose, degrees (of y where x is vertical)."
-        ),
+        str, option("--headings LABEL=deg,…", "Direction of x in each pose, degrees (of y where x is vertical).")
     ] = "",
-    face: Annotated[str, typer.Option("--face", metavar="+x|…|-z", help="The face that is up all the time.")] = "",
-    blocks: Annotated[
-        float | None, typer.Option("--blocks", metavar="S", help="Dwells of this length, for a record in one pose.")
-    ] = None,
+    face: Annotated[str, option("--face +x|…|-z", "The face that is up all the time.")] = "",
+    blocks: Annotated[float | None, option("--blocks S", "Dwells of this length, for a record in one pose.")] = None,
     positions: Annotated[
-        int | None, typer.Option("--positions", metavar="N", help="Positions logged back to back, without the moves.")
+        int | None, option("--positions N", "Positions logged back to back, without the moves.")
     ] = None,
     window: Annotated[
-        float | None,
-        typer.Option("--window", metavar="S", help="Sliding window of the search for dwells; 1 s by default."),
+        float | None, option("--window S", "Sliding window of the search for dwells; 1 s by default.")
     ] = None,
     threshold: Annotated[
-        float | None,
-        typer.Option(
-            "--threshold", metavar="SD", help="Standard deviation in a window that means motion, in the output unit."
-        ),
+        float | None, option("--threshold SD", "Standard deviation in a window that means motion, in the output unit.")
     ] = None,
-    shortest: Annotated[
-        float | None, typer.Option("--shortest", metavar="S", help="Shortest dwell; 1 s by default.")
-    ] = None,
+    shortest: Annotated[float | None, option("--shortest S", "Shortest dwell; 1 s by default.")] = None,
     gaps: Annotated[
-        str,
-        typer.Option(
-            "--gaps", metavar="refuse|split", help="Rows without a number, and gaps in time; refuse by default."
-        ),
+        str, option("--gaps refuse|split", "Rows without a number, and gaps in time; refuse by default.")
     ] = "",
     faulty: Annotated[
-        str,
-        typer.Option(
-            "--faulty", metavar="refuse|leave-out|keep", help="Constant axes and torn words; refuse by default."
-        ),
+        str, option("--faulty refuse|leave-out|keep", "Constant axes and torn words; refuse by default.")
     ] = "",
-    join: options.JoinOption = "",
-    group: options.GroupOption = "",
+    join: JoinOption = "",
+    group: GroupOption = "",
     list_dwells: Annotated[
-        bool, typer.Option("--list-dwells", help="List every dwell: start, end, mean, sd, residual, influence.")
+        bool, option("--list-dwells", "List every dwell: start, end, mean, sd, residual, influence.")
     ] = False,
     local_g: Annotated[
-        float | None,
-        typer.Option("--local-g", metavar="M/S2", help="Local gravity at the place of the measurement, m/s²."),
+        float | None, option("--local-g M/S2", "Local gravity at the place of the measurement, m/s².")
     ] = None,
-    verify: Annotated[
-        str, typer.Option("--verify", metavar="N|N%", help="Dwells that the fit does not use; they verify it.")
-    ] = "",
+    verify: Annotated[str, option("--verify N|N%", "Dwells that the fit does not use; they verify it.")] = "",
     references: Annotated[
-        Path | None,
-        typer.Option("--references", metavar="TOML", help="Uncertainty of the references; a certificate needs it."),
+        Path | None, option("--references TOML", "Uncertainty of the references; a certificate needs it.")
     ] = None,
-    measured: Annotated[str, typer.Option("--measured", metavar="DATE", help="Day of the measurement.")] = "",
-    zero_output: Annotated[
-        float | None, typer.Option("--zero-output", metavar="VALUE", help="Nominal output at 0 g; 0.")
-    ] = None,
-    fit: Annotated[
-        str, typer.Option("--fit", metavar="norm|plane|faces|temperature", help="Fit, and judge the fit.")
-    ] = "",
+    measured: Annotated[str, option("--measured DATE", "Day of the measurement.")] = "",
+    zero_output: Annotated[float | None, option("--zero-output VALUE", "Nominal output at 0 g; 0.")] = None,
+    fit: Annotated[str, option("--fit norm|plane|faces|temperature", "Fit, and judge the fit.")] = "",
     procedure: Annotated[
         str,
-        typer.Option(
-            "--procedure",
-            metavar="NAME",
-            help="Dynamic test: the transfer function of a sweep, or with --map reference=… the waveforms of a procedure.",
+        option(
+            "--procedure NAME",
+            "Dynamic test: the transfer function of a sweep, or with --map reference=… the waveforms of a procedure.",
         ),
     ] = "",
-    part: Annotated[
-        Path | None, typer.Option("--part", metavar="TOML", help="Keys of the procedure, and full_scale of the output.")
-    ] = None,
+    part: Annotated[Path | None, option("--part TOML", "Keys of the procedure, and full_scale of the output.")] = None,
     effects: Annotated[
-        str,
-        typer.Option(
-            "--effects", metavar="a,b,…", help="Model of the transfer function; second_order,delay by default."
-        ),
+        str, option("--effects a,b,…", "Model of the transfer function; second_order,delay by default.")
     ] = "",
-    archive: options.ArchiveOption = None,
+    archive: ArchiveOption = None,
     *,
-    as_json: options.JsonOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Import recordings of other systems into the archive: a raw record and its dwells in the exchange format.
 
@@ -146,10 +103,9 @@ def command(
 
     limited.start()
     if procedure and (columns or procedure != "sweep"):
-        stated = (columns, units, rate, group)
-        raise typer.Exit(import_and_print(files, procedure, part, unit, stated, archive, as_json=as_json))
+        _waveforms(files, procedure, part, unit, (columns, units, rate, group), archive, as_json=as_json)
     if procedure:
-        raise typer.Exit(_transfer(files, procedure, unit, effects, archive, as_json=as_json))
+        _transfer(files, unit, effects, archive, as_json=as_json)
     from pipelines.diagnosis.import_document import import_document
     from pipelines.importers import mapping as mapped
 
@@ -180,7 +136,10 @@ def command(
         "zero_output": zero_output,
     }
     keys = given | {key: value for key, value in options.items() if value not in ("", None, {}, [])}  # 0 is a value
-    _refuse_unknown_fit(fit)
+    if fit and fit not in METHODS:
+        raise WrongUse(
+            f"--fit: found '{shown(fit)}', one of {', '.join(METHODS)} is needed; {did_you_mean(fit, METHODS)}"
+        )
     stated = None
     if references is not None:
         from pipelines.importers.stated_references import stated_references
@@ -191,41 +150,25 @@ def command(
     imports = [import_document(paths, keys, where, fit, archive, stated, working) for paths in sets]
     verdicts = [one["adequate"] for one in imports if one["fit"]]
     adequate = False if False in verdicts else None if None in verdicts else True
-    if as_json:
-        print_json(imports[0] if len(imports) == 1 else {"imports": imports, "adequate": adequate})
-    else:
-        for one in imports:
-            print_import(one, archive, list_dwells=list_dwells)
-    raise typer.Exit(DONE if adequate is True else PART_FAILED)
+    document = imports[0] if len(imports) == 1 else {"imports": imports, "adequate": adequate}
+    show = partial(print_imports, imports, archive, list_dwells=list_dwells)
+    conclude(document, show, as_json=as_json, passed=adequate is True)
 
 
-def _transfer(files: list[Path], procedure: str, unit: str, effects: str, archive: str | None, *, as_json: bool) -> int:
-    """Judge and store transfer functions; the exit status is 1 if one is not adequate or cannot be judged."""
+def _transfer(files: list[Path], unit: str, effects: str, archive: str | None, *, as_json: bool) -> NoReturn:
+    """Judge, store and print transfer functions; a part failed where one is not adequate or cannot be judged."""
     from pipelines.importers.transfer import import_transfer
 
-    if procedure != "sweep":
-        raise WrongUse(
-            f"--procedure: found '{shown(procedure)}', sweep is what can be imported; measure others with a recipe"
-        )
     if not unit:
         raise WrongUse("import: no serial number, a transfer function needs one; add --unit SN")
     model = [part.strip() for part in effects.split(",")] if effects else ["second_order", "delay"]
     imported = [import_transfer(path, unit, model, archive) for path in files]
-    if as_json:
-        print_json(dict(imported[0]) if len(imported) == 1 else {"imports": imported})
-    else:
-        print_transfers(imported)
-    return DONE if all(one["adequate"] is True for one in imported) else PART_FAILED
+    document = dict(imported[0]) if len(imported) == 1 else {"imports": imported}
+    passed = all(one["adequate"] is True for one in imported)
+    conclude(document, lambda _: print_transfers(imported), as_json=as_json, passed=passed)
 
 
-def _refuse_unknown_fit(fit: str) -> None:
-    if fit and fit not in METHODS:
-        raise WrongUse(
-            f"--fit: found '{shown(fit)}', one of {', '.join(METHODS)} is needed; {did_you_mean(fit, METHODS)}"
-        )
-
-
-def import_and_print(
+def _waveforms(
     paths: list[Path],
     procedure: str,
     part: Path | None,
@@ -234,8 +177,8 @@ def import_and_print(
     archive: str | None,
     *,
     as_json: bool,
-) -> int:
-    """Reduce, keep and print the recordings of one unit; the exit status: part failed where a figure is not determined.
+) -> NoReturn:
+    """Reduce, keep and print the recordings of one unit; a part failed where a figure is not determined.
 
     Parameters
     ----------
@@ -249,15 +192,5 @@ def import_and_print(
     columns, units, rate, group = stated
     layout = RecordingLayout(pairs(columns, "--map"), pairs(units, "--units"), rate, group)
     imported = import_waveforms(paths, procedure, part, unit, layout, archive)
-    if as_json:
-        print_json(dict(imported))
-    else:
-        say(f"{imported['unit']}: {imported['records']} recordings, kept as run {imported['run']}")
-        rows = [
-            [one["figure"], one["axis"], short(one["value"]), short(one["uncertainty"]), one["unit"], one["note"]]
-            for one in imported["figures"]
-        ]
-        print_table(["figure", "axis", "value", "standard uncertainty", "unit", "remark"], rows, whole=2)
-        for line in imported["text"]:
-            say(f"  {line}")
-    return DONE if all(one["identified"] for one in imported["figures"]) else PART_FAILED
+    passed = all(one["identified"] for one in imported["figures"])
+    conclude(dict(imported), print_waveforms, as_json=as_json, passed=passed)

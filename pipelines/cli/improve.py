@@ -7,19 +7,16 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
 from pipelines.archive import Archive, Run
 from pipelines.cli import options
-from pipelines.cli.printing import error_console, give, refuse_standard_output, remark, say
-from pipelines.improvement.improvement import ImprovedTables, Improvement
-from schemas.errors import DONE, PART_FAILED, WrongUse
+from pipelines.cli.options import argument, names_in, option
+from pipelines.cli.printing import conclude, error_console, refuse_standard_output, remark, say
+from pipelines.improvement.improvement import Attendant, ImprovedTables, Improvement
+from schemas.errors import WrongUse
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from pipelines.improvement.documents import RecordingDocument
-    from pipelines.jobs.job import Job
 
 PART = "Start here"
 ORDER = 20
@@ -37,25 +34,17 @@ MEASURES = "y or Enter measures them, n leaves it; Ctrl-C stops, and the same co
 
 def command(
     data: Annotated[
-        str,
-        typer.Argument(
-            metavar="DATA|RUN", help="A recording in any format that import reads, a table of dwells, or a run."
-        ),
+        str, argument("DATA|RUN", "A recording in any format that import reads, a table of dwells, or a run.")
     ],
     effects: options.EffectsOption = "",
     model: Annotated[
-        Path | None,
-        typer.Option("--model", metavar="FILE", help="Model file to judge; its next versions are written to it."),
+        Path | None, option("--model FILE", "Model file to judge; its next versions are written to it.")
     ] = None,
     output: Annotated[
-        Path | None,
-        typer.Option("--out", "-o", metavar="FILE", help="Model file to write; --model or model.toml by default."),
+        Path | None, option("--out -o FILE", "Model file to write; --model or model.toml by default.")
     ] = None,
     choose: Annotated[
-        str,
-        typer.Option(
-            "--effect", metavar="a,b", help="Effects to add, one per class of the diagnosis, without a question."
-        ),
+        str, option("--effect a,b", "Effects to add, one per class of the diagnosis, without a question.")
     ] = "",
     history: options.HistoryOption = "",
     fresh: options.FreshOption = "",
@@ -66,15 +55,12 @@ def command(
     group: options.GroupOption = "",
     archive: options.ArchiveOption = None,
     *,
-    yes: Annotated[
-        bool,
-        typer.Option("--yes", "-y", help="Answer yes; a class of several effects needs --effect."),
-    ] = False,
+    yes: Annotated[bool, option("--yes -y", "Answer yes; a class of several effects needs --effect.")] = False,
     measure: Annotated[
         bool | None,
-        typer.Option(
+        option(
             "--measure/--no-measure",
-            help="Let the station of a run measure its units again as the fresh run; default: ask at a terminal.",
+            "Let the station of a run measure its units again as the fresh run; default: ask at a terminal.",
         ),
     ] = None,
     show_all: options.AllOption = False,
@@ -92,13 +78,17 @@ def command(
     from pipelines.cli.inputs import add_effects, both_runs, without_dwells
     from pipelines.cli.next_commands import judged_data
     from pipelines.cli.terminal import attended
-    from pipelines.cli.text.improve_text import next_lines, print_improvement
-    from pipelines.cli.text.recording_text import next_of_recording, print_recording
+    from pipelines.cli.text.improve_text import next_lines, next_of_recording, print_improvement, print_recording
     from pipelines.diagnosis.inputs import history_beside, judged_effects
+    from pipelines.importers import limited
     from pipelines.importers.files import is_file
+    from pipelines.improvement.recording import bring_in
 
     add_effects(effect_file)
-    recording = _brought_in(data, archive, group) if is_file(data) else None
+    recording = None
+    if is_file(data):
+        limited.start()
+        recording = bring_in([Path(data)], archive, error_console().status, group)  # None for a table of dwells
     data = data if recording is None else recording["run"]
     yes = yes or (recording is not None and not attended())
     judged = judged_effects(data, archive, effects, model, "improve")
@@ -111,26 +101,17 @@ def command(
     brief = recording is not None and not show_all
     attendant = _Terminal(data, model, archive, quiet=as_json or brief, measure=may_measure)
     improvement = Improvement(data, tables, model, target, beside, by, fresh, attendant)
-    document = improvement.run(judged, _names(choose), yes=yes)
+    document = improvement.run(judged, list(names_in(choose)), yes=yes)
     find = partial(judged_data, data, beside, archive)
     document["next"] = next_lines(document, target, find, after=document["after"] or document["diagnosis"])
     if recording is not None:
         document["recording"] = recording
         document["next"] = document["next"] or next_of_recording(document, archive)
-    give(document, print_recording if brief else print_improvement, as_json=as_json)
-    raise typer.Exit(DONE if document["adequate"] and not document["refuted"] else PART_FAILED)
+    show = print_recording if brief else print_improvement
+    conclude(document, show, as_json=as_json, passed=bool(document["adequate"] and not document["refuted"]))
 
 
-def _brought_in(data: str, archive: str | None, group: str) -> RecordingDocument | None:
-    """The import of a recording of another system; None for a table of dwells."""
-    from pipelines.importers import limited
-    from pipelines.improvement.recording import bring_in
-
-    limited.start()
-    return bring_in([Path(data)], archive, error_console().status, group)
-
-
-class _Terminal:
+class _Terminal(Attendant):
     """Shows an improvement at the terminal and asks its questions there.
 
     quiet : no diagnosis is printed · measure : whether the station measures a fresh run; None: it is asked
@@ -194,10 +175,6 @@ def _target(model: Path | None, output: Path | None) -> Path:
     return target
 
 
-def _names(listed: str) -> list[str]:
-    return list(dict.fromkeys(part.strip() for part in listed.split(",") if part.strip()))
-
-
 def fresh_run(source: str, archive: str | None, *, measure: bool | None) -> str:
     """The fresh run of a run; empty where there is none and none is measured.
 
@@ -227,24 +204,19 @@ def _measured(store: Archive, run: Run, *, ask: bool) -> str:
     from pipelines.cli.terminal import agreed, attended
     from pipelines.jobs.fresh_run import fresh_repeat
     from pipelines.jobs.job import job_of_run, measured_again
+    from pipelines.schedule.steps import steps
+    from pipelines.schedule.timing import minutes
 
     if ask and not attended():
         return ""
     job = measured_again(job_of_run(run), fresh_repeat(store, run))
+    time = minutes(steps(job.recipe), job.station, job.recipe).total
     question = (
         f"Measure the same {len(job.lot.units)} units again on station {job.station.name} as a fresh run "
-        f"({_minutes(job):.0f} min of station time)?"
+        f"({time:.0f} min of station time)?"
     )
     if ask and not agreed(question, MEASURES):
         return ""
     from pipelines.cli.run import measured
 
     return measured(job, store, None, asks=attended() and job.station.kind == "modbus").id
-
-
-def _minutes(job: Job) -> float:
-    """Station time of a job, min."""
-    from pipelines.schedule.steps import steps
-    from pipelines.schedule.timing import minutes
-
-    return minutes(steps(job.recipe), job.station, job.recipe).total

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from pipelines.parallel import Distributor
+    from schemas.lot import Lot
 
 
 def dwells_and_history(source: str, history: str, archive: str | None) -> tuple[pd.DataFrame, pd.DataFrame | None]:
@@ -77,3 +78,11 @@ def both_runs(
     first, temperatures = dwells_and_history(dwells, history, archive)
     again, again_temperatures = dwells_and_history(fresh, fresh_history, archive) if fresh else (None, None)
     return first, temperatures, again, again_temperatures
+
+
+def made_up(device: str, units: int, seed: int, repeat: int = 0) -> Lot:
+    """A lot with generated serial numbers, one per slot."""
+    from schemas.lot import Lot, Unit
+
+    sitting = [Unit(serial=f"SIM{i:04d}", slot=i) for i in range(units)]
+    return Lot(units=sitting, device=device, seed=seed, repeat=repeat)

@@ -5,12 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-import typer
-
 from inertial.counts import number_of
-from pipelines.cli import options
-from pipelines.cli.printing import error_console, print_json, print_table, say
-from schemas.errors import DONE, PART_FAILED, WrongUse
+from pipelines.cli.options import GroupOption, JoinOption, JsonOption, argument, option
+from pipelines.cli.printing import conclude, error_console, print_table, say
+from schemas.errors import WrongUse
 
 if TYPE_CHECKING:
     from pipelines.importers.documents import InspectDocument
@@ -31,17 +29,13 @@ PICTURES = (".svg", ".png", ".pdf")
 
 
 def command(
-    files: Annotated[list[Path], typer.Argument(metavar="FILE…", help="Recordings in any format that import reads.")],
-    join: options.JoinOption = "",
-    group: options.GroupOption = "",
-    picture: Annotated[
-        Path | None, typer.Option("--picture", metavar="FILE", help="Draw the record: .svg, .png or .pdf.")
-    ] = None,
-    page: Annotated[
-        Path | None, typer.Option("--page", metavar="FILE.html", help="Write the result as an HTML page.")
-    ] = None,
+    files: Annotated[list[Path], argument("FILE…", "Recordings in any format that import reads.")],
+    join: JoinOption = "",
+    group: GroupOption = "",
+    picture: Annotated[Path | None, option("--picture FILE", "Draw the record: .svg, .png or .pdf.")] = None,
+    page: Annotated[Path | None, option("--page FILE.html", "Write the result as an HTML page.")] = None,
     *,
-    as_json: options.JsonOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Show the content of a file and its probable meaning, with reasons: columns, units, rate, gaps, faults, static intervals.
 
@@ -68,17 +62,19 @@ def command(
     if picture or page:
         _write(inspections[0], picture, page)
     documents = [one.document for one in inspections]
-    if as_json:
-        print_json(documents[0] if len(documents) == 1 else {"inspections": documents})
-    else:
-        if len(documents) > 1:
-            say(
-                f"{len(documents)} recordings; if they are parts of one, add --join rows (one after the other) or --join "
-                "columns (side by side)",
-            )
-        for document in documents:
-            _print(document)
-    raise typer.Exit(PART_FAILED if any(document["open"] for document in documents) else DONE)
+    whole = documents[0] if len(documents) == 1 else {"inspections": documents}
+    passed = not any(document["open"] for document in documents)
+    conclude(whole, lambda _: _print_all(documents), as_json=as_json, passed=passed)
+
+
+def _print_all(documents: list[InspectDocument]) -> None:
+    if len(documents) > 1:
+        say(
+            f"{len(documents)} recordings; if they are parts of one, add --join rows (one after the other) or --join "
+            "columns (side by side)",
+        )
+    for document in documents:
+        _print(document)
 
 
 def _write(inspection: Inspection, picture: Path | None, page: Path | None) -> None:

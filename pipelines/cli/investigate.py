@@ -6,15 +6,13 @@ import sys
 from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
 from pipelines.archive import Archive
 from pipelines.cli import options
 from pipelines.cli.next_commands import command_line, judged_data, print_extension, print_next
-from pipelines.cli.printing import error_console, give, print_table, remark, say, short
+from pipelines.cli.options import option
+from pipelines.cli.printing import conclude, error_console, print_table, remark, say, short
 from pipelines.cli.run import shown
 from pipelines.cli.text.verdict_text import print_verdict
-from schemas.errors import DONE, PART_FAILED
 
 if TYPE_CHECKING:
     from pipelines.inquiry.inquiry import FollowUp, Inquiry
@@ -35,38 +33,29 @@ SETTLED = frozenset({"adequate", "told_apart"})
 def command(
     recipe: options.RecipeArgument = "production",
     station: options.StationOption = None,
-    units: Annotated[
-        str, typer.Option("--units", metavar="SN,…|FILE", help="Serial numbers slot by slot, or a slot map.")
-    ] = "",
+    units: Annotated[str, option("--units SN,…|FILE", "Serial numbers slot by slot, or a slot map.")] = "",
     archive: options.ArchiveOption = None,
     seed: options.SeedOption = None,
     repeat: options.RepeatOption = 0,
     effects: Annotated[
-        str,
-        typer.Option("--effects", metavar="a,b,c", help="Effects of the model to diagnose; the recipe's by default."),
+        str, option("--effects a,b,c", "Effects of the model to diagnose; the recipe's by default.")
     ] = "",
     budget: Annotated[
         float | None,
-        typer.Option(
-            "--budget",
-            min=0.0,
-            metavar="MIN",
-            help="Station time for follow-ups, min; 30 % of the first run by default.",
-        ),
+        option("--budget MIN", "Station time for follow-ups, min; 30 % of the first run by default.", min=0.0),
     ] = None,
     *,
     yes: Annotated[
         bool | None,
-        typer.Option(
+        option(
             "--yes/--ask",
-            help="Approval of extra station time: automatic, or ask, at the terminal or through a paused flow run.",
+            "Approval of extra station time: automatic, or ask, at the terminal or through a paused flow run.",
         ),
     ] = None,
     unseen: Annotated[
-        bool,
-        typer.Option("--unseen", help="Also measure follow-ups for effects that are not visible in the first run."),
+        bool, option("--unseen", "Also measure follow-ups for effects that are not visible in the first run.")
     ] = False,
-    direct: Annotated[bool, typer.Option("--direct", help="Run without the orchestrator.")] = False,
+    direct: Annotated[bool, option("--direct", "Run without the orchestrator.")] = False,
     as_json: options.JsonOption = False,
 ) -> None:
     """Measure a lot, diagnose it, and measure follow-ups that discriminate between the effects that may be missing.
@@ -103,9 +92,10 @@ def command(
 
             paused = yes is False and not at_terminal
             document = investigate_locally(request, store, settings, participants, ask=paused)
-    document["command"] = _continue_command() if document["ended"] in {"asked", "declined"} else None
-    give(document, lambda _: print_inquiry(document, archive), as_json=as_json)
-    raise typer.Exit(DONE if document["ended"] in SETTLED else PART_FAILED)
+    again = [word for word in sys.argv[1:] if word not in {"--ask", "--json"}]
+    document["command"] = command_line(*again, "--yes") if document["ended"] in {"asked", "declined"} else None
+    show = partial(print_inquiry, archive=archive)
+    conclude(document, show, as_json=as_json, passed=document["ended"] in SETTLED)
 
 
 def _answer(inquiry: Inquiry, follow_up: FollowUp) -> Consent:
@@ -127,12 +117,6 @@ def _print_diagnosis(joint: JointDiagnosis) -> None:
 
     runs = len(joint.lineage.runs)
     remark(f"diagnosis of {runs} run{'s' if runs > 1 else ''}: {verdict(joint.document)}")
-
-
-def _continue_command() -> str:
-    """The command that measures the proposed follow-up."""
-    given = [a for a in sys.argv[1:] if a not in {"--ask", "--json"}]
-    return command_line(*given, "--yes")
 
 
 def print_inquiry(document: dict[str, Any], archive: str | None = None) -> None:

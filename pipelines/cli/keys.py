@@ -5,9 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Annotated
 
-import typer
-
-from pipelines.cli import options
+from pipelines.cli.options import JsonOption, argument
 from pipelines.cli.printing import give, print_table, say
 from schemas.errors import WrongUse, did_you_mean
 
@@ -22,13 +20,10 @@ EXAMPLES = (
 
 def command(
     subject: Annotated[
-        str,
-        typer.Argument(
-            metavar="[SUBJECT]", help="recipe, limits, station, fault, demo or names; all in short by default."
-        ),
+        str, argument("[SUBJECT]", "recipe, limits, station, fault, demo or names; all in short by default.")
     ] = "",
     *,
-    as_json: options.JsonOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """List what a recipe, limits or station file may contain, what --fault and demo accept, and the names of files.
 

@@ -5,10 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from inertial.counts import number_of
-from pipelines.cli import options
+from pipelines.cli.options import ArchiveOption, JsonOption, argument, option
 from pipelines.cli.printing import console, print_json, say
 
 if TYPE_CHECKING:
@@ -27,24 +25,17 @@ EXAMPLES = (
 
 def command(
     target: Annotated[
-        str,
-        typer.Argument(
-            metavar="UNIT|RUN|FILE", help="A serial number, a run, a file of the archive, or a copy of such a file."
-        ),
+        str, argument("UNIT|RUN|FILE", "A serial number, a run, a file of the archive, or a copy of such a file.")
     ] = "latest",
     prov: Annotated[
-        Path | None,
-        typer.Option("--prov", metavar="FILE", help="Write the lineage as W3C PROV in JSON-LD; - for standard output."),
+        Path | None, option("--prov FILE", "Write the lineage as W3C PROV in JSON-LD; - for standard output.")
     ] = None,
     crate: Annotated[
-        Path | None,
-        typer.Option(
-            "--crate", metavar="DIR", help="Write an RO-Crate with every file of the lineage into this folder."
-        ),
+        Path | None, option("--crate DIR", "Write an RO-Crate with every file of the lineage into this folder.")
     ] = None,
-    archive: options.ArchiveOption = None,
+    archive: ArchiveOption = None,
     *,
-    as_json: options.JsonOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Show the origin of certificates, tables and samples, and the results made from them: by whom, when, with which code."""
     from pipelines.archive import Archive, files

@@ -6,7 +6,7 @@ from dataclasses import asdict
 
 from inertial.counts import number_of
 from pipelines.archive import Archive, RunInfo
-from pipelines.cli import options
+from pipelines.cli.options import ArchiveOption, JsonOption
 from pipelines.cli.printing import give, print_table, say
 from schemas.tables import ADEQUATE
 
@@ -19,7 +19,7 @@ EXAMPLES = (
 )
 
 
-def command(archive: options.ArchiveOption = None, *, as_json: options.JsonOption = False) -> None:
+def command(archive: ArchiveOption = None, *, as_json: JsonOption = False) -> None:
     """List the runs of the archive in the order of their start."""
     store = Archive(archive)
     infos = store.runs()
@@ -32,15 +32,14 @@ def _print(infos: list[RunInfo], store: Archive) -> None:
         say(f"no run in {store.root}; make one with 'tumbleline run'")
         return
     say(f"{number_of(len(infos), 'run')} in {store.root}")
-    print_table(["run", "started (UTC)", "station", "passed", "units"], [_line(info) for info in infos])
+    lines = [
+        [info.id, info.started[:16].replace("T", " "), info.station or "import", _result(info), _units(info)]
+        for info in infos
+    ]
+    print_table(["run", "started (UTC)", "station", "passed", "units"], lines)
     for info in infos:
         if info.rerun_of:
             say(f"{info.id} is a re-run of {info.rerun_of}")
-
-
-def _line(info: RunInfo) -> list[str]:
-    started = info.started[:16].replace("T", " ")
-    return [info.id, started, info.station or "import", _result(info), f"{_units(info.units)}, {info.device}"]
 
 
 def _result(info: RunInfo) -> str:
@@ -51,5 +50,7 @@ def _result(info: RunInfo) -> str:
     return passed if info.verdict in {None, ADEQUATE} else f"{passed}, model {info.verdict}"
 
 
-def _units(units: tuple[str, ...]) -> str:
-    return ", ".join(units) if len(units) <= 3 else f"{units[0]} … {units[-1]} ({len(units)})"
+def _units(info: RunInfo) -> str:
+    units = info.units
+    listed = ", ".join(units) if len(units) <= 3 else f"{units[0]} … {units[-1]} ({len(units)})"
+    return f"{listed}, {info.device}"

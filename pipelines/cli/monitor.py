@@ -8,12 +8,10 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from pipelines.archive import Archive
-from pipelines.cli import options
-from pipelines.cli.printing import give_lines, say
-from schemas.errors import DONE, PART_FAILED, WrongUse
+from pipelines.cli.options import ArchiveOption, JsonOption, option
+from pipelines.cli.printing import conclude, print_text, say
+from schemas.errors import WrongUse
 
 if TYPE_CHECKING:
     from pipelines.monitoring.alerts import Poster
@@ -31,32 +29,22 @@ PORT = 9464
 
 
 def command(
-    archive: options.ArchiveOption = None,
+    archive: ArchiveOption = None,
     queue: Annotated[
-        list[str] | None,
-        typer.Option("--queue", metavar="NAME", help="A queue that must have a worker online; may be repeated."),
+        list[str] | None, option("--queue NAME", "A queue that must have a worker online; may be repeated.")
     ] = None,
-    days: Annotated[int, typer.Option("--days", min=1, max=3650, help="Number of days whose runs are counted.")] = 30,
-    free_gb: Annotated[
-        float, typer.Option("--free-gb", min=0.0, metavar="GB", help="Free space that the archive needs.")
-    ] = 1.0,
-    webhook: Annotated[
-        str, typer.Option("--webhook", metavar="ADDRESS", help="Post alerts to this address, with --serve.")
-    ] = "",
+    days: Annotated[int, option("--days", "Number of days whose runs are counted.", min=1, max=3650)] = 30,
+    free_gb: Annotated[float, option("--free-gb GB", "Free space that the archive needs.", min=0.0)] = 1.0,
+    webhook: Annotated[str, option("--webhook ADDRESS", "Post alerts to this address, with --serve.")] = "",
     audits: Annotated[
-        Path | None,
-        typer.Option("--audits", metavar="DIR", help="Folder of audit documents whose findings are alerts too."),
+        Path | None, option("--audits DIR", "Folder of audit documents whose findings are alerts too.")
     ] = None,
-    host: Annotated[
-        str, typer.Option("--host", metavar="ADDRESS", help="Address to listen on, with --serve.")
-    ] = "127.0.0.1",
-    port: Annotated[int, typer.Option("--port", min=0, max=65535, help="Port, with --serve; 0: a free one.")] = PORT,
+    host: Annotated[str, option("--host ADDRESS", "Address to listen on, with --serve.")] = "127.0.0.1",
+    port: Annotated[int, option("--port", "Port, with --serve; 0: a free one.", min=0, max=65535)] = PORT,
     *,
-    metrics: Annotated[
-        bool, typer.Option("--metrics", help="Print the numbers in the format of Prometheus, and exit.")
-    ] = False,
-    serve: Annotated[bool, typer.Option("--serve", help="Serve /metrics, /healthz and /livez until stopped.")] = False,
-    as_json: options.JsonOption = False,
+    metrics: Annotated[bool, option("--metrics", "Print the numbers in the format of Prometheus, and exit.")] = False,
+    serve: Annotated[bool, option("--serve", "Serve /metrics, /healthz and /livez until stopped.")] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Report whether the line is healthy; exit status 1 if it is not.
 
@@ -78,12 +66,11 @@ def command(
         return
     snapshot = monitor.snapshot()
     if metrics:
-        typer.echo(text(snapshot).decode(), nl=False)
+        print_text(text(snapshot).decode())
         return
     document = snapshot.document()
     verdict = "healthy" if document["ok"] else f"{len(document['problems'])} problems"
-    give_lines(document, [*document["problems"], verdict], as_json=as_json)
-    raise typer.Exit(DONE if document["ok"] else PART_FAILED)
+    conclude(document, [*document["problems"], verdict], as_json=as_json, passed=document["ok"])
 
 
 def _serve(monitor: Monitor, host: str, port: int, poster: Poster | None, audits: Path | None) -> None:

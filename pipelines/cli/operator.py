@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import os
-from typing import TYPE_CHECKING, Annotated
-
-import typer
+from typing import TYPE_CHECKING, Annotated, Any
 
 from pipelines.archive import Archive
-from pipelines.cli import options
+from pipelines.cli.options import ArchiveOption, JsonOption, argument, option
 from pipelines.cli.printing import give, print_table, say
 from schemas.errors import WrongUse
 
 if TYPE_CHECKING:
     from pipelines.chain.attendance import Answer
-    from pipelines.flows.operator import Waiting
 
 PART = "Measure"
 ORDER = 140
@@ -26,16 +23,12 @@ EXAMPLES = (
 
 
 def command(
-    run: Annotated[
-        str, typer.Argument(metavar="[FLOW-RUN]", help="The run to answer: the beginning of its name or id.")
-    ] = "",
-    archive: options.ArchiveOption = None,
+    run: Annotated[str, argument("[FLOW-RUN]", "The run to answer: the beginning of its name or id.")] = "",
+    archive: ArchiveOption = None,
     *,
-    go: Annotated[bool, typer.Option("--go", help="Confirm: the run continues.")] = False,
-    stop: Annotated[
-        bool, typer.Option("--stop", help="Stop the run; the same 'tumbleline run' continues it later.")
-    ] = False,
-    as_json: options.JsonOption = False,
+    go: Annotated[bool, option("--go", "Confirm: the run continues.")] = False,
+    stop: Annotated[bool, option("--stop", "Stop the run; the same 'tumbleline run' continues it later.")] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Show the runs that wait for the operator and their questions; answer with --go or --stop."""
     if go and stop:
@@ -46,20 +39,21 @@ def command(
     matches = [one for one in waiting() if one.name.startswith(run) or one.id.startswith(run)]
     reply: Answer | None = "go" if go else "stop" if stop else None
     if reply is not None:
-        _refuse_other_than_one(matches, run)
+        if len(matches) != 1:
+            names = ", ".join(one.name for one in matches) or "none"
+            raise WrongUse(
+                f"operator: {len(matches)} waiting runs begin with '{run}' ({names}), one is needed; give more of its name"
+            )
         answer(matches[0].id, reply)
-    give(
-        {"waiting": [vars(one) for one in matches], "answered": reply},
-        lambda _: _print(matches, reply),
-        as_json=as_json,
-    )
+    give({"waiting": [vars(one) for one in matches], "answered": reply}, _print, as_json=as_json)
 
 
-def _print(matches: list[Waiting], reply: Answer | None) -> None:
+def _print(document: dict[str, Any]) -> None:
+    reply, waiting = document["answered"], document["waiting"]
     if reply is not None:
-        say(f"{matches[0].name}: {'continues' if reply == 'go' else 'stops'}")
-    elif matches:
-        print_table(["run", "asks"], [[one.name, one.question] for one in matches])
+        say(f"{waiting[0]['name']}: {'continues' if reply == 'go' else 'stops'}")
+    elif waiting:
+        print_table(["run", "asks"], [[one["name"], one["question"]] for one in waiting])
     else:
         say("no run waits for the operator")
 
@@ -77,11 +71,3 @@ def _reach(archive: str | None) -> None:
             "operator: no orchestrator of this archive answers, so that no run waits; give the archive of the run with --archive"
         )
     os.environ.update(matches)
-
-
-def _refuse_other_than_one(matches: list[Waiting], run: str) -> None:
-    if len(matches) != 1:
-        names = ", ".join(one.name for one in matches) or "none"
-        raise WrongUse(
-            f"operator: {len(matches)} waiting runs begin with '{run}' ({names}), one is needed; give more of its name"
-        )

@@ -2,27 +2,153 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
-from pipelines.cli.next_commands import command_line, print_next
-from pipelines.cli.optimise_options import OptimiseOptions, levels_of, requirement_of
-from pipelines.cli.printing import error_console, print_table, remark, say, short
-from schemas.errors import TumblelineError
+from pipelines.cli.options import names_in
+from pipelines.cli.printing import error_console
+from schemas.bounds import COLDEST_C, HOTTEST_C
+from schemas.errors import TumblelineError, WrongUse, did_you_mean
+from schemas.foreign import shown
 from schemas.recipe import Recipe
 from schemas.station import StationConfig
+from schemas.units import MICRO
 
 if TYPE_CHECKING:
     from inertial.noise.dwells import DwellNoise
+    from pipelines.planning.context import PlanContext
     from pipelines.planning.optimise import Optimum
+    from pipelines.planning.requirement import Requirement
+
+
+@dataclass(frozen=True)
+class OptimiseOptions:
+    """The options of the command."""
+
+    see: str
+    required_errors: Sequence[str]
+    factor: float
+    temperatures: str
+    poses: str
+    criterion: str
+    verification: int | None
+    part: str
+    size: float | None
+    separation: float | None
+    ramp: bool
+
+
+def levels_of(base: Recipe, temperatures: str) -> tuple[float, ...]:
+    """Required temperatures, °C, in rising order."""
+    try:
+        given = [float(part) for part in temperatures.split(",")] if temperatures else base.temperatures_C
+    except ValueError:
+        raise WrongUse(
+            f"plan: --temperatures '{temperatures}' is no list of numbers, one is needed; write -10,25,60"
+        ) from None
+    outside = [level for level in given if not COLDEST_C <= level <= HOTTEST_C]
+    if outside:
+        found, needed = f"found {outside[0]:g} °C", f"{COLDEST_C:g} to {HOTTEST_C:g} °C is needed"
+        raise WrongUse(f"plan: --temperatures '{temperatures}': {found}, {needed}; correct it")
+    return tuple(sorted(set(given)))
+
+
+def _discriminates(options: OptimiseOptions) -> bool:
+    """Whether the options require discrimination; options that do not go together are refused."""
+    parts = options.criterion.upper() == "T"
+    other = (
+        {"--wanted": options.required_errors, "--factor": options.factor != 1.0}
+        if parts
+        else {
+            "--part": options.part,
+            "--size": options.size is not None,
+            "--separation": options.separation is not None,
+        }
+    )
+    for option, given in other.items():
+        if given:
+            raise WrongUse(
+                f"plan: {option} does not go with --criterion {options.criterion}; leave one of the two out"
+                + ("" if parts else ", or write --criterion T")
+            )
+    return parts
+
+
+def _discrimination(options: OptimiseOptions, against: PlanContext, levels: tuple[float, ...]) -> Requirement:
+    from pipelines.jobs.model_files import refuse_unknown_effects
+    from pipelines.planning.discrimination import ENOUGH, SIZE_UG, discrimination_requirement
+
+    rivals, see = names_in(options.part), names_in(options.see)
+    if not rivals:
+        raise WrongUse(
+            "plan: --criterion T needs the effects to discriminate between; write --part third_order,odd_quadratic"
+        )
+    refuse_unknown_effects(rivals, "plan: --part")
+    refuse_unknown_effects(see, "plan: --see")
+    _refuse_unknown_plan(options.poses)
+    size, enough = options.size or SIZE_UG, options.separation or ENOUGH
+    return discrimination_requirement(against, rivals, levels, size_ug=size, enough=enough, plan=options.poses, see=see)
+
+
+def _refuse_unknown_plan(name: str) -> None:
+    from inertial.poses import NAMED
+
+    if name and name not in NAMED:
+        raise WrongUse(f"plan: no plan of poses is called '{shown(name)}'; {did_you_mean(name, list(NAMED))}")
+
+
+def _required_errors(
+    options: OptimiseOptions, base: Recipe, against: PlanContext, levels: tuple[float, ...]
+) -> Requirement:
+    from inertial.design import local_names, split
+    from inertial.planning.pose_exchange import Criterion
+    from pipelines.jobs.model_files import refuse_unknown_effects
+    from pipelines.planning.requirement import Requirement, candidates, temperature_choices
+    from pipelines.planning.textbook import reference_errors, seen_by
+
+    criteria = {name.lower(): name for name in get_args(Criterion)}
+    if options.criterion.lower() not in criteria:
+        known = [*get_args(Criterion), "T"]
+        raise WrongUse(f"plan: no criterion '{options.criterion}'; {did_you_mean(options.criterion, known)}")
+    _refuse_unknown_plan(options.poses)
+    see = names_in(options.see)
+    refuse_unknown_effects(see, "plan: --see")
+    errors = options.factor * reference_errors(against, base)
+    names = [name for name, _ in local_names(split(base.effects)[0], 0)]
+    for effect, limit in _limits(options.required_errors, names).items():
+        for column, name in enumerate(names):
+            if name == effect:
+                errors[:, column] = limit / MICRO
+    return Requirement(
+        errors=errors,
+        see=see or seen_by(against, levels),
+        levels=levels if options.temperatures else (levels[0], levels[-1]),
+        optional_levels=() if options.temperatures else temperature_choices(levels),
+        candidates=candidates(against.station, options.poses),
+        criterion=criteria[options.criterion.lower()],
+    )
+
+
+def _limits(required_errors: Sequence[str], model: list[str]) -> dict[str, float]:
+    """Required errors by effect, µg per unit of the column."""
+    limits: dict[str, float] = {}
+    for text in required_errors:
+        effect, _, number = text.partition("=")
+        try:
+            limits[effect] = float(number)
+        except ValueError:
+            limits[effect] = 0.0
+        if effect not in model:
+            raise WrongUse(f"plan: --wanted '{text}': '{effect}' is not in the model; {did_you_mean(effect, model)}")
+        if not limits[effect] > 0.0:
+            raise WrongUse(f"plan: --wanted '{text}': a positive error in µg is needed; write {effect}=50")
+    return limits
+
 
 TOLERANCE = 1.1
 """Largest ratio to the textbook plan's errors for which the nearest recipe is written, without required errors in the options."""
-
-
-ERROR_HEADS = ("coefficient, unit", "error\n1σ", "required", "ratio", "given\n1σ")
 
 
 def cheapest_recipe(
@@ -42,10 +168,15 @@ def cheapest_recipe(
 
     levels = levels_of(base, options.temperatures)
     against = plan_context(textbook(base, levels), station, noise)
-    requirement = requirement_of(options, base, against, levels)
+    requirement = (
+        _discrimination(options, against, levels)
+        if _discriminates(options)
+        else _required_errors(options, base, against, levels)
+    )
     requirement = replace(requirement, verification=options.verification or verified_in(base))
+    errors_named = bool(options.required_errors) or options.factor != 1.0
+    tolerance = 1.0 if errors_named else TOLERANCE
     with error_console().status("searching for the recipe with the least station time") as status:
-        tolerance = 1.0 if options.errors_named else TOLERANCE
         best = optimise(
             base,
             against,
@@ -97,82 +228,3 @@ def _reached(best: Optimum) -> str:
     rivals = best.requirement.effects[-len(best.requirement.discrimination.rivals) :]
     chi_square = best.requirement.discrimination.chi_square / best.worst**2
     return f"Discrimination between {', '.join(rivals)}: χ² at least {chi_square:.0f}"
-
-
-def print_optimum(document: dict[str, Any]) -> None:
-    """Print the recipe found."""
-    temperatures = ", ".join(f"{t:g}" for t in document["temperatures_C"])
-    say(
-        f"{document['recipe']}: {document['dwells']} dwells of {document['dwell_s']:g} s "
-        f"in {document['poses']} poses, {'ramps to' if document['ramp'] else 'soaks at'} {temperatures} °C"
-    )
-    minutes, own, textbook = document["minutes"], document["own_minutes"], document["textbook_minutes"]
-    parts = [
-        [name.replace("_", " "), f"{minutes[name]:.0f}", f"{own[name]:.0f}", f"{textbook[name]:.0f}"]
-        for name in minutes
-    ]
-    print_table(["station time, min", "new recipe", document["from"], "textbook plan"], parts)
-    for line in _comparison(document):
-        say(line)
-    if document["rivals"]:
-        lines = [[r["true"], r["wrong"], short(r["chi_square"]), short(r["textbook"])] for r in document["rivals"]]
-        print_table(["true effect", "fitted effect", "χ², new recipe", "χ², textbook plan"], lines, whole=2)
-    else:
-        print_table(ERROR_HEADS, _error_lines(document["coefficients"]))
-        say(f"error: of the new recipe; given: of {document['from']}", style="dim")
-    if document["seen_besides"]:
-        say(f"Also visible, unlike with the textbook plan: {', '.join(document['seen_besides'])}")
-    say(f"Recipe file: {document['file']}")
-    if document["limits_missing"]:
-        remark(f"warning: {document['limits_missing']}", style="yellow")
-    else:
-        print_next([command_line("run", str(document["file"]))])
-    if "page" in document:
-        say(f"Page: {document['page']}")
-
-
-def _comparison(document: dict[str, Any]) -> list[str]:
-    """Sentences that compare the new recipe with the own one and the textbook plan."""
-    name, more = document["from"], document["minutes"]["total"] - document["own_minutes"]["total"]
-    difference = (
-        f"{abs(more):.0f} min {'more' if more > 0.0 else 'less'} than {name}" if abs(more) >= 0.5 else f"as {name}"
-    )
-    first = (
-        f"The new recipe takes {difference}, and {100.0 * document['share']:.0f} % of the textbook plan's time without the "
-        f"static record; {document['verification_dwells']} dwells are for verification (textbook plan: none)."
-    )
-    lines = [first]
-    if document["bound"] is not None:
-        lines.append(
-            f"Measuring without a pause on ramps would need {100.0 * document['bound']['share']:.0f} %, for "
-            f"{document['bound']['effect']}: lag, ramp and wander allow no less."
-        )
-    worst = document["own_worst"]
-    if worst is not None:
-        meets = "meets the required errors" if worst <= 1.0 else f"has up to {worst:.2f} times the required errors"
-        lines.append(
-            f"{name} {meets}." + ("" if worst <= 1.0 else f" For errors as in {name}, give --factor {worst:.2f}.")
-        )
-        if worst <= 1.0 and more > 0.0:
-            lines.append(f"{name} is quicker and meets the requirement: keep it.")
-    if document["worst"] > 1.0:
-        lines.append(
-            "No recipe was found that reaches the textbook plan's errors for every coefficient; the nearest has up to "
-            f"{document['worst']:.3f} times these errors. Allow larger errors with --factor, or fewer dwells with --verification."
-        )
-    return lines
-
-
-def _error_lines(rows: list[dict[str, Any]]) -> list[list[str]]:
-    count = Counter((r["effect"], r["axis"]) for r in rows)
-    several = {effect for (effect, _), number in count.items() if number > 1}
-    return [
-        [
-            f"{r['effect']} {r['axis']}{' ' + r['name'] if r['effect'] in several else ''}, {r['unit']}",
-            short(r["uncertainty_ug"]),
-            short(r["wanted_ug"]),
-            f"{r['uncertainty_ug'] / r['wanted_ug']:.2f}",
-            short(r["own_ug"]) or "–",
-        ]
-        for r in rows
-    ]

@@ -2,24 +2,23 @@
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from typer.core import TyperGroup
 
-from pipelines.archive import Archive
 from pipelines.cli import options
-from pipelines.cli.plan_files import save, write_page, write_pictures
-from pipelines.cli.printing import give, is_standard_output, print_json, print_text, remark
-from pipelines.cli.text.plan_text import print_plan, print_procedures
-from schemas.errors import PART_FAILED, RecipeInvalid
-from schemas.limits import Limits
-from schemas.recipe import Recipe
+from pipelines.cli.options import argument, option
+from pipelines.cli.printing import conclude, give, is_standard_output, print_text, remark
+from pipelines.cli.text.plan_text import print_optimum, print_plan, print_procedures
+from schemas.errors import RecipeInvalid
 
 if TYPE_CHECKING:
     from typer._click import Context
 
+    from pipelines.planning.context import PlanContext
 
 PART = "Measure"
 ORDER = 120
@@ -45,29 +44,21 @@ RECIPE = "recipe"
 
 
 DeviceOption = Annotated[
-    str,
-    typer.Option(
-        "--device", metavar="PRESET", help="Preset with the noise of the device; the recipe's device by default."
-    ),
+    str, option("--device PRESET", "Preset with the noise of the device; the recipe's device by default.")
 ]
 NoiseOption = Annotated[
-    float | None,
-    typer.Option("--noise", min=0.0, help="White noise density of the device, µg/√Hz; the preset's by default."),
+    float | None, option("--noise", "White noise density of the device, µg/√Hz; the preset's by default.", min=0.0)
 ]
 WanderOption = Annotated[
     float | None,
-    typer.Option(
+    option(
         "--wander",
+        "Flicker floor of the Allan deviation, µg, without random walk; flicker and random walk of the preset by default.",
         min=0.0,
-        help="Flicker floor of the Allan deviation, µg, without random walk; flicker and random walk of the preset by default.",
     ),
 ]
-EffectsOption = Annotated[
-    str, typer.Option("--effects", metavar="a,b,c", help="Effects of the model; the recipe's by default.")
-]
-PageOption = Annotated[
-    Path | None, typer.Option("--page", metavar="FILE.html", help="Also write an HTML page with pictures to this file.")
-]
+EffectsOption = Annotated[str, option("--effects a,b,c", "Effects of the model; the recipe's by default.")]
+PageOption = Annotated[Path | None, option("--page FILE.html", "Also write an HTML page with pictures to this file.")]
 
 
 class _RecipeFirst(TyperGroup):
@@ -103,18 +94,16 @@ def command(
     wander: WanderOption = None,
     pose: Annotated[
         list[str] | None,
-        typer.Option(
-            "--pose",
-            metavar="NAME=OUTER,INNER",
-            help="Plan with a pose at other angles, in degrees: p05 is the fifth of the fit, v1 the first of the "
+        option(
+            "--pose NAME=OUTER,INNER",
+            "Plan with a pose at other angles, in degrees: p05 is the fifth of the fit, v1 the first of the "
             "verification; may be repeated.",
         ),
     ] = None,
     page: PageOption = None,
     archive: options.ArchiveOption = None,
     pictures: Annotated[
-        Path | None,
-        typer.Option("--pictures", metavar="DIR", help="Also write the pictures to this folder, as RECIPE-NAME.svg."),
+        Path | None, option("--pictures DIR", "Also write the pictures to this folder, as RECIPE-NAME.svg.")
     ] = None,
     *,
     as_json: options.JsonOption = False,
@@ -125,7 +114,8 @@ def command(
     equipment, and the figures that they determine.
     """
     from pipelines.jobs.moved_poses import moves_of, with_moved_poses
-    from pipelines.jobs.recipes import folder_of
+    from pipelines.jobs.recipes import folder_of, load_limits
+    from pipelines.jobs.releases import planned_recipe
     from pipelines.jobs.terms import planned_terms, refused_by_run
     from pipelines.planning.context import noise_of, plan_context
     from pipelines.planning.plan import plan
@@ -133,116 +123,83 @@ def command(
     from schemas.station import load_station
 
     config = load_station(station)
-    planned_recipe = with_moved_poses(
-        with_model(recipe, effects, model, archive, config.name), moves_of(pose or (), "plan"), "plan"
-    )
-    for message in refused_by_run(planned_recipe, config, folder_of(recipe)):
+    planned = planned_recipe(recipe, effects, model, archive, config.name)
+    planned = with_moved_poses(planned, moves_of(pose or (), "plan"), "plan")
+    for message in refused_by_run(planned, config, folder_of(recipe)):
         remark(f"warning: 'tumbleline run' refuses this recipe: {message}", style="yellow")
-    limits = _limits(planned_recipe, folder_of(recipe))
-    if not planned_recipe.tumbles and page is None and pictures is None:
-        document = plan_of_procedures(planned_recipe, config, limits)
-        print_json(document) if as_json else print_procedures(document)
+    try:
+        limits = load_limits(planned, folder_of(recipe))
+    except RecipeInvalid:
+        limits = None  # a plan does not need them
+    if not planned.tumbles and page is None and pictures is None:
+        give(plan_of_procedures(planned, config, limits), print_procedures, as_json=as_json)
         return
-    context = plan_context(
-        planned_recipe, config, noise_of(planned_recipe, device or planned_recipe.device, noise, wander)
-    )
-    document = plan(context, planned_terms(planned_recipe, config, limits), limits)
-    if planned_recipe.procedures:
-        document["procedures"] = procedure_rows(planned_recipe, config, limits)
+    context = plan_context(planned, config, noise_of(planned, device or planned.device, noise, wander))
+    document = plan(context, planned_terms(planned, config, limits), limits)
+    if planned.procedures:
+        document["procedures"] = procedure_rows(planned, config, limits)
     if page is not None:
         write_page(page, document, context)
         document["page"] = str(page)
     if pictures is not None:
         write_pictures(pictures, document, context)
-    give(document, print_plan, as_json=as_json)
-    stated = document.get("uncertainty")
-    if stated is not None and stated["unreachable"]:
-        raise typer.Exit(PART_FAILED)
+    conclude(document, print_plan, as_json=as_json, passed=not (document.get("uncertainty") or {}).get("unreachable"))
 
 
 @app.command()
 def optimise(
     recipe: Annotated[
-        str,
-        typer.Argument(
-            metavar="[RECIPE]", help="Recipe to start from: device, sample rate, soak, temperature range, limits."
-        ),
+        str, argument("[RECIPE]", "Recipe to start from: device, sample rate, soak, temperature range, limits.")
     ] = "production",
     output: Annotated[
         Path | None,
-        typer.Option(
-            "--output",
-            "-o",
-            metavar="FILE.toml",
-            help="File of the new recipe; - prints it; NAME-optimal.toml by default.",
-        ),
+        option("--output -o FILE.toml", "File of the new recipe; - prints it; NAME-optimal.toml by default."),
     ] = None,
     device: DeviceOption = "",
     station: options.StationOption = None,
     effects: EffectsOption = "",
     model: options.ModelOption = None,
     see: Annotated[
-        str,
-        typer.Option(
-            "--see",
-            metavar="a,b,c",
-            help="Further effects that must be visible; those of the textbook plan by default.",
-        ),
+        str, option("--see a,b,c", "Further effects that must be visible; those of the textbook plan by default.")
     ] = "",
     required_errors: Annotated[
         list[str] | None,
-        typer.Option(
-            "--wanted", metavar="EFFECT=µg", help="Required error (1σ) of an effect's coefficients; may be repeated."
-        ),
+        option("--wanted EFFECT=µg", "Required error (1σ) of an effect's coefficients; may be repeated."),
     ] = None,
     factor: Annotated[
-        float, typer.Option("--factor", min=0.01, help="Required errors as a multiple of the textbook plan's.")
+        float, option("--factor", "Required errors as a multiple of the textbook plan's.", min=0.01)
     ] = 1.0,
     temperatures: Annotated[
         str,
-        typer.Option(
-            "--temperatures",
-            metavar="a,b,c",
-            help="Required temperatures, °C; by default the ends of the recipe's range, and others between as needed.",
+        option(
+            "--temperatures a,b,c",
+            "Required temperatures, °C; by default the ends of the recipe's range, and others between as needed.",
         ),
     ] = "",
     poses: Annotated[
-        str,
-        typer.Option(
-            "--poses",
-            metavar="PLAN",
-            help="Named plan of candidate poses; a Fibonacci lattice of directions by default.",
-        ),
+        str, option("--poses PLAN", "Named plan of candidate poses; a Fibonacci lattice of directions by default.")
     ] = "",
     criterion: Annotated[
         str,
-        typer.Option(
+        option(
             "--criterion",
-            help="worst (coefficient), A (mean variance), D (volume), or T (discrimination between effects, see --part).",
+            "worst (coefficient), A (mean variance), D (volume), or T (discrimination between effects, see --part).",
         ),
     ] = "worst",
-    part: Annotated[
-        str, typer.Option("--part", metavar="a,b", help="With --criterion T: effects to discriminate between.")
-    ] = "",
+    part: Annotated[str, option("--part a,b", "With --criterion T: effects to discriminate between.")] = "",
     size: Annotated[
         float | None,
-        typer.Option(
-            "--size", min=1e-3, help="With --criterion T: largest contribution of each effect, µg; 100 by default."
-        ),
+        option("--size", "With --criterion T: largest contribution of each effect, µg; 100 by default.", min=1e-3),
     ] = None,
     separation: Annotated[
         float | None,
-        typer.Option(
-            "--separation",
-            min=1.0,
-            help="With --criterion T: required χ² of the wrong effect over the lot; 50 by default.",
+        option(
+            "--separation", "With --criterion T: required χ² of the wrong effect over the lot; 50 by default.", min=1.0
         ),
     ] = None,
     verification: Annotated[
         int | None,
-        typer.Option(
-            "--verification", min=1, help="Repetitions of each verification pose; as in the recipe by default."
-        ),
+        option("--verification", "Repetitions of each verification pose; as in the recipe by default.", min=1),
     ] = None,
     noise: NoiseOption = None,
     wander: WanderOption = None,
@@ -250,10 +207,7 @@ def optimise(
     archive: options.ArchiveOption = None,
     *,
     ramp: Annotated[
-        bool,
-        typer.Option(
-            "--ramp", help="Measure while the chamber ramps, without soaks; the device's temperature is read."
-        ),
+        bool, option("--ramp", "Measure while the chamber ramps, without soaks; the device's temperature is read.")
     ] = False,
     as_json: options.JsonOption = False,
 ) -> None:
@@ -263,31 +217,20 @@ def optimise(
     10 s) over the same temperatures, and every effect that is visible under it stays visible. With --criterion T --part a,b: the
     recipe with the least station time that discriminates between these effects.
     """
-    from pipelines.cli.optimal import cheapest_recipe, missing_limits, print_optimum, written
-    from pipelines.cli.optimise_options import OptimiseOptions
+    from pipelines.cli.optimal import OptimiseOptions, cheapest_recipe, missing_limits, written
     from pipelines.jobs.recipes import folder_of
+    from pipelines.jobs.releases import planned_recipe
     from pipelines.planning.context import noise_of
     from schemas.station import load_station
 
     printed = is_standard_output(output, "plan optimise", as_json=as_json)
     config = load_station(station)
-    base = with_model(recipe, effects, model, archive, config.name)
-    options = OptimiseOptions(
-        see,
-        tuple(required_errors or ()),
-        factor,
-        temperatures,
-        poses,
-        criterion,
-        verification,
-        part,
-        size,
-        separation,
-        ramp,
+    base = planned_recipe(recipe, effects, model, archive, config.name)
+    wanted = OptimiseOptions(
+        see, required_errors or (), factor, temperatures, poses, criterion, verification, part, size, separation, ramp
     )
-    optimum, document = cheapest_recipe(
-        base, Path(recipe).name, config, noise_of(base, device or base.device, noise, wander), options
-    )
+    noise_of_device = noise_of(base, device or base.device, noise, wander)
+    optimum, document = cheapest_recipe(base, Path(recipe).name, config, noise_of_device, wanted)
     target = output or Path(f"{optimum.planned.recipe.name}.toml")
     document["file"] = str(target)
     home = folder_of(recipe)
@@ -300,37 +243,36 @@ def optimise(
         document["page"] = str(page)
     if printed:  # the recipe alone: its first comments say what it reaches
         print_text(text)
-    elif as_json:
-        print_json(document)
     else:
-        print_optimum(document)
+        give(document, print_optimum, as_json=as_json)
 
 
-def _limits(recipe: Recipe, home: Path) -> Limits | None:
-    """The limits that a recipe names; None where they are not there, which a plan does not need."""
-    from pipelines.jobs.recipes import load_limits
+def save(path: Path, text: str) -> None:
+    """Write a file; a folder that does not exist or cannot be written to is wrong use."""
+    from schemas.errors import WrongUse
 
     try:
-        return load_limits(recipe, home)
-    except RecipeInvalid:
-        return None
+        path.write_text(text, encoding="utf-8")
+    except OSError as problem:
+        raise WrongUse(
+            f"plan: {path} cannot be written ({problem.strerror}); give a file in a folder that exists and is writable"
+        ) from None
 
 
-def with_model(recipe: str, effects: str, model: Path | None, archive: str | None, station: str) -> Recipe:
-    """The recipe, with another model where one is given; the archive is read only for a recipe with the line's model."""
-    from pipelines.jobs.model_files import chosen_effects, use_formulas
-    from pipelines.jobs.recipes import load_recipe
+def write_page(page: Path, document: dict[str, Any], context: PlanContext) -> None:
+    """Write the page."""
+    from pipelines.report.plan import render_plan
 
-    chosen = chosen_effects(effects, model, "plan")
+    save(page, render_plan(document, context))
 
-    def line(device: str) -> dict[str, Any]:
-        from pipelines.jobs.releases import line_model
 
-        if chosen:
-            return {"effects": chosen}
-        keys = line_model(Archive(archive), device, station)
-        use_formulas(keys["formulas"], "the line's model")
-        return keys
+def write_pictures(folder: Path, document: dict[str, Any], context: PlanContext) -> None:
+    """Write each picture to a file."""
+    from pipelines.drawing.vector import alone
+    from pipelines.report.plan import pictures
 
-    loaded = load_recipe(recipe, line)
-    return loaded.model_copy(update={"effects": list(chosen)}) if chosen else loaded
+    with contextlib.suppress(OSError):  # what is wrong with the folder is said where a picture cannot be written to it
+        folder.mkdir(parents=True, exist_ok=True)
+    for name, text in pictures(document, context).items():
+        if text:
+            save(folder / f"{document['recipe']}-{name}.svg", alone(text))

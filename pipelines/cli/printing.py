@@ -6,13 +6,13 @@ import json
 import sys
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import typer
 
 from inertial.uncertainty import rounding
 from pipelines.tables.json_values import json_value
-from schemas.errors import WrongUse
+from schemas.errors import DONE, PART_FAILED, WrongUse
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -44,9 +44,9 @@ def error_console() -> Console:
     return WordConsole(stderr=True, highlight=False, markup=False, emoji=False)
 
 
-def say(what: object = "", style: str = "", end: str = "\n") -> None:
+def say(what: object = "", style: str = "") -> None:
     """Print a text, or another thing that rich shows, on standard output."""
-    console().print(what, style=style, end=end)
+    console().print(what, style=style)
 
 
 def publish(path: Path, content: str | bytes, what: str) -> None:
@@ -62,21 +62,27 @@ def remark(text: str, style: str = "", end: str = "\n") -> None:
     error_console().print(text, style=style, end=end)
 
 
-def give(document: Any, show: Callable[[Any], object], *, as_json: bool) -> None:
-    """The result of a command: its document as JSON, or what ``show`` prints of it for people."""
+def give(document: Any, show: Callable[[Any], object] | Iterable[str], *, as_json: bool) -> None:
+    """The result of a command: its document as JSON, or for people lines, or what ``show`` prints of the document."""
     if as_json:
         print_json(document)
-    else:
+    elif callable(show):
         show(document)
+    else:
+        for line in show:
+            say(line)
 
 
-def give_lines(document: Any, lines: Iterable[str], *, as_json: bool, show: Callable[[str], object] = say) -> None:
-    """The result of a command: its document as JSON, or lines for people, which ``show`` prints."""
-    if as_json:
-        print_json(document)
-        return
-    for line in lines:
-        show(line)
+def conclude(document: Any, show: Callable[[Any], object] | Iterable[str], *, as_json: bool, passed: bool) -> NoReturn:
+    """The end of a command: its result as :func:`give` shows it, and the exit status, which says whether all passed."""
+    give(document, show, as_json=as_json)
+    raise typer.Exit(DONE if passed else PART_FAILED)
+
+
+def warn(texts: Iterable[str]) -> None:
+    """Print warnings that a document has."""
+    for text in texts:
+        say(f"warning: {text}", style="yellow")
 
 
 def print_json(document: Any) -> None:
@@ -213,6 +219,11 @@ def refuse_standard_output(path: Path | None, command: str, why: str) -> None:
     """Refuse ``-`` where a file of the system is needed."""
     if path == STANDARD_OUTPUT:
         raise WrongUse(f"{command}: output '-' is standard output, a file is needed: {why}; name one")
+
+
+def cell(value: object) -> str:
+    """A value of a stored table as an entry of a printed one."""
+    return short(value, 5) if isinstance(value, float) else str(value)
 
 
 def print_text(text: str) -> None:

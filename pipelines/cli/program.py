@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from pipelines.archive import Archive
-from pipelines.cli import options
+from pipelines.cli.options import ArchiveOption, JsonOption, RunArgument, StationOption, option
 from pipelines.cli.printing import give, print_table, remark, say
 from schemas.errors import DONE, PART_FAILED, WrongUse, did_you_mean
 
@@ -26,22 +26,20 @@ UNATTENDED = "program: standard input ended before an answer, a line is needed; 
 
 
 def command(
-    run: options.RunArgument = "latest",
-    station: options.StationOption = None,
-    units: Annotated[
-        str, typer.Option("--units", metavar="SN,…", help="Write only these units; default: all that passed.")
-    ] = "",
-    form: Annotated[str, typer.Option("--form", metavar="float32|q24", help="Form of the coefficients.")] = "float32",
+    run: RunArgument = "latest",
+    station: StationOption = None,
+    units: Annotated[str, option("--units SN,…", "Write only these units; default: all that passed.")] = "",
+    form: Annotated[str, option("--form float32|q24", "Form of the coefficients.")] = "float32",
     tolerance: Annotated[
-        float, typer.Option("--tolerance", metavar="UG", min=1.0, help="Largest allowed error in the two poses, µg.")
+        float, option("--tolerance UG", "Largest allowed error in the two poses, µg.", min=1.0)
     ] = 3000.0,
-    archive: options.ArchiveOption = None,
+    archive: ArchiveOption = None,
     *,
     offset_registers: Annotated[
-        bool, typer.Option("--offset-registers", help="Also write the offset registers of an ADXL355.")
+        bool, option("--offset-registers", "Also write the offset registers of an ADXL355.")
     ] = False,
-    yes: Annotated[bool, typer.Option("--yes", "-y", help="Write without confirmation.")] = False,
-    as_json: options.JsonOption = False,
+    yes: Annotated[bool, option("--yes -y", "Write without confirmation.")] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Write the coefficients of a run into the memory of its devices, which are in the slots of the run.
 

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-import typer
-
 from pipelines.cli import options
+from pipelines.cli.options import option
 from pipelines.cli.printing import error_console, give, print_table, say, short
 from schemas.errors import WrongUse
 
@@ -27,8 +26,7 @@ def command(
     rate: options.RateOption = None,
     unit: options.SeriesUnitOption = "",
     segment: Annotated[
-        int | None,
-        typer.Option("--segment", metavar="N", help="Samples of a segment; an eighth of the record by default."),
+        int | None, option("--segment N", "Samples of a segment; an eighth of the record by default.")
     ] = None,
     stretch: options.StretchOption = None,
     plot: options.PlotOption = None,
@@ -42,7 +40,7 @@ def command(
     σ²(τ) = 2·∫ S(f)·sin⁴(πfτ)/(πfτ)² df (IEEE Std 952). Where the two differ, the record holds lines, jumps or a drift.
     """
     from pipelines.chain.noise_documents import psd_document
-    from pipelines.cli.series_options import even_series, write_pictures
+    from pipelines.cli.allan import even_series, write_pictures
 
     series = even_series(source, columns, (time, time_unit, rate), unit, archive, stretch)
     if series is None:

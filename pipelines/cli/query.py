@@ -6,12 +6,10 @@ import csv
 import sys
 from typing import Annotated
 
-import typer
-
 from inertial.counts import number_of
 from pipelines.archive import Archive
-from pipelines.cli import options
-from pipelines.cli.printing import print_json, print_table, say, short
+from pipelines.cli.options import ArchiveOption, JsonOption, argument, option
+from pipelines.cli.printing import cell, print_json, print_table, say
 from schemas.errors import WrongUse
 
 PART = "Results"
@@ -26,16 +24,14 @@ MANY = 100
 
 
 def command(
-    sql: Annotated[str, typer.Argument(metavar="SQL", help="One SELECT, for instance 'SELECT count(*) FROM units'.")],
-    archive: options.ArchiveOption = None,
+    sql: Annotated[str, argument("SQL", "One SELECT, for instance 'SELECT count(*) FROM units'.")],
+    archive: ArchiveOption = None,
     *,
-    as_json: options.JsonOption = False,
-    as_csv: Annotated[bool, typer.Option("--csv", help="Print comma-separated values and nothing else.")] = False,
+    as_json: JsonOption = False,
+    as_csv: Annotated[bool, option("--csv", "Print comma-separated values and nothing else.")] = False,
     compact: Annotated[
         bool,
-        typer.Option(
-            "--index/--no-index", help="Read coefficients and figures from the index, or from the files of every run."
-        ),
+        option("--index/--no-index", "Read coefficients and figures from the index, or from the files of every run."),
     ] = True,
 ) -> None:
     """Query the archive in SQL: DuckDB on its Parquet files, read only.
@@ -57,12 +53,8 @@ def command(
         writer.writerow(answer.columns)
         writer.writerows(answer.rows)
         return
-    print_table(list(answer.columns), [[_cell(value) for value in row] for row in answer.rows[:MANY]])
+    print_table(
+        list(answer.columns), [["" if value is None else cell(value) for value in row] for row in answer.rows[:MANY]]
+    )
     if len(answer.rows) > MANY:
         say(f"{number_of(len(answer.rows) - MANY, 'more row')}; print all rows with --json or --csv")
-
-
-def _cell(value: object) -> str:
-    if value is None:
-        return ""
-    return short(value, 5) if isinstance(value, float) else str(value)

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
-
-import typer
+from typing import TYPE_CHECKING, Annotated
 
 from pipelines.archive import Archive
-from pipelines.cli import options
-from pipelines.cli.printing import give, give_lines, print_table, say
+from pipelines.cli.options import ArchiveOption, EffectFileOption, JsonOption, argument, option
+from pipelines.cli.printing import give, print_table, say
 from schemas.errors import WrongUse
 
 if TYPE_CHECKING:
@@ -25,58 +23,48 @@ EXAMPLES = (
 
 
 def command(
-    model: Annotated[Path | None, typer.Argument(metavar="[MODEL]", help="A model file.")] = None,
-    since: Annotated[str, typer.Option("--from", metavar="DATE", help="First day of use (UTC).")] = "",
-    device: Annotated[str, typer.Option("--device", metavar="KIND", help="For this kind of device only.")] = "",
-    station: Annotated[str, typer.Option("--station", metavar="NAME", help="For this station only.")] = "",
-    reason: Annotated[str, typer.Option("--reason", metavar="TEXT", help="Reason for the release.")] = "",
-    effect_file: options.EffectFileOption = None,
-    archive: options.ArchiveOption = None,
+    model: Annotated[Path | None, argument("[MODEL]", "A model file.")] = None,
+    since: Annotated[str, option("--from DATE", "First day of use (UTC).")] = "",
+    device: Annotated[str, option("--device KIND", "For this kind of device only.")] = "",
+    station: Annotated[str, option("--station NAME", "For this station only.")] = "",
+    reason: Annotated[str, option("--reason TEXT", "Reason for the release.")] = "",
+    effect_file: EffectFileOption = None,
+    archive: ArchiveOption = None,
     *,
-    force: Annotated[
-        bool, typer.Option("--force", help="Release the model without a what-if with the verdict 'better'.")
-    ] = False,
-    listed: Annotated[bool, typer.Option("--list", help="List the releases.")] = False,
-    as_json: options.JsonOption = False,
+    force: Annotated[bool, option("--force", "Release the model without a what-if with the verdict 'better'.")] = False,
+    listed: Annotated[bool, option("--list", "List the releases.")] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Release a model to the line from a date, or list the releases.
 
     Recipes with model = "line" use the model from this date on. It needs a what-if in the archive with the verdict 'better' (see
     'tumbleline whatif'), or --force and a reason. Releases are never changed; a later release replaces an earlier one.
     """
+    from pipelines.jobs.model_change import change_from_options
+    from pipelines.jobs.releases import release as publish
+    from pipelines.rerun.selection import moment
+
     store = Archive(archive)
     if listed:
         if model is not None:
             raise WrongUse(f"release: --list and the model {model.name} are both given, one is needed; leave one out")
         _list(store, as_json=as_json)
         return
-    record = _released(
-        store, model, since, effect_file, {"device": device, "station": station, "reason": reason, "force": force}
-    )
-    lines = [
-        f"release {record.number}: {_name(record)} for {_where(record)} from {record.since:%Y-%m-%d %H:%M} UTC",
-        f"  {', '.join(record.effects or ())}",
-        f"  evidence: {record.evidence or 'none'}{', forced' if record.forced else ''}",
-    ]
-    give_lines({"archive": str(store.root), **record.document()}, lines, as_json=as_json)
-
-
-def _released(
-    store: Archive, model: Path | None, since: str, effect_file: list[Path] | None, how: dict[str, Any]
-) -> Release:
-    from pipelines.jobs.model_change import change_from_options
-    from pipelines.jobs.releases import release
-    from pipelines.rerun.selection import moment
-
     if model is None or not since:
         missing = ["a model file"] * (model is None) + ["--from DATE"] * (not since)
         are = "are" if len(missing) > 1 else "is"
         raise WrongUse(
             f"release: {' and '.join(missing)} {are} missing; give 'tumbleline release MODEL --from DATE', or --list"
         )
-    return release(
-        store, change_from_options("", model, "", effect_file, where="release"), moment(since, "--from"), **how
-    )
+    change = change_from_options("", model, "", effect_file, where="release")
+    first = moment(since, "--from")
+    record = publish(store, change, first, device=device, station=station, reason=reason, force=force)
+    lines = [
+        f"release {record.number}: {_name(record)} for {_where(record)} from {record.since:%Y-%m-%d %H:%M} UTC",
+        f"  {', '.join(record.effects or ())}",
+        f"  evidence: {record.evidence or 'none'}{', forced' if record.forced else ''}",
+    ]
+    give({"archive": str(store.root), **record.document()}, lines, as_json=as_json)
 
 
 def _list(store: Archive, *, as_json: bool) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import typer
 
 from pipelines.archive import Archive
-from pipelines.cli import options
+from pipelines.cli.options import ArchiveOption, JsonOption, RunArgument
 from pipelines.cli.printing import error_console, give
 
 PART = "Results"
@@ -17,11 +17,9 @@ EXAMPLES = (
 )
 
 
-def command(
-    run: options.RunArgument = "latest", archive: options.ArchiveOption = None, *, as_json: options.JsonOption = False
-) -> None:
+def command(run: RunArgument = "latest", archive: ArchiveOption = None, *, as_json: JsonOption = False) -> None:
     """Print the path of a run's report; write the report if it is missing or older than the run's tables."""
-    from pipelines.report.any_run import make_report
+    from pipelines.report import make_report
 
     stored = Archive(archive).run(run)
     with error_console().status("drawing the report"):

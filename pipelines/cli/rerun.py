@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Annotated, Any, NoReturn
-
-import typer
+from functools import partial
+from typing import TYPE_CHECKING, Annotated, Any
 
 from inertial.counts import number_of
 from pipelines.archive import Archive
 from pipelines.cli import options
 from pipelines.cli.inputs import distribution
 from pipelines.cli.next_commands import archive_words, command_line, print_next
-from pipelines.cli.printing import error_console, give, print_table, say
+from pipelines.cli.options import option
+from pipelines.cli.printing import conclude, error_console, print_table, say
 from schemas.errors import WrongUse
 
 if TYPE_CHECKING:
@@ -45,9 +45,9 @@ def command(
     workers: options.WorkersOption = None,
     *,
     check: Annotated[
-        bool, typer.Option("--check", help="Write nothing; check that every table is reproduced byte for byte.")
+        bool, option("--check", "Write nothing; check that every table is reproduced byte for byte.")
     ] = False,
-    report: Annotated[bool, typer.Option("--report", help="Also make the report of every re-run.")] = False,
+    report: Annotated[bool, option("--report", "Also make the report of every re-run.")] = False,
     as_json: options.JsonOption = False,
 ) -> None:
     """Re-analyse archived runs with the present code, another model or other limits; only stages with a changed key are computed.
@@ -72,11 +72,13 @@ def command(
         checked if check else run_again, store, runs, change, distribution(store, runs, dask, workers), report=report
     )
     if check:
-        _give_check(store, done, as_json=as_json)
+        same = sum(result.same for result in done)
+        rows = [{**asdict(result), "same": result.same} for result in done]
+        checks = {"archive": str(store.root), "selected": len(done), "same": same, "runs": rows}
+        conclude(checks, lambda _: _print_check(done), as_json=as_json, passed=same == len(done))
     add_runs(store, [outcome.new for outcome in done if outcome.new])
     document = {"archive": str(store.root), "runs": [asdict(outcome) for outcome in done], **_counts(done)}
-    give(document, lambda _: _print(done, document, archive), as_json=as_json)
-    raise typer.Exit(1 if document["failed"] else 0)
+    conclude(document, partial(_print, done, archive), as_json=as_json, passed=not document["failed"])
 
 
 def _mapped(
@@ -105,7 +107,7 @@ def _counts(outcomes: list[RerunOutcome]) -> dict[str, int]:
     return {"selected": len(outcomes), "rerun": anew, "unchanged": len(outcomes) - anew - failed, "failed": failed}
 
 
-def _print(outcomes: list[RerunOutcome], document: dict[str, Any], archive: str | None) -> None:
+def _print(outcomes: list[RerunOutcome], archive: str | None, document: dict[str, Any]) -> None:
     lines = [_line(one) for one in outcomes[:SHOWN] if not one.error]
     if lines:
         print_table(["run", "re-run", "changed", "stages computed"], lines, whole=2)
@@ -126,14 +128,6 @@ def _line(one: RerunOutcome) -> list[str]:
     whats = dict.fromkeys("code" if change["what"] == "code" else change["what"] for change in one.because)
     worked = [name for name, how in one.stages.items() if how == "computed"]
     return [one.run, one.new if one.new != one.run else "—", ", ".join(whats) or "nothing", ", ".join(worked) or "none"]
-
-
-def _give_check(store: Archive, results: list[Reproduction], *, as_json: bool) -> NoReturn:
-    same = sum(result.same for result in results)
-    rows = [{**asdict(result), "same": result.same} for result in results]
-    document = {"archive": str(store.root), "selected": len(results), "same": same, "runs": rows}
-    give(document, lambda _: _print_check(results), as_json=as_json)
-    raise typer.Exit(1 if same < len(results) else 0)
 
 
 def _print_check(results: list[Reproduction]) -> None:

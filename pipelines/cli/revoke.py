@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from typing import Annotated
 
-import typer
-
 from pipelines.archive import Archive, Run
-from pipelines.cli import options
-from pipelines.cli.printing import give_lines
+from pipelines.cli.options import ArchiveOption, JsonOption, argument, option
+from pipelines.cli.printing import give
 
 PART = "Certificates, trace, audit"
 ORDER = 420
@@ -20,28 +18,22 @@ EXAMPLES = (
 
 
 def command(
-    serial: Annotated[str, typer.Argument(metavar="SERIAL", help="The unit.")],
-    reason: Annotated[str, typer.Option("--reason", help="Reason, for the users of the calibration.")] = "",
+    serial: Annotated[str, argument("SERIAL", "The unit.")],
+    reason: Annotated[str, option("--reason", "Reason, for the users of the calibration.")] = "",
     day: Annotated[
-        str,
-        typer.Option(
-            "--from", metavar="DATE", help="First day without validity; default: the first day of the calibration."
-        ),
+        str, option("--from DATE", "First day without validity; default: the first day of the calibration.")
     ] = "",
     certificate: Annotated[
-        int,
-        typer.Option(
-            "--certificate", min=0, help="Number after the serial; default: all that are valid today or later."
-        ),
+        int, option("--certificate", "Number after the serial; default: all that are valid today or later.", min=0)
     ] = 0,
-    archive: options.ArchiveOption = None,
+    archive: ArchiveOption = None,
     *,
-    as_json: options.JsonOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Revoke a unit's calibration, with the reason. Nothing is deleted: the revocation is added to the ledger of the unit."""
     from pipelines.certificates import Ledger
     from pipelines.certificates.days import day_of
-    from pipelines.report.any_run import renew_report
+    from pipelines.report import renew_report
 
     store = Archive(archive)
     ledger = Ledger(store)
@@ -50,4 +42,4 @@ def command(
     for run in dict.fromkeys(one.run for one in ledger.calibrations(serial) if one.certificate in ended):
         renew_report(Run(store, run))
     lines = [f"revoked {', '.join(ended)} from {event.start} on: {event.reason}"]
-    give_lines({"unit": serial, "revoked": ended, **event.document()}, lines, as_json=as_json)
+    give({"unit": serial, "revoked": ended, **event.document()}, lines, as_json=as_json)

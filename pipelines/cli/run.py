@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator
 from contextlib import AbstractContextManager, contextmanager
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
 from pipelines.archive import Archive, Run
 from pipelines.cli import options
-from pipelines.cli.printing import error_console, print_json, remark
+from pipelines.cli.options import option
+from pipelines.cli.printing import conclude, error_console, remark
 from schemas.errors import WrongUse
 from schemas.progress import Progress
 
@@ -33,34 +33,27 @@ def command(
     station: options.StationOption = None,
     units: Annotated[
         str,
-        typer.Option(
-            "--units",
-            metavar="SN,…|FILE|scan",
-            help="Serial numbers in the order of the slots, a slot map (CSV or TOML), or 'scan' to scan them.",
+        option(
+            "--units SN,…|FILE|scan",
+            "Serial numbers in the order of the slots, a slot map (CSV or TOML), or 'scan' to scan them.",
         ),
     ] = "",
     archive: options.ArchiveOption = None,
     seed: options.SeedOption = None,
     repeat: options.RepeatOption = 0,
     fault: Annotated[
-        list[str] | None,
-        typer.Option("--fault", metavar="KIND[:KEY=VALUE…]", help="Fault of the simulated station; may be repeated."),
+        list[str] | None, option("--fault KIND[:KEY=VALUE…]", "Fault of the simulated station; may be repeated.")
     ] = None,
     *,
     prompts: Annotated[
         bool | None,
-        typer.Option(
-            "--prompts/--no-prompts", help="Ask the operator to load and unload; default: on hardware, at a terminal."
-        ),
+        option("--prompts/--no-prompts", "Ask the operator to load and unload; default: on hardware, at a terminal."),
     ] = None,
     record: options.RecordOption = None,
     replay: Annotated[
-        Path | None,
-        typer.Option(
-            "--replay", metavar="FILE", help="Answer from this recording of the same run; no station is opened."
-        ),
+        Path | None, option("--replay FILE", "Answer from this recording of the same run; no station is opened.")
     ] = None,
-    direct: Annotated[bool, typer.Option("--direct", help="Run the same chain without the orchestrator.")] = False,
+    direct: Annotated[bool, option("--direct", "Run the same chain without the orchestrator.")] = False,
     as_json: options.JsonOption = False,
 ) -> None:
     """Measure and calibrate a lot, from recipe to report: the main job.
@@ -72,7 +65,7 @@ def command(
     """
     from pipelines.certificates.coefficient_remarks import library_remarks
     from pipelines.cli.next_commands import print_next
-    from pipelines.cli.summary import exit_status, print_result, summary
+    from pipelines.cli.summary import all_passed, print_result, summary
     from pipelines.cli.terminal import attended, scanned
     from pipelines.cli.text.verdict_text import judged
     from pipelines.jobs.job import OF_RUN, Request
@@ -101,15 +94,15 @@ def command(
     for line in (line for run in runs for line in library_remarks(run)):
         remark(f"run: {line}")
     documents = [judged(summary(run), run) for run in runs]
-    if as_json:
-        print_json(documents[0] if len(documents) == 1 else {"fillings": documents})
-    else:
+
+    def show(_: object) -> None:
         for document in documents:
             print_result(document)
-        print_next(
-            [line for run, document in zip(runs, documents, strict=True) for line in _next(run, document, archive)],
-        )
-    raise typer.Exit(max(exit_status(document) for document in documents))
+        lines = [_next(run, document, archive) for run, document in zip(runs, documents, strict=True)]
+        print_next([*chain.from_iterable(lines)])
+
+    whole = documents[0] if len(documents) == 1 else {"fillings": documents}
+    conclude(whole, show, as_json=as_json, passed=all(map(all_passed, documents)))
 
 
 def refuse_recorded(jobs: list[Job], store: Archive, *, replays: bool) -> None:

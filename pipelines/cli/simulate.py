@@ -5,10 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from pipelines.archive import Archive
-from pipelines.cli import options
+from pipelines.cli.options import ArchiveOption, JsonOption, RateOption, TimeColumnOption, argument, option
 from pipelines.cli.printing import error_console, give, say, short
 
 if TYPE_CHECKING:
@@ -26,34 +24,24 @@ EXAMPLES = (
 
 def command(
     file: Annotated[
-        Path,
-        typer.Argument(
-            metavar="FILE", help="True specific force over time: time_s, force_x, force_y, force_z, unit_C."
-        ),
+        Path, argument("FILE", "True specific force over time: time_s, force_x, force_y, force_z, unit_C.")
     ],
-    output: Annotated[
-        Path, typer.Option("--output", "-o", metavar="FILE", help="Raw samples, as .csv, .parquet, .mat or .npy.")
-    ],
+    output: Annotated[Path, option("--output -o FILE", "Raw samples, as .csv, .parquet, .mat or .npy.")],
     calibration: Annotated[
-        str, typer.Option("--calibration", metavar="RUN:UNIT", help="The calibration: a run and one of its units.")
+        str, option("--calibration RUN:UNIT", "The calibration: a run and one of its units.")
     ] = "latest",
-    units: Annotated[str, typer.Option("--units", metavar="g|m/s^2", help="Unit of the force.")] = "g",
-    time: options.TimeColumnOption = "",
-    rate: options.RateOption = None,
+    units: Annotated[str, option("--units g|m/s^2", "Unit of the force.")] = "g",
+    time: TimeColumnOption = "",
+    rate: RateOption = None,
     bandwidth: Annotated[
-        float | None,
-        typer.Option(
-            "--bandwidth", metavar="HZ", min=1e-9, help="Of the sensor, two poles; by default none is applied."
-        ),
+        float | None, option("--bandwidth HZ", "Of the sensor, two poles; by default none is applied.", min=1e-9)
     ] = None,
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Of the noise; the same seed gives the same samples.")] = 0,
-    archive: options.ArchiveOption = None,
+    seed: Annotated[int, option("--seed", "Of the noise; the same seed gives the same samples.", min=0)] = 0,
+    archive: ArchiveOption = None,
     *,
-    noise: Annotated[
-        bool, typer.Option("--noise/--no-noise", help="Add the noise of the unit's static record.")
-    ] = True,
-    failed: Annotated[bool, typer.Option("--failed", help="Also use a unit that failed its limits.")] = False,
-    as_json: options.JsonOption = False,
+    noise: Annotated[bool, option("--noise/--no-noise", "Add the noise of the unit's static record.")] = True,
+    failed: Annotated[bool, option("--failed", "Also use a unit that failed its limits.")] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Pass a trajectory through a calibrated unit: bias, scale, misalignment, temperature, all effects of the model, and noise.
 

@@ -3,19 +3,25 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pipelines.cli import options
+from pipelines.archive import Archive
+from pipelines.cli.inputs import made_up
+from pipelines.cli.options import (
+    ArchiveOption,
+    JsonOption,
+    SimulatedDeviceOption,
+    SimulatedUnitsOption,
+    StationOption,
+    argument,
+    option,
+)
 from pipelines.cli.printing import give, print_json, print_table, say
-from pipelines.cli.station_bring_up import bring_up
+from pipelines.cli.station_bring_up import bring_up, frames, replay
 from pipelines.cli.station_check import check
-from pipelines.cli.station_frames import frames, replay
-from pipelines.cli.station_log import log
-from pipelines.cli.station_lot import DeviceOption, UnitsOption, made_up
-from pipelines.cli.station_status import status
-from pipelines.cli.station_watch import watch
+from pipelines.cli.station_watch import status, watch
 
 if TYPE_CHECKING:
     from schemas.profile import Profile
@@ -67,7 +73,93 @@ EXAMPLES_OF = {
 }
 """Of the subcommands."""
 
+STYLES = {
+    "spoilt": "yellow",
+    "suspended": "yellow",
+    "resumed": "green",
+    "unit_lost": "magenta",
+    "power": "yellow",
+    "emergency_stop": "bold red",
+    "stopped": "red",
+    "not_safe": "bold red",
+    "watchdog_acts": "yellow",
+    "watchdog_failed": "bold red",
+    "watchdog_lost": "yellow",
+    "lease_lost": "bold red",
+}
+QUIET = {"reference", "soak"}  # shown only with --all, because they occur in every run
+
+
+def log(
+    run: Annotated[str, argument("[RUN]", "Show only this run of the archive.")] = "",
+    archive: ArchiveOption = None,
+    limit: Annotated[int, option("--limit", "Number of events, newest last.", min=1)] = 50,
+    *,
+    everything: Annotated[bool, option("--all", "Also show soaks and reference readings.")] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Show events that paused or ended runs (from the archive) and events of stations (from the log of this computer)."""
+    recorded = [*_of_runs(Archive(archive), run), *([] if run else _of_machine())]
+    events = [event for event in recorded if everything or event["kind"] not in QUIET]
+    events = sorted(events, key=lambda event: event["when"])[-limit:]
+    give({"events": events}, _print, as_json=as_json)
+
+
+def _print(document: dict[str, Any]) -> None:
+    """Every event as text: time, place and kind; below it the cause and the action."""
+    from rich.padding import Padding
+    from rich.text import Text
+
+    for event in document["events"]:
+        record = f", record {event['record']}" if event.get("record", -1) >= 0 else ""
+        head = Text.assemble(
+            (event["when"][:19].replace("T", " "), "dim"),
+            f"  {event['where']}{record}  ",
+            (event["kind"].replace("_", " "), STYLES.get(event["kind"], "")),
+        )
+        say(head)
+        cause_and_action = " → ".join(part for part in (event["reason"], event["action"]) if part)
+        if cause_and_action:
+            say(Padding(Text(cause_and_action), (0, 0, 0, 4)))
+    if not document["events"]:
+        say("no events")
+
+
+def _of_runs(store: Archive, run: str) -> list[dict[str, Any]]:
+    """Events of the captures of the archive, each once, under the name of the first run that used it."""
+    runs = [store.run(run)] if run else [store.run(info.id) for info in store.runs()]
+    captures: dict[str, str] = {}
+    for one in runs:
+        captures.setdefault(str(one.about.get("capture") or ""), one.id)
+    return [
+        {"where": run_id, **event}
+        for capture, run_id in captures.items()
+        if capture
+        for event in store.capture(capture).events.documents()
+    ]
+
+
+def _of_machine() -> list[dict[str, Any]]:
+    """Events of stations on this computer: motion, safe state after a run, safe state by a watchdog."""
+    from stations.safety.folder import read_log as machine_log
+    from stations.safety.folder import state_folder
+
+    known = {"when", "station", "event", "why", "what"}
+    return [
+        {
+            "when": line["when"],
+            "where": line["station"],
+            "kind": line["event"],
+            "reason": line.get("why", ""),
+            "action": line.get("what") or ", ".join(f"{k} {v}" for k, v in line.items() if k not in known),
+        }
+        for line in machine_log(state_folder())
+    ]
+
+
 SHORT = {"read": "r", "write": "w", "read_write": "rw"}
+SETTINGS = re.compile(r"[,:;(]| with | behind ")
+"""What stands between the name of a model and the required settings of the device."""
 
 app = typer.Typer(
     help=SUMMARY,
@@ -87,23 +179,20 @@ app.command()(watch)
 
 @app.command()
 def serve(
-    station: options.StationOption = None,
-    host: Annotated[str, typer.Option("--host", help="Interface to listen on.")] = "127.0.0.1",
-    port: Annotated[int, typer.Option("--port", min=0, max=65535, help="TCP port; 0: any free port.")] = 5020,
+    station: StationOption = None,
+    host: Annotated[str, option("--host", "Interface to listen on.")] = "127.0.0.1",
+    port: Annotated[int, option("--port", "TCP port; 0: any free port.", min=0, max=65535)] = 5020,
     speed: Annotated[
-        float, typer.Option("--speed", min=0.001, max=1000.0, help="Simulated seconds per second of real time.")
+        float, option("--speed", "Simulated seconds per second of real time.", min=0.001, max=1000.0)
     ] = 1.0,
-    device: DeviceOption = "ADXL355",
-    units: UnitsOption = 8,
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Random seed of the simulated units.")] = 1,
+    device: SimulatedDeviceOption = "ADXL355",
+    units: SimulatedUnitsOption = 8,
+    seed: Annotated[int, option("--seed", "Random seed of the simulated units.", min=0)] = 1,
     silence: Annotated[
-        float,
-        typer.Option(
-            "--silence", min=0.0, help="Seconds without a request after which drives and reader stop; 0: never."
-        ),
+        float, option("--silence", "Seconds without a request after which drives and reader stop; 0: never.", min=0.0)
     ] = 30.0,
     *,
-    as_json: options.JsonOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Serve the simulated station over Modbus TCP until interrupted, for any Modbus client."""
     import signal
@@ -133,9 +222,9 @@ def serve(
 
 @app.command()
 def profiles(
-    name: Annotated[str, typer.Argument(metavar="[PROFILE]", help="Show the registers of this profile.")] = "",
+    name: Annotated[str, argument("[PROFILE]", "Show the registers of this profile.")] = "",
     *,
-    as_json: options.JsonOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """List the register-map profiles, or the registers of one profile."""
     from stations.profile_files import load_profile, profile_names
@@ -147,16 +236,17 @@ def profiles(
     loaded = [load_profile(one) for one in profile_names()]
     heads = ["profile", "kind", "device", "links", "verified"]
     lines = [
-        [p.name, p.kind, f"{p.maker} {_first_words(p.model)}", " ".join(p.links), "yes" if p.verified else "no"]
+        [
+            p.name,
+            p.kind,
+            f"{p.maker} {SETTINGS.split(p.model)[0].strip()}",
+            " ".join(p.links),
+            "yes" if p.verified else "no",
+        ]
         for p in loaded
     ]
     rows = [p.model_dump(mode="json", exclude={"registers", "commands", "groups", "fifo"}) for p in loaded]
     give({"profiles": rows}, lambda _: print_table(heads, lines), as_json=as_json)
-
-
-def _first_words(model: str) -> str:
-    """The name of a model without the required settings of the device."""
-    return re.split(r"[,:;(]| with | behind ", model)[0].strip()
 
 
 def _print_profile(profile: Profile) -> None:

@@ -7,9 +7,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from inertial.counts import number_of
-from pipelines.cli import options
+from pipelines.cli.inputs import made_up
+from pipelines.cli.options import (
+    JsonOption,
+    RecordOption,
+    SimulatedDeviceOption,
+    SimulatedUnitsOption,
+    StationOption,
+    option,
+)
 from pipelines.cli.printing import print_json, print_table, remark
-from pipelines.cli.station_lot import DeviceOption, UnitsOption, made_up
 from schemas.errors import STATION
 
 if TYPE_CHECKING:
@@ -20,13 +27,13 @@ if TYPE_CHECKING:
 
 
 def check(
-    station: options.StationOption = None,
-    device: DeviceOption = "ADXL355",
-    units: UnitsOption = 8,
+    station: StationOption = None,
+    device: SimulatedDeviceOption = "ADXL355",
+    units: SimulatedUnitsOption = 8,
     *,
-    registers: Annotated[bool, typer.Option("--registers", help="Only read every register once; no motion.")] = False,
-    record: options.RecordOption = None,
-    as_json: options.JsonOption = False,
+    registers: Annotated[bool, option("--registers", "Only read every register once; no motion.")] = False,
+    record: RecordOption = None,
+    as_json: JsonOption = False,
 ) -> None:
     """Test a station before a shift: registers, instruments, moves, noise of every slot, a check standard.
 

@@ -1,36 +1,126 @@
-"""``tumbleline station watch``: temperatures and angles over time, drawn in the terminal."""
+"""``tumbleline station status`` and ``watch``: readings of a station, and temperatures and angles over time in the terminal."""
 
 from __future__ import annotations
 
 import math
 import sys
 from collections.abc import Callable, Generator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
 from pipelines.archive import Archive, Records
-from pipelines.cli import options
 from pipelines.cli.chart import Line, chart, clock
-from pipelines.cli.printing import console, print_json, say
-from pipelines.cli.station_lot import made_up
-from schemas.errors import WrongUse
+from pipelines.cli.inputs import made_up
+from pipelines.cli.options import (
+    ArchiveOption,
+    JsonOption,
+    SimulatedDeviceOption,
+    SimulatedUnitsOption,
+    StationOption,
+    argument,
+    option,
+)
+from pipelines.cli.printing import console, print_json, remark, say
+from schemas.errors import STATION, WrongUse
 
 if TYPE_CHECKING:
     from rich.console import Group
+    from rich.text import Text
 
     from stations.overview import Overview
 
+
+GOOD, BAD = "green", "bold red"
+
+
+def status(
+    station: StationOption = None,
+    device: SimulatedDeviceOption = "ADXL355",
+    units: SimulatedUnitsOption = 8,
+    every: Annotated[float, option("--every", "Seconds between two readings with --watch.", min=0.1)] = 1.0,
+    *,
+    watch: Annotated[bool, option("--watch", "Repeat until Ctrl-C.")] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Show angles, temperatures, states, slots and the run that drives the station.
+
+    Exit status 3: a part does not answer, or a run ended without the safe state.
+
+    Nothing is moved and no lease is needed: a run in progress is not disturbed.
+    """
+    from schemas.station import load_station
+    from stations.overview import looked_at
+
+    config = load_station(station)
+    with looked_at(config, made_up(device, units, 1)) as look:
+        now = look()
+        if as_json:
+            print_json({"ok": not now.faults, **now.document()})
+        elif watch:
+            now = _live(look, overview, every)
+        else:
+            say(overview(now))
+    if not as_json:
+        for fault in now.faults.values():
+            remark(fault)
+    raise typer.Exit(STATION if now.faults else 0)
+
+
+def overview(now: Overview) -> Group:
+    """The readings of a station as a table for the terminal."""
+    from rich.console import Group
+    from rich.table import Table
+
+    parts = Table(box=None, show_header=False, pad_edge=False)
+    for name in ("outer", "inner"):
+        angle = now.angles_deg.get(name)
+        parts.add_row(f"{name} axis", "—" if angle is None else f"{angle:9.3f}°", now.axes.get(name, ""))
+    air = "—" if now.chamber_C is None else f"{now.chamber_C:9.2f} °C"
+    goal = "" if now.set_point_C is None else f"{now.chamber}, set point {now.set_point_C:g} °C"
+    parts.add_row("chamber", air, goal)
+    shaken = "—" if now.vibration_g is None else f"{now.vibration_g * 1e6:9.1f} µg"
+    parts.add_row("vibration", shaken, "")
+    parts.add_row("door", "", _word(now.door, "closed"))
+    parts.add_row("emergency stop", "", _word(now.emergency_stop, "released"))
+    parts.add_row("sampling", "", now.sampling)
+    parts.add_row("driven by", "", driven_by(now))
+    slots = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    for heading in ("slot", "unit", "°C", "V"):
+        slots.add_column(heading, justify="left" if heading == "unit" else "right")
+    for slot in now.slots:
+        slots.add_row(str(slot.slot), slot.serial or "—", f"{slot.unit_C:.2f}", f"{slot.supply_V:.4f}")
+    return Group(f"{now.station} ({now.kind})", parts, "", slots)
+
+
+def driven_by(now: Overview) -> str:
+    """The run that drives a station, as text."""
+    if now.kind == "simulated":
+        return "no shared station: every run simulates its own"
+    if now.lease is None:
+        return "no run"
+    lease = now.lease
+    process = f"{lease['run']}, process {lease['pid']} on {lease['host']} since {lease['since']}"
+    who = f"{process}, last sign of life {lease['heard_s']:g} s ago"
+    return f"the watchdog of {who}" if lease["role"] == "watchdog" else who
+
+
+def _word(state: str, good: str) -> Text:
+    from rich.text import Text
+
+    return Text(state or "—", style=GOOD if state == good else BAD)
+
+
 MOVE_S = 5.0  # the table keeps its position until shortly before the next record
 Points = list[tuple[float, float]]
+Seen = TypeVar("Seen")
 Look = Callable[[], "ChartData"]
 
 
-def _series() -> dict[str, Points]:
-    return {name: [] for name in ("chamber", "coldest", "warmest", "outer", "inner")}
+SERIES = ("chamber", "coldest", "warmest", "outer", "inner")
 
 
 @dataclass
@@ -39,7 +129,7 @@ class ChartData:
 
     title: str
     over: bool = False
-    points: dict[str, Points] = field(default_factory=_series)
+    points: dict[str, Points] = field(default_factory=lambda: {name: [] for name in SERIES})
 
     @property
     def last(self) -> float:
@@ -52,16 +142,16 @@ class ChartData:
 
 
 def watch(
-    run: Annotated[str, typer.Argument(metavar="[RUN]", help="A run of the archive; default: the newest.")] = "latest",
-    station: options.StationOption = None,
-    archive: options.ArchiveOption = None,
+    run: Annotated[str, argument("[RUN]", "A run of the archive; default: the newest.")] = "latest",
+    station: StationOption = None,
+    archive: ArchiveOption = None,
     minutes: Annotated[
-        float, typer.Option("--minutes", min=0.1, help="Time span, minutes before now; default: the whole run.")
+        float, option("--minutes", "Time span, minutes before now; default: the whole run.", min=0.1)
     ] = math.inf,
-    every: Annotated[float, typer.Option("--every", min=0.1, help="Seconds between two readings.")] = 1.0,
+    every: Annotated[float, option("--every", "Seconds between two readings.", min=0.1)] = 1.0,
     *,
-    once: Annotated[bool, typer.Option("--once", help="Draw once and exit.")] = False,
-    as_json: options.JsonOption = False,
+    once: Annotated[bool, option("--once", "Draw once and exit.")] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Draw temperatures and angles over time, live: of a run in the archive, or with --station of a station."""
     with _source(run, station, archive) as look:
@@ -70,7 +160,7 @@ def watch(
         elif once or not sys.stdout.isatty():
             say(picture(look(), minutes))
         else:
-            _live(look, minutes, every)
+            _live(look, lambda seen: picture(seen, minutes), every, lambda seen: seen.over)
 
 
 @contextmanager
@@ -150,18 +240,21 @@ def picture(seen: ChartData, minutes: float) -> Group:
     )
 
 
-def _live(look: Look, minutes: float, every: float) -> None:
-    """Redraw the charts until the end of the run, or Ctrl-C."""
+def _live(
+    look: Callable[[], Seen],
+    draw: Callable[[Seen], Group],
+    every: float,
+    over: Callable[[Seen], bool] = lambda _: False,
+) -> Seen:
+    """Show new readings until the end of the run, or Ctrl-C; return the last one."""
     import time
 
     from rich.live import Live
 
-    with Live(picture(look(), minutes), console=console(), refresh_per_second=4) as live:
-        try:
+    seen = look()
+    with Live(draw(seen), console=console(), refresh_per_second=4) as live, suppress(KeyboardInterrupt):
+        while not over(seen):
+            time.sleep(every)
             seen = look()
-            while not seen.over:
-                time.sleep(every)
-                seen = look()
-                live.update(picture(seen, minutes))
-        except KeyboardInterrupt:
-            return
+            live.update(draw(seen))
+    return seen

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import pandas as pd
-
 from inertial.counts import number_of
 from pipelines.archive import Run
 from pipelines.capture.interruptions import Interruptions, interruptions
 from pipelines.cli.printing import STYLES, print_table, say, short
 from pipelines.tables.frames import rows_of
 from pipelines.tables.json_values import json_value
-from schemas.errors import DONE, PART_FAILED
 
 if TYPE_CHECKING:
     from rich.text import Text
@@ -45,7 +42,11 @@ NOISE_LEGEND = "N, B: noise of the worst axis, an upper limit where a term is no
 def summary(run: Run) -> dict[str, Any]:
     """The result of a run: outcome, grade, reasons and figures of each unit; the yield; the path of the report."""
     grades, figures = run.table("grades"), run.table("figures")
-    units = [_unit(row, figures) for row in rows_of(grades.sort_values("slot"))]
+    units: list[dict[str, Any]] = []
+    for row in rows_of(grades.sort_values("slot")):
+        of_unit = rows_of(figures[figures["unit"] == row["unit"]])
+        cells = {f["figure"]: {k: f[k] for k in (*FIXED, *RISKS) if k in f} for f in of_unit}
+        units.append(json_value({**row, "figures": cells}))
     passed = sum(unit["outcome"] == "pass" for unit in units)
     return {
         "run": run.id,
@@ -63,14 +64,9 @@ def summary(run: Run) -> dict[str, Any]:
     }
 
 
-def _unit(row: dict[str, Any], figures: pd.DataFrame) -> dict[str, Any]:
-    of_unit = rows_of(figures[figures["unit"] == row["unit"]])
-    return json_value({**row, "figures": {f["figure"]: {k: f[k] for k in (*FIXED, *RISKS) if k in f} for f in of_unit}})
-
-
-def exit_status(document: dict[str, Any]) -> int:
-    """Done where every unit passed; otherwise a part failed."""
-    return DONE if document["passed"] == len(document["units"]) else PART_FAILED
+def all_passed(document: dict[str, Any]) -> bool:
+    """Whether every unit passed."""
+    return document["passed"] == len(document["units"])
 
 
 def print_summary(document: dict[str, Any]) -> None:

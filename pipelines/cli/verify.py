@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
-
-import typer
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 from inertial.counts import number_of
 from pipelines.archive import Archive
-from pipelines.cli import options
-from pipelines.cli.printing import console, error_console, give
+from pipelines.cli.options import ArchiveOption, JsonOption, argument, option
+from pipelines.cli.printing import conclude, console, error_console, say
 from pipelines.integrity import Report
-from schemas.errors import DONE, PART_FAILED, WrongUse
+from schemas.errors import WrongUse
+
+if TYPE_CHECKING:
+    from pipelines.certificates.document.file_check import CheckedFile
 
 SHOWN = 8  # consequences of one finding
 
@@ -29,42 +32,36 @@ EXAMPLES = (
 def command(
     runs: Annotated[
         list[str] | None,
-        typer.Argument(
-            metavar="[RUN…|FILE…]",
-            help="Only these runs and their captures, or files of certificates (.pdf, .xml, .sig); default: the whole archive.",
+        argument(
+            "[RUN…|FILE…]",
+            "Only these runs and their captures, or files of certificates (.pdf, .xml, .sig); default: the whole archive.",
         ),
     ] = None,
     trust: Annotated[
         list[Path] | None,
-        typer.Option(
-            "--trust",
-            metavar="FILE.pem",
-            help="Certificate of a laboratory's key, or of its authority, that vouches for the signatures of FILE.",
+        option(
+            "--trust FILE.pem",
+            "Certificate of a laboratory's key, or of its authority, that vouches for the signatures of FILE.",
         ),
     ] = None,
     laboratory: Annotated[
         Path | None,
-        typer.Option(
-            "--laboratory",
-            metavar="FILE.toml",
-            help="The laboratory's file, as for 'certificate': with --archive it proves names and addresses of FILE.",
+        option(
+            "--laboratory FILE.toml",
+            "The laboratory's file, as for 'certificate': with --archive it proves names and addresses of FILE.",
         ),
     ] = None,
     key: Annotated[
         list[str] | None,
-        typer.Option(
-            "--key",
-            metavar="FILE|HEX",
-            help="A public key; each manifest must have a signature of one of these keys. Default: the own key.",
+        option(
+            "--key FILE|HEX",
+            "A public key; each manifest must have a signature of one of these keys. Default: the own key.",
         ),
     ] = None,
-    head: Annotated[
-        str,
-        typer.Option("--head", metavar="HASH", help="Hash of an entry of the chain from an earlier verification."),
-    ] = "",
-    archive: options.ArchiveOption = None,
+    head: Annotated[str, option("--head HASH", "Hash of an entry of the chain from an earlier verification.")] = "",
+    archive: ArchiveOption = None,
     *,
-    as_json: options.JsonOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Compute every hash again: find changed bytes, missing files, edited manifests, foreign tables, false signatures.
 
@@ -74,12 +71,10 @@ def command(
     """
     from pipelines.archive.signatures import public_keys
     from pipelines.audit.index import check_index
-    from pipelines.cli.certificate_check import certificate_files, check_certificates
     from pipelines.integrity import verify
 
     if files := certificate_files(runs or ()):
-        accepted = check_certificates(files, trust or (), archive, laboratory, as_json=as_json)
-        raise typer.Exit(DONE if accepted else PART_FAILED)
+        check_certificates(files, trust or (), archive, laboratory, as_json=as_json)
     if trust or laboratory:
         raise WrongUse(
             f"{'--trust' if trust else '--laboratory'}: no file of a certificate is given, one is needed; give FILE.pdf or "
@@ -98,8 +93,7 @@ def command(
             also=[check_index],
             progress=lambda done, total: status.update(f"reading {done}/{total}"),
         )
-    give(report.document(), lambda _: _print(report), as_json=as_json)
-    raise typer.Exit(DONE if report.whole else PART_FAILED)
+    conclude(report.document(), lambda _: _print(report), as_json=as_json, passed=report.whole)
 
 
 def _print(report: Report) -> None:
@@ -123,3 +117,94 @@ def _print(report: Report) -> None:
         out.print(f"chain       ends with {report.head}")
     verdict = number_of(len(checked.findings), "finding") if checked.findings else "nothing is wrong"
     out.print(verdict, style="bold green" if report.whole else "bold red")
+
+
+ENDINGS = (".pdf", ".xml", ".sig")
+STYLES = {"good": "", "bad": "bold red", "not checked": "yellow"}
+
+
+def certificate_files(names: Sequence[str]) -> list[Path]:
+    """The names as files of certificates; empty where none is one.
+
+    Raises
+    ------
+    WrongUse
+        Files and runs are mixed, or a file is not there.
+    """
+    files = [Path(name) for name in names if Path(name).suffix.lower() in ENDINGS]
+    if not files:
+        return []
+    if len(files) < len(names):
+        other = next(name for name in names if Path(name) not in files)
+        raise WrongUse(
+            f"verify: {other} is no file of a certificate, and {files[0]} is one; give files or runs, not both"
+        )
+    missing = [path for path in files if not path.is_file()]
+    if missing:
+        raise WrongUse(f"verify: {missing[0]} is not there, the file of a certificate is needed; correct the name")
+    return files
+
+
+def check_certificates(
+    files: Sequence[Path], trust: Sequence[Path], archive: str | None, laboratory: Path | None, *, as_json: bool
+) -> NoReturn:
+    """Check files of certificates and print the result; a part failed where one is not accepted."""
+    from pipelines.certificates.document.file_check import Against, check_file
+    from pipelines.certificates.document.laboratory import read_laboratory
+    from pipelines.certificates.document.signers import read_trusted
+
+    who = None if laboratory is None else read_laboratory(laboratory)
+    trusted, store = read_trusted(trust), None
+    if archive is not None or os.environ.get("TUMBLELINE_ARCHIVE") or Path("archive").is_dir():
+        store = Archive(archive)  # the usual one only where there is one
+        store.refuse_none()
+    against = Against(trusted, store, archive is not None, who)
+    done = [check_file(path, against) for path in files]
+    accepted = all(one.accepted for one in done)
+    document = {"files": [_document(one) for one in done], "accepted": accepted}
+    conclude(document, lambda _: [_print_checked(one) for one in done], as_json=as_json, passed=accepted)
+
+
+def _document(one: CheckedFile) -> dict[str, Any]:
+    facts = one.facts
+    return {
+        "file": str(one.path),
+        "certificate": "" if facts is None else facts.number,
+        "serial": "" if facts is None else facts.serial,
+        "run": "" if facts is None else facts.run,
+        "issued": "" if facts is None else facts.issued,
+        "signers": one.signers,
+        "checks": [{"check": c.check, "state": c.state, "message": c.message} for c in one.checks],
+        "proven_by": list(one.proven_by),
+        "accepted": one.accepted,
+    }
+
+
+def _print_checked(one: CheckedFile) -> None:
+    head = f"{one.path}: certificate {one.facts.number}, unit {one.facts.serial}" if one.facts else str(one.path)
+    say(head, style="bold")
+    for check in one.checks:
+        mark = {"good": "ok", "bad": "WRONG", "not checked": "-"}[check.state]
+        say(f"  {mark:<6}{check.check:<11} {check.message}", style=STYLES[check.state])
+    wrong = sum(check.state == "bad" for check in one.checks)
+    if wrong:
+        say(f"  not accepted: {wrong} of {len(one.checks)} checks failed", style="bold red")
+    elif one.accepted:
+        by = {"signature": "a trusted signature", "archive": "the archive"}
+        proven = " and ".join(by[name] for name in one.proven_by)
+        say(f"  accepted: nothing is wrong, proven by {proven}", style="bold green")
+    else:
+        say(
+            f"  not accepted: nothing is wrong, and nothing shows where the file comes from; {_needed(one)}",
+            style="bold yellow",
+        )
+
+
+def _needed(one: CheckedFile) -> str:
+    """What would prove the origin: an archive proves the values of an XML, and nothing of the pages of a PDF."""
+    signed = any(check.check == "signature" and check.state == "good" for check in one.checks)
+    if one.path.suffix.lower() == ".pdf" and not signed:
+        return "the pages of an unsigned PDF cannot be proven: give its XML with --archive, or ask for a signed PDF"
+    if any(check.check == "laboratory" for check in one.checks):
+        return "names and addresses are not proven by the archive: give --laboratory FILE, or --trust for its signature"
+    return "give --trust FILE with the certificate of the laboratory's key, or --archive with --laboratory"

@@ -5,10 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from pipelines.archive import Archive
-from pipelines.cli import options
+from pipelines.cli.options import ArchiveOption, RunArgument, option
 from pipelines.cli.printing import is_standard_output, print_text, say
 from schemas.errors import WrongUse
 
@@ -27,19 +25,14 @@ FORMATS = "csv, hdf5, lvm, mat, tdms, uff58, wav"  # names of the writers, which
 
 
 def command(
-    run: options.RunArgument = "latest",
-    record: Annotated[int, typer.Option("--record", metavar="N", help="Number of the record, from 0.")] = 0,
-    unit: Annotated[
-        str, typer.Option("--unit", metavar="SN", help="Serial number; default: the first unit of the record.")
-    ] = "",
-    form: Annotated[str, typer.Option("--format", help=f"{FORMATS}.")] = "csv",
+    run: RunArgument = "latest",
+    record: Annotated[int, option("--record N", "Number of the record, from 0.")] = 0,
+    unit: Annotated[str, option("--unit SN", "Serial number; default: the first unit of the record.")] = "",
+    form: Annotated[str, option("--format", f"{FORMATS}.")] = "csv",
     output: Annotated[
-        Path | None,
-        typer.Option(
-            "--output", "-o", metavar="FILE", help="File to write; - prints a text; named after run and record."
-        ),
+        Path | None, option("--output -o FILE", "File to write; - prints a text; named after run and record.")
     ] = None,
-    archive: options.ArchiveOption = None,
+    archive: ArchiveOption = None,
 ) -> None:
     """Write the channels of a unit and of the reference sensor with unit and sample interval.
 

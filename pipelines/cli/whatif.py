@@ -5,13 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any
 
-import typer
-
 from inertial.counts import number_of
 from pipelines.archive import Archive
 from pipelines.cli import options
 from pipelines.cli.inputs import distribution
-from pipelines.cli.printing import error_console, give, print_table, say, short
+from pipelines.cli.options import argument
+from pipelines.cli.printing import conclude, error_console, print_table, say, short
 
 PART = "Old data, new models"
 ORDER = 540
@@ -25,10 +24,9 @@ SHOWN = 12
 
 
 def command(
-    model: Annotated[Path, typer.Argument(metavar="MODEL", help="A model file.")],
+    model: Annotated[Path, argument("MODEL", "A model file.")],
     selection: Annotated[
-        list[str] | None,
-        typer.Argument(metavar="[SELECTION…]", help="Runs as for 'tumbleline rerun'; default: all."),
+        list[str] | None, argument("[SELECTION…]", "Runs as for 'tumbleline rerun'; default: all.")
     ] = None,
     limits: options.OtherLimitsOption = "",
     effect_file: options.EffectFileOption = None,
@@ -53,8 +51,7 @@ def command(
     distribute, count = distribution(store, runs, dask, workers)
     with error_console().status(f"evaluating {number_of(len(runs), 'lot')}, {count} at a time"):
         document = evaluated(store, runs, change, distribute, count)
-    give({"archive": str(store.root), **document}, lambda _: _print(document), as_json=as_json)
-    raise typer.Exit(0 if document["verdict"] == BETTER else 1)
+    conclude({"archive": str(store.root), **document}, _print, as_json=as_json, passed=document["verdict"] == BETTER)
 
 
 def _print(document: dict[str, Any]) -> None:

@@ -6,9 +6,8 @@ import sys
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 from pipelines.archive import Archive
+from pipelines.cli.options import argument, option
 from pipelines.cli.printing import remark, say
 from schemas.errors import WrongUse
 
@@ -22,45 +21,35 @@ EXAMPLES = (
 
 
 def command(
-    archive: Annotated[
-        str, typer.Argument(metavar="[ARCHIVE]", help="The archive; TUMBLELINE_ARCHIVE or ./archive by default.")
-    ] = "",
+    archive: Annotated[str, argument("[ARCHIVE]", "The archive; TUMBLELINE_ARCHIVE or ./archive by default.")] = "",
     folder: Annotated[
-        Path,
-        typer.Option("--folder", metavar="DIR", help="Folder for files of dwells, recipes, models, uploads and lots."),
+        Path, option("--folder DIR", "Folder for files of dwells, recipes, models, uploads and lots.")
     ] = Path("workbench"),
     station: Annotated[
         list[Path] | None,
-        typer.Option(
-            "--station",
-            metavar="FILE",
-            help="A station of the operator's page; may be repeated. The built-in simulated one by default.",
+        option(
+            "--station FILE",
+            "A station of the operator's page; may be repeated. The built-in simulated one by default.",
         ),
     ] = None,
-    port: Annotated[int, typer.Option("--port", min=0, max=65535, help="Port; 0: a free one.")] = 8321,
-    host: Annotated[str, typer.Option("--host", metavar="ADDRESS", help="Interface to listen on.")] = "127.0.0.1",
+    port: Annotated[int, option("--port", "Port; 0: a free one.", min=0, max=65535)] = 8321,
+    host: Annotated[str, option("--host ADDRESS", "Interface to listen on.")] = "127.0.0.1",
     name: Annotated[
-        list[str] | None,
-        typer.Option("--name", metavar="HOST", help="Further host name of this server; may be repeated."),
+        list[str] | None, option("--name HOST", "Further host name of this server; may be repeated.")
     ] = None,
-    certificate: Annotated[
-        Path | None, typer.Option("--certificate", metavar="FILE.pem", help="Certificate for HTTPS.")
-    ] = None,
-    key: Annotated[
-        Path | None, typer.Option("--key", metavar="FILE.pem", help="Private key of the certificate.")
-    ] = None,
-    workers: Annotated[int, typer.Option("--workers", min=1, max=32, help="Processes for diagnoses and fits.")] = 2,
+    certificate: Annotated[Path | None, option("--certificate FILE.pem", "Certificate for HTTPS.")] = None,
+    key: Annotated[Path | None, option("--key FILE.pem", "Private key of the certificate.")] = None,
+    workers: Annotated[int, option("--workers", "Processes for diagnoses and fits.", min=1, max=32)] = 2,
     *,
     pause_lots: Annotated[
         bool,
-        typer.Option(
+        option(
             "--pause-lots",
-            help="Pause lots when the workbench ends, for a service manager that ends their processes with it.",
+            "Pause lots when the workbench ends, for a service manager that ends their processes with it.",
         ),
     ] = False,
     behind_proxy: Annotated[
-        bool,
-        typer.Option("--behind-proxy", help="A proxy in front encrypts; needed on other hosts without a certificate."),
+        bool, option("--behind-proxy", "A proxy in front encrypts; needed on other hosts without a certificate.")
     ] = False,
 ) -> None:
     """Serve pages on this machine: units, what is missing, upload, operator, plan, station and audit.

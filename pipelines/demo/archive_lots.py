@@ -7,7 +7,10 @@ its targets, wander from an Ornstein-Uhlenbeck cascade. What is hidden is a hard
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -15,6 +18,8 @@ from numpy.typing import NDArray
 
 from inertial import poses
 from inertial.frames import force_from_angles
+from pipelines.archive import Archive, code_hash, stage_key
+from pipelines.archive.keys import digest
 
 Array = NDArray[np.float64]
 
@@ -65,7 +70,8 @@ class Line:
         wafers = rng.integers(1, self.wafers + 1, self.units)
         about = pd.DataFrame({"unit": serials, "slot": range(self.units), "wafer": [f"W{w:02d}" for w in wafers]})
         about["station"] = station
-        angles, soak = self._plan()
+        angles = np.concatenate([self._angles[rng.permutation(POSES)] for _ in SOAKS_C])  # another order in each soak
+        soak = np.repeat(np.arange(len(SOAKS_C)), POSES)
         time = self._times(soak)
         rest = angles + np.degrees(self.rests) * rng.standard_normal(angles.shape)  # where the table really rests
         force = _force(rest)
@@ -90,11 +96,6 @@ class Line:
         dwells = pd.concat(tables, ignore_index=True)
         dwells["n"], dwells["out_unit"] = 1000, "g"
         return dwells, about
-
-    def _plan(self) -> tuple[Array, NDArray[np.intp]]:
-        """Angles of every dwell, the poses in another order in each soak, and the soaks' numbers."""
-        order = [self._rng.permutation(POSES) for _ in SOAKS_C]
-        return np.concatenate([self._angles[each] for each in order]), np.repeat(np.arange(len(SOAKS_C)), POSES)
 
     def _times(self, soak: NDArray[np.intp]) -> Array:
         step = np.full(soak.size, DWELL_S + MOVE_S)
@@ -142,3 +143,57 @@ def _wander(rng: np.random.Generator, time: Array) -> Array:
             state = kept * state + math.sqrt(1.0 - kept**2) * rng.standard_normal(3)
             total[k] += state
     return total / math.sqrt(len(_TAU_S))
+
+
+EFFECTS = ("bias", "scale", "misalignment", "bias_temperature", "scale_temperature")
+DEVICE = "DEMO"
+A_NIGHT = 20
+BEGIN = datetime(2026, 1, 5, 6, tzinfo=UTC)
+
+
+@dataclass(frozen=True)
+class DemoArchive:
+    """What was written: the archive, and the table of what is known of its units."""
+
+    folder: Path
+    units: Path
+    lots: int
+
+
+def write_lots(folder: Path, line: Line, lots: int, progress: Callable[[int], None] = lambda _: None) -> DemoArchive:
+    """Write lots of a line as runs of an archive, and ``units.csv`` with the wafer of each unit beside it.
+
+    Parameters
+    ----------
+    progress : is told the number of lots that are written
+    """
+    archive = Archive(str(folder / "archive"))
+    archive.prepare()
+    known: list[pd.DataFrame] = []
+    for number in range(lots):
+        station = STATIONS[number % len(STATIONS)]
+        dwells, about = line.lot(station)
+        known.append(about[["unit", "wafer"]].rename(columns={"unit": "serial"}))
+        write_run(archive, number, station, dwells, about)
+        progress(number + 1)
+    units = folder / "units.csv"
+    pd.concat(known, ignore_index=True).to_csv(units, index=False)
+    return DemoArchive(folder / "archive", units, lots)
+
+
+def write_run(archive: Archive, number: int, station: str, dwells: pd.DataFrame, about: pd.DataFrame) -> None:
+    """One run: its dwells, as an import of a simulated lot."""
+    when = BEGIN + timedelta(days=number // A_NIGHT, minutes=40 * (number % A_NIGHT))
+    units = [{"serial": str(s), "slot": int(k)} for s, k in zip(about["unit"], about["slot"], strict=True)]
+    described = {
+        "when": when.isoformat(timespec="seconds"),
+        "name": f"simulated lot {number}",
+        "lot": {"device": DEVICE, "units": units},
+        "station": {"name": station, "kind": "simulated"},
+        "recipe": {"name": "line", "effects": list(EFFECTS), "formulas": [], "model_name": "", "model_version": 0},
+    }
+    inputs, code = {"source": digest({"lot": number, "units": units})}, code_hash("import")
+    key = stage_key("import", inputs, {"simulated": number}, code)
+    run = archive.open_run("line", described, {"key": key})
+    run.save("import", key, {"dwells": dwells}, {"inputs": inputs, "parameters": {"simulated": number}, "code": code})
+    run.seal()

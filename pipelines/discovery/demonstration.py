@@ -8,8 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from pipelines.archive import Archive
-from pipelines.demo.archive_lots import Hidden, Line
-from pipelines.demo.lot_archive import DemoArchive, write_lots
+from pipelines.demo.archive_lots import DemoArchive, Hidden, Line, write_lots
 from pipelines.discovery.attributes import added_from
 from pipelines.discovery.discover import Look, discovered
 from pipelines.discovery.documents import DiscoveryDemo

@@ -1,7 +1,7 @@
 """Charts as plain descriptions, drawn by Plotly in a page, as SVG or PNG without a browser, and written as CSV."""
 
 from pipelines.drawing.chart import Chart, ColourScale, Plot, PlotAxis, Trace
-from pipelines.drawing.csv_rows import csv_text
+from pipelines.drawing.picture import csv_text
 from pipelines.drawing.plotly_figure import plotly_figure
 from pipelines.drawing.vector import svg_text
 

@@ -5,7 +5,7 @@ A page, a file of a report and a CSV file are drawn from the same description, s
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -123,7 +123,6 @@ class Chart:
     scale: ColourScale | None = None
     height: int = 320
     note: str = ""
-    tags: dict[str, str] = field(default_factory=dict[str, str])
 
     @property
     def rows(self) -> int:
@@ -173,9 +172,9 @@ def symmetric(values: Array, label: str) -> ColourScale:
     return ColourScale(label, -(largest or 1.0), largest or 1.0)
 
 
-def density(x: Array, y: Array, *, columns: int = 80, rows: int = 60) -> Trace:
+def density(x: Array, y: Array) -> Trace:
     """Counts of many points in cells of a grid: for points that would cover each other."""
     there = np.isfinite(x) & np.isfinite(y)
-    counts, xs, ys = np.histogram2d(x[there], y[there], bins=(columns, rows))
-    middle = lambda edges: 0.5 * (edges[1:] + edges[:-1])  # noqa: E731 - twice, in one line
-    return Trace("all units", middle(xs), middle(ys), "density", "muted", counts=counts.T)
+    counts, *edges = np.histogram2d(x[there], y[there], bins=(80, 60))
+    columns, rows = (0.5 * (edge[1:] + edge[:-1]) for edge in edges)
+    return Trace("all units", columns, rows, "density", "muted", counts=counts.T)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.drawing.chart import DIVERGING, SEQUENTIAL, Chart, Plot, PlotAxis, Trace, shortened
+from pipelines.drawing.chart import DIVERGING, SEQUENTIAL, Chart, ColourScale, Plot, PlotAxis, Trace, shortened
 from pipelines.drawing.ticks import log_ticks
 
 MANY = 4000
@@ -59,13 +59,13 @@ def plotly_figure(chart: Chart, *, webgl: bool = True) -> dict[str, Any]:
     for number, plot in enumerate(chart.plots):
         names = _axis_names(number)
         for trace in plot.traces:
-            data.append(_trace(trace, names, chart, shown))
+            data.append(_trace(trace, names, shown, dates=plot.x.dates))
             if not webgl and data[-1]["type"] == "scattergl":
                 data[-1]["type"] = "scatter"
             shown.add(trace.name)
         _place(layout, plot, number, chart)
     if chart.scale is not None:
-        layout["coloraxis"] = _colour_axis(chart)
+        layout["coloraxis"] = _colour_axis(chart.scale)
         layout["margin"]["r"] = 78
     if all(plot.sphere for plot in chart.plots):
         layout["margin"] |= {"l": 8, "b": 8, "t": 34}
@@ -136,8 +136,8 @@ def _axis(axis: PlotAxis, plot: Plot, side: str, columns: int) -> dict[str, Any]
     return out
 
 
-def _trace(trace: Trace, names: tuple[str, str], chart: Chart, shown: set[str]) -> dict[str, Any]:
-    x = trace.x * DAY_MS if _dated(chart, names) else trace.x
+def _trace(trace: Trace, names: tuple[str, str], shown: set[str], *, dates: bool) -> dict[str, Any]:
+    x = trace.x * DAY_MS if dates else trace.x
     out: dict[str, Any] = {
         "xaxis": names[0],
         "yaxis": names[1],
@@ -160,7 +160,7 @@ def _trace(trace: Trace, names: tuple[str, str], chart: Chart, shown: set[str]) 
             "type": "scatter", "mode": "lines", "fill": "toself", "fillcolor": f"{colour}:0.2", "line": {"width": 0},
             "x": packed(np.concatenate([x, x[::-1]])), "y": packed(np.concatenate([trace.y, back])), "hoverinfo": "skip",
         }  # fmt: skip
-    out |= {"x": packed(x, dates=_dated(chart, names)), "y": packed(trace.y)}
+    out |= {"x": packed(x, dates=dates), "y": packed(trace.y)}
     if trace.style == "bars":
         return out | {"type": "bar", "marker": {"color": colour}, "hovertext": [_safe(text) for text in trace.texts]}
     if trace.style == "labels":
@@ -197,15 +197,7 @@ def _points(trace: Trace, colour: str) -> dict[str, Any]:
     return out
 
 
-def _dated(chart: Chart, names: tuple[str, str]) -> bool:
-    number = int(names[0][1:] or 1) - 1
-    return chart.plots[number].x.dates
-
-
-def _colour_axis(chart: Chart) -> dict[str, Any]:
-    scale = chart.scale
-    if scale is None:
-        return {}
+def _colour_axis(scale: ColourScale) -> dict[str, Any]:
     colours = [list(one) for one in (DIVERGING if scale.diverging else SEQUENTIAL)]
     if scale.diverging:
         colours[len(colours) // 2][1] = "role:middle"  # zero has the colour of the page

@@ -47,8 +47,10 @@ def power_label(value: float) -> str:
 
 
 def _step(least: float) -> float:
-    power = 10.0 ** np.floor(np.log10(least)) if least > 0.0 else 1.0
-    return float(next(step * power for step in STEPS if step * power >= least * (1.0 - 1e-9))) if least > 0.0 else 1.0
+    if least <= 0.0:
+        return 1.0
+    power = 10.0 ** np.floor(np.log10(least))
+    return float(next(step * power for step in STEPS if step * power >= least * (1.0 - 1e-9)))
 
 
 def _label(value: float, step: float, largest: float) -> str:

@@ -58,7 +58,11 @@ def svg_text(chart: Chart) -> str:
         max((_left(chart, k, scaled[k][1]) for k in range(column, len(chart.plots), chart.columns)), default=0.0)
         for column in range(chart.columns)
     ]
-    parts = [_legend(lines)]
+    parts = [
+        f'<g transform="translate({x:.1f} {LINE * row + 10.0:.1f})">{mark}{text_at(14.0, 4.0, name)}</g>'
+        for row, line in enumerate(lines)
+        for x, name, mark in line
+    ]
     for number, plot in enumerate(chart.plots):
         row, column = divmod(number, chart.columns)
         x, y = column * (each + GAP), head + row * tall
@@ -219,14 +223,6 @@ def _legend_lines(names: list[tuple[str, str]]) -> list[list[tuple[float, str, s
         lines[-1].append((at, name, mark))
         at += long
     return lines
-
-
-def _legend(lines: list[list[tuple[float, str, str]]]) -> str:
-    return "".join(
-        f'<g transform="translate({x:.1f} {LINE * row + 10.0:.1f})">{mark}{text_at(14.0, 4.0, name)}</g>'
-        for row, line in enumerate(lines)
-        for x, name, mark in line
-    )
 
 
 def _bar(scale: ColourScale, x: float, y: float, height: float) -> str:

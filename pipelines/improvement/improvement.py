@@ -6,10 +6,10 @@ The demonstration, the history of a model and the workbench use its parts.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from schemas.errors import WrongUse, did_you_mean
 
@@ -29,28 +29,26 @@ class ImprovedTables:
     fresh_history: pd.DataFrame | None
 
 
-class Attendant(Protocol):
-    """Who sees an improvement and answers its questions: a terminal, or pages."""
+class Attendant:
+    """Who sees an improvement and answers its questions: nobody here, a terminal or pages in a class of their own."""
 
     def working(self, what: str) -> AbstractContextManager[Any]:
         """Shows what is computed, until it is done."""
-        ...
+        return nullcontext()
 
     def begins_again(self, added: list[str]) -> None:
         """Is told that the model with some more effects is diagnosed next."""
-        ...
 
     def diagnosed(self, document: dict[str, Any], *, first: bool) -> None:
         """Sees a diagnosis: of the model that is judged, or of the last version."""
-        ...
 
     def agrees(self, effect: str, others: list[str], target: Path) -> bool:
         """Whether an effect is added, which the data do not separate from others."""
-        ...
+        return not others
 
     def fresh_run(self) -> tuple[str, pd.DataFrame, pd.DataFrame | None] | None:
         """Name, dwells and temperatures of a fresh run that is there or is measured now; None without one."""
-        ...
+        return None
 
 
 def with_effects(text: str, steps: Sequence[ModelStep], file: Path) -> tuple[str, ModelFile | None]:

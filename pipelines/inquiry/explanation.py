@@ -74,8 +74,9 @@ def what(state: State, proposal: Proposal) -> str:
         "excursion": lambda: f"going to {_temperatures(proposal.steps)} in this order",
         "ramp": lambda: f"measuring while the temperature changes to {_temperatures(proposal.steps)}",
         "later": lambda: f"repeating the same poses after {_waits(proposal.steps)}",
-        "power": lambda: f"switching the units off for {_off(proposal.steps)}: {_power(state, proposal.ids)}",
+        "power": lambda: f"switching the units off for {off} min: {_power(state, proposal.ids)}",
     }
+    off = " and ".join(f"{m:g}" for m in sorted({round(s.off / 60.0, 1) for s in proposal.steps if s.off > 0.0}))
     text = ", and ".join(phrases[kind]() for kind in proposal.kinds)
     return text[:1].upper() + text[1:]
 
@@ -97,11 +98,6 @@ def _waits(steps: Sequence[SequenceStep]) -> str:
     if len(long) == 1 or long[-1] < DRAWN_OUT_S:
         return f"{long[-1]} s"
     return f"{long[0]} to {long[-1]} s"
-
-
-def _off(steps: Sequence[SequenceStep]) -> str:
-    minutes = sorted({round(s.off / 60.0, 1) for s in steps if s.off > 0.0})
-    return " and ".join(f"{m:g}" for m in minutes) + " min"
 
 
 def _power(state: State, ids: Sequence[str]) -> str:

@@ -53,7 +53,8 @@ class RunSequence:
 
     def minutes(self) -> list[float]:
         """Station time of each run, min."""
-        ends = [_end(run) for run in self.runs]
+        readings = [run.table("readings") for run in self.runs]
+        ends = [float((one["start_s"] + one["duration_s"]).max()) for one in readings]  # on the station's clock
         return [(end - begin) / 60.0 for begin, end in zip([0.0, *ends], ends, strict=False)]
 
     def with_run(self, run: Run) -> RunSequence:
@@ -94,9 +95,3 @@ def _numbered_through(tables: Sequence[pd.DataFrame]) -> pd.DataFrame:
                 shifted[column] = table[column] + 1 + max(int(before[column].max()) for before in numbered)
         numbered.append(shifted)
     return pd.concat(numbered, ignore_index=True)
-
-
-def _end(run: Run) -> float:
-    """End of the last record of a run, s on the station's clock."""
-    readings = run.table("readings")
-    return float((readings["start_s"] + readings["duration_s"]).max())

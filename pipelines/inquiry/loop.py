@@ -12,8 +12,7 @@ from typing import Any, Literal
 from pipelines.archive import Archive
 from pipelines.chain.chain import ORDER
 from pipelines.chain.runner import Done, Runner
-from pipelines.inquiry.endings import Ending
-from pipelines.inquiry.inquiry import FOLLOW_UP, FollowUp, Inquiry, begin
+from pipelines.inquiry.inquiry import FOLLOW_UP, Ending, FollowUp, Inquiry, begin
 from pipelines.inquiry.lineage import JointDiagnosis
 from pipelines.jobs.job import Job
 from schemas.progress import Progress, silent

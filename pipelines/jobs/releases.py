@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from pathlib import Path
 from typing import Any
 
 from pipelines.archive import Archive, files, hash_chain
@@ -17,8 +18,10 @@ from pipelines.archive.keys import digest, provenance
 from pipelines.archive.locks import alone
 from pipelines.jobs.documents import ReleaseRecord
 from pipelines.jobs.model_change import ModelChange
+from pipelines.jobs.model_files import chosen_effects, use_formulas
+from pipelines.jobs.recipes import load_recipe
 from schemas.errors import RecipeInvalid, WrongUse
-from schemas.recipe import FormulaSpec
+from schemas.recipe import FormulaSpec, Recipe
 
 FOLDER, EVIDENCE = "releases", "whatif"
 SCHEMA = 1
@@ -190,6 +193,26 @@ def line_model(archive: Archive, device: str, station: str, when: datetime | Non
             key="model",
         )
     return in_force.of_model()
+
+
+def planned_recipe(name: str, effects: str, model: Path | None, archive: str | None, station: str) -> Recipe:
+    """The recipe to be planned, with another model where one is given; the archive is read only for the line's model.
+
+    Parameters
+    ----------
+    effects, model : a list of effects, or a model file; empty or None if not given
+    """
+    chosen = chosen_effects(effects, model, "plan")
+
+    def line(device: str) -> dict[str, Any]:
+        if chosen:
+            return {"effects": chosen}
+        keys = line_model(Archive(archive), device, station)
+        use_formulas(keys["formulas"], "the line's model")
+        return keys
+
+    loaded = load_recipe(name, line)
+    return loaded.model_copy(update={"effects": list(chosen)}) if chosen else loaded
 
 
 def _place(archive: Archive, number: int) -> Any:

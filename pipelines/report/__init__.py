@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from pipelines.archive import Run, code_hash, stage_key
@@ -14,7 +14,7 @@ from pipelines.report.panel import rendered
 from pipelines.report.templates import page_hash, template
 from schemas.errors import WrongUse
 
-__all__ = ["TABLES", "make_report", "render"]
+__all__ = ["TABLES", "keep_report", "make_report", "render", "renew_report"]
 
 PANELS = "pipelines.report.panels"
 
@@ -31,28 +31,62 @@ def render(run: Run, certificates: Mapping[str, Calibration] | None = None) -> s
 
 
 def make_report(run: Run) -> bool:
-    """Write the report of a captured run if it is missing or older than its tables; return whether it was up to date."""
+    """Write the report of a run if it is missing or older than its tables; return whether it was up to date.
+
+    Raises
+    ------
+    WrongUse
+        The run is not finished, or an import without coefficients of a model of the catalogue.
+    """
+    if not _captured(run):
+        from pipelines.report.imported import make_imported_report  # loads the search for effects
+
+        return make_imported_report(run)
     if run.about.get("parents") and run.report.is_file():
         return True  # a follow-up has no decisions: its report is the diagnosis of all runs together
-    _refuse_unfinished(run)
-    names = [*TABLES, *(name for name in ("history", *OPTIONAL) if name in run.tables())]
-    inputs, code = {name: run.manifest(name)["sha256"] for name in names}, code_hash("report")
-    certificates = stated(run, run.table("grades")["unit"])
-    parameters: dict[str, Any] = {"page": page_hash()}  # the code's hash has no templates
-    if certificates:
-        parameters["certificates"] = {unit: one.stated() for unit, one in sorted(certificates.items())}
-    key = stage_key("report", inputs, parameters, code)
-    if run.has_report(key):
-        run.seal()  # a killed writer may not have written it
-        return True
-    run.save_report(key, render(run, certificates), {"inputs": inputs, "parameters": parameters, "code": code})
-    return False
-
-
-def _refuse_unfinished(run: Run) -> None:
-    """Refuse a report on a run without decisions."""
     missing = [name for name in TABLES if name not in run.tables()]
     if missing:
         raise WrongUse(
             f"report: run {run.id} has no {', '.join(missing)}; it is not finished: give its 'tumbleline run' again to continue"
         )
+    names = [*TABLES, *(name for name in ("history", *OPTIONAL) if name in run.tables())]
+    certificates = stated(run, run.table("grades")["unit"])
+    parameters = {"page": page_hash()}  # the code's hash has no templates
+    return keep_report(run, "report", names, parameters, certificates, lambda: render(run, certificates))
+
+
+def renew_report(run: Run) -> None:
+    """Write an existing report again after a change of the ledger."""
+    if (run.path / "report.json").is_file() and (not _captured(run) or set(TABLES) <= set(run.tables())):
+        make_report(run)
+
+
+def _captured(run: Run) -> bool:
+    """Whether a run was measured on a station, or is one of a lot that was, not imported."""
+    return bool(run.about.get("capture") or run.about.get("parents"))
+
+
+def keep_report(
+    run: Run,
+    code_name: str,
+    tables: Sequence[str],
+    parameters: dict[str, Any],
+    certificates: Mapping[str, Calibration],
+    page: Callable[[], str],
+) -> bool:
+    """Write a report if it is missing or older than its tables; return whether it was up to date.
+
+    Parameters
+    ----------
+    code_name : of the code that makes it · tables : that it is made from
+    page : makes it as one HTML text
+    """
+    inputs, code = {name: run.manifest(name)["sha256"] for name in tables}, code_hash(code_name)
+    if certificates:
+        parameters = {**parameters, "certificates": {unit: one.stated() for unit, one in sorted(certificates.items())}}
+    key = stage_key("report", inputs, parameters, code)
+    if run.has_report(key):
+        run.seal()  # a killed writer may not have written it
+        return True
+    run.save_report(key, page(), {"inputs": inputs, "parameters": parameters, "code": code})
+    return False

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inertial import effects
 from inertial.criticism.diagnosis import Diagnosis
@@ -58,14 +57,12 @@ def render_diagnosis(
 def _members(group: dict[str, Any], document: dict[str, Any]) -> list[dict[str, Any]]:
     """The effects of a class, or its handling errors, each with symbol and equation, and which one is recommended."""
     simplest = next((name for name in document["recommended"] if name in group["effects"]), group["effects"][0])
-    return [{**_member(name), "recommended": name == simplest} for name in group["effects"]]
-
-
-def _member(name: str) -> dict[str, str]:
-    known = handled(name) or (effects.get(name) if name in effects.catalogue() or ":" in name else None)
-    if known is None:
-        return {"id": name, "symbol": "", "equation": "one dwell of one unit"}
-    return {"id": name, "symbol": known.symbol, "equation": known.equation}
+    members: list[dict[str, Any]] = []
+    for name in group["effects"]:
+        known = handled(name) or (effects.get(name) if name in effects.catalogue() or ":" in name else None)
+        symbol, equation = ("", "one dwell of one unit") if known is None else (known.symbol, known.equation)
+        members.append({"id": name, "symbol": symbol, "equation": equation, "recommended": name == simplest})
+    return members
 
 
 def _pictures(diagnosis: Diagnosis, units: tuple[str, ...]) -> dict[str, Any]:
@@ -74,6 +71,7 @@ def _pictures(diagnosis: Diagnosis, units: tuple[str, ...]) -> dict[str, Any]:
     drivers = drivers_shown(diagnosis)
     excluding = bands_without_zero(left, drivers)
     force, models = lot.state.force[left.shown], [(label, residual[left.shown]) for label, residual in left.models]
+    poses = len(np.unique(np.round(force, 2), axis=0))
     return {
         "turned": lot.state.temperature is not None and any(series.name == "unit_C" for series in drivers),
         "excluding": excluding,
@@ -82,14 +80,9 @@ def _pictures(diagnosis: Diagnosis, units: tuple[str, ...]) -> dict[str, Any]:
         "several": len(units) > 1,
         "added": left.before is not left.after,
         "model": figure_of(model_chart(left, lot.state, lot.output, MICRO * diagnosis.floor)),
-        "maps": figure_of(pose_chart(left.unit, left.axes, force, models)) if _poses(force) >= FEWEST_POSES else "",
+        "maps": figure_of(pose_chart(left.unit, left.axes, force, models)) if poses >= FEWEST_POSES else "",
         "drivers": figure_of(driver_chart(left, drivers, lot.state.temperature)) if drivers else "",
     }
-
-
-def _poses(force: NDArray[np.float64]) -> int:
-    """Number of different poses."""
-    return len(np.unique(np.round(force, 2), axis=0))
 
 
 def _ladder(diagnosis: Diagnosis) -> list[dict[str, Any]]:

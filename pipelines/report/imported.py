@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 from inertial.quantities import ANGLE_COLUMNS, FORCE_COLUMNS
-from pipelines.archive import Run, code_hash, stage_key
+from pipelines.archive import Run
 from pipelines.certificates.ledger import stated
 from pipelines.certificates.validity import Calibration
 from pipelines.diagnosis.diagnose import examination
 from pipelines.jobs.model_files import use_formulas_of
+from pipelines.report import keep_report
 from pipelines.report.context import ReportContext
 from pipelines.report.diagnosis import render_diagnosis
 from pipelines.report.panels import budget, certificates
@@ -98,19 +98,13 @@ def make_imported_report(run: Run) -> bool:
             "--effects bias,scale,misalignment' then give this command for the new run"
         )
     use_formulas_of(run)
-    past = run.table("history") if "history" in run.tables() else None
     judged = [name for name in GRADED if name in run.tables()]
-    inputs, code = {name: run.manifest(name)["sha256"] for name in (*names, *judged)}, code_hash("report of an import")
-    parameters: dict[str, Any] = {"effects": effects}
-    if given := certificates_of(run):
-        parameters["certificates"] = {unit: one.stated() for unit, one in sorted(given.items())}
-    key = stage_key("report", inputs, parameters, code)
-    if run.has_report(key):
-        run.seal()
-        return True
-    rows = rows_of(run.table("coefficients"))
-    made = examination(fitted_dwells(run.table("dwells")), past, effects)
-    page = render_diagnosis(made.document, made.measured, made.diagnosis, f"run {run.id}", rows)
-    page = page.replace("</body>", f"{decisions(run)}</body>")
-    run.save_report(key, page, {"inputs": inputs, "parameters": parameters, "code": code})
-    return False
+
+    def page() -> str:
+        past = run.table("history") if "history" in run.tables() else None
+        made = examination(fitted_dwells(run.table("dwells")), past, effects)
+        rows = rows_of(run.table("coefficients"))
+        text = render_diagnosis(made.document, made.measured, made.diagnosis, f"run {run.id}", rows)
+        return text.replace("</body>", f"{decisions(run)}</body>")
+
+    return keep_report(run, "report of an import", [*names, *judged], {"effects": effects}, certificates_of(run), page)

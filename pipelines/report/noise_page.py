@@ -9,55 +9,10 @@ import numpy as np
 from pipelines.drawing.chart import SEVERAL, Chart, Plot, PlotAxis, Role, Trace, measured_curve
 from pipelines.drawing.vector import svg_text
 from pipelines.report.numbers import significant
-from pipelines.report.templates import fill
+from pipelines.report.templates import template
 from schemas.units import AXES
 
 PER_DECADE = 40
-PAGE = """\
-<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<title>{{ title }} of {{ document.source }}</title>
-<style>
-{% include 'style.css' %}
-</style>
-</head>
-<body>
-<h1>{{ title }}</h1>
-<p class="lead">{{ document.source }} · {{ document.samples }} samples at {{ number(document.rate_hz) }} Hz</p>
-{{ picture | safe }}
-{% if document.terms %}
-<h2>Noise terms of the Allan deviation</h2>
-<table>
-<tr><th>channel</th><th>term</th><th>name</th><th class="n">value</th>
-<th class="n">lower end</th><th class="n">upper end or limit</th><th>unit</th></tr>
-{% for row in document.terms %}
-<tr><td>{{ row.channel }}</td><td>{{ row.term }}</td><td>{{ row.name }}</td>
-<td class="n">{{ number(row.value) if row.identified else "not identified" }}</td>
-<td class="n">{{ number(row.low) if row.identified else "" }}</td>
-<td class="n">{{ "" if row.identified else "≤ " }}{{ number(row.high) }}</td><td>{{ row.unit }}</td></tr>
-{% endfor %}
-</table>
-<p class="note">Intervals and limits at {{ "%.0f" | format(100 * document.term_confidence) }} %;
-bands of the curve at {{ "%.0f" | format(100 * document.confidence) }} %.</p>
-{% endif %}
-{% if document.spectra %}
-<h2>Allan deviation from the density</h2>
-<table>
-<tr><th>channel</th><th class="n">τ / s</th>
-<th class="n">σ from the density / {{ unit }}</th><th class="n">σ of the samples / {{ unit }}</th></tr>
-{% for row in document.spectra %}{% for k in range(row.tau_s | length) %}
-<tr><td>{{ row.channel }}</td><td class="n">{{ number(row.tau_s[k]) }}</td>
-<td class="n">{{ number(row.deviation_from_density[k]) }}</td><td class="n">{{ number(row.deviation[k]) }}</td></tr>
-{% endfor %}{% endfor %}
-</table>
-{% endif %}
-{% for note in document.notes or [] %}<p class="note">{{ note }}</p>{% endfor %}
-</body>
-</html>
-"""
 
 
 def noise_chart(document: dict[str, Any]) -> Chart:
@@ -69,8 +24,7 @@ def noise_page(document: dict[str, Any]) -> str:
     """One HTML page that needs no other file."""
     name = document.get("statistic_name", "")
     title = "Power spectral density" if "spectra" in document else name[:1].upper() + name[1:]
-    return fill(
-        PAGE,
+    return template("noise.html").render(
         title=title,
         document={"terms": [], "spectra": [], "notes": [], **document},
         unit=document["unit"] or "unit",

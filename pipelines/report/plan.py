@@ -4,15 +4,22 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
+from inertial.arrays import Array
+from inertial.frames import force_from_angles
+from inertial.planning.visibility import confounding
 from pipelines.drawing import svg_text
+from pipelines.drawing.chart import Chart, ColourScale, Plot, PlotAxis, Role, Symbol, Trace
+from pipelines.drawing.mollweide import project, sphere
 from pipelines.planning.context import PlanContext
 from pipelines.planning.plan_rows import worst_axes
-from pipelines.report.axes import side_by_side
 from pipelines.report.budget_plots import shares_plot
-from pipelines.report.numbers import scientific, significant
-from pipelines.report.plan_pictures import alias_chart, sight_chart, sphere_chart, temperature_chart
+from pipelines.report.numbers import scientific, side_by_side, significant
 from pipelines.report.templates import template
+from pipelines.schedule.timing import temperatures
 from schemas.decisions import LARGEST_ERROR
+from schemas.units import AXES
 
 
 def render_plan(document: dict[str, Any], context: PlanContext) -> str:
@@ -57,3 +64,104 @@ def _budget(reach: dict[str, Any] | None) -> str:
     return shares_plot(
         {f"{titles.get(q, q)}, {row['axis']}": row["shares"] for q, row in worst.items() if row["shares"]}
     )
+
+
+KINDS: tuple[tuple[str, str, Role, Symbol], ...] = (
+    ("dwell", "fit", "accent", "circle"),
+    ("verification", "verification", "before", "square"),
+    ("allan", "static record", "z", "diamond"),
+)
+CELL = 18.0  # of a confounded pair and of an effect, pixels
+CONFOUNDED, ALIKE = 0.98, 1.0 - 1e-9
+
+
+def sphere_chart(context: PlanContext) -> Chart:
+    """Directions of specific force in the fixture for every pose, with the order in the first soak."""
+    traces: list[Trace] = []
+    first = [a for a in context.activities if a.kind == "dwell" and a.step.soak == context.activities[0].step.soak]
+    for kind, label, role, symbol in KINDS[:2]:
+        own = [a.step.pose for a in context.activities if a.kind == kind]
+        if own:
+            named = {(pose.outer_deg, pose.inner_deg): pose.name for pose in own}
+            outer, inner = np.radians(np.array(list(named))).T
+            x, y = project(force_from_angles(outer, inner))
+            texts = tuple(f"{name}: outer {o:g}°, inner {i:g}°" for (o, i), name in named.items())
+            picks = tuple(named.values())
+            traces.append(Trace(label, x, y, role=role, symbol=symbol, size=11.0, texts=texts, picks=picks))
+    if len(first) > 1:
+        outer, inner = np.radians(np.array([(a.step.pose.outer_deg, a.step.pose.inner_deg) for a in first])).T
+        x, y = project(force_from_angles(outer, inner))
+        numbers = tuple(str(k + 1) for k in range(len(first)))
+        traces.append(Trace("order in the first soak", x, y - 0.085, "labels", "ink", texts=numbers, legend=False))
+    return Chart(
+        "Poses of the plan: where specific force points in the fixture", (sphere("", tuple(traces)),), height=420
+    )
+
+
+def temperature_chart(context: PlanContext) -> Chart:
+    """Chamber and slowest device over the station's time, with the times of the measurements."""
+    time, air, device = np.array(temperatures(context.activities, context.station)).T
+    hours = time / 3600.0
+    low = float(min(air.min(), device.min()))
+    span = float(max(air.max(), device.max())) - low or 1.0
+    traces = [Trace("chamber", hours, air, "line", "muted"), Trace("slowest device", hours, device, "line", "ink")]
+    for row, (kind, label, role, symbol) in enumerate(KINDS):
+        own = [a for a in context.activities if a.kind == kind]
+        if own:
+            x = np.array([a.start + 0.5 * a.seconds for a in own]) / 3600.0
+            y = np.full(x.shape, low - (0.08 + 0.06 * row) * span)
+            lasting = np.array([(a.start, a.start + a.seconds, np.nan) for a in own]).ravel() / 3600.0
+            traces.append(Trace("", lasting, np.repeat(y, 3), "line", role, width=5.0, legend=False))
+            texts = tuple(f"{label}: {a.step.pose.name}" for a in own)
+            traces.append(Trace(label, x, y, role=role, symbol=symbol, size=5.0, texts=texts))
+    plot = Plot("", PlotAxis("station time / h"), PlotAxis("temperature / °C"), tuple(traces))
+    return Chart("Temperatures and records over the station's time", (plot,), height=340)
+
+
+def alias_chart(context: PlanContext) -> Chart | None:
+    """Confounding: cosine of the row's effect with the span of the column's, after the model; None without effects outside it."""
+    names, cosines = confounding(context.state, context.recipe.effects)
+    if not names:
+        return None
+    order = _grouped(cosines)
+    labels, cosines = tuple(names[k] for k in order), cosines[np.ix_(order, order)]
+    row, column = (index.ravel().astype(float) for index in np.indices(cosines.shape))
+    value = cosines.ravel()
+    size = len(labels)
+    row = size - 1.0 - row
+    cells = Trace("cosine", column, row, symbol="square", size=CELL - 3.0, colour=value, legend=False)
+    marked = (value > CONFOUNDED) & (size - 1.0 - row != column)
+    signs = tuple("=" if one > ALIKE else "≈" for one in value[marked])
+    traces = (cells, Trace("", column[marked], row[marked], "labels", "ink", texts=signs, legend=False))
+    across = PlotAxis("", names=labels, low=-0.6, high=size - 0.4)
+    along = PlotAxis("", names=labels[::-1], low=-0.6, high=size - 0.4)
+    scale = ColourScale("cosine of the row's effect with the column's", 0.0, 1.0, diverging=False)
+    return Chart("Confounded effects", (Plot("", across, along, traces),), scale=scale, height=round(90 + CELL * size))
+
+
+def _grouped(cosines: Array) -> list[int]:
+    """Order of rows in which each follows the one it is most confounded with."""
+    like = np.maximum(cosines, cosines.T)
+    left = set(range(len(like)))
+    order = [0]
+    left.discard(0)
+    while left:
+        best = max(left, key=lambda k: float(like[order[-1], k]))
+        order.append(best)
+        left.discard(best)
+    return order
+
+
+def sight_chart(effects: list[dict[str, Any]]) -> Chart:
+    """Remaining fraction v of every effect by axis."""
+    shown = sorted(effects, key=lambda row: row["left"])
+    place = np.arange(len(shown), dtype=float)
+    traces = [
+        Trace(
+            f"sensor axis {axis}", np.array([row["left_by_axis"][k] for row in shown]), place + 0.2 * (1 - k), role=axis
+        )
+        for k, axis in enumerate(AXES)
+    ]
+    across = PlotAxis("v, fraction of the effect that remains after the model", low=-0.02, high=1.02)
+    along = PlotAxis("", names=tuple(str(row["effect"]) for row in shown), low=-0.6, high=len(shown) - 0.4)
+    return Chart("Remaining fractions", (Plot("", across, along, tuple(traces)),), height=round(80 + CELL * len(shown)))

@@ -129,9 +129,9 @@ def quantities_of_added(diagnosis: Diagnosis) -> tuple[list[DriverValues], list[
     """
     problem = diagnosis.problem
     state = problem.lot.state
-    held = {t.effect.id for t in diagnosis.base.terms}
-    added = [t.effect for t in diagnosis.final.terms if t.effect.id not in held and not isinstance(t.effect, Handling)]
-    drivers = [(effect, quantities_of(state, effect)) for effect in added]
+    new = {*added(diagnosis)}
+    effects = [t.effect for t in diagnosis.final.terms if t.effect.id in new and not isinstance(t.effect, Handling)]
+    drivers = [(effect, quantities_of(state, effect)) for effect in effects]
     series: list[DriverValues] = []
     of_angles = state.outer is not None and state.inner is not None
     if of_angles and any(isinstance(effect, StationEffect) and "force" in names for effect, names in drivers):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from functools import cache
 from hashlib import sha256
 from importlib.resources import files
@@ -57,3 +58,17 @@ def fill(text: str, **values: Any) -> str:
 @cache
 def _compiled(text: str) -> Template:
     return _environment().from_string(text)
+
+
+def plain_reason(text: str) -> str:
+    """One reason, or several divided by ``; ``, in which a figure has its label instead of its id."""
+    return "; ".join(_plain(part) for part in text.split("; "))
+
+
+def _plain(part: str) -> str:
+    begin = re.match(r"\w+", part)
+    known = FIGURES.get(begin.group()) if begin else None
+    if begin is None or known is None:
+        return part
+    rest = part[begin.end() :]
+    return f"{known.label[:1].upper()}{known.label[1:]}{'' if rest.startswith(':') else ':'}{rest}"

@@ -157,6 +157,8 @@ def applied(calibration: Calibration, units: Sequence[str], dwells: pd.DataFrame
     lot = lot_arrays(dwells[dwells["unit"].isin(known)], history, KINDS)
     order = [calibration.units.index(unit) for unit in lot.units]
     state = replace(lot.state, memory={})
-    force = correct(calibration.effects, state, lot.output, calibration.coefficients[order], carried_over(calibration.nonlinear))
+    force = correct(
+        calibration.effects, state, lot.output, calibration.coefficients[order], carried_over(calibration.nonlinear)
+    )
     error = MICRO * (np.linalg.norm(force, axis=-1) - np.linalg.norm(lot.state.force, axis=-1))
     return {unit: (float(np.sum(own**2)), own.size) for unit, own in zip(lot.units, error, strict=True)}

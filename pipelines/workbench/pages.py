@@ -22,16 +22,16 @@ from starlette.responses import HTMLResponse, JSONResponse, Response
 from pipelines.archive import Archive
 from pipelines.drawing import Chart, csv_text, plotly_figure
 from pipelines.drawing.chart import shortened
-from pipelines.drawing.csv_rows import safe_cell
-from pipelines.drawing.picture import picture
+from pipelines.drawing.picture import picture, safe_cell
 from pipelines.report.numbers import significant
-from pipelines.report.reasons import plain_reason
+from pipelines.report.templates import plain_reason
 from pipelines.report.unit_panels.budget import without_nothing
+from pipelines.workbench.services import requests
 from pipelines.workbench.services.index import RecentIndex
-from pipelines.workbench.services.jobs import Jobs
+from pipelines.workbench.services.jobs import BackgroundJob, Jobs
 from pipelines.workbench.settings import WorkbenchSettings
 from pipelines.workbench.state import PageState
-from schemas.errors import WrongUse
+from schemas.errors import TumblelineError, WrongUse
 from schemas.foreign import shown
 from schemas.units import MICRO
 
@@ -76,6 +76,26 @@ class Workbench:
         """The archive of the workbench."""
         return Archive(self.settings.archive)
 
+    def work(self, kind: str, state: PageState, problems: list[str]) -> tuple[Any, BackgroundJob | None]:
+        """Result and job of the work that a page needs, None while there is none; what refuses it is added to ``problems``."""
+        try:
+            _, content = requests.KINDS[kind][1](self.settings, state)
+        except TumblelineError as problem:
+            problems.append(str(problem))
+            return None, None
+        return self.jobs.result(kind, content), self.jobs.known(kind, content)
+
+    def done(self, kind: str, state: PageState) -> Any:
+        """The result of the work that a page needs; None while there is none."""
+        return self.jobs.result(kind, requests.KINDS[kind][1](self.settings, state)[1])
+
+    def finished(self, kind: str, state: PageState) -> Any:
+        """The result of the work that a page needs; refused while there is none."""
+        found = self.done(kind, state)
+        if found is None:
+            raise WrongUse(f"{kind}: not finished; wait until it is done")
+        return found
+
 
 def workbench_of(request: Request) -> Workbench:
     """The workbench of a request."""
@@ -83,9 +103,9 @@ def workbench_of(request: Request) -> Workbench:
     return bench
 
 
-def state_of(request: Request, kind: type[State]) -> tuple[State, list[str]]:
-    """The state of an address, and messages on invalid parts."""
-    return kind.parse(request.query_params.multi_items())
+def asked(request: Request, kind: type[State]) -> tuple[Workbench, State, list[str]]:
+    """The workbench of a request, the state of its address, and messages on invalid parts."""
+    return workbench_of(request), *kind.parse(request.query_params.multi_items())
 
 
 def state_at(body: Mapping[str, Any], kind: type[State]) -> State:
@@ -144,6 +164,11 @@ def figure(chart: Chart | None, ending: str, name: str) -> Response:
     raise WrongUse(f"figure {name}: '{ending[:10]}', one of json, csv, png is needed")
 
 
+def no_figure(name: str) -> WrongUse:
+    """The refusal of a figure that a page does not have."""
+    return WrongUse(f"figure: none of this page is called '{name[:40]}'")
+
+
 def saved_as(name: str) -> dict[str, str]:
     """Headers of a download with a file name."""
     safe = "".join(letter if letter.isascii() and (letter.isalnum() or letter in "._-") else "_" for letter in name)
@@ -176,6 +201,38 @@ def _table(archive: str, run: str, name: str, when: int) -> pd.DataFrame:
     return Archive(archive).run(run).table(name)
 
 
+def samples_of(bench: Workbench, run: str, dwell: str) -> tuple[pd.DataFrame, str, str]:
+    """Samples of a dwell ``UNIT:DWELL``, from the capture of a run or an imported record, the unit of their values, and a title.
+
+    Raises
+    ------
+    WrongUse
+        There is no such dwell, or its samples were not recorded.
+    """
+    stored = bench.archive.run(run)
+    unit, _, number = dwell.rpartition(":")
+    table = run_table(bench, run, "dwells")
+    rows = table[(table["unit"] == unit) & (table["dwell"].astype(str) == number)]
+    if rows.empty:
+        raise WrongUse(f"run {stored.id} has no dwell '{dwell[:80]}'; click a residual")
+    row = rows.iloc[0]
+    record = int(row["record"]) if "record" in rows.columns else int(number)
+    if stored.records is not None:
+        tables = list(stored.records.samples({record}))
+    elif "samples" in stored.tables():
+        samples = run_table(bench, run, "samples")
+        tables = [samples[samples["record"] == record]]
+    else:
+        raise WrongUse(f"run {stored.id} was imported as dwells: its samples were not recorded")
+    kept = [own for one in tables if len(own := one[one["unit"] == unit])]
+    if not kept:
+        raise WrongUse(f"run {stored.id}: no samples of dwell {number} of unit {unit} are stored")
+    out_unit = str(row["out_unit"]) if "out_unit" in rows.columns else ""
+    pose = str(row["pose"]) if "pose" in rows.columns else ""
+    title = f"Unit {unit}, dwell {number}{', pose ' + pose if pose else ''}"
+    return pd.concat(kept, ignore_index=True), out_unit, title
+
+
 @cache
 def static_version() -> str:
     """Part of the addresses of scripts and styles that changes with their content, so that browsers can cache them."""
@@ -199,15 +256,14 @@ def _environment() -> Environment:
     environment = Environment(
         loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
-    environment.filters["short"] = short
-    environment.filters["plain_reason"] = plain_reason
-    environment.filters["tuple_of"] = _tuple_of
-    environment.filters["without_nothing"] = without_nothing
+    own: dict[str, Any] = {
+        "short": short,
+        "plain_reason": plain_reason,
+        "tuple_of": tuple,
+        "without_nothing": without_nothing,
+    }
+    environment.filters.update(own)
     return environment
-
-
-def _tuple_of(values: Any) -> tuple[Any, ...]:
-    return tuple(values)
 
 
 def short(text: object, most: int = 28) -> str:

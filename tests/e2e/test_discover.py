@@ -103,8 +103,7 @@ def test_what_cannot_be_judged_is_said(tmp_path: Path) -> None:
 
 
 def test_few_lots_are_told_and_a_full_folder_is_refused(tmp_path: Path, folder: Path) -> None:
-    from pipelines.demo.archive_lots import Line
-    from pipelines.demo.lot_archive import write_lots
+    from pipelines.demo.archive_lots import Line, write_lots
 
     made = write_lots(tmp_path, Line(6), 3)
     status, out, err = given("discover", "--archive", made.folder)
@@ -133,8 +132,7 @@ def test_python_and_the_audit_tell_the_same(folder: Path) -> None:
 
 @pytest.mark.slow
 def test_scores_on_dask_are_those_of_this_machine(folder: Path, tmp_path: Path) -> None:
-    from pipelines.demo.archive_lots import Line
-    from pipelines.demo.lot_archive import write_lots
+    from pipelines.demo.archive_lots import Line, write_lots
 
     made = write_lots(tmp_path, Line(8), 3)
     assert document_of("discover", "--archive", made.folder, "--dask", "local", "--workers", "1")["pooled"]["lots"] == 3

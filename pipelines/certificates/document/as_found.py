@@ -68,7 +68,9 @@ def _errors(run: Run, source: Run, unit: str) -> Array:
     past = None if history is None else history[history["unit"] == unit]
     lot = lot_arrays(own, past)
     calibration = read_calibration(*(table[table["unit"] == unit] for table in (coefficients, covariance)))
-    corrected = correct(calibration.effects, lot.state, lot.output, calibration.coefficients, carried_over(calibration.nonlinear))
+    corrected = correct(
+        calibration.effects, lot.state, lot.output, calibration.coefficients, carried_over(calibration.nonlinear)
+    )
     error = MICRO * (np.linalg.norm(corrected, axis=-1) - np.linalg.norm(lot.state.force, axis=-1))
     unseen = lot.of_kind("verification")
     return error.reshape(-1)[unseen] if unseen.any() else error.reshape(-1)

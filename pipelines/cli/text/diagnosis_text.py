@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pipelines.cli.next_commands import FindData, JudgedData, command_line, print_extension, print_next
-from pipelines.cli.printing import console, print_table, say
+from pipelines.cli.printing import console, print_table, say, warn
 from pipelines.cli.text.verdict_text import print_verdict
 from pipelines.diagnosis import sections, sentences
 from pipelines.diagnosis.sections import Section
@@ -52,8 +52,7 @@ def print_findings(document: dict[str, Any]) -> None:
     _dim(sentences.tails_left_out(document))
     for text in sentences.influences(document):
         _dim(text)
-    for text in document.get("warnings", ()):
-        say(f"warning: {text}", style="yellow")
+    warn(document.get("warnings", ()))
 
 
 def print_next_measurement(proposed: list[dict[str, Any]], out: Console | None = None) -> None:

@@ -20,19 +20,32 @@ def print_transfers(imports: Sequence[Mapping[str, Any]]) -> None:
         print_verdict_of_fit(one["adequate"], "the model does not describe these points")
 
 
-def print_import(one: dict[str, Any], archive: str | None, *, list_dwells: bool) -> None:
-    """An import for people."""
-    dwells = number_of(one["dwells"], "dwell")
-    rows = f"{number_of(one['samples'], 'sample')}, {dwells}" if one["samples"] else dwells
-    say(f"{', '.join(one['units'])}: {rows} in {one['out_unit']}, kept as run {one['run']}")
-    for remark in [*one["remarks"], *one["lines"]]:
-        say(f"  {remark}")
-    if list_dwells:
-        _print_dwells(one["dwell_list"], one["out_unit"])
-    if one["fit"]:
-        print_verdict_of_fit(one["adequate"], "this fit does not describe these data")
-        if one["fit"] == "norm" and one["adequate"] is False:
-            print_next([command_line("diagnose", one["run"], *archive_words(archive))])
+def print_waveforms(imported: Mapping[str, Any]) -> None:
+    """Imported recordings of a test procedure for people."""
+    say(f"{imported['unit']}: {imported['records']} recordings, kept as run {imported['run']}")
+    rows = [
+        [one["figure"], one["axis"], short(one["value"]), short(one["uncertainty"]), one["unit"], one["note"]]
+        for one in imported["figures"]
+    ]
+    print_table(["figure", "axis", "value", "standard uncertainty", "unit", "remark"], rows, whole=2)
+    for line in imported["text"]:
+        say(f"  {line}")
+
+
+def print_imports(imports: Sequence[dict[str, Any]], archive: str | None, _: object, *, list_dwells: bool) -> None:
+    """Imports for people."""
+    for one in imports:
+        dwells = number_of(one["dwells"], "dwell")
+        rows = f"{number_of(one['samples'], 'sample')}, {dwells}" if one["samples"] else dwells
+        say(f"{', '.join(one['units'])}: {rows} in {one['out_unit']}, kept as run {one['run']}")
+        for remark in [*one["remarks"], *one["lines"]]:
+            say(f"  {remark}")
+        if list_dwells:
+            _print_dwells(one["dwell_list"], one["out_unit"])
+        if one["fit"]:
+            print_verdict_of_fit(one["adequate"], "this fit does not describe these data")
+            if one["fit"] == "norm" and one["adequate"] is False:
+                print_next([command_line("diagnose", one["run"], *archive_words(archive))])
 
 
 def _print_dwells(dwells: list[dict[str, Any]], unit: str) -> None:

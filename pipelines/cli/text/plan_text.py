@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from typing import Any
 
 from inertial.counts import number_of
-from pipelines.cli.printing import print_table, say, short
+from pipelines.cli.next_commands import command_line, print_next
+from pipelines.cli.printing import print_table, remark, say, short
 from pipelines.planning.plan_rows import worst_axes
 from schemas.decisions import LARGEST_ERROR
 
@@ -122,7 +124,7 @@ def _longer(dwell: dict[str, float]) -> str:
 
 def _coefficient_lines(rows: list[dict[str, Any]]) -> list[list[str]]:
     """One line per coefficient with its three axes; one value for parameters of the station."""
-    from pipelines.report.axes import side_by_side
+    from pipelines.report.numbers import side_by_side
 
     lines = side_by_side(rows, lambda row: short(row["uncertainty_ug"]), "unit")
     axes = [["*" if "*" in line["cells"] else "x", "y", "z"] for line in lines]
@@ -166,10 +168,15 @@ def print_reach(reach: dict[str, Any] | None) -> None:
         say("uncertainty: noise only, the station states no [uncertainty]; no grade above consumer, no certificate")
         return
     worst = worst_axes(reach)
-    print_table(["quantity, worst axis", "axis", "u", "U, k = 2", "unit"], [_line(row) for row in worst.values()])
-    for row in worst.values():
+    of_period = {"bias_error_period", LARGEST_ERROR}  # bounds themselves
+    lines = [
+        [TITLES[name], row["axis"], short(row["u"]), "" if name in of_period else short(row["expanded"]), row["unit"]]
+        for name, row in worst.items()
+    ]
+    print_table(["quantity, worst axis", "axis", "u", "U, k = 2", "unit"], lines)
+    for quantity, row in worst.items():
         rulers = ", ".join(f"{name} {100.0 * share:.0f} %" for name, share in row["shares"].items() if share >= LEAST)
-        say(f"{TITLES[row['quantity']]}: {rulers or 'no contribution'}")
+        say(f"{TITLES[quantity]}: {rulers or 'no contribution'}")
     period = f"period of validity {reach['validity_months']} months, frame {reach['frame']}"
     say(f"{period}; references by {reach['grade_source'].replace('_', ' ')}", style="dim")
     if reach["grade_source"] == "assumed":
@@ -180,6 +187,83 @@ def print_reach(reach: dict[str, Any] | None) -> None:
         say(line)
 
 
-def _line(row: dict[str, Any]) -> list[str]:
-    expanded = "" if row["quantity"] in {"bias_error_period", LARGEST_ERROR} else short(row["expanded"])
-    return [TITLES[row["quantity"]], row["axis"], short(row["u"]), expanded, row["unit"]]
+ERROR_HEADS = ("coefficient, unit", "error\n1σ", "required", "ratio", "given\n1σ")
+
+
+def print_optimum(document: dict[str, Any]) -> None:
+    """Print the recipe found."""
+    temperatures = ", ".join(f"{t:g}" for t in document["temperatures_C"])
+    say(
+        f"{document['recipe']}: {document['dwells']} dwells of {document['dwell_s']:g} s "
+        f"in {document['poses']} poses, {'ramps to' if document['ramp'] else 'soaks at'} {temperatures} °C"
+    )
+    minutes, own, textbook = document["minutes"], document["own_minutes"], document["textbook_minutes"]
+    parts = [
+        [name.replace("_", " "), f"{minutes[name]:.0f}", f"{own[name]:.0f}", f"{textbook[name]:.0f}"]
+        for name in minutes
+    ]
+    print_table(["station time, min", "new recipe", document["from"], "textbook plan"], parts)
+    for line in _comparison(document):
+        say(line)
+    if document["rivals"]:
+        lines = [[r["true"], r["wrong"], short(r["chi_square"]), short(r["textbook"])] for r in document["rivals"]]
+        print_table(["true effect", "fitted effect", "χ², new recipe", "χ², textbook plan"], lines, whole=2)
+    else:
+        print_table(ERROR_HEADS, _error_lines(document["coefficients"]))
+        say(f"error: of the new recipe; given: of {document['from']}", style="dim")
+    if document["seen_besides"]:
+        say(f"Also visible, unlike with the textbook plan: {', '.join(document['seen_besides'])}")
+    say(f"Recipe file: {document['file']}")
+    if document["limits_missing"]:
+        remark(f"warning: {document['limits_missing']}", style="yellow")
+    else:
+        print_next([command_line("run", str(document["file"]))])
+    if "page" in document:
+        say(f"Page: {document['page']}")
+
+
+def _comparison(document: dict[str, Any]) -> list[str]:
+    """Sentences that compare the new recipe with the own one and the textbook plan."""
+    name, more = document["from"], document["minutes"]["total"] - document["own_minutes"]["total"]
+    difference = (
+        f"{abs(more):.0f} min {'more' if more > 0.0 else 'less'} than {name}" if abs(more) >= 0.5 else f"as {name}"
+    )
+    first = (
+        f"The new recipe takes {difference}, and {100.0 * document['share']:.0f} % of the textbook plan's time without the "
+        f"static record; {document['verification_dwells']} dwells are for verification (textbook plan: none)."
+    )
+    lines = [first]
+    if document["bound"] is not None:
+        lines.append(
+            f"Measuring without a pause on ramps would need {100.0 * document['bound']['share']:.0f} %, for "
+            f"{document['bound']['effect']}: lag, ramp and wander allow no less."
+        )
+    worst = document["own_worst"]
+    if worst is not None:
+        meets = "meets the required errors" if worst <= 1.0 else f"has up to {worst:.2f} times the required errors"
+        lines.append(
+            f"{name} {meets}." + ("" if worst <= 1.0 else f" For errors as in {name}, give --factor {worst:.2f}.")
+        )
+        if worst <= 1.0 and more > 0.0:
+            lines.append(f"{name} is quicker and meets the requirement: keep it.")
+    if document["worst"] > 1.0:
+        lines.append(
+            "No recipe was found that reaches the textbook plan's errors for every coefficient; the nearest has up to "
+            f"{document['worst']:.3f} times these errors. Allow larger errors with --factor, or fewer dwells with --verification."
+        )
+    return lines
+
+
+def _error_lines(rows: list[dict[str, Any]]) -> list[list[str]]:
+    count = Counter((r["effect"], r["axis"]) for r in rows)
+    several = {effect for (effect, _), number in count.items() if number > 1}
+    return [
+        [
+            f"{r['effect']} {r['axis']}{' ' + r['name'] if r['effect'] in several else ''}, {r['unit']}",
+            short(r["uncertainty_ug"]),
+            short(r["wanted_ug"]),
+            f"{r['uncertainty_ug'] / r['wanted_ug']:.2f}",
+            short(r["own_ug"]) or "–",
+        ]
+        for r in rows
+    ]

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
-from typing import Any
-
 import numpy as np
 import pandas as pd
 
@@ -15,6 +12,7 @@ from pipelines.report.templates import fill
 from pipelines.stages.figures import FIGURES
 from pipelines.stages.uncertainty.tables import LABELS
 from pipelines.tables.frames import rows_of
+from schemas.uncertainty import NEEDED
 
 ORDER = 45
 TITLE = "Uncertainty budget"
@@ -55,6 +53,7 @@ def render(report: ReportContext) -> str:
     sums, station = report.tables.get("uncertainties", pd.DataFrame()), report.about.get("station") or {}
     recipe = report.recipe
     entries = {**(station.get("uncertainty") or {}), **(recipe.get("uncertainty") or {})}
+    missing = {name: rules for name, rules in NEEDED.items() if name not in {*entries, *report.not_needed}}
     first = str(sums["unit"].iloc[0]) if len(sums) else ""
     return fill(
         TEMPLATE,
@@ -63,17 +62,11 @@ def render(report: ReportContext) -> str:
         frame=str(sums["frame"].iloc[0]) if len(sums) else "",
         source=str(entries.get("grade_source", "assumed")).replace("_", " "),
         plot=shares_plot(_shares(report.tables["budget"], first)) if len(sums) else "",
-        missing=_missing(entries, report.not_needed) if len(sums) else {},
+        missing=missing if len(sums) else {},
         references=[{**NO_REFERENCE, **one} for one in station.get("reference", [])],
         seen=_seen(sums),
         risks=_risks(report.tables.get("lot_risks")),
     )
-
-
-def _missing(entries: dict[str, Any], not_needed: Collection[str]) -> dict[str, str]:
-    from schemas.uncertainty import NEEDED
-
-    return {name: rules for name, rules in NEEDED.items() if name not in {*entries, *not_needed}}
 
 
 def _shares(budget: pd.DataFrame, unit: str) -> dict[str, dict[str, float]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pipelines.report.context import ReportContext, UnitContext
+from pipelines.report.context import ReportContext
 from pipelines.report.panel import rendered
 from pipelines.report.templates import fill
 
@@ -35,8 +35,5 @@ FIRST = ("fail", "refused")
 def render(report: ReportContext) -> str:
     """Every unit with the panels that have something to show; failed and refused units first, and open."""
     units = sorted(report.units, key=lambda unit: unit.outcome not in FIRST)
-    return fill(TEMPLATE, units=[(unit, _panels(unit)) for unit in units])
-
-
-def _panels(unit: UnitContext) -> list[tuple[str, str]]:
-    return [] if unit.outcome == "refused" else rendered(UNIT_PANELS, unit)
+    shown = [(unit, [] if unit.outcome == "refused" else rendered(UNIT_PANELS, unit)) for unit in units]
+    return fill(TEMPLATE, units=shown)

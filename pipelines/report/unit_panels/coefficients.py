@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from pipelines.report.axes import side_by_side
 from pipelines.report.context import UnitContext
-from pipelines.report.numbers import with_uncertainty
+from pipelines.report.numbers import side_by_side, with_uncertainty
 from pipelines.report.templates import fill
 from pipelines.tables.frames import rows_of
 

@@ -13,10 +13,8 @@ from inertial.uncertainty.rounding import chance
 from pipelines.audit.documents import AuditDocument
 from pipelines.audit.finding import WHO
 from pipelines.stages.figures import FIGURES
-from pipelines.workbench.pages import Workbench, figure, page, state_of, table_csv, workbench_of
-from pipelines.workbench.services import requests
+from pipelines.workbench.pages import asked, figure, no_figure, page, table_csv
 from pipelines.workbench.state import AuditPage
-from schemas.errors import TumblelineError, WrongUse
 
 router = APIRouter()
 HEADING, ORDER, ADDRESS = "Audit", 70, "/audit"
@@ -39,14 +37,8 @@ TABLES: dict[str, Callable[[AuditDocument], Sequence[Mapping[str, Any]]]] = {
 @router.get("/audit")
 def audit(request: Request) -> Response:
     """The page."""
-    bench = workbench_of(request)
-    state, problems = state_of(request, AuditPage)
-    audited, job = None, None
-    try:
-        _, content = requests.audit(bench.settings, state)
-        audited, job = bench.jobs.result("audit", content), bench.jobs.known("audit", content)
-    except TumblelineError as problem:
-        problems = [*problems, str(problem)]
+    bench, state, problems = asked(request, AuditPage)
+    audited, job = bench.work("audit", state, problems)
     return page(
         request, "audit.html", state, problems, empty=not bench.archive.run_ids(), audited=audited, job=job, who=WHO,
         most_due=DUE, most_findings=FINDINGS, compared=COMPARED, chance=chance,
@@ -57,14 +49,11 @@ def audit(request: Request) -> Response:
 @router.get("/audit/figure/{name}.{ending}")
 def drawn(request: Request, name: str, ending: str) -> Response:
     """A figure of the page."""
-    audited = _finished_audit(workbench_of(request), request)
-    if name == "evidence":
-        state, _ = state_of(request, AuditPage)
-        chart = audited["evidence"].get(state.finding)
-    else:
-        chart = audited["charts"].get(name)
+    bench, state, _ = asked(request, AuditPage)
+    audited = bench.finished("audit", state)
+    chart = audited["evidence"].get(state.finding) if name == "evidence" else audited["charts"].get(name)
     if chart is None:
-        raise WrongUse(f"figure: none of this page is called '{name[:40]}'")
+        raise no_figure(name)
     return figure(chart, ending, f"audit-{name}")
 
 
@@ -73,8 +62,8 @@ def table(request: Request, name: str) -> Response:
     """A table of the page."""
     if name not in TABLES:
         raise HTTPException(404)
-    document = _finished_audit(workbench_of(request), request)["document"]
-    return table_csv([_flat(row) for row in TABLES[name](document)], name)
+    bench, state, _ = asked(request, AuditPage)
+    return table_csv([_flat(row) for row in TABLES[name](bench.finished("audit", state)["document"])], name)
 
 
 def _flat(row: Mapping[str, Any]) -> dict[str, Any]:
@@ -84,11 +73,3 @@ def _flat(row: Mapping[str, Any]) -> dict[str, Any]:
         if value is not None:
             out |= {f"{key}_{side}": value[side] for side in value} if isinstance(value, dict) else {key: value}
     return out
-
-
-def _finished_audit(bench: Workbench, request: Request) -> dict[str, Any]:
-    state, _ = state_of(request, AuditPage)
-    audited: dict[str, Any] | None = bench.jobs.result("audit", requests.audit(bench.settings, state)[1])
-    if audited is None:
-        raise WrongUse("audit: not finished; wait until it is done")
-    return audited

@@ -10,24 +10,23 @@ from starlette.responses import JSONResponse, Response
 from pipelines.diagnosis.inputs import use_written_formulas
 from pipelines.diagnosis.sections import worded
 from pipelines.drawing import Chart
-from pipelines.report.diagnosis_pictures import pose_chart, quantity_chart, slot_chart
-from pipelines.report.evolution import evolution_chart
+from pipelines.report.diagnosis_pictures import evolution_chart, pose_chart, quantity_chart, slot_chart
 from pipelines.report.run_pictures import samples_chart
 from pipelines.workbench.pages import (
     RequestBody,
     Workbench,
+    asked,
     figure,
+    no_figure,
     page,
     page_part,
     part_of,
-    run_table,
+    samples_of,
     state_at,
-    state_of,
     table_csv,
     workbench_of,
 )
 from pipelines.workbench.services import models, requests, sources
-from pipelines.workbench.services.samples import samples_of
 from pipelines.workbench.services.work import Diagnosed
 from pipelines.workbench.state import MissingPage
 from schemas.errors import TumblelineError, WrongUse
@@ -40,8 +39,7 @@ CANDIDATES, INFLUENCE = 12, 12
 @router.get("/missing")
 def missing(request: Request) -> Response:
     """The page; the page itself requests missing results."""
-    bench = workbench_of(request)
-    state, problems = state_of(request, MissingPage)
+    bench, state, problems = asked(request, MissingPage)
     if part_of(request) == "samples" and state.source and not problems:
         state = requests.settled(bench.settings, state)
         return page_part(request, "missing_samples.html", state, is_file=sources.is_file(bench.settings, state.source))
@@ -50,10 +48,10 @@ def missing(request: Request) -> Response:
         try:
             state = requests.settled(bench.settings, state)
             work = {kind: requests.KINDS[kind][1](bench.settings, state) for kind in ("diagnose", "ladder")}
-            diagnosed = bench.jobs.result("diagnose", work["diagnose"][1])
-            rows = bench.jobs.result("ladder", work["ladder"][1])
+            diagnosed, rows = (bench.jobs.result(kind, content) for kind, (_, content) in work.items())
         except TumblelineError as problem:
             problems, work = [*problems, str(problem)], {}
+    table = None if diagnosed is None else diagnosed.table
     return page(
         request, "missing.html", state, problems, sources=chosen, diagnosed=diagnosed, rows=rows,
         worded=None if diagnosed is None else worded(diagnosed.document),
@@ -61,8 +59,9 @@ def missing(request: Request) -> Response:
         twin=sources.twin(bench.settings, state.source) if state.source and not state.fresh else "",
         models=models.models(bench.settings),
         ladder_command=state.ladder_command(bench.settings.archive),
-        unit=_unit(diagnosed, state), against="" if diagnosed is None else _quantity(diagnosed, state),
-        candidates=CANDIDATES, influence=INFLUENCE, drivers=_drivers(diagnosed),
+        unit=state.unit if table is None else table.units[table.place_of(state.unit)],
+        against="" if diagnosed is None else _quantity(diagnosed, state), candidates=CANDIDATES, influence=INFLUENCE,
+        drivers=[] if table is None else [(name, label) for name, (label, _) in table.drivers.items()],
         is_file=any(one.is_file and one.name == state.source for one in chosen),
     )  # fmt: skip
 
@@ -70,16 +69,14 @@ def missing(request: Request) -> Response:
 @router.get("/missing/figure/{name}.{ending}")
 def drawn(request: Request, name: str, ending: str) -> Response:
     """A figure of the page."""
-    bench = workbench_of(request)
-    state, _ = state_of(request, MissingPage)
+    bench, state, _ = asked(request, MissingPage)
     return figure(_chart(bench, state, name), ending, f"missing-{name}")
 
 
 @router.get("/missing/candidates.csv")
 def candidates(request: Request) -> Response:
     """The candidates of the first step."""
-    bench = workbench_of(request)
-    state, _ = state_of(request, MissingPage)
+    bench, state, _ = asked(request, MissingPage)
     diagnosed = _diagnosed(bench, state)
     return table_csv([] if diagnosed is None else list(diagnosed.ladder), "candidates")
 
@@ -114,23 +111,18 @@ def formula(body: RequestBody) -> JSONResponse:
 
 
 def _diagnosed(bench: Workbench, state: MissingPage) -> Diagnosed | None:
-    _, content = requests.diagnosis(bench.settings, state)
-    diagnosed: Diagnosed | None = bench.jobs.result("diagnose", content)
-    return diagnosed
+    return bench.done("diagnose", state)
 
 
 def _chart(bench: Workbench, state: MissingPage, name: str) -> Chart | None:
     if name == "samples":
-        samples, out_unit, title = samples_of(
-            bench.archive, state.source, state.dwell, partial(run_table, bench, state.source)
-        )
+        samples, out_unit, title = samples_of(bench, state.source, state.dwell)
         return samples_chart(samples, title, out_unit)
     if name == "ladder":
-        _, content = requests.ladder(bench.settings, state)
-        rows = bench.jobs.result("ladder", content)
+        rows = bench.done("ladder", state)
         return None if rows is None else evolution_chart(rows)
     if name not in {"sphere", "drivers", "slots"}:
-        raise WrongUse(f"figure: none of this page is called '{name[:40]}'")
+        raise no_figure(name)
     diagnosed = _diagnosed(bench, state)
     if diagnosed is None or diagnosed.table is None:
         return None
@@ -140,11 +132,8 @@ def _chart(bench: Workbench, state: MissingPage, name: str) -> Chart | None:
         return slot_chart(table)
     if name == "drivers":
         return quantity_chart(table, before, _quantity(diagnosed, state), unit, state.colour)
-    models = (
-        [("after", table.residual[unit])]
-        if before is None
-        else [("before", before[unit]), ("after", table.residual[unit])]
-    )
+    shown = [("before", before), ("after", table.residual)]
+    models = [(name, residual[unit]) for name, residual in shown if residual is not None]
     return pose_chart(table.units[unit], table.axes, table.force[unit], models, partial(table.pick, unit))
 
 
@@ -154,15 +143,3 @@ def _quantity(diagnosed: Diagnosed, state: MissingPage) -> str:
     first = "" if diagnosed.table is None else diagnosed.table.first
     followed = [first, *(str(one["driver"]) for one in diagnosed.document["where"])]
     return next((name for name in (state.against, *followed) if name in known), "force")
-
-
-def _unit(diagnosed: Diagnosed | None, state: MissingPage) -> str:
-    if diagnosed is None or diagnosed.table is None:
-        return state.unit
-    return diagnosed.table.units[diagnosed.table.place_of(state.unit)]
-
-
-def _drivers(diagnosed: Diagnosed | None) -> list[tuple[str, str]]:
-    if diagnosed is None or diagnosed.table is None:
-        return []
-    return [(name, label) for name, (label, _) in diagnosed.table.drivers.items()]

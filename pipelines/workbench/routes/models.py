@@ -11,8 +11,8 @@ from starlette.responses import JSONResponse, Response
 from inertial import effects
 from pipelines.jobs.model_files import read_model, versions
 from pipelines.jobs.releases import released, releases
-from pipelines.workbench.pages import RequestBody, Workbench, page, state_of, table_csv, workbench_of
-from pipelines.workbench.services import models, requests
+from pipelines.workbench.pages import RequestBody, Workbench, asked, page, table_csv, workbench_of
+from pipelines.workbench.services import models
 from pipelines.workbench.state import ModelsPage
 from schemas.errors import TumblelineError
 
@@ -23,18 +23,16 @@ HEADING, ORDER, ADDRESS = "Models", 30, "/models"
 @router.get("/models")
 def shown(request: Request) -> Response:
     """The page; the what-if is computed on request."""
-    bench = workbench_of(request)
-    state, problems = state_of(request, ModelsPage)
+    bench, state, problems = asked(request, ModelsPage)
     what_if, job, steps = None, None, []
     if state.model:
         try:
             place = models.place_of(bench.settings, state.model)
             with effects.additions_forgotten():
                 steps = versions(read_model(place))[::-1]
-            _, content = requests.what_if(bench.settings, state)
-            what_if, job = bench.jobs.result("whatif", content), bench.jobs.known("whatif", content)
+            what_if, job = bench.work("whatif", state, problems)
         except TumblelineError as problem:
-            problems = [*problems, str(problem)]
+            problems.append(str(problem))
     return page(
         request, "models.html", state, problems, models=models.models(bench.settings), steps=steps, whatif=what_if, job=job,
         releases=_releases(bench), today=datetime.now(UTC).date().isoformat(),
@@ -44,15 +42,10 @@ def shown(request: Request) -> Response:
 @router.get("/models/lots.csv")
 def lots(request: Request) -> Response:
     """The what-if by device and station."""
-    bench = workbench_of(request)
-    state, _ = state_of(request, ModelsPage)
-    what_if = bench.jobs.result("whatif", requests.what_if(bench.settings, state)[1])
-    rows = (
-        []
-        if what_if is None
-        else [_flat(row) for row in [*what_if["groups"], {"station": "all", "device": "all", **what_if["total"]}]]
-    )
-    return table_csv(rows, f"what-if-{state.model}")
+    bench, state, _ = asked(request, ModelsPage)
+    what_if = bench.done("whatif", state)
+    rows = [] if what_if is None else [*what_if["groups"], {"station": "all", "device": "all", **what_if["total"]}]
+    return table_csv([_flat(row) for row in rows], f"what-if-{state.model}")
 
 
 @router.post("/models/release")

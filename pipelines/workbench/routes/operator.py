@@ -2,14 +2,83 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
 from fastapi import APIRouter, Request
+from starlette.exceptions import HTTPException
 from starlette.responses import JSONResponse, Response
 
 from pipelines.jobs.job import Request as LotRequest
-from pipelines.workbench.pages import RequestBody, page, state_of, workbench_of
-from pipelines.workbench.services import lots, requests, stations
+from pipelines.workbench.pages import RequestBody, asked, page, workbench_of
+from pipelines.workbench.services import lots, requests
+from pipelines.workbench.settings import WorkbenchSettings
 from pipelines.workbench.state import OperatorPage
 from schemas.errors import WrongUse, did_you_mean
+from schemas.station import BUILT_IN, load_station
+
+
+@dataclass(frozen=True)
+class Bench:
+    """A station of the operator's page.
+
+    file : None for the built-in one · slots : number of them
+    """
+
+    file: Path | None
+    name: str
+    slots: int
+    simulated: bool
+
+    @property
+    def address(self) -> str:
+        """The station as a lot names it."""
+        return str(self.file or "")
+
+
+def stations_of(settings: WorkbenchSettings) -> list[Bench]:
+    """The stations in the order of the command line; two of one name are told apart by their files.
+
+    Raises
+    ------
+    RecipeInvalid
+        The file of a station was changed and is invalid.
+    """
+    configs = [(file, load_station(file)) for file in settings.stations or (None,)]
+    names = [config.name for _, config in configs]
+    return [
+        Bench(
+            file,
+            config.name if names.count(config.name) == 1 else str(file or BUILT_IN),
+            config.devices.slots.count,
+            config.kind == "simulated",
+        )
+        for file, config in configs
+    ]
+
+
+def station_named(known: Sequence[Bench], name: str) -> Bench:
+    """The station of this name; the first for none.
+
+    Raises
+    ------
+    WrongUse
+        No station has the name.
+    """
+    if not name:
+        return known[0]
+    station = next((one for one in known if one.name == name), None)
+    if station is None:
+        names = [one.name for one in known]
+        raise WrongUse(f"station: none of this workbench is called '{name[:60]}'; {did_you_mean(name, names)}")
+    return station
+
+
+def station_at(known: Sequence[Bench], address: str) -> Bench:
+    """The station of a lot; the first for a lot of a station that this workbench was not started with."""
+    return next((one for one in known if one.address == address), known[0])
+
 
 router = APIRouter()
 HEADING, ORDER, ADDRESS = "Operator", 40, "/operator"
@@ -25,11 +94,10 @@ REMEDIES = {
 @router.get("/operator")
 def operator(request: Request) -> Response:
     """The newest lot as tiles, or the one of the address; seats to scan if no lot is running."""
-    bench = workbench_of(request)
-    state, problems = state_of(request, OperatorPage)
-    newest, known = lots.lots(bench.settings), stations.stations(bench.settings)
+    bench, state, problems = asked(request, OperatorPage)
+    newest, known = lots.lots(bench.settings), stations_of(bench.settings)
     chosen = next((one for one in newest if one.id == state.lot), None)
-    station = stations.at(known, chosen.station) if chosen else stations.named(known, state.station)
+    station = station_at(known, chosen.station) if chosen else station_named(known, state.station)
     here = [one for one in newest if one.station == station.address]
     shown = chosen or next((one for one in here if not one.ended), None)
     return page(
@@ -47,7 +115,7 @@ def start(request: Request, body: RequestBody) -> JSONResponse:
     recipe = str(body.get("recipe", ""))
     if recipe not in known:
         raise WrongUse(f"lot: no recipe is called '{recipe[:60]}'; {did_you_mean(recipe, known)}")
-    station = stations.named(stations.stations(bench.settings), str(body.get("station", "")))
+    station = station_named(stations_of(bench.settings), str(body.get("station", "")))
     filled = {
         _slot(key.removeprefix("slot-"), station.slots): serial
         for key, value in body.items()
@@ -75,24 +143,13 @@ def answer(request: Request, name: str, body: RequestBody) -> JSONResponse:
     return JSONResponse({"address": OperatorPage(lot=name).address()})
 
 
-@router.post("/operator/{name}/stop")
-def stop(request: Request, name: str) -> JSONResponse:
-    """Stop the lot's process after the safe state."""
-    lots.stop(workbench_of(request).settings, name)
-    return JSONResponse({"address": OperatorPage(lot=name).address()})
-
-
-@router.post("/operator/{name}/pause")
-def pause(request: Request, name: str) -> JSONResponse:
-    """Stop the lot's process after the safe state; the lot keeps the station."""
-    lots.pause(workbench_of(request).settings, name)
-    return JSONResponse({"address": OperatorPage(lot=name).address()})
-
-
-@router.post("/operator/{name}/continue")
-def again(request: Request, name: str) -> JSONResponse:
-    """Continue a stopped lot."""
-    lot = lots.again(workbench_of(request).settings, name)
+@router.post("/operator/{name}/{action}")
+def act(request: Request, name: str, action: str) -> JSONResponse:
+    """Stop the lot's process after the safe state, pause it so that the lot keeps the station, or continue the lot."""
+    actions = {"stop": lots.stop, "pause": lots.pause, "continue": lots.again}
+    if action not in actions:
+        raise HTTPException(404)
+    lot = actions[action](workbench_of(request).settings, name)
     return JSONResponse({"address": OperatorPage(lot=lot.id).address()})
 
 

@@ -10,7 +10,7 @@ from typing import Any
 from fastapi import APIRouter, Request
 from starlette.responses import JSONResponse, Response, StreamingResponse
 
-from pipelines.workbench.pages import RequestBody, Workbench, page_address, workbench_of
+from pipelines.workbench.pages import RequestBody, page_address, workbench_of
 from pipelines.workbench.services import lots, requests
 from pipelines.workbench.services.jobs import Jobs
 from schemas.errors import WrongUse
@@ -53,12 +53,8 @@ def look(request: Request, name: str) -> JSONResponse:
 async def events(request: Request) -> Response:
     """The stream of events."""
     bench = workbench_of(request)
-    content = stream(request, bench.boot, bench.jobs, lambda: _stamps(bench))
+    content = stream(request, bench.boot, bench.jobs, lambda: {"lots": lots.stamp(bench.settings)})
     return StreamingResponse(content, media_type="text/event-stream", headers={"x-accel-buffering": "no"})
-
-
-def _stamps(bench: Workbench) -> dict[str, str]:
-    return {"lots": lots.stamp(bench.settings)}
 
 
 async def stream(request: Request, boot: str, jobs: Jobs, stamps: Callable[[], dict[str, str]]) -> AsyncIterator[str]:

@@ -7,9 +7,7 @@ from starlette.responses import Response
 
 from pipelines.certificates.ledger import stated
 from pipelines.tables.frames import rows_of
-from pipelines.workbench.pages import Workbench, page, run_table, saved_as, state_of, table_csv, workbench_of
-from pipelines.workbench.services import requests
-from pipelines.workbench.services.work import Diagnosed
+from pipelines.workbench.pages import asked, page, run_table, saved_as, table_csv
 from pipelines.workbench.state import MissingPage, RunPage
 from schemas.errors import TumblelineError, WrongUse
 
@@ -26,54 +24,44 @@ SHOWN = (
 @router.get("/run")
 def run(request: Request) -> Response:
     """Result and figures of every unit of a run."""
-    bench = workbench_of(request)
-    state, problems = state_of(request, RunPage)
+    bench, state, problems = asked(request, RunPage)
     stored = bench.archive.run(state.run)
     state = state.model_copy(update={"run": stored.id})
     tables, about = stored.tables(), stored.about
     grades = rows_of(run_table(bench, stored.id, "grades").sort_values("slot")) if "grades" in tables else []
     figures = run_table(bench, stored.id, "figures") if "figures" in tables else None
     cells: dict[str, dict[str, float]] = {}
-    if figures is not None:
-        chosen = figures[figures["figure"].isin(SHOWN)]
-        for row in rows_of(chosen):
-            cells.setdefault(str(row["unit"]), {})[str(row["figure"])] = float(row["value"])
+    for row in [] if figures is None else rows_of(figures[figures["figure"].isin(SHOWN)]):
+        cells.setdefault(str(row["unit"]), {})[str(row["figure"])] = float(row["value"])
     try:
         certificates = {
             unit: one.sentence() for unit, one in stated(stored, [str(row["unit"]) for row in grades]).items()
         }
     except TumblelineError as problem:
-        certificates, problems = {}, [*problems, str(problem)]
+        certificates = {}
+        problems.append(str(problem))
     events = rows_of(run_table(bench, stored.id, "events")) if "events" in tables else []
+    diagnosed, _ = bench.work(
+        "diagnose", MissingPage(source=stored.id), []
+    )  # where it was judged since the server began
     return page(
         request, "run.html", state, problems, run=stored, about=about, grades=grades, cells=cells, shown=SHOWN, tables=tables,
-        certificates=certificates, events=events, adequate=_adequate(bench, stored.id),
+        certificates=certificates, events=events, adequate=None if diagnosed is None else diagnosed.document["adequate"],
     )  # fmt: skip
-
-
-def _adequate(bench: Workbench, run: str) -> bool | None:
-    """The verdict on the run's own model, where it was judged since the server began; None else."""
-    try:
-        _, content = requests.diagnosis(bench.settings, MissingPage(source=run))
-    except TumblelineError:
-        return None
-    diagnosed: Diagnosed | None = bench.jobs.result("diagnose", content)
-    return None if diagnosed is None else diagnosed.document["adequate"]
 
 
 @router.get("/run/table/{name}.csv")
 def table(request: Request, name: str) -> Response:
     """A table of a run."""
-    bench = workbench_of(request)
-    state, _ = state_of(request, RunPage)
+    bench, state, _ = asked(request, RunPage)
     return table_csv(rows_of(run_table(bench, state.run, name)), f"{state.run}-{name}")
 
 
 @router.get("/run/report.html")
 def report(request: Request) -> Response:
     """The report of a run, as a file."""
-    state, _ = state_of(request, RunPage)
-    stored = workbench_of(request).archive.run(state.run)
+    bench, state, _ = asked(request, RunPage)
+    stored = bench.archive.run(state.run)
     if not stored.report.is_file():
         raise WrongUse(f"run {stored.id} has no report; make it with 'tumbleline report {stored.id}'")
     return Response(stored.report.read_bytes(), media_type="text/html", headers=saved_as(f"{stored.id}.html"))

@@ -10,7 +10,7 @@ from starlette.responses import Response
 from pipelines.commissioning.frames import timeline
 from pipelines.report.run_pictures import station_chart
 from pipelines.tables.frames import rows_of
-from pipelines.workbench.pages import Workbench, figure, page, run_table, state_of, workbench_of
+from pipelines.workbench.pages import Workbench, asked, figure, no_figure, page, run_table
 from pipelines.workbench.state import StationPage
 from schemas.errors import WrongUse
 from stations.recordings.frame_file import read_frames
@@ -35,8 +35,7 @@ def recordings_of(bench: Workbench) -> dict[str, Path]:
 @router.get("/station")
 def station(request: Request) -> Response:
     """The page of a run's station."""
-    bench = workbench_of(request)
-    state, problems = state_of(request, StationPage)
+    bench, state, problems = asked(request, StationPage)
     infos = bench.archive.runs()[::-1]
     run, events, soaks = None, [], []
     if infos:
@@ -46,13 +45,12 @@ def station(request: Request) -> Response:
         events = run.records.events.documents() if run.records is not None else []
         soaks = rows_of(run_table(bench, run.id, "soaks")) if "soaks" in tables else []
         if not tables >= NEEDED:
-            problems = [
-                *problems,
-                f"run {run.id} was not measured on a station of this archive: it has no temperatures over time",
-            ]
+            problems.append(
+                f"run {run.id} was not measured on a station of this archive: it has no temperatures over time"
+            )
     recordings = recordings_of(bench)
     if state.recording and state.recording not in recordings:
-        problems = [*problems, f"recording: the archive has none called '{state.recording[:40]}'"]
+        problems.append(f"recording: the archive has none called '{state.recording[:40]}'")
         state = state.model_copy(update={"recording": ""})
     return page(
         request, "station.html", state, problems, recordings=list(recordings), run=run,
@@ -64,14 +62,13 @@ def station(request: Request) -> Response:
 @router.get("/station/figure/{name}.{ending}")
 def drawn(request: Request, name: str, ending: str) -> Response:
     """A figure of the page."""
-    bench = workbench_of(request)
-    state, _ = state_of(request, StationPage)
+    bench, state, _ = asked(request, StationPage)
     if name == "frames":
         path = recordings_of(bench).get(state.recording)
         if path is None:
             raise WrongUse(f"recording: the archive has none called '{state.recording[:40]}'; choose one of the page")
         return figure(timeline(read_frames(path)), ending, path.stem)
     if name != "station":
-        raise WrongUse(f"figure: none of this page is called '{name[:40]}'")
+        raise no_figure(name)
     history, readings, events = (run_table(bench, state.run, table) for table in ("history", "readings", "events"))
     return figure(station_chart(history, readings, events), ending, f"{state.run}-station")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import partial
 from typing import Any
 
 import pandas as pd
@@ -14,22 +13,21 @@ from pipelines.audit.calibrations import day_of
 from pipelines.certificates import Ledger
 from pipelines.drawing import Chart
 from pipelines.report import run_pictures
-from pipelines.report.axes import side_by_side
-from pipelines.report.numbers import with_uncertainty
+from pipelines.report.numbers import side_by_side, with_uncertainty
 from pipelines.stages.figures import FIGURES
 from pipelines.tables.frames import rows_of
 from pipelines.workbench.pages import (
     Workbench,
+    asked,
     figure,
+    no_figure,
     page,
     page_part,
     part_of,
     run_table,
-    state_of,
+    samples_of,
     table_csv,
-    workbench_of,
 )
-from pipelines.workbench.services.samples import samples_of
 from pipelines.workbench.state import UnitPage, quoted
 from schemas.errors import WrongUse
 
@@ -42,8 +40,7 @@ COVERAGE = 2.0
 @router.get("/unit")
 def unit(request: Request) -> Response:
     """All data of a unit in a run."""
-    bench = workbench_of(request)
-    state, problems = state_of(request, UnitPage)
+    bench, state, problems = asked(request, UnitPage)
     run = bench.archive.run(state.run)
     units = [str(one["serial"]) for one in run.about.get("lot", {}).get("units", [])]
     state = state.model_copy(update={"run": run.id, "unit": state.unit or (units[0] if units else "")})
@@ -53,7 +50,7 @@ def unit(request: Request) -> Response:
         return page_part(request, "unit_samples.html", state)
     tables = run.tables()
     own = {
-        name: _own(bench, state, name)
+        name: rows_of(_table(bench, state, name))
         for name in ("grades", "figures", "coefficients", "noise", "verdicts", "uncertainties")
         if name in tables
     }
@@ -76,23 +73,20 @@ def unit(request: Request) -> Response:
 @router.get("/unit/budget.csv")
 def budget(request: Request) -> Response:
     """The contributions to the uncertainty of every coefficient of a unit."""
-    state, _ = state_of(request, UnitPage)
-    return table_csv(_own(workbench_of(request), state, "budget"), f"{state.unit}-budget")
+    bench, state, _ = asked(request, UnitPage)
+    return table_csv(rows_of(_table(bench, state, "budget")), f"{state.unit}-budget")
 
 
 @router.get("/unit/figure/{name}.{ending}")
 def drawn(request: Request, name: str, ending: str) -> Response:
     """A figure of the page."""
-    bench = workbench_of(request)
-    state, _ = state_of(request, UnitPage)
+    bench, state, _ = asked(request, UnitPage)
     return figure(_chart(bench, state, name), ending, f"{state.unit}-{name}")
 
 
 def _chart(bench: Workbench, state: UnitPage, name: str) -> Chart:
     if name == "samples":
-        samples, out_unit, title = samples_of(
-            bench.archive, state.run, state.dwell, partial(run_table, bench, state.run)
-        )
+        samples, out_unit, title = samples_of(bench, state.run, state.dwell)
         return run_pictures.samples_chart(samples, title, out_unit)
     if name == "history":
         rows = [row for row in _history(bench, state.unit) if _parameter(row) == state.parameter]
@@ -109,7 +103,7 @@ def _chart(bench: Workbench, state: UnitPage, name: str) -> Chart:
         if name == "response":
             return run_pictures.response_chart(state.unit, residuals, dwells)
         return run_pictures.residual_chart(state.unit, residuals, dwells, state.against)
-    raise WrongUse(f"figure: none of this page is called '{name[:40]}'")
+    raise no_figure(name)
 
 
 def _table(bench: Workbench, state: UnitPage, name: str) -> pd.DataFrame:
@@ -125,10 +119,6 @@ def _drawn(bench: Workbench, state: UnitPage, name: str) -> pd.DataFrame:
             f"figure: unit '{state.unit[:80]}' has no {name} in run {state.run[:80]}, some are needed; choose another unit or run"
         )
     return rows
-
-
-def _own(bench: Workbench, state: UnitPage, name: str) -> list[dict[str, Any]]:
-    return rows_of(_table(bench, state, name))
 
 
 def _history(bench: Workbench, serial: str) -> list[dict[str, Any]]:

@@ -6,7 +6,7 @@ from fastapi import APIRouter, Request
 from starlette.responses import Response
 
 from pipelines.archive.listing import info_of
-from pipelines.workbench.pages import page, state_of, table_csv, workbench_of
+from pipelines.workbench.pages import asked, page, table_csv
 from pipelines.workbench.state import ROWS, UnitsPage
 
 router = APIRouter()
@@ -18,8 +18,7 @@ NEWEST = 12
 @router.get("/units")
 def units(request: Request) -> Response:
     """A page of units, newest first."""
-    bench = workbench_of(request)
-    state, problems = state_of(request, UnitsPage)
+    bench, state, problems = asked(request, UnitsPage)
     answer = bench.index.ask(state.question())
     rows = [dict(zip(answer.columns, row, strict=True)) for row in answer.rows]
     counts = {str(name): int(count) for name, count in bench.index.ask(yield_question(state)).rows}
@@ -34,8 +33,8 @@ def units(request: Request) -> Response:
 @router.get("/units/table.csv")
 def table(request: Request) -> Response:
     """All units of the search."""
-    state, _ = state_of(request, UnitsPage)
-    answer = workbench_of(request).index.ask(state.model_copy(update={"page": 1}).question(EVERYTHING))
+    bench, state, _ = asked(request, UnitsPage)
+    answer = bench.index.ask(state.model_copy(update={"page": 1}).question(EVERYTHING))
     return table_csv([dict(zip(answer.columns, row, strict=True)) for row in answer.rows], "units")
 
 

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from fastapi import APIRouter, Request
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import JSONResponse, Response
 
 from pipelines.importers.mapping import OUTPUT_UNITS, TEMPERATURE_UNITS, TIME_UNITS
-from pipelines.workbench.pages import page, state_of, table_csv, workbench_of
-from pipelines.workbench.services import requests, uploads
+from pipelines.workbench.pages import asked, page, table_csv, workbench_of
+from pipelines.workbench.services import uploads
 from pipelines.workbench.state import UploadPage
 from schemas.errors import TumblelineError, WrongUse
 
@@ -22,17 +20,15 @@ MEANINGS = ("time", "x", "y", "z", "temperature", "unit", "dwell")
 @router.get("/upload")
 def upload(request: Request) -> Response:
     """The page: drop a file, check the interpretation of its columns, correct it, import it."""
-    bench = workbench_of(request)
-    state, problems = state_of(request, UploadPage)
+    bench, state, problems = asked(request, UploadPage)
     reading, job, done = None, None, None
     if state.file:
         try:
             reading = uploads.reading(bench.settings, state)
             if state.columns and state.output and not reading.problem:
-                _, content = requests.bring_in(bench.settings, state)
-                job, done = bench.jobs.known("import", content), bench.jobs.result("import", content)
+                done, job = bench.work("import", state, problems)
         except TumblelineError as problem:
-            problems = [*problems, str(problem)]
+            problems.append(str(problem))
     folder = bench.settings.folder / uploads.FOLDER
     files = [one for one in folder.iterdir() if not one.name.startswith(uploads.PART)] if folder.is_dir() else []
     there = sorted(files, key=lambda one: -one.stat().st_mtime)[:12]
@@ -68,10 +64,8 @@ async def dropped(request: Request, name: str) -> JSONResponse:
 @router.get("/upload/coefficients.csv")
 def coefficients(request: Request) -> Response:
     """The coefficients of an import."""
-    bench = workbench_of(request)
-    state, _ = state_of(request, UploadPage)
-    _, content = requests.bring_in(bench.settings, state)
-    done: dict[str, Any] | None = bench.jobs.result("import", content)
+    bench, state, _ = asked(request, UploadPage)
+    done = bench.done("import", state)
     if done is None:
         raise WrongUse("upload: this file is not imported yet; import it first")
     return table_csv(done["coefficients"], "coefficients")

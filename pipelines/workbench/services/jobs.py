@@ -115,7 +115,10 @@ class Jobs:
             self._requests[name] = (kind, dict(request))
             self._changed(job)
             self._queue.put(name)
-            self._start_threads()
+            if len(self._threads) < self._workers:
+                thread = threading.Thread(target=self._work, daemon=True, name="workbench-jobs")
+                self._threads.append(thread)
+                thread.start()
             return job
 
     def result(self, kind: str, request: Mapping[str, Any]) -> Any:
@@ -163,12 +166,6 @@ class Jobs:
             self._busy.clear()
         for process in busy:
             process.end()
-
-    def _start_threads(self) -> None:
-        if len(self._threads) < self._workers:
-            thread = threading.Thread(target=self._work, daemon=True, name="workbench-jobs")
-            self._threads.append(thread)
-            thread.start()
 
     def _work(self) -> None:
         """The loop of a thread: it owns one process, and a new one after that has ended."""

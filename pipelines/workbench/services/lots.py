@@ -29,6 +29,8 @@ ENDED = frozenset({"done", "stopped", "failed", "interrupted"})
 PAUSED = "paused"
 """Name of the phase, and of the file that keeps it: a lot that was stopped to be continued holds its station."""
 NEWEST = 12
+TOLD = ("done", "total", "note", "question", "number", "problem", "run", "since")
+"""What the process of a lot tells of its state, by the names of :class:`LotState`."""
 SAFE_S, POLL_S = 20.0, 0.1
 """Time that the processes of lots are given at the end of the server, and how often they are looked at, s."""
 
@@ -214,12 +216,11 @@ def state_of(place: Path) -> LotState:
         phase = PAUSED
     results = {int(slot): str(text) for slot, text in now.get("results", [])}
     seats = [(int(slot), str(serial)) for slot, serial in request["seats"]]
+    told = {name: now[name] for name in TOLD if name in now}
     return LotState(
         id=place.name, phase=phase, recipe=str(request["recipe"]), units=tuple(serial for _, serial in seats),
-        slots=tuple((slot, serial, results.get(slot, "")) for slot, serial in seats),
-        done=int(now.get("done", 0)), total=int(now.get("total", 0)), note=str(now.get("note", "")),
-        question=now.get("question"), number=int(now.get("number", 0)), problem=str(now.get("problem", "")),
-        run=str(now.get("run", "")), since=float(now.get("since", 0.0)), pid=pid, station=str(request.get("station") or ""),
+        slots=tuple((slot, serial, results.get(slot, "")) for slot, serial in seats), pid=pid,
+        station=str(request.get("station") or ""), **told,
     )  # fmt: skip
 
 

@@ -40,9 +40,9 @@ def resolve(settings: WorkbenchSettings, name: str, where: str) -> str:
     WrongUse
         It is neither a run of the archive nor a file of the folder.
     """
-    if is_file(settings, name):
-        return name
     files = {one.name for one in _files(settings.folder)}
+    if name in files:
+        return name
     if "/" in name or "\\" in name or name.endswith(ENDINGS):
         raise WrongUse(f"{where}: no file '{name}' in {settings.folder}; {did_you_mean(name, files or {'none'})}")
     return Archive(settings.archive).run(name).id

@@ -134,7 +134,7 @@ def planned(request: Mapping[str, Any], report_progress: ReportProgress) -> dict
     report_progress(0, 2, "reading the recipe")
     from pipelines.planning.context import noise_of, plan_context
     from pipelines.planning.plan import plan
-    from pipelines.report.plan_pictures import sphere_chart, temperature_chart
+    from pipelines.report.plan import sphere_chart, temperature_chart
 
     report_progress(1, 2, "visibility of effects")
     as_it_stands, recipe, config = recipe_of(request)
@@ -160,25 +160,12 @@ def recipe_of(request: Mapping[str, Any]) -> tuple[Recipe, Recipe, StationConfig
     """
     from pathlib import Path
 
-    from pipelines.archive import Archive
-    from pipelines.jobs.model_files import chosen_effects, use_formulas
     from pipelines.jobs.moved_poses import moves_of, with_moved_poses
-    from pipelines.jobs.recipes import load_recipe
-    from pipelines.jobs.releases import line_model
+    from pipelines.jobs.releases import planned_recipe
     from schemas.station import load_station
 
     config = load_station(Path(request["station"]) if request["station"] else None)
-    chosen = chosen_effects(",".join(request["effects"]), None, "plan")
-
-    def line(device: str) -> dict[str, Any]:
-        if chosen:
-            return {"effects": chosen}
-        keys = line_model(Archive(request["archive"]), device, config.name)
-        use_formulas(keys["formulas"], "the line's model")
-        return keys
-
-    recipe = load_recipe(request["recipe"], line)
-    recipe = recipe.model_copy(update={"effects": list(chosen)}) if chosen else recipe
+    recipe = planned_recipe(request["recipe"], ",".join(request["effects"]), None, request["archive"], config.name)
     return recipe, with_moved_poses(recipe, moves_of(request["pose"], "plan"), "plan"), config
 
 

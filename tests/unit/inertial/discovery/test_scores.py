@@ -13,8 +13,7 @@ from inertial.estimation.model import Model
 from inertial.estimation.problem import Lot, Problem
 from inertial.estimation.refinement import terms_of
 from inertial.estimation.term import Term
-from pipelines.demo.archive_lots import Hidden, Line
-from pipelines.demo.lot_archive import EFFECTS
+from pipelines.demo.archive_lots import EFFECTS, Hidden, Line
 from pipelines.tables.sound_lot import sound_lot
 
 

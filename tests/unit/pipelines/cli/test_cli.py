@@ -20,7 +20,7 @@ from pipelines.certificates.ledger import Ledger
 from pipelines.chain.certify import certify
 from pipelines.cli import demo, take_texts_as_given
 from pipelines.cli.terminal import agreed
-from pipelines.cli.text.demo_text import print_ending
+from pipelines.cli.text.discovery_text import print_ending
 from pipelines.demo.scenes import scene
 from schemas.errors import UNUSABLE, WrongUse
 

@@ -14,10 +14,10 @@ from inertial.counts import size_text
 from inertial.planning.ranges import UnseenRange
 from pipelines.certificates.document.file_check import Check, CheckedFile
 from pipelines.cli import app, flowing
-from pipelines.cli.certificate_check import _needed  # pyright: ignore[reportPrivateUsage]
 from pipelines.cli.console import WordConsole
-from pipelines.cli.optimal import ERROR_HEADS, _error_lines  # pyright: ignore[reportPrivateUsage]
 from pipelines.cli.printing import print_table, short
+from pipelines.cli.text.plan_text import ERROR_HEADS, _error_lines  # pyright: ignore[reportPrivateUsage]
+from pipelines.cli.verify import _needed  # pyright: ignore[reportPrivateUsage]
 from pipelines.diagnosis.model_history import _fall  # pyright: ignore[reportPrivateUsage]
 from pipelines.importers.exchange import read_dwells
 from pipelines.jobs.recipes import load_recipe

@@ -11,8 +11,7 @@ import pytest
 
 from pipelines.archive import Archive
 from pipelines.audit.calibrations import Calibrations
-from pipelines.demo.archive_lots import Hidden, Line
-from pipelines.demo.lot_archive import write_lots
+from pipelines.demo.archive_lots import Hidden, Line, write_lots
 from pipelines.discovery.attributes import add_attributes
 from pipelines.discovery.discover import Look, discovered
 from pipelines.discovery.lot_source import DiscoveryArchive

@@ -5,8 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from pipelines.demo.archive_lots import Line
-from pipelines.demo.lot_archive import write_lots
+from pipelines.demo.archive_lots import Line, write_lots
 from pipelines.flows import discover
 from pipelines.monitoring.alerts import alerts_of
 

@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 
 from inertial.data_errors.handling.not_soaked import NotSoaked
-from pipelines.inquiry.endings import NO_FOLLOW_UP, ending_of, no_follow_up
+from pipelines.inquiry.inquiry import NO_FOLLOW_UP, ending_of, no_follow_up
 
 
 def joint(

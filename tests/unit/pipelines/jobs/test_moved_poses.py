@@ -10,7 +10,7 @@ from inertial.frames import force_from_angles
 from pipelines.drawing.mollweide import direction_at, project
 from pipelines.jobs.moved_poses import moves_of, with_moved_poses
 from pipelines.jobs.recipes import load_recipe
-from pipelines.workbench.services import recipes
+from pipelines.workbench.routes.plan import dragged_to, save_recipe, turned_to
 from pipelines.workbench.settings import WorkbenchSettings
 from pipelines.workbench.state import PlanPage
 from schemas.errors import RecipeInvalid, WrongUse
@@ -69,24 +69,24 @@ def test_moves_that_a_recipe_cannot_have_are_refused() -> None:
 
 def test_a_drag_turns_the_table_the_nearer_way(settings: WorkbenchSettings, page: PlanPage) -> None:
     for outer, inner in ((45.0, 100.0), (-45.0, 100.0)):
-        near = recipes.turned_to(settings, page, "p3", outer + 4.0, inner + 4.0)
+        near = turned_to(settings, page, "p3", outer + 4.0, inner + 4.0)
         x, y = project(force(outer, inner)[None])
-        dragged = recipes.dragged_to(settings, near, "p3", float(x[0]), float(y[0]))
+        dragged = dragged_to(settings, near, "p3", float(x[0]), float(y[0]))
         assert dragged.pose == (f"p3={outer:g},{inner:g}",)
     with pytest.raises(WrongUse, match="outside"):
-        recipes.dragged_to(settings, page, "p3", 3.0, 0.0)
+        dragged_to(settings, page, "p3", 3.0, 0.0)
 
 
 def test_the_written_recipe_reads_as_the_moved_one_and_replaces_nothing(
     settings: WorkbenchSettings, page: PlanPage
 ) -> None:
-    moved = recipes.turned_to(settings, page, "p3", 33.5, 71.25)
-    place = recipes.save(settings, moved, "mine")
+    moved = turned_to(settings, page, "p3", 33.5, 71.25)
+    place = save_recipe(settings, moved, "mine")
     read = load_recipe(str(place))
     wanted = with_moved_poses(load_recipe(page.recipe), {"p3": (33.5, 71.25)}, "plan")
     assert read.model_dump(exclude={"name"}) == wanted.model_dump(exclude={"name"})
     before = place.read_bytes()
     for name in ("mine", "production", "../there", "Big", ""):
         with pytest.raises(WrongUse):
-            recipes.save(settings, moved, name)
+            save_recipe(settings, moved, name)
     assert place.read_bytes() == before

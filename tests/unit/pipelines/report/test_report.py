@@ -9,9 +9,9 @@ from pipelines.diagnosis.diagnose import examination
 from pipelines.procedures.wording import probability, signed, with_uncertainty
 from pipelines.report.context import UnitContext
 from pipelines.report.numbers import with_uncertainty as in_tables
-from pipelines.report.reasons import plain_reason
 from pipelines.report.residual_table import residual_table
 from pipelines.report.residuals import drivers_shown
+from pipelines.report.templates import plain_reason
 from pipelines.stages.figures import FIGURES
 from tumbleline import example
 

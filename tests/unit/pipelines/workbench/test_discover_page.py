@@ -7,8 +7,7 @@ import pytest
 from asgi_client import AsgiClient
 
 from pipelines.archive import Archive
-from pipelines.demo.archive_lots import Hidden, Line
-from pipelines.demo.lot_archive import write_lots
+from pipelines.demo.archive_lots import Hidden, Line, write_lots
 from pipelines.discovery.attributes import add_attributes
 from pipelines.workbench.application import create_app
 from pipelines.workbench.services import requests

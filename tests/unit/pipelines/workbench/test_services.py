@@ -16,9 +16,9 @@ from capture_double import recipe_file
 from pipelines.archive import Archive
 from pipelines.jobs.job import Request
 from pipelines.jobs.model_files import read_model
-from pipelines.workbench.routes.operator import _slot
+from pipelines.workbench.routes.operator import _slot, station_named, stations_of
 from pipelines.workbench.services import jobs as job_table
-from pipelines.workbench.services import lots, models, sources, stations, uploads
+from pipelines.workbench.services import lots, models, sources, uploads
 from pipelines.workbench.services.jobs import Jobs
 from pipelines.workbench.services.work import done_in_process
 from pipelines.workbench.settings import WorkbenchSettings
@@ -140,7 +140,7 @@ def test_a_lot_may_sit_in_any_slot_of_the_page() -> None:
 
 
 def test_each_station_measures_one_lot_at_a_time(two: WorkbenchSettings) -> None:
-    left, right = stations.stations(two)
+    left, right = stations_of(two)
     assert (left.name, right.name, left.simulated) == ("left", "right", True)
     recipe = recipe_file(two.folder)
     first = lots.start(two, Request(recipe, left.file, ("A1",), (0,)))
@@ -150,13 +150,13 @@ def test_each_station_measures_one_lot_at_a_time(two: WorkbenchSettings) -> None
     with pytest.raises(WrongUse, match=f"has lot {first.id}"):
         lots.start(two, Request(recipe, left.file, ("A2",), (0,)))
     assert lots.start(two, Request(recipe, left.file, ("A1",), (0,))).id == first.id  # the same lot, pressed twice
-    assert stations.named(stations.stations(two), "") == left
+    assert station_named(stations_of(two), "") == left
     with pytest.raises(WrongUse, match="middle"):
-        stations.named(stations.stations(two), "middle")
+        station_named(stations_of(two), "middle")
 
 
 def test_a_paused_lot_keeps_its_station_and_a_stopped_one_makes_room(two: WorkbenchSettings) -> None:
-    left = stations.stations(two)[0]
+    left = stations_of(two)[0]
     recipe = recipe_file(two.folder)
     lot = lots.start(two, Request(recipe, left.file, ("A1",), (0,)))
     lots.pause(two, lot.id)
