@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
-from capture_double import CaptureDouble, small_job, small_run
+from capture_double import small_job, small_run
 
 from pipelines.archive import Archive, Run, files, parquet, stage_key
 from pipelines.chain.chain import ORDER
@@ -86,16 +86,6 @@ def test_a_table_changed_behind_the_archives_back_is_found(tmp_path: Path) -> No
         run.table("coefficients")
 
 
-def test_other_effects_make_a_run_of_their_own_on_the_same_capture(run: Run, tmp_path: Path) -> None:
-    job = small_job(tmp_path, ('"scale_temperature"]', '"scale_temperature", "second_order"]'))
-    other = Runner(job, run.archive, measure=_never)
-    stages = {name: other.stage(name).reused for name in ORDER[:-1]}
-    assert other.run.id != run.id
-    assert stages["capture"]
-    assert not stages["fit"]
-    pd.testing.assert_frame_equal(other.run.table("dwells"), run.table("dwells"))
-
-
 def test_finds_a_run_by_its_beginning_and_the_latest_and_names_what_is_close(run: Run) -> None:
     archive = Archive(run.archive.root)
     ids = [info.id for info in archive.runs()]
@@ -116,13 +106,3 @@ def test_one_process_at_a_time_measures_a_lot(tmp_path: Path) -> None:
 
     with pytest.raises(OperatorNeeded, match="another process is measuring this lot"):
         list(Runner(job, archive, measure=second).all())
-
-
-def test_samples_are_kept_record_by_record_beside_the_stations_last_state_alone(run: Run, tmp_path: Path) -> None:
-    assert sum(len(frame) for frame in run.records.samples()) == len(run.table("samples"))
-    assert len(list(run.records.samples())) == len(run.records.finished())
-    job = small_job(tmp_path)
-    records = Archive(tmp_path / "archive").capture(job.capture_id)
-    CaptureDouble()(job, records, lambda *_: None)
-    assert records.last_state() == str(max(records.finished())).encode()
-    assert len(list((records.path / "state").iterdir())) == 1

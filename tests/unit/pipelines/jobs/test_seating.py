@@ -8,7 +8,7 @@ from each import each
 from root_process import ROOT
 
 from pipelines.jobs.job import Request
-from pipelines.jobs.seating import Seating, read_seating, scan
+from pipelines.jobs.seating import Seating, read_seating
 from schemas.errors import RecipeInvalid, WrongUse
 
 
@@ -44,13 +44,6 @@ def test_refuses_slot_maps_with_a_slip(row: tuple[str, str, str], tmp_path: Path
         read_seating(written(tmp_path, name, text))
     with pytest.raises(RecipeInvalid, match=r"slot map: .*none\.csv cannot be read"):
         read_seating(str(tmp_path / "none.csv"))
-
-
-def test_a_scan_leaves_slots_empty_and_asks_again_for_what_was_there() -> None:
-    lines, told = iter(["S1", "", "S1", "S2", ""]), []
-    seating = scan(4, lambda _slot: next(lines), told.append)
-    assert seating == Seating(("S1", "S2"), (0, 2))
-    assert told == ["slot 2: S1 was scanned for slot 0 already; scan the unit in slot 2"]
 
 
 def test_a_job_has_its_units_where_the_slot_map_says(tmp_path: Path) -> None:

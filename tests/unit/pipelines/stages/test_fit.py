@@ -133,13 +133,6 @@ def test_a_model_without_scale_of_counts_is_refused_with_what_it_needs(rng: np.r
         fit(dwells.assign(out_unit="LSB"), NO_HISTORY, ["bias", "bias_temperature"])
 
 
-def test_wander_between_dwells_is_found_and_told(rng: np.random.Generator) -> None:
-    dwells, _ = lot(rng, wander=1e-4, lagging=0.0)
-    table = fit(dwells, NO_HISTORY, LINEAR)["wander"]
-    assert set(table["method"]) == {"wander"}
-    assert (table["flicker_ug"] > 3.0 * 1e6 * WHITE).all()
-
-
 def test_says_so_where_there_are_too_few_dwells_for_the_noise(rng: np.random.Generator) -> None:
     dwells, _ = lot(rng, units=1)
     few = dwells[dwells["dwell"] < 5]

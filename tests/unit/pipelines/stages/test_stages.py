@@ -13,7 +13,6 @@ from pipelines.stages.reduce import reduce
 from pipelines.stages.validate import validate
 from pipelines.tables.calibration import read_calibration
 from pipelines.tables.dwells import lot_arrays
-from pipelines.tables.summaries import summarised
 from schemas.errors import DataRejected
 
 NO_HISTORY = pd.DataFrame({"time_s": [], "chamber_C": [], "slot": [], "unit": [], "unit_C": []})
@@ -127,24 +126,6 @@ def test_the_samples_of_a_run_are_decoded_once(tmp_path: Path, monkeypatch: pyte
     run = small_run(tmp_path)
     static = set(run.table("readings").query("kind == 'allan'")["record"])
     assert asked == [None, static]
-
-
-def test_a_summary_holds_what_a_look_at_the_samples_tells(tmp_path: Path) -> None:
-    samples, readings, _ = captured(tmp_path, "")
-    frame = pd.concat(samples, ignore_index=True)
-    summaries = summarised(samples, readings).set_index(["unit", "record"])
-    for key, own in frame.groupby(["unit", "record"]):
-        values, row = own[["x", "y", "z"]].to_numpy(), summaries.loc[key]
-        assert row["n"] == len(values)
-        for name, expected in (
-            ("out", np.mean(values, axis=0)),
-            ("sd", np.std(values, axis=0, ddof=1)),
-            ("low", np.min(values, axis=0)),
-            ("high", np.max(values, axis=0)),
-        ):
-            np.testing.assert_allclose(row[[f"{name}_{axis}" for axis in "xyz"]].astype(float), expected, rtol=1e-11)
-    assert len(summaries) == frame.groupby(["unit", "record"]).ngroups
-    assert not summaries[["wild_count", "clipped"]].to_numpy().any()
 
 
 def test_a_recorded_covariate_stays_in_the_dwells_unless_it_has_a_gap(tmp_path: Path) -> None:

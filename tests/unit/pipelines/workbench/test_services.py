@@ -16,7 +16,6 @@ from capture_double import recipe_file
 from pipelines.archive import Archive
 from pipelines.jobs.job import Request
 from pipelines.jobs.model_files import read_model
-from pipelines.workbench.routes.operator import _slot
 from pipelines.workbench.services import jobs as job_table
 from pipelines.workbench.services import lots, models, sources, stations, uploads
 from pipelines.workbench.services.jobs import Jobs
@@ -133,10 +132,6 @@ def two(settings: WorkbenchSettings, monkeypatch: pytest.MonkeyPatch) -> Workben
     for place in places:
         place.write_text(text.replace('name = "simulated"', f'name = "{place.stem}"'))
     return replace(settings, stations=tuple(places))
-
-
-def test_a_lot_may_sit_in_any_slot_of_the_page() -> None:
-    assert [_slot(str(number), 8) for number in range(8)] == list(range(8))
 
 
 def test_each_station_measures_one_lot_at_a_time(two: WorkbenchSettings) -> None:
