@@ -130,24 +130,6 @@ def test_chamber_ramps_within_its_limit_overshoots_a_little_settles_and_shakes_m
     assert abs(path[-600:] - 60.0).max() < 0.05
 
 
-def test_open_door_lets_the_room_in():
-    plant = plant_of(station_of(faults=[{"kind": "door", "at_s": 4000.0}]))
-    write(plant, 3, "set_point", 60.0)
-    plant.advance(4_000_000_000)
-    assert plant.air_reading() == pytest.approx(60.0, abs=0.2)
-    plant.advance(600_000_000)
-    assert plant.air_reading() < 55.0
-
-
-def test_slots_lag_behind_the_air_each_by_its_own():
-    plant = plant_of(lot=lot_of(8))
-    write(plant, 3, "set_point", 60.0)
-    plant.advance(600_000_000)
-    readings = np.array(plant.temperature_reading())[:8]  # the other slots are empty
-    assert (readings < plant.air_reading() - 3.0).all()
-    assert np.ptp(readings) > 1.0
-
-
 @pytest.mark.parametrize("kind", sorted(HIDDEN))
 def test_every_hidden_effect_moves_an_output_and_nothing_at_zero_size(kind):
     size = {
