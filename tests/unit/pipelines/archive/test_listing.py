@@ -5,7 +5,6 @@ import os
 import time
 from pathlib import Path
 
-import pandas as pd
 import pytest
 
 from pipelines.archive import Archive, Run, RunInfo, derived, files, listing
@@ -91,13 +90,3 @@ def test_a_line_of_an_older_version_is_read_again_and_is_no_edit(archive: Archiv
     assert listing.agrees(info, line)
     assert not listing.agrees(info, [*line[:2], "another device", *line[3:]])
     assert all(info.station == "st-1" for info in archive.runs())  # not in the older lines
-
-
-def test_a_graded_run_tells_how_many_units_passed_and_a_spoilt_table_nothing(archive: Archive) -> None:
-    run = Run(archive, archive.runs()[0].id)
-    pd.DataFrame({"unit": ["A", "B", "C"], "outcome": ["pass", "fail", "pass"]}).to_parquet(run.path / "grades.parquet")
-    info = listing.info_of(run)
-    assert (info.passed, info.graded) == (2, 3)
-    (run.path / "grades.parquet").write_bytes(b"PAR1 half")
-    info = listing.info_of(run)
-    assert (info.passed, info.graded) == (None, None)

@@ -205,17 +205,6 @@ def test_show_export_and_verify_name_who_did_not_sign(
     assert "a signature by the own key, or by one given with --key, is needed" in str(refused)
 
 
-def test_an_edit_behind_a_signature_stops_show_and_export(
-    run: Run, typed: Typed, keys: dict[str, Path], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    sign(run, keys["own"])
-    path = run.path / "coefficients.json"
-    path.write_bytes(files.json_bytes({**json.loads(path.read_text()), "who": "somebody else"}))
-    monkeypatch.setenv(VARIABLE, str(keys["own"]))
-    for words in (("show", run.id), ("export", run.id)):
-        assert "was edited after it was signed" in str(typed(*words).exception)
-
-
 def test_a_run_of_a_station_with_another_key_is_certified_where_that_key_is_trusted(
     tmp_path: Path, keys: dict[str, Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
