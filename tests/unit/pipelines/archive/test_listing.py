@@ -7,9 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from pipelines.archive import Archive, Run, RunInfo, derived, files, listing
+from pipelines.archive import Archive, Run, derived, files, listing
 from pipelines.archive.keys import digest
-from pipelines.archive.run import stages_of
 
 LOTS = 40
 
@@ -64,18 +63,6 @@ def test_a_run_that_is_gone_is_not_listed_and_a_spoilt_note_does_no_harm(archive
     assert len(archive.runs()) == LOTS - 1
     (archive.root / "index" / "list.json").write_text("{half")
     assert len(archive.runs()) == LOTS - 1
-
-
-def test_a_sealed_run_tells_its_stages_from_one_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from capture_double import small_run
-
-    run = small_run(tmp_path)
-    run.seal()
-    wanted = stages_of(run.path)
-    monkeypatch.setattr(listing, "stages_of", lambda *_: pytest.fail("manifests were read"))
-    info = listing.info_of(run)
-    assert isinstance(info, RunInfo)
-    assert list(info.stages) == wanted
 
 
 def test_a_line_of_an_older_version_is_read_again_and_is_no_edit(archive: Archive) -> None:

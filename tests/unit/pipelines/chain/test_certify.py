@@ -59,18 +59,6 @@ def end_of(run: Run) -> str:
     return str(run.manifest("readings")["when"])[:10]
 
 
-def test_the_run_is_named_before_it_is_signed(run: Run, typed: Typed, monkeypatch: pytest.MonkeyPatch) -> None:
-    def refused(*_args: object) -> None:
-        raise WrongUse("stopped before anything was written")
-
-    with monkeypatch.context() as patch:
-        patch.setattr(certifying, "refuse_unsound", refused)
-        assert f"certify: run {run.id}, measured on {end_of(run)}, 3 units: A1, A2, A3" in typed("certify").stderr
-    done = typed("certify", "--json")
-    assert f"certify: run {run.id}, measured on {end_of(run)}" in done.stderr
-    assert json.loads(done.stdout)["run"] == run.id
-
-
 def test_a_certificate_begins_at_the_measurement_or_later_and_lasts_no_longer_than_is_allowed(
     run: Run, typed: Typed
 ) -> None:

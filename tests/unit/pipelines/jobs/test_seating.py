@@ -53,14 +53,6 @@ def test_a_job_has_its_units_where_the_slot_map_says(tmp_path: Path) -> None:
         Request(recipe=recipe_file(tmp_path), units=("A9",), slots=(9,)).job()
 
 
-@pytest.mark.parametrize("slots", [16, 32])
-def test_a_larger_fixture_takes_a_larger_lot(tmp_path: Path, slots: int) -> None:
-    units = tuple(f"S{n}" for n in range(slots))
-    station = ROOT / "deploy" / "stations" / f"simulated-{slots}.toml"
-    assert len(Request(recipe=recipe_file(tmp_path), station=station, units=units).job().lot.units) == slots
-    assert [len(part.units) for part in Request(units=units).fillings(8)] == [8] * (slots // 8)
-
-
 def test_faults_of_the_command_line_and_the_recipe_become_the_stations(tmp_path: Path) -> None:
     recipe = recipe_file(tmp_path, ("seed = 5", 'seed = 5\nfaults = [{ kind = "door", at_s = 9000.0, for_s = 60.0 }]'))
     job = Request(recipe=recipe, faults=("silent:serial=A2:at_s=500", "vibration:rms_g=0.5")).job()
