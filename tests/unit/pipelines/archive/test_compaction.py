@@ -5,6 +5,7 @@ import zipfile
 from pathlib import Path
 
 import pytest
+from capture_double import small_run
 from packed_archive import certified_archive, copied, later, logical, packed_zips, single
 
 from pipelines.archive import Archive, files, packs
@@ -77,6 +78,14 @@ def test_open_and_unfinished_runs_are_left_alone(archive: Archive) -> None:
     (run.path / "sealed.json").unlink()
     assert compact(archive).unfinished == [run.id]
     assert (Path(str(run.path)) / "run.json").stat().st_size
+
+
+def test_finished_command_finds_its_packed_run(archive: Archive) -> None:
+    compact(archive)
+    before = single(archive)
+    again = small_run(Path(str(archive.root)).parent)
+    assert again.id == archive.run("latest").id
+    assert {p.suffix for p in set(single(archive)) - set(before)} <= {".html", ".json"}
 
 
 def test_next_event_follows_the_packed_ones(archive: Archive) -> None:

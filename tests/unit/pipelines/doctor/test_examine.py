@@ -20,6 +20,7 @@ from pathlib import Path
 
 import pytest
 from each import each
+from s3_server import CREDENTIALS, s3_bucket
 from served_station import modbus_station, moves_ordered, served_plant, station_file
 from typer.testing import CliRunner
 
@@ -163,6 +164,19 @@ def test_a_disk_that_takes_half_a_file_is_a_fault_and_nothing_stays(tmp_path: Pa
     assert {(row[0], row[1]): row[2] for row in of_host}["state folder", "writable"] == state
     assert [p.name for p in (tmp_path / "a").iterdir()] == ["archive.json"]
     assert not list((tmp_path / "state").iterdir())
+
+
+@pytest.mark.slow
+def test_an_object_store_is_written_to_timed_and_left_as_it_was(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, value in CREDENTIALS.items():
+        monkeypatch.setenv(name, value)
+    with s3_bucket() as query:
+        address = f"s3://factory/archive?{query}"
+        archive_in(address)
+        by_check = states(archive_checks(address, 1.0))
+        assert by_check == dict.fromkeys(("reachable", "format", "writable", "clock"), "good")
+        assert [p.name for p in Archive(address).root.iterdir()] == ["archive.json"]
+    assert only_fault(archive_checks(address, 1.0)).check == "reachable"  # the server is down now
 
 
 def test_a_key_is_private_and_outside_the_archive(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

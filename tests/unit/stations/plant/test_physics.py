@@ -1,4 +1,7 @@
-"""Physics of the simulated station, seen from its truth."""
+"""Physics of the simulated station, seen from its truth, and the journal of what was done to it."""
+
+import json
+import zlib
 
 import numpy as np
 import pytest
@@ -6,11 +9,13 @@ from small_station import QUIET, lot_of, plant_of, station_of, turn_to, write
 
 from inertial.frames import force_from_angles
 from schemas.errors import RecipeInvalid, WrongUse
+from schemas.fault import FaultOrder
 from schemas.lot import Lot, Unit
 from stations.codec import unpack_samples
 from stations.plant.chamber import Chamber
 from stations.plant.fixture import Moisture
 from stations.plant.hidden import HIDDEN, hidden_effect
+from stations.plant.journal import Injection, Journal, LineOrder, Write
 from stations.plant.preset import load_preset
 from stations.plant.table import Axis, Move, turn
 
@@ -174,3 +179,24 @@ def test_relative_humidity_falls_in_warmed_air_as_the_table_of_saturation_says()
     cool, warm, frost = moisture.relative(time, np.array([20.0, 60.0, -10.0]))
     assert cool / warm == pytest.approx(199.46 / 23.39, rel=0.01)
     assert frost == 100.0
+
+
+EVENTS = [
+    Write(1, 2, 100, (1, 2, 3)),
+    Injection(2, FaultOrder(kind="door", at_s=1.0)),
+    LineOrder(3, 5, "SETP 25"),
+    Write(4, 2, 101, (), "coil"),
+    Write(5, 3, 7, (9,)),
+    Injection(6, FaultOrder(kind="noise", serial="U001")),
+]
+
+
+def test_a_state_after_every_event_is_that_of_all_events_at_once() -> None:
+    often, once = Journal("station"), Journal("station")
+    for number, event in enumerate(EVENTS, start=1):
+        often.add(event)
+        assert [e for e, _ in zip(often.events(), EVENTS, strict=False)] == EVENTS[:number]
+        assert len(json.loads(zlib.decompress(often.state(number)))["events"]) == number
+        once.add(event)
+    assert often.state(9) == once.state(9)
+    assert once.recorded(often.state(9)) == (EVENTS, 9)

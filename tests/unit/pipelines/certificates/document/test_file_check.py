@@ -67,7 +67,8 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Issued:
     (folder / "key.pem").write_bytes(pem(key))
     (folder / "trust.pem").write_bytes(key.certificate.public_bytes(Encoding.PEM))
     words = ["certificate", run.id, "--laboratory", str(who), "--archive", str(run.archive.root)]
-    for out, more in (("signed", ["--sign-with", str(folder / "key.pem")]), ("unsigned", [])):
+    signed = ["--sign-with", str(folder / "key.pem"), "--address", "https://example.org/{number}"]
+    for out, more in (("signed", signed), ("unsigned", [])):
         done = CliRunner().invoke(app, [*words, "--output", str(folder / out), *more])
         assert done.exit_code == 0, done.output
     return Issued(run, key, folder, folder / "trust.pem")
