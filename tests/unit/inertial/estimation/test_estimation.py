@@ -74,8 +74,8 @@ def test_an_axis_that_wanders_by_itself_has_shares_of_its_own(seed: int) -> None
 
 
 def test_equal_axes_have_the_shares_of_their_lot() -> None:
-    runs = [run_of(NULLS[name], SEED_OF_SHARES + seed) for name in ("B30", "K4", "white") for seed in range(3)]
-    assert [run.model().noise.shares.own for run in runs] == [()] * 9
+    runs = [run_of(NULLS[name], SEED_OF_SHARES + seed) for name in ("B30", "K4", "white") for seed in range(2)]
+    assert [run.model().noise.shares.own for run in runs] == [()] * 6
 
 
 def test_plausible_shares_are_those_that_the_likelihood_leaves_with_weights_that_add_up() -> None:
@@ -101,7 +101,7 @@ def test_noise_that_grows_with_temperature_is_known_for_each_soak() -> None:
 
 @pytest.mark.parametrize("name", ["B30", "K4", "t3", "lengths", "units_spread", "one_unit", "B300"])
 def test_soaks_of_equal_noise_are_not_told_apart(name: str) -> None:
-    assert [loudness_of(run_of(NULLS[name], SEED_OF_SHARES + seed).model()) for seed in range(4)] == [None] * 4
+    assert [loudness_of(run_of(NULLS[name], SEED_OF_SHARES + seed).model()) for seed in range(2)] == [None] * 2
 
 
 @pytest.mark.parametrize("name", ["B30", "white", "B300"])
