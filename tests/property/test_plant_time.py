@@ -44,13 +44,13 @@ WHOLE = drive([])[1]
 
 @given(st.lists(st.integers(0, TOTAL_US), max_size=30))
 @example(list(range(0, TOTAL_US, 437_003)))
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=6, deadline=None)
 def test_chopped_sleeps_and_looks_leave_no_trace(cuts):
     assert drive(cuts, look=True)[1] == WHOLE
 
 
 @given(st.integers(5_250_002, TOTAL_US - 3_000_001))
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=4, deadline=None)
 def test_a_resumed_plant_goes_on_bit_for_bit(at):
     plant = plant_of(station_of(), lot_of(2), hidden=[Creep(), HysteresisPlay()])
     for time, device_id, name, value in [

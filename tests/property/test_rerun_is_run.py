@@ -9,9 +9,7 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
 from pipelines.archive import Archive, Run
-from pipelines.integrity import verify
-from pipelines.jobs.model_change import ModelChange, change_from_options
-from pipelines.rerun.reproduce import check
+from pipelines.jobs.model_change import change_from_options
 from pipelines.rerun.rerun import again
 
 FEWER = settings(FEW, max_examples=3, phases=(Phase.explicit, Phase.generate))
@@ -36,15 +34,6 @@ def hashes(run: Run) -> dict[str, str]:
 
 
 @FEWER
-@given(effects=MODELS)
-def test_a_rerun_reproduces_itself(effects: str, original: Run, tmp_path_factory: pytest.TempPathFactory) -> None:
-    archive = copied(original, tmp_path_factory)
-    outcome = again(archive, original.id, change_from_options(effects=effects))
-    assert check(archive, outcome.new).same
-    assert verify(archive, keys={}).whole
-
-
-@FEWER
 @given(first=MODELS, then=MODELS)
 def test_a_way_round_does_not_matter(
     first: str, then: str, original: Run, tmp_path_factory: pytest.TempPathFactory
@@ -55,15 +44,3 @@ def test_a_way_round_does_not_matter(
     over = again(round_about, original.id, change_from_options(effects=first)).new
     reached = again(round_about, over, change_from_options(effects=then)).new
     assert hashes(round_about.run(reached)) == hashes(direct.run(straight))
-
-
-@FEWER
-@given(effects=MODELS)
-def test_a_second_time_nothing_is_computed(
-    effects: str, original: Run, tmp_path_factory: pytest.TempPathFactory
-) -> None:
-    archive = copied(original, tmp_path_factory)
-    change = change_from_options(effects=effects)
-    outcome = again(archive, original.id, change)
-    assert again(archive, original.id, change).new == outcome.new
-    assert set(again(archive, outcome.new, ModelChange()).stages.values()) == {"there"}

@@ -75,26 +75,17 @@ def assert_the_same(frame: pd.DataFrame, world: str, *, redrawn: bool) -> None:
 Change = Callable[[pd.DataFrame, st.DataObject], pd.DataFrame]
 
 
-def rows_in_any_order(frame: pd.DataFrame, data: st.DataObject) -> pd.DataFrame:
-    return frame.sample(frac=1.0, random_state=data.draw(st.integers(0, 2**32 - 1)))
-
-
-def units_of_other_names_and_order(frame: pd.DataFrame, data: st.DataObject) -> pd.DataFrame:
+def written_otherwise(frame: pd.DataFrame, data: st.DataObject) -> pd.DataFrame:
+    """Rows and columns in any order, units of other names, dwells of other numbers, and a clock that was set otherwise."""
     names = data.draw(
         st.lists(st.from_regex(r"[A-Z][A-Z0-9]{1,5}", fullmatch=True), min_size=2, max_size=2, unique=True)
     )
-    return frame.assign(unit=frame["unit"].map(dict(zip(["U000", "U001"], names, strict=True))))
-
-
-def dwells_of_other_numbers(frame: pd.DataFrame, data: st.DataObject) -> pd.DataFrame:
-    return frame.assign(dwell=data.draw(st.integers(1, 9)) * frame["dwell"] + data.draw(st.integers(0, 1000)))
-
-
-def clocks_set_otherwise(frame: pd.DataFrame, data: st.DataObject) -> pd.DataFrame:
-    return frame.assign(time_s=frame["time_s"] + data.draw(st.integers(0, 10**6)))
-
-
-def columns_in_any_order(frame: pd.DataFrame, data: st.DataObject) -> pd.DataFrame:
+    frame = frame.sample(frac=1.0, random_state=data.draw(st.integers(0, 2**32 - 1)))
+    frame = frame.assign(
+        unit=frame["unit"].map(dict(zip(["U000", "U001"], names, strict=True))),
+        dwell=data.draw(st.integers(1, 9)) * frame["dwell"] + data.draw(st.integers(0, 1000)),
+        time_s=frame["time_s"] + data.draw(st.integers(0, 10**6)),
+    )
     return frame[data.draw(st.permutations(list(frame.columns)))]
 
 
@@ -114,19 +105,10 @@ def outputs_in_another_unit(frame: pd.DataFrame, data: st.DataObject) -> pd.Data
     return frame.assign(**scaled, out_unit=unit)
 
 
-CHANGES = (
-    rows_in_any_order,
-    units_of_other_names_and_order,
-    dwells_of_other_numbers,
-    clocks_set_otherwise,
-    columns_in_any_order,
-    axes_turned,
-    outputs_in_another_unit,
-)
-
-
 @pytest.mark.parametrize("world", WORLDS)
-@pytest.mark.parametrize("change", CHANGES, ids=lambda change: change.__name__)
+@pytest.mark.parametrize(
+    "change", [written_otherwise, axes_turned, outputs_in_another_unit], ids=lambda change: change.__name__
+)
 @FEWER
 @given(data=st.data())
 def test_a_verdict_stays_with(change: Change, world: str, data: st.DataObject) -> None:

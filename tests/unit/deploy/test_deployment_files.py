@@ -79,15 +79,6 @@ def test_a_service_may_do_little_holds_no_key_and_writes_below_its_own_folders_o
         assert int(service["LimitNOFILE"][0]) >= 4 * MOST
 
 
-def test_the_backup_is_made_every_night_and_may_write_to_its_own_folder_only() -> None:
-    service = unit("tumbleline-backup")["Service"]
-    assert service["Type"] == ["oneshot"]
-    assert service["ReadWritePaths"] == ["/var/backups/tumbleline"]
-    timer = (DEPLOY / "systemd" / "tumbleline-backup.timer").read_text(encoding="utf-8")
-    assert "OnCalendar=*-*-* 02:30:00" in timer
-    assert "Persistent=true" in timer
-
-
 def test_the_worker_is_asked_to_stop_and_its_watchdog_has_time() -> None:
     service = unit(WORKER)["Service"]
     assert "worker stop" in service["ExecStop"][0]
@@ -166,17 +157,6 @@ def test_every_folder_that_a_container_writes_is_a_named_volume() -> None:
     }
     made = re.search(r"mkdir -p (.*) \\", CONTAINERFILE)[1].split()
     assert {f"/var/lib/{folder}" for folder in made} == {place for own in mounted.values() for place in own.values()}
-
-
-def test_the_database_of_a_plant_is_an_image_by_digest_with_its_password_in_a_file() -> None:
-    database, server = PLANT["services"]["database"], PLANT["services"]["server"]
-    assert re.fullmatch(r"docker\.io/library/postgres@\$\{POSTGRES_DIGEST:\?[^}]+\}", database["image"])
-    assert database["user"] == "999:999"
-    assert database["environment"]["POSTGRES_PASSWORD_FILE"] == "/run/secrets/postgres-password"
-    assert not [key for key in database["environment"] if key == "POSTGRES_PASSWORD"]
-    assert server["environment"]["TUMBLELINE_ORCHESTRATOR_DATABASE"] == "/run/secrets/prefect-database"
-    assert set(PLANT["secrets"]) == {"postgres-password", "prefect-database"}
-    assert set(PLANT["volumes"]) == {"database"}
 
 
 def test_the_base_image_has_a_digest_or_is_not_built() -> None:

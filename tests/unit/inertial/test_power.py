@@ -178,15 +178,6 @@ def dwells_of(state: State, noise: float, rng: np.random.Generator) -> pd.DataFr
     return pd.concat(units, ignore_index=True)
 
 
-def test_dwells_of_runs_that_switched_nothing_stand_beside_those_of_one_that_did(rng):
-    rows = dwells_of(run_of(20, 2), 1e-5, rng)
-    assert measured(rows).state.power_off is None
-    rows["power_off_s"] = np.where(rows["dwell"] == 12, 300.0, np.where(rows["dwell"] < 12, np.nan, 0.0))
-    measured_state = measured(rows).state
-    assert switched(measured_state) == [12]
-    assert not measured_state.covariates
-
-
 def test_warm_up_after_a_power_off_is_the_same_for_a_fit_as_for_a_diagnosis(rng):
     """Off for 600 s: the columns of both, against a body that warms and cools step by step."""
     run, tau, off = switched_off(run_of(units=1), 600.0), 900.0, 600.0

@@ -32,14 +32,6 @@ def test_a_refusal_names_unit_row_and_what_is_needed(row) -> None:
         table_check.check("dwells", dwells(**row[0]))
 
 
-def test_names_a_missing_column_and_those_that_are_there_and_a_value_that_is_not_known() -> None:
-    with pytest.raises(DataRejected, match="column time_s is missing, found unit, dwell"):
-        table_check.check("dwells", dwells().drop(columns="time_s"))
-    row = {"unit": "A", "slot": 0, "outcome": "good", "grade": "", "reasons": "", "rule": ""}
-    with pytest.raises(DataRejected, match=r"row 0 \(unit A\), column outcome: found good"):
-        table_check.check("grades", pd.DataFrame([row]))
-
-
 @given(st.lists(st.floats(allow_nan=False, allow_infinity=False), min_size=2, max_size=2))
 def test_leaves_finite_numbers_as_they_are(values: list[float]) -> None:
     checked = table_check.check("dwells", dwells(out_x=values, humidity_pct=[40.0, 41.0]))

@@ -82,7 +82,7 @@ def test_one_axis_alone_at_six_deviations_is_left_out_and_not_named(monkeypatch)
     assert named(values, monkeypatch) == []
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", range(6))
 def test_scatter_that_follows_the_temperature_is_not_quantised(seed: int) -> None:
     made = make(World(noise=Noise(white=150.0, flicker=10.0)), 5_800_000 + seed)
     dwells = made.dwells.copy()
@@ -103,6 +103,6 @@ def test_scatter_that_follows_the_temperature_is_not_quantised(seed: int) -> Non
     "world", [*(NULLS[n] for n in ("B30", "K8", "two_units", "many_units")), HIDDEN["third_order_2"]]
 )
 def test_no_pair_is_searched_where_no_units_were_exchanged(world: World) -> None:
-    lots = (make(world, 6_300_020 + seed) for seed in range(4))
-    assert [UnitsSwapped().places(lot_in(one)) for one in lots] == [[]] * 4
+    lots = (make(world, 6_300_020 + seed) for seed in range(2))
+    assert [UnitsSwapped().places(lot_in(one)) for one in lots] == [[]] * 2
     assert not UnitsSwapped().possible(np.array([0.5]))

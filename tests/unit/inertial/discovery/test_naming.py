@@ -22,7 +22,11 @@ def pool() -> Pool:
     return Pool(maker().columns, maker().size.reshape(-1), *maker().products)
 
 
-HIDDEN = [("third_order", "wafer"), ("second_order", "radius"), ("cross_coupling", "slot"), ("scale_asymmetry", "mean")]
+HIDDEN = [
+    ("third_order", "wafer"),
+    ("cross_coupling", "slot"),
+    *(pytest.param(*one, marks=pytest.mark.slow) for one in (("second_order", "radius"), ("scale_asymmetry", "mean"))),
+]
 
 
 @pytest.mark.parametrize(("effect", "driver"), HIDDEN)

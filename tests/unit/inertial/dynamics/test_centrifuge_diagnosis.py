@@ -66,12 +66,6 @@ def test_a_hidden_effect_of_a_centrifuge_is_named_with_its_rival_and_a_second_ra
         assert (hidden in after, RIVAL[hidden] in after) == (True, False)
 
 
-def test_no_effect_of_a_centrifuge_is_named_where_there_is_none(rng) -> None:
-    diagnoses = [diagnosed((0.5,), {}, rng) for _ in range(100)]
-    assert sum(bool(one.classes) for one in diagnoses) <= 1
-    assert sum(one.adequate is False for one in diagnoses) <= 3
-
-
 def test_a_single_mounting_cannot_be_judged_for_what_it_does_not_show() -> None:
     points = spins((0.5,))
     one = points.picked(points.acceleration > 0.0)

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from inertial.dynamics.centrifuge_effects import EFFECTS as SPIN_EFFECTS
 from inertial.dynamics.shock_diagnosis import diagnose_shock
 from inertial.dynamics.shock_effects import EFFECTS as SHOCK_EFFECTS
 from inertial.dynamics.shock_fit import Design, ShockRecord, Waves, predicted
@@ -93,10 +92,3 @@ def test_nothing_is_named_in_shocks_without_a_hidden_effect(rng) -> None:
     assert all(one.adequate for one in diagnoses)
     sensitivity = [(one.fit.sensitivity - 1.0) / one.fit.sensitivity_error for one in diagnoses]
     assert np.std(sensitivity) < 1.6
-
-
-@pytest.mark.parametrize("known", [SPIN_EFFECTS, SHOCK_EFFECTS])
-def test_every_effect_says_what_it_is(known) -> None:
-    for name, one in known.items():
-        assert one.id == name
-        assert all((type(one).__doc__, one.equation, one.source, one.breaker))

@@ -35,7 +35,7 @@ def test_the_stability_of_the_static_record_has_the_freedoms_of_its_noise(walk, 
     assert held / runs > 0.9  # as of 36 independent means it holds in 42 % of a walk
 
 
-SECONDS, RUNS = 3600, 200
+SECONDS, RUNS = 3600, 100
 
 
 def hours(rng: np.random.Generator, white: float, flicker: float) -> tuple[np.ndarray, np.ndarray]:

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from inertial.dynamics.ratiometry import departures, largest_departure, slope_over, zero_and_sensitivity
-from inertial.dynamics.sine_fit import fit_tone
 from inertial.dynamics.transverse import fit_transverse, relative_phase
 from inertial.errors import NotIdentified
 
@@ -111,12 +110,3 @@ def test_a_phase_that_differs_between_records_leaves_no_trace_in_the_transverse_
     assert abs(fit_transverse(np.cos(angle), np.sin(angle), apart, np.full(angle.size, 5e-6)).value - 0.002915) > 1e-4
     with pytest.raises(NotIdentified, match="does not answer"):
         relative_phase(drive, 0.0 * answer)
-
-
-def test_distortion_is_no_noise_of_a_tone() -> None:
-    time = np.arange(2000) / 10_000.0
-    wave = np.cos(2.0 * np.pi * 80.0 * time) + 0.03 * np.cos(2.0 * np.pi * 160.0 * time + 0.7)
-    plain, whole = (fit_tone(wave[:, None], 10_000.0, 80.0, harmonics=k) for k in (1, 5))
-    assert plain.sigma[0] == pytest.approx(0.03 / np.sqrt(2.0), rel=1e-2)
-    assert whole.sigma[0] < 1e-12
-    assert whole.value[0] == pytest.approx(1.0, abs=1e-12)

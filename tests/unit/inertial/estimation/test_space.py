@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from inertial.criticism.noise_draws import Directions
-from inertial.estimation.bases import SEEN, eigen
+from inertial.estimation.bases import SEEN
 from inertial.estimation.candidate import Candidate, times_rows
 from inertial.estimation.covariance import Covariance
 from inertial.estimation.noise_shares import Noise, Shares
@@ -122,17 +122,3 @@ def test_drawn_noise_is_white_again_after_the_whitener(rng: np.random.Generator)
         again = whole.white_rows(rows[blocks].copy(), SHARES, blocks)
         again /= (whole.level * noise.scale)[blocks, None, None]
         np.testing.assert_allclose(again, np.swapaxes(expected, 1, 2)[blocks], rtol=1e-9, atol=1e-9)
-
-
-def test_eigenvalues_of_two_rows_are_those_of_the_solver(rng: np.random.Generator) -> None:
-    roots = rng.standard_normal((500, 2, 2))
-    roots[:100, 1] = roots[:100, 0] + 1e-3 * rng.standard_normal((100, 2))  # nearly parallel
-    given = [np.zeros((2, 2)), np.eye(2), np.diag([3.0, 1.0]), np.diag([1.0, 3.0]), [[1.0, 1.0], [1.0, 1.0]]]
-    gram = np.concatenate([roots @ np.swapaxes(roots, -1, -2), given])
-    values, vectors = eigen(gram)
-    expected = np.linalg.eigvalsh(gram)
-    np.testing.assert_allclose(values, expected, rtol=1e-12, atol=1e-14)
-    np.testing.assert_allclose(
-        vectors @ np.swapaxes(vectors, -1, -2), np.broadcast_to(np.eye(2), gram.shape), atol=1e-14
-    )
-    np.testing.assert_allclose((vectors * values[:, None]) @ np.swapaxes(vectors, -1, -2), gram, atol=1e-13)

@@ -1,4 +1,4 @@
-"""Small modules of the noise: spectrum, dwell means, measurands of a bias, and Gauss-Markov processes."""
+"""Small modules of the noise: spectrum, dwell means, measurands of a bias, Gauss-Markov processes, errors of navigation."""
 
 import made_noise as generate
 import numpy as np
@@ -17,6 +17,7 @@ from inertial.noise.gauss_markov import (
     step_of_walk,
 )
 from inertial.noise.measurands import walk_kernel
+from inertial.noise.navigation import PER_G, navigation_error
 from inertial.noise.psd import allan_variance as variance_of_spectrum
 from inertial.noise.psd import one_sided
 from stations.plant.noise import UnitNoise
@@ -138,3 +139,35 @@ def test_the_series_of_short_steps_continues_the_closed_form() -> None:
     assert above == pytest.approx(below, rel=1e-5)
     slow, walk = step_of_process(1.0, 1e9, 1.0), step_of_walk(np.sqrt(2e-9), 1.0)  # K² = 2s²/T
     assert (slow.mean_variance, slow.covariance) == pytest.approx((walk.mean_variance, walk.covariance), rel=1e-6)
+
+
+DT_S, TIME_S, RECORDS = 0.1, 60.0, 4000
+
+
+def integrated(acceleration):
+    velocity = np.cumsum(acceleration, axis=1) * DT_S
+    return velocity[:, -1].std(), (np.cumsum(velocity, axis=1) * DT_S)[:, -1].std()
+
+
+@pytest.mark.parametrize("term", ["N", "B", "K"])
+def test_the_errors_are_those_of_integrated_noise(term):
+    rng, n = np.random.default_rng(20_261), round(TIME_S / DT_S)
+    white = rng.standard_normal((RECORDS, n))
+    made = {
+        "N": 2.0 * white / np.sqrt(DT_S),  # σ(τ) = N/√τ
+        "B": np.repeat(2.0 * white[:, :1], n, axis=1),
+        "K": 2.0 * np.cumsum(white, axis=1) * np.sqrt(DT_S),
+    }[term]
+    got = navigation_error({term: 2.0}, "m/s^2", np.array([TIME_S]))
+    velocity, position = integrated(made)
+    assert got.velocity[0] == pytest.approx(velocity, rel=0.05)
+    assert got.position[0] == pytest.approx(position, rel=0.05)
+
+
+def test_velocity_random_walk_is_sixty_times_the_density():
+    # 25 µg/√Hz, the ADXL355 of the notes: 25e-6 · 9.80665 · 60 = 0.0147 m/s/√h
+    got = navigation_error({"N": 25.0, "B": 20.0, "K": None}, "µg", np.array([3600.0]))
+    assert got.velocity_random_walk == pytest.approx(0.01471, rel=1e-3)
+    assert got.q_n == pytest.approx((25e-6 * PER_G) ** 2)
+    assert got.q_b == pytest.approx((20e-6 * PER_G) ** 2)
+    assert got.velocity[0] == pytest.approx(np.hypot(0.01471, 20e-6 * PER_G * 3600.0), rel=1e-3)

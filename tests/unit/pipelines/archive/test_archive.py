@@ -1,12 +1,16 @@
-"""The archive: whole or not at all, the same bytes for the same content, and trouble told in one message."""
+"""The archive: whole or not at all, the same bytes for the same content, keys of its code, and trouble told in one message."""
 
+import subprocess
+import sys
 from pathlib import Path
 
 import pandas as pd
 import pytest
-from capture_double import CaptureDouble, small_job, small_run
+from capture_double import small_job, small_run
 
 from pipelines.archive import Archive, Run, files, parquet, stage_key
+from pipelines.archive.code import CODE
+from pipelines.archive.keys import sources
 from pipelines.chain.chain import ORDER
 from pipelines.chain.runner import Runner
 from schemas.errors import ArchiveUnusable, OperatorNeeded, WrongUse
@@ -86,16 +90,6 @@ def test_a_table_changed_behind_the_archives_back_is_found(tmp_path: Path) -> No
         run.table("coefficients")
 
 
-def test_other_effects_make_a_run_of_their_own_on_the_same_capture(run: Run, tmp_path: Path) -> None:
-    job = small_job(tmp_path, ('"scale_temperature"]', '"scale_temperature", "second_order"]'))
-    other = Runner(job, run.archive, measure=_never)
-    stages = {name: other.stage(name).reused for name in ORDER[:-1]}
-    assert other.run.id != run.id
-    assert stages["capture"]
-    assert not stages["fit"]
-    pd.testing.assert_frame_equal(other.run.table("dwells"), run.table("dwells"))
-
-
 def test_finds_a_run_by_its_beginning_and_the_latest_and_names_what_is_close(run: Run) -> None:
     archive = Archive(run.archive.root)
     ids = [info.id for info in archive.runs()]
@@ -118,11 +112,23 @@ def test_one_process_at_a_time_measures_a_lot(tmp_path: Path) -> None:
         list(Runner(job, archive, measure=second).all())
 
 
-def test_samples_are_kept_record_by_record_beside_the_stations_last_state_alone(run: Run, tmp_path: Path) -> None:
-    assert sum(len(frame) for frame in run.records.samples()) == len(run.table("samples"))
-    assert len(list(run.records.samples())) == len(run.records.finished())
-    job = small_job(tmp_path)
-    records = Archive(tmp_path / "archive").capture(job.capture_id)
-    CaptureDouble()(job, records, lambda *_: None)
-    assert records.last_state() == str(max(records.finished())).encode()
-    assert len(list((records.path / "state").iterdir())) == 1
+def test_a_key_takes_in_what_its_stage_uses_by_name_or_by_discovery_and_nothing_of_others() -> None:
+    assert not {n for n in sources(CODE["grade"]) if n.startswith("inertial.criticism")}
+    assert "inertial.fits.wander" not in sources(CODE["reduce"])
+    assert {"inertial.effects.third_order", "inertial.effects.covariate"} <= set(sources(CODE["fit"]))
+    assert "pipelines.procedures.sweep" in sources(CODE["procedures"])
+    assert {"inertial.noise.allan", "inertial.noise"} <= set(sources(("inertial.noise",)))
+    assert list(sources(CODE["fit"])) == sorted(sources(CODE["fit"]))
+    for name in ("inertial.no_such_module", "no_such_package", "inertial.counts.number_of"):
+        with pytest.raises(LookupError, match=name):
+            sources((name,))
+
+
+def test_no_module_is_imported_for_its_source():
+    code = (
+        "import sys; from pipelines.archive.keys import code_hash; before = set(sys.modules); "
+        "code_hash('report'); print(*(set(sys.modules) - before))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    imported = done.stdout.split()
+    assert not [name for name in imported if name.split(".")[0] in {"matplotlib", "inertial", "pipelines", "scipy"}]

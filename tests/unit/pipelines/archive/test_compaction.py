@@ -12,7 +12,7 @@ from pipelines.archive import Archive, files, packs
 from pipelines.archive.backup import copy_archive
 from pipelines.archive.compaction import compact
 from pipelines.archive.locks import alone
-from pipelines.archive.pack_writing import FolderToPack, due_of, merge_packs, write_pack
+from pipelines.archive.pack_writing import FolderToPack, merge_packs, write_pack
 from pipelines.archive.packed_path import PackedPath
 from pipelines.audit.index import up_to_date
 from pipelines.audit.sql import ask
@@ -154,11 +154,6 @@ def test_every_folder_is_where_its_table_says_however_many_are_asked_for(tmp_pat
         folder = known.folder(name)
         assert folder.files["run.json"][1:] == (100 * number, 7, number)
     assert known.folder("runs/line-1") is None
-
-
-def test_small_packs_are_merged_with_one_at_most_twice_as_large() -> None:
-    counts = {(): 0, (5,): 1, (8, 1): 1, (2, 1): 2, (9, 5, 1, 1): 2, (8, 3, 1, 1): 4, (2**30 - 5, 9): 1}
-    assert {sizes: due_of(sizes) for sizes in counts} == counts
 
 
 def test_many_compactions_leave_few_packs_and_the_same_files(archive: Archive) -> None:

@@ -5,12 +5,10 @@ import os
 import time
 from pathlib import Path
 
-import pandas as pd
 import pytest
 
-from pipelines.archive import Archive, Run, RunInfo, derived, files, listing
+from pipelines.archive import Archive, Run, derived, files, listing
 from pipelines.archive.keys import digest
-from pipelines.archive.run import stages_of
 
 LOTS = 40
 
@@ -67,18 +65,6 @@ def test_a_run_that_is_gone_is_not_listed_and_a_spoilt_note_does_no_harm(archive
     assert len(archive.runs()) == LOTS - 1
 
 
-def test_a_sealed_run_tells_its_stages_from_one_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from capture_double import small_run
-
-    run = small_run(tmp_path)
-    run.seal()
-    wanted = stages_of(run.path)
-    monkeypatch.setattr(listing, "stages_of", lambda *_: pytest.fail("manifests were read"))
-    info = listing.info_of(run)
-    assert isinstance(info, RunInfo)
-    assert list(info.stages) == wanted
-
-
 def test_a_line_of_an_older_version_is_read_again_and_is_no_edit(archive: Archive) -> None:
     archive.runs()
     place = archive.root / "index" / "list.json"
@@ -91,13 +77,3 @@ def test_a_line_of_an_older_version_is_read_again_and_is_no_edit(archive: Archiv
     assert listing.agrees(info, line)
     assert not listing.agrees(info, [*line[:2], "another device", *line[3:]])
     assert all(info.station == "st-1" for info in archive.runs())  # not in the older lines
-
-
-def test_a_graded_run_tells_how_many_units_passed_and_a_spoilt_table_nothing(archive: Archive) -> None:
-    run = Run(archive, archive.runs()[0].id)
-    pd.DataFrame({"unit": ["A", "B", "C"], "outcome": ["pass", "fail", "pass"]}).to_parquet(run.path / "grades.parquet")
-    info = listing.info_of(run)
-    assert (info.passed, info.graded) == (2, 3)
-    (run.path / "grades.parquet").write_bytes(b"PAR1 half")
-    info = listing.info_of(run)
-    assert (info.passed, info.graded) == (None, None)

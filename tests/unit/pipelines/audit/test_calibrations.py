@@ -1,16 +1,12 @@
 """Parts of the audit on calibrations whose truth is known: charts, slots, gauge studies, intervals, strangers."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from pipelines.audit.calibrations import Calibrations, date_of, day_of
+from pipelines.audit.calibrations import Calibrations, day_of
 from pipelines.audit.drifts import kind_drifts
 from pipelines.audit.due import due
-from pipelines.audit.exchanged_serials import strangers
 from pipelines.audit.gauge_mounts import studies
-from pipelines.audit.pairs import pairs_of
 from pipelines.audit.parameters import NAMES, parameters_of
 from pipelines.audit.population import odd_ones, yields
 from pipelines.audit.rules import load_rules
@@ -86,28 +82,6 @@ def test_a_slot_that_is_knocked_is_told_with_its_day(rng):
     assert len(means) == 8
 
 
-def test_exchanged_serials_are_told_both_ways_and_leave_the_histories_alone(rng):
-    rows, values = units_again(rng)
-    a, b = 5 * 6 + 3, 9 * 6 + 3
-    values[[a, b]] = values[[b, a]]
-    rows[b] = (*rows[b][:3], rows[a][3])
-    broken = values.copy()
-    broken[5 * 6 + 5] += 40.0  # a unit that is broken fits nobody
-    assert ("", False) in [(one.looks_like, one.exchanged) for one in strangers(calibrations(rows, broken))]
-    histories = calibrations(rows, values)
-    strange = strangers(histories)
-    assert [(histories.unit[s.row], s.looks_like, s.exchanged) for s in strange] == [
-        ("U005", "U009", True),
-        ("U009", "U005", True),
-    ]
-    good = everything(histories)
-    good[[s.row for s in strange]] = False
-    pairs = pairs_of(histories, good)
-    assert (
-        np.abs(histories.column("bias_x")[pairs.later] - histories.column("bias_x")[pairs.earlier]).max() < 10 * ERROR
-    )
-
-
 def test_a_gauge_study_is_found_among_the_runs(rng):
     rows, values = units_again(rng, units=20, times=2)
     own = rng.standard_normal((10, len(NAMES)))
@@ -121,18 +95,6 @@ def test_a_gauge_study_is_found_among_the_runs(rng):
     assert {(s.stations, s.gauge.parts, s.gauge.mounts) for s in all_} == {(("line-1", "line-2"), 10, 3)}
     assert np.median([s.gauge.repeatability for s in all_]) == pytest.approx(0.1, rel=0.15)
     assert np.median([s.gauge.reproducibility for s in all_]) == pytest.approx(0.3 / np.sqrt(2.0), rel=0.3)
-
-
-def test_fixed_intervals_count_calendar_months_from_the_last_pass(rng):
-    rows = [("A", "line-1", 0, 0.0), ("A", "line-1", 0, day_of("2022-08-31") - START), ("B", "line-1", 1, 30.0)]
-    histories = calibrations(rows, rng.standard_normal((3, len(NAMES))))
-    outcome = histories.outcome.copy()
-    outcome[2] = "fail"
-    histories = replace(histories, outcome=outcome)
-    rules = load_rules().model_copy(update={"interval_months": 6})
-    answer = due(histories, everything(histories), rules, [], {})
-    assert [date_of(day) for day in answer.day] == ["2023-02-28", date_of(START + 30.0)]
-    assert answer.because.tolist() == ["fixed", "did not pass"]
 
 
 def test_a_unit_that_drifts_is_due_earlier_when_drift_decides(rng):

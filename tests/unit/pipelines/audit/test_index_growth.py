@@ -2,7 +2,6 @@
 
 import json
 import logging
-import os
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -68,14 +67,6 @@ def test_small_parts_become_one_when_there_are_many(archive: Archive, monkeypatc
     assert parts == [1, 2, 3, 1, 2, 3]
     held = [runs_of(part, version_of_rows()) for part in part_folders(index_of(archive))]
     assert sorted(run for part in held for run in part) == names(archive), "every run once"
-
-
-def test_a_run_that_was_added_and_changed_is_read_again(archive: Archive) -> None:
-    add_runs(archive, names(archive))
-    os.utime(index_of(archive).parent / "runs" / names(archive)[2] / "run.json", (1.0, 1.0))
-    index = up_to_date(archive)
-    assert (index.made, index.kept) == (6, 0), "its part is made anew"
-    assert {row["run"] for row in rows(archive, "runs")} == set(names(archive))
 
 
 def test_figures_do_not_depend_on_the_order_of_parts(archive: Archive) -> None:

@@ -1,6 +1,5 @@
 """What is stated of references, device and certificate: what is refused, what is missing, and what a decision then says."""
 
-import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -15,8 +14,6 @@ from pipelines.archive import Run
 from pipelines.certificates.stated_budget import stated_budget
 from pipelines.cli import app
 from pipelines.jobs.job import job_of_run
-from pipelines.jobs.recipe_text import recipe_text
-from pipelines.jobs.recipes import load_recipe, resolved
 from pipelines.jobs.terms import refuse_contradictions
 from pipelines.schedule.steps import steps
 from pipelines.stages.figures import UNITS
@@ -24,10 +21,8 @@ from pipelines.stages.uncertainty.contributions import merged, sources
 from schemas.decisions import decide
 from schemas.errors import RecipeInvalid, WrongUse
 from schemas.limits import parse_limits
-from schemas.recipe import parse_recipe
 from schemas.station import StationConfig, load_station
 from schemas.uncertainty import Uncertainty
-from schemas.validity import CertificateTerms, Stability
 
 LINE = ROOT / "deploy" / "stations" / "line-1.toml"
 
@@ -106,22 +101,6 @@ def test_a_recipes_entries_go_before_the_stations_and_the_weaker_source_counts()
     assert both.grade_source == "data_sheet"
     assert sources(both)["pose"].stated.u == pytest.approx(9e-6)
     assert "level" in sources(both)
-
-
-def test_a_recipe_with_its_tables_is_written_and_read() -> None:
-    recipe = load_recipe("production").model_copy(
-        update={
-            "certificate": CertificateTerms(validity_months=6, force_range_g=(-2.0, 2.0), frame="fixture"),
-            "stability": Stability(switch_on_ug=300.0, horizon_days=400.0, source="history"),
-            "uncertainty": stated(seat={"u_urad": 100.0, "scope": "mount", "source": "remounts"}),
-            "verification_order": "interleaved",
-        }
-    )
-    text = recipe_text(recipe)
-    tomllib.loads(text)
-    again = resolved(parse_recipe(text, "text"), "text")
-    for key in ("certificate", "stability", "uncertainty", "verification_order"):
-        assert getattr(again, key) == getattr(recipe, key)
 
 
 def test_the_order_of_verification_is_the_recipes() -> None:

@@ -4,9 +4,7 @@ import io
 
 import pytest
 from rich.console import Console
-from rich.text import Text
 
-from inertial.effects import built_in
 from pipelines.cli.console import WordConsole
 from pipelines.cli.printing import console, print_table
 
@@ -33,17 +31,6 @@ def test_a_table_fits_the_terminal_and_keeps_every_word(width: int, monkeypatch:
     assert (
         sum("production-30db20d7e5" in line for line in printed(80, terminal=False)) == 2
     )  # in a pipe it is one table
-
-
-@pytest.mark.parametrize("terminal", [True, False])
-def test_the_name_of_an_effect_is_not_broken(*, terminal: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delenv("COLUMNS", raising=False)
-    sink = io.StringIO()
-    out = WordConsole(file=sink, width=80, force_terminal=terminal, color_system=None, legacy_windows=False)
-    longest = max(built_in(), key=len)
-    figures = ["4697.7", "0.38", "-45.882", "1.9034", "LSB/(g·K)"]
-    print_table(["unit", "effect", "value", "error", "low", "high", "text"], [["LT-01", longest, *figures]], out=out)
-    assert longest in sink.getvalue()
 
 
 def test_a_sentence_is_wrapped_between_words_and_a_command_stays_whole() -> None:
@@ -86,34 +73,3 @@ def test_brackets_and_colons_of_a_reason_are_printed_as_they_are(capsys: pytest.
     console().print("run [/b] :bug:")
     out = capsys.readouterr().out
     assert all(words in out for words in ("dropped [red] [/x] :warning:", "[2]", "archive [a]", "run [/b] :bug:"))
-
-
-def test_a_column_without_an_entry_is_left_out_and_an_empty_table_keeps_its_heads() -> None:
-    text = table_text(80, COLUMNS, LINES)
-    assert "with" not in text.split()
-    assert "scale_temperature_quadratic" in text
-    assert (
-        table_text(80, ["serial", "reason"], [["", ""]]).split()[0] == "serial"
-    )  # the first column says what a row is
-    assert {"unit", "why"} <= set(table_text(80, ["unit", "why"], []).split())
-    assert "pass" in table_text(40, ["result"], [[Text("pass", style="bold green")]])
-
-
-def test_narrower_gaps_save_a_continuation_of_one_column() -> None:
-    heads = [
-        "slot",
-        "unit",
-        "result",
-        "grade",
-        *(f"{n}\nµg" for n in ("fit", "verify", "error", "period")),
-        "N\nµg/√Hz",
-        "B\nµg",
-    ]
-    line = ["0", "TL0001", "pass", "consumer", "352", "474", "595", "731", "10.3", "299"]
-    out = WordConsole(file=io.StringIO(), width=80, force_terminal=True, color_system=None)
-    print_table(heads, [line], out=out)
-    text = out.file.getvalue()  # pyright: ignore[reportAttributeAccessIssue]
-    assert text.count("slot") == 1
-    assert max(map(len, text.splitlines())) <= 80
-    wide = table_text(200, heads, [line])
-    assert "  slot   unit     result" in wide

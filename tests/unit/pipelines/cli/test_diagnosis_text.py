@@ -13,8 +13,7 @@ from pipelines.cli.text.diagnosis_text import print_diagnosis
 
 sys.path.insert(0, str(ROOT / "benchmarks" / "worlds"))
 
-from noise import Noise
-from tables import FAULTS, NULLS
+from tables import FAULTS
 from world import World, make
 
 SEED = 5_500_000
@@ -62,29 +61,6 @@ def test_dwells_that_carry_a_verdict_stand_in_text_document_and_page(tmp_path, c
         f"{first['unit']} dwell {first['dwell']} {share}"
         in html.split("Dwells with the largest influence on the verdict")[1]
     )
-
-
-def test_dwells_left_out_as_tails_are_listed_beside_a_verdict_of_adequate(tmp_path, capsys):
-    made = make(World(units=1, poses=18, noise=Noise(white=200.0, flicker=5.0, tails=3)), SEED + 2)
-    made.dwells.to_parquet(tmp_path / "dwells.parquet")
-    given = ["diagnose", str(tmp_path / "dwells.parquet"), "--report", str(tmp_path / "page.html"), "--json"]
-    document = json.loads(CliRunner().invoke(app, given).stdout)
-    assert document["classes"] == []
-    assert document["removed"]["heavy_tails"] is True
-    print_diagnosis(document, data=None, model=None)
-    assert "the tails of the noise of this run may reach as far" in " ".join(capsys.readouterr().out.split())
-    assert "the tails of the noise of this run may reach as far" in (tmp_path / "page.html").read_text(encoding="utf-8")
-
-
-def test_a_converters_fault_in_every_unit_is_no_verdict_on_the_model(tmp_path):
-    made = make(replace(NULLS["lsb5"], units=2, poses=8), SEED)
-    made.dwells.to_parquet(tmp_path / "dwells.parquet")
-    page = tmp_path / "page.html"
-    done = CliRunner().invoke(app, ["diagnose", str(tmp_path / "dwells.parquet"), "--report", str(page), "--json"])
-    document = json.loads(done.stdout)
-    assert (document["adequate"], done.exit_code) == (None, 1)
-    assert "every unit (2) has a data fault" in document["reason"]
-    assert "CANNOT BE JUDGED: every unit (2)" in page.read_text(encoding="utf-8")
 
 
 def test_missing_dwells_are_told_in_the_report_and_at_the_terminal(tmp_path):

@@ -1,6 +1,5 @@
 """Texts that a newcomer met and could not use: what they say now, and how numbers are written in them."""
 
-import io
 import re
 from pathlib import Path
 
@@ -10,23 +9,11 @@ from each import each
 from root_process import ROOT
 from typer.testing import CliRunner
 
-from inertial.counts import size_text
-from inertial.planning.ranges import UnseenRange
-from pipelines.certificates.document.file_check import Check, CheckedFile
-from pipelines.cli import app, flowing
-from pipelines.cli.console import WordConsole
-from pipelines.cli.printing import print_table, short
-from pipelines.cli.text.plan_text import ERROR_HEADS, _error_lines  # pyright: ignore[reportPrivateUsage]
-from pipelines.cli.verify import _needed  # pyright: ignore[reportPrivateUsage]
-from pipelines.diagnosis.model_history import _fall  # pyright: ignore[reportPrivateUsage]
+from pipelines.cli import app
 from pipelines.importers.exchange import read_dwells
 from pipelines.jobs.recipes import load_recipe
-from pipelines.report.unit_panels.budget import without_nothing
-from pipelines.report.unit_panels.figures import _line  # pyright: ignore[reportPrivateUsage]
-from schemas.decisions import decide
 from schemas.errors import DataRejected, RecipeInvalid
 from schemas.key_list import keys_of
-from schemas.limits import parse_limits
 from schemas.recipe import FaultOrder
 from schemas.station import StationConfig, load_station
 from schemas.toml_files import PATTERNS
@@ -67,35 +54,6 @@ def test_what_cannot_be_is_refused_with_what_is_needed(tmp_path: Path, monkeypat
     said = refused(["inspect", str(dwells)], tmp_path, monkeypatch)
     assert "column out_y: found oops, a finite number is needed" in said
     assert f"tumbleline compare {dwells}" in refused(["fit", str(dwells)], tmp_path, monkeypatch)
-
-
-def test_an_unsigned_pdf_is_not_sent_to_the_archive_that_cannot_prove_it() -> None:
-    unsigned = [Check("signature", "not checked", "the PDF is not signed")]
-    assert "give its XML with --archive" in _needed(CheckedFile(Path("A1_1.pdf"), checks=unsigned))
-    assert "--trust FILE" in _needed(CheckedFile(Path("A1_1.xml"), checks=unsigned))
-    signed = [Check("signature", "good", "as it was signed")]
-    assert "--trust FILE" in _needed(CheckedFile(Path("A1_1.pdf"), checks=signed))
-
-
-def test_numbers_have_three_digits_and_no_exponent() -> None:
-    assert str(UnseenRange("tau", "s", 1118.0, 3000.0)) == "tau 1120 to 3000 s"
-    assert str(UnseenRange("tau", "s", 36000.0, 36000.0)) == "tau 36000 s"
-    assert str(UnseenRange("tau", "s", 0.0123, 0.5)) == "tau 0.0123 to 0.5 s"
-    sizes = {1: "1 byte", 512: "512 bytes", 2_000: "2.00 kB", 18721670: "18.7 MB", 123_456_789_000: "123 GB"}
-    assert {size: size_text(size) for size in sizes} == sizes
-    for fall, error, text in (
-        (97.13, 2.8, "falls by 97.1 ± 5.6 (k = 2) µg"),
-        (-6.41, 0.7, "rises by 6.4 ± 1.4 (k = 2) µg"),
-        (123.4, None, "falls by 123 µg"),
-    ):
-        assert _fall({"fall_ug": fall, "fall_u_ug": error, "estimated_again": None}) == f"the error {text}"
-
-
-def test_a_contribution_of_nothing_is_not_among_the_largest_and_a_help_is_broken_by_the_terminal_alone() -> None:
-    text = "noise of the dwells 99 %, references, as far as verification cannot show them 1 %, seat of the fixture 0 %"
-    assert without_nothing(text) == text.removesuffix(", seat of the fixture 0 %")
-    assert without_nothing("noise of the dwells 80 %, supply 20 %") == "noise of the dwells 80 %, supply 20 %"
-    assert flowing("One line\nand its end.\n\n- a list\n- stays") == "One line and its end.\n\n- a list\n- stays"
 
 
 def test_patterns_and_expanded_uncertainties_of_a_schema_are_explained_in_words() -> None:
@@ -141,50 +99,3 @@ def test_inspect_sends_dwells_in_the_exchange_format_to_diagnose(tmp_path: Path)
     assert "1 unit, 2 dwells; reference: the force on each axis" in done.stdout
     assert {"reference", "covariate"} <= set(done.stdout.split())
     assert "--map" not in done.stdout
-
-
-@each(["run [OPTIONS] [RECIPE]", "diagnose [OPTIONS] DWELLS", "inspect [OPTIONS] FILE…", "show [OPTIONS] [RUN|UNIT] [TABLE]",
-       "plan optimise [OPTIONS] [RECIPE]"])  # fmt: skip
-def test_arguments_of_a_usage_line_have_one_pair_of_brackets(usage: str) -> None:
-    words = usage.partition(" [OPTIONS]")[0].split()
-    line = next(line for line in CliRunner().invoke(app, [*words, "--help"]).stdout.splitlines() if "Usage" in line)
-    assert line.strip().removeprefix("Usage: ").split(" ", 1)[1] == usage
-
-
-def test_report_and_reason_give_the_digits_of_the_summary() -> None:
-    row = {
-        "figure": "bias_error_ug", "value": 473.64, "uncertainty": 490.2, "limit": 1000.0, "unit_text": "µg", "outcome": "pass",
-    }  # fmt: skip
-    line = _line(row)
-    assert (line["value"], line["uncertainty"]) == (short(473.64), "490") == ("474", "490")
-    limits = parse_limits(
-        'name = "own"\ngrade = "consumer"\n[figures.bias_error_ug]\nmax = 500.0\nunit = "µg"\n',
-        "limits",
-        {"bias_error_ug": "µg"},
-    )
-    assert "846 ± 490 µg, limit 500 µg" in decide(limits, "bias_error_ug", 845.7, 245.1).sentence
-
-
-def test_the_tables_of_a_plan_are_not_continued_at_eighty_columns(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("NO_COLOR", "1")
-    text = CliRunner().invoke(app, ["plan"], env={"COLUMNS": "80"}).stdout
-    heads = [line.split() for line in text.splitlines() if line.startswith("  visible effect ")]
-    assert heads == [
-        ["visible", "effect", "v", "1/v²", "floor,", "µg", "coefficient"],
-        ["visible", "effect", "confounded", "with"],
-    ]
-    assert text.count("coefficient, unit") == 1
-    assert "scale_temperature_quadratic, µg/(g·K²)" in text
-    assert re.search(r"thermal_rate .* µg/\(K/min\)", text)
-    sink = io.StringIO()
-    out = WordConsole(file=sink, width=80, force_terminal=True, color_system=None)
-    row = {"effect": "misalignment_temperature", "name": "KxyT", "axis": "x", "unit": "µg/(g·K)"}
-    errors = {"uncertainty_ug": 0.0518, "wanted_ug": 0.0654, "own_ug": 1060.0}
-    lines = _error_lines([{**row, **errors}, {**row, **errors, "name": "KxzT"}, {**row, **errors, "effect": "bias"}])
-    print_table(ERROR_HEADS, lines, out=out)
-    assert sink.getvalue().count("coefficient") == 1
-    assert "misalignment_temperature x KxzT, µg/(g·K)" in sink.getvalue()
-    assert "bias x, µg/(g·K)" in sink.getvalue()

@@ -10,7 +10,6 @@ from benchmarks.made_recordings import NOISES, Recording, make
 from inertial.fits.ellipsoid import fit_ellipsoid
 from inertial.norm_fit import fit_norms
 from inertial.probability import passes
-from pipelines.diagnosis.compare import compare
 from pipelines.diagnosis.diagnose import diagnose
 from pipelines.diagnosis.sections import parameters_of
 from pipelines.diagnosis.sentences import verdict
@@ -94,13 +93,6 @@ def test_bad_dwells_are_named_and_left_out_before_physics(count: int) -> None:
     assert [g["effects"] for g in document["classes"]] == [["bad_dwell"]] * count
     without = leave_out(made.dwells, [("HAND-1", dwell) for dwell in made.spoilt])
     assert diagnose(without)["adequate"] is document["leave_out"]["adequate_without"]
-
-
-def test_a_fit_a_comparison_and_a_diagnosis_have_one_residual() -> None:
-    dwells = make(Recording(40, "white 280, B 30"), 7).dwells
-    rms = 1e6 * norms_fitted(dwells, None, PLAIN).rms
-    assert compare(dwells, PLAIN)["rms_ug"] == pytest.approx(rms, rel=1e-3)
-    assert diagnose(dwells, None, PLAIN)["error"]["rms_ug"] == pytest.approx(rms, rel=1e-3)
 
 
 def test_nine_parameters_without_weights_are_those_of_the_ellipsoid() -> None:

@@ -16,7 +16,7 @@ from pipelines.tables.leave_out import leave_out, named_dwells
 from pipelines.workbench.services import requests
 from pipelines.workbench.services.work import done_in_process
 from pipelines.workbench.settings import WorkbenchSettings
-from pipelines.workbench.state import MissingPage, PlanPage
+from pipelines.workbench.state import MissingPage
 from schemas.errors import DataRejected, RecipeInvalid, WrongUse
 
 
@@ -77,14 +77,3 @@ def test_a_page_says_what_its_command_says(settings: WorkbenchSettings) -> None:
     assert outcome.table.residual.shape == (2, 3, 24)
     assert np.isnan(outcome.table.residual[1, :, 5]).all()  # the dwell that was left out
     assert outcome.before.shape == outcome.table.residual.shape
-
-
-def test_a_plan_on_its_page_is_that_of_its_command(settings: WorkbenchSettings) -> None:
-    page = PlanPage()
-    state, outcome = done_in_process("plan", requests.plan(settings, page)[1], lambda *_: None)
-    assert state == "done"
-    told = json.loads(CliRunner().invoke(app, [*page.arguments(), "--json"]).stdout)
-    assert told["minutes"] == pytest.approx(outcome["document"]["minutes"])
-    assert [(row["effect"], row["seen"]) for row in told["effects"]] == [
-        (row["effect"], row["seen"]) for row in outcome["document"]["effects"]
-    ]

@@ -130,28 +130,6 @@ def test_a_revoked_run_is_taken_out_from_that_night_on(archive: Archive) -> None
     assert state.alarms
 
 
-def test_the_wafer_is_found_and_keeps_its_id(archive: Archive) -> None:
-    first = discovered(archive, Look()).document
-    (row,) = first["discoveries"]
-    assert first["new"] == ["D1"]
-    assert (row["recommended"], row["driver"], row["scope"]) == ("third_order", "wafer", "sensor")
-    assert row["levels"][0]["level"] == "W03"
-    assert row["levels"][0]["size_ug"] < 0.0
-    assert row["size_ug"] < 0.25 * 16.0  # µg, of a dwell's noise
-    assert (row["carried_by"]["lots_for"] or 0.0) > 0.7
-    assert row["since"] <= "2026-01-08"
-    second = discovered(archive, Look()).document
-    assert second["new"] == []
-    assert second["discoveries"] == first["discoveries"]
-
-
-def test_the_effect_in_every_model_takes_the_evidence_away(archive: Archive) -> None:
-    (compared,) = discovered(archive, Look(effects=("third_order",))).document["compared"]
-    assert compared["log_e_before"] > 15.0
-    assert compared["log_e_after"] < 8.0
-    assert compared["size_ug_after"] < 0.3 * compared["size_ug_before"]
-
-
 def test_attributes_that_come_later_start_with_the_lots_after_them(archive: Archive) -> None:
     brought_up(DiscoveryArchive(archive))
     units = [unit for info in archive.runs() for unit in info.units]

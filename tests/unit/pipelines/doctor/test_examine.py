@@ -80,11 +80,6 @@ def test_a_healthy_archive_is_good_and_holds_nothing_of_the_check_afterwards(tmp
     assert sorted((tmp_path / "a").rglob("*")) == before
 
 
-def test_the_default_archive_need_not_be_there_and_is_not_made(tmp_path: Path) -> None:
-    assert states(archive_checks(None, 1.0)) == {"reachable": "not configured"}
-    assert not (tmp_path / "archive").exists()
-
-
 def entry_of_tomorrow(folder: Path) -> None:
     (folder / "runs").mkdir()
     os.utime(folder / "runs", (time.time() + 3600.0,) * 2)
@@ -317,13 +312,6 @@ def test_a_station_that_does_not_answer_or_whose_file_is_wrong_is_a_fault_and_no
 
 
 # the host and its software
-
-
-def test_a_state_folder_that_cannot_be_made_is_a_fault(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "file").write_text("", encoding="utf-8")
-    monkeypatch.setenv("TUMBLELINE_STATE", str(tmp_path / "file" / "state"))
-    fault = only_fault(host_checks())
-    assert (fault.part, fault.check) == ("state folder", "writable")
 
 
 def test_the_clock_is_what_the_kernel_says(monkeypatch: pytest.MonkeyPatch) -> None:

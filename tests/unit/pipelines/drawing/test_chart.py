@@ -8,7 +8,6 @@ import re
 import numpy as np
 import pandas as pd
 import pytest
-from each import each
 
 from pipelines.drawing import (
     Chart,
@@ -83,18 +82,6 @@ def test_a_crowd_loses_no_point_and_mollweide_keeps_areas(rng: np.random.Generat
     assert np.mean((x > 0.0) & (y > 0.0)) == pytest.approx(0.25, abs=0.004)
 
 
-@each([-90.0, -45.0, 0.0, 10.0, 30.0, 60.0, 85.0, 89.9, 90.0])
-def test_mollweide_solves_its_equation_at_every_latitude(latitude: float) -> None:
-    """sin θ with 2θ + sin 2θ = π sin φ (Snyder, USGS 1395, eqs. 31-1 to 31-3), here by bisection."""
-    low, high = -0.5 * np.pi, 0.5 * np.pi
-    for _ in range(80):
-        middle = 0.5 * (low + high)
-        short = 2.0 * middle + np.sin(2.0 * middle) < np.pi * np.sin(np.radians(latitude))
-        low, high = (middle, high) if short else (low, middle)
-    direction = np.array([[np.cos(np.radians(latitude)), 0.0, np.sin(np.radians(latitude))]])
-    assert project(direction)[1][0] == pytest.approx(np.sin(low), abs=1e-6)
-
-
 @pytest.mark.parametrize(("lost", "style"), [(False, "line"), (True, "points")])
 def test_samples_are_a_line_unless_one_beside_a_gap_would_be_hidden(
     rng: np.random.Generator, *, lost: bool, style: str
@@ -109,35 +96,3 @@ def test_samples_are_a_line_unless_one_beside_a_gap_would_be_hidden(
     assert [trace.style for plot in chart.plots for trace in plot.traces] == [style] * 3
     shown = chart.plots[0].traces[0].y
     assert np.allclose(shown, values[:, 0] - np.nanmean(values[:, 0]), equal_nan=True)
-
-
-def test_a_letter_of_the_sphere_stands_beside_the_lines_that_cross_there_in_every_drawing() -> None:
-    whole = Chart("a sphere", (sphere("one", ()),))
-    letters = next(trace for trace in whole.plots[0].traces if trace.style == "labels")
-    assert dict(zip(letters.texts, letters.anchors, strict=True))["+x"] == "top right"
-    drawn = next(one for one in plotly_figure(whole)["data"] if one["mode"] == "text")
-    assert drawn["textposition"] == ["top right", "top right", "top left", "top center", "bottom center"]
-    places = re.findall(r'<text x="([\d.]+)" y="([\d.]+)" text-anchor="(\w+)"[^>]*>(.[xyz])</text>', svg_text(whole))
-    ends = {letter: end for _, _, end, letter in places}
-    assert ends == {"+x": "start", "+y": "start", "−y": "end", "+z": "middle", "−z": "middle"}
-    assert picture(whole, ".png")
-
-
-def test_a_short_logarithmic_axis_has_whole_numbers_and_no_digits_between_powers() -> None:
-    tau = np.array([0.01, 0.1, 1.0, 10.0, 100.0])
-    points = Trace("x", tau, np.array([90.0, 40.0, 20.0, 8.0, 4.0]))
-    layout = plotly_figure(Chart("a", (Plot("", PlotAxis("s", log=True), PlotAxis("µg", log=True), (points,)),)))[
-        "layout"
-    ]
-    assert layout["yaxis"]["ticktext"] == ["5", "10", "20", "50"]
-    assert layout["xaxis"]["dtick"] == 1
-    assert "tickvals" not in layout["xaxis"]
-
-
-def test_names_under_a_narrow_plot_are_thinned_out() -> None:
-    names = tuple(f"p{k:02d}" for k in range(1, 25))
-    plot = Plot("", PlotAxis("pose", names=names), PlotAxis("µg"), (Trace("x", np.arange(24.0), np.zeros(24)),))
-    alone = plotly_figure(Chart("a", (plot,)))["layout"]["xaxis"]["ticktext"]
-    among_three = plotly_figure(Chart("a", (plot, plot, plot), 3))["layout"]["xaxis"]["ticktext"]
-    assert len(alone) == 24
-    assert among_three == ["p01", "p03", "p05", "p07", "p09", "p11", "p13", "p15", "p17", "p19", "p21", "p23"]

@@ -16,7 +16,6 @@ from capture_double import small_run
 from each import each
 from numpy.typing import NDArray
 
-from inertial.correction import correct
 from pipelines.archive import Run
 from pipelines.export import (
     FORMATS,
@@ -30,19 +29,7 @@ from pipelines.export import (
 from pipelines.export.polynomials import ORDER
 from pipelines.export.unit_noise import UnitNoise
 from pipelines.importers.readers.matlab import table_of
-from pipelines.tables.calibration import read_calibration
-from pipelines.tables.dwells import lot_arrays
 from schemas.errors import WrongUse
-
-
-def test_the_polynomials_correct_as_the_model_does(run: Run) -> None:
-    calibration = read_calibration(run.table("coefficients"), run.table("covariance"))
-    lot = lot_arrays(run.table("dwells"))
-    wanted = correct(calibration.effects, lot.state, lot.output, calibration.coefficients, calibration.nonlinear)
-    for u, exported in enumerate(unit_calibrations(run, (), failed=True)):
-        temperatures = lot.state.temperature[u]
-        corrected = [exported.correct(out[None], t)[0] for out, t in zip(lot.output[u], temperatures, strict=True)]
-        np.testing.assert_allclose(corrected, wanted[u], atol=1e-11)
 
 
 def test_refuses_a_unit_that_is_not_there_an_effect_without_a_place_and_noise_without_a_static_record(

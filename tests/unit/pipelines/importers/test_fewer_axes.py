@@ -79,13 +79,6 @@ def test_a_tumble_is_its_fourier_series(tmp_path):
     assert "x alone" in refused("export", plain["run"], "--format", "px4", "--archive", archive)
 
 
-def test_inspect_proposes_an_import_that_works(tmp_path):
-    path, _ = tilt_file(tmp_path)
-    proposed = document_of("inspect", path)["command"].replace("output=UNIT", "output=V").split()
-    assert "--axes x" in " ".join(proposed)
-    assert document_of(*proposed[1:], "--archive", tmp_path / "archive")["dwells"] == 24
-
-
 @pytest.mark.parametrize(
     ("words", "needed"),
     [

@@ -14,7 +14,7 @@ from pipelines.importers.record import imported
 from schemas.errors import DataRejected, WrongUse
 
 
-@each(range(25))
+@each(range(8))
 def test_one_frozen_dwell_of_known_pose_is_a_stuck_output(seed: int) -> None:
     rng = np.random.default_rng([4_401, seed])
     table = lots.lot(rng, units=1)

@@ -11,7 +11,7 @@ from each import each
 
 from inertial.poses import NAMED
 from pipelines.jobs.job import Request
-from pipelines.jobs.recipes import load_recipe, read_limits, recipe_names, sample_names
+from pipelines.jobs.recipes import load_recipe, read_limits, recipe_names
 from pipelines.schedule.steps import steps
 from schemas import own_files
 from schemas.errors import RecipeInvalid, WrongUse
@@ -21,20 +21,6 @@ from stations.profile_files import load_profile
 
 POSES = 'poses = "nine"'
 LAST_EFFECT = '"scale_temperature"]'
-
-
-@each(sample_names())
-def test_every_built_in_recipe_makes_a_job(name: str) -> None:
-    job = Request(recipe=name).job()
-    assert job.recipe.soak_min_s >= 900.0
-
-
-def test_the_main_job_is_the_one_of_the_figures() -> None:
-    recipe = load_recipe()
-    assert len(recipe.units) == 8
-    assert (len(recipe.poses), len({p.name for p in recipe.verification}), len(recipe.temperatures_C)) == (24, 6, 3)
-    assert [p.name for p in recipe.verification] == [f"v{k}" for k in range(1, 7)] * 3
-    assert recipe.static_record_s == 1200.0
 
 
 REFUSED: tuple[tuple[str, str, tuple[str, ...]], ...] = (

@@ -8,7 +8,7 @@ from each import each
 from root_process import ROOT
 
 from pipelines.jobs.job import Request
-from pipelines.jobs.seating import Seating, read_seating, scan
+from pipelines.jobs.seating import Seating, read_seating
 from schemas.errors import RecipeInvalid, WrongUse
 
 
@@ -46,26 +46,11 @@ def test_refuses_slot_maps_with_a_slip(row: tuple[str, str, str], tmp_path: Path
         read_seating(str(tmp_path / "none.csv"))
 
 
-def test_a_scan_leaves_slots_empty_and_asks_again_for_what_was_there() -> None:
-    lines, told = iter(["S1", "", "S1", "S2", ""]), []
-    seating = scan(4, lambda _slot: next(lines), told.append)
-    assert seating == Seating(("S1", "S2"), (0, 2))
-    assert told == ["slot 2: S1 was scanned for slot 0 already; scan the unit in slot 2"]
-
-
 def test_a_job_has_its_units_where_the_slot_map_says(tmp_path: Path) -> None:
     request = Request(recipe=recipe_file(tmp_path), units=("A5", "A2"), slots=(5, 2))
     assert [(unit.serial, unit.slot) for unit in request.job().lot.units] == [("A5", 5), ("A2", 2)]
     with pytest.raises(WrongUse, match="unit A9 in slot 9, the fixture of station simulated has slots 0 to 7"):
         Request(recipe=recipe_file(tmp_path), units=("A9",), slots=(9,)).job()
-
-
-@pytest.mark.parametrize("slots", [16, 32])
-def test_a_larger_fixture_takes_a_larger_lot(tmp_path: Path, slots: int) -> None:
-    units = tuple(f"S{n}" for n in range(slots))
-    station = ROOT / "deploy" / "stations" / f"simulated-{slots}.toml"
-    assert len(Request(recipe=recipe_file(tmp_path), station=station, units=units).job().lot.units) == slots
-    assert [len(part.units) for part in Request(units=units).fillings(8)] == [8] * (slots // 8)
 
 
 def test_faults_of_the_command_line_and_the_recipe_become_the_stations(tmp_path: Path) -> None:

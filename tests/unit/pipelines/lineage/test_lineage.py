@@ -88,13 +88,6 @@ def test_a_units_lineage_goes_from_its_certificate_to_every_record_with_origin_a
     assert all(files.sha256(run.archive.root / node.file) == node.sha256 for node in with_hash)
 
 
-def test_a_certificate_is_a_target_by_the_number_that_is_printed(run: Run) -> None:
-    traced = lineage(run.archive, "A1/1")
-    assert traced.kind == "certificate"
-    assert labels(traced, "certificate") >= {"A1/1"}
-    assert [traced.graph.nodes[name].label for name in traced.focus] == ["A1/1"]
-
-
 def test_a_record_leads_to_the_certificates_that_it_went_into(run: Run) -> None:
     traced = lineage(run.archive, str(run.records.path / "00003" / "samples.parquet"))
     assert traced.kind == "file"

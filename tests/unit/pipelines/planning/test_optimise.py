@@ -12,8 +12,7 @@ from pipelines.jobs.model_files import STARTING_MODEL
 from pipelines.jobs.recipes import load_recipe
 from pipelines.planning.context import plan_context
 from pipelines.planning.plan import identified
-from pipelines.planning.requirement import Requirement, candidates, temperature_choices
-from pipelines.planning.soak_orders import mirrored, orders
+from pipelines.planning.requirement import Requirement, candidates
 from pipelines.planning.textbook import reference_errors, textbook
 from pipelines.planning.timed_design import FEWEST, PlanDesign, TimedDesign, fewest_dwells, smallest_passing, spanned
 from pipelines.schedule.timing import spent
@@ -71,13 +70,6 @@ def test_what_the_textbook_plan_cannot_identify_is_wanted_as_the_recipe_knows_it
     own = identified(plan_context(recipe, STATION, noise)).errors
     assert errors[:, -1] == pytest.approx(own[:, -1])
     assert np.all(errors[:, :-1] < own[:, :-1])
-
-
-def test_orders_without_coming_back_may_be_one_soak_and_those_upside_down_are_known():
-    sequences = orders((), STATION, 900.0, optional=temperature_choices((-10.0, 60.0)), back=False)
-    assert sequences[0] == (25.0,)
-    assert (-10.0, 60.0) in sequences
-    assert mirrored((25.0, -10.0, 60.0)) == (25.0, 60.0, -10.0)
 
 
 def test_wander_alone_forbids_the_bias_of_a_qa700_in_six_tenths_of_the_textbooks_time():

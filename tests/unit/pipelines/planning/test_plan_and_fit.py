@@ -86,12 +86,6 @@ def test_plan_and_fit_state_the_bias_s_uncertainty_alike_and_lots_scatter_no_mor
     assert 0.7 < scatter.stated[1] / planned[1] < (3.0 if name == "flicker" else 1.35)
 
 
-def test_nothing_is_stated_of_the_next_switch_on_and_the_plan_says_why() -> None:
-    expected = plan(plan_context(RECIPE, load_station(), NOISES["flicker"]))["bias"]
-    assert expected["switch_on_u_ug"] is None
-    assert "switching on" in expected["switch_on_why"]
-
-
 def test_the_mean_of_a_walk_is_off_its_start_as_sums_say() -> None:
     steps = np.random.default_rng(20_261_140).standard_normal((4000, 400))
     path = np.cumsum(steps, axis=1)

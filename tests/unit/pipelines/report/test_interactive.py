@@ -11,8 +11,6 @@ import numpy as np
 import pandas as pd
 import pytest
 from each import each
-from hypothesis import given
-from hypothesis import strategies as st
 
 from pipelines.archive import Run
 from pipelines.drawing import Chart, ColourScale, Plot, PlotAxis, Trace, svg_text
@@ -21,7 +19,6 @@ from pipelines.drawing.ticks import date_ticks, linear_ticks, log_ticks
 from pipelines.report import interactive as module
 from pipelines.report import make_report, render
 from pipelines.report.interactive import BUNDLE, BUNDLE_SHA256, figure_of, interactive
-from pipelines.report.numbers import significant, with_uncertainty
 from pipelines.report.run_pictures import lot_chart
 
 
@@ -59,16 +56,6 @@ def test_the_limit_is_for_the_mean_of_a_pose_not_for_a_dwell_that_wandered(mean:
     assert shown.get("mean of a pose, beyond the limit", []) == ([mean] if red else [])
     assert shown["single dwell"] == [1400.0, 2.0 * mean - 1400.0, 10.0]
     assert ("beyond the limit" in svg_text(chart)) is red
-
-
-@given(st.floats(min_value=1e-6, max_value=1e9))
-def test_rounded_numbers_stay_close_and_have_the_digits_of_their_uncertainty(value: float) -> None:
-    shown = float(significant(value).replace("\u202f", "").replace("−", "-"))
-    assert abs(shown - value) <= 0.0051 * value
-    assert with_uncertainty(255224.4846, 61.7) == ("255\u202f224", "62")
-    assert with_uncertainty(-0.230123, 0.0361) == ("−0.230", "0.036")
-    assert with_uncertainty(12345.678, 1234.0) == ("12\u202f300", "1\u202f200")
-    assert with_uncertainty(1.0, 0.0) == ("1.000", "")
 
 
 def test_numbers_are_no_longer_than_their_uncertainty_supports_k_is_printed_and_a_report_is_made_once(
@@ -154,13 +141,6 @@ def test_figures_that_would_make_it_too_large_stay_pictures(monkeypatch: pytest.
     assert "<script" not in never
     assert never.count("<svg") == 2
     assert interactive(PAGE.format("<p>none</p>")) == PAGE.format("<p>none</p>")
-
-
-def test_a_name_becomes_no_markup() -> None:
-    text = figure_of(chart("</script><script>alert(1)</script><img src=x onerror=alert(2)>"))
-    assert "<img" not in text
-    assert text.count("<script") == 1
-    assert text.count("</script") == 1
 
 
 def test_points_lie_at_their_places_in_the_picture() -> None:

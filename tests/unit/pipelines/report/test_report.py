@@ -45,6 +45,7 @@ def test_numbers_have_the_digits_of_their_uncertainty_a_sign_and_no_negative_zer
     assert [probability(p) for p in (0.68, 3.2e-12, 0.0)] == ["p = 0.68", "p < 0.001", "p < 0.001"]
 
 
+@pytest.mark.usefixtures("no_next_measurement")
 @pytest.mark.parametrize(
     ("effect", "first"), [("cubic_transfer", "force"), ("encoder_harmonic", "outer_deg"), ("warm_up", "since_power_s")]
 )

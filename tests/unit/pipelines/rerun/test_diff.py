@@ -32,13 +32,6 @@ def whats(document: dict) -> list[tuple[str, str]]:
     return [(row["what"], row["stage"]) for row in document["because"]]
 
 
-def test_a_run_does_not_differ_from_itself(run: Run) -> None:
-    document = diff(run, run)
-    assert document["same"]
-    assert document["because"] == []
-    assert [row["flipped"] for row in document["units"]] == [False] * 3
-
-
 def test_other_limits_flip_grades_and_no_coefficient_and_are_named(run: Run, tmp_path: Path) -> None:
     limits = tmp_path / "hard.toml"
     figures = run.table("figures").query("figure == 'zero_g_offset_mg'").eval("value = abs(value)")

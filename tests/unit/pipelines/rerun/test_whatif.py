@@ -8,14 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from capture_double import CaptureDouble, measured_run, recipe_file, small_job
+from capture_double import CaptureDouble, measured_run, small_job
 
 from pipelines.archive import Archive, files
 from pipelines.chain.chain import ORDER
 from pipelines.chain.runner import Runner
-from pipelines.jobs.job import Request, job_of_run
+from pipelines.jobs.job import job_of_run
 from pipelines.jobs.model_change import ModelChange, change_from_options
-from pipelines.jobs.recipes import load_recipe
 from pipelines.jobs.releases import evidence_for, keep_evidence, line_model, release, released, releases
 from pipelines.rerun.lot_comparison import LotComparison, Side, applied, fresh, judged
 from pipelines.rerun.partition import Batch
@@ -136,13 +135,6 @@ def test_a_fit_of_measured_data_is_no_measurement_and_no_fresh_run(
     assert fresh_tasks(both, own.address, change) == []
 
 
-def test_a_model_that_was_there_already_is_no_better(archive: Archive, tmp_path: Path) -> None:
-    same = change_from_options("", model_file(tmp_path, GOOD[:-1]))
-    document = what_if(archive, same)
-    assert document["verdict"] == "no better"
-    assert document["total"]["fresh_rms_ug"][0] == pytest.approx(document["total"]["fresh_rms_ug"][1])
-
-
 def test_a_lot_that_the_model_cannot_be_fitted_to_is_named(archive: Archive, tmp_path: Path) -> None:
     document = what_if(archive, change_from_options("", model_file(tmp_path, (*GOOD, "bias_temperature_quadratic"))))
     assert document["verdict"] == "nothing to judge"
@@ -207,21 +199,6 @@ def test_the_line_uses_the_narrowest_release_whose_date_is_reached(tmp_path: Pat
         RecipeInvalid, match=r"no model is released at 2026-01-02 \(released: every device from 2026-02-01"
     ):
         line_model(own, "ADXL355", "s1", datetime(2026, 1, 2, tzinfo=UTC))
-
-
-def test_a_recipe_asks_for_the_line_s_model_of_its_device_and_station(tmp_path: Path) -> None:
-    own = Archive(tmp_path / "archive")
-    own.prepare()
-    request = Request(recipe=recipe_file(tmp_path, (FULL, 'model = "line"')))
-    with pytest.raises(RecipeInvalid, match="for adxl355 on simulated no model is released"):
-        request.job(own)
-    with pytest.raises(RecipeInvalid, match="'line' is the model that is released in an archive"):
-        load_recipe(request.recipe)
-    release(
-        own, change_from_options("", model_file(tmp_path)), datetime(2026, 1, 1, tzinfo=UTC), reason="test", force=True
-    )
-    recipe = request.job(own).recipe
-    assert (recipe.model_name, recipe.model_version, tuple(recipe.effects)) == ("better", 2, GOOD)
 
 
 def test_verdicts_on_models_that_are_equally_good_are_seldom_better(archive: Archive) -> None:

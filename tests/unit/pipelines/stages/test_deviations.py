@@ -13,7 +13,7 @@ from inertial.noise.terms import fit_terms
 from pipelines.cli import allan
 from pipelines.stages.deviations import STATISTICS, Deviations, deviations
 
-RECORDS, N = 300, 2048
+RECORDS, N = 150, 2048
 KINDS = {
     "white": lambda rng: generate.white(rng, (RECORDS, N), np.sqrt(2.0), 1.0),
     "flicker": lambda rng: generate.flicker(rng, (RECORDS, 3 * N), 1.0)[:, 2 * N :],

@@ -1,6 +1,5 @@
 """The fit stage: noise between dwells, nonlinear parameters, and what it says where it cannot find the noise."""
 
-import independent_lots as lots
 import made_noise as generate
 import numpy as np
 import pandas as pd
@@ -14,28 +13,6 @@ from pipelines.stages.verify import verify
 from pipelines.tables.calibration import read_calibration
 from schemas.errors import DataRejected
 from schemas.table_check import check
-
-FACES_MODEL = ["bias", "scale", "misalignment"]
-
-
-def test_the_bias_of_six_faces_is_stated_for_the_record_and_for_the_day_after() -> None:
-    rng = np.random.default_rng(7_310_003)
-    held = {"record": 0, "day": 0, "day by the record's": 0}
-    for _ in range(12):
-        world = lots.world(rng, units=4, flicker=300.0)
-        fitted = fit(world.dwells, lots.NO_HISTORY, FACES_MODEL)
-        rows = fitted["coefficients"]
-        value = 1e6 * rows[rows["effect"] == "bias"].sort_values(["unit", "axis"])["value"].to_numpy().reshape(-1, 3)
-        own = fitted["wander"].sort_values(["unit", "axis"])
-        record, day = (2.0 * own[name].to_numpy().reshape(-1, 3) for name in ("bias_record_u_ug", "bias_long_u_ug"))
-        assert own["bias_switch_on_u_ug"].isna().all()
-        held["record"] += int(np.sum(np.abs(value - world.record) <= record))
-        held["day"] += int(np.sum(np.abs(value - world.day) <= day))
-        held["day by the record's"] += int(np.sum(np.abs(value - world.day) <= record))
-    assert held["record"] >= 134  # of 144
-    assert held["day"] >= 130
-    assert held["day by the record's"] < 120  # what was stated before
-
 
 LINEAR = ["bias", "scale", "misalignment", "bias_temperature"]
 LAG = [*LINEAR, "thermal_lag"]
@@ -131,13 +108,6 @@ def test_a_model_without_scale_of_counts_is_refused_with_what_it_needs(rng: np.r
     dwells, _ = lot(rng, units=2)
     with pytest.raises(DataRejected, match=r"no 'scale', and the outputs are in LSB.* add 'scale'"):
         fit(dwells.assign(out_unit="LSB"), NO_HISTORY, ["bias", "bias_temperature"])
-
-
-def test_wander_between_dwells_is_found_and_told(rng: np.random.Generator) -> None:
-    dwells, _ = lot(rng, wander=1e-4, lagging=0.0)
-    table = fit(dwells, NO_HISTORY, LINEAR)["wander"]
-    assert set(table["method"]) == {"wander"}
-    assert (table["flicker_ug"] > 3.0 * 1e6 * WHITE).all()
 
 
 def test_says_so_where_there_are_too_few_dwells_for_the_noise(rng: np.random.Generator) -> None:

@@ -62,11 +62,8 @@ def dwells_of(made: PlantDevices, noise_ug: float, rng: np.random.Generator, uni
 
 
 @pytest.mark.parametrize("name", PRESETS)
-@pytest.mark.parametrize("seed", [71, 72])
-def test_a_lot_without_hidden_physics_is_adequate_at_a_microg_with_axes_that_lean_by_20_mrad(
-    name: str, seed: int
-) -> None:
-    document = diagnose(dwells_of(devices(name, seed), 1.0, np.random.default_rng(seed)), None, MODEL)
+def test_a_lot_without_hidden_physics_is_adequate_at_a_microg_with_axes_that_lean_by_20_mrad(name: str) -> None:
+    document = diagnose(dwells_of(devices(name, 71), 1.0, np.random.default_rng(71)), None, MODEL)
     assert document["adequate"], (document["error"]["p_value"], [c["effects"] for c in document["classes"]])
     assert document["error"]["p_value"] > 0.001
     assert not document["classes"]

@@ -5,15 +5,14 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from capture_double import STANDARD_G, CaptureDouble, plan, small_job, small_run
+from capture_double import STANDARD_G, CaptureDouble, plan, small_job
 
-from pipelines.archive import Records, Run
+from pipelines.archive import Run
 from pipelines.stages.fit import fit
 from pipelines.stages.reduce import reduce
 from pipelines.stages.validate import validate
 from pipelines.tables.calibration import read_calibration
 from pipelines.tables.dwells import lot_arrays
-from pipelines.tables.summaries import summarised
 from schemas.errors import DataRejected
 
 NO_HISTORY = pd.DataFrame({"time_s": [], "chamber_C": [], "slot": [], "unit": [], "unit_C": []})
@@ -116,35 +115,6 @@ def test_a_unit_that_never_answered_has_a_verdict(tmp_path: Path) -> None:
     verdicts = validate(samples, without, job.lot.units).set_index("unit")
     assert verdicts.loc["A3", "refused"]
     assert "no reading for 23 of 23 records" in verdicts.loc["A3", "reason"]
-
-
-def test_the_samples_of_a_run_are_decoded_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """All of them once for validation and reduction together, and the static record once more, whole, for the noise."""
-    asked: list[object] = []
-    plain = Records.samples
-    monkeypatch.setattr(Records, "samples", lambda own, records=None: asked.append(records) or plain(own, records))
-    (tmp_path / "archive").mkdir()  # so the run is made here, not copied
-    run = small_run(tmp_path)
-    static = set(run.table("readings").query("kind == 'allan'")["record"])
-    assert asked == [None, static]
-
-
-def test_a_summary_holds_what_a_look_at_the_samples_tells(tmp_path: Path) -> None:
-    samples, readings, _ = captured(tmp_path, "")
-    frame = pd.concat(samples, ignore_index=True)
-    summaries = summarised(samples, readings).set_index(["unit", "record"])
-    for key, own in frame.groupby(["unit", "record"]):
-        values, row = own[["x", "y", "z"]].to_numpy(), summaries.loc[key]
-        assert row["n"] == len(values)
-        for name, expected in (
-            ("out", np.mean(values, axis=0)),
-            ("sd", np.std(values, axis=0, ddof=1)),
-            ("low", np.min(values, axis=0)),
-            ("high", np.max(values, axis=0)),
-        ):
-            np.testing.assert_allclose(row[[f"{name}_{axis}" for axis in "xyz"]].astype(float), expected, rtol=1e-11)
-    assert len(summaries) == frame.groupby(["unit", "record"]).ngroups
-    assert not summaries[["wild_count", "clipped"]].to_numpy().any()
 
 
 def test_a_recorded_covariate_stays_in_the_dwells_unless_it_has_a_gap(tmp_path: Path) -> None:

@@ -36,20 +36,6 @@ def history(rng: np.random.Generator) -> pd.DataFrame:
     return frame
 
 
-def test_the_order_of_the_rows_does_not_matter(rng: np.random.Generator) -> None:
-    table, temperatures = dwells(rng), history(rng)
-    lot = lot_arrays(table, temperatures)
-    mixed = lot_arrays(table.sample(frac=1.0, random_state=1), temperatures.sample(frac=1.0, random_state=2))
-    assert mixed.units == lot.units == UNITS
-    assert (mixed.poses, mixed.kinds.tolist()) == (lot.poses, lot.kinds.tolist())
-    for name in ("force", "time", "temperature", "slot"):
-        np.testing.assert_array_equal(getattr(mixed.state, name), getattr(lot.state, name))
-    np.testing.assert_array_equal(mixed.output, lot.output)
-    np.testing.assert_array_equal(mixed.standard_error, lot.standard_error)
-    assert lot.state.history is not None
-    np.testing.assert_array_equal(mixed.state.history.temperature, lot.state.history.temperature)
-
-
 def test_arrays_hold_the_rows_of_every_unit(rng: np.random.Generator) -> None:
     table, temperatures = dwells(rng), history(rng)
     lot = lot_arrays(table, temperatures)

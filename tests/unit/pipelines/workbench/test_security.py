@@ -274,16 +274,6 @@ def test_the_drawing_library_is_the_one_that_was_checked(client: AsgiClient) -> 
     assert client.get("/static/x/../../pages.py").status_code == 404
 
 
-def test_an_empty_archive_has_every_page(tmp_path: Path) -> None:
-    settings = WorkbenchSettings(archive=str(tmp_path / "none"), folder=tmp_path / "bench", token=TOKEN)
-    client = AsgiClient(create_app(settings), ORIGIN)
-    for address in ("/units", "/missing", "/upload", "/operator", "/plan", "/station", "/audit"):
-        assert client.get(address).status_code == 200, address
-    assert not (tmp_path / "none").exists()
-    assert client.get("/run?run=latest").status_code == 422
-    assert client.get("/nowhere").status_code == 404
-
-
 @each(product(["residuals", "response", "allan", "history", "samples"], ["png", "json", "csv"]), ".".join)
 def test_a_figure_of_a_unit_without_data_is_a_sentence(figure: tuple[str, str], client: AsgiClient) -> None:
     answer = client.get(f"/unit/figure/{'.'.join(figure)}?run=latest&unit=NOBODY&dwell=NOBODY:1&parameter=x")

@@ -5,7 +5,7 @@ import pytest
 from scipy.signal import freqs, welch
 
 from stations.plant.dynamics import Dynamics, transfer
-from stations.plant.noise import UnitNoise, flicker_time_constants, flicker_variance
+from stations.plant.noise import UnitNoise
 from stations.plant.preset import load_preset, preset_names
 
 RATE = 100.0
@@ -36,13 +36,6 @@ def test_white_density_comes_back_as_the_preset_says(name):
     band = (frequency > 1.0) & (frequency < 45.0)
     assert np.sqrt(power[band].mean()) == pytest.approx(density * 1e-6, rel=0.01)
     assert x.std() == pytest.approx(density * 1e-6 * np.sqrt(RATE / 2.0), rel=0.01)
-
-
-def test_flicker_density_falls_as_one_over_f():
-    tau, variance = flicker_time_constants(), flicker_variance(1.0)
-    f = np.geomspace(1e-3, 0.3, 50)[:, None]
-    density = (4.0 * variance * tau / (1.0 + (2.0 * np.pi * f * tau) ** 2)).sum(axis=1)
-    assert density == pytest.approx(1.0 / (np.pi * f[:, 0]), rel=0.07)
 
 
 def test_allan_deviation_of_flicker_is_flat_at_0_664_of_the_instability():

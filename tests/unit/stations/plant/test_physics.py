@@ -1,4 +1,7 @@
-"""Physics of the simulated station, seen from its truth."""
+"""Physics of the simulated station, seen from its truth, and the journal of what was done to it."""
+
+import json
+import zlib
 
 import numpy as np
 import pytest
@@ -6,10 +9,12 @@ from small_station import QUIET, lot_of, plant_of, station_of, turn_to, write
 
 from inertial.frames import force_from_angles
 from schemas.errors import RecipeInvalid, WrongUse
+from schemas.fault import FaultOrder
 from schemas.lot import Lot, Unit
 from stations.codec import unpack_samples
 from stations.plant.fixture import Chamber, Moisture
 from stations.plant.hidden import HIDDEN, hidden_effect
+from stations.plant.journal import Injection, Journal, LineOrder, Write
 from stations.plant.preset import load_preset
 from stations.plant.table import Axis, Move, turn
 
@@ -129,24 +134,6 @@ def test_chamber_ramps_within_its_limit_overshoots_a_little_settles_and_shakes_m
     assert abs(path[-600:] - 60.0).max() < 0.05
 
 
-def test_open_door_lets_the_room_in():
-    plant = plant_of(station_of(faults=[{"kind": "door", "at_s": 4000.0}]))
-    write(plant, 3, "set_point", 60.0)
-    plant.advance(4_000_000_000)
-    assert plant.air_reading() == pytest.approx(60.0, abs=0.2)
-    plant.advance(600_000_000)
-    assert plant.air_reading() < 55.0
-
-
-def test_slots_lag_behind_the_air_each_by_its_own():
-    plant = plant_of(lot=lot_of(8))
-    write(plant, 3, "set_point", 60.0)
-    plant.advance(600_000_000)
-    readings = np.array(plant.temperature_reading())[:8]  # the other slots are empty
-    assert (readings < plant.air_reading() - 3.0).all()
-    assert np.ptp(readings) > 1.0
-
-
 @pytest.mark.parametrize("kind", sorted(HIDDEN))
 def test_every_hidden_effect_moves_an_output_and_nothing_at_zero_size(kind):
     size = {
@@ -191,3 +178,24 @@ def test_relative_humidity_falls_in_warmed_air_as_the_table_of_saturation_says()
     cool, warm, frost = moisture.relative(time, np.array([20.0, 60.0, -10.0]))
     assert cool / warm == pytest.approx(199.46 / 23.39, rel=0.01)
     assert frost == 100.0
+
+
+EVENTS = [
+    Write(1, 2, 100, (1, 2, 3)),
+    Injection(2, FaultOrder(kind="door", at_s=1.0)),
+    LineOrder(3, 5, "SETP 25"),
+    Write(4, 2, 101, (), "coil"),
+    Write(5, 3, 7, (9,)),
+    Injection(6, FaultOrder(kind="noise", serial="U001")),
+]
+
+
+def test_a_state_after_every_event_is_that_of_all_events_at_once() -> None:
+    often, once = Journal("station"), Journal("station")
+    for number, event in enumerate(EVENTS, start=1):
+        often.add(event)
+        assert [e for e, _ in zip(often.events(), EVENTS, strict=False)] == EVENTS[:number]
+        assert len(json.loads(zlib.decompress(often.state(number)))["events"]) == number
+        once.add(event)
+    assert often.state(9) == once.state(9)
+    assert once.recorded(often.state(9)) == (EVENTS, 9)

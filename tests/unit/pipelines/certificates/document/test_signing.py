@@ -50,6 +50,7 @@ def test_the_pdf_is_intact_and_trusted_for_two_programs_and_an_altered_one_is_no
     good = status(signed)
     assert (good.intact, good.valid, good.trusted) == (True, True, True)
     assert str(good.coverage).endswith("ENTIRE_FILE")
+    assert b"/ETSI.CAdES.detached" in signed  # PAdES
     assert signed.startswith(document)  # an incremental update: what was typeset is in it unchanged
     assert openssl_accepts(signed, trust, tmp_path)
     place = document.index(b"stream") + 20

@@ -1,11 +1,15 @@
-"""The start of a deployed run: its own number in the archive, and runs of a schedule that come too late."""
+"""Flows without a server: the start of a deployed run, runs of a schedule that come too late, and what a night tells."""
 
 from datetime import UTC, datetime, timedelta
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
-from pipelines.flows import calibrate
+from pipelines.demo.archive_lots import Line
+from pipelines.demo.lot_archive import write_lots
+from pipelines.flows import calibrate, discover
+from pipelines.monitoring.alerts import alerts_of
 
 
 def running(monkeypatch: pytest.MonkeyPatch, **about: object) -> None:
@@ -57,3 +61,33 @@ def test_of_missed_runs_that_a_worker_took_before_the_rules_only_the_newest_meas
     monkeypatch.setattr(calibrate, "newer_run", lambda *about: asked.append(about) or newer)
     assert told in calibrate.late_start() if told else calibrate.late_start() == ""
     assert asked == [("aaaaaaaa-0000-4000-8000-000000000000", due)]
+
+
+def test_a_night_writes_page_and_document_and_a_discovery_is_an_alert(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = write_lots(tmp_path, Line(2), 3)
+    told: list[str] = []
+    monkeypatch.setattr(discover, "create_markdown_artifact", lambda key, markdown: told.append(markdown))
+    monkeypatch.setattr(discover, "look", discover.look.fn)
+    assert discover.discover_in_archive.fn(str(made.folder), pages=str(tmp_path / "pages")) == 0
+    assert "0 discoveries in 3 lots" in told[0]
+    page, document = sorted((tmp_path / "pages").iterdir())
+    assert page.suffix == ".html"
+    row = {
+        "id": "D1",
+        "effects": ["third_order"],
+        "drivers": ["wafer"],
+        "driver": "wafer",
+        "size_ug": 0.4,
+        "since": "2026-01-01",
+    }
+    found = document.read_text("utf-8").replace(
+        '"discoveries": []', f'"discoveries": [{str(row).replace(chr(39), chr(34))}]'
+    )
+    document.write_text(found, encoding="utf-8")
+    snapshot = type("Empty", (), {"when": datetime.now(UTC), "runs": [], "stations": None, "late": []})()
+    monkeypatch.setattr("pipelines.monitoring.alerts._of_runs", lambda _: [])
+    (alert,) = alerts_of(snapshot, tmp_path / "pages")
+    assert (alert["kind"], alert["subject"]) == ("discovery", "wafer")
+    assert "third_order by wafer, rms 0.4 µg" in alert["text"]
