@@ -12,7 +12,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 from capture_double import CaptureDouble, small_job, small_run
-from in_process import refused, text_of
+from in_process import text_of
 
 from pipelines.archive import Archive, parquet
 from pipelines.chain.chain import ORDER
@@ -62,6 +62,7 @@ def tables(archive: Path) -> dict[str, bytes]:
     return {str(path.relative_to(archive)): path.read_bytes() for path in sorted(archive.glob("runs/*/*.parquet"))}
 
 
+@pytest.mark.slow  # a check of one run: tests/unit/pipelines/rerun/test_rerun.py
 def test_check_proves_the_archive_and_names_a_value_that_was_exchanged_with_its_hash(own: Path) -> None:
     words = ("rerun", "all", "--check", "--archive", own)
     assert "3 of 3 runs reproduced: 75 tables" in text_of(*words, *ALONE, status=0)
@@ -75,7 +76,6 @@ def test_check_proves_the_archive_and_names_a_value_that_was_exchanged_with_its_
     told = text_of(*words, *ALONE, status=1)
     assert "figures: value in 1 of" in told
     assert "2 of 3 runs reproduced" in told
-    assert "--check with another model or limits has no stored result" in refused(*words, "--effects", LARGER)
 
 
 @pytest.mark.slow
