@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from root_process import ROOT
 
 from inertial.frames import force_from_angles
 from pipelines.archive import Archive, Records, Run
@@ -172,6 +173,14 @@ static_record_s = 30.0
 effects = ["bias", "scale", "misalignment", "bias_temperature", "scale_temperature"]
 limits = "consumer"
 """
+
+
+AT_ROOM = (
+    ("temperatures_C = [0.0, 50.0]", "temperatures_C = [23.0]\nsoak_min_s = 1.0\nallow_short_soak = true"),
+    (', "bias_temperature", "scale_temperature"', ""),
+    ('limits = "consumer"', f'limits = "{ROOT / "deploy" / "recipes" / "line-quick.limits.toml"}"'),
+)
+"""Changes of the small recipe: one soak at the temperature of the room, which a simulated station reaches at once."""
 
 
 def recipe_file(folder: Path, *changes: tuple[str, str], name: str = "small.toml") -> str:

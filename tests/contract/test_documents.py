@@ -131,7 +131,7 @@ ELSEWHERE = {
     "run --json (several fillings)": "e2e/test_operator.py",
     "show RUN --json (no grades)": "e2e/test_inquiry.py",
     "investigate --json": "e2e/test_inquiry.py",
-    "operator --json": "e2e/test_operator.py",
+    "operator --json": "e2e/test_inquiry.py",
     "discover --explain ID --json": "e2e/test_discover.py",
     "demo --archive --json": "e2e/test_discover.py",
     "certificate --json": "unit/pipelines/certificates/document/test_compose.py",

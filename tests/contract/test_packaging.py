@@ -1,9 +1,7 @@
-"""What is shipped is what is there; nothing tracked names a machine; links in the documents lead somewhere."""
+"""Nothing tracked names a machine; links in the documents lead somewhere. What is shipped: ``test_wheel.py``."""
 
-import fnmatch
 import re
 import subprocess
-import tomllib
 from pathlib import Path
 
 import pytest
@@ -11,8 +9,6 @@ from each import each
 
 ROOT = Path(__file__).resolve().parents[2]
 SHIPPED = ("inertial", "schemas", "stations", "pipelines", "tumbleline")
-SETUP = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["setuptools"]
-
 MACHINE = re.compile(r"(?<![\w.~])/(?:work|tmp|root|home)/")
 INDEX = re.compile(
     r"\b(?:[\w-]+[.])*(?:pypi|pythonhosted|npmjs|npmmirror|anaconda|crates|debian|ubuntu|artifactory)[.](?:org|com|io)\b"
@@ -39,45 +35,6 @@ def text_of(path: Path) -> str:
     """Content of a text file; empty for pictures and other binary files."""
     data = path.read_bytes()
     return "" if b"\0" in data else data.decode("utf-8")
-
-
-def test_the_packages_listed_are_the_packages_on_disk() -> None:
-    on_disk = {
-        ".".join(path.parent.relative_to(ROOT).parts) for top in SHIPPED for path in (ROOT / top).rglob("__init__.py")
-    }
-    assert set(SETUP["packages"]) == on_disk
-    assert len(SETUP["packages"]) == len(set(SETUP["packages"]))
-
-
-def test_every_folder_with_modules_is_a_package() -> None:
-    bare = {path.parent for top in SHIPPED for path in (ROOT / top).rglob("*.py")}
-    assert [str(folder.relative_to(ROOT)) for folder in bare if not (folder / "__init__.py").is_file()] == []
-
-
-def is_shipped(path: Path) -> bool:
-    """Whether a pattern of the package data covers a file that is no module."""
-    for package, patterns in SETUP["package-data"].items():
-        folder = ROOT.joinpath(*package.split("."))
-        if folder in path.parents:
-            name = path.relative_to(folder)
-            if any(
-                len(name.parts) == pattern.count("/") + 1 and fnmatch.fnmatch(str(name), pattern)
-                for pattern in patterns
-            ):
-                return True
-    return False
-
-
-def test_every_data_file_of_a_package_is_shipped() -> None:
-    data = [path for path in tracked(*SHIPPED) if path.suffix != ".py"]
-    assert data
-    assert [str(path.relative_to(ROOT)) for path in data if not is_shipped(path)] == []
-
-
-def test_every_pattern_of_package_data_finds_something() -> None:
-    for package, patterns in SETUP["package-data"].items():
-        folder = ROOT.joinpath(*package.split("."))
-        assert [pattern for pattern in patterns if not any(folder.glob(pattern))] == []
 
 
 def test_no_file_names_an_index_or_a_path_of_a_machine() -> None:

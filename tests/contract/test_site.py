@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 from docs import build_site
-from docs.build_site import CONFIGURATION, LINK, NEEDED, ROOT, modules, navigation, stage
+from docs.build_site import CONFIGURATION, NEEDED, ROOT, modules, navigation, stage
 
 ELSEWHERE = re.compile(r"<(?:script|img|link|iframe|source)\b[^>]*?\b(?:src|href)=[\"']?(?:https?:)?//[^>]*>")
 BUILT = pytest.mark.skipif(any(find_spec(name) is None for name in NEEDED), reason="the extra 'docs' is not installed")
@@ -38,16 +38,6 @@ def test_every_module_of_the_science_and_of_the_package_for_python_has_a_page(st
         modules("tumbleline")
     )
     assert {"inertial.effects.third_order", "inertial.noise", "inertial.dynamics.spectra"} <= pages
-
-
-def test_every_relative_link_of_a_staged_page_leads_to_a_file(staged: Path) -> None:
-    wrong = []
-    for page in staged.rglob("*.md"):
-        for _, address, _ in LINK.findall(re.sub(r"```.*?```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL)):
-            plain = address.partition("#")[0]
-            if plain and "://" not in address and not (page.parent / plain).is_file():
-                wrong.append(f"{page.relative_to(staged)}: {address}")
-    assert wrong == []
 
 
 def test_the_site_loads_no_fonts_of_others_and_checks_its_links() -> None:

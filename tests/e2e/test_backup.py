@@ -101,19 +101,6 @@ def test_a_copy_that_was_torn_is_completed_and_is_sound_at_any_point(
     assert content(copy.root) == content(archive.root)
 
 
-def test_a_copy_while_a_lot_is_measured_is_sound(line, tmp_path: Path) -> None:
-    archive, copy = line
-    writer = threading.Thread(target=measure, args=(tmp_path / "line", 3))
-    writer.start()
-    while writer.is_alive():
-        copy_archive(archive, copy)
-    writer.join()
-    findings = verify(copy, keys={}).checked.findings
-    assert [one for one in findings if one.kind in {"missing", "changed", "edited"}] == []
-    copy_archive(archive, copy)
-    assert verify(copy, keys={}).whole
-
-
 def test_a_copy_during_which_a_run_ends_is_sound(line, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     archive, copy = line
     names, listed = backup._names, list[str]()
@@ -234,9 +221,9 @@ def test_a_refused_restore_of_the_archive_leaves_the_database(made: Path, tmp_pa
 SPOILT = {
     "runs/*/coefficients.json": ("short",),
     "runs/*/coefficients.parquet": ("short",),
-    "captures/*/*/samples.parquet": ("short", "empty", "torn"),
-    "captures/*/*/record.json": ("short", "empty", "torn"),
-    "captures/*/complete.json": ("short", "empty", "torn"),
+    "captures/*/*/samples.parquet": ("short", "torn"),
+    "captures/*/*/record.json": ("empty",),
+    "captures/*/complete.json": ("torn",),
 }
 
 

@@ -151,13 +151,11 @@ OF_NO_CATALOGUE = {
     "cubic_with_heat": ("transfer", "the transfer curve follows"),
     "fixture_bends": ("axes", "the directions of the axes follow"),
 }
-FAST = ("scale_warms_up", "cubic_with_heat", "fixture_bends")
-"""One physics of each part."""
 
 
 @pytest.mark.usefixtures("no_next_measurement")
 @pytest.mark.parametrize(
-    "name", [pytest.param(one, marks=[] if one in FAST else [pytest.mark.slow]) for one in OF_NO_CATALOGUE]
+    "name", [pytest.param(one, marks=[] if one == "fixture_bends" else [pytest.mark.slow]) for one in OF_NO_CATALOGUE]
 )
 def test_the_suggested_formula_explains_what_no_effect_does(tmp_path: Path, name: str) -> None:
     assert set(OF_NO_CATALOGUE) == set(OUTSIDE)

@@ -138,6 +138,7 @@ def test_scores_on_dask_are_those_of_this_machine(folder: Path, tmp_path: Path) 
     assert document_of("discover", "--archive", made.folder, "--dask", "local", "--workers", "1")["pooled"]["lots"] == 3
 
 
+@pytest.mark.slow
 def test_the_demonstration_for_people_ends_with_a_command_that_runs(tmp_path: Path) -> None:
     status, out, err = given("demo", "--archive", "--lots", "60", "--seed", "4", "--folder", tmp_path / "few")
     assert status == 0, err

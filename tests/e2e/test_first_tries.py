@@ -150,6 +150,7 @@ def test_a_clock_of_a_station_that_is_served_faster_runs_faster_and_goes_on() ->
     assert WallClock(clock.state(), speed=60.0).now() >= 6.0
 
 
+@pytest.mark.slow  # the clock alone: the test above
 def test_a_station_that_is_served_faster_is_checked_by_a_client_that_knows_the_speed(tmp_path: Path) -> None:
     with served(speed=30.0) as port:
         knowing = modbus_station(port, link={"speed": 30.0})

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 from brought_up import Middle, Scripted, brought_up, served_device
-from capture_double import recipe_file
+from capture_double import AT_ROOM, recipe_file
 from each import each
 from in_process import command
 
@@ -48,9 +48,23 @@ def made(recipe, archive, *more):
     return Archive(archive).run("latest"), done
 
 
-def test_a_replayed_run_gives_the_same_tables_bit_for_bit(tmp_path):
-    recipe, frames = recipe_file(tmp_path), tmp_path / "run.jsonl"
-    first, _ = made(recipe, tmp_path / "one", "--record", str(frames))
+QUICK = (*AT_ROOM, ('units = ["A1", "A2", "A3"]', 'units = ["A1"]'))
+
+
+@pytest.fixture(scope="module")
+def recorded_run(tmp_path_factory):
+    """A run with the recording of its links: recipe, archive, recording."""
+    folder = tmp_path_factory.mktemp("recorded")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("TUMBLELINE_STATE", str(folder / "state"))
+        recipe, frames = recipe_file(folder, *QUICK), folder / "run-1.jsonl"
+        made(recipe, folder / "archive", "--record", str(frames))
+    return recipe, folder / "archive", frames
+
+
+def test_a_replayed_run_gives_the_same_tables_bit_for_bit(recorded_run, tmp_path):
+    recipe, archive, frames = recorded_run
+    first = Archive(archive).run("latest")
     again, done = made(recipe, tmp_path / "two", "--replay", str(frames))
     assert "were not asked for" not in done.stderr
     assert sorted(first.tables()) == sorted(again.tables())
@@ -59,15 +73,15 @@ def test_a_replayed_run_gives_the_same_tables_bit_for_bit(tmp_path):
     refused = command(["run", recipe, "--archive", str(tmp_path / "two"), "--direct", "--replay", str(frames)])
     assert refused.returncode == 2
     assert "has measurements of this lot already" in refused.stderr
-    other = recipe_file(tmp_path, ("dwell_s = 1.0", "dwell_s = 1.5"))
+    other = recipe_file(tmp_path, *QUICK, ("dwell_s = 1.0", "dwell_s = 1.5"))
     departed = command(["run", other, "--archive", str(tmp_path / "three"), "--direct", "--replay", str(frames)])
     assert departed.returncode == 2
     assert re.search(r"replay: .* continues with", departed.stderr), departed.stderr
 
 
 def test_a_run_with_faults_of_the_wire_is_replayed_with_them(tmp_path):
-    recipe, frames = recipe_file(tmp_path), tmp_path / "run.jsonl"
-    faults = ["--fault", "time_out:at_s=437.5", "--fault", "silent:device=reader:at_s=600:for_s=15"]
+    recipe, frames = recipe_file(tmp_path, *QUICK), tmp_path / "run.jsonl"
+    faults = ["--fault", "time_out:at_s=37.5", "--fault", "silent:device=reader:at_s=60:for_s=3"]
     first, _ = made(recipe, tmp_path / "one", "--record", str(frames), *faults)
     assert {e.failed for e in read_frames(frames).exchanges} >= {"", "silence"}
     again, _ = made(recipe, tmp_path / "two", "--replay", str(frames), *faults)
@@ -321,16 +335,15 @@ def test_a_chamber_with_lines_is_recorded_and_replayed(tmp_path):
     assert [p for p in again.findings.points if p.verdict == "differs"] == []
 
 
-def test_the_station_page_draws_the_recordings_of_the_archive(tmp_path):
+def test_the_station_page_draws_the_recordings_of_the_archive(recorded_run, tmp_path):
     from asgi_client import AsgiClient
 
     from pipelines.workbench.application import create_app
     from pipelines.workbench.settings import WorkbenchSettings
 
-    recipe, archive = recipe_file(tmp_path), tmp_path / "archive"
-    made(recipe, archive, "--record", str(tmp_path / "run-1.jsonl"))
+    archive = shutil.copytree(recorded_run[1], tmp_path / "archive")
     (archive / "recordings").mkdir()
-    shutil.copy(tmp_path / "run-1.jsonl", archive / "recordings")
+    shutil.copy(recorded_run[2], archive / "recordings")
     settings = WorkbenchSettings(archive=str(archive), folder=tmp_path / "bench")
     client, key = AsgiClient(create_app(settings), settings.address), {"authorization": f"Bearer {settings.token}"}
     page = client.get("/station", headers=key).text

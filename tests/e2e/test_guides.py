@@ -96,7 +96,6 @@ GUIDES = [
         files=(("game/report.html", "<th>scope</th>"), ("game/history.png", "")),
     ),
     Guide("docs/tutorial/from-a-spreadsheet.md", positions, close=0.05, files=(("positions.html", "<svg"),)),
-    Guide("docs/how-to/add-your-own-effect.md", glue),
     Guide("docs/how-to/audit.md", factory),
     Guide("docs/how-to/audit-a-laboratory.md", line, files=(("audit.html", "<svg"),)),
     Guide(
@@ -111,15 +110,17 @@ GUIDES = [
 ]  # fmt: skip
 
 SLOW = [
+    Guide("docs/how-to/add-your-own-effect.md", glue),  # an effect of a file: tests/e2e/test_diagnosis.py
     Guide("docs/how-to/run-an-archive-again.md", old_runs),
     Guide("docs/how-to/release-a-model.md", old_runs),
 ]
-"""Guides whose commands start processes of their own."""
+"""Guides whose commands start processes of their own, or search for long."""
 
 ELSEWHERE = {
     "import-your-data": "tests/e2e/test_guides.py",
     "correct-a-recording": "tests/e2e/test_correct.py",
     "README": "tests/e2e/test_guides.py",
+    "add-your-own-effect": "tests/e2e/test_guides.py",
     "issue-a-certificate": "tests/e2e/test_guides.py",
     "program-the-device": "tests/faults/test_programming.py",
 }

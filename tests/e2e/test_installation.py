@@ -125,6 +125,7 @@ def test_a_server_whose_folder_is_gone_or_whose_clients_have_gone_leaves(
     assert not (tmp_path / server.ADDRESS).exists()  # it takes its address away
 
 
+@pytest.mark.slow  # every server of tests/e2e/test_orchestrator.py starts with such a database
 def test_prefect_itself_makes_an_empty_database_which_is_copied_and_has_nothing_left_to_migrate(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

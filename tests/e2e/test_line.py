@@ -87,18 +87,6 @@ def sampling(config: Any) -> bool:
         return devices.reader.sampling() == "running"
 
 
-def test_a_scheduled_run_is_taken_by_a_worker_into_the_archive(line: Orchestrator, tmp_path: Path) -> None:
-    deployed(line, tmp_path, {"schedules": MINUTELY, "parameters": {"recipe": recipe_file(tmp_path)}})
-    line.until(lambda: line.runs("production-line", "SCHEDULED"), "a scheduled run", 60.0)
-    with worker(line, tmp_path):
-        line.until(lambda: line.runs("production-line", "COMPLETED"), "a run taken by the worker", 300.0)
-    done = line.runs("production-line", "COMPLETED")
-    assert done[0]["auto_scheduled"]
-    assert done[0]["parameters"]["recipe"].endswith("small.toml")
-    assert Archive(tmp_path / "archive").runs()[0].finished
-    assert stat.S_IMODE((line.home / "prefect.db").stat().st_mode) == 0o600
-
-
 def test_a_worker_that_is_told_to_end_leaves_its_station_safe_and_its_run_is_closed(
     line: Orchestrator, tmp_path: Path
 ) -> None:
@@ -189,27 +177,6 @@ def long_run(line: Orchestrator, folder: Path, port: int, crashed: str) -> tuple
     deployed(line, folder, {"name": name, "parameters": parameters, "policy": {"crashed": crashed}})
     order(line, name)
     return config, name
-
-
-def test_a_run_whose_worker_was_killed_goes_on_from_its_checkpoint(line: Orchestrator, tmp_path: Path) -> None:
-    with station_served(lot_of(2)) as port:
-        config, name = long_run(line, tmp_path, port, "continue")
-        with worker(line, tmp_path / "a") as process:
-            line.until(lambda: len(records(tmp_path)) >= 2, "two records", 300.0)
-            assert kill_all(process) >= 3  # first process, worker of Prefect, flow
-        before = records(tmp_path)
-        line.until(lambda: safe(config), "the station is safe", 60.0)
-        killed = time.monotonic()
-        with worker(line, tmp_path / "a"):
-            line.until(lambda: line.runs(name, "RUNNING", "PENDING", "SCHEDULED"), "the run goes on", 120.0)
-            [run] = line.until(lambda: line.runs(name, "COMPLETED"), "the run is complete", 500.0)
-        assert time.monotonic() - killed < 500.0
-    assert run["run_count"] == 2
-    after = records(tmp_path)
-    assert {record: after[record] for record in before} == before, "finished records were not measured again"
-    assert len(after) > len(before)
-    [info] = Archive(tmp_path / "archive").runs()
-    assert info.finished
 
 
 def test_a_run_whose_computer_died_is_closed_by_the_server_within_a_minute(line: Orchestrator, tmp_path: Path) -> None:
@@ -357,24 +324,6 @@ def test_a_run_through_the_orchestrator_stores_no_credentials_of_an_object_store
     for word in (user, secret):
         assert [str(path) for path in kept if word.encode() in path.read_bytes()] == []
         assert word not in done.stdout + done.stderr
-
-
-def test_a_deployment_started_by_hand_appears_in_the_archive(tmp_path: Path) -> None:
-    archive, recipe, schedules = tmp_path / "archive", recipe_file(tmp_path), ("prefect", "deployment", "schedule")
-    with local_server(tmp_path / "orchestrator") as address:
-        environment = {**os.environ, **address, "PYTHONPATH": str(ROOT)}
-        python(environment, "-m", "prefect", "work-pool", "create", "line", "--type", "process")
-        names = python(environment, "-m", "pipelines.flows.deploy", "deploy/prefect.yaml").split()
-        parameters = json.dumps({"recipe": recipe, "archive": str(archive), "units": ["S1", "S2"]})
-        python(environment, "-m", "prefect", "deployment", "run", "calibrate_lot/on-demand", "--params", parameters)
-        python(environment, "-m", "prefect", "worker", "start", "--pool", "line", "--run-once", "--limit", "1")
-        listed = python(environment, "-m", *schedules, "ls", "calibrate_lot/production-line")
-    assert names == ["calibrate_lot/production-line", "calibrate_lot/on-demand", "audit_archive/weekly-audit"]
-    assert "0 6 * * 1-5" in listed
-    [info] = Archive(archive).runs()
-    assert (info.finished, info.units) == (True, ("S1", "S2"))
-    done = history(tmp_path / "orchestrator", "select state_type from flow_run where state_type != 'SCHEDULED'")
-    assert done == [("COMPLETED",)]
 
 
 def test_the_server_goes_when_its_last_user_has_gone(tmp_path: Path) -> None:

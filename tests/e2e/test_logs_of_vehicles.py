@@ -9,7 +9,6 @@ from each import each
 from in_process import command
 
 from pipelines.importers import files
-from pipelines.importers.readers import READERS
 from schemas.errors import DataRejected, TumblelineError, WrongUse
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "contract"))
@@ -112,8 +111,8 @@ def test_a_damaged_file_is_refused_in_one_message(name, tmp_path):
     samples.SAMPLES[name](path)
     whole = path.read_bytes()
     rng = np.random.default_rng(5)
-    for k in range(12):
-        data = bytearray(whole[: len(whole) * (k + 1) // 13] if k % 2 else whole)
+    for k in range(5):
+        data = bytearray(whole[: len(whole) * (k + 1) // 6] if k % 2 else whole)
         for place in rng.integers(8, max(len(data), 9), 4 * (k % 3)):
             data[min(int(place), len(data) - 1)] = int(rng.integers(256))
         damaged = tmp_path / f"damaged-{k}"
@@ -124,7 +123,3 @@ def test_a_damaged_file_is_refused_in_one_message(name, tmp_path):
         except TumblelineError as problem:
             told = str(problem)
         assert "\n" not in told
-
-
-def test_every_new_reader_names_its_extra():
-    assert {READERS[name].EXTRA for name in NEW} == {"excel", "autopilot", "ros", "mdf", "seismic"}

@@ -5,7 +5,6 @@ import re
 import sys
 from pathlib import Path
 
-import pandas as pd
 import printed_pages as pages
 import pytest
 from each import each
@@ -186,22 +185,6 @@ def test_an_adequate_model_is_left_alone_and_what_cannot_be_writes_nothing(alike
     target.write_text("a model of somebody else", encoding="utf-8")
     assert "is not the model that is judged" in refused(*words, "--yes")
     assert target.read_text(encoding="utf-8") == "a model of somebody else"
-
-
-@pytest.mark.slow
-def test_another_effect_of_a_class_is_added_by_name_and_other_units_of_a_fresh_run_leave_no_model(
-    alike: Path, tmp_path: Path
-) -> None:
-    other, target = pd.read_parquet(alike / "fresh.parquet"), tmp_path / "m.toml"
-    other.assign(unit="other-" + other["unit"]).to_parquet(tmp_path / "other.parquet")
-    words = ("improve", alike / "dwells.parquet", "--effects", PLAIN, "--out", target, "--effect")
-    _, _, err = given(*words, "second_order", "--fresh", tmp_path / "other.parquet")
-    assert "every unit is needed in both" in " ".join(err.split())
-    assert not target.exists()
-    given(*words, "fourth_order")
-    model = read_model(target)
-    assert model.model.effects[-1] == "fourth_order"
-    assert "second_order" in model.change[-1].why
 
 
 @pytest.mark.slow

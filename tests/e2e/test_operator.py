@@ -1,14 +1,13 @@
 """The person at the station: asked at a terminal, or by the orchestrator, and answered from either."""
 
 import io
-import os
 import subprocess
 import sys
 import time
 from pathlib import Path
 
 import pytest
-from capture_double import CaptureDouble, recipe_file, small_job
+from capture_double import AT_ROOM, CaptureDouble, recipe_file, small_job
 from in_process import given, typed_document
 from root_process import ROOT
 
@@ -17,7 +16,6 @@ from pipelines.chain.attendance import Answer, Attendance, Prompt
 from pipelines.chain.chain import ORDER
 from pipelines.chain.runner import Runner
 from pipelines.cli.terminal import scanned
-from pipelines.flows.local import local_server
 from schemas.errors import LeaseLost, OperatorNeeded
 from schemas.fault import FaultOrder
 from schemas.station import with_faults
@@ -105,12 +103,8 @@ def test_trouble_is_asked_about_and_the_run_goes_on_behind_its_last_record(tmp_p
     assert measure.measured == sorted(set(measure.measured))
 
 
-NEAR = ("temperatures_C = [0.0, 50.0]", "temperatures_C = [20.0, 30.0]")
-"""Soaks that are reached in moments."""
-
-
 def run_at_a_terminal(folder: Path, typed: str, *options: str) -> tuple[int, str, str]:
-    words = ("run", recipe_file(folder, NEAR), "--direct", "--prompts", "--archive", folder / "archive")
+    words = ("run", recipe_file(folder, *AT_ROOM), "--direct", "--prompts", "--archive", folder / "archive")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(sys, "stdin", io.StringIO(typed))
         return given(*words, *options)
@@ -149,27 +143,6 @@ def test_a_scan_of_nothing_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sys.stdin", io.StringIO("\n\n"))
     with pytest.raises(Exception, match="no unit was scanned"):
         scanned(2)
-
-
-@pytest.mark.slow
-def test_a_paused_flow_run_is_answered_from_another_terminal(tmp_path: Path) -> None:
-    archive = tmp_path / "archive"
-    code = (
-        "from pipelines.flows.calibrate import calibrate_lot; import sys; "
-        "calibrate_lot(recipe=sys.argv[1], archive=sys.argv[2], repeat=0, prompts=True)"
-    )
-    with local_server(tmp_path / "orchestrator") as address:
-        environment = {**os.environ, **address, "PYTHONPATH": str(ROOT)}
-        command = [sys.executable, "-c", code, recipe_file(tmp_path), str(archive)]
-        with subprocess.Popen(command, cwd=ROOT, env=environment) as flow:
-            questions = [answered(environment), answered(environment)]
-            assert flow.wait(120) == 0
-    assert questions[0].startswith("load: seat the units as listed")
-    assert "slot 1: A2" in questions[0]
-    assert questions[1].startswith("unload")
-    assert "passed; remove the units" in questions[1]
-    [info] = Archive(archive).runs()
-    assert info.finished
 
 
 def answered(environment: dict[str, str]) -> str:

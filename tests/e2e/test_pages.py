@@ -84,14 +84,6 @@ def test_what_a_page_names_is_there(page: Path) -> None:
     assert hidden <= {"random"} | {scene.kind for scene in SCENES} | {scene.effect for scene in SCENES}
 
 
-def test_readme_and_changelog_say_the_main_things() -> None:
-    assert {"make run", "make test"} <= set(re.findall(r"make \w+", pages.text("README.md")))
-    version = tomllib.loads(pages.text("pyproject.toml"))["project"]["version"]
-    changes = pages.text("CHANGELOG.md")
-    assert f"## [{version}]" in changes or "## [Unreleased]" in changes
-    assert "### Changed numbers" in changes
-
-
 def test_files_of_the_guide_to_running_a_lot_are_files(tmp_path: Path) -> None:
     guide = pages.text("docs/how-to/run-a-lot.md")
     (recipe,) = (block for block in pages.blocks("docs/how-to/run-a-lot.md", "toml") if "poses" in block)

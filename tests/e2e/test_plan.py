@@ -317,6 +317,7 @@ def test_effects_that_may_be_mistaken_are_told_apart_by_the_cheapest_recipe(tmp_
     assert np.mean((size > 0.1) & (size < 0.6), axis=0).min() > 0.3  # where the two curves are apart
 
 
+@pytest.mark.slow  # a search and its bound: tests/e2e/test_ramps.py
 def test_no_recipe_is_quicker_than_the_bound_of_dwells_without_end() -> None:
     base = load_recipe().model_copy(update={"effects": THERMAL.split(","), "static_record_s": 0.0})
     shares: dict[float, float] = {}

@@ -118,7 +118,11 @@ def copied(line: str) -> bool:
     return text.startswith("tumbleline ") or max(map(len, text.split()), default=0) > WIDE - 20
 
 
-@pytest.mark.parametrize("name", OUTPUTS)
+@pytest.mark.parametrize(
+    # a diagnosis searches for the next measurement; its text in the guides: tests/e2e/test_guides.py
+    "name",
+    [pytest.param(one, marks=pytest.mark.slow if one == "diagnose" else ()) for one in OUTPUTS],
+)
 def test_a_command_prints_the_approved_text_in_eighty_columns(name: str, folder: Path) -> None:
     if name in BEFORE:
         printed(BEFORE[name])

@@ -18,6 +18,8 @@ from pipelines.monitoring.queue_numbers import read_queues
 from pipelines.orchestrator.dead_runs import LOST_S, WORKER, LostRuns, have_automation
 from pipelines.orchestrator.queue_rules import CONTINUED_WITHIN, SETTLED, apply_rules, newer_run
 
+pytestmark = pytest.mark.slow  # by rows of policies: tests/faults/test_worker_processes.py
+
 QUEUE, DAILY_QUEUE = "line-7", "line-8"
 MOST_SCHEDULED = 40
 """Runs of a deployment that the server schedules ahead: a minute apart, twice as far as the tests look."""

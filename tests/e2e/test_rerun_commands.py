@@ -12,7 +12,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 from capture_double import CaptureDouble, small_job, small_run
-from in_process import document_of, refused, text_of
+from in_process import text_of
 
 from pipelines.archive import Archive, parquet
 from pipelines.chain.chain import ORDER
@@ -62,15 +62,7 @@ def tables(archive: Path) -> dict[str, bytes]:
     return {str(path.relative_to(archive)): path.read_bytes() for path in sorted(archive.glob("runs/*/*.parquet"))}
 
 
-def test_reruns_of_all_runs_leave_the_old_ones_as_they_were(own: Path) -> None:
-    before = tables(own)
-    words = ("rerun", "all", "--effects", LARGER, "--archive", own, *ALONE)
-    document = document_of(*words, status=0)
-    assert (document["selected"], document["rerun"], document["failed"]) == (3, 3, 0)
-    assert {name: content for name, content in tables(own).items() if name in before} == before
-    assert "3 selected: 3 re-analysed" in text_of(*words)
-
-
+@pytest.mark.slow  # a check of one run: tests/unit/pipelines/rerun/test_rerun.py
 def test_check_proves_the_archive_and_names_a_value_that_was_exchanged_with_its_hash(own: Path) -> None:
     words = ("rerun", "all", "--check", "--archive", own)
     assert "3 of 3 runs reproduced: 75 tables" in text_of(*words, *ALONE, status=0)
@@ -84,19 +76,6 @@ def test_check_proves_the_archive_and_names_a_value_that_was_exchanged_with_its_
     told = text_of(*words, *ALONE, status=1)
     assert "figures: value in 1 of" in told
     assert "2 of 3 runs reproduced" in told
-    assert "--check with another model or limits has no stored result" in refused(*words, "--effects", LARGER)
-
-
-def test_whatif_release_and_list(own: Path, tmp_path: Path) -> None:
-    model, where = tmp_path / "m.toml", ("--archive", own)
-    effects = json.dumps(LINEAR.split(","))  # what the lots were fitted with
-    model.write_text(f'[model]\nname = "m"\nversion = 1\neffects = {effects}\n')
-    assert "adxl355 on simulated" in text_of("whatif", model, *where, *ALONE, status=1)
-    words = ("release", model, "--from", "2026-01-01", "--reason", "a trial", *where)
-    assert "says no better" in refused(*words)
-    assert document_of(*words, "--force", status=0)["evidence"]
-    (listed,) = document_of("release", "--list", *where)["releases"]
-    assert (listed["model"], listed["in_use"], listed["forced"]) == ("m", True, True)
 
 
 @pytest.mark.slow

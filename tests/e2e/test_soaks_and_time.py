@@ -5,7 +5,6 @@ import itertools
 import re
 
 import numpy as np
-import pandas as pd
 import pytest
 from each import each
 from inquiries import job_of
@@ -14,7 +13,7 @@ from small_station import MemorySink, captured, lot_of, quiet_progress, short_re
 from inertial.planning.sequences import SequenceStep as Wanted
 from inertial.planning.sequences import timeline
 from pipelines.capture.capture import capture
-from pipelines.capture.time_left import Remaining, duration_text
+from pipelines.capture.time_left import Remaining
 from pipelines.inquiry.followup import circumstances, state_after, station_minutes
 from pipelines.schedule.planned_state import planned_state
 from pipelines.schedule.steps import steps
@@ -29,26 +28,6 @@ def in_parts(*parts: SoakPart) -> Recipe:
     return Recipe.model_validate({**short_recipe(3).model_dump(), "verification": [], **soaks})
 
 
-def readings(recipe: Recipe) -> pd.DataFrame:
-    return captured(recipe, lot_of(1), station_of()).all(1)
-
-
-def test_each_pose_of_a_soak_may_have_its_own_wait():
-    recipe = in_parts(SoakPart(temperature_C=23.0, poses=[1, 2, 1], waits_s=[0.0, 30.0, 90.0], settled=False))
-    assert [s.wait_s for s in steps(recipe)] == [0.0, 30.0, 90.0]
-    since = readings(recipe)["since_move_s"].to_numpy()
-    assert since - since[0] == pytest.approx([0.0, 30.0, 90.0], abs=0.5)
-
-
-def test_dwells_of_a_soak_that_is_not_settled_are_read_on_the_way():
-    recipe = in_parts(SoakPart(temperature_C=60.0, poses=[1, 2, 1, 2], waits_s=[60.0] * 4, settled=False))
-    seen = readings(recipe)
-    temperature = seen["unit_C"].to_numpy()
-    assert (temperature[1:] > temperature[:-1] + 0.3).all()
-    assert temperature[-1] < 45.0
-    assert seen["start_s"].iloc[-1] < 400.0
-
-
 def test_refuses_waits_that_are_not_as_many_as_the_poses():
     with pytest.raises(ValueError, match="soak 1 has 2 waits for 3 poses"):
         in_parts(SoakPart(temperature_C=23.0, waits_s=[1.0, 2.0]))
@@ -59,7 +38,7 @@ LEFT = re.compile(r"(?:(\d+) h )?(?:(\d+) min|(\d+) s) of station time left(?:, 
 
 def told_and_true(recipe, config, lot=None):
     """Pairs (station time, seconds left as told), and when the run was over."""
-    told, lot = [], lot or lot_of(8)
+    told, lot = [], lot or lot_of(2)
     with open_station(config, lot) as station:
 
         def progress(_done, _total, note):
@@ -123,22 +102,6 @@ def test_a_resumed_run_counts_only_what_is_left_and_far_moves_count_for_more():
     assert seconds[1] > seconds[0]
 
 
-DURATIONS = {59.6: "60 s", 119.0: "119 s", 121.0: "2 min", 3599.0: "1 h 00 min", 7380.0: "2 h 03 min"}
-
-
-@each(DURATIONS)
-def test_durations_are_told_in_words(seconds):
-    assert duration_text(seconds) == DURATIONS[seconds]
-
-
-def test_only_a_simulated_station_has_a_time_of_its_own():
-    recipe = short_recipe()
-    plan = steps(recipe)
-    real = station_of().model_copy(update={"kind": "modbus", "simulation": None})
-    assert Remaining(plan, station_of(), recipe).text(plan[0], 0.0).endswith(" of station time left")
-    assert re.fullmatch(r"\d+ min left", Remaining(plan, real, recipe).text(plan[0], 0.0))
-
-
 def test_the_time_by_the_wall_clock_is_in_proportion_to_the_records_that_are_left(monkeypatch: pytest.MonkeyPatch):
     clock = [100.0]
     monkeypatch.setattr("pipelines.capture.time_left.time.monotonic", lambda: clock[0])
@@ -156,7 +119,7 @@ def test_the_time_by_the_wall_clock_is_in_proportion_to_the_records_that_are_lef
 
 def really_taken(recipe, config):
     """Minutes of the plant's clock, in all and of the soaks."""
-    with open_station(config, lot_of(8)) as station:
+    with open_station(config, lot_of(2)) as station:
         begun, soaks, inner = station.clock.now(), [], station.soak
 
         def soak(*given):
@@ -165,7 +128,7 @@ def really_taken(recipe, config):
 
         watched = dataclasses.replace(station)
         object.__setattr__(watched, "soak", soak)
-        capture(watched, recipe, lot_of(8), MemorySink(), progress=quiet_progress)
+        capture(watched, recipe, lot_of(2), MemorySink(), progress=quiet_progress)
         return (station.clock.now() - begun) / 60.0, sum(soaks) / 60.0
 
 
@@ -194,18 +157,6 @@ def test_parts_of_the_planned_time_are_told_apart():
     soaked = minutes([first], station_of(), recipe, standing)  # it only moves and dwells
     assert soaked.soaks == 0.0
     assert soaked.dwells > 0.0
-
-
-def test_far_moves_and_slow_axes_take_longer():
-    recipe, config = short_recipe(1), station_of()
-    slow = config.model_copy(update={"limits": config.limits.model_copy(update={"speed_deg_s": 5.0})})
-
-    def moves(angle, on):
-        pose = Pose(name="p", outer_deg=angle, inner_deg=0.0)
-        return minutes([dataclasses.replace(steps(recipe)[0], pose=pose)], on, recipe).moves
-
-    assert moves(180.0, config) > moves(10.0, config)
-    assert moves(180.0, slow) > 3.0 * moves(180.0, config)
 
 
 def test_hardware_takes_its_pace_from_the_stations_file():

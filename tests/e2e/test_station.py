@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from each import each
-from in_process import document_of, typed_document
+from in_process import typed_document
 from pydantic import ValidationError
 from root_process import ROOT
 from served_station import served
@@ -138,17 +138,6 @@ def test_analogue_devices_are_read_in_volts(device: str) -> None:
     readings = sink.all(1)
     assert (readings["out_unit"] == "V").all()
     assert (sink.all(0)[["x", "y", "z"]].abs().max() < readings["full_scale"].max() + 1.5).all()
-
-
-@each(sorted(STATIONS.glob("*.toml")), lambda path: path.name)
-def test_sample_stations_load(path: Path) -> None:
-    assert load_station(path).name
-
-
-@pytest.mark.slow
-def test_ten_hours_of_soak_take_seconds() -> None:
-    recipe = short_recipe(poses=1).model_copy(update={"soak_min_s": 36000.0})
-    assert captured(recipe, lot_of(8)).all(1)["start_s"].min() > 36000.0
 
 
 def test_the_temperature_of_a_dwell_on_a_ramp_is_that_of_its_middle() -> None:
@@ -408,11 +397,3 @@ def test_a_port_that_another_program_has_just_taken_is_not_the_end(monkeypatch: 
         monkeypatch.setattr(serving, "_free_port_pair", lambda host: next(offers, 0) or search(host))
         with served() as port, socket.create_connection(("127.0.0.1", port), 5.0):
             assert port not in {taken, taken - 1}
-
-
-def test_check_reads_every_register_of_the_built_in_station() -> None:
-    document = document_of("station", "check", "--units", "2", "--registers")
-    assert document["ok"]
-    assert {row["device"] for row in document["registers"]} == {
-        "outer axis", "inner axis", "chamber", "reader", "slot 0", "slot 1"
-    }  # fmt: skip

@@ -151,7 +151,9 @@ def test_check_drives_hardware_under_a_lease_and_leaves_it_safe(tmp_path):
 
 
 def test_log_tells_why_a_run_was_paused_and_watch_draws_it(tmp_path):
-    recipe = recipe_file(tmp_path, ("temperatures_C = [0.0, 50.0]", "temperatures_C = [20.0, 50.0]"))
+    recipe = recipe_file(
+        tmp_path, ("temperatures_C = [0.0, 50.0]", "temperatures_C = [20.0, 50.0]"), ('["A1", "A2", "A3"]', '["A1"]')
+    )
     archive = ("--archive", tmp_path / "archive")
     text_of("run", recipe, "--direct", "--fault", "door:at_s=930:for_s=120", *archive)
     events = document_of("station", "log", *archive)["events"]

@@ -33,15 +33,6 @@ WITH_A_DEVICE = ("station bring-up",)
 LONG = ("demo",)
 """Examples that take minutes."""
 
-PARTITIONED = {"rerun", "whatif", "release"}
-"""Commands that start processes of their own for every partition, or need one that does: in the slow part."""
-
-SEARCHING = (
-    "plan optimise", "investigate",
-    "program latest --station line-1.toml --form q24", "verify certificates/", "fit latest --effects",
-)  # fmt: skip
-"""Examples in the slow part: they search for a recipe and measure it, or mean that run as the latest one."""
-
 DIRECT = {"run", "investigate"}
 """Commands that are given with --direct: the orchestrator is tested elsewhere."""
 
@@ -49,7 +40,7 @@ ELSEWHERE = {"run", "investigate", "import"}
 """Commands whose runs are kept in another archive, so that the latest run is the one that the other examples mean."""
 
 OTHERWISE = {
-    "tumbleline operator": "no run waits",  # with one that waits: tests/e2e/test_operator.py
+    "tumbleline operator": "no run waits",  # with one that waits: tests/e2e/test_inquiry.py
     "tumbleline operator line-six --go": "no run waits",
     # the example before it has programmed other units: the simulated station goes on with that lot only
     "tumbleline program latest --station line-1.toml --form q24 --yes": "it belongs to another station or lot",
@@ -65,10 +56,6 @@ OTHERWISE = {
 
 def kept(example: str) -> bool:
     return any(one in example for one in SERVE)
-
-
-def slow(example: str) -> bool:
-    return example.split()[1] in PARTITIONED or any(f"tumbleline {one}" in example for one in SEARCHING)
 
 
 ALL = list(examples())
@@ -99,16 +86,10 @@ def test_the_examples_are_found_and_every_exception_is_one_of_them() -> None:
         assert any(one in example for example in ALL), one
 
 
+@pytest.mark.slow  # that each exists and is parsed: tests/contract/test_commands.py
 @pytest.mark.timeout(900)
-@pytest.mark.parametrize(
-    "chosen",
-    [
-        pytest.param([one for one in SHORT if not slow(one)], id="short"),
-        pytest.param(SHORT, id="all", marks=pytest.mark.slow),
-    ],
-)
 def test_the_examples_of_every_help_end_with_a_result(
-    chosen: list[str], world: tuple[Path, dict[str, str]], monkeypatch, tmp_path: Path
+    world: tuple[Path, dict[str, str]], monkeypatch, tmp_path: Path
 ) -> None:
     """In one test: later examples use what earlier ones made, in a copy of the folder."""
     made, names = world
@@ -118,7 +99,7 @@ def test_the_examples_of_every_help_end_with_a_result(
     _at_home(monkeypatch, folder)
     monkeypatch.chdir(folder)
     wrong: list[tuple[str, int, str]] = []
-    for example in chosen:
+    for example in SHORT:
         words = words_of(example, names)
         words += ["--direct"] if words[0] in DIRECT else []
         words += ["--archive", "elsewhere"] if words[0] in ELSEWHERE else []

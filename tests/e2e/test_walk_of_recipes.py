@@ -6,6 +6,7 @@ recipe; the slow part measures every recipe, and every station file with the qui
 
 import re
 import shlex
+from itertools import cycle, product
 from pathlib import Path
 
 import pytest
@@ -96,14 +97,14 @@ def test_the_quickest_recipe_passes_and_its_next_lines_can_be_pasted(tmp_path: P
         assert "certificate LN-01/1" in text
 
 
-@each([(recipe, station) for recipe in PROCEDURES for station in STATIONS], lambda case: " on ".join(map(named, case)))
-def test_a_procedure_can_be_planned_on_a_station_or_is_refused_by_name(case: tuple[Path, Path]) -> None:
+@each([*zip((*PROCEDURES, *RECIPES), cycle(STATIONS), strict=False)], lambda case: " on ".join(map(named, case)))
+def test_a_recipe_can_be_planned_on_one_station_or_is_refused_by_name(case: tuple[Path, Path]) -> None:
     planned_or_refused(*case)
 
 
 @pytest.mark.slow
-@each([(recipe, station) for recipe in RECIPES for station in STATIONS], lambda case: " on ".join(map(named, case)))
-def test_a_recipe_can_be_planned_on_a_station_or_is_refused_by_name(case: tuple[Path, Path]) -> None:
+@each(product((*PROCEDURES, *RECIPES), STATIONS), lambda case: " on ".join(map(named, case)))
+def test_a_recipe_can_be_planned_on_every_station_or_is_refused_by_name(case: tuple[Path, Path]) -> None:
     planned_or_refused(*case)
 
 

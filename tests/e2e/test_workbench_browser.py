@@ -59,6 +59,7 @@ def test_the_browser_of_these_tests_reaches_nothing_outside_and_notes_what_is_as
         assert one.outside == ["http://192.0.2.1/", "http://example.org/"]
 
 
+@pytest.mark.slow  # what may be released: tests/unit/pipelines/rerun/test_whatif.py
 def test_a_model_is_evaluated_on_the_archive_and_released_only_if_it_is_better(
     bench: Served, browser: Any, pictures: Path
 ) -> None:
@@ -196,6 +197,7 @@ def test_a_server_that_is_killed_is_said_and_the_page_goes_on(bench: Served, bro
         )
 
 
+@pytest.mark.slow  # uploads without a browser: tests/faults/test_uploads_of_strangers.py
 def test_an_upload_in_a_wrong_unit_says_so_and_is_corrected(bench: Served, browser: Any, tmp_path: Path) -> None:
     rng = np.random.default_rng(3)
     general = np.array(

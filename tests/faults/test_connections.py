@@ -105,16 +105,6 @@ def test_idle_connections_shut_nobody_out(content: bytes) -> None:
         assert len([one for one in place.connections.open.values() if one.socket.fileno() >= 0]) <= 25
 
 
-@pytest.mark.slow
-def test_1500_idle_connections_shut_nobody_out() -> None:
-    with served(ConnectionLimits()) as place, ExitStack() as within:
-        crowd(place, 1500, within)
-        begin = time.monotonic()
-        assert status(within.enter_context(connected(place, GET % b"/"))) == b"200"
-        assert time.monotonic() - begin < 2.0
-        assert len(place.connections.open) <= 640
-
-
 @pytest.mark.parametrize(
     "content",
     [b"", b"GET / HTTP/1.1\r\n", b"POST / HTTP/1.1\r\nhost: x\r\ncontent-length: 9\r\n\r\n1234"],

@@ -13,7 +13,7 @@ from long_suites import rounds
 
 HERE = Path(__file__).parent
 SEED = 20261122
-FEW, MANY = 150, rounds(4000, 10_000)
+FEW, MANY = 60, rounds(4000, 10_000)
 HANG_S = 120.0  # of wall time without a word from the worker, on a machine that others use as well
 LONGEST_MESSAGE = 1000
 
@@ -81,4 +81,5 @@ def test_no_mutated_file_ends_in_a_traceback_a_hang_or_much_memory(count: int) -
     assert slow == []
     words = [one.get("words", "") for one in outcomes]
     assert [text for text in words if len(text) > LONGEST_MESSAGE or "\n" in text] == []
-    assert {one["reader"] for one in outcomes if one["came"] == "accepted"} >= {"dwells.csv", "raw.csv", "slots.csv"}
+    accepted = {one["reader"].partition(".")[0] for one in outcomes if one["came"] == "accepted"}
+    assert accepted >= ({"dwells", "raw"} if count == FEW else {"dwells", "raw", "slots", "recording"})

@@ -15,7 +15,6 @@ from scipy.io import savemat
 
 from pipelines.drawing import Chart, Plot, PlotAxis, Trace, svg_text
 from pipelines.importers import exchange, files
-from pipelines.importers.faces import six_faces
 from pipelines.importers.mapping import Mapping, build, pairs
 from pipelines.importers.record import imported
 from pipelines.jobs.recipes import load_recipe, lot_of
@@ -251,25 +250,6 @@ def faces(offset: float) -> pd.DataFrame:
     """A sample for each face, without noise."""
     force = np.array([[s * (k == a) for k in range(3)] for a in range(3) for s in (1.0, -1.0)]) + offset
     return pd.DataFrame(force, columns=["ax", "ay", "az"]).assign(label=FACES)
-
-
-def test_six_faces_without_noise_cannot_be_judged_and_wrong_labels_are_seen_without_it(tmp_path: Path) -> None:
-    content = {
-        "columns": {"x": "ax", "y": "ay", "z": "az", "dwell": "label"},
-        "rows": "dwells",
-        "local_gravity_m_s2": 9.80665,
-    }
-    poses = {face: face for face in FACES}
-    right, turned = (how(**content, poses=poses | more) for more in ({}, {"+x": "-x", "-x": "+y", "+y": "+x"}))
-    judged = six_faces(imported(faces(1e-3), right, "f"), right)
-    assert judged.adequate is None
-    assert "cannot be judged" in judged.document["reason"]
-    assert six_faces(imported(faces(1e-3), turned, "f"), turned).adequate is False
-    faces(0.0).to_csv(tmp_path / "a.csv", index=False)
-    words = ("--map", "x=ax,y=ay,z=az,dwell=label", "--units", "output=g", "--unit", "A", "--rows", "dwells")
-    fit = ("--local-g", "9.81", "--fit", "faces", "--poses", ",".join(f"{face}={face}" for face in FACES))
-    status, out, _ = given("import", tmp_path / "a.csv", *words, *fit, "--archive", tmp_path / "archive")
-    assert (status, "CANNOT BE JUDGED" in out) == (1, True)
 
 
 # -- names that could be a formula or markup ----------------------------------------------------------------------------

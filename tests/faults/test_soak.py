@@ -7,7 +7,6 @@ Clocks are those of the workers' processes, their flows and watchdogs (wrong_clo
 
 import os
 import random
-import shutil
 import signal
 import socket
 import subprocess
@@ -22,7 +21,7 @@ from typing import Any
 
 import psutil
 import pytest
-from capture_double import recipe_file
+from capture_double import AT_ROOM, recipe_file
 from lines import deployments, kill_all, order, worker
 from orchestrator import Orchestrator
 from postgres_server import Postgres, installed, postgres
@@ -45,13 +44,11 @@ pytestmark = [pytest.mark.slow, pytest.mark.timeout(1200 + 600 * SHIFTS)]
 STATIONS = ("line-1", "line-2", "line-3")
 FAST: dict[str, object] = {"speed_deg_s": 90.0, "acceleration_deg_s2": 200.0}
 QUICK = (
+    *AT_ROOM,
     ('units = ["A1", "A2", "A3"]', 'units = ["U000", "U001"]'),
-    ("temperatures_C = [0.0, 50.0]", "temperatures_C = [23.0]\nsoak_min_s = 1.0\nallow_short_soak = true"),
     ("settle_s = 2.0", "settle_s = 0.2"),
     ("static_record_s = 30.0", "static_record_s = 0.0"),
     ('poses = "nine"', 'poses = "six"'),
-    ('limits = "consumer"', 'limits = "line-quick.limits.toml"'),
-    (', "bias_temperature", "scale_temperature"', ""),
 )
 SAFE_S = 90.0
 SHIFT_S = 900.0
@@ -150,7 +147,6 @@ class Soak:
         self.again = 0
 
     def set_up(self) -> None:
-        shutil.copy(ROOT / "deploy" / "recipes" / "line-quick.limits.toml", self.folder)
         recipe = recipe_file(self.folder, *QUICK)
         wanted = []
         for name in STATIONS:

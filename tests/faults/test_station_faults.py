@@ -2,7 +2,6 @@
 
 import threading
 
-import numpy as np
 import pytest
 from each import each
 from plant_wires import tcp_link
@@ -23,10 +22,9 @@ from schemas.errors import (
     WrongUse,
 )
 from schemas.event import MemoryLog
-from schemas.fault import FaultOrder
 from schemas.poses import Pose
 from schemas.station import load_station
-from stations.opening import make_plant, open_station, serve_plant
+from stations.opening import make_plant, open_station
 from stations.plant.server import PlantServer
 from stations.serving import serve
 
@@ -56,38 +54,9 @@ def test_a_capture_that_holds_dwells_of_a_worn_table_is_not_gone_on_with():
         assert 0 < stored < 8
 
 
-def test_a_unit_that_falls_silent_between_records_keeps_its_earlier_samples():
-    sink = run(station_of(faults=[{"kind": "silent", "at_s": 912.0, "serial": "U001"}]), lot_of())
-    status = sink.all(1).query("unit == 'U001'")["status"].tolist()
-    assert (status[0], status[-1]) == ("ok", "slot 1: no answer")
-    assert (sink.all(1).query("unit != 'U001'")[["status", "n"]] == ["ok", 200]).all(axis=None)
-
-
-def test_another_serial_in_the_slot_stops_the_run_before_anything_is_measured():
-    config, lot = load_station(), lot_of()
-    plant = make_plant(config, lot)
-    plant.serials[1] = "X999"
-    sink = MemorySink()
-    with serve_plant(config, lot, plant) as station, pytest.raises(OperatorNeeded, match="'X999' sits there, 'U001'"):
-        capture(station, short_recipe(), lot, sink, progress=quiet_progress)
-    assert not sink.records
-
-
 def test_a_lot_of_which_nobody_answers_is_refused():
     with pytest.raises(OperatorNeeded, match="no unit"):
         run(station_of(faults=[{"kind": "silent", "serial": "U000"}]), lot_of(1))
-
-
-def test_what_the_station_may_not_do_is_refused_before_anything_moves():
-    lot, sink = lot_of(), MemorySink()
-    with open_station(load_station(), lot) as station:
-        for change, needed in (({"temperatures_C": [25.0, 120.0]}, "120 °C"), ({"rate_hz": 9000.0}, "9000 Hz")):
-            with pytest.raises(StationRefused, match=needed):
-                capture(station, short_recipe().model_copy(update=change), lot, sink, progress=quiet_progress)
-        with pytest.raises(StationRefused, match="-200 to 200 deg"):
-            station.table.move(250.0, 0.0)
-        assert station.clock.now() == 0.0
-        assert station.table.angles() == pytest.approx((0.0, 0.0), abs=0.01)
 
 
 def test_samples_that_the_ring_has_lost_are_flagged_and_not_made_up():
@@ -99,41 +68,6 @@ def test_samples_that_the_ring_has_lost_are_flagged_and_not_made_up():
         samples = station.reader.slots[0].take()
     assert samples.overflow
     assert (samples.first, len(samples.outputs)) == (8000, 12000)
-
-
-def test_nothing_is_flagged_when_the_ring_is_emptied_in_time():
-    with open_station(load_station(), lot_of(1)) as station:
-        station.reader.start(1000.0)
-        parts = []
-        for _ in range(4):
-            station.clock.sleep(5.0)
-            parts.append(station.reader.slots[0].take())
-    assert [part.first for part in parts] == [0, 5000, 10000, 15000]
-    assert not any(part.overflow for part in parts)
-    assert not np.array_equal(parts[0].outputs, parts[3].outputs)
-
-
-def test_a_move_asked_while_moving_is_refused_as_busy_and_not_queued():
-    with open_station(load_station(), lot_of(1)) as station:
-        outer = station.table._outer
-        outer.start(90.0)
-        station.clock.sleep(0.5)
-        with pytest.raises(StationRefused, match="busy"):
-            outer.start(10.0)
-        station.clock.sleep(30.0)
-        assert outer.position() == pytest.approx(90.0, abs=0.01)
-
-
-def test_a_write_whose_answer_is_lost_is_sent_once():
-    config, lot = load_station(), lot_of(1)
-    plant = make_plant(config, lot)
-    plant.inject(FaultOrder(kind="mute", serial="U000"))
-    with PlantServer(plant) as server:
-        link = tcp_link(server.host, server.port, timeout_s=0.6, read_attempts=3)
-        with pytest.raises(StationTimeout, match=r"device 11: no answer to 'write tail"):
-            link.write(11, 42, [0, 0], "tail")
-        assert link.read(10, 0, 1, "slots") == [8]
-        link.close()
 
 
 def test_a_write_is_sent_once_and_a_read_as_often_as_allowed():

@@ -60,22 +60,6 @@ def test_a_condition_that_passes_costs_time_and_no_data(condition, undisturbed):
     assert far < 20.0  # LSB of 1/256000 g: the table does not come to rest twice in the same place
 
 
-def test_a_chamber_that_loses_its_power_for_a_while_is_settled_anew():
-    recipe = short_recipe(poses=3, temperatures=(60.0,))
-    whole, _ = run(recipe=recipe)
-    begins = whole.all(1).drop_duplicates("record").set_index("record")["start_s"]
-    far = float(begins[1]) - 2.0
-    sink, events = run(
-        {"kind": "chamber_power", "at_s": far, "for_s": 900.0}, recipe=recipe.model_copy(update={"dwell_s": 60.0})
-    )
-    assert "spoilt" in kinds(events)
-    assert any("is needed" in event.reason for event in events.recorded() if event.kind == "spoilt")
-    readings = sink.all(1)
-    assert (abs(readings["unit_C"] - 60.0) <= 1.0).all()
-    assert (readings["status"] == "ok").all()
-    assert sum(event.kind == "soak" for event in events.recorded()) >= 2
-
-
 def test_a_door_that_stays_open_ends_the_run_with_its_finished_records():
     sink, events = MemorySink(), MemoryLog()
     words = r"paused for 3\d\d s: the chamber's door is open, .*; correct it .* no measured record is lost"
@@ -110,15 +94,6 @@ def test_the_emergency_stop_waits_for_nothing_and_leaves_the_station_safe():
     assert plant.now < DURING + 15.0
 
 
-def test_one_supply_that_stays_low_costs_its_unit_and_nobody_else():
-    sink, events = run({"kind": "supply_sag", "at_s": DURING, "serial": "U001"}, limit_s=120.0)
-    readings = sink.all(1)
-    assert "unit_lost" in kinds(events)
-    assert set(readings.query("unit == 'U001'")["status"]) == {"ok", "slot 1: supply out of tolerance"}
-    assert (readings.query("unit != 'U001'")["status"] == "ok").all()
-    assert "U001" not in set(sink.all(0).query("record > 0")["unit"])
-
-
 def test_a_dwell_spoilt_again_and_again_is_given_up_after_the_allowed_attempts():
     shocks = [{"kind": "vibration", "at_s": at, "for_s": 5.0} for at in (911.0, *range(1020, 1060, 6))]
     with pytest.raises(OperatorNeeded, match=r"record \d+ \(pose p\d\) spoilt 2 times: vibration"):
@@ -131,12 +106,6 @@ def test_soaks_tell_how_far_they_went_beyond():
     assert [soak["target_C"] for soak in soaks] == [25.0, 60.0]
     assert 0.2 < soaks[1]["air_overshoot_K"] < 2.0
     assert 0.0 <= soaks[1]["device_overshoot_K"] < soaks[1]["air_overshoot_K"]
-
-
-def test_a_device_of_the_station_that_is_silent_for_a_moment_costs_no_run():
-    sink, events = run({"kind": "silent", "at_s": DURING, "for_s": 8.0, "device": "chamber"})
-    assert len(sink.records) == 4
-    assert kinds(events) == ["suspended"]
 
 
 @pytest.mark.parametrize("records", [1, 2])

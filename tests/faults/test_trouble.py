@@ -6,13 +6,10 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from capture_double import CaptureDouble, PulledPlug, small_job, small_run
+from capture_double import CaptureDouble, small_job, small_run
 from each import each
 
 from pipelines.archive import Archive, Run
-from pipelines.archive.cleaning import clean
-from pipelines.chain.chain import ORDER
-from pipelines.chain.runner import Runner
 from pipelines.cli.summary import all_passed, summary
 from pipelines.export import unit_calibrations
 from pipelines.report import render
@@ -103,17 +100,3 @@ def test_a_station_that_delivers_no_time_is_refused(tmp_path: Path) -> None:
     with pytest.raises(DataRejected, match=r"samples: row 5 \(unit A1\), column time_s"):
         records.put(0, samples, readings, history, b"")
     assert records.finished() == set()
-
-
-def test_a_capture_that_was_cut_off_goes_on_and_ends_the_same(tmp_path: Path, sound: Run) -> None:
-    archive, job, stop_after = Archive(tmp_path / "archive"), small_job(tmp_path), 7
-    with pytest.raises(PulledPlug):
-        list(Runner(job, archive, measure=CaptureDouble(stop_after=stop_after)).all())
-    assert clean(archive).removed == []
-    second = CaptureDouble()
-    runner = Runner(job, archive, measure=second)
-    for stage in ORDER[:-1]:
-        runner.stage(stage)
-    assert len(second.measured) == job.recipe.planned_records - stop_after
-    for name in sound.tables():
-        assert (runner.run.path / f"{name}.parquet").read_bytes() == (sound.path / f"{name}.parquet").read_bytes()

@@ -163,16 +163,6 @@ def test_an_edited_manifest_is_found_even_unsigned(copy: Path) -> None:
         path.write_bytes(data)
 
 
-def test_a_manifest_of_a_newer_schema_and_one_that_is_no_json_are_told_and_not_read(copy: Path) -> None:
-    run = run_of(copy)
-    edit(run.path / "dwells.json", lambda content: content.update(schema=99))
-    (run.path / "grades.json").write_text("not json")
-    told = set(found(copy))
-    assert {("newer", "dwells.json"), ("unreadable", "grades.json")} <= told
-    with pytest.raises(ArchiveUnusable, match=r"dwells\.json has schema 99, this version knows up to \d+; use a newer"):
-        run.table("dwells")
-
-
 def test_a_run_that_was_cut_off_is_told_and_is_not_wrong(tmp_path: Path) -> None:
     archive = Archive(tmp_path / "archive")
     with pytest.raises(PulledPlug):

@@ -105,17 +105,6 @@ def test_a_run_that_ends_in_peace_leaves_its_station_safe_too():
         assert [line["event"] for line in folder.read_log(folder.state_folder())] == ["driven", "left_safe"]
 
 
-def test_a_station_that_is_driven_is_refused_with_who_drives_it():
-    with served() as port:
-        config = modbus_station(port)
-        with (
-            driver(config) as process,
-            pytest.raises(OperatorNeeded, match=f"driven by the driver .process {process.pid} on"),
-            open_station(config, lot_of()),
-        ):
-            pytest.fail("two drive one station")
-
-
 def test_two_files_that_name_one_device_share_its_lease():
     ours = modbus_station(4000, host="127.0.0.1")
     theirs = modbus_station(4001, host="localhost").model_copy(update={"name": "another"})

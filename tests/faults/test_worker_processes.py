@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import nullcontext
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from types import SimpleNamespace
@@ -191,6 +192,55 @@ def test_a_crashed_run_whose_process_lives_is_not_started_again(monkeypatch: pyt
     [text] = queue_rules._continue_crashed(client, "pool", "line-1", NOW, queue_rules.SETTLED)
     assert text.startswith("run a-run continues from its checkpoint")
     assert client.scheduled == ["run-1"]
+
+
+class Queue:
+    """A client of the server with two runs of a deployment that were due 20 and 10 minutes ago, on a station that may be busy."""
+
+    def __init__(self, tags: tuple[str, ...], other: tuple[str, ...]) -> None:
+        common = {"deployment_id": "d", "tags": tags, "auto_scheduled": True, "run_count": 0}
+        self.runs = {
+            name: SimpleNamespace(
+                id=name, name=name, expected_start_time=NOW - late, state_type=StateType.SCHEDULED, **common
+            )
+            for name, late in (("first", timedelta(minutes=20)), ("second", timedelta(minutes=10)))
+        }
+        self.working = [SimpleNamespace(name=name, state_type=StateType.RUNNING) for name in other]
+
+    def of_states(
+        self, _client: object, _pool: str, _queue: str, states: tuple[StateType, ...], *_: object
+    ) -> list[Any]:
+        return [run for run in (*self.runs.values(), *self.working) if run.state_type in states]
+
+    def read_flow_run(self, run: str) -> Any:
+        return self.runs[run]
+
+    def set_flow_run_state(self, run: str, state: Any) -> None:
+        self.runs[run].state_type = state.type
+
+
+POLICIES = [  # tags of the runs, what has the station, what is cancelled
+    (("latest_start_min=60",), (), ()),
+    (("latest_start_min=60",), ("other",), ()),
+    (("latest_start_min=5",), (), ("first", "second")),
+    (("latest_start_min=15",), (), ("first",)),
+    (("latest_start_min=5", "missed=latest"), (), ("first",)),
+    (("latest_start_min=60", "busy=skip"), (), ()),
+    (("latest_start_min=60", "busy=skip"), ("other",), ("first", "second")),
+]
+
+
+@each(POLICIES, repr)
+def test_runs_that_are_missed_or_meet_a_busy_station_are_cancelled_as_their_policy_says(
+    row: tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tags, other, cancelled = row
+    queue = Queue(tags, other)
+    monkeypatch.setattr(queue_rules, "runs_of_queue", queue.of_states)
+    monkeypatch.setattr(queue_rules, "get_client", lambda **_: nullcontext(queue))
+    told = queue_rules.apply_rules("pool", "line-1", NOW)
+    assert [name for name, run in queue.runs.items() if run.state_type == StateType.CANCELLED] == [*cancelled]
+    assert [text.split()[1] for text in told] == [*cancelled]
 
 
 def run_of_process(pid: int) -> Any:
