@@ -6,7 +6,7 @@ from typing import Any
 
 from pipelines.drawing import svg_text
 from pipelines.planning.context import PlanContext
-from pipelines.planning.plan_rows import worst_axes
+from pipelines.planning.documents import worst_axes
 from pipelines.report.axes import side_by_side
 from pipelines.report.budget_plots import shares_plot
 from pipelines.report.numbers import scientific, significant

@@ -13,11 +13,10 @@ from inertial.noise.dwells import DwellNoise
 from pipelines.archive import Archive
 from pipelines.jobs.recipes import load_recipe
 from pipelines.planning.context import plan_context
-from pipelines.planning.lower_bound import lower_bound
+from pipelines.planning.lower_bound import lower_bound, ramp_orders
 from pipelines.planning.optimise import optimise
 from pipelines.planning.plan import identified
 from pipelines.planning.requirement import Requirement, candidates
-from pipelines.planning.soak_orders import ramp_orders
 from pipelines.planning.textbook import seen_by, textbook
 from pipelines.planning.timed_design import REACHED, followed_along, short_of
 from pipelines.schedule.planned_state import planned_state

@@ -7,7 +7,7 @@ from typing import Any
 
 from inertial.counts import number_of
 from pipelines.cli.printing import print_table, say, short
-from pipelines.planning.plan_rows import worst_axes
+from pipelines.planning.documents import worst_axes
 from schemas.decisions import LARGEST_ERROR
 
 RAISED = 3.0

@@ -18,7 +18,7 @@ from pipelines.cli.certificate_check import _needed  # pyright: ignore[reportPri
 from pipelines.cli.console import WordConsole
 from pipelines.cli.optimal import ERROR_HEADS, _error_lines  # pyright: ignore[reportPrivateUsage]
 from pipelines.cli.printing import print_table, short
-from pipelines.diagnosis.model_history import _fall  # pyright: ignore[reportPrivateUsage]
+from pipelines.diagnosis.confirmation import _fall_text  # pyright: ignore[reportPrivateUsage]
 from pipelines.importers.exchange import read_dwells
 from pipelines.jobs.recipes import load_recipe
 from pipelines.report.unit_panels.budget import without_nothing
@@ -88,7 +88,7 @@ def test_numbers_have_three_digits_and_no_exponent() -> None:
         (-6.41, 0.7, "rises by 6.4 ± 1.4 (k = 2) µg"),
         (123.4, None, "falls by 123 µg"),
     ):
-        assert _fall({"fall_ug": fall, "fall_u_ug": error, "estimated_again": None}) == f"the error {text}"
+        assert _fall_text({"fall_ug": fall, "fall_u_ug": error, "estimated_again": None}) == f"the error {text}"
 
 
 def test_a_contribution_of_nothing_is_not_among_the_largest_and_a_help_is_broken_by_the_terminal_alone() -> None:

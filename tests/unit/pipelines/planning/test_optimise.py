@@ -11,9 +11,9 @@ from inertial.noise.dwells import DwellNoise, dwell_covariance
 from pipelines.jobs.model_files import STARTING_MODEL
 from pipelines.jobs.recipes import load_recipe
 from pipelines.planning.context import plan_context
+from pipelines.planning.lower_bound import mirrored, orders
 from pipelines.planning.plan import identified
 from pipelines.planning.requirement import Requirement, candidates, temperature_choices
-from pipelines.planning.soak_orders import mirrored, orders
 from pipelines.planning.textbook import reference_errors, textbook
 from pipelines.planning.timed_design import FEWEST, PlanDesign, TimedDesign, fewest_dwells, smallest_passing, spanned
 from pipelines.schedule.timing import spent
