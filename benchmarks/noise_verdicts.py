@@ -29,7 +29,7 @@ from inertial.noise.terms import fit_terms  # noqa: E402
 from inertial.population.change_points import change_points  # noqa: E402
 from inertial.population.control_charts import alarms, baseline, chance_of_alarms, signals  # noqa: E402
 from pipelines.stages.fit import fit  # noqa: E402
-from pipelines.stages.noise import noise  # noqa: E402
+from pipelines.stages.noise import noise, static_record  # noqa: E402
 from pipelines.stages.verify import verify  # noqa: E402
 
 RATE, SAMPLES = 10.0, 36_000
@@ -237,7 +237,7 @@ def record(records: int, seed: int) -> None:
             values = made.white(rng, 3, n, 25.0, RATE).T + drift[:, None]
             samples, readings = lots.static_record(1e-6 * values[None], RATE)
             for name, past in (("samples alone", None), ("temperature coefficient removed", history)):
-                rows = noise([samples], readings, *tables, past)["noise"]
+                rows = noise(static_record([samples], readings, *tables, past))["noise"]
                 slow[name] += int(rows[rows["term"].isin(["B", "K", "R"])].groupby("axis")["identified"].any().sum())
         for name, count in slow.items():
             print(
@@ -248,7 +248,7 @@ def record(records: int, seed: int) -> None:
         for _ in range(records):
             values = made.white(rng, 3, n, 25.0, RATE).T + rng.uniform(0.0, lsb, 3)
             samples, readings = lots.static_record(1e-6 * lsb * np.round(values / lsb)[None], RATE)
-            rows = noise([samples], readings, *tables)["noise"]
+            rows = noise(static_record([samples], readings, *tables))["noise"]
             rows = rows[rows["term"] == "n_d"]
             plain += [float(np.sqrt(np.mean(np.diff(lsb * np.round(v / lsb)) ** 2) / RATE)) / 25.0 for v in values.T]
             stated += (rows["value"].dropna() / 25.0).tolist()

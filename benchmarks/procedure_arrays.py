@@ -21,8 +21,8 @@ from inertial.dynamics.ratiometry import largest_departure
 from inertial.dynamics.stability import ShortNoise, difference_error, short_noise, stability
 from inertial.dynamics.warm_up import entered
 from inertial.errors import NotIdentified
-from pipelines.procedures.columns import noise_columns
 from pipelines.procedures.ratiometry import RatiometryPart, over_supply
+from pipelines.procedures.recorded import noise_columns
 from stations.plant.noise import UnitNoise
 from stations.plant.preset import load_preset
 

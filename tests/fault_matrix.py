@@ -15,8 +15,8 @@ from small_station import QUIET, MemorySink, lot_of, quiet_progress
 from inertial import poses
 from pipelines.capture.capture import capture
 from pipelines.schedule.steps import steps
-from pipelines.stages.reduce import reduced_summaries
-from pipelines.stages.validate import verdicts
+from pipelines.stages.reduce import reduce
+from pipelines.stages.validate import validate
 from pipelines.tables.summaries import summarised
 from schemas.errors import StationError
 from schemas.event import MemoryLog
@@ -109,12 +109,12 @@ def run_case(case: Case) -> CaseResult:
         return CaseResult(RUN, message, status, [], 0, planned, spoilt)
     readings = sink.all(1)
     summaries = summarised([sink.records[n][0] for n in sorted(sink.records)], readings)
-    judged = verdicts(summaries, readings, lot.units)
+    judged = validate(summaries, readings, lot.units)
     refused = judged.loc[judged["refused"], "unit"].tolist()
     if not message and refused:
         message = judged.loc[judged["refused"], "reason"].iloc[0]
     outcome = RUN if status else UNIT if refused else RECOVERED
-    dwells = reduced_summaries(summaries, readings, judged, recipe.local_gravity_m_s2)
+    dwells = reduce(summaries, readings, judged, recipe.local_gravity_m_s2)
     bad = list(far_from_the_truth(plant, dwells))
     return CaseResult(outcome, message, status, refused, len(sink.records), planned, spoilt, bad)
 

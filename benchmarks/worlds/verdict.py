@@ -108,7 +108,7 @@ def looped(task: tuple[str, str, int], making: Making = make) -> tuple[str, dict
 def _confirmed(made: Made, effect: str, again: tuple[Any, Any]) -> bool | None:
     """The verdict on an effect that is added to the plain model."""
     from pipelines.diagnosis.compare import compare
-    from pipelines.diagnosis.model_history import evolution
+    from pipelines.diagnosis.confirmation import evolution
     from pipelines.jobs.model_files import Version
 
     versions = [Version(1, BASE, (), (), None), Version(2, (*BASE, effect), (effect,), (), None)]

@@ -41,8 +41,9 @@ class Points:
 
     def picked(self, rows: Flags) -> "Points":
         """Some of the points."""
-        own = (each[rows] for each in (self.value, self.magnitude_error, self.phase_error))
-        return Points(self.conditions.picked(rows), *own)
+        return Points(
+            self.conditions.picked(rows), self.value[rows], self.magnitude_error[rows], self.phase_error[rows]
+        )
 
 
 @dataclass(frozen=True)

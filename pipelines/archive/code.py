@@ -20,7 +20,7 @@ _ENGINE = (
 )
 _NOISE = (
     *(*_TABLES, *_MODEL, "inertial.distributions", "inertial.dynamics", "inertial.noise"),
-    *("pipelines.stages.coarse_digits", "pipelines.stages.noise", "pipelines.stages.static_record"),
+    *("pipelines.stages.noise", "pipelines.stages.static_record"),
 )
 _BUDGET = (
     *(*_TABLES, *_MODEL, "schemas", "inertial.correction", "inertial.distributions", "inertial.noise"),
@@ -66,7 +66,8 @@ CODE = {
     ),
     "procedures": (*_PROCEDURES, "pipelines.stages.procedures"),
     "grade": (
-        *(*_NOISE, "schemas", "inertial.uncertainty", "pipelines.procedures", "pipelines.stages.figures"),
+        *(*_NOISE, "schemas", "inertial.counts", "inertial.probability", "inertial.uncertainty"),
+        *("pipelines.procedures", "pipelines.stages.figures"),
         *("pipelines.stages.grade", "pipelines.stages.uncertainty"),
     ),
     "import": _READ,

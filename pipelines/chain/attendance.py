@@ -58,7 +58,8 @@ class Attendance:
             return stage()
         if not records.finished():
             self._need("load", "seat the units as listed", lot=True)
-        self._confirm()
+        while wrong := seated_otherwise(self.job):  # until the slots agree with the slot map
+            self._need("confirm", "; ".join(wrong) + "; seat the units as in the slot map")
         while True:
             try:
                 done = stage()
@@ -78,11 +79,6 @@ class Attendance:
         text = f"{passed} of {number_of(len(results), 'unit')} passed; remove the units and sort them as listed"
         slots = tuple((u.slot, f"{u.serial}  {results.get(u.serial, 'no result')}") for u in self.job.lot.units)
         self._ask(Prompt("unload", self.run, text, slots))
-
-    def _confirm(self) -> None:
-        """Repeats the question until the slots agree with the slot map."""
-        while wrong := seated_otherwise(self.job):
-            self._need("confirm", "; ".join(wrong) + "; seat the units as in the slot map")
 
     def _need(self, kind: Kind, text: str, *, lot: bool = False) -> None:
         slots = tuple((unit.slot, unit.serial) for unit in self.job.lot.units) if lot else ()

@@ -124,6 +124,8 @@ def _proposals(
         "device": about["lot"]["device"], "run": run.id, "start": first, "until": last, "station": station,
         "recipe": about["recipe"]["name"], "coefficients": run.manifest("coefficients")["sha256"], "reason": reason,
         "evidence": evidence, "adequacy": adequacy,
+        # the ledger has still to number and stamp the event
+        "sequence": 0, "action": "certify", "ends": (), "who": "", "where": "", "when": "", "previous": "",
     }  # fmt: skip
     proposals: list[LedgerEntry] = []
     for serial in units or tuple(grades):
@@ -137,7 +139,7 @@ def _proposals(
             result.left_out[serial] = half
             continue
         if row["outcome"] == "pass":
-            proposals.append(_blank(serial, grade=str(row["grade"]), **shared))
+            proposals.append(LedgerEntry(serial=serial, grade=str(row["grade"]), **shared))
             continue
         why = f"{row['outcome']}: {row['reasons']}"
         if units:
@@ -162,10 +164,3 @@ def _how_to_grade(run: Run) -> str:
         return f"it was turned about {axis} alone, the scale of {axis} is not known: measure other orientations"
     again = f"'tumbleline fit {run.id} --limits FILE'"
     return f"it was imported: fit it against limits with {again} and certify the run that this makes"
-
-
-def _blank(serial: str, **content: Any) -> LedgerEntry:
-    """An event that the ledger has still to number and stamp."""
-    return LedgerEntry(
-        serial=serial, sequence=0, action="certify", ends=(), who="", where="", when="", previous="", **content
-    )

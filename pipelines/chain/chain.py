@@ -13,12 +13,12 @@ from pipelines.jobs.job import Job
 from pipelines.stages.fit import fit_tables
 from pipelines.stages.grade import GradeEvidence, grade
 from pipelines.stages.judge import judge
-from pipelines.stages.noise import noise
+from pipelines.stages.noise import noise, static_record
 from pipelines.stages.procedures import procedures
-from pipelines.stages.reduce import reduced_summaries
+from pipelines.stages.reduce import reduce
 from pipelines.stages.uncertainty.budget import budget
 from pipelines.stages.uncertainty.budget_terms import BudgetTables
-from pipelines.stages.validate import verdicts
+from pipelines.stages.validate import validate
 from pipelines.stages.verify import verify_tables
 from pipelines.tables.dwells import LotTables
 from pipelines.tables.samples import PROCEDURE
@@ -70,14 +70,10 @@ def _summaries(job: Job, run: Run) -> pd.DataFrame:
     return summaries
 
 
-def _validate(job: Job, run: Run) -> Tables:
-    return {"verdicts": verdicts(_summaries(job, run), run.table("readings"), job.lot.units)}
-
-
 def _reduce(job: Job, run: Run) -> Tables:
     tables = run.table("readings"), run.table("verdicts")
     gravity, follows = job.recipe.local_gravity_m_s2, job.terms.follows
-    return {"dwells": reduced_summaries(_summaries(job, run), *tables, gravity, follows)}
+    return {"dwells": reduce(_summaries(job, run), *tables, gravity, follows)}
 
 
 def _reduced_with(job: Job) -> dict[str, Any]:
@@ -105,10 +101,6 @@ def _lot(run: Run) -> LotTables:
 _VERIFIED = ("dwells", "history", "coefficients", "covariance", "predictions")
 
 
-def _fit(job: Job, run: Run) -> Tables:
-    return fit_tables(_lot(run), job.recipe.effects)
-
-
 def _judge(job: Job, run: Run) -> Tables:
     return judge(run.table("dwells"), run.table("history"), job.recipe.effects if job.recipe.tumbles else ())
 
@@ -123,10 +115,6 @@ def static_inputs(run: Run) -> tuple[Iterable[pd.DataFrame], *tuple[pd.DataFrame
     readings, *tables = (run.table(name) for name in ("readings", "coefficients", "covariance", "history"))
     static = set(readings.loc[readings["kind"] == "allan", "record"])
     return _records(run).samples(static), readings, *tables
-
-
-def _noise(job: Job, run: Run) -> Tables:
-    return noise(*static_inputs(run))
 
 
 _BUDGETED = ("dwells", "history", "coefficients", "covariance", "wander", "verification", "verification_poses", "noise")
@@ -172,17 +160,13 @@ def _listed(job: Job) -> dict[str, Any]:
     return {"recipe": job.recipe.model_dump(mode="json", exclude=set(NOT_OF_PROCEDURES))}
 
 
-def _none(job: Job) -> dict[str, Any]:
-    return {}
-
-
 STAGES: tuple[Stage, ...] = (
     Stage(
         name="validate",
         inputs=(RECORDS, "readings"),
         outputs=("verdicts",),
         parameters=lambda job: {"lot": job.lot.model_dump(mode="json"), "zero_output": job.recipe.zero_output},
-        call=_validate,
+        call=lambda job, run: {"verdicts": validate(_summaries(job, run), run.table("readings"), job.lot.units)},
     ),
     Stage(
         name="reduce",
@@ -196,7 +180,7 @@ STAGES: tuple[Stage, ...] = (
         inputs=("dwells", "history"),
         outputs=("coefficients", "covariance", "residuals", "predictions", "wander"),
         parameters=_model,
-        call=_fit,
+        call=lambda job, run: fit_tables(_lot(run), job.recipe.effects),
     ),
     Stage(
         name="judge",
@@ -209,15 +193,15 @@ STAGES: tuple[Stage, ...] = (
         name="verify",
         inputs=_VERIFIED,
         outputs=("verification", "verification_poses"),
-        parameters=_none,
+        parameters=lambda _: {},
         call=_verify,
     ),
     Stage(
         name="noise",
         inputs=(RECORDS, "readings", "coefficients", "covariance", "history"),
         outputs=("allan", "noise"),
-        parameters=_none,
-        call=_noise,
+        parameters=lambda _: {},
+        call=lambda _, run: noise(static_record(*static_inputs(run))),
     ),
     Stage(
         name="budget",

@@ -139,9 +139,9 @@ class Runner:
         return make_report(self.run)
 
     def _inputs(self, names: tuple[str, ...]) -> dict[str, str]:
-        return {name: self._input_hash(name) for name in names}
-
-    def _input_hash(self, name: str) -> str:
-        if name == RECORDS:
-            return self.archive.capture(self.job.capture_id).hash()
-        return self.run.manifest(name)["sha256"]
+        return {
+            name: self.archive.capture(self.job.capture_id).hash()
+            if name == RECORDS
+            else self.run.manifest(name)["sha256"]
+            for name in names
+        }

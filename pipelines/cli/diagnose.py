@@ -138,7 +138,7 @@ def write_next(path: Path, document: dict[str, Any], base: Recipe, home: Path, s
     """
     from pipelines.archive import files
     from pipelines.cli.next_commands import command_line
-    from pipelines.diagnosis.next_recipe import next_recipe, reasons
+    from pipelines.diagnosis.next_measurement import next_recipe, reasons
     from pipelines.jobs.recipe_text import limits_from, recipe_text
 
     out, rows = error_console(), document["next_measurements"]

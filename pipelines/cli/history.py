@@ -37,7 +37,7 @@ def command(
     Without --dwells only the changes are shown.
     """
     from pipelines.cli.inputs import add_effects, both_runs
-    from pipelines.diagnosis.model_history import FIGURES, JUDGED, change_row
+    from pipelines.diagnosis.confirmation import FIGURES, JUDGED, change_row
     from pipelines.improvement.improvement import ImprovedTables, errors_by_version
     from pipelines.jobs.model_files import read_model, versions
 

@@ -163,8 +163,8 @@ def cheapest_recipe(
     from pipelines.planning.context import plan_context
     from pipelines.planning.optimise import optimise
     from pipelines.planning.optimum_document import optimum_document
+    from pipelines.planning.requirement import verified_in
     from pipelines.planning.textbook import textbook
-    from pipelines.planning.verification_poses import verified_in
 
     levels = levels_of(base, options.temperatures)
     against = plan_context(textbook(base, levels), station, noise)

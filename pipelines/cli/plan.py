@@ -117,9 +117,8 @@ def command(
     from pipelines.jobs.recipes import folder_of, load_limits
     from pipelines.jobs.releases import planned_recipe
     from pipelines.jobs.terms import planned_terms, refused_by_run
-    from pipelines.planning.context import noise_of, plan_context
+    from pipelines.planning.context import noise_of, plan_context, plan_of_procedures, procedure_rows
     from pipelines.planning.plan import plan
-    from pipelines.planning.procedure_plan import plan_of_procedures, procedure_rows
     from schemas.station import load_station
 
     config = load_station(station)

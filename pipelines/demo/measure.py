@@ -17,6 +17,7 @@ from pipelines.capture.capture import capture
 from pipelines.demo.scenes import Scene
 from pipelines.jobs.recipes import load_recipe
 from pipelines.stages.reduce import reduce
+from pipelines.tables.summaries import summarised
 from schemas.errors import WrongUse
 from schemas.lot import Lot, Unit
 from schemas.poses import Pose
@@ -102,7 +103,7 @@ def _once(recipe: Recipe, chosen: Scene, seed: int, repeat: int, progress: Progr
         capture(station, recipe, lot, kept, progress=progress)
     accepted = pd.DataFrame({"unit": [u.serial for u in units], "refused": False})
     readings = pd.concat(kept.readings, ignore_index=True)
-    dwells = reduce(kept.samples, readings, accepted, recipe.local_gravity_m_s2)
+    dwells = reduce(summarised(kept.samples, readings), readings, accepted, recipe.local_gravity_m_s2)
     return [dwells, pd.concat([h for h in kept.history if len(h)], ignore_index=True)]
 
 

@@ -73,7 +73,6 @@ def _compared(
     fitted = estimate(model)
     left = fitted_residuals(model)
     out = left_out(model)
-    units = _by_unit(measurement, left)
     answer: dict[str, Any] = {
         "effects": [t.effect.id for t in model.terms],
         "rms_ug": MICRO * rms(left),
@@ -82,9 +81,12 @@ def _compared(
         "heldout": {kind: MICRO * rms(out.missed[kind]) for kind in out.density},
         "fresh_rms_ug": None,
         "by_unit": {
-            u: {"rms_ug": MICRO * rms(r), "fresh_rms_ug": None} for u, r in zip(measurement.units, units, strict=True)
+            u: {"rms_ug": MICRO * rms(r), "fresh_rms_ug": None}
+            for u, r in zip(measurement.units, left.reshape(len(measurement.units), -1), strict=True)
         },
-        "by_axis": _by_axis(left, radial=problem.lot.radial),
+        "by_axis": {"norm": MICRO * rms(left)}
+        if problem.lot.radial
+        else {axis: MICRO * rms(left[i::3]) for i, axis in enumerate("xyz")},
         "by_pose": _by_pose(measurement, left),
         "nonlinear": {t.effect.id: t.keywords for t in model.terms if t.keywords},
         "nonlinear_interval": intervals(model),
@@ -97,7 +99,7 @@ def _compared(
         again = _same_units(measurement, fresh)
         on_fresh = residuals_of(Problem(lot_of(again, like=measurement, square=square)), fitted)
         answer["fresh_rms_ug"] = MICRO * rms(on_fresh)
-        for unit, values in zip(again.units, _by_unit(again, on_fresh), strict=True):
+        for unit, values in zip(again.units, on_fresh.reshape(len(again.units), -1), strict=True):
             answer["by_unit"][unit]["fresh_rms_ug"] = MICRO * rms(values)
         answer["fresh_by_pose"] = _by_pose(again, on_fresh)
     if before is not None:
@@ -154,16 +156,6 @@ def _same_units(first: Measured, again: Measured) -> Measured:
             "give a fresh run of the same units, or leave the others out of both files"
         )
     return again.pick([again.units.index(u) for u in first.units])
-
-
-def _by_unit(measurement: Measured, left: Array) -> Array:
-    return left.reshape(len(measurement.units), -1)
-
-
-def _by_axis(left: Array, *, radial: bool) -> dict[str, float]:
-    if radial:
-        return {"norm": MICRO * rms(left)}
-    return {axis: MICRO * rms(left[i::3]) for i, axis in enumerate("xyz")}
 
 
 def _by_pose(measurement: Measured, left: Array) -> list[dict[str, Any]]:

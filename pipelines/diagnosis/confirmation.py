@@ -1,21 +1,22 @@
-"""Test of the effects added to a model: by a fresh run if there is one, else by dwells left out."""
+"""Test of the effects added to a model: by a fresh run if there is one, else by dwells left out; of all versions of a model."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from inertial.arrays import Array
 from inertial.criticism.left_out import Kind, LeftOut, left_out
-from inertial.criticism.reproduced_change import ReproducedChange, reproduced_change, without_own_bias
+from inertial.criticism.reproduced_change import reproduced_change, without_own_bias
 from inertial.decisions import BLOCKS, CONFIRMED, LEFT_OUT, RISES
 from inertial.estimation.comparison import estimate, residuals_of, rms
 from inertial.estimation.model import Model
 from inertial.estimation.problem import Lot, Problem
 from inertial.uncertainty.rounding import short
 from pipelines.diagnosis.result_rows import known
+from pipelines.jobs.model_files import Version
 from schemas.units import MICRO
 
 _TOLD = {"blocks of time": "stretches of time"}
@@ -55,7 +56,9 @@ def _by_fresh(before: Model, after: Model, out: LeftOut, fresh: Lot) -> dict[str
         rises = _clear_rise("the error on the fresh run", left[0], left[1]) or _rises_left_out(
             left_out(before, also=after.terms), out
         )
-        reason = rises or _unclear(change)
+        reason = rises
+        if not rises and np.isfinite(change.fall_error) and change.fall <= CONFIRMED * change.fall_error:
+            reason = "the fall of the error is not clearly more than its uncertainty"
     elif change.confirmed is None:
         reason = "the fresh run does not decide; measure another run"
     return {
@@ -72,13 +75,6 @@ def _by_fresh(before: Model, after: Model, out: LeftOut, fresh: Lot) -> dict[str
     }
 
 
-def _unclear(change: ReproducedChange) -> str | None:
-    """A fall on the fresh run that is no larger than its uncertainty, as text; None if it is larger, or has none."""
-    if not np.isfinite(change.fall_error) or change.fall > CONFIRMED * change.fall_error:
-        return None
-    return "the fall of the error is not clearly more than its uncertainty"
-
-
 def _by_left_out(before: LeftOut, after: LeftOut, doubt: Callable[[], str | None] = lambda: None) -> dict[str, Any]:
     kinds: list[Kind] = [kind for kind in before.density if kind in after.density]
     gains: dict[Kind, float] = {kind: after.density[kind] - before.density[kind] for kind in kinds}
@@ -86,10 +82,15 @@ def _by_left_out(before: LeftOut, after: LeftOut, doubt: Callable[[], str | None
     falls: dict[Kind, tuple[float, float]] = {kind: _fall(before.missed[kind], after.missed[kind]) for kind in kinds}
     worst = min(kinds, key=lambda kind: falls[kind][0]) if kinds else None
     both = (before.rms(set(kinds)), after.rms(set(kinds))) if kinds else (float("nan"), float("nan"))
-    convincing = gain is not None and gain > LEFT_OUT
-    rises = _rise("the error on dwells left out", *both) if convincing else None
-    # the search for a fault of the run is the longest part: only where it decides
-    against = rises or _disagreement(gains, falls) or doubt() if convincing else _no_gain(gain)
+    rises = None
+    if gain is None:
+        against = "no judgement is possible"
+    elif gain <= LEFT_OUT:
+        against = f"log density {gain:+.1f}, more than {LEFT_OUT:g} is needed"
+    else:
+        rises = _rise("the error on dwells left out", *both)
+        # the search for a fault of the run is the longest part: only where it decides
+        against = rises or _disagreement(gains, falls) or doubt()
     return {
         "judged_by": "dwells left out",
         # absence of evidence is no evidence: without a fresh run nothing is refuted
@@ -103,12 +104,6 @@ def _by_left_out(before: LeftOut, after: LeftOut, doubt: Callable[[], str | None
         "estimated_again": None,
         "log_density": gain,
     }
-
-
-def _no_gain(gain: float | None) -> str:
-    if gain is None:
-        return "no judgement is possible"
-    return f"log density {gain:+.1f}, more than {LEFT_OUT:g} is needed"
 
 
 def _disagreement(gains: Mapping[Kind, float], falls: Mapping[Kind, tuple[float, float]]) -> str | None:
@@ -126,7 +121,7 @@ def _disagreement(gains: Mapping[Kind, float], falls: Mapping[Kind, tuple[float,
 
 def fall_of(fall: float, error: float | None) -> str:
     """The decrease of an error, µg, with its standard uncertainty, as text."""
-    from pipelines.procedures.wording import with_uncertainty  # its room loads every procedure
+    from pipelines.procedures.figures import with_uncertainty  # its room loads every procedure
 
     size = f"{float(f'{abs(fall):.3g}'):g}" if error is None else f"{with_uncertainty(abs(fall), 2.0 * error)} (k = 2)"
     return f"the error {'falls' if fall >= 0.0 else 'rises'} by {size} µg"
@@ -134,9 +129,7 @@ def fall_of(fall: float, error: float | None) -> str:
 
 def _rise(what: str, before: float, after: float) -> str | None:
     """The error that rises with the added effects, as text; None if none rises or none can be judged."""
-    if not (np.isfinite(before) and np.isfinite(after)):
-        return None
-    if after <= (1.0 + RISES) * before:
+    if not (np.isfinite(before) and np.isfinite(after)) or after <= (1.0 + RISES) * before:
         return None
     return f"{what} rises from {short(MICRO * before)} to {short(MICRO * after)} µg"
 
@@ -178,3 +171,98 @@ def _fall(before: Array, after: Array) -> tuple[float, float]:
 
 def _decrease(before: Array, after: Array) -> float:
     return float(np.sqrt(np.nanmean(before**2)) - np.sqrt(np.nanmean(after**2)))
+
+
+FIGURES = {
+    "fitted_ug": "rms_ug",
+    "heldout_ug": "heldout_rms_ug",
+    "fresh_ug": "fresh_rms_ug",
+    "floor_ug": "floor_ug",
+}
+"""Figures of a version, with their keys in a comparison."""
+
+JUDGED = ("fall_ug", "fall_u_ug", "confirmed", "reason")
+
+
+Compare = Callable[[list[str], list[str] | None], dict[str, Any]]
+"""Errors of a model as :func:`pipelines.diagnosis.compare.compare` states them; the effects added to the second are judged."""
+
+
+def evolution(versions: Sequence[Version], compare: Compare) -> list[dict[str, Any]]:
+    """One row per version: the change, its errors, and the verdict on the change as text.
+
+    Parameters
+    ----------
+    versions : oldest first
+    """
+    rows: list[dict[str, Any]] = []
+    before: list[str] | None = None
+    for version in versions:
+        effects = list(version.effects)
+        errors = compare(effects, before if version.added else None)
+        progress = errors.get("progress")
+        row = {**change_row(version), **{name: errors[key] for name, key in FIGURES.items()}}
+        row |= {name: None if progress is None else progress.get(name) for name in JUDGED}
+        text = text_of(row, progress) if before is not None else "the model to begin with"
+        rows.append({**row, "text": text, "warnings": errors.get("warnings", [])})
+        before = effects
+    return rows
+
+
+def change_row(version: Version) -> dict[str, Any]:
+    """The change of a version with author, date and reason."""
+    change = version.change
+    return {
+        "version": version.number,
+        "added": list(version.added),
+        "removed": list(version.removed),
+        "effects": list(version.effects),
+        "by": change.by if change else "",
+        "at": change.at.isoformat() if change else "",
+        "why": change.why if change else "",
+        "run": change.run if change else "",
+    }
+
+
+def text_of(row: dict[str, Any], progress: dict[str, Any] | None) -> str:
+    """The verdict of unfitted data on a change, as text."""
+    if progress is None:
+        return "removed" if row["removed"] else "nothing added"
+    fall = _fall_text(progress)
+    if progress["judged_by"] == "fresh run":
+        return _told_by_fresh(progress, fall)
+    gain = progress["log_density"]
+    if progress["confirmed"]:
+        return f"confirmed on stretches of time left out (log density +{gain:.1f}), and the run shows no fault; {fall}"
+    why = progress.get("reason") or "no judgement is possible"
+    told = why if fall in why else f"{why}; {fall}"
+    decides = "a fresh run of the same units decides"
+    if gain is not None and gain > LEFT_OUT:
+        return (
+            f"holds on stretches of time left out (log density +{gain:.1f}), not decided by this run: {told}; {decides}"
+        )
+    return f"not decided by dwells left out: {told}; {decides}"
+
+
+def _told_by_fresh(progress: dict[str, Any], fall: str) -> str:
+    part, error = progress["part"], progress["part_u"]
+    if part is None:
+        return "not decided: the dwells of the fresh run do not show the effect; measure the same poses and temperatures again"
+    came = f"{part:.2f} ± {2.0 * error:.2f} (k = 2) of the predicted change appears in the fresh run"
+    if progress["confirmed"] is True:
+        return f"confirmed: {came}; {fall}"
+    if progress["confirmed"] is False:
+        return f"refuted: {came}; {fall}"
+    if part > CONFIRMED * error:  # the part alone would confirm it
+        return f"not decided: {came}, but {progress.get('reason')}; {fall}; measure another run"
+    return f"not decided: {came}; {fall}; measure another run"
+
+
+def _fall_text(progress: dict[str, Any]) -> str:
+    """The decrease of the error with its uncertainty; of a fresh run, without what may change from day to day."""
+    fall = progress["fall_ug"]
+    if fall is None:
+        return "the error cannot be judged on dwells left out"
+    beside = {"base": "the coefficients of the earlier model", "bias": "the bias of each unit"}
+    again = beside.get(progress["estimated_again"] or "")
+    return fall_of(fall, progress["fall_u_ug"]) + (f" where {again} may change from day to day" if again else "")

@@ -55,6 +55,10 @@ def import_document(
             judged = judge(fit, data, how)
     run = keep.keep(data, source, how, judged, archive, stated)
     turned = fit == "plane" and judged is not None and judged.adequate is not False  # its one axis is meant to be still
+    slips = (  # covariates whose name is close to a known one
+        f"'{shown(name)}' is imported as a covariate; if you mean {' or '.join(close)}, import again with that name"
+        for name, close in how.likely_slips.items()
+    )
     return {
         "run": run.id,
         "source": source.as_dict(),
@@ -62,7 +66,7 @@ def import_document(
         "out_unit": data.out_unit,
         "samples": 0 if data.samples is None else len(data.samples),
         "dwells": 0 if data.dwells is None else len(data.dwells),
-        "remarks": [*(r for r in data.remarks if not (turned and r.startswith(CHECK_AXIS))), *_slips(how)],
+        "remarks": [*(r for r in data.remarks if not (turned and r.startswith(CHECK_AXIS))), *slips],
         "faults": list(data.faults),
         "fit": fit or None,
         "adequate": None if judged is None else judged.adequate,
@@ -70,14 +74,6 @@ def import_document(
         "lines": [] if judged is None else list(judged.lines),
         "dwell_list": dwell_rows(data, judged, how),
     }
-
-
-def _slips(how: Mapping) -> list[str]:
-    """A sentence for every covariate whose name is close to a known one."""
-    return [
-        f"'{shown(name)}' is imported as a covariate; if you mean {' or '.join(close)}, import again with that name"
-        for name, close in how.likely_slips.items()
-    ]
 
 
 def _mapping(keys: dict[str, Any], content: Content, where: str, name: str) -> Mapping:

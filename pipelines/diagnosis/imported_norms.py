@@ -148,7 +148,14 @@ def _lines(done: FittedNorms, smaller: FittedNorms | None, verdict: dict[str, An
     spread = bias_uncertainty(done)
     units = range(len(done.measured.units))
     lines += [_axis_line(done, spread, (unit, k), out_unit) for unit in units for k in range(3)]
-    lines += _large_biases(_bias(done)[0], done.scale[0], out_unit)
+    share = _bias(done)[0] / done.scale[0]
+    if out_unit in {"g", "m/s^2"}:  # the zero of counts and volts may lie anywhere
+        lines += [
+            f"CHECK AXIS {AXES[k]}: its bias is {share[k]:.2g} of gravity, which no sound sensor has: a factory offset applied "
+            "twice, a shifted word, or a damaged axis"
+            for k in range(3)
+            if abs(share[k]) > _LARGE_BIAS
+        ]
     out = verdict["leave_out"]
     if out is not None:
         lines.append(_bad_line(out, verdict))
@@ -158,17 +165,6 @@ def _lines(done: FittedNorms, smaller: FittedNorms | None, verdict: dict[str, An
     if verdict["reason"] and out is None:
         lines.append(f"cannot be judged: {verdict['reason']}")
     return lines
-
-
-def _large_biases(bias: Array, scale: Array, unit: str) -> list[str]:
-    """A sentence on each axis whose bias is no bias of a sensor; not for counts and volts, whose zero may lie anywhere."""
-    share = bias / scale
-    return [
-        f"CHECK AXIS {AXES[k]}: its bias is {share[k]:.2g} of gravity, which no sound sensor has: a factory offset applied "
-        "twice, a shifted word, or a damaged axis"
-        for k in range(3)
-        if unit in {"g", "m/s^2"} and abs(share[k]) > _LARGE_BIAS
-    ]
 
 
 def _noise_line(error: dict[str, Any], count: int) -> str:

@@ -17,7 +17,7 @@ from pipelines.importers import files
 from pipelines.importers.documents import TransferImport, TransferParameter
 from pipelines.importers.keep import keep_tables, lot_of_import
 from pipelines.importers.values import finite_column
-from pipelines.procedures.columns import finding_table, gathered_points
+from pipelines.procedures.recorded import finding_table, gathered_points
 from pipelines.procedures.transfer_figures import bandwidth_of, diagnosis_text
 from schemas.errors import DataRejected, WrongUse, did_you_mean
 

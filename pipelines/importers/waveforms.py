@@ -21,8 +21,16 @@ from pipelines.importers.mapping import TIME_UNITS
 from pipelines.importers.values import finite_column
 from pipelines.procedures import PROCEDURES
 from pipelines.procedures.base import FromWaveforms, NominalScale
-from pipelines.procedures.columns import figure_table, finding_table, gathered_points
-from pipelines.procedures.recorded import REFERENCE, Device, ProcedureRecord, ProcedureStep, UnitRecord
+from pipelines.procedures.recorded import (
+    REFERENCE,
+    Device,
+    ProcedureRecord,
+    ProcedureStep,
+    UnitRecord,
+    figure_table,
+    finding_table,
+    gathered_points,
+)
 from schemas.errors import DataRejected, WrongUse, did_you_mean
 from schemas.foreign import shown
 from schemas.poses import Pose

@@ -70,7 +70,7 @@ def errors_by_version(
     ----------
     working : is entered while a version is fitted
     """
-    from pipelines.diagnosis.model_history import evolution
+    from pipelines.diagnosis.confirmation import evolution
 
     def compared(effects: list[str], before: list[str] | None) -> dict[str, Any]:
         with working():
@@ -227,7 +227,7 @@ class Improvement:
 
     def _rows(self, versions: list[Version], noise: float | None, given: ImprovedTables) -> list[dict[str, Any]]:
         """Errors of each version; none where no unit can be judged."""
-        from pipelines.diagnosis.model_history import JUDGED
+        from pipelines.diagnosis.confirmation import JUDGED
 
         if noise is None:
             return []

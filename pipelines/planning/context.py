@@ -1,9 +1,10 @@
-"""A recipe on a station before it is measured: its activities and dwells, and what the poses of verification show besides."""
+"""A recipe on a station before it is measured: activities, dwells and procedures, and what poses of verification show besides."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,10 +13,12 @@ from inertial.noise.dwells import DwellNoise, dwell_covariance
 from inertial.noise.flicker import FLICKER_FLOOR
 from inertial.planning.visibility import SEEN, visibilities
 from inertial.state import State
+from pipelines.procedures import PROCEDURES, FigureSpec, parts_of
 from pipelines.schedule.planned_state import state_of
 from pipelines.schedule.steps import steps
-from pipelines.schedule.timing import Activity, schedule
+from pipelines.schedule.timing import Activity, schedule, spent
 from schemas.errors import RecipeInvalid
+from schemas.limits import Limit, Limits
 from schemas.recipe import Recipe
 from schemas.station import StationConfig
 from stations.plant.preset import load_preset
@@ -105,3 +108,47 @@ def noise_of(recipe: Recipe, device: str, density: float | None, wander: float |
     if wander is not None:
         return DwellNoise(white * UG, wander * UG / FLICKER_FLOOR)
     return DwellNoise(white * UG, preset.bias_instability_ug * UG, preset.rate_random_walk_ug * UG)
+
+
+def plan_of_procedures(recipe: Recipe, station: StationConfig, limits: Limits | None) -> dict[str, Any]:
+    """Document of a recipe without the multi-position test: its time and procedures; no effect of a sensor's model is fitted."""
+    return {
+        "recipe": recipe.name,
+        "device": recipe.device,
+        "station": station.name,
+        "minutes": spent(schedule(steps(recipe), station, recipe)).document(),
+        "procedures": procedure_rows(recipe, station, limits),
+        "effects": [],
+    }
+
+
+def procedure_rows(recipe: Recipe, station: StationConfig, limits: Limits | None) -> list[dict[str, Any]]:
+    """A row for each procedure of the recipe's list, in order: records, station time, equipment, figures with their limits."""
+    activities = schedule(steps(recipe), station, recipe)
+    asked = {} if limits is None else limits.figures
+    rows: list[dict[str, Any]] = []
+    for number, part in enumerate(parts_of(recipe)):
+        procedure = PROCEDURES[part.kind]
+        own = [activity for activity in activities if activity.step.procedure == number]
+        rows.append(
+            {
+                "procedure": part.kind,
+                "states": procedure.states,
+                "records": len({activity.step.record for activity in own}),
+                "minutes": round(spent(own).total, 2),
+                "temperatures_C": list(dict.fromkeys(activity.step.temperature for activity in own)),
+                "equipment": list(procedure.roles),
+                "figures": [_figure(spec, asked) for spec in procedure.figures],
+            }
+        )
+    return rows
+
+
+def _figure(spec: FigureSpec, asked: Mapping[str, Limit]) -> dict[str, Any]:
+    limit = asked.get(spec.name)
+    return {
+        "figure": spec.name,
+        "unit": spec.unit,
+        "meaning": spec.meaning,
+        "limit": None if limit is None else limit.text,
+    }

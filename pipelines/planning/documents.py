@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, NotRequired
+from typing import Annotated, Any, NotRequired
 
 from typing_extensions import TypedDict
 
@@ -179,3 +179,12 @@ class ChoiceDocument(TypedDict):
     calibrations: Annotated[dict[str, str], "what each calibration is"]
     assumptions: list[str]
     candidates: Annotated[list[ChoiceRow], "those that reach the error first"]
+
+
+def worst_axes(reach: dict[str, Any]) -> dict[str, dict[str, Any]]:
+    """The row with the largest uncertainty of each quantity that a plan can reach."""
+    worst: dict[str, dict[str, Any]] = {}
+    for row in reach["quantities"]:
+        if row["quantity"] not in worst or row["u"] > worst[row["quantity"]]["u"]:
+            worst[row["quantity"]] = row
+    return worst

@@ -16,13 +16,11 @@ from inertial.planning.expected import Expected
 from inertial.planning.pose_exchange import exchanged
 from inertial.planning.visibility import visibilities
 from pipelines.planning.context import PlanContext, plan_context
-from pipelines.planning.lower_bound import lower_bound
+from pipelines.planning.lower_bound import lower_bound, mirrored, orders, ramp_orders
 from pipelines.planning.plan import identified
-from pipelines.planning.requirement import Requirement
-from pipelines.planning.soak_orders import mirrored, orders, ramp_orders
+from pipelines.planning.requirement import Requirement, apart, numbered, turns
 from pipelines.planning.textbook import PART_SEEN
 from pipelines.planning.timed_design import FEWEST, MOST, PlanDesign, TimedDesign, fewest_dwells, short_of, spanned
-from pipelines.planning.verification_poses import apart, numbered, turns
 from pipelines.schedule.timing import spent
 from schemas.errors import RecipeInvalid
 from schemas.poses import SoakPart
@@ -181,10 +179,7 @@ class RecipeSearch:
         tried: list[tuple[float, PlanDesign]] = []
         for seconds, order in likely:
             if math.isfinite(seconds):
-                tried += [
-                    self.with_fewest_dwells(PlanDesign(order, (), length, self.ramp))
-                    for length in self.timed.dwell_lengths()
-                ]
+                tried += [self.with_fewest_dwells(order, length) for length in self.timed.dwell_lengths()]
         chosen: list[tuple[PlanDesign, float]] = []
         for seconds, plan in sorted(tried, key=lambda one: one[0]):
             used = {other.order for other, _ in chosen}
@@ -218,9 +213,10 @@ class RecipeSearch:
             return math.inf
         return ends[0] + (ends[1] - ends[0]) * (count - few) / (many - few)
 
-    def with_fewest_dwells(self, plan: PlanDesign) -> tuple[float, PlanDesign]:
+    def with_fewest_dwells(self, order: tuple[float, ...], dwell_s: float) -> tuple[float, PlanDesign]:
         """The design with the fewest dwells, and its station time in s; infinite where no number is enough."""
-        ratio, _ = self.timed.ratio_and_seconds(replace(plan, counts=(FEWEST,) * len(plan.order)))
+        plan = PlanDesign(order, (FEWEST,) * len(order), dwell_s, self.ramp)
+        ratio, _ = self.timed.ratio_and_seconds(plan)
         fewest = fewest_dwells(self.timed, plan, self.allowed(ratio))
         return (math.inf, plan) if fewest is None else (self.timed.ratio_and_seconds(fewest)[1], fewest)
 
@@ -256,11 +252,8 @@ class RecipeSearch:
         if self.near is None or self.near[0] > tolerance:
             return None
         nearest = self.near[1]
-        return (
-            None
-            if measuring_minutes(nearest) >= measuring_minutes(self.against) or self.not_visible(nearest)
-            else nearest
-        )
+        quicker = measuring_minutes(nearest) < measuring_minutes(self.against)
+        return nearest if quicker and not self.not_visible(nearest) else None
 
     def slower(self, plan: PlanDesign, best: PlanContext | None) -> bool:
         """Whether a design clearly takes longer than the best recipe so far."""

@@ -18,14 +18,6 @@ from schemas.recipe import Recipe
 from schemas.units import AXES, MICRO
 
 
-def _bound(best: Optimum, base: Recipe) -> dict[str, Any] | None:
-    """The least share of the textbook plan's station time on ramps, and what determines it; None for soaks and discrimination."""
-    if not best.ramp or best.requirement.discrimination is not None:
-        return None
-    lower = lower_bound(base, best.against, best.requirement, ramp=True)
-    return None if lower is None else {"share": lower.share, "effect": lower.effect}
-
-
 def optimum_document(best: Optimum, base: Recipe, name: str) -> dict[str, Any]:
     """The result of a search as a document for programs.
 
@@ -33,14 +25,15 @@ def optimum_document(best: Optimum, base: Recipe, name: str) -> dict[str, Any]:
     ----------
     base : the recipe that the search started from; ``name`` : as given on the command line
     """
-    document = plan(best.planned)
+    document, by_errors = plan(best.planned), best.requirement.discrimination is None
+    lower = lower_bound(base, best.against, best.requirement, ramp=True) if best.ramp and by_errors else None
     slowest = float(best.against.state.time[-1])  # the flicker model of the new recipe
     own = plan_context(base, best.against.station, best.against.noise, slowest=slowest)
     try:
         own_errors = identified(own).errors
     except NotIdentified:
         own_errors = None
-    textbook = best.against
+    textbook, recipe = best.against, best.planned.recipe
     seen = {s.effect for s in visibilities(textbook.state, textbook.recipe.effects, 1.0) if s.seen}
     reference = {
         (row["true"], row["wrong"]): row["chi_square"] for row in rival_separations(best.requirement, textbook)
@@ -57,25 +50,22 @@ def optimum_document(best: Optimum, base: Recipe, name: str) -> dict[str, Any]:
         "dwells": document["dwells"],
         "minutes": document["minutes"],
         "own_minutes": spent(own.activities).document(),
-        "own_worst": _own_worst(best, own_errors),
+        # largest ratio of the own recipe's errors to the required ones; None for rivals, or where it cannot identify its model
+        "own_worst": float((own_errors / best.requirement.errors).max())
+        if by_errors and own_errors is not None
+        else None,
         "textbook_minutes": spent(textbook.activities).document(),
         "share": best.share,
         "ramp": best.ramp,
-        "bound": _bound(best, base),
-        "verification_dwells": _verification(best.planned.recipe),
+        # least share of the textbook plan's station time on ramps, and what determines it; None for soaks and discrimination
+        "bound": None if lower is None else {"share": lower.share, "effect": lower.effect},
+        "verification_dwells": sum(len(recipe.verification_at(k)) for k in range(len(recipe.temperatures_C))),
         "worst": best.worst,
         "coefficients": _coefficient_rows(best, document["coefficients"], own_errors),
         "rivals": rivals,
         "seen_besides": sorted({row["effect"] for row in document["effects"] if row["seen"]} - seen),
         "plan": document,
     }
-
-
-def _own_worst(best: Optimum, own_errors: Array | None) -> float | None:
-    """Largest ratio of the own recipe's errors to the required ones; None for rivals, or where it cannot identify its model."""
-    if own_errors is None or best.requirement.discrimination is not None:
-        return None
-    return float((own_errors / best.requirement.errors).max())
 
 
 def _coefficient_rows(
@@ -92,8 +82,3 @@ def _coefficient_rows(
             errors = {"wanted_ug": required, "own_ug": own_errors}
             rows.append({**row, **{key: None if e is None else MICRO * float(e[at]) for key, e in errors.items()}})
     return rows
-
-
-def _verification(recipe: Recipe) -> int:
-    """Number of verification dwells of a recipe."""
-    return sum(len(recipe.verification_at(k)) for k in range(len(recipe.temperatures_C)))

@@ -14,7 +14,7 @@ from inertial.planning.visibility import visibilities
 from inertial.state import State
 from pipelines.planning.context import PlanContext, plan_context
 from pipelines.planning.plan import identified
-from pipelines.planning.verification_poses import numbered
+from pipelines.planning.requirement import numbered
 from pipelines.schedule.planned_state import planned_state
 from schemas.recipe import Recipe
 

@@ -17,8 +17,7 @@ from inertial.frames import force_from_angles
 from inertial.noise.dwells import DwellNoise, dwell_covariance
 from inertial.noise.flicker import flicker_of_means
 from inertial.planning.pose_exchange import PlanSlots
-from pipelines.planning.requirement import Requirement
-from pipelines.planning.verification_poses import numbered, turns
+from pipelines.planning.requirement import Requirement, numbered, turns
 from pipelines.schedule.planned_state import settled_state
 from pipelines.schedule.timing import StationPose, air_of, move_seconds, soaked
 from schemas.recipe import FEWEST_SAMPLES, Recipe

@@ -10,7 +10,6 @@ from collections.abc import Mapping
 from importlib import import_module
 from inspect import isabstract
 from pkgutil import iter_modules
-from types import ModuleType
 from typing import Any, TypeVar
 
 from pydantic import ValidationError
@@ -47,8 +46,6 @@ __all__ = [
     "steps_of",
 ]
 
-MULTI_POSITION = "multi_position"
-
 
 class IncompleteProcedure(Exception):
     """A module without a procedure, or with a name or figure that another has: its author must correct it."""
@@ -66,7 +63,8 @@ def find_procedures(package: str, path: Any) -> dict[str, Procedure]:
     for info in iter_modules(path):
         module = import_module(f"{package}.{info.name}")
         one = getattr(module, "PROCEDURE", None)
-        if one is None and not _defines_one(module):
+        own = (kind for kind in vars(module).values() if isinstance(kind, type) and kind.__module__ == module.__name__)
+        if one is None and not any(issubclass(kind, Procedure) and not isabstract(kind) for kind in own):
             continue  # a part that procedures share
         if not isinstance(one, Procedure) or one.name != info.name:
             raise IncompleteProcedure(
@@ -79,12 +77,6 @@ def find_procedures(package: str, path: Any) -> dict[str, Procedure]:
     if twice:
         raise IncompleteProcedure(f"{package}: figure {', '.join(twice)} is declared twice; rename one")
     return {one.name: one for one in sorted(procedures, key=lambda one: (one.order, one.name))}
-
-
-def _defines_one(module: ModuleType) -> bool:
-    """Whether a module has a procedure of its own, in whole."""
-    own = (one for one in vars(module).values() if isinstance(one, type) and one.__module__ == module.__name__)
-    return any(issubclass(one, Procedure) and not isabstract(one) for one in own)
 
 
 def _refuse_half(module: str, one: Procedure) -> None:

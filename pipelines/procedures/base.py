@@ -12,9 +12,8 @@ from pydantic import Field
 
 from inertial.errors import NotIdentified
 from pipelines.drawing.chart import Chart
-from pipelines.procedures.columns import point_table
 from pipelines.procedures.figures import FigureSpec, FigureValue, Finding, Outcome, Texts, UnitOutcome
-from pipelines.procedures.recorded import Array, Device, ProcedureStep, Records, Taken, UnitRecord, taken
+from pipelines.procedures.recorded import Array, Device, ProcedureStep, Records, Taken, UnitRecord, point_table, taken
 from schemas.errors import RecipeInvalid, did_you_mean
 from schemas.recipe import Recipe, Strict
 from schemas.station import StationConfig

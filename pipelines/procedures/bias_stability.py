@@ -12,10 +12,8 @@ from pydantic import Field
 from inertial.dynamics.stability import StabilityFigures, block_means, stability
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace
 from pipelines.procedures.base import InG, NominalScale, RecordByRecord, scale_of
-from pipelines.procedures.columns import numbers, point_rows
-from pipelines.procedures.figures import FigureSpec, FigureValue, UnitOutcome, worst
-from pipelines.procedures.recorded import Device, ProcedureStep, Taken
-from pipelines.procedures.wording import with_uncertainty
+from pipelines.procedures.figures import FigureSpec, FigureValue, UnitOutcome, with_uncertainty, worst
+from pipelines.procedures.recorded import Device, ProcedureStep, Taken, numbers, point_rows
 from schemas.bounds import Positive
 from schemas.poses import Pose
 from schemas.recipe import Recipe

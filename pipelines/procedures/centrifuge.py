@@ -26,9 +26,8 @@ from pipelines.procedures.centrifuge_radii import (
     texts_of_radii,
     texts_of_radius,
 )
-from pipelines.procedures.columns import numbers
-from pipelines.procedures.figures import FigureSpec, FigureValue, UnitOutcome
-from pipelines.procedures.recorded import REFERENCE, Device, ProcedureStep, Taken, on_equipment
+from pipelines.procedures.figures import FigureSpec, UnitOutcome
+from pipelines.procedures.recorded import REFERENCE, Device, ProcedureStep, Taken, numbers, on_equipment
 from schemas.bounds import NotNegative, Positive
 from schemas.errors import RecipeInvalid
 from schemas.recipe import Recipe
@@ -176,48 +175,40 @@ class CentrifugeTest(InG, OnEquipment, RecordByRecord):
             )
         if bool((rows["spread"] <= 0.0).any()):
             raise NotIdentified("the output is constant; check the unit")
-        if _responds(rows) < 0.5:
+        force, value = numbers(rows, "setting", "value")
+        if float(np.corrcoef(force, value)[0, 1] ** 2) < 0.5:  # share of the variance that the acceleration explains
             raise NotIdentified("the output does not follow the acceleration; check cable and mounting")
-        figures, texts = _of_radii(part, rows) if part.radii_m else _of_radius(part, rows)
+        if part.radii_m:
+            radii = fitted_radii(rows, 1e-6 * part.radius_um)
+            figures, texts = figures_of_radii(radii, part.full_scale_g), texts_of_radii(radii, part.radii)
+        else:
+            fit = fitted(part, rows)
+            figures = figures_of_radius(fit, part.full_scale_g, part.radius_m, 1e-6 * part.radius_um)
+            texts = texts_of_radius(fit, part.radius_m, both=part.reversed)
         return figures, [*texts, *diagnosis_text(judged(part, rows))]
 
     def chart(self, part: CentrifugePart, points: pd.DataFrame) -> Chart:
         """Departure from the straight line over the acceleration, with the polynomial; each radius has a line of its own."""
-        traces = of_radii(points, 1e-6 * part.radius_um) if part.radii_m else self._of_one_radius(part, points)
+        if part.radii_m:
+            traces = of_radii(points, 1e-6 * part.radius_um)
+        else:
+            force, value, error = numbers(points)
+            line, fit = np.polyfit(force, value, 1), fitted(part, points)
+            shown, expanded = 1e3 * (value - np.polyval(line, force)), 2e3 * error
+            x = np.linspace(force.min(), force.max(), 300)
+            curve = columns(x, fit.names) @ fit.value - np.polyval(line, x)
+            traces = [
+                Trace("measured, U (k = 2)", force, shown, error=expanded),
+                Trace("polynomial", x, 1e3 * curve, "line", "before"),
+            ]
         axes = PlotAxis("acceleration / g"), PlotAxis("departure from the straight line / mg")
         return Chart(self.title, (Plot("", *axes, tuple(traces)),))
-
-    @staticmethod
-    def _of_one_radius(part: CentrifugePart, points: pd.DataFrame) -> list[Trace]:
-        force, value, error = numbers(points)
-        line = np.polyfit(force, value, 1)
-        shown, expanded = 1e3 * (value - np.polyval(line, force)), 2e3 * error
-        fit = fitted(part, points)
-        x = np.linspace(force.min(), force.max(), 300)
-        curve = columns(x, fit.names) @ fit.value - np.polyval(line, x)
-        return [
-            Trace("measured, U (k = 2)", force, shown, error=expanded),
-            Trace("polynomial", x, 1e3 * curve, "line", "before"),
-        ]
 
 
 def fitted(part: CentrifugePart, rows: pd.DataFrame) -> Polynomial:
     """All terms with the input reversed; without it the four that one direction separates."""
     force, value, error = numbers(rows)
     return fit_polynomial(force, value, error, TERMS if part.reversed else TERMS[:4])
-
-
-def _of_radius(part: CentrifugePart, rows: pd.DataFrame) -> tuple[list[FigureValue], list[tuple[str, str]]]:
-    """Figures and texts of a unit at one radius."""
-    fit = fitted(part, rows)
-    figures = figures_of_radius(fit, part.full_scale_g, part.radius_m, 1e-6 * part.radius_um)
-    return figures, texts_of_radius(fit, part.radius_m, both=part.reversed)
-
-
-def _of_radii(part: CentrifugePart, rows: pd.DataFrame) -> tuple[list[FigureValue], list[tuple[str, str]]]:
-    """Figures and texts of a unit at several radii."""
-    fit = fitted_radii(rows, 1e-6 * part.radius_um)
-    return figures_of_radii(fit, part.full_scale_g), texts_of_radii(fit, part.radii)
 
 
 def judged(part: CentrifugePart, rows: pd.DataFrame) -> SpinDiagnosis:
@@ -228,12 +219,6 @@ def judged(part: CentrifugePart, rows: pd.DataFrame) -> SpinDiagnosis:
     slowing = np.r_[0.0, (np.diff(np.abs(force)) < 0.0) & same].astype(float)
     spins = Spins(force, radius, np.linspace(0.0, 1.0, force.size), slowing, 1e-6 * part.radius_um)
     return diagnose_spins(spins, value, error, part.effects)
-
-
-def _responds(rows: pd.DataFrame) -> float:
-    """Share of the output's variance that the acceleration explains."""
-    force, value = numbers(rows, "setting", "value")
-    return float(np.corrcoef(force, value)[0, 1] ** 2)
 
 
 PROCEDURE = CentrifugeTest()

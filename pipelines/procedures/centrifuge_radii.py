@@ -13,9 +13,8 @@ from inertial.dynamics.centrifuge_diagnosis import SpinDiagnosis
 from inertial.dynamics.centrifuge_effects import EFFECTS
 from inertial.dynamics.centrifuge_radii import RadiiFit, fit_radii
 from pipelines.drawing.chart import SEVERAL, Trace
-from pipelines.procedures.columns import numbers
-from pipelines.procedures.figures import FigureValue
-from pipelines.procedures.wording import diagnosis_texts, verdict_of, with_uncertainty
+from pipelines.procedures.figures import FigureValue, diagnosis_texts, verdict_of, with_uncertainty
+from pipelines.procedures.recorded import numbers
 from schemas.units import MICRO
 
 OF_RADII = ("centrifuge_mass_offset_um", "centrifuge_radius_consistency_ppm")
@@ -72,8 +71,7 @@ def texts_of_radii(fit: RadiiFit, radii: Sequence[float]) -> list[tuple[str, str
             ("Koq", f"{_stated(unit.of('odd_quadratic'), MICRO)} µg/g² (k = 2)"),
         ]
     else:
-        text = "K1′ is in the sensitivity and Koq in K2; measure with the units reversed"
-        out.append(("not determined", text))
+        out.append(("not determined", "K1′ is in the sensitivity and Koq in K2; measure with the units reversed"))
     each = ", ".join(
         f"{radius:g} m {_stated(one, MICRO)} µm"
         for radius, one in zip(sorted(radii, reverse=True), fit.radius_errors_m, strict=True)
@@ -124,28 +122,17 @@ def texts_of_radius(fit: Polynomial, radius_m: float, *, both: bool) -> list[tup
     """Verdict on the polynomial at one radius, and the classes of effects that it holds: subject and text."""
     out = [("model", f"polynomial {' + '.join(fit.names)} {verdict_of(fit)}")]
     if not both:
-        text = (
-            "arm stretch, Koq and the offset of the proof mass cannot be separated from K2, K3 and bias; "
-            "measure with the units reversed"
-        )
-        return [*out, ("not determined", text)]
-    for name, text in (
-        (
-            "arm_stretch_or_odd_quadratic",
-            "arm stretch or Koq, one class: two radii (radii_m) or the optical radius at speed separate them",
-        ),
-        (
-            "mass_offset_or_asymmetry",
-            "offset of the proof mass from the turning centre, or K1′, one class: two radii (radii_m) separate them",
-        ),
+        open_ = "arm stretch, Koq and the offset of the proof mass cannot be separated from K2, K3 and bias"
+        return [*out, ("not determined", f"{open_}; measure with the units reversed")]
+    stretch = "arm stretch or Koq, one class: two radii (radii_m) or the optical radius at speed separate them"
+    offset = "offset of the proof mass from the turning centre, or K1′, one class: two radii (radii_m) separate them"
+    for name, text, factor, unit in (
+        ("arm_stretch_or_odd_quadratic", stretch, MICRO, "µg/g²"),
+        ("mass_offset_or_asymmetry", offset, 1e3 * radius_m, "mm of offset"),
     ):
         value, error = fit.of(name)
         if abs(value) > 4.0 * error:
-            factor = 1e3 * radius_m if name.startswith("mass") else MICRO
-            unit = "mm of offset" if name.startswith("mass") else "µg/g²"
-            out.append(
-                ("effect found", f"{text}: {with_uncertainty(factor * value, 2.0 * factor * error)} {unit} (k = 2)")
-            )
+            out.append(("effect found", f"{text}: {_stated((value, error), factor)} {unit} (k = 2)"))
     return out
 
 

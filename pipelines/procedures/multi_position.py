@@ -38,15 +38,12 @@ class MultiPosition(Procedure):
                 ProcedureStep(pose.name, pose, temperature, "verification", soak=soak, settled=settled)
                 for pose in recipe.verification_at(soak)
             ]
-            steps += _interleaved(fit, checks) if recipe.verification_order == "interleaved" else [*fit, *checks]
+            every = [*fit, *checks]
+            if recipe.verification_order == "interleaved":  # those for verification spread among the others
+                at = [(k + 0.5) / len(own) for own in (fit, checks) for k in range(len(own))]
+                every = [every[k] for k in sorted(range(len(every)), key=lambda k: (at[k], k))]
+            steps += every
         return steps
-
-
-def _interleaved(fit: list[ProcedureStep], checks: list[ProcedureStep]) -> list[ProcedureStep]:
-    """The records of a soak with those for verification spread among the others."""
-    places = [(k + 0.5) / len(own) for own in (fit, checks) for k in range(len(own))]
-    every = [*fit, *checks]
-    return [every[k] for k in sorted(range(len(every)), key=lambda k: (places[k], k))]
 
 
 PROCEDURE = MultiPosition()

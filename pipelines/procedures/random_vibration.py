@@ -18,13 +18,22 @@ from inertial.dynamics.transfer_effects import EFFECTS
 from inertial.errors import NotIdentified
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace
 from pipelines.procedures.base import Evaluated, InG, NominalScale, OnEquipment, refuse_unknown_effects, scale_of
-from pipelines.procedures.columns import numbers, point_rows, point_table
-from pipelines.procedures.figures import FigureSpec, FigureValue, Texts, UnitOutcome
-from pipelines.procedures.recorded import REFERENCE, Device, ProcedureStep, Records, UnitRecord, on_equipment, taken
+from pipelines.procedures.figures import FigureSpec, FigureValue, Texts, UnitOutcome, signed
+from pipelines.procedures.recorded import (
+    REFERENCE,
+    Device,
+    ProcedureStep,
+    Records,
+    UnitRecord,
+    numbers,
+    on_equipment,
+    point_rows,
+    point_table,
+    taken,
+)
+from pipelines.procedures.sweep import bode_chart
 from pipelines.procedures.sweep_points import FEWEST_POINTS, condition_texts, response_bands, transfer_points
-from pipelines.procedures.transfer_chart import bode_chart
 from pipelines.procedures.transfer_figures import diagnosis_text, figures_of_model, judged_points
-from pipelines.procedures.wording import signed
 from schemas.bounds import NotNegative, Positive
 from schemas.recipe import Recipe
 from schemas.units import AXES, MICRO

@@ -14,10 +14,8 @@ from inertial.dynamics.stability import difference_error, short_noise
 from inertial.errors import NotIdentified
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Role, Trace, level
 from pipelines.procedures.base import Part, RecordByRecord, SetsEquipment
-from pipelines.procedures.columns import noise_columns, pooled_noise
-from pipelines.procedures.figures import FigureSpec, FigureValue, UnitOutcome, worst
-from pipelines.procedures.recorded import Device, ProcedureStep, Taken
-from pipelines.procedures.wording import with_uncertainty
+from pipelines.procedures.figures import FigureSpec, FigureValue, UnitOutcome, with_uncertainty, worst
+from pipelines.procedures.recorded import Device, ProcedureStep, Taken, noise_columns, pooled_noise
 from schemas.bounds import NotNegative, Positive, Wait
 from schemas.errors import RecipeInvalid
 from schemas.poses import Pose
@@ -187,26 +185,22 @@ def over_supply(part: RatiometryPart, rows: pd.DataFrame) -> Follows:
     noise, window = pooled_noise(rows), float(rows["window_s"].mean())
     # both faces of a voltage follow each other: slow wander is the same on them, so their mean has it like one longer record,
     # and their difference has what wanders from one face to the other, however long ago the nominal voltage was
-    zero_error = np.maximum(error, difference_error(noise, 2.0 * window, _time_between_voltages(rows)) / np.sqrt(2.0))
-    error = np.maximum(error, 0.5 * difference_error(noise, window, _time_between_faces(rows)))
+    faces, voltages = _times_between(rows)
+    zero_error = np.maximum(error, difference_error(noise, 2.0 * window, voltages) / np.sqrt(2.0))
+    error = np.maximum(error, 0.5 * difference_error(noise, window, faces))
     own = 1e-6 * part.repeatability_ug * abs(sensitivity[0]) / np.sqrt(2.0)
     error, zero_error = np.hypot(error, own), np.hypot(zero_error, own)
     return departures(measured, zero, sensitivity, error, follows=part.follows, zero_error=zero_error)
 
 
-def _time_between_faces(rows: pd.DataFrame) -> float:
-    """Mean time between the two faces of a voltage, s; 0 where no times are known."""
+def _times_between(rows: pd.DataFrame) -> tuple[float, float]:
+    """Mean times between the two faces of a voltage, and between a voltage and the first one, s; 0 where none are known."""
     if "time_s" not in rows:  # points of earlier versions have none
-        return 0.0
-    return float(rows.groupby("setting", sort=False)["time_s"].agg(np.ptp).mean())
-
-
-def _time_between_voltages(rows: pd.DataFrame) -> float:
-    """Mean time between a voltage and the first one, s; 0 where no times are known."""
-    if "time_s" not in rows:  # points of earlier versions have none
-        return 0.0
-    middle = rows.groupby("setting", sort=False)["time_s"].mean()
-    return float((middle - middle.min()).drop(middle.idxmin()).mean()) if len(middle) > 1 else 0.0
+        return 0.0, 0.0
+    by_voltage = rows.groupby("setting", sort=False)["time_s"]
+    middle = by_voltage.mean()
+    apart = float((middle - middle.min()).drop(middle.idxmin()).mean()) if len(middle) > 1 else 0.0
+    return float(by_voltage.agg(np.ptp).mean()), apart
 
 
 def _figure(name: str, axis: str, one: Follows, device: Device) -> FigureValue:

@@ -15,9 +15,8 @@ from inertial.dynamics.shock_effects import EFFECTS
 from inertial.dynamics.stability import difference_error, error_of_mean, short_noise
 from inertial.errors import NotIdentified
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Role, Trace
-from pipelines.procedures import shock_pulse, shock_waves
+from pipelines.procedures import shock_waves
 from pipelines.procedures.base import FromWaveforms, InG, NominalScale, OnEquipment, refuse_unknown_effects, scale_of
-from pipelines.procedures.columns import noise_columns, numbers, point_rows, point_table, pooled_noise
 from pipelines.procedures.figures import FigureSpec, FigureValue, UnitOutcome, worst
 from pipelines.procedures.recorded import (
     REFERENCE,
@@ -27,13 +26,19 @@ from pipelines.procedures.recorded import (
     Taken,
     UnitRecord,
     at_rest,
+    noise_columns,
+    numbers,
     on_equipment,
+    point_rows,
+    point_table,
+    pooled_noise,
     taken,
 )
 from schemas.bounds import NotNegative, Positive, Wait
 from schemas.recipe import Recipe
 from schemas.units import AXES, MICRO
 
+STUCK = 1e-9  # µg, uncertainty of the mean of an output that never changes
 TOO_FAR = 1.5
 """Ratio of the stated to the recorded duration beyond which the low-pass for one would alter the peak of the other."""
 
@@ -91,7 +96,7 @@ class ShockTest(InG, OnEquipment, FromWaveforms):
         FigureSpec(
             "shock_bias_shift_ug", "µg", "bias after the shocks minus before, same pose and temperature, worst axis"
         ),
-        *shock_pulse.OF_PULSE,
+        *shock_waves.OF_PULSE,
     )
 
     def steps(self, part: ShockPart, recipe: Recipe) -> list[ProcedureStep]:
@@ -155,13 +160,13 @@ class ShockTest(InG, OnEquipment, FromWaveforms):
             pair = shock_waves.filtered_pair(
                 in_g if alone else one.record.samples[REFERENCE], one.own, axis, scale[axis], duration
             )
-            of_shock = shock_pulse.rows_of(
+            of_shock = shock_waves.rows_of(
                 one.number, direction, one.own.output[:, axis], pair, before_s, device, alone=alone
             )
             names = ("unit",) if alone else ("reference", "unit")
             if not alone:
                 noise = shock_waves.noise_before(pair, before_s)
-                of_shock += shock_waves.waves(one.number, pair, direction, settings_of(part), noise)
+                of_shock += shock_waves.waves(one.number, pair, direction, part, noise)
             if one.number == first:
                 of_shock += shock_waves.curves(pair, names, duration, before_s)
             rows += [row | {"unit": one.unit, "axis": part.axis} for row in of_shock]
@@ -175,12 +180,12 @@ class ShockTest(InG, OnEquipment, FromWaveforms):
         if len(bias) and bool((bias.loc[bias["setting"] > 0.0, "uncertainty"] <= STUCK).any()):
             texts.append(("survival", "the output is constant after the shocks: the unit has not survived"))
         pulse = rows[rows["series"] == "pulse"]
-        texts += shock_pulse.texts_of(reference, pulse)
-        apart = shock_pulse.no_comparison(good, reference, pulse)
+        texts += shock_waves.texts_of(reference, pulse)
+        apart = shock_waves.no_comparison(good, reference, pulse)
         if len(good) and not apart:
-            texts += shock_waves.diagnosis_text(rows, settings_of(part), part.effects)
-        compared = shock_pulse.ratio_figures(part, ratio, good, apart)
-        return [*compared, bias_shift(bias), *shock_pulse.pulse_figures(part.axis, pulse, ratio)], texts
+            texts += shock_waves.diagnosis_text(rows, part)
+        compared = shock_waves.ratio_figures(part, ratio, good, apart)
+        return [*compared, bias_shift(bias), *shock_waves.pulse_figures(part.axis, pulse, ratio)], texts
 
     def chart(self, part: ShockPart, points: pd.DataFrame) -> Chart:
         """First shock of reference and unit, and their shock response spectra."""
@@ -200,17 +205,6 @@ class ShockTest(InG, OnEquipment, FromWaveforms):
 def _setting(part: ShockPart, peak_g: float, direction: float) -> dict[str, float]:
     axis = float(AXES.index(part.axis))
     return {"peak_g": peak_g, "duration_s": 1e-3 * part.duration_ms, "direction": direction, "axis": axis}
-
-
-def settings_of(part: ShockPart) -> shock_waves.WaveSettings:
-    """What the comparison of the waveforms needs of a part."""
-    return shock_waves.WaveSettings(1e-3 * part.duration_ms, 1e-3 * part.before_ms, part.waveform_percent)
-
-
-PROCEDURE = ShockTest()
-
-
-STUCK = 1e-9
 
 
 def bias_points(one: Taken, scale: np.ndarray) -> list[dict[str, Any]]:
@@ -234,7 +228,10 @@ def bias_points(one: Taken, scale: np.ndarray) -> list[dict[str, Any]]:
 def bias_shift(bias: pd.DataFrame) -> FigureValue:
     """Bias after minus before of the axis with the largest shift; the uncertainty holds white noise and flicker."""
     shifts: list[FigureValue] = []
-    pooled = _pooled_error(bias) if len(bias) else 0.0
+    pooled = 0.0
+    if len(bias):  # white noise and flicker of after minus before, pooled over the axes
+        time = bias["time_s"].to_numpy(dtype=float) if "time_s" in bias else np.zeros(1)  # earlier versions have none
+        pooled = difference_error(pooled_noise(bias), float(bias["window_s"].mean()), float(np.ptp(time)))
     for axis, own in bias.groupby("axis", sort=False):
         before, after = own[own["setting"] == 0.0], own[own["setting"] > 0.0]
         if before.empty or after.empty:
@@ -249,8 +246,4 @@ def bias_shift(bias: pd.DataFrame) -> FigureValue:
     return worst(shifts)
 
 
-def _pooled_error(bias: pd.DataFrame) -> float:
-    """Standard uncertainty of after minus before by white noise and flicker, pooled over the axes."""
-    window = float(bias["window_s"].mean())
-    time = bias["time_s"].to_numpy(dtype=float) if "time_s" in bias else np.zeros(1)  # earlier versions have none
-    return difference_error(pooled_noise(bias), window, float(np.ptp(time)))
+PROCEDURE = ShockTest()

@@ -1,22 +1,34 @@
-"""Waveforms of a shock: for the picture, the shock response spectrum, and the diagnosis of their comparison."""
+"""Shocks as pulses and as waveforms: peak, duration, velocity change and ratio; spectra, and the diagnosis of the comparison."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from contextlib import suppress
+from typing import Any
 
 import numpy as np
 import pandas as pd
 from scipy.interpolate import CubicSpline
 
-from inertial.dynamics.pulses import low_passed, octave_frequencies, shock_spectrum
+from inertial.dynamics.pulses import (
+    Pulse,
+    low_passed,
+    measured_pulse,
+    octave_frequencies,
+    return_time,
+    shock_spectrum,
+    velocity_change,
+    zero_shift,
+)
 from inertial.dynamics.shock_diagnosis import ShockDiagnosis, diagnose_shock
 from inertial.dynamics.shock_effects import EFFECTS
 from inertial.dynamics.shock_fit import ShockRecord, Waves
+from inertial.dynamics.wander import stated_error
 from inertial.errors import NotIdentified
-from pipelines.procedures.columns import numbers, point_rows
-from pipelines.procedures.recorded import UnitRecord
-from pipelines.procedures.wording import diagnosis_texts, with_uncertainty
+from inertial.record_faults import clipped as at_extreme
+from pipelines.procedures.figures import FigureSpec, FigureValue, diagnosis_texts, with_uncertainty
+from pipelines.procedures.recorded import Device, UnitRecord, numbers, point_rows
+from schemas.units import STANDARD_GRAVITY_M_S2
 
 DRAWN = 400  # points of a waveform in the picture
 PER_PULSE = 40  # samples of the compared waveforms in a duration of the pulse
@@ -25,18 +37,10 @@ LEAD, TAIL = 1.5, 6.0  # durations before and after the pulse that are compared
 Pair = tuple[tuple[np.ndarray, float], tuple[np.ndarray, float]]
 
 
-class WaveSettings(NamedTuple):
-    """Nominal duration of the pulse, s; time that is free of it, s; standard uncertainty of a sample, % of the peak."""
-
-    duration_s: float
-    before_s: float
-    floor_percent: float
-
-
 def filtered_pair(reference: UnitRecord, own: UnitRecord, axis: int, scale: float, duration_s: float) -> Pair:
     """Reference and unit along an axis in g, each through the same phaseless low-pass, with their rates."""
-    both = (reference.output[:, axis], reference.rate_hz), (own.output[:, axis] / scale, own.rate_hz)
-    (first, rate), (second, unit_rate) = both
+    first, second = reference.output[:, axis], own.output[:, axis] / scale
+    rate, unit_rate = reference.rate_hz, own.rate_hz
     return (low_passed(first, rate, duration_s), rate), (low_passed(second, unit_rate, duration_s), unit_rate)
 
 
@@ -46,25 +50,26 @@ def noise_before(pair: Pair, before_s: float) -> float:
     return float(np.hypot(quiet[0].std(ddof=1), quiet[1].std(ddof=1)))
 
 
-def waves(number: int, pair: Pair, direction: float, settings: WaveSettings, noise_g: float) -> list[dict[str, Any]]:
+def waves(number: int, pair: Pair, direction: float, part: Any, noise_g: float) -> list[dict[str, Any]]:
     """Both waveforms of a shock on one time base, without the baseline, for the diagnosis.
 
     Parameters
     ----------
     pair : waveform (n,) in g and rate in Hz of reference and unit, both from the trigger
+    part : of the recipe: duration_ms, before_ms, waveform_percent
     """
-    duration = settings.duration_s
+    duration, before_s = 1e-3 * part.duration_ms, 1e-3 * part.before_ms
     both: list[tuple[np.ndarray, CubicSpline]] = []
     for wave, rate in pair:
         time = np.arange(wave.size) / rate
-        both.append((time, CubicSpline(time, wave - wave[: int(settings.before_s * rate)].mean())))
+        both.append((time, CubicSpline(time, wave - wave[: int(before_s * rate)].mean())))
     (time, reference), (own, unit) = both
     peak = float(time[int(np.argmax(np.abs(reference(time))))])
     first = max(peak - (0.5 + LEAD) * duration, 0.0)
     last = min(peak + (0.5 + TAIL) * duration, time[-1], own[-1])
     at = np.arange(first, last, duration / PER_PULSE)
     top = float(np.max(np.abs(reference(at))))
-    error = float(np.hypot(noise_g, 1e-2 * settings.floor_percent * top))
+    error = float(np.hypot(noise_g, 1e-2 * part.waveform_percent * top))
     return point_rows(
         series="compared",
         point=MOST_SAMPLES * number + np.arange(at.size),
@@ -77,23 +82,24 @@ def waves(number: int, pair: Pair, direction: float, settings: WaveSettings, noi
     )
 
 
-def judged(rows: pd.DataFrame, settings: WaveSettings, effects: Sequence[str]) -> ShockDiagnosis | None:
+def judged(rows: pd.DataFrame, part: Any) -> ShockDiagnosis | None:
     """The diagnosis of the first shock in each direction; None where no waveforms are kept."""
     kept = rows[rows["series"] == "compared"]
     shocks: list[Waves] = []
-    before, rate = 0.0, PER_PULSE / settings.duration_s
+    duration = 1e-3 * part.duration_ms
+    before, rate = 0.0, PER_PULSE / duration
     for _, one in kept.groupby("direction", sort=False):
         own = one[one["shock"] == one["shock"].iloc[0]]
         reference, unit, error = numbers(own, "reference_g", "value", "uncertainty")
         shocks.append(Waves(reference, unit, error))
         before = -float(own["setting"].iloc[0])
-    return diagnose_shock(ShockRecord(rate, settings.duration_s, before, tuple(shocks)), effects) if shocks else None
+    return diagnose_shock(ShockRecord(rate, duration, before, tuple(shocks)), part.effects) if shocks else None
 
 
-def diagnosis_text(rows: pd.DataFrame, settings: WaveSettings, effects: Sequence[str]) -> list[tuple[str, str]]:
+def diagnosis_text(rows: pd.DataFrame, part: Any) -> list[tuple[str, str]]:
     """The diagnosis in sentences: subject and text."""
     try:
-        diagnosis = judged(rows, settings, effects)
+        diagnosis = judged(rows, part)
     except NotIdentified as problem:
         return [("comparison of the waveforms", f"cannot be judged: {problem}")]
     if diagnosis is None:
@@ -102,7 +108,7 @@ def diagnosis_text(rows: pd.DataFrame, settings: WaveSettings, effects: Sequence
 
     def size(name: str) -> str:
         effect, fit = EFFECTS[name], diagnosis.extended
-        parameters = effect.parameters(settings.duration_s)
+        parameters = effect.parameters(1e-3 * part.duration_ms)
         value, error = fit.coefficients[name] if name in fit.coefficients else fit.parameters[parameters[0].name]
         return f"{with_uncertainty(value, 2.0 * error)} {effect.unit} (k = 2)"
 
@@ -135,3 +141,162 @@ def curves(pair: Pair, names: Sequence[str], duration: float, before_s: float) -
             point = np.arange(x.size)
             rows += point_rows(series=f"{series}_{name}", point=point, setting=x, value=value, uncertainty=np.nan)
     return rows
+
+
+OF_PULSE = (
+    FigureSpec("shock_peak_g", "g", "peak of the unit's pulse above its baseline; mean of the shocks", one_axis=True),
+    FigureSpec("shock_duration_ms", "ms", "duration of the half sine with the unit's 10 % points", one_axis=True),
+    FigureSpec("shock_velocity_m_s", "m/s", "velocity change, the integral over the unit's pulse", one_axis=True),
+    FigureSpec(
+        "shock_return_ms", "ms", "after the pulse, until the output stays within 2 % of the peak of where it ends"
+    ),
+    FigureSpec("shock_zero_shift_percent", "%", "output at the end of the record minus the baseline, of the peak"),
+)
+_COLUMNS = ("value", "duration_s", "velocity_m_s", "return_s", "zero_shift_percent")
+_ERRORS = ("uncertainty", "duration_error_s", "velocity_error_m_s", "return_error_s", "zero_shift_error_percent")
+_FACTORS = (1.0, 1e3, 1.0, 1e3, 1.0)
+APART = 0.3
+"""Departure of peak or duration from the reference's above which the two were not mounted on each other."""
+
+
+def rows_of(
+    number: int,
+    direction: float,
+    raw: np.ndarray,
+    pair: Pair,
+    before_s: float,
+    device: Device,
+    *,
+    alone: bool = False,
+) -> list[dict[str, Any]]:
+    """The pulses of reference and unit and their ratio; no value where the unit shows no pulse or clips.
+
+    Parameters
+    ----------
+    raw : (n,), output of the unit as recorded; pair : both channels in g behind their low-pass
+    alone : no reference was recorded; the first of the pair is not looked at
+    """
+    (reference, rate), (unit, unit_rate) = pair
+    about = {"point": number, "setting": direction}
+    rows: list[dict[str, Any]] = []
+    drive = None if alone else measured_pulse(reference, rate, before_s=before_s)
+    if drive is not None:
+        rows.append(about | {"series": "reference"} | _columns(drive, reference, rate))
+    still = np.median(raw[: int(before_s * unit_rate)])
+    # a rail of the unit itself, below the range of the data sheet, shows as an extreme at which it stands still
+    clipped = device.at_end(raw) + device.at_end(raw - still) + at_extreme(raw)[2] > 0
+    ratio = error = under = noise = np.nan
+    with suppress(NotIdentified):
+        if not clipped:
+            answer = measured_pulse(unit, unit_rate, before_s=before_s)
+            noise = answer.noise
+            rows.append(about | {"series": "pulse"} | _columns(answer, unit, unit_rate))
+            if drive is not None:
+                ratio = answer.peak / drive.peak
+                error = abs(ratio) * float(np.hypot(answer.peak_error / answer.peak, drive.peak_error / drive.peak))
+                under = 100.0 * (answer.undershoot - drive.undershoot)
+    compared = {"value": ratio, "uncertainty": error, "undershoot_percent": under, "noise_g": noise}
+    return [*rows, about | {"series": "ratio", "clipped": float(clipped), "alone": float(alone)} | compared]
+
+
+def _columns(pulse: Pulse, wave: np.ndarray, rate_hz: float) -> dict[str, float]:
+    shift, error = zero_shift(wave, pulse)
+    between = 1.0 / rate_hz / np.sqrt(12.0)  # rectangular, over the interval of the samples
+    share = float(np.hypot(pulse.peak_error / pulse.peak, np.sqrt(2.0) * between / pulse.duration_s))
+    return {
+        "duration_error_s": np.sqrt(2.0) * between,
+        "velocity_error_m_s": share * pulse.velocity * STANDARD_GRAVITY_M_S2,
+        "return_error_s": between,
+        "value": pulse.peak,
+        "uncertainty": pulse.peak_error,
+        "duration_s": pulse.duration_s,
+        "velocity_m_s": pulse.velocity * STANDARD_GRAVITY_M_S2,
+        "return_s": return_time(wave, pulse, rate_hz),
+        "zero_shift_percent": 100.0 * shift / pulse.peak,
+        "zero_shift_error_percent": 100.0 * error / abs(pulse.peak),
+    }
+
+
+def texts_of(reference: pd.DataFrame, pulse: pd.DataFrame) -> list[tuple[str, str]]:
+    """Peak, duration and velocity change of the reference, or of the unit where it was recorded alone."""
+    own, name = (reference, "reference") if len(reference) else (pulse, "unit")
+    if own.empty:
+        return []
+    peak, lasting = float(own["value"].abs().mean()), float(own["duration_s"].mean())
+    text = (
+        f"{name} {peak:.4g} g, {1e3 * lasting:.3g} ms, velocity change {float(own['velocity_m_s'].abs().mean()):.3g} m/s "
+        f"(half sine: {velocity_change(peak, lasting):.3g} m/s; IEC 60068-2-27 allows ± 15 %)"
+    )
+    return [("pulse", text)]
+
+
+def no_comparison(good: pd.DataFrame, reference: pd.DataFrame, pulse: pd.DataFrame) -> str:
+    """Why the pulses of unit and reference are not those of two sensors on each other; empty where they may be."""
+    if good.empty or reference.empty or pulse.empty:
+        return ""
+    peak = float(good["value"].mean())
+    lasting = float(pulse["duration_s"].mean()) / float(reference["duration_s"].mean())
+    for what, ratio in (("the peak", peak), ("the duration", lasting)):
+        if not abs(ratio - 1.0) < APART:
+            return (
+                f"{what} is {ratio:.3g} times that of the reference: two places of a structure are no comparison; mount the unit "
+                "on the reference, or check the scale and the polarity"
+            )
+    return ""
+
+
+def ratio_figures(part: Any, ratio: pd.DataFrame, good: pd.DataFrame, apart: str) -> list[FigureValue]:
+    """Sensitivity and undershoot by comparison; ``apart``: why there is no comparison."""
+    names = ("shock_sensitivity_percent", "shock_undershoot_percent")
+    note = apart or _without(ratio, len(good))
+    if note:
+        return [FigureValue.not_determined(name, part.axis, note) for name in names]
+    _, value, each = numbers(good)
+    scatter = float(value.std(ddof=1) / np.sqrt(value.size)) if value.size > 2 else 0.0
+    spread = max(scatter, float(np.sqrt(np.mean(each**2)) / np.sqrt(value.size)))
+    under = good["undershoot_percent"].to_numpy(dtype=float)
+    floor = 100.0 * float(good["noise_g"].mean()) / part.peak_g / np.sqrt(under.size)
+    # shocks differ in duration, and so in undershoot: of a few, their scatter is itself uncertain
+    scatter = float(under.std(ddof=1) / np.sqrt(under.size)) if under.size > 1 else 0.0
+    error = float(np.hypot(100.0 * spread, part.reference_percent))
+    under_error = stated_error(floor**2 + scatter**2, 1.0, scatter**2 * np.sqrt(2.0 / max(1, under.size - 1)))
+    return [
+        FigureValue(names[0], part.axis, float(100.0 * (value.mean() - 1.0)), error),
+        FigureValue(names[1], part.axis, float(under.mean()), under_error),
+    ]
+
+
+def _without(ratio: pd.DataFrame, good: int) -> str:
+    """Why there is no comparison; empty where every shock has one."""
+    if ratio.empty:
+        return "0 of 0 shocks show no pulse; check cable and mounting"
+    clipped = int((ratio["clipped"] > 0.0).sum())
+    if clipped:
+        return f"{clipped} of {len(ratio)} shocks clip the output; lower the peak, or choose a wider range"
+    if "alone" in ratio and bool((ratio["alone"] > 0.0).any()):
+        return "recorded without a reference, which a comparison needs; record one beside the unit"
+    return (
+        f"{len(ratio) - good} of {len(ratio)} shocks show no pulse; check cable and mounting"
+        if good < len(ratio)
+        else ""
+    )
+
+
+def pulse_figures(axis: str, pulse: pd.DataFrame, ratio: pd.DataFrame) -> list[FigureValue]:
+    """Peak, duration, velocity change, return and zero shift of the unit, means of the shocks; polarity apart."""
+    if pulse.empty or len(pulse) < len(ratio):
+        note = _without(ratio, len(pulse)) or "0 shocks show a pulse; check cable and mounting"
+        return [FigureValue.not_determined(spec.name, axis, note) for spec in OF_PULSE]
+    figures: list[FigureValue] = []
+    for spec, column, of_error, factor in zip(OF_PULSE, _COLUMNS, _ERRORS, _FACTORS, strict=True):
+        value = factor * numbers(pulse, column)[0]
+        value = np.abs(value) if column == "value" else value
+        if not np.isfinite(value).all():
+            note = "the output does not come to rest; record longer"
+            figures.append(FigureValue.not_determined(spec.name, axis, note))
+            continue
+        each = factor * numbers(pulse, of_error)[0]
+        scatter = float(value.std(ddof=1)) if value.size > 1 else 0.0
+        error = float(np.hypot(scatter, np.sqrt(np.mean(each**2)))) / np.sqrt(value.size)
+        figures.append(FigureValue(spec.name, axis, float(value.mean()), error))
+    return figures

@@ -13,9 +13,18 @@ from inertial.dynamics.step_record import RISE_POINTS, StepFigures, aligned, ste
 from inertial.errors import NotIdentified
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace, between
 from pipelines.procedures.base import FromWaveforms, OnEquipment, Part
-from pipelines.procedures.columns import numbers, point_rows, point_table
 from pipelines.procedures.figures import FigureSpec, FigureValue, UnitOutcome, worst
-from pipelines.procedures.recorded import REFERENCE, Device, ProcedureStep, Records, UnitRecord, on_equipment
+from pipelines.procedures.recorded import (
+    REFERENCE,
+    Device,
+    ProcedureStep,
+    Records,
+    UnitRecord,
+    numbers,
+    on_equipment,
+    point_rows,
+    point_table,
+)
 from schemas.bounds import Positive
 from schemas.recipe import Recipe
 from schemas.units import AXES

@@ -15,8 +15,7 @@ from inertial.dynamics.sine_fit import HARMONICS, fit_tone, fit_tone_and_frequen
 from inertial.dynamics.transfer_effects import EFFECTS, Conditions
 from inertial.dynamics.transfer_model import Points
 from pipelines.procedures.base import Part, refuse_unknown_effects
-from pipelines.procedures.columns import point_rows
-from pipelines.procedures.recorded import REFERENCE, Array, Device, ProcedureRecord, UnitRecord
+from pipelines.procedures.recorded import REFERENCE, Array, Device, ProcedureRecord, UnitRecord, point_rows
 from schemas.bounds import NotNegative, Positive
 
 FEWEST_POINTS = 8

@@ -13,9 +13,8 @@ from inertial.dynamics.tilt import TiltFit, fit_tilt, left_open
 from inertial.errors import NotIdentified
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Role, Trace, level
 from pipelines.procedures.base import Part, RecordByRecord
-from pipelines.procedures.columns import numbers, point_rows
 from pipelines.procedures.figures import FigureSpec, FigureValue, Texts, UnitOutcome, worst
-from pipelines.procedures.recorded import Device, ProcedureStep, Taken
+from pipelines.procedures.recorded import Device, ProcedureStep, Taken, numbers, point_rows
 from schemas.bounds import NotNegative, Positive
 from schemas.poses import Pose
 from schemas.recipe import Recipe
@@ -106,7 +105,8 @@ class Tilt(RecordByRecord):
         # of the whole model: what K2 and K3 leave in a sine's residual is no wander
         values = [worst([_linearity(axis, one) for axis, one in fits.items()]), _orthogonality(part, fits)]
         if part.orders == 3:
-            values.append(worst([_second_order(axis, one) for axis, one in fits.items()]))
+            scaled = ((axis, MICRO * np.array(one.of("second_order")) / one.scale[0]) for axis, one in fits.items())
+            values.append(worst([FigureValue("tilt_second_order_ug_g2", axis, *one.tolist()) for axis, one in scaled]))
         else:
             values.append(FigureValue.not_determined("tilt_second_order_ug_g2", "*", "orders = 1; set orders = 3"))
         return values, [_residual(axis, one) for axis, one in linear.items()]
@@ -190,12 +190,6 @@ def _orthogonality(part: TiltPart, fits: dict[str, TiltFit]) -> FigureValue:
     common = fits[first].phase_covariance(fits[second], float(np.radians(part.angle_uncertainty_deg)))
     error = MILLI * np.sqrt(max(0.0, a[1] ** 2 + b[1] ** 2 - 2.0 * common))
     return FigureValue("tilt_orthogonality_mrad", f"{first}{second}", float(departure), float(error))
-
-
-def _second_order(axis: str, one: TiltFit) -> FigureValue:
-    value, error = one.of("second_order")
-    scale = one.scale[0]
-    return FigureValue("tilt_second_order_ug_g2", axis, MICRO * value / scale, MICRO * error / scale)
 
 
 PROCEDURE = Tilt()

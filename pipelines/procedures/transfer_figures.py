@@ -15,8 +15,7 @@ from inertial.dynamics.spectra import folded_share
 from inertial.dynamics.transfer_diagnosis import TransferDiagnosis, diagnose_transfer
 from inertial.dynamics.transfer_effects import EFFECTS, Conditions
 from inertial.dynamics.transfer_model import IDENTIFIED_SHARE, PLAIN, Points, TransferFit, factor
-from pipelines.procedures.figures import FigureValue
-from pipelines.procedures.wording import probability
+from pipelines.procedures.figures import FigureValue, probability
 
 Array = NDArray[np.float64]
 
@@ -97,12 +96,7 @@ def bandwidth_of(fit: TransferFit, values: Array, top: float) -> float:
     if below.size == 0 or below[0] == 0:
         return float("nan")
     k = int(below[0])
-
-    def at_one(f: float) -> float:
-        value: Any = over(f)
-        return float(value[0])
-
-    crossing: Any = brentq(at_one, grid[k - 1], grid[k])
+    crossing: Any = brentq(lambda f: float(over(f)[0]), grid[k - 1], grid[k])
     return float(crossing)
 
 
@@ -147,14 +141,11 @@ def _flatness(part: Any, points: Points) -> FigureValue:
     inside = f <= part.flat_to_hz
     departure = 100.0 * (size[inside] / rest - 1.0)
     k = int(np.argmax(np.abs(departure)))
-    scatter = np.median(points.magnitude_error[low]) * np.sqrt(_variance_of_median(len(low)))
+    # variance of the median of n normal values over that of one: π/(2n + π − 2), within 2 % for an odd n
+    of_median = float(np.pi / (2.0 * len(low) + np.pi - 2.0))
+    scatter = np.median(points.magnitude_error[low]) * np.sqrt(of_median)
     error = 100.0 * float(np.hypot(points.magnitude_error[inside][k], scatter))
     return FigureValue("sweep_flatness_percent", part.axis, float(departure[k]), error)
-
-
-def _variance_of_median(count: int) -> float:
-    """Variance of the median of normal values over that of one value: π/(2n + π − 2), within 2 % for an odd count."""
-    return float(np.pi / (2.0 * count + np.pi - 2.0))
 
 
 def _sensitivity(part: Any, fit: TransferFit, static: Array | None) -> FigureValue:

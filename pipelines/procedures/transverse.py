@@ -15,8 +15,7 @@ from inertial.dynamics.transverse import Z95, Transverse, fit_transverse, relati
 from inertial.errors import NotIdentified
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace, level
 from pipelines.procedures.base import Evaluated, InG, NominalScale, OnEquipment, scale_of
-from pipelines.procedures.columns import numbers, point_table
-from pipelines.procedures.figures import FigureSpec, FigureValue, UnitOutcome
+from pipelines.procedures.figures import FigureSpec, FigureValue, UnitOutcome, verdict_of
 from pipelines.procedures.recorded import (
     REFERENCE,
     Device,
@@ -24,9 +23,10 @@ from pipelines.procedures.recorded import (
     ProcedureStep,
     Records,
     UnitRecord,
+    numbers,
     on_equipment,
+    point_table,
 )
-from pipelines.procedures.wording import verdict_of
 from schemas.bounds import NotNegative, Positive
 from schemas.recipe import Recipe
 from schemas.units import AXES

@@ -11,9 +11,8 @@ from pydantic import Field
 from inertial.dynamics.stability import error_of_mean, repeatability
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace, level
 from pipelines.procedures.base import InG, NominalScale, RecordByRecord, scale_of
-from pipelines.procedures.columns import numbers, point_rows
 from pipelines.procedures.figures import FigureSpec, FigureValue, UnitOutcome, worst
-from pipelines.procedures.recorded import Device, ProcedureStep, Taken, at_rest
+from pipelines.procedures.recorded import Device, ProcedureStep, Taken, at_rest, numbers, point_rows
 from schemas.bounds import Positive, Wait
 from schemas.recipe import Recipe
 from schemas.units import AXES, MICRO

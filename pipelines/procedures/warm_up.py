@@ -15,9 +15,8 @@ from inertial.dynamics.warm_up import entered
 from inertial.errors import NotIdentified
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace, between
 from pipelines.procedures.base import InG, NominalScale, RecordByRecord, scale_of
-from pipelines.procedures.columns import numbers, point_rows
 from pipelines.procedures.figures import FigureSpec, FigureValue, UnitOutcome, worst
-from pipelines.procedures.recorded import Device, ProcedureStep, Taken, at_rest
+from pipelines.procedures.recorded import Device, ProcedureStep, Taken, at_rest, numbers, point_rows
 from schemas.bounds import Positive
 from schemas.recipe import Recipe
 from schemas.units import AXES, MICRO

@@ -271,7 +271,7 @@ def evolution_chart(rows: list[dict[str, Any]], name: str = "") -> Chart:
 
     Parameters
     ----------
-    rows : by version, see :func:`pipelines.diagnosis.model_history.evolution`
+    rows : by version, see :func:`pipelines.diagnosis.confirmation.evolution`
     name : of the model
     """
     number = np.arange(len(rows), dtype=float)

@@ -13,7 +13,7 @@ from pipelines.drawing import svg_text
 from pipelines.drawing.chart import Chart, ColourScale, Plot, PlotAxis, Role, Symbol, Trace
 from pipelines.drawing.mollweide import project, sphere
 from pipelines.planning.context import PlanContext
-from pipelines.planning.plan_rows import worst_axes
+from pipelines.planning.documents import worst_axes
 from pipelines.report.budget_plots import shares_plot
 from pipelines.report.numbers import scientific, side_by_side, significant
 from pipelines.report.templates import template

@@ -94,7 +94,7 @@ def _residual_rows(lot: LotArrays, fitted: NoisyFit) -> pd.DataFrame:
     used = lot.of_kind("dwell")
     scale = fitted.per_g[:, None, :]
     force = np.broadcast_to(lot.state.force[..., lot.state.axes], lot.output.shape)[:, used]
-    u, n, a = (index.ravel() for index in np.meshgrid(*(np.arange(size) for size in force.shape), indexing="ij"))
+    u, n, a = np.indices(force.shape).reshape(3, -1)
     temperature = lot.state.temperature
     return pd.DataFrame(
         {
@@ -115,10 +115,7 @@ def _prediction_rows(lot: LotArrays, fitted: NoisyFit) -> pd.DataFrame:
     """Covariance of the expected residuals of the dwells for verification, as a long table of lower triangles."""
     dwells = lot.dwells[~lot.of_kind("dwell")]
     row, column = np.tril_indices(dwells.size)
-    u, a, k = (
-        i.ravel()
-        for i in np.meshgrid(np.arange(len(lot.units)), np.arange(len(lot.letters)), np.arange(row.size), indexing="ij")
-    )
+    u, a, k = np.indices((len(lot.units), len(lot.letters), row.size)).reshape(3, -1)
     values = _predicted(fitted)
     return pd.DataFrame(
         {
@@ -139,9 +136,7 @@ def _predicted(fitted: NoisyFit) -> Array:
 def _wander_rows(lot: LotArrays, fitted: NoisyFit) -> pd.DataFrame:
     """The method that estimates the noise of the dwells, and the parts of the noise, by unit and axis."""
     scale = fitted.per_g
-    u, a = (
-        index.ravel() for index in np.meshgrid(np.arange(len(lot.units)), np.arange(len(lot.letters)), indexing="ij")
-    )
+    u, a = np.indices((len(lot.units), len(lot.letters))).reshape(2, -1)
     parts = {"white_ug": fitted.white, "flicker_ug": fitted.flicker, "walk_ug": fitted.walk}
     return pd.DataFrame(
         {

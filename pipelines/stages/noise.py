@@ -13,8 +13,7 @@ from inertial.distributions import chi2_upper
 from inertial.noise.allan import AllanCurve, overlapping
 from inertial.noise.flicker import FLICKER_FLOOR
 from inertial.noise.terms import NoiseTerms, fit_terms, model_deviation
-from pipelines.stages.coarse_digits import Coarse, remark, without_digits
-from pipelines.stages.static_record import StaticSeries, Warmed, warmed
+from pipelines.stages.static_record import Coarse, StaticSeries, Warmed, remark, warmed, without_digits
 from pipelines.tables.calibration import Calibration, read_calibration
 from pipelines.tables.frames import empty_table
 from pipelines.tables.samples import by_record
@@ -62,16 +61,11 @@ FEWEST = 192  # samples of a channel: six averaging times, as many as five terms
 MOVED_K = 0.01  # change of the temperature of a record from which it is stated
 N_ONE_SIDED = "n_d"
 B_BOUND = "B_bound"
+UNITS = {"Q": "µg·s", "N": "µg/√Hz", N_ONE_SIDED: "µg/√Hz", "B": "µg", "K": "µg/√s", "R": "µg/s", B_BOUND: "µg"}
 TERM_COLUMNS = ["unit", "axis", "term", "value", "low", "high", "identified", "unit_text", "note"]
 
 
-def noise(
-    samples: Iterable[pd.DataFrame],
-    readings: pd.DataFrame,
-    coefficients: pd.DataFrame,
-    covariance: pd.DataFrame,
-    history: pd.DataFrame | None = None,
-) -> dict[str, pd.DataFrame]:
+def noise(record: StaticRecord | None) -> dict[str, pd.DataFrame]:
     """Allan curves (table ``allan``) and noise terms (table ``noise``) of every calibrated unit, in µg.
 
     Terms: Q, N, B, K, R as in IEEE Std 952 (N is two-sided: σ(τ) = N/√τ); ``n_d`` = N·√2 is the one-sided density of
@@ -80,12 +74,7 @@ def noise(
     temperature of the record, by the model's tempco, is subtracted first. The rounding of coarse digits is subtracted from N if
     possible. A channel that is silent, too short or not finite has rows without a value. The column ``note`` states each of
     these.
-
-    Parameters
-    ----------
-    history : temperatures between the dwells; nothing is subtracted if None
     """
-    record = static_record(samples, readings, coefficients, covariance, history)
     if record is None:
         return _nothing()
     channels, rate, size = record.channels, record.rate_hz, record.size
@@ -96,8 +85,15 @@ def noise(
         terms = without_digits(terms, [one.digits for one in group], rate)
         curves.append(_curve_rows(group, curve, terms))
         rows += [row for place, one in enumerate(group) for row in _term_rows(one, terms, place)]
-        rows += [row for one in group for row in _stability_row(one, rate / size)]
-    rows += [row for one in channels if one.silent for row in _silent_rows(one)]
+        for one in group:
+            stability = bias_stability(one.record, rate / size)
+            if stability is not None:
+                rows.append((one.unit, one.axis, TERM, *stability, True, "µg", one.warmth))
+    for one in channels:
+        if one.silent:
+            rows += [
+                (one.unit, one.axis, term, np.nan, 0.0, np.nan, False, text, one.silent) for term, text in UNITS.items()
+            ]
     order = {(one.unit, one.axis): place for place, one in enumerate(channels)}
     rows.sort(key=lambda row: order[str(row[0]), str(row[1])])
     return {
@@ -122,7 +118,12 @@ def static_record(
     covariance: pd.DataFrame,
     history: pd.DataFrame | None = None,
 ) -> StaticRecord | None:
-    """The channels of every calibrated unit; None where no record was taken or no unit is calibrated."""
+    """The channels of every calibrated unit; None where no record was taken or no unit is calibrated.
+
+    Parameters
+    ----------
+    history : temperatures between the dwells; no response to the temperature is subtracted if None
+    """
     static = readings[(readings["kind"] == "allan") & (readings["status"] == "ok")]
     if static.empty or coefficients.empty:
         return None
@@ -240,7 +241,8 @@ def limits_where_unexplained(curve: AllanCurve, terms: NoiseTerms) -> NoiseTerms
 
 
 def _curve_rows(channels: list[StaticChannel], curve: AllanCurve, terms: NoiseTerms) -> pd.DataFrame:
-    c, t = (i.ravel() for i in np.indices(curve.deviation.shape))
+    c, t = np.indices(curve.deviation.shape).reshape(2, -1)
+    explained = (terms.p_value >= UNEXPLAINED_P)[..., None]
     return pd.DataFrame(
         {
             "unit": np.array([one.unit for one in channels], dtype=object)[c],
@@ -249,15 +251,10 @@ def _curve_rows(channels: list[StaticChannel], curve: AllanCurve, terms: NoiseTe
             "deviation_ug": curve.deviation.ravel(),
             "low_ug": curve.low.ravel(),
             "high_ug": curve.high.ravel(),
-            "fitted_ug": _fitted(curve, terms).ravel(),
+            # the likeliest mixture; NaN for channels that no mixture explains
+            "fitted_ug": np.where(explained, model_deviation(terms, curve.tau), np.nan).ravel(),
         }
     )
-
-
-def _fitted(curve: AllanCurve, terms: NoiseTerms) -> np.ndarray:
-    """Deviation of the likeliest mixture; NaN for channels that no mixture explains."""
-    explained = (terms.p_value >= UNEXPLAINED_P)[..., None]
-    return np.where(explained, model_deviation(terms, curve.tau), np.nan)
 
 
 def _term_rows(channel: StaticChannel, terms: NoiseTerms, place: int) -> list[tuple[object, ...]]:
@@ -273,22 +270,6 @@ def _term_rows(channel: StaticChannel, terms: NoiseTerms, place: int) -> list[tu
             rows.append((*where, N_ONE_SIDED, *ends, term.identified, "µg/√Hz", note))
     bound = float(terms.bias_instability_bound[place])
     return [*rows, (channel.unit, channel.axis, B_BOUND, np.nan, 0.0, bound, False, "µg", "")]
-
-
-def _stability_row(channel: StaticChannel, rate: float) -> list[tuple[object, ...]]:
-    """The bias stability over the last hour of the record; none where it is shorter."""
-    stability = bias_stability(channel.record, rate)
-    where = (channel.unit, channel.axis, TERM)
-    return [] if stability is None else [(*where, *stability, True, "µg", channel.warmth)]
-
-
-def _silent_rows(channel: StaticChannel) -> list[tuple[object, ...]]:
-    """Rows of an unusable channel: no value, no limit, and the reason."""
-    units = {"Q": "µg·s", "N": "µg/√Hz", N_ONE_SIDED: "µg/√Hz", "B": "µg", "K": "µg/√s", "R": "µg/s", B_BOUND: "µg"}
-    return [
-        (channel.unit, channel.axis, term, np.nan, 0.0, np.nan, False, text, channel.silent)
-        for term, text in units.items()
-    ]
 
 
 def _nothing() -> dict[str, pd.DataFrame]:

@@ -109,7 +109,7 @@ def _by_wander(lot: LotArrays, fitted: WanderFit, used: NDArray[np.bool_]) -> No
 
 def _by_birge(lot: LotArrays, plain: LotFit, used: NDArray[np.bool_]) -> NoisyFit:
     """The plain fit with its covariance scaled, by Student's factor too; all its noise is taken to be white."""
-    stretch = birge_squared(plain)
+    stretch = np.maximum(1.0, plain.chi2 / np.maximum(plain.dof, 1))  # χ²/ν, never below one
     noise = lot.standard_error * np.sqrt(stretch)[:, None, :]
     columns = design.local_columns(design.split(plain.effects)[0], lot.state, plain.nonlinear)
     known = np.where(stretch <= 1.0, 1.0, np.vectorize(student, otypes=[np.float64])(np.maximum(plain.dof, 1)))
@@ -153,11 +153,6 @@ def _per_g(lot: LotArrays, lot_fit: LotFit) -> Array:
             "--units output=g"
         )
     return np.full_like(scale, _PER_G[lot.out_unit])
-
-
-def birge_squared(lot_fit: LotFit) -> Array:
-    """χ²/ν of every unit and axis, never below one, (units, 3)."""
-    return np.maximum(1.0, lot_fit.chi2 / np.maximum(lot_fit.dof, 1))
 
 
 def profiled(lot: LotArrays, effects: Sequence[str], used: NDArray[np.bool_]) -> dict[str, dict[str, Any]]:

@@ -13,9 +13,17 @@ from inertial.dynamics.wandering_means import IdentifiedNoise
 from inertial.errors import InertialError
 from pipelines.procedures import PROCEDURES, parts_of, steps_of
 from pipelines.procedures.base import Evaluated, Part
-from pipelines.procedures.columns import figure_table, finding_table, gathered_points, point_table
 from pipelines.procedures.figures import FigureValue, Outcome
-from pipelines.procedures.recorded import Device, ProcedureRecord, nominal_device, procedure_record
+from pipelines.procedures.recorded import (
+    Device,
+    ProcedureRecord,
+    figure_table,
+    finding_table,
+    gathered_points,
+    nominal_device,
+    point_table,
+    procedure_record,
+)
 from pipelines.tables.calibration import read_calibration
 from schemas.recipe import Recipe
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +12,7 @@ from inertial.frames import force_from_angles
 from inertial.quantities import ANGLE_COLUMNS, BY_ATTRIBUTE, READINGS
 from pipelines.tables.dwell_table import covariates
 from pipelines.tables.samples import PROCEDURE, STATIC
-from pipelines.tables.summaries import MEANS, SPREADS, summarised
+from pipelines.tables.summaries import MEANS, SPREADS
 from schemas.errors import DataRejected
 from schemas.units import AXES, STANDARD_GRAVITY_M_S2
 
@@ -39,18 +38,6 @@ class FollowedSupply(NamedTuple):
 
 
 def reduce(
-    samples: Iterable[pd.DataFrame], readings: pd.DataFrame, verdicts: pd.DataFrame, local_gravity_m_s2: float
-) -> pd.DataFrame:
-    """Dwells of samples without summaries, see :func:`reduced_summaries`.
-
-    Parameters
-    ----------
-    samples : one table per record, or several of a long one.
-    """
-    return reduced_summaries(summarised(samples, readings), readings, verdicts, local_gravity_m_s2)
-
-
-def reduced_summaries(
     summaries: pd.DataFrame,
     readings: pd.DataFrame,
     verdicts: pd.DataFrame,
@@ -75,10 +62,9 @@ def reduced_summaries(
     kept = [*KEPT, *(c for c in WHERE_THERE if c in static.columns), *recorded]
     columns = static[[*kept, "start_s"]].assign(time_s=static["start_s"] + 0.5 * static["duration_s"])
     dwells = columns.drop(columns="start_s").merge(means, on=["unit", "record"], validate="one_to_one")
-    dwells = dwells.assign(
-        dwell=dwells["record"],
-        **_forces(dwells, local_gravity_m_s2 / STANDARD_GRAVITY_M_S2),
-    )
+    angles = (np.radians(dwells[name].to_numpy()) for name in ("outer_deg", "inner_deg"))
+    force = local_gravity_m_s2 / STANDARD_GRAVITY_M_S2 * force_from_angles(*angles)
+    dwells = dwells.assign(dwell=dwells["record"], **{f"force_{axis}": force[:, i] for i, axis in enumerate(AXES)})
     if follows is not None:
         dwells = at_nominal_supply(dwells, follows)
     return dwells.sort_values(["unit", "dwell"], ignore_index=True)
@@ -100,12 +86,3 @@ def at_nominal_supply(dwells: pd.DataFrame, follows: FollowedSupply) -> pd.DataF
         )
     ratio = follows.ratio(supply)
     return dwells.assign(**{name: dwells[name].to_numpy(dtype=float) / ratio for name in (*MEANS, *SPREADS)})
-
-
-def _forces(dwells: pd.DataFrame, magnitude_g: float) -> dict[str, np.ndarray]:
-    outer, inner = (
-        np.radians(dwells["outer_deg"].to_numpy()),
-        np.radians(dwells["inner_deg"].to_numpy()),
-    )
-    force = magnitude_g * force_from_angles(outer, inner)
-    return {f"force_{axis}": force[:, i] for i, axis in enumerate(AXES)}

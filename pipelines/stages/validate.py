@@ -5,7 +5,7 @@ A unit with a fault is refused completely: it gets a verdict, but no coefficient
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from inertial.frames import force_from_angles
 from inertial.pointing import _force, contradicts, pointing_error
 from pipelines.tables.samples import PROCEDURE, STATIC
-from pipelines.tables.summaries import HIGHS, LOWS, means, summarised
+from pipelines.tables.summaries import HIGHS, LOWS, means
 from schemas.lot import Unit
 from schemas.units import AXES
 
@@ -38,20 +38,7 @@ class DataFault(NamedTuple):
     reason: str
 
 
-def validate(
-    samples: Iterable[pd.DataFrame], readings: pd.DataFrame, units: Sequence[Unit], zero_output: float = 0.0
-) -> pd.DataFrame:
-    """Verdicts on samples without summaries, see :func:`verdicts`.
-
-    Parameters
-    ----------
-    samples : one table per record, or several of a long one.
-    zero_output : nominal output at 0 g, from which the full scale extends both ways; output unit.
-    """
-    return verdicts(summarised(samples, readings, zero_output), readings, units)
-
-
-def verdicts(summaries: pd.DataFrame, readings: pd.DataFrame, units: Sequence[Unit]) -> pd.DataFrame:
+def validate(summaries: pd.DataFrame, readings: pd.DataFrame, units: Sequence[Unit]) -> pd.DataFrame:
     """Verdicts: one row per unit of the lot with ``refused``, the first fault, and all reasons.
 
     Parameters
@@ -65,36 +52,44 @@ def verdicts(summaries: pd.DataFrame, readings: pd.DataFrame, units: Sequence[Un
     answered = readings[readings["status"] == "ok"]
     faults += _sample_faults(answered, summaries)
     faults += _stale_temperatures(answered)
-    faults += _frozen_temperatures(answered)
+    faults += [
+        DataFault(
+            unit,
+            "frozen_temperature",
+            f"the unit's temperature is {value:.6g} °C to the last digit in the last {count} records, a reading that changes "
+            "as before and as in the other units is needed; check the temperature sensor",
+        )
+        for unit, count, value in frozen(answered)
+    ]
     output = means(summaries, (STATIC,))
     if len(output):
         faults += _dead_channels(output, answered)
-        faults += _table(output, readings, units, {fault.unit for fault in faults})
+        sound = output[~output["unit"].isin({fault.unit for fault in faults})]
+        if reason := contradicts(pointing_of(sound, readings)):  # a pointing error of the table against its encoders
+            faults += [DataFault(unit.serial, "table_angles", reason) for unit in units]
     return _verdicts(faults, units)
 
 
 def _verdicts(faults: list[DataFault], units: Sequence[Unit]) -> pd.DataFrame:
     rows = []
     for unit in units:
-        own = [fault for fault in faults if fault.unit == unit.serial]
-        kinds = list(dict.fromkeys(fault.fault for fault in own))
-        shown = [_first_of([fault.reason for fault in own if fault.fault == kind]) for kind in kinds]
+        reasons: dict[str, list[str]] = {}
+        for fault in faults:
+            if fault.unit == unit.serial:
+                reasons.setdefault(fault.fault, []).append(fault.reason)
+        others = [len(set(own)) - 1 for own in reasons.values()]
+        more = [f" (and {count} more of this kind)" if count else "" for count in others]
+        shown = [own[0] + text for own, text in zip(reasons.values(), more, strict=True)]
         rows.append(
             {
                 "unit": unit.serial,
                 "slot": unit.slot,
-                "refused": bool(own),
-                "fault": own[0].fault if own else "",
+                "refused": bool(reasons),
+                "fault": next(iter(reasons), ""),
                 "reason": "; ".join(shown),
             }
         )
     return pd.DataFrame(rows)
-
-
-def _first_of(reasons: list[str]) -> str:
-    """The first of several reasons of one kind, with the number of the others."""
-    others = len(set(reasons)) - 1
-    return reasons[0] + (f" (and {others} more of this kind)" if others else "")
 
 
 def _silent(readings: pd.DataFrame, units: Sequence[Unit]) -> list[DataFault]:
@@ -176,24 +171,6 @@ def _stale_temperatures(readings: pd.DataFrame) -> list[DataFault]:
     ]
 
 
-def _frozen_temperatures(readings: pd.DataFrame) -> list[DataFault]:
-    return [
-        DataFault(
-            unit,
-            "frozen_temperature",
-            f"the unit's temperature is {value:.6g} °C to the last digit in the last {count} records, a reading that changes "
-            "as before and as in the other units is needed; check the temperature sensor",
-        )
-        for unit, count, value in frozen(readings)
-    ]
-
-
-def _table(output: pd.DataFrame, readings: pd.DataFrame, units: Sequence[Unit], unsound: set[str]) -> list[DataFault]:
-    """Every unit, if the sound units show a pointing error of the table against its encoders."""
-    reason = contradicts(pointing_of(output[~output["unit"].isin(unsound)], readings))
-    return [DataFault(unit.serial, "table_angles", reason) for unit in units] if reason else []
-
-
 def _dead_channels(means: pd.DataFrame, readings: pd.DataFrame) -> list[DataFault]:
     """Axes whose mean output over the poses is not a linear function of the specific force."""
     columns = ["unit", "record", "kind", "outer_deg", "inner_deg", "soak"]
@@ -216,27 +193,20 @@ def _dead_channels(means: pd.DataFrame, readings: pd.DataFrame) -> list[DataFaul
 
 def _turned(rows: pd.DataFrame) -> NDArray[np.bool_]:
     """Axes that the poses turn far enough to expect a response, (3,)."""
-    angles = np.radians(rows[["outer_deg", "inner_deg"]].to_numpy())
-    return np.asarray(np.ptp(force_from_angles(angles[:, 0], angles[:, 1]), axis=0) >= TURNED_G)
+    force = force_from_angles(*np.radians(rows[["outer_deg", "inner_deg"]].to_numpy()).T)
+    return np.asarray(np.ptp(force, axis=0) >= TURNED_G)
 
 
 def _explained_by_force(rows: pd.DataFrame) -> NDArray[np.float64]:
     """Share of each axis' variance inside the soaks that a linear function of the force explains, (3,)."""
-    force = force_from_angles(
-        np.radians(rows["outer_deg"].to_numpy()),
-        np.radians(rows["inner_deg"].to_numpy()),
-    )
+    force = force_from_angles(*np.radians(rows[["outer_deg", "inner_deg"]].to_numpy()).T)
     soaks = (rows["soak"].to_numpy()[:, None] == np.unique(rows["soak"].to_numpy())).astype(float)
     output = np.nan_to_num(rows[list(AXES)].to_numpy(dtype=float), posinf=0.0, neginf=0.0)
     inside = output - soaks @ np.linalg.lstsq(soaks, output, rcond=None)[0]
     design = np.column_stack([force, soaks])
     left = output - design @ np.linalg.lstsq(design, output, rcond=None)[0]
     total = np.sum(inside**2, axis=0)
-    return np.where(
-        total > 0.0,
-        1.0 - np.sum(left**2, axis=0) / np.where(total > 0.0, total, 1.0),
-        0.0,
-    )
+    return np.where(total > 0.0, 1.0 - np.sum(left**2, axis=0) / np.where(total > 0.0, total, 1.0), 0.0)
 
 
 def pointing_of(means: pd.DataFrame, readings: pd.DataFrame) -> float:
@@ -251,16 +221,14 @@ def pointing_of(means: pd.DataFrame, readings: pd.DataFrame) -> float:
 
 
 def _of_soak(means: pd.DataFrame, static: pd.DataFrame) -> float:
-    kept = [_by_record(rows, static.index) for _, rows in means.groupby("unit")]
+    kept = [
+        rows.set_index("record")[list(AXES)].reindex(static.index).to_numpy(dtype=float)
+        for _, rows in means.groupby("unit")
+    ]
     whole = [table for table in kept if np.all(np.isfinite(table))]
     if not whole:
         return 0.0
     return pointing_error(_force(static[["outer_deg", "inner_deg"]].to_numpy(dtype=float)), np.stack(whole, axis=1))
-
-
-def _by_record(rows: pd.DataFrame, records: pd.Index) -> Array:
-    """Mean outputs (n, 3) of one unit in order of record; NaN where one is missing."""
-    return rows.set_index("record")[list(AXES)].reindex(records).to_numpy(dtype=float)
 
 
 SAME_K = 1e-9  # means of equal readings differ by rounding
@@ -287,15 +255,9 @@ def frozen(readings: pd.DataFrame) -> Iterator[tuple[str, int, float]]:
     for column, unit in enumerate(table.columns):
         if not known[:, column].all():
             continue
-        still = _unchanged_at_the_end(changed[:, column])
+        still = int(np.argmax(np.append(changed[::-1, column], True)))  # steps from the end on in which nothing changed
         if still and _by_chance(changed & known, known & within[:, None], column, still) < BY_CHANCE:
             yield str(unit), still + 1, float(values[-1, column])
-
-
-def _unchanged_at_the_end(changed: NDArray[np.bool_]) -> int:
-    """Steps from record to record, counted from the end, in which nothing changed."""
-    moved = np.flatnonzero(changed)
-    return len(changed) - (int(moved[-1]) + 1 if moved.size else 0)
 
 
 def _by_chance(changed: NDArray[np.bool_], counted: NDArray[np.bool_], column: int, still: int) -> float:

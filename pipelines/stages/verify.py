@@ -126,18 +126,14 @@ def _pose_rows(lot: LotArrays, unseen: NDArray[np.bool_], error: Array, expected
             "pose": [pose for pose in names for _ in lot.units],
             "dwells": np.repeat([places.size for places in own], len(lot.units)),
             "error_ug": np.concatenate([error[:, places].mean(axis=1) for places in own]),
-            "uncertainty_ug": np.concatenate([_mean_spread(expected, places) for places in own]),
+            # standard deviation of the mean over the dwells of a pose
+            "uncertainty_ug": np.concatenate([np.sqrt(expected[:, k][:, :, k].mean(axis=(1, 2))) for k in own]),
         }
     )
 
 
-def _mean_spread(expected: Array, own: NDArray[np.intp]) -> Array:
-    """Standard deviation of the mean over some dwells of every unit, (units,), µg."""
-    return np.sqrt(expected[:, own][:, :, own].mean(axis=(1, 2)))
-
-
 def _rows(lot: LotArrays, unseen: NDArray[np.bool_], columns: dict[str, Array], by_axis: Array) -> pd.DataFrame:
-    u, n = (index.ravel() for index in np.meshgrid(*(np.arange(s) for s in by_axis.shape[:2]), indexing="ij"))
+    u, n = np.indices(by_axis.shape[:2]).reshape(2, -1)
     temperature = lot.state.temperature
     return pd.DataFrame(
         {

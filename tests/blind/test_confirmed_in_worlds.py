@@ -10,8 +10,8 @@ from made_worlds import BASE, Noise, World, force_of, make
 
 from benchmarks.truth import Spec, make_run
 from pipelines.diagnosis.compare import compare
+from pipelines.diagnosis.confirmation import text_of
 from pipelines.diagnosis.diagnose import examination
-from pipelines.diagnosis.model_history import text_of
 
 
 @pytest.mark.slow

@@ -12,7 +12,7 @@ from in_process import document_of, given, refused, text_of
 from root_process import ROOT
 
 from inertial import effects
-from pipelines.diagnosis.next_recipe import next_recipe
+from pipelines.diagnosis.next_measurement import next_recipe
 from pipelines.jobs.job import Request
 from pipelines.jobs.recipes import load_recipe
 from schemas.errors import RecipeInvalid

@@ -9,7 +9,7 @@ from typing import Any
 from inertial.counts import number_of
 from pipelines.cli.next_commands import command_line, print_next
 from pipelines.cli.printing import print_table, remark, say, short
-from pipelines.planning.plan_rows import worst_axes
+from pipelines.planning.documents import worst_axes
 from schemas.decisions import LARGEST_ERROR
 
 RAISED = 3.0

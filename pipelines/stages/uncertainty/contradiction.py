@@ -76,9 +76,9 @@ def _evidence(
     calibration, state = tables.calibrated(), lot.state
     model = MeasurementModel(calibration.effects, calibration.coefficients, calibration.nonlinear)
     physical = with_device_temperature(model, calibration.response, terms.stability)
-    inputs, scattered = influences(
-        _with_poses(stated), conditions(lot, tables.dwells, calibration.response, terms), terms.stability
-    )
+    if stated.pose is not None:  # their repeatability also where the budget leaves it to the scatter of the fit
+        stated = stated.model_copy(update={"pose": stated.pose.model_copy(update={"seen_in_residuals": False})})
+    inputs, scattered = influences(stated, conditions(lot, tables.dwells, calibration.response, terms), terms.stability)
     common = [one for one in inputs if one.scope in COMMON]
     whole = sensitivity(physical, state, common, scattered)
     shape = (*lot.output.shape, -1)
@@ -98,13 +98,6 @@ def _evidence(
     names = np.array(whole.contributions, dtype=object)
     groups = {name: np.flatnonzero(names == name) for name in JUDGED if np.any(names == name)}
     return without(evidence, np.arange(free)), groups, names.size + np.arange(along.shape[-1])
-
-
-def _with_poses(stated: Uncertainty) -> Uncertainty:
-    """The statement with the repeatability of the poses also where the budget leaves it to the scatter of the fit."""
-    if stated.pose is None:
-        return stated
-    return stated.model_copy(update={"pose": stated.pose.model_copy(update={"seen_in_residuals": False})})
 
 
 def _each_dwell(change: Array, shape: tuple[int, ...]) -> Array:

@@ -15,8 +15,7 @@ from inertial.state import State
 from inertial.uncertainty.propagation import Propagated, norm_errors, rms_over
 from pipelines.stages.rms_error import OF_UNITS
 from pipelines.stages.uncertainty.budget_terms import BudgetTables, BudgetTerms
-from pipelines.stages.uncertainty.period import period_of
-from pipelines.stages.uncertainty.period_error import AxisErrors, largest_error
+from pipelines.stages.uncertainty.period_error import AxisErrors, largest_error, period_of
 from pipelines.tables.calibration import Calibration
 from pipelines.tables.dwells import LotArrays
 from pipelines.tables.frames import ByUnit
@@ -134,16 +133,12 @@ def _coefficients(
         for axis, letter in enumerate(AXES):
             own = [k for k, (name, _) in enumerate(calibration.names[axis]) if name == effect]
             for place, column in enumerate(own):
-                along = letter + _across(axis, place) if effect == "misalignment" else letter
+                along = letter + AXES[(axis + 1 + place) % 3] if effect == "misalignment" else letter
                 factor = MICRO / scale[:, axis]
                 value = factor * calibration.coefficients[:, axis, column]
                 parts = factor[:, None] * variances.fit.coefficients[:, axis, column, :]
                 nominal = MICRO if effect == "scale" else 0.0
                 yield BudgetQuantity(effect, along, unit, value - nominal, factor * spread[:, axis, column], parts, dof)
-
-
-def _across(axis: int, place: int) -> str:
-    return AXES[(axis + 1 + place) % 3]
 
 
 def _angles(calibration: Calibration, variances: VarianceParts, scale: Array, dof: Array) -> Iterator[BudgetQuantity]:

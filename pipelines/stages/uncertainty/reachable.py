@@ -16,8 +16,7 @@ from pipelines.stages.uncertainty.budget import with_device_temperature
 from pipelines.stages.uncertainty.budget_terms import BudgetTerms
 from pipelines.stages.uncertainty.contributions import DwellConditions, influences
 from pipelines.stages.uncertainty.measurands import EFFECTS
-from pipelines.stages.uncertainty.period import after_run
-from pipelines.stages.uncertainty.period_error import AxisErrors, largest_error
+from pipelines.stages.uncertainty.period_error import AxisErrors, after_run, largest_error
 from schemas.decisions import BOUND, GRADES, LARGEST_ERROR
 from schemas.limits import Limits
 from schemas.units import AXES, MICRO

@@ -280,7 +280,7 @@ def covariance_rows(units: Sequence[str], covariance: Array) -> pd.DataFrame:
     """Covariance (units, 3p, 3p) of the coefficients by the budget, x before y before z, as its lower triangles; output unit²."""
     many = np.broadcast_to(covariance, (len(units), *covariance.shape[-2:]))
     row, column = np.tril_indices(many.shape[-1])
-    u, k = (index.ravel() for index in np.meshgrid(np.arange(len(units)), np.arange(row.size), indexing="ij"))
+    u, k = np.indices((len(units), row.size)).reshape(2, -1)
     return pd.DataFrame(
         {"unit": picked(units, u), "row": row[k], "column": column[k], "value": many[:, row, column].ravel()}
     )

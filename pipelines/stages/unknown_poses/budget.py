@@ -13,7 +13,7 @@ from inertial.uncertainty.norm_design import propagated_by_norm
 from pipelines.stages.uncertainty.budget import conditions, with_device_temperature
 from pipelines.stages.uncertainty.budget_terms import BudgetTables, BudgetTerms
 from pipelines.stages.uncertainty.contributions import influences, sources
-from pipelines.stages.uncertainty.measurands import BudgetQuantity, VarianceParts, quantities_of
+from pipelines.stages.uncertainty.measurands import VarianceParts, quantities_of
 from pipelines.stages.uncertainty.tables import covariance_rows, empty, rows_of_quantities
 from pipelines.stages.unknown_poses.dwells import NormDwells, norm_dwells
 from schemas.uncertainty import Uncertainty
@@ -22,21 +22,16 @@ OF_POSES = ("level", "orthogonality", "outer_offset", "inner_offset", "harmonics
 """Entries that change the direction of the force only: the norm does not depend on them."""
 
 
-def norm_budget(tables: BudgetTables, terms: BudgetTerms) -> dict[str, pd.DataFrame]:
+def norm_budget(tables: BudgetTables, terms: BudgetTerms, stated: Uncertainty) -> dict[str, pd.DataFrame]:
     """The tables of the stage budget for dwells of unknown orientation; empty where nothing is stated."""
     if terms.stated is None or tables.coefficients.empty:
         return empty()
-    stated = of_the_norm(terms.stated)
+    stated = terms.stated.model_copy(update=dict.fromkeys(OF_POSES))
     own = [
         _of_unit(one, tables, replace(terms, stated=stated), stated)
         for one in norm_dwells(tables.dwells, tables.history, tables.coefficients, tables.covariance, tables.wander)
     ]
     return {name: pd.concat([part[name] for part in own], ignore_index=True) for name in own[0]}
-
-
-def of_the_norm(stated: Uncertainty) -> Uncertainty:
-    """The entries of a statement that the norm of gravity depends on."""
-    return stated.model_copy(update=dict.fromkeys(OF_POSES))
 
 
 def _of_unit(one: NormDwells, tables: BudgetTables, terms: BudgetTerms, stated: Uncertainty) -> dict[str, pd.DataFrame]:
@@ -64,16 +59,13 @@ def _of_unit(one: NormDwells, tables: BudgetTables, terms: BudgetTerms, stated: 
         verification_poses=_of(tables.verification_poses, unit),
         noise=_of(tables.noise, unit),
     )
-    quantities = [q for q in quantities_of(lot, one.calibration, part, terms, variances) if not _is_rotation(q)]
+    # a coefficient of K below the diagonal is a rotation of the whole unit, zero by definition
+    every = quantities_of(lot, one.calibration, part, terms, variances)
+    quantities = [q for q in every if not (q.name == "misalignment" and q.axis in {"yx", "zx", "zy"})]
     return {
         **rows_of_quantities((unit,), quantities, variances, terms, sources(stated)),
         "budget_covariance": covariance_rows((unit,), variances.fit.covariance()),
     }
-
-
-def _is_rotation(quantity: BudgetQuantity) -> bool:
-    """Whether it is a coefficient of K below the diagonal: a rotation of the whole unit, zero by definition."""
-    return quantity.name == "misalignment" and quantity.axis in {"yx", "zx", "zy"}
 
 
 def _of(table: pd.DataFrame, unit: str) -> pd.DataFrame:

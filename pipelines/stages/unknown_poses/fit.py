@@ -194,7 +194,7 @@ def _residual_rows(done: FittedNorms, dwells: pd.DataFrame) -> pd.DataFrame:
 
 def _wander_rows(done: FittedNorms) -> pd.DataFrame:
     units = len(done.measured.units)
-    u, a = (index.ravel() for index in np.meshgrid(np.arange(units), np.arange(3), indexing="ij"))
+    u, a = np.indices((units, 3)).reshape(2, -1)
     parts = {"white_ug": done.white, "flicker_ug": done.flicker, "walk_ug": done.walk}
     return pd.DataFrame(
         {

@@ -7,8 +7,7 @@ from benchmarks.budget import PRESETS
 from benchmarks.budget_lots import LOT, plan_of
 from benchmarks.exceedance import used_again
 from inertial.uncertainty.period import Windows
-from pipelines.stages.uncertainty.period import walk_carried
-from pipelines.stages.uncertainty.period_error import AxisErrors, largest_error
+from pipelines.stages.uncertainty.period_error import AxisErrors, largest_error, walk_carried
 from schemas.decisions import GRADES, decide, exceedance
 from schemas.limits import parse_limits
 from stations.plant.preset import load_preset

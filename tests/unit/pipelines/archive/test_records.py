@@ -18,6 +18,7 @@ from pipelines.stages import noise as noise_stage
 from pipelines.stages.reduce import reduce
 from pipelines.stages.validate import validate
 from pipelines.tables.samples import by_record
+from pipelines.tables.summaries import summarised
 from schemas.lot import Unit
 from schemas.station import load_station
 from stations import open_station
@@ -105,11 +106,13 @@ def test_pieces_are_judged_as_the_whole_is(tmp_path: Path, fault: str, cuts: int
     samples, readings = lot_in_memory(tmp_path, {"A2": fault} if fault else {})
     assert [(n, len(list(own))) for n, own in by_record(cut(samples, cuts))] == [(n, cuts) for n in range(10)]
     units = [Unit(serial=serial, slot=slot) for slot, serial in enumerate(UNITS)]
-    whole, pieces = validate(samples, readings, units), validate(cut(samples, cuts), readings, units)
+    summaries = [summarised(tables, readings) for tables in (samples, cut(samples, cuts))]
+    whole, pieces = (validate(own, readings, units) for own in summaries)
     pd.testing.assert_frame_equal(whole, pieces)
     assert whole["refused"].tolist() == [False, bool(fault), False]
     pd.testing.assert_frame_equal(
-        reduce(samples, readings, whole, 9.81), reduce(cut(samples, cuts), readings, pieces, 9.81), rtol=1e-12
+        *(reduce(own, readings, judged, 9.81) for own, judged in zip(summaries, (whole, pieces), strict=True)),
+        rtol=1e-12,
     )
 
 

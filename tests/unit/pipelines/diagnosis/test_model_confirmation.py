@@ -11,7 +11,7 @@ from inertial.criticism.examination import Named
 from inertial.criticism.left_out import LeftOut
 from inertial.criticism.reproduced_change import ReproducedChange
 from pipelines.diagnosis import confirmation
-from pipelines.diagnosis.model_history import text_of
+from pipelines.diagnosis.confirmation import text_of
 
 ROW = {"removed": []}
 

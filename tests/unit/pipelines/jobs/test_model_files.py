@@ -6,7 +6,7 @@ import pytest
 from each import each
 
 from inertial import effects
-from pipelines.diagnosis.model_history import evolution
+from pipelines.diagnosis.confirmation import evolution
 from pipelines.jobs.model_files import ModelStep, chosen_effects, extended, new_model, read_model, versions
 from schemas.errors import RecipeInvalid, WrongUse
 from schemas.model import parse_model

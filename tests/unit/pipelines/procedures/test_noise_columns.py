@@ -12,9 +12,8 @@ from inertial.dynamics.sine_fit import fit_tone_and_frequency
 from inertial.dynamics.stability import short_noise
 from inertial.dynamics.transfer_effects import Conditions
 from inertial.dynamics.transfer_model import Points
-from pipelines.procedures.columns import noise_columns
 from pipelines.procedures.ratiometry import RatiometryPart, over_supply
-from pipelines.procedures.recorded import Device, UnitRecord
+from pipelines.procedures.recorded import Device, UnitRecord, noise_columns
 from pipelines.procedures.sweep_points import SweepPart, response_point
 from pipelines.procedures.transfer_figures import figures_of_transfer
 from stations.plant.noise import UnitNoise

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pipelines.diagnosis.diagnose import examination
-from pipelines.procedures.wording import probability, signed, with_uncertainty
+from pipelines.procedures.figures import probability, signed, with_uncertainty
 from pipelines.report.context import UnitContext
 from pipelines.report.numbers import with_uncertainty as in_tables
 from pipelines.report.residual_table import residual_table

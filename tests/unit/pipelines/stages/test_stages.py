@@ -13,6 +13,7 @@ from pipelines.stages.reduce import reduce
 from pipelines.stages.validate import validate
 from pipelines.tables.calibration import read_calibration
 from pipelines.tables.dwells import lot_arrays
+from pipelines.tables.summaries import summarised
 from schemas.errors import DataRejected
 
 NO_HISTORY = pd.DataFrame({"time_s": [], "chamber_C": [], "slot": [], "unit": [], "unit_C": []})
@@ -82,7 +83,7 @@ def captured(folder: Path, fault: str) -> tuple[list[pd.DataFrame], pd.DataFrame
     job, double = small_job(folder), CaptureDouble({"A2": fault})
     records = [double.record(job, *step) for step in plan(job.recipe)]
     samples, readings = [r[0] for r in records], pd.concat([r[1] for r in records], ignore_index=True)
-    return samples, readings, validate(samples, readings, job.lot.units)
+    return samples, readings, validate(summarised(samples, readings), readings, job.lot.units)
 
 
 @pytest.mark.parametrize(
@@ -105,14 +106,14 @@ def test_refuses_the_unit_with_a_fault_and_no_other(tmp_path: Path, fault: str, 
     assert table["refused"].to_dict() == {"A1": False, "A2": True, "A3": False}
     assert table.loc["A2", "fault"] == name
     assert words in table.loc["A2", "reason"]
-    assert set(reduce(samples, readings, verdicts, 9.81)["unit"]) == {"A1", "A3"}
+    assert set(reduce(summarised(samples, readings), readings, verdicts, 9.81)["unit"]) == {"A1", "A3"}
 
 
 def test_a_unit_that_never_answered_has_a_verdict(tmp_path: Path) -> None:
     job = small_job(tmp_path)
     samples, readings, _ = captured(tmp_path, "")
     without = readings[readings["unit"] != "A3"]
-    verdicts = validate(samples, without, job.lot.units).set_index("unit")
+    verdicts = validate(summarised(samples, without), without, job.lot.units).set_index("unit")
     assert verdicts.loc["A3", "refused"]
     assert "no reading for 23 of 23 records" in verdicts.loc["A3", "reason"]
 
@@ -120,7 +121,7 @@ def test_a_unit_that_never_answered_has_a_verdict(tmp_path: Path) -> None:
 def test_a_recorded_covariate_stays_in_the_dwells_unless_it_has_a_gap(tmp_path: Path) -> None:
     samples, readings, verdicts = captured(tmp_path, "")
     readings["humidity_pct"] = 45.0 + 0.1 * readings["record"]
-    dwells = reduce(samples, readings, verdicts, 9.81)
+    dwells = reduce(summarised(samples, readings), readings, verdicts, 9.81)
     np.testing.assert_allclose(dwells["humidity_pct"], 45.0 + 0.1 * dwells["record"])
     readings.loc[readings["record"] == 3, "humidity_pct"] = np.nan
-    assert "humidity_pct" not in reduce(samples, readings, verdicts, 9.81)
+    assert "humidity_pct" not in reduce(summarised(samples, readings), readings, verdicts, 9.81)

@@ -6,9 +6,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from pipelines.stages.coarse_digits import Coarse
 from pipelines.stages.fit import fit
-from pipelines.stages.noise import noise
+from pipelines.stages.noise import noise, static_record
+from pipelines.stages.static_record import Coarse
 from schemas.table_check import check
 
 RATE, N, WHITE = 10.0, 6000, 100.0
@@ -32,7 +32,7 @@ def terms(
 ):
     """Table ``noise`` of records (units, n, 3) in µg, by unit, axis and term."""
     samples, readings = lots.static_record(1e-6 * values, n_rate)
-    tables = noise([samples], readings, calibration["coefficients"], calibration["covariance"], history)
+    tables = noise(static_record([samples], readings, calibration["coefficients"], calibration["covariance"], history))
     check("noise", tables["noise"])
     check("allan", tables["allan"])
     return tables["noise"].set_index(["unit", "axis", "term"]).sort_index()
@@ -60,7 +60,7 @@ def test_a_short_record_and_one_that_is_not_finite_refuse_nobody_else(calibratio
     values[0, 5, 1] = np.nan
     samples, readings = lots.static_record(1e-6 * values, RATE)
     samples = samples.drop(samples.index[samples["unit"] == "U002"][100:])
-    table = noise([samples], readings, calibration["coefficients"], calibration["covariance"])["noise"]
+    table = noise(static_record([samples], readings, calibration["coefficients"], calibration["covariance"]))["noise"]
     note = table.set_index(["unit", "axis", "term"])["note"]
     assert "not finite" in note["U000", "y", "N"]
     assert "100 samples" in note["U002", "x", "N"]

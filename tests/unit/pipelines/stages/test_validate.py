@@ -8,6 +8,7 @@ from small_station import lot_of
 from inertial.operators import first_order_lag
 from pipelines.inquiry.lineage import RunSequence
 from pipelines.stages.validate import _stale_temperatures, frozen, validate
+from pipelines.tables.summaries import summarised
 from schemas.errors import DataRejected
 
 SOAKS, DWELLS = 3, 11
@@ -57,7 +58,7 @@ def test_its_unit_is_refused_with_the_reason() -> None:
     full = table.assign(
         kind="dwell", pose="up", status="ok", overflow=False, chamber_C=table["unit_C"], full_scale=1.0, n=0
     )
-    verdicts = validate([], full, lot.units).set_index("unit")
+    verdicts = validate(summarised([], full), full, lot.units).set_index("unit")
     assert verdicts.loc[lot.units[0].serial, "fault"] == "frozen_temperature"
     assert "to the last digit in the last 11 records" in verdicts.loc[lot.units[0].serial, "reason"]
     assert not verdicts.loc[lot.units[1].serial, "refused"]
