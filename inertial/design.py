@@ -107,3 +107,13 @@ def grid_of(effect: AnyEffect, state: State) -> list[dict[str, float]]:
     values = product(*(p.grid().tolist() for p in parameters))
     names = [p.name for p in parameters]
     return [{**constants, **dict(zip(names, v, strict=True))} for v in values]
+
+
+def resting_grid(effect: AnyEffect, state: State) -> list[dict[str, float]]:
+    """The same for a run that begins at rest: what a plan can show may not rest on the state that a run happens to begin in."""
+    return [values for values in grid_of(effect, state) if at_rest(effect, values)]
+
+
+def at_rest(effect: AnyEffect, values: Mapping[str, float]) -> bool:
+    """Whether values of an effect are those of a run that begins at rest."""
+    return all(values.get(p.name, 0.0) == 0.0 for p in effect.nonlinear if p.of_run)

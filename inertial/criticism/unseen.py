@@ -13,7 +13,7 @@ import numpy as np
 from inertial.arrays import Array, Flags
 from inertial.criticism.field import Candidates
 from inertial.decisions import MATERIAL, NAMED_BELOW
-from inertial.design import grid_of
+from inertial.design import at_rest, resting_grid
 from inertial.distributions import chi2_upper
 from inertial.effects.base import AnyEffect, SensorEffect
 from inertial.estimation.alternative import soaks
@@ -23,7 +23,7 @@ from inertial.estimation.model import Model
 from inertial.estimation.noise_shares import Noise, Shares
 from inertial.estimation.penalty import price
 from inertial.estimation.problem import Problem
-from inertial.estimation.space import Space
+from inertial.estimation.space import Gain, Space
 from inertial.estimation.term import Term
 from inertial.planning.ranges import UnseenRange, unseen_ranges
 from inertial.state import History, State
@@ -49,11 +49,17 @@ def unseen(field: Candidates, base: Model, candidates: Sequence[AnyEffect]) -> t
     state = base.problem.lot.state
     memories = _memories(field, base, {*blind, *(t.effect.id for t in base.terms)})
     ranges = [
-        (e.id, unseen_ranges(e, state, memories.get(e.id, (gains[e.id].rank > 0).tolist())))
+        (e.id, unseen_ranges(e, state, memories.get(e.id) or _at_rest(field, e, gains[e.id])))
         for e in candidates
         if e.id in gains
     ]
     return tuple(sorted({*blind, *field.lacking} & set(order), key=order.index)), tuple(r for r in ranges if r[1])
+
+
+def _at_rest(field: Candidates, effect: AnyEffect, gain: Gain) -> list[bool]:
+    """Whether an effect is visible at each place of its grid at which a run begins at rest."""
+    shown = zip(field.grids[effect.id], gain.rank > 0, strict=True)
+    return [bool(there) for values, there in shown if at_rest(effect, values)]
 
 
 def _memories(field: Candidates, base: Model, without: set[str]) -> Mapping[str, list[bool]]:
@@ -70,10 +76,10 @@ def _memories(field: Candidates, base: Model, without: set[str]) -> Mapping[str,
     plain, still = (Model(Problem(each), terms) for each in (lot, replace(lot, state=without_scatter(lot.state))))
     visible: dict[str, list[bool]] = {}
     for effect in field.effects:
-        continuous = [p for p in effect.parameters(lot.state) if not p.choices]
+        continuous = [p for p in effect.parameters(lot.state) if not (p.choices or p.of_run)]
         if not effect.memory or effect.id in without or len(continuous) != 1:
             continue
-        grid = grid_of(effect, lot.state)
+        grid = resting_grid(effect, lot.state)
         alone = still if _follows_order_only(effect, lot.state, grid[0]) else plain
         noise = alone.problem.covariance.white_noise()
         visible[effect.id] = [_shown(alone, noise, effect, place) for place in grid]

@@ -8,7 +8,7 @@ import numpy as np
 from inertial import effects as catalogue
 from inertial.arrays import Flags
 from inertial.criticism.classes import EffectClass
-from inertial.design import grid_of
+from inertial.design import resting_grid
 from inertial.errors import MissingInput
 from inertial.estimation.model import Model
 from inertial.estimation.term import Term
@@ -106,7 +106,7 @@ def _term(model: Model, name: str) -> Term | None:
     """An effect at the middle of its grid; None if the dwells lack a quantity."""
     effect, state = catalogue.get(name), model.problem.lot.state
     try:
-        grid = grid_of(effect, state)
+        grid = resting_grid(effect, state)
         model.problem.columns(effect, grid[0])
     except MissingInput:
         return None

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from inertial.design import grid_of
+from inertial.design import resting_grid
 from inertial.effects.base import AnyEffect
 from inertial.state import State
 
@@ -35,14 +35,14 @@ def unseen_ranges(effect: AnyEffect, state: State, seen: Sequence[bool]) -> tupl
 
     Parameters
     ----------
-    seen : whether it is visible at each set of values of :func:`inertial.design.grid_of`
+    seen : whether it is visible at each set of values of :func:`inertial.design.resting_grid`
     """
-    grid = grid_of(effect, state)
+    grid = resting_grid(effect, state)
     if not any(seen) or all(seen):
         return ()
     ranges: list[UnseenRange] = []
     for parameter in effect.parameters(state):
-        if parameter.choices:
+        if parameter.choices or parameter.of_run:
             continue
         at = {float(v): False for v in sorted(parameter.grid().tolist())}
         for values, there in zip(grid, seen, strict=True):

@@ -150,7 +150,7 @@ def _remainder(effect: AnyEffect, state: State, span: Array) -> _Remainder | Non
     best: _Remainder | None = None
     seen: list[bool] = []
     try:
-        for values in design.grid_of(effect, state):
+        for values in design.resting_grid(effect, state):
             columns = _columns(effect, state, values)
             remainder = _measured(columns, _after(span, columns, _start(effect, state, values)))
             seen.append(remainder.remaining_fraction > SEEN)

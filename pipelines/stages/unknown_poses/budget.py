@@ -22,7 +22,7 @@ OF_POSES = ("level", "orthogonality", "outer_offset", "inner_offset", "harmonics
 """Entries that change the direction of the force only: the norm does not depend on them."""
 
 
-def norm_budget(tables: BudgetTables, terms: BudgetTerms, stated: Uncertainty) -> dict[str, pd.DataFrame]:
+def norm_budget(tables: BudgetTables, terms: BudgetTerms) -> dict[str, pd.DataFrame]:
     """The tables of the stage budget for dwells of unknown orientation; empty where nothing is stated."""
     if terms.stated is None or tables.coefficients.empty:
         return empty()

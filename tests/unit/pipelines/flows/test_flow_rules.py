@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import pytest
 
 from pipelines.demo.archive_lots import Line
-from pipelines.demo.lot_archive import write_lots
+from pipelines.demo.archive_lots import write_lots
 from pipelines.flows import calibrate, discover
 from pipelines.monitoring.alerts import alerts_of
 
