@@ -6,8 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from pipelines.demo.archive_lots import Line
-from pipelines.demo.archive_lots import write_lots
+from pipelines.demo.archive_lots import Line, write_lots
 from pipelines.flows import calibrate, discover
 from pipelines.monitoring.alerts import alerts_of
 

@@ -11,8 +11,7 @@ from capture_double import small_run
 
 from benchmarks.generated_archive import write_archive
 from pipelines.archive import Archive
-from pipelines.demo.archive_lots import Hidden, Line
-from pipelines.demo.archive_lots import write_lots
+from pipelines.demo.archive_lots import Hidden, Line, write_lots
 from pipelines.discovery.attributes import add_attributes
 from pipelines.report.numbers import significant, with_uncertainty
 from pipelines.workbench.application import create_app
