@@ -99,7 +99,7 @@ def fit_lot(
     output : (..., n, 3), mean output of each dwell, in the output's unit
     standard_error : (..., n, 3), output unit; infinity takes a value out of the fit; None weighs all alike
     nonlinear : values of nonlinear parameters by effect id; the middle of their bounds otherwise
-        (:func:`inertial.fits.profile.fit_profiled` finds them)
+        (:func:`inertial.estimation.refinement.terms_of` finds them)
 
     Raises
     ------
