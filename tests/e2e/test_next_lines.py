@@ -23,13 +23,13 @@ from pipelines.cli.history import removal
 
 HERE = "tests/e2e/test_next_lines.py::"
 ELSEWHERE = {
-    "demo_text": "tests/e2e/test_discover.py::test_the_demonstration_for_people_ends_with_a_command_that_runs",
+    "discovery_text": "tests/e2e/test_discover.py::test_the_demonstration_for_people_ends_with_a_command_that_runs",
     "diagnosis_text": HERE + "test_files_beside_the_dwells_are_found_and_stand_in_the_printed_lines",
     "diagnose": HERE + "test_the_lines_after_a_diagnosis_of_a_run_measure_it_again_and_judge_by_it",
     "investigate": HERE + "test_the_lines_after_an_investigation_name_the_judged_model",
     "improve_text": HERE + "test_the_lines_after_an_improvement_decide_between_alternatives",
     "demo": HERE + "test_the_lines_of_the_demonstration_run_by_hand",
-    "optimal": "tests/e2e/test_plan.py::test_the_line_after_a_search_measures_the_new_recipe",
+    "plan_text": "tests/e2e/test_plan.py::test_the_line_after_a_search_measures_the_new_recipe",
 }
 """Where the lines of a module are run that prints them after minutes only, or after several commands."""
 
@@ -109,7 +109,7 @@ def _improved(folder: Path) -> tuple[int, str, str]:
 
 
 CASES = {
-    "rerun": _rerun, "run": _run, "history": _refuted, "import_text": _imported, "recording_text": _improved,
+    "rerun": _rerun, "run": _run, "history": _refuted, "import_text": _imported, "improve_text": _improved,
 }  # fmt: skip
 
 

@@ -51,13 +51,13 @@ def channels(draw: st.DrawFn) -> list[Channel]:
 @FEW
 @given(written=channels())
 def test_samples_and_interval_of_a_recording_read_back_exactly(form: str, written: list[Channel], folder: Path) -> None:
-    path = folder / f"recording{WRITERS[form].SUFFIX}"
+    path = folder / f"recording{WRITERS[form].suffix}"
     assert write_waveforms(form, written, path) == [path]
     content, source = files.read_content(path)
     columns = [name for name in content.table if not str(name).lower().startswith(("time", "x_value"))]
     assert len(columns) == len(written)
     for name, channel in zip(columns, written, strict=True):
-        np.testing.assert_array_equal(content.table[name].to_numpy(dtype=float), channel.values)
+        np.testing.assert_array_equal(content.table[name].to_numpy(dtype=float), channel.samples)
     if form in STATE_THE_INTERVAL:
         assert source.form == form
         assert content.interval_s == pytest.approx(written[0].interval_s, rel=1e-5)
