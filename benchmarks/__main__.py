@@ -49,6 +49,7 @@ SHORT: dict[str, str] = {
     "sweep_parameters": "12 1",
     "shock_and_spin": "centrifuge 9",
     "discovery": "names --archives 6",
+    "scoreboard": "--seed 1 --share 0.1 --only hand",
 }
 
 
