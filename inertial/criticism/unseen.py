@@ -150,31 +150,31 @@ def smallest_named(field: Candidates, model: Model) -> list[Smallest]:
     least = MATERIAL * model.scatter()
     held = {t.effect.id for t in model.terms}
     smallest: list[Smallest] = []
-    for name in (e.id for e in field.effects if e.id not in held):
-        sizes = _sizes(field, model, spaces, name, least)
+    for effect in (e for e in field.effects if e.id not in held):
+        sizes = _sizes(field, model, spaces, effect, least)
         sizes = sizes[:, np.isfinite(sizes).all(axis=0) & (sizes > 0.0).all(axis=0)]
         if sizes.size:
-            smallest.append(Smallest(name, *np.median(sizes, axis=1).tolist()))
+            smallest.append(Smallest(effect.id, *np.median(sizes, axis=1).tolist()))
     # of effects that the plan shows alike the order is that of the catalogue, not that of rounding errors
     return sorted(smallest, key=lambda s: -round(s.size / s.without_slow, _DIGITS))
 
 
-def _sizes(field: Candidates, model: Model, spaces: tuple[Space, Space], name: str, least: float) -> Array:
+def _sizes(field: Candidates, model: Model, spaces: tuple[Space, Space], effect: AnyEffect, least: float) -> Array:
     """RMS, g, of the effect's most visible column that is detected in the mean, (2, grid), in each space; else infinite.
+
+    Of an effect whose run begins at rest.
 
     Parameters
     ----------
     spaces : with the noise that was found, and with its white part alone
     least : RMS, g, of the part of an effect beyond the model below which it is never reported
     """
-    problem, effect = model.problem, field.of(name)
+    problem, places = model.problem, field.grids[effect.id]
     values: list[Array] = []
-    for piece in problem.pieces(effect, field.grids[name]):
+    for piece in problem.pieces(effect, [values for values in places if at_rest(effect, values)]):
         raw = np.sqrt(_squares(piece, problem.covariance.there) / problem.count)
         grid, p = piece.columns.shape[2:]
-        coefficients = float(p if piece.shared else problem.blocks * p) + len(field.grids[name][0]) * (
-            len(field.grids[name]) > 1
-        )
+        coefficients = float(p if piece.shared else problem.blocks * p) + len(places[0]) * (len(places) > 1)
         needed = _needed(coefficients, field.looks, problem.count)
         each: list[Array] = []
         share = np.ones((grid, p))
