@@ -40,7 +40,7 @@ from pipelines import procedures
 from pipelines.archive import Archive
 from pipelines.capture.capture import capture
 from pipelines.jobs.recipes import load_recipe
-from pipelines.procedures import PROCEDURES, parts_of, roles_of, shock_waves
+from pipelines.procedures import PROCEDURES, parts_of, roles_of, shock_records
 from pipelines.procedures.recorded import nominal_device, procedure_record
 from pipelines.schedule.steps import steps
 from schemas.lot import Lot, Unit
@@ -151,7 +151,7 @@ def main() -> None:
     asked = reader.parse_args()
     for name in asked.procedures or list(PARTS):
         setattr(getattr(procedures, KIND.get(name, name)), "worst", of_axis("z"))  # noqa: B010 - not every module has one
-        shock_waves.diagnosis_text = lambda *_: []  # it enters no figure
+        shock_records.diagnosis_text = lambda *_: []  # it enters no figure
         begun, left, lot = time.process_time(), asked.units, 0
         rows: list[dict[str, Any]] = []
         while left > 0:

@@ -54,7 +54,7 @@ def _section(effect: AnyEffect) -> str:
         f"- source: {effect.source}",
     ]
     lines += [
-        f"- {p.name}: between {p.low:g} and {p.high:g} {p.unit}".rstrip()
+        f"- {p.name}: between {p.low:g} and {p.high:g} {p.unit.removeprefix('1')}".rstrip()
         if not p.choices
         else f"- {p.name}: one of {', '.join(f'{c:g}' for c in p.choices)}"
         for p in effect.nonlinear

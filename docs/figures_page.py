@@ -16,7 +16,7 @@ EMPTY: Any = SimpleNamespace(static_record_s=0.0, verification=[], effects=[])
 HEAD = """\
 # Figures of merit
 
-Written by `python -m docs.figures_page` from `pipelines/stages/figures/`; change a figure's file, not this page. The names are
+Written by `python -m docs.figures_page` from `pipelines/stages/figures/`; change its entry there, not this page. The names are
 the keys of `[figures]` in limits files and the column `figure` of the table `figures`. A limits file states the unit again:
 `bias_error_ug = { max = 100.0, unit = "µg" }`.
 

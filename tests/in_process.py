@@ -2,6 +2,7 @@
 
 import contextlib
 import io
+import json
 import subprocess
 import sys
 from collections.abc import Callable, Sequence
@@ -61,7 +62,8 @@ def document_of(*words: object, status: int | None = None) -> dict[str, Any]:
 
 def typed_document(name: str, text: str) -> dict[str, Any]:
     """A document of a command, which is of one of its types, with no key more and none less."""
-    return _types(name).validate_json(text, strict=True, extra="forbid")
+    _types(name).validate_json(text, strict=True, extra="forbid")
+    return json.loads(text)
 
 
 @cache

@@ -1,4 +1,4 @@
-"""Test of the effects added to a model: by a fresh run if there is one, else by dwells left out; of all versions of a model."""
+"""Test of the effects added to a model, by a fresh run or else by dwells left out; the error of all its versions."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def _by_fresh(before: Model, after: Model, out: LeftOut, fresh: Lot) -> dict[str
             left_out(before, also=after.terms), out
         )
         reason = rises
-        if not rises and np.isfinite(change.fall_error) and change.fall <= CONFIRMED * change.fall_error:
+        if not rises and np.isfinite(change.fall_error) and not change.fall > CONFIRMED * change.fall_error:
             reason = "the fall of the error is not clearly more than its uncertainty"
     elif change.confirmed is None:
         reason = "the fresh run does not decide; measure another run"
@@ -85,7 +85,7 @@ def _by_left_out(before: LeftOut, after: LeftOut, doubt: Callable[[], str | None
     rises = None
     if gain is None:
         against = "no judgement is possible"
-    elif gain <= LEFT_OUT:
+    elif not gain > LEFT_OUT:  # a nan is no gain
         against = f"log density {gain:+.1f}, more than {LEFT_OUT:g} is needed"
     else:
         rises = _rise("the error on dwells left out", *both)

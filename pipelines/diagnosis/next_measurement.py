@@ -136,7 +136,8 @@ SAME_SOAK_K = 0.5
 def next_recipe(base: Recipe, rows: Sequence[dict[str, Any]], name: str) -> Recipe:
     """The recipe ``base`` followed by the proposed steps; its model is that of ``base``.
 
-    A recipe file holds no formulas: those of a model file are left out.
+    The proposed steps alone have too few poses for a fit, and their expected χ² includes the dwells so far: both are measured. A
+    recipe file holds no formulas: those of a model file are left out.
 
     Parameters
     ----------

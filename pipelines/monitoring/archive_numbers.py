@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import shutil
-from collections import Counter
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
-from typing import Any
 
 from pipelines.archive import Archive, files
 from pipelines.archive.listing import RunInfo
@@ -25,19 +23,31 @@ DUE_DAYS = (0, 30)
 IMPORTED = "(import)"  # station label of an imported run
 
 
+@dataclass(frozen=True)
+class RunTime:
+    """Of a finished run: time on the station's clock, s; pauses and their duration, s; repeated dwells; door openings."""
+
+    station_s: float = 0.0
+    pauses: int = 0
+    paused_s: float = 0.0
+    repeated: int = 0
+    door: int = 0
+
+    def __add__(self, other: RunTime) -> RunTime:
+        """The sum of two runs, field by field."""
+        return RunTime(**{one.name: getattr(self, one.name) + getattr(other, one.name) for one in fields(self)})
+
+
 @dataclass
 class LineNumbers:
-    """Sums over the runs of one station and recipe inside the window; ``last`` is the newest start of a finished run.
-
-    times : by name, time on the station's clock, s; pauses and their duration, s; repeated dwells; door openings
-    """
+    """Sums over the runs of one station and recipe inside the window; ``last`` is the newest start of a finished run."""
 
     finished: int = 0
     unfinished: int = 0
     passed: int = 0
     failed: int = 0
     last: datetime | None = None
-    times: Counter[str] = field(default_factory=Counter[str])
+    times: RunTime = RunTime()
 
 
 @dataclass
@@ -62,7 +72,7 @@ class ArchiveReader:
 
     def __init__(self, archive: Archive, window_d: int) -> None:
         self.archive, self.window_d = archive, window_d
-        self._times: dict[str, Counter[str]] = {}
+        self._times: dict[str, RunTime] = {}
         self._sealed: set[str] = set()
 
     def read(self, now: datetime | None = None) -> ArchiveNumbers:
@@ -94,22 +104,20 @@ class ArchiveReader:
         line.last = started if line.last is None else max(line.last, started)
         if info.id not in self._times:
             self._times[info.id] = self._time_of(info.id)
-        line.times.update(self._times[info.id])
+        line.times += self._times[info.id]
 
-    def _time_of(self, run_id: str) -> Counter[str]:
-        """The times and counts of a finished run, see :class:`LineNumbers`."""
+    def _time_of(self, run_id: str) -> RunTime:
         run = self.archive.run(run_id)
         try:
-            dwells: Any = run.table("dwells") if "dwells" in run.tables() else ()
+            dwells = run.table("dwells") if "dwells" in run.tables() else None
             interrupted = interruptions(run)
         except TumblelineError:  # 'tumbleline verify' reports the faults of its files
-            return Counter()
-        times: dict[str, Any] = {"station_s": float(dwells["time_s"].max())} if len(dwells) else {}
-        if interrupted is not None:
-            times |= {"pauses": interrupted["pauses"], "paused_s": interrupted["paused_s"]}
-            times["repeated"] = sum(one["times"] for one in interrupted["repeated_dwells"])
-            times["door"] = interrupted["door_opened"]
-        return Counter(times)
+            return RunTime()
+        station_s = float(dwells["time_s"].max()) if dwells is not None and len(dwells) else 0.0
+        if interrupted is None:
+            return RunTime(station_s)
+        repeated = sum(one["times"] for one in interrupted["repeated_dwells"])
+        return RunTime(station_s, interrupted["pauses"], interrupted["paused_s"], repeated, interrupted["door_opened"])
 
     def _lag(self, finished: Iterable[RunInfo], numbers: ArchiveNumbers, at: datetime) -> None:
         for info in finished:

@@ -16,7 +16,7 @@ from pipelines.monitoring.queue_numbers import QueueNumbers
 from pipelines.monitoring.snapshot import Snapshot, StationNumbers
 
 LINE = ("station", "recipe")
-OPEN = ("SCHEDULED", "PENDING", "RUNNING", "PAUSED")
+SHOWN_STATES = ("SCHEDULED", "PENDING", "RUNNING", "PAUSED")
 TIMES = {
     "station_s": ("station_seconds", "Time on the clock of the station"),
     "pauses": ("pauses", "Pauses for a condition of the station"),
@@ -24,7 +24,7 @@ TIMES = {
     "repeated": ("repeated_dwells", "Dwells that were discarded and measured again"),
     "door": ("door_openings", "Openings of the chamber door during runs"),
 }
-"""Name and meaning of each sum over runs."""
+"""Name and meaning of each sum over runs, by its field of :class:`RunTime`."""
 
 
 class _Collector:
@@ -67,7 +67,7 @@ def _archive(numbers: ArchiveNumbers, window_d: int) -> Iterator[GaugeMetricFami
     last = {key: line.last.timestamp() for key, line in lines if line.last is not None}
     yield _family("last_run_timestamp_seconds", "Start of the newest finished run", LINE, last)
     for count, (name, text) in TIMES.items():
-        yield _family(name, text, LINE, {key: line.times[count] for key, line in lines})
+        yield _family(name, text, LINE, {key: getattr(line.times, count) for key, line in lines})
     yield _family("archive_unsealed_runs", "Finished runs that are not in the hash chain", (), {(): numbers.unsealed})
     lag = "Age of the oldest finished run that is not in the hash chain"
     yield _family("archive_lag_seconds", lag, (), {(): numbers.lag_s})
@@ -82,7 +82,7 @@ def _archive(numbers: ArchiveNumbers, window_d: int) -> Iterator[GaugeMetricFami
 def _queues(numbers: QueueNumbers, now: datetime) -> Iterator[GaugeMetricFamily]:
     queues = sorted(numbers.queues)
     opened, ended = (Counter((run.queue, run.state) for run in runs) for runs in (numbers.open, numbers.ended))
-    states = {(queue, one.lower()): opened[queue, one] for queue in queues for one in OPEN}
+    states = {(queue, one.lower()): opened[queue, one] for queue in queues for one in SHOWN_STATES}
     yield _family("queue_runs", "Flow runs that are due, running or paused", ("queue", "state"), states)
     since: dict[str, datetime] = {}
     for run in numbers.late(now):

@@ -124,8 +124,10 @@ def _leave_when_alone(home: Path, server: uvicorn.Server) -> None:
     while not server.should_exit:
         time.sleep(LOOK_S)
         try:
-            server.should_exit = _left(home)
+            left = _left(home)
         except FileNotFoundError:  # the folder was removed with the command of this server: no client can find it
+            left = True
+        if left:  # never set back: a signal sets it, too
             server.should_exit = True
 
 

@@ -109,7 +109,7 @@ def use_key(variable: str) -> str:
     WrongUse
         The key is missing or too short, or other users may read its file.
     """
-    given = next(filter(None, map(os.environ.get, (variable, SERVER_KEY, CLIENT_KEY))), "")
+    given = os.environ.get(variable) or os.environ.get(SERVER_KEY) or os.environ.get(CLIENT_KEY)
     key = given or _secret(KEY_FILE, CREDENTIAL, "key file")
     if len(key) < SHORTEST_KEY or ":" not in key:
         fault = "no key" if not key else f"a key of {len(key)} characters"

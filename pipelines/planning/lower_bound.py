@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise, permutations, product
+from itertools import permutations
 
 import numpy as np
 
@@ -19,85 +19,11 @@ from inertial.arrays import Array
 from inertial.noise.dwells import dwell_covariance
 from pipelines.planning.context import PlanContext
 from pipelines.planning.requirement import Requirement
+from pipelines.planning.soak_orders import orders, ramp_orders
 from pipelines.planning.timed_design import followed_along, short_of, soak_waits
 from pipelines.schedule.planned_state import settled_state
-from pipelines.schedule.timing import StationPose, soaked, spent
+from pipelines.schedule.timing import spent
 from schemas.recipe import Recipe
-from schemas.station import StationConfig
-
-FEWEST, MOST = 3, 6
-MANY = 250
-"""Number of orders of each length to consider, the quickest ones."""
-
-RAMPS = (2, 3, 4, 5)
-"""Numbers of ramps in turn that are tried."""
-
-PRODUCTS = 20000
-"""Maximum number of arrangements of a given number of soaks to enumerate."""
-
-
-def orders(
-    levels: Sequence[float],
-    station: StationConfig,
-    shortest_s: float,
-    *,
-    optional: Sequence[float] = (),
-    back: bool = True,
-) -> list[tuple[float, ...]]:
-    """Orders of soaks over temperatures, the quickest first.
-
-    Every order includes all levels, repeats at least one temperature (which separates drift from temperature) and both rises and
-    falls (which makes hysteresis visible).
-
-    Parameters
-    ----------
-    levels : °C, required temperatures; a single level gives one order of one soak
-    shortest_s : s, shortest soak
-    optional : °C, further temperatures that an order may include
-    back : whether a repeated temperature and a change of direction are required
-    """
-    free = sorted({*levels, *optional})
-    if len(free) == 1:
-        return [(free[0],)]
-    candidates: list[tuple[float, ...]] = []
-    for count in range(FEWEST if back else 1, MOST + 1):
-        if len(free) ** count > PRODUCTS:
-            break
-        own = [
-            o
-            for o in product(free, repeat=count)
-            if set(levels) <= set(o) and all(a != b for a, b in pairwise(o)) and (not back or _returns(o))
-        ]
-        candidates += sorted(own, key=lambda order: soak_seconds(order, station, shortest_s))[:MANY]
-    return sorted(candidates, key=lambda order: soak_seconds(order, station, shortest_s))
-
-
-def ramp_orders(levels: Sequence[float]) -> list[tuple[float, ...]]:
-    """The ends of a ramp in turn, °C: the chamber climbs and falls between the ends of the required temperatures."""
-    low, high = min(levels), max(levels)
-    if low == high:
-        return [(low,)]
-    turns = [[(high, low)[(first + k) % 2] for k in range(RAMPS[-1])] for first in (0, 1)]
-    return [tuple(turn[:count]) for count in RAMPS for turn in turns]
-
-
-def mirrored(order: Sequence[float]) -> tuple[float, ...]:
-    """The order with its temperatures mirrored about the middle of their range."""
-    middle = min(order) + max(order)
-    return tuple(round(middle - t, 3) + 0.0 for t in order)
-
-
-def _returns(order: Sequence[float]) -> bool:
-    """Whether a temperature is repeated, and the temperature both rises and falls."""
-    rises = [b > a for a, b in pairwise(order)]
-    return len(set(order)) < len(order) and any(rises) and not all(rises)
-
-
-def soak_seconds(order: Sequence[float], station: StationConfig, shortest_s: float) -> float:
-    """Station time of the soaks alone, s, from room temperature; each starts from the settled temperature of the one before."""
-    room = station.simulation.room_C if station.simulation else station.pace.room_C
-    return sum(soaked(StationPose(air=a, device=a), b, station, shortest_s)[0] for a, b in pairwise((room, *order)))
-
 
 RESTED_S = 1e4  # s at rest before a dwell: nothing of the last move is left
 PIECE_S = 120.0

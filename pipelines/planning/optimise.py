@@ -16,9 +16,10 @@ from inertial.planning.expected import Expected
 from inertial.planning.pose_exchange import exchanged
 from inertial.planning.visibility import visibilities
 from pipelines.planning.context import PlanContext, plan_context
-from pipelines.planning.lower_bound import lower_bound, mirrored, orders, ramp_orders
+from pipelines.planning.lower_bound import lower_bound
 from pipelines.planning.plan import identified
 from pipelines.planning.requirement import Requirement, apart, numbered, turns
+from pipelines.planning.soak_orders import mirrored, orders, ramp_orders
 from pipelines.planning.textbook import PART_SEEN
 from pipelines.planning.timed_design import FEWEST, MOST, PlanDesign, TimedDesign, fewest_dwells, short_of, spanned
 from pipelines.schedule.timing import spent

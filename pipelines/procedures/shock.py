@@ -15,7 +15,7 @@ from inertial.dynamics.shock_effects import EFFECTS
 from inertial.dynamics.stability import difference_error, error_of_mean, short_noise
 from inertial.errors import NotIdentified
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Role, Trace
-from pipelines.procedures import shock_waves
+from pipelines.procedures import shock_records
 from pipelines.procedures.base import FromWaveforms, InG, NominalScale, OnEquipment, refuse_unknown_effects, scale_of
 from pipelines.procedures.figures import FigureSpec, FigureValue, UnitOutcome, worst
 from pipelines.procedures.recorded import (
@@ -96,7 +96,7 @@ class ShockTest(InG, OnEquipment, FromWaveforms):
         FigureSpec(
             "shock_bias_shift_ug", "µg", "bias after the shocks minus before, same pose and temperature, worst axis"
         ),
-        *shock_waves.OF_PULSE,
+        *shock_records.OF_PULSE,
     )
 
     def steps(self, part: ShockPart, recipe: Recipe) -> list[ProcedureStep]:
@@ -157,18 +157,18 @@ class ShockTest(InG, OnEquipment, FromWaveforms):
             direction = one.record.step.setting["direction"]
             alone = REFERENCE not in one.record.samples
             in_g = UnitRecord(one.own.time, one.own.output / scale)
-            pair = shock_waves.filtered_pair(
+            pair = shock_records.filtered_pair(
                 in_g if alone else one.record.samples[REFERENCE], one.own, axis, scale[axis], duration
             )
-            of_shock = shock_waves.rows_of(
+            of_shock = shock_records.rows_of(
                 one.number, direction, one.own.output[:, axis], pair, before_s, device, alone=alone
             )
             names = ("unit",) if alone else ("reference", "unit")
             if not alone:
-                noise = shock_waves.noise_before(pair, before_s)
-                of_shock += shock_waves.waves(one.number, pair, direction, part, noise)
+                noise = shock_records.noise_before(pair, before_s)
+                of_shock += shock_records.waves(one.number, pair, direction, part, noise)
             if one.number == first:
-                of_shock += shock_waves.curves(pair, names, duration, before_s)
+                of_shock += shock_records.curves(pair, names, duration, before_s)
             rows += [row | {"unit": one.unit, "axis": part.axis} for row in of_shock]
         return point_table(rows)
 
@@ -180,12 +180,12 @@ class ShockTest(InG, OnEquipment, FromWaveforms):
         if len(bias) and bool((bias.loc[bias["setting"] > 0.0, "uncertainty"] <= STUCK).any()):
             texts.append(("survival", "the output is constant after the shocks: the unit has not survived"))
         pulse = rows[rows["series"] == "pulse"]
-        texts += shock_waves.texts_of(reference, pulse)
-        apart = shock_waves.no_comparison(good, reference, pulse)
+        texts += shock_records.texts_of(reference, pulse)
+        apart = shock_records.no_comparison(good, reference, pulse)
         if len(good) and not apart:
-            texts += shock_waves.diagnosis_text(rows, part)
-        compared = shock_waves.ratio_figures(part, ratio, good, apart)
-        return [*compared, bias_shift(bias), *shock_waves.pulse_figures(part.axis, pulse, ratio)], texts
+            texts += shock_records.diagnosis_text(rows, part)
+        compared = shock_records.ratio_figures(part, ratio, good, apart)
+        return [*compared, bias_shift(bias), *shock_records.pulse_figures(part.axis, pulse, ratio)], texts
 
     def chart(self, part: ShockPart, points: pd.DataFrame) -> Chart:
         """First shock of reference and unit, and their shock response spectra."""

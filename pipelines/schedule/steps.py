@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 from pipelines.procedures import PROCEDURES, Part, ProcedureStep, parts_of
 from schemas.poses import Pose
 from schemas.recipe import Recipe
 
 Kind = Literal["dwell", "verification", "allan", "procedure"]
-ALIKE = ("kind", "pose", "wait_s", "settled", "off_s", "lasting_s", "rate_hz")
-"""What a step has of the step of its procedure."""
 
 
 @dataclass(frozen=True)
@@ -60,8 +58,19 @@ def steps(recipe: Recipe) -> list[Step]:
         same = bool(records and own) and records[-1].temperature == own[0].temperature_C and own[0].settled
         first = (records[-1].soak + (0 if same else 1)) if records else 0
         for one in own:
-            own_values: dict[str, Any] = {name: getattr(one, name) for name in ALIKE}
-            own_values |= {"procedure": number, "order": one} if recipe.procedures else {}
-            soak = first + one.soak - own[0].soak
-            records.append(Step(len(records), soak=soak, temperature=one.temperature_C, **own_values))
+            step = Step(
+                record=len(records),
+                kind=one.kind,
+                soak=first + one.soak - own[0].soak,
+                temperature=one.temperature_C,
+                pose=one.pose,
+                wait_s=one.wait_s,
+                settled=one.settled,
+                off_s=one.off_s,
+                procedure=number if recipe.procedures else None,
+                lasting_s=one.lasting_s,
+                rate_hz=one.rate_hz,
+                order=one if recipe.procedures else None,
+            )
+            records.append(step)
     return records

@@ -190,10 +190,8 @@ def _of_procedures(table: pd.DataFrame | None, unit: str, limits: Limits) -> lis
         why = "" if row["identified"] else f"axis {row['axis']}: {row['note']}"
         value = float(row["value"]) if row["identified"] else np.inf
         name = str(row["figure"])
-        dof, removed = (
-            float(row.get("dof", np.nan)),
-            float(row.get("removed", 0.0)),
-        )  # runs of earlier versions have none
+        # runs of earlier versions have none
+        dof, removed = float(row.get("dof", np.nan)), float(row.get("removed", 0.0))
         error = float(row["uncertainty"]) if not why else 0.0
         one = Figure(name, str(row["unit_text"]), Value(value, error, why, dof=dof, removed=removed))
         before = figures.get(name)

@@ -66,7 +66,7 @@ TERM_COLUMNS = ["unit", "axis", "term", "value", "low", "high", "identified", "u
 
 
 def noise(record: StaticRecord | None) -> dict[str, pd.DataFrame]:
-    """Allan curves (table ``allan``) and noise terms (table ``noise``) of every calibrated unit, in µg.
+    """Allan curves (table ``allan``) and noise terms (table ``noise``) of every calibrated unit, in µg; empty without a record.
 
     Terms: Q, N, B, K, R as in IEEE Std 952 (N is two-sided: σ(τ) = N/√τ); ``n_d`` = N·√2 is the one-sided density of
     data sheets; ``B_bound`` = min σ/0.664 is only an upper bound of B. Records longer than 2¹⁸ samples are read table by table

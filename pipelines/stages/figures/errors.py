@@ -58,13 +58,16 @@ def _bias_error(tables: UnitTables) -> Value | None:
 
     See :func:`pipelines.stages.rms_error.rms_uncertainty`. Runs of earlier versions have the uncertainty of white noise alone.
     """
-    rows, values = tables.verification, list[Value]()
-    for axis in AXES if len(rows) else ():
+    rows = tables.verification
+    if not len(rows):
+        return None
+    values: list[Value] = []
+    for axis in AXES:
         if f"error_{axis}_ug" in rows:
             name, shown = f"rms_uncertainty_{axis}_ug", rms(rows[f"error_{axis}_ug"])
             shown = shown._replace(uncertainty=float(rows[name][0])) if name in rows else shown
             values.append(_with_references(shown, tables.stated_u("bias_error", axis)))
-    return max(values, key=lambda value: value.reach(tables.guard)) if len(rows) else None
+    return max(values, key=lambda value: value.reach(tables.guard))
 
 
 def _over_period(tables: UnitTables) -> Value | None:
