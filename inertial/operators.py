@@ -31,15 +31,6 @@ def first_order_lag(time: ArrayLike, signal: ArrayLike, tau: float) -> Array:
     return recursion(x[..., 0], keep, drive)
 
 
-def natural_spline(z: Array, knots: Array) -> list[Array]:
-    """The curved functions of a natural cubic spline. Hastie, Tibshirani, Friedman: Elements of Statistical Learning, eq. 5.4."""
-
-    def d(k: int) -> Array:
-        return (np.maximum(z - knots[k], 0.0) ** 3 - np.maximum(z - knots[-1], 0.0) ** 3) / (knots[-1] - knots[k])
-
-    return [d(k) - d(knots.size - 2) for k in range(knots.size - 2)]
-
-
 def recursion(start: ArrayLike, keep: Array, drive: Array) -> Array:
     """y₀ = start, yₖ₊₁ = keepₖ·yₖ + driveₖ along the last axis, (..., m) for ``keep``, ``drive`` (..., m − 1)."""
     out = np.empty((*drive.shape[:-1], drive.shape[-1] + 1))

@@ -15,8 +15,8 @@ from inertial.estimation.candidate import Candidate
 from inertial.estimation.penalty import log_p_value
 from inertial.estimation.problem import Problem
 from inertial.estimation.space import Space
-from inertial.operators import natural_spline
 from inertial.quantities import attribute_drivers, is_clock
+from inertial.splines import natural_spline
 from inertial.state import ALL_AXES, State
 
 _KNOTS = 5

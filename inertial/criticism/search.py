@@ -100,11 +100,12 @@ def _widened(field: Candidates, model: Model, rival: Rival, chosen: Sequence[Ter
 
     The simpler form of an effect with memory leaves a remainder, which would be found as another effect.
     """
+    simpler = [term for term in chosen if term.memory and term.first is not None]
+    if not simpler:
+        return None
     least = cost_of_model(model.with_term(rival.term))
     found: list[Term] | None = None
-    for term in chosen:
-        if not term.memory or term.first is None:
-            continue
+    for term in simpler:
         wider = judge_refined(field, model.without_term(term), replace(term, first=None)).term
         terms = [wider if each is term else each for each in chosen]
         cost = cost_of_model(model.without_term(term).with_term(wider))
@@ -269,9 +270,10 @@ def _judged(field: Candidates, model: Model, term: Term) -> Rival:
 
 
 def _begun(model: Model, term: Term) -> tuple[Term, ...]:
-    """A term, and where it remembers, the same with its memory at rest before the first dwell.
+    """A term, and where it remembers, the same without coefficients for the state of each series before the first dwell.
 
-    Devices are at rest when a run begins, as a rule. A coefficient for the state of every series would be paid for else, and an
+    It is then at rest, or where the effect has a parameter for that state, as this says. Devices are at rest when a run begins,
+    as a rule. A coefficient for the state of every series would be paid for else, and an
     effect without memory that leaves as little stands alone: a step between two soaks in place of hysteresis.
     """
     if not term.memory:

@@ -1,7 +1,7 @@
 """Effects outside the catalogue: one curve of one driver that is better than the effects that imitate it."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -50,7 +50,7 @@ class Unexplained:
     part: Part = "bias"
     floor: float = float("inf")
     cost: float = float("inf")
-    there: Flags | None = None
+    there: Flags | None = field(default=None, compare=False, repr=False)
 
 
 @dataclass(frozen=True)

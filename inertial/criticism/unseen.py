@@ -44,7 +44,7 @@ def unseen(field: Candidates, base: Model, candidates: Sequence[AnyEffect]) -> t
     not recorded.
     """
     gains = field.gains([base.at(base.problem.covariance.white_noise())], {t.effect.id for t in base.terms})[0]
-    blind = [name for name, gain in gains.items() if not gain.rank.any()]
+    blind = [e.id for e in field.effects if e.id in gains and not any(_at_rest(field, e, gains[e.id]))]
     order = [e.id for e in candidates]
     state = base.problem.lot.state
     memories = _memories(field, base, {*blind, *(t.effect.id for t in base.terms)})
@@ -171,7 +171,7 @@ def _sizes(field: Candidates, model: Model, spaces: tuple[Space, Space], effect:
     """
     problem, places = model.problem, field.grids[effect.id]
     values: list[Array] = []
-    for piece in problem.pieces(effect, [values for values in places if at_rest(effect, values)]):
+    for piece in problem.pieces(effect, resting_grid(effect, problem.lot.state)):
         raw = np.sqrt(_squares(piece, problem.covariance.there) / problem.count)
         grid, p = piece.columns.shape[2:]
         coefficients = float(p if piece.shared else problem.blocks * p) + len(places[0]) * (len(places) > 1)

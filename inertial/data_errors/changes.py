@@ -1,4 +1,4 @@
-"""What errors of handling have in common: a change from a dwell on, an error that one unit alone has, one of a single axis."""
+"""What errors of handling have in common: a change from a dwell on, an error of one unit, of a single axis, of the angles."""
 
 from abc import abstractmethod
 from typing import ClassVar

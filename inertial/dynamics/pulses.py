@@ -211,7 +211,10 @@ def octave_frequencies(low_hz: float, high_hz: float, per_octave: int = PER_OCTA
 
 
 def responses(record: Array, rate_hz: float, natural_hz: float, q: float) -> Array:
-    """Absolute acceleration (n,) of a base-excited oscillator with this natural frequency and Q (``inf``: undamped)."""
+    """Absolute acceleration (n,) of a base-excited oscillator with this natural frequency and Q (``inf``: undamped).
+
+    ISO 18431-4: the ramp-invariant recursion after Smallwood.
+    """
     damping = 0.0 if np.isinf(q) else 0.5 / q
     wn, t = 2.0 * np.pi * natural_hz, 1.0 / rate_hz
     wd = wn * np.sqrt(1.0 - damping**2)

@@ -64,7 +64,7 @@ def bandwidth(natural_hz: float, damping: float) -> float:
     (1 - r²)² + 4ζ²r² = 2 solved for r = f/f_n: √(q + √(q² + 1)) with q = 1 − 2ζ².
     """
     q = 1.0 - 2.0 * damping**2
-    return natural_hz * float(np.sqrt(q + np.sqrt(q**2 - 1.0 + 2.0)))
+    return natural_hz * float(np.sqrt(q + np.sqrt(q**2 + 1.0)))
 
 
 def largest_level(frequency: ArrayLike, *, displacement_m: float, velocity_m_s: float, acceleration_g: float) -> Array:

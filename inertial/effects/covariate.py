@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from inertial.effects.base import Array, SensorEffect, stack
-from inertial.operators import natural_spline
+from inertial.splines import natural_spline
 from inertial.state import State
 
 COVARIATE_PREFIX = "covariate:"

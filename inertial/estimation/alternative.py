@@ -79,8 +79,8 @@ class Handling(Effect):
         return []
 
     def short(self, size: Array, **place: float) -> str:
-        """A short text for one of :meth:`instead`."""
-        return self.id
+        """A short text for one of :meth:`instead`; to be written where that has places."""
+        raise NotImplementedError(f"{self.id}: a short text is missing beside the places of 'instead'")
 
     def possible(self, size: Array) -> bool:
         """Whether coefficients (k,) are possible for the alternative; others have another cause of the same shape."""

@@ -227,12 +227,12 @@ class Problem:
         start: bool = False,
         key: object = None,
     ) -> Candidate:
-        """The same for values that are tried once: nothing of them is kept. Rows that blocks share are stored once.
+        """Columns of an effect over values, those of one value after another; rows that blocks share are stored once.
 
         Parameters
         ----------
         start : whether columns of the unknown state of a memory follow
-        key : of the candidate
+        key : under which the candidate is kept; None where it is tried once
         """
         shared = effect.scope in SHARED
         every: list[Array] = []

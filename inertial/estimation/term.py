@@ -19,7 +19,7 @@ class Term:
 
     values : of nonlinear parameters and constants; one value, or one per sensor axis
     first : how many of its columns are used; None for all
-    rest : whether its memory was at rest before the first dwell; its state then is unknown otherwise
+    rest : whether the state of its memory before the first dwell has no coefficients: it was at rest, or as a parameter says
     """
 
     effect: AnyEffect | Handling

@@ -72,5 +72,17 @@ class LotColumns:
         largest: dict[str, dict[str, float]] = {}
         for (effect, name, _), one in zip(self._free, spread.tolist(), strict=True):
             own = largest.setdefault(effect, {})
-            own[name] = max(own.get(name, 0.0), one)
+            own[name] = max(own.get(name, 0.0), self._within_bounds(effect, name, one))
         return largest
+
+    def _within_bounds(self, effect: str, name: str, error: float) -> float:
+        """A standard error; of the state in which a run began no more than of what its bounds leave.
+
+        Where the path takes up that state before the first dwell, the column is zero and its inverse, too: nothing is known.
+        """
+        every = (p for one in (*self._sensor, *self._station) if one.id == effect for p in one.parameters(self._state))
+        parameter = next(p for p in every if p.name == name)
+        if not parameter.of_run:
+            return error
+        rectangular = (parameter.high - parameter.low) / np.sqrt(12.0)
+        return float(min(error, rectangular)) if error > 0.0 else float(rectangular)

@@ -156,7 +156,6 @@ def model_deviation(terms: NoiseTerms, tau: Array) -> Array:
     return np.sqrt(3.0 * q**2 / tau**2 + n**2 / tau + flat + k**2 * tau / 3.0 + r**2 * tau**2 / 2.0)
 
 
-SYMBOLS = ("N", "B", "K")
 _FREE = np.array([symbol not in {"K", "R"} for symbol in mixture.TERMS])
 """A filter knows no ramp: what looks like one is the end of a walk. The walk is searched."""
 _SHARES = np.concatenate([[0.0], np.logspace(-4.0, 0.5, 19)])
@@ -164,7 +163,7 @@ _SHARES = np.concatenate([[0.0], np.logspace(-4.0, 0.5, 19)])
 _WORTH = 2.0  # fall of the deviance that one more parameter must bring (Akaike)
 _SPREAD = 3.0  # n times the relative variance of the Allan variance of adjacent samples, for white noise
 _LAST = 4  # averaging times that give the scale of a walk
-_N, _B, _K = (mixture.TERMS.index(symbol) for symbol in SYMBOLS)
+_N, _B, _K = (mixture.TERMS.index(symbol) for symbol in ("N", "B", "K"))
 
 
 @dataclass(frozen=True)

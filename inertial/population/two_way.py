@@ -38,7 +38,7 @@ def group_medians(values: Array, codes: Index) -> Array:
 
 
 def _groups(codes: Index) -> tuple[Index, Index, Index]:
-    """Index, and where each group begins and how long it is."""
+    """Codes, and where each group begins and how long it is."""
     counts = np.bincount(codes)
     return codes, np.concatenate([[0], np.cumsum(counts)[:-1]]), counts
 

@@ -13,7 +13,7 @@ from scipy.linalg import block_diag
 
 from docs.effects_page import page
 from inertial import effects, poses
-from inertial.design import grid_of
+from inertial.design import grid_of, resting_grid
 from inertial.effects import SensorEffect, StationEffect
 from inertial.effects.base import AnyEffect
 from inertial.errors import MissingInput, NotIdentified
@@ -235,7 +235,7 @@ def test_is_reported_unseen_on_six_faces_exactly_where_it_cannot_show(name: str,
     effect = effects.get(name)
     shows = False
     try:
-        for values in grid_of(effect, state):
+        for values in resting_grid(effect, state):
             columns = all_columns(effect, state, values)
             for axis in range(3):
                 shows |= absorbed_share(columns[axis, 0], model_columns(list(BASE), state, axis)) > 1e-5

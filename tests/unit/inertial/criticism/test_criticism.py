@@ -12,7 +12,7 @@ from inertial.criticism.field import Candidates
 from inertial.criticism.jumps import _evenness
 from inertial.criticism.noise_draws import NoiseDraws
 from inertial.criticism.search import judge, ranked
-from inertial.criticism.unseen import unseen
+from inertial.criticism.unseen import smallest_named, unseen
 from inertial.data_errors.handling import alternatives
 from inertial.data_errors.handling.wrong_pose import WrongPose
 from inertial.estimation import covariance, problem, share_statistics, space
@@ -56,6 +56,19 @@ def test_the_scatter_of_a_thermometer_shows_no_narrow_hysteresis(history):
     # soaks that only climb by 35 K hide a play that is narrower
     assert ranges[0].low == 1.0
     assert 15.0 < ranges[0].high < 35.0
+
+
+def test_what_a_run_at_one_temperature_cannot_show_is_said_whatever_state_a_run_may_begin_in():
+    """A play that begins at its edge would rectify the scatter of the thermometer, and count as seen."""
+    made, rng = make(World(units=4, poses=24), SEED), np.random.default_rng(5)
+    dwells = made.dwells[made.dwells["unit_C"].between(15.0, 35.0)].copy()
+    dwells["unit_C"] = 25.0 + 0.05 * rng.standard_normal(len(dwells))
+    problem = Problem(lot_of(measured(dwells)))
+    base = Model(problem, terms_of(catalogue.get_all(BASE), problem))
+    effect = catalogue.get("thermal_hysteresis")
+    field = Candidates(problem, [effect])
+    assert unseen(field, base, [effect])[0] == ("thermal_hysteresis",)
+    assert smallest_named(field, base) == []
 
 
 def stepped(dwells, size_ug: float):
