@@ -62,8 +62,10 @@ def document_of(*words: object, status: int | None = None) -> dict[str, Any]:
 
 def typed_document(name: str, text: str) -> dict[str, Any]:
     """A document of a command, which is of one of its types, with no key more and none less."""
-    _types(name).validate_json(text, strict=True, extra="forbid")
-    return json.loads(text)
+    kind, document = _types(name), json.loads(text)
+    found = kind.validate_json(text, strict=True, extra="forbid")
+    assert kind.dump_python(found, mode="json") == document, f"{name}: a key with a default is missing"
+    return document
 
 
 @cache

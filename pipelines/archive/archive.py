@@ -14,9 +14,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pipelines.archive import files
-from pipelines.archive.keys import digest, provenance
+from pipelines.archive.keys import digest
 from pipelines.archive.listing import RunInfo, infos_of
 from pipelines.archive.packed_path import with_packs
+from pipelines.archive.provenance import provenance
 from pipelines.archive.records import Records
 from pipelines.archive.run import START, Run
 from pipelines.archive.signatures import key_place

@@ -11,8 +11,8 @@ from pathlib import Path
 
 from pipelines.archive import files, hash_chain, packs
 from pipelines.archive.archive import Archive
-from pipelines.archive.keys import provenance
 from pipelines.archive.locks import CLAIM, LEASE_S, alone
+from pipelines.archive.provenance import provenance
 from pipelines.archive.run import Run
 from pipelines.archive.store import ObjectPath, Place
 from schemas import host

@@ -12,7 +12,7 @@ _SAMPLES = (
 _TABLES = (*_SAMPLES, "inertial.arrays", "inertial.errors", "inertial.quantities", "inertial.state")
 _MODEL = (
     *("inertial.design", "inertial.effects", "inertial.expressions", "inertial.fits"),
-    *("inertial.operators", "inertial.power"),
+    *("inertial.operators", "inertial.splines", "inertial.power"),
 )
 _ENGINE = (
     *(*_TABLES, *_MODEL, "inertial.data_errors", "inertial.decisions", "inertial.distributions"),

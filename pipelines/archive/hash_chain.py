@@ -32,8 +32,8 @@ def append(root: Place, kind: str, sealed: Mapping[str, str], about: Mapping[str
         number = last_number(root) + 1
         while True:
             previous = files.sha256(place_of_entry(root, number - 1)) if number > 1 else ""
-            place = {"number": number, "kind": kind, "previous": previous, "schema": 1}
-            content = files.manifest_bytes({**about, **place, "files": dict(sealed)})
+            position = {"number": number, "kind": kind, "previous": previous, "schema": 1}
+            content = files.manifest_bytes({**about, **position, "files": dict(sealed)})
             if files.publish_first(place_of_entry(root, number), content):
                 return number
             number += 1

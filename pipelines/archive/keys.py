@@ -1,16 +1,10 @@
-"""Keys of stages: a hash of inputs, parameters and code. They do not contain what has no effect on a result.
-
-That is the provenance: user, host, time and versions, which are stored in manifests, never in results or keys.
-"""
+"""Keys of stages: a hash of inputs, parameters and code. They do not contain what has no effect on a result."""
 
 from __future__ import annotations
 
-import getpass
 import hashlib
 import json
-import platform
 from collections.abc import Iterable, Mapping
-from datetime import UTC, datetime
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
@@ -55,25 +49,6 @@ def libraries() -> dict[str, str]:
     from importlib.metadata import version
 
     return {name: version(name) for name in LIBRARIES}
-
-
-def provenance() -> dict[str, Any]:
-    """The user, the host, the moment, and the versions of the product and of the libraries that a number may depend on."""
-    return {
-        "who": getpass.getuser(),
-        "where": platform.node(),
-        "when": datetime.now(UTC).isoformat(timespec="milliseconds"),
-        "software": _software(),
-        "libraries": libraries(),
-    }
-
-
-@cache
-def _software() -> dict[str, str]:
-    """Versions of the product and of what runs it; read from the installed packages."""
-    from importlib.metadata import version  # see libraries()
-
-    return {"tumbleline": version("tumbleline"), "python": platform.python_version()}
 
 
 EXTENDED = {"inertial.effects": "tumbleline.effects"}

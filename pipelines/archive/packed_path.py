@@ -145,8 +145,10 @@ class PackedPath(Base):
             return 0 if self.known.below(name) else None
         folder, rest = parts
         packed = self.known.folder(folder)
-        if packed is None or rest in packed.files:
-            return None if packed is None else packed.files[rest]
+        if packed is None:
+            return None
+        if rest in packed.files:
+            return packed.files[rest]
         return packed.mtime_ns if not rest or any(one.startswith(f"{rest}/") for one in packed.files) else None
 
     def _member(self) -> packs.Member | None:

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Protocol
 
 from pipelines.archive import files, hash_chain
-from pipelines.archive.keys import provenance
 from pipelines.archive.parquet import columns_of, encoded, read_table
+from pipelines.archive.provenance import provenance
 from pipelines.archive.records import COMPLETE, PARTS, Records
 from pipelines.archive.store import Place
 from schemas.errors import ArchiveUnusable, WrongUse, did_you_mean
@@ -115,7 +115,7 @@ class Run:
                 )
             self._put(f"{name}.parquet", data)
             follows = self._manifests(manifest.get("inputs", {}))
-            # signed anew
+            # manifest_bytes replaces the signature
             content = {**manifest, "taken_from": manifest.get("taken_from", other.id), "manifests": follows}
             self._put(f"{name}.json", files.manifest_bytes(content))
 

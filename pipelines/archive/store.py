@@ -186,10 +186,8 @@ def globbed(place: Any, pattern: str) -> Iterator[Any]:
     first, _, rest = pattern.partition("/")
     matches = [place / first]
     if any(mark in first for mark in "*?["):
-        try:
-            matches = sorted(one for one in place.iterdir() if fnmatchcase(one.name, first))
-        except (FileNotFoundError, NotADirectoryError):
-            return
+        inside = place.iterdir() if place.is_dir() else ()
+        matches = sorted(one for one in inside if fnmatchcase(one.name, first))
     for one in matches:
         if rest:
             yield from one.glob(rest)

@@ -88,8 +88,8 @@ def differing_libraries(run: str, manifests: Mapping[str, Mapping[str, Any]]) ->
     for library, by in sorted(versions.items()):
         if len(by) > 1:
             made = " and ".join(f"{number} ({', '.join(names)})" for number, names in sorted(by.items()))
-            check = f"check the numbers with 'tumbleline rerun {run} --check'"
-            remarks.append(f"run {run}: tables made with {library} {made}; {check}")
+            advice = f"check the numbers with 'tumbleline rerun {run} --check'"
+            remarks.append(f"run {run}: tables made with {library} {made}; {advice}")
     return remarks
 
 

@@ -14,8 +14,8 @@ from dataclasses import replace
 from datetime import datetime, timedelta
 
 from pipelines.archive import Archive, Run, files, hash_chain
-from pipelines.archive.keys import provenance
 from pipelines.archive.locks import alone
+from pipelines.archive.provenance import provenance
 from pipelines.archive.store import ObjectPath, Place
 from pipelines.certificates.days import LAST, today
 from pipelines.certificates.entries import LedgerEntry, event_of, folder_of, numbered_files
@@ -215,7 +215,7 @@ def _same(one: Calibration, event: LedgerEntry) -> bool:
 
 
 def stated(run: Run, serials: Iterable[str]) -> dict[str, Calibration]:
-    """The calibrations in the ledger that a run's units have by it, by serial: of each that is not ended, else the last.
+    """By serial, the calibration that certifies this run: the one that is not ended, else the last.
 
     Raises
     ------

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from typing import Any, Literal
 
 from pipelines.archive import files, hash_chain
-from pipelines.archive.keys import provenance
+from pipelines.archive.provenance import provenance
 from pipelines.archive.store import Place
 from pipelines.certificates.entries import folder_of, numbered_files
 from schemas.errors import ArchiveUnusable, WrongUse

@@ -45,10 +45,9 @@ def stated_budget(run: Run, unit: str) -> StatedBudget:
         raise WrongUse(
             f"run {run.id}: no uncertainty budget, one is needed; its station states no [uncertainty] (noise only)"
         )
-    sums, parts, figures = (
-        [row for row in rows_of(run.table(name)) if row["unit"] == unit]
-        for name in ("uncertainties", "budget", "figures")
-    )
+    tables = (run.table(name) for name in ("uncertainties", "budget", "figures"))
+    # the unit's rows first: a certificate of each unit of a large lot asks for its own
+    sums, parts, figures = (rows_of(table[table["unit"] == unit]) for table in tables)
     if not sums:
         raise WrongUse(
             f"run {run.id}: no uncertainty budget of unit {unit!r}; see 'tumbleline show {run.id} uncertainties'"

@@ -73,7 +73,7 @@ class Calibration:
         """Whether it is valid on a day."""
         return self.start <= day < self.until
 
-    def stated(self) -> list[str]:
+    def key_values(self) -> list[str]:
         """What exports and reports state of it: certificate, first day, the day after the last, state, reason of its end."""
         return [self.certificate, self.start, self.until, self.state, self.reason]
 
@@ -87,7 +87,7 @@ class Calibration:
     def statement(self) -> dict[str, Any]:
         """The statement of exports for JSON, with its validity today."""
         keys = ("certificate", "from", "until", "state", "reason")
-        return {**dict(zip(keys, self.stated(), strict=True)), "valid_now": self.holds(today())}
+        return {**dict(zip(keys, self.key_values(), strict=True)), "valid_now": self.holds(today())}
 
     def document(self) -> CalibrationDocument:
         """The calibration for JSON."""

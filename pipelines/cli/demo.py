@@ -13,7 +13,7 @@ import typer
 from pipelines.cli.next_commands import command_line, extension, judged_data
 from pipelines.cli.options import JsonOption, option
 from pipelines.cli.printing import error_console, give, print_json, publish, remark, say
-from pipelines.cli.text.discovery_text import print_ending
+from pipelines.cli.text.demo_text import print_ending
 from schemas.progress import Progress
 
 if TYPE_CHECKING:
@@ -82,7 +82,7 @@ def command(
 def _archive(folder: Path, seed: int, lots: int, *, as_json: bool) -> None:
     """An archive with something hidden in a wafer: written, judged, explained, and judged again with the effect in the model."""
     from pipelines.archive.files import ELSEWHERE, writing
-    from pipelines.cli.text.discovery_text import print_discovery_demo
+    from pipelines.cli.text.demo_text import print_discovery_demo
     from pipelines.discovery.demonstration import made, played
     from pipelines.parallel import processors
 

@@ -1,4 +1,4 @@
-"""``tumbleline show``: a run, or one of its tables."""
+"""``tumbleline show``: a run, one of its tables, or the calibration of a unit on a date, from a few small files without numpy."""
 
 from __future__ import annotations
 

@@ -18,8 +18,8 @@ import pandas as pd
 
 from inertial.counts import number_of
 from pipelines.archive import Archive, files
-from pipelines.archive.keys import provenance
 from pipelines.archive.locks import alone
+from pipelines.archive.provenance import provenance
 from pipelines.discovery.documents import AddedAttributes, KnownAttribute, ListedAttributes
 from schemas.errors import WrongUse, did_you_mean
 

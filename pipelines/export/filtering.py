@@ -163,7 +163,10 @@ def _kept(content: dict[str, Any]) -> Kept:
 
 
 def write_state(path: Path, kept: Kept) -> None:
-    """Keep the state; the numbers are written so that they are read back bit for bit."""
+    """Keep the state; the numbers are written so that they are read back bit for bit.
+
+    The names of its keys are those of the attributes of filter, bias and flicker: whoever renames one changes the file's format.
+    """
     own, track = kept.filter, kept.track
     content = {
         "unit": kept.unit,

@@ -17,8 +17,9 @@ from typing import Any
 
 from pipelines.archive import Run, files, hash_chain
 from pipelines.archive.hash_chain import is_number
-from pipelines.archive.keys import digest, provenance
+from pipelines.archive.keys import digest
 from pipelines.archive.listing import stages_of
+from pipelines.archive.provenance import provenance
 from pipelines.archive.signatures import ENTRY
 from pipelines.archive.store import Place
 from pipelines.certificates.entries import SCHEMA, folder_of

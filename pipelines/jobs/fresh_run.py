@@ -16,12 +16,12 @@ def fresh_run_of(archive: Archive, run: Run) -> Run | None:
         return None
     about = run.about
     units = tuple(unit["serial"] for unit in about["lot"]["units"])
-    wanted = _measurement(about)
+    wanted, capture = _measurement(about), about["capture"]
     infos = (info for info in reversed(archive.runs()) if info.finished and not info.rerun_of and info.units == units)
     for other in (archive.run(info.id) for info in infos):
         with suppress(ArchiveUnusable, KeyError):  # 'tumbleline verify' says what is wrong with it
             same = _measurement(other.about) == wanted
-            if same and other.about["capture"] != about["capture"] and not other.about.get("parents"):
+            if same and other.about["capture"] != capture and not other.about.get("parents"):
                 return other
     return None
 

@@ -14,8 +14,9 @@ from pathlib import Path
 from typing import Any
 
 from pipelines.archive import Archive, files, hash_chain
-from pipelines.archive.keys import digest, provenance
+from pipelines.archive.keys import digest
 from pipelines.archive.locks import alone
+from pipelines.archive.provenance import provenance
 from pipelines.jobs.documents import ReleaseRecord
 from pipelines.jobs.model_change import ModelChange
 from pipelines.jobs.model_files import chosen_effects, use_formulas

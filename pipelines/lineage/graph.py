@@ -83,7 +83,8 @@ class Graph:
         beside = {node for name in steps_down for node in self.steps[name].used} & self.nodes.keys()
         kept = up | down | {node for node in beside if self.nodes[node].kind in {"recipe", "limits", "station"}}
         part = Graph({name: node for name, node in self.nodes.items() if name in kept})
-        for step in (step for name, step in self.steps.items() if name in steps_up | steps_down):
+        reached = steps_up | steps_down
+        for step in (step for name, step in self.steps.items() if name in reached):
             used, made = (tuple(node for node in nodes if node in kept) for nodes in (step.used, step.made))
             part.put(replace(step, used=used, made=made))
         return part

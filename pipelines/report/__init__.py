@@ -83,7 +83,10 @@ def keep_report(
     """
     inputs, code = {name: run.manifest(name)["sha256"] for name in tables}, code_hash(code_name)
     if certificates:
-        parameters = {**parameters, "certificates": {unit: one.stated() for unit, one in sorted(certificates.items())}}
+        parameters = {
+            **parameters,
+            "certificates": {unit: one.key_values() for unit, one in sorted(certificates.items())},
+        }
     key = stage_key("report", inputs, parameters, code)
     if run.has_report(key):
         run.seal()  # a killed writer may not have written it

@@ -1,4 +1,4 @@
-"""Numbers for people: as many digits as their uncertainty supports, no more."""
+"""Numbers for people: as many digits as their uncertainty supports, no more; columns of numbers side by side."""
 
 from __future__ import annotations
 

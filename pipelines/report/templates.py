@@ -1,4 +1,4 @@
-"""The templates of pages, in this folder with one common style, and those in the modules of panels."""
+"""The templates of pages, in this folder and in the modules of panels, with one style; reasons of decisions in words."""
 
 from __future__ import annotations
 

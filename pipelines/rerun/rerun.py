@@ -10,8 +10,8 @@ from typing import Annotated, Any
 from threadpoolctl import ThreadpoolController
 
 from pipelines.archive import Archive, Run, files, stage_key
-from pipelines.archive.keys import provenance
 from pipelines.archive.locks import alone
+from pipelines.archive.provenance import provenance
 from pipelines.archive.run import START
 from pipelines.chain.chain import RECORDS
 from pipelines.jobs.model_change import ModelChange

@@ -83,7 +83,8 @@ class Workbench:
         except TumblelineError as problem:
             problems.append(str(problem))
             return None, None
-        return self.jobs.result(kind, content), self.jobs.known(kind, content)
+        job = self.jobs.known(kind, content)  # first: a job that ends between the looks has its result in the second
+        return self.jobs.result(kind, content), job
 
     def done(self, kind: str, state: PageState) -> Any:
         """The result of the work that a page needs; None while there is none."""

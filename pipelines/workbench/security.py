@@ -17,14 +17,8 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.responses import PlainTextResponse, RedirectResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from pipelines.workbench.settings import (
-    LOOPBACK_HOSTS,
-    SESSION_S,
-    WorkbenchSettings,
-    change_proof,
-    session,
-    session_holds,
-)
+from pipelines.workbench.access import SESSION_S, change_proof, session, session_holds
+from pipelines.workbench.settings import LOOPBACK_HOSTS, WorkbenchSettings
 
 READING = frozenset({"GET", "HEAD"})
 CHANGING = frozenset({"POST", "PUT", "DELETE"})

@@ -22,7 +22,7 @@ from served_station import served
 from small_station import QUIET, MemorySink, captured, lot_of, quiet_progress, short_recipe, station_of
 
 from inertial.frames import force_from_angles
-from pipelines.capture.capture import capture, check
+from pipelines.capture.capture import capture
 from pipelines.schedule.steps import steps
 from schemas.errors import RecipeInvalid, StationRefused
 from schemas.fault import parse_fault
@@ -233,7 +233,7 @@ def test_what_either_limit_forbids_is_refused_before_anything_moves(words: str) 
     asked = short_recipe().model_copy(update=recipe)
     with open_station(limited(**limits), lot_of()) as station:
         with pytest.raises(StationRefused, match=words):
-            check(station, asked, steps(asked))
+            capture(station, asked, lot_of(), MemorySink(), progress=quiet_progress)
         assert station.clock.now() == 0.0
         assert not station.table.axes["outer"].moving()
 

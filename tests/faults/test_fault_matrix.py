@@ -10,13 +10,13 @@ from stations.plant.faults.base import DEVICES
 from stations.plant.faults.base import UNIT as UNIT_TARGET
 from stations.plant.faults.catalogue import kinds
 
-FIRST = {case.kind: case for case in reversed(CASES)}
-"""The first case of each kind of fault; the others are in the slow suite."""
+FIRST = {(case.kind, case.outcome): case for case in reversed(CASES)}
+"""The first case of each kind of fault with each of its outcomes; the others are in the slow suite."""
 
 
 @pytest.mark.parametrize(
     "case",
-    [pytest.param(c, marks=() if c is FIRST[c.kind] else pytest.mark.slow, id=c.fault) for c in CASES],
+    [pytest.param(c, marks=() if c is FIRST[c.kind, c.outcome] else pytest.mark.slow, id=c.fault) for c in CASES],
 )
 def test_a_fault_ends_as_the_matrix_says(case: Case) -> None:
     result = run_case(case)

@@ -60,6 +60,22 @@ def test_a_condition_that_passes_costs_time_and_no_data(condition, undisturbed):
     assert far < 20.0  # LSB of 1/256000 g: the table does not come to rest twice in the same place
 
 
+def test_a_chamber_that_loses_its_power_for_a_while_is_settled_anew():
+    recipe = short_recipe(poses=3, temperatures=(60.0,))
+    whole, _ = run(recipe=recipe)
+    begins = whole.all(1).drop_duplicates("record").set_index("record")["start_s"]
+    far = float(begins[1]) - 2.0
+    sink, events = run(
+        {"kind": "chamber_power", "at_s": far, "for_s": 900.0}, recipe=recipe.model_copy(update={"dwell_s": 60.0})
+    )
+    assert "spoilt" in kinds(events)
+    assert any("is needed" in event.reason for event in events.recorded() if event.kind == "spoilt")
+    readings = sink.all(1)
+    assert (abs(readings["unit_C"] - 60.0) <= 1.0).all()
+    assert (readings["status"] == "ok").all()
+    assert sum(event.kind == "soak" for event in events.recorded()) >= 2
+
+
 def test_a_door_that_stays_open_ends_the_run_with_its_finished_records():
     sink, events = MemorySink(), MemoryLog()
     words = r"paused for 3\d\d s: the chamber's door is open, .*; correct it .* no measured record is lost"

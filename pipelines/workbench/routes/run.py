@@ -41,9 +41,8 @@ def run(request: Request) -> Response:
         certificates = {}
         problems.append(str(problem))
     events = rows_of(run_table(bench, stored.id, "events")) if "events" in tables else []
-    diagnosed, _ = bench.work(
-        "diagnose", MissingPage(source=stored.id), []
-    )  # where it was judged since the server began
+    # where it was judged since the server began
+    diagnosed, _ = bench.work("diagnose", MissingPage(source=stored.id), [])
     return page(
         request, "run.html", state, problems, run=stored, about=about, grades=grades, cells=cells, shown=SHOWN, tables=tables,
         certificates=certificates, events=events, adequate=None if diagnosed is None else diagnosed.document["adequate"],

@@ -2,18 +2,68 @@
 
 import errno
 import io
+import json
+import subprocess
+import sys
 from pathlib import Path
 from typing import Annotated, Any
 
 import pytest
 import typer
+from capture_double import small_run
+from in_process import command
 from typer.core import TyperCommand
 from typer.testing import CliRunner
 
 from pipelines import cli
+from pipelines.certificates.ledger import Ledger
+from pipelines.chain.certify import certify
 from pipelines.cli import demo, take_texts_as_given
 from pipelines.cli.terminal import agreed
+from pipelines.cli.text.demo_text import print_ending
+from pipelines.demo.scenes import scene
 from schemas.errors import UNUSABLE, WrongUse
+
+SHOWN = """
+import json, sys
+from pipelines.cli import main
+sys.argv = ["tumbleline", *sys.argv[1:]]
+try:
+    main()
+finally:
+    print(json.dumps(sorted(sys.modules)), file=sys.stderr)
+"""
+
+
+@pytest.fixture(scope="module")
+def certified(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    root = tmp_path_factory.mktemp("made") / "archive"
+    run = small_run(root.parent)
+    run.seal()
+    certify(Ledger(root), run)
+    return root, run.about["lot"]["units"][0]["serial"]
+
+
+@pytest.mark.parametrize("form", [["--json"], []], ids=["json", "text"])
+def test_validity_of_a_serial_is_answered_without_numpy_and_pydantic(
+    certified: tuple[Path, str], form: list[str]
+) -> None:
+    root, serial = certified
+    day = json.loads(command(["show", serial, "--archive", str(root), "--json"]).stdout)["history"][0]["from"]
+    words = ["show", serial, "--at", day, "--archive", str(root), *form]
+    alone = subprocess.run([sys.executable, "-c", SHOWN, *words], capture_output=True, text=True, check=True)
+    loaded = set(json.loads(alone.stderr.splitlines()[-1]))
+    assert "pyarrow.parquet" in loaded
+    assert not {"numpy", "pandas", "scipy", "duckdb", "prefect", "pydantic"} & loaded
+    here = command(words)  # numpy is loaded here
+    assert "numpy" in sys.modules
+    assert alone.stdout == here.stdout
+    if not form:
+        assert "standard error" in alone.stdout
+        return
+    rows = json.loads(alone.stdout)["calibration"]["coefficients"]
+    assert rows
+    assert {row["unit"] for row in rows} == {serial}
 
 
 class _Direct(TyperCommand):
@@ -87,6 +137,49 @@ def test_enter_is_yes_no_is_no_and_what_is_neither_is_asked_again(entered, capsy
     entered("")  # the terminal closed
     with pytest.raises(WrongUse, match="ended before an answer"):
         agreed("Measure?")
+
+
+NONE = {"rms_ug": 9.0, "heldout_rms_ug": 9.5, "fresh_rms_ug": 9.9, "floor_ug": 4.0}
+CLASS = ["aging_log", "warm_up", "thermal_lag"]
+
+
+def ending(capsys: pytest.CaptureFixture[str], **changes: Any) -> str:
+    hidden = scene("warm_up", 0)
+    document = {
+        "hidden": {"kind": hidden.kind, "effect": hidden.effect, "physics": hidden.truth}, "folder": "game",
+        "classes": [CLASS], "unseen": [], "added": ["thermal_lag"], "found": True, "told_apart": False,
+        "not_told_apart": [CLASS], "next_measurements": [], "before": NONE, "after": NONE, **changes,
+    }  # fmt: skip
+    print_ending(document)
+    return " ".join(capsys.readouterr().out.split())
+
+
+def test_an_effect_added_from_a_class_is_not_called_found(capsys: pytest.CaptureFixture[str]) -> None:
+    row = {
+        "outer_deg": 0.0, "inner_deg": 90.0, "chamber_C": 25.0, "why": "aging_log | warm_up", "minutes": 12.0,
+        "separation_before": 0.4, "separation_after": 60.0, "separation_if": {"aging_log": 60.0, "warm_up": 75.0},
+        "not_parted": ["thermal_lag"],
+    }  # fmt: skip
+    said = ending(capsys, next_measurements=[row])
+    assert "Found in a class, not separated" in said
+    assert (
+        "the added effect, thermal_lag, is one of a class; these data fit equally well with aging_log, warm_up." in said
+    )
+    assert "The measurement that separates them:" in said
+    assert "expected 60 if aging_log is true, 75 if warm_up is true; not separated from the first: thermal_lag" in said
+    assert "Found." not in said
+
+
+def test_where_no_measurement_parts_the_class_that_is_said(capsys: pytest.CaptureFixture[str]) -> None:
+    assert "No measurement that the station can take is certain to separate them." in ending(capsys)
+    words = {"why": "aging_log | warm_up: no steps of this station are certain to separate them; needed: a power cycle"}
+    said = ending(capsys, next_measurements=[words | {"measurable": False}])
+    assert "needed: a power cycle" in said
+
+
+def test_an_effect_that_stands_alone_is_found(capsys: pytest.CaptureFixture[str]) -> None:
+    said = ending(capsys, classes=[["warm_up"]], told_apart=True, not_told_apart=[])
+    assert "The diagnosis named warm_up. Found." in said
 
 
 def test_a_full_disk_is_no_defect_of_the_program(

@@ -24,7 +24,7 @@ from root_process import ROOT
 from pipelines.archive import Archive, files
 from pipelines.monitoring import snapshot as snapshots
 from pipelines.monitoring.alerts import Poster, alerts_of
-from pipelines.monitoring.archive_numbers import ArchiveNumbers, ArchiveReader, LineNumbers
+from pipelines.monitoring.archive_numbers import ArchiveNumbers, ArchiveReader, LineNumbers, RunTime
 from pipelines.monitoring.exposition import text
 from pipelines.monitoring.queue_numbers import OpenRun, QueueNumbers
 from pipelines.monitoring.service import alerting, application
@@ -44,7 +44,7 @@ def run(state: str, minutes_ago: float, name: str = "a-run", message: str = "", 
 
 def full(**changes: object) -> Snapshot:
     """A snapshot in which every family has a sample; its names need escapes."""
-    times = Counter({"station_s": 7200.0, "pauses": 2, "paused_s": 60.0, "repeated": 1, "door": 1})
+    times = RunTime(station_s=7200.0, pauses=2, paused_s=60.0, repeated=1, door=1)
     numbers = ArchiveNumbers({('st "1"\\x', "line\nsix"): LineNumbers(3, 1, 20, 4, NOW, times)})
     numbers.free_bytes, numbers.certified, numbers.due = 10**11, 24, {0: 2, 30: 5}
     queues = QueueNumbers([run("RUNNING", 20)], [], {"line-1": False}, {"line-1 on host": True})
@@ -117,7 +117,7 @@ def test_the_numbers_of_an_archive_are_those_of_its_tables(tmp_path: Path) -> No
     assert (line.finished, line.unfinished) == (1, 0)
     assert (line.passed, line.failed) == ((grades == "pass").sum(), (grades != "pass").sum())
     assert line.failed >= 1
-    assert line.times["station_s"] == pytest.approx(made.table("dwells")["time_s"].max())
+    assert line.times.station_s == pytest.approx(made.table("dwells")["time_s"].max())
     assert numbers.unsealed == 0
     (made.path / "sealed.json").unlink()
     again = ArchiveReader(Archive(tmp_path / "archive"), 30).read(datetime.now(UTC) + timedelta(hours=2))

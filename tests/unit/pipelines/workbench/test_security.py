@@ -137,7 +137,7 @@ def test_a_session_is_of_one_origin_and_ends(
     end, rest = cookie.partition(".")[::2]
     forged = f"{int(end) + 1}.{rest}"
     assert change(client, **own | {"cookie": f"{settings.cookie}={forged}"}).status_code == 403
-    monkeypatch.setattr("pipelines.workbench.settings.time.time", lambda: float(end))
+    monkeypatch.setattr("pipelines.workbench.access.time.time", lambda: float(end))
     assert told(settings, "127.0.0.1:8321") == 403
 
 
@@ -308,3 +308,13 @@ def test_a_body_that_cannot_be_used_is_a_sentence(case: tuple[str, object, str],
 def told(client: AsgiClient, address: str, body: object) -> httpx.Response:
     headers = {"authorization": f"Bearer {TOKEN}", "content-type": "application/json"}
     return client.post(address, headers=headers, content=json.dumps(body))
+
+
+def test_an_empty_archive_has_every_page(tmp_path: Path) -> None:
+    settings = WorkbenchSettings(archive=str(tmp_path / "none"), folder=tmp_path / "bench", token=TOKEN)
+    client = AsgiClient(create_app(settings), ORIGIN)
+    for address in ("/units", "/missing", "/upload", "/operator", "/plan", "/station", "/audit"):
+        assert client.get(address).status_code == 200, address
+    assert not (tmp_path / "none").exists()
+    assert client.get("/run?run=latest").status_code == 422
+    assert client.get("/nowhere").status_code == 404

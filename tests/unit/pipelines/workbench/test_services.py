@@ -15,9 +15,10 @@ from capture_double import recipe_file
 
 from pipelines.archive import Archive
 from pipelines.jobs.job import Request
+from pipelines.jobs.model_files import read_model
 from pipelines.workbench.routes.operator import station_named, stations_of
 from pipelines.workbench.services import jobs as job_table
-from pipelines.workbench.services import lots, sources, uploads
+from pipelines.workbench.services import lots, models, sources, uploads
 from pipelines.workbench.services.jobs import Jobs
 from pipelines.workbench.services.work import done_in_process
 from pipelines.workbench.settings import WorkbenchSettings
@@ -189,6 +190,24 @@ def test_lots_are_paused_and_waited_for_when_the_service_ends(settings: Workbenc
         assert process.wait(10.0) == 0
     assert lots.state_of(place).phase == "paused"
     assert name == "abc"
+
+
+def test_a_model_is_saved_version_by_version_with_its_formulas(settings: WorkbenchSettings) -> None:
+    start, formulas = ["bias", "scale"], ["humid = humidity_pct - 45"]
+    place, version = models.save(settings, "line-1", start, ["third_order", "humid"], formulas, "seen twice", "run-7")
+    assert version == 3
+    model = read_model(place)
+    assert model.model.effects == ["bias", "scale", "third_order", "humid"]
+    assert [change.why for change in model.change][1:] == ["seen twice", "seen twice"]
+    assert (
+        models.save(settings, "line-1", start, ["third_order", "humid", "second_order"], formulas, "more", "run-8")[1]
+        == 4
+    )
+    with pytest.raises(WrongUse, match="already"):
+        models.save(settings, "line-1", start, ["third_order"], [], "again", "run-8")
+    for name, why in (("../x", "a reason"), ("ok", "  "), ("", "a reason")):
+        with pytest.raises(WrongUse):
+            models.save(settings, name, start, ["third_order"], [], why, "")
 
 
 def test_only_files_of_the_folder_are_sources(settings: WorkbenchSettings, tmp_path: Path) -> None:
