@@ -47,6 +47,7 @@ Gravity = Annotated[FiniteFloat, Field(gt=9.7, lt=9.9)]  # every place on earth 
 class _Measurement(Grown):
     """The keys that a recipe file and a resolved recipe share.
 
+    ``sensor_axes`` is the number of axes with an output: x alone, x and y, or all three.
     ``zero_output`` is the nominal output at 0 g, in the output's unit; the zero-g offset is counted from it.
     ``soaks`` say soak by soak which poses are measured; ``temperatures_C`` are theirs then and may be left out.
     ``span_min_g`` is how far the poses must reach on every axis, largest minus smallest. ``faults`` are trouble for a
@@ -58,12 +59,13 @@ class _Measurement(Grown):
     """
 
     later: ClassVar[frozenset[str]] = frozenset(
-        {"verification_order", "uncertainty", "stability", "certificate", "procedures"}
+        {"sensor_axes", "verification_order", "uncertainty", "stability", "certificate", "procedures"}
     )
 
     name: Annotated[Name, Field(pattern=r"^[a-z0-9][a-z0-9._-]*$")]
     description: Text = ""
     device: Name
+    sensor_axes: Annotated[int, Field(ge=1, le=3)] = 3
     local_gravity_m_s2: Gravity
     temperatures_C: Annotated[list[Celsius], Field(min_length=1, max_length=MOST_SOAKS)]
     soaks: Annotated[list[SoakPart], Field(max_length=MOST_SOAKS)] = []

@@ -12,7 +12,7 @@ from schemas.profile import Register, WordOrder
 Value = float | str | list[float]
 Words = NDArray[np.uint16]
 Counts = NDArray[np.int64]
-Packing = Literal["int20x3", "int24x3"]
+Packing = Literal["int20x3", "int24x3", "int24x2", "int24x1"]
 
 _FORMAT = {"uint16": ">H", "int16": ">h", "uint32": ">I", "int32": ">i", "float32": ">f"}
 _RANGE = {
@@ -22,9 +22,12 @@ _RANGE = {
     "int32": (-(2**31), 2**31 - 1),
     "bit": (0, 1),
 }
-WORDS_PER_SAMPLE: dict[Packing, int] = {"int20x3": 4, "int24x3": 5}
-SEQUENCE: dict[Packing, int] = {"int20x3": 16, "int24x3": 256}
-BITS: dict[Packing, int] = {"int20x3": 20, "int24x3": 24}
+WORDS_PER_SAMPLE: dict[Packing, int] = {"int20x3": 4, "int24x3": 5, "int24x2": 4, "int24x1": 2}
+SEQUENCE: dict[Packing, int] = {"int20x3": 16, "int24x3": 256, "int24x2": 256, "int24x1": 256}
+BITS: dict[Packing, int] = {"int20x3": 20, "int24x3": 24, "int24x2": 24, "int24x1": 24}
+OUTPUTS: dict[Packing, int] = {"int20x3": 3, "int24x3": 3, "int24x2": 2, "int24x1": 1}
+"""The number of axes of a sample."""
+_LEFT: dict[Packing, int] = {"int24x2": 40, "int24x1": 8}  # place of the first axis, bits from the last
 
 
 class NotEncodable(ValueError):
@@ -116,17 +119,24 @@ def pack_samples(counts: Counts, first: int, packing: Packing) -> Words:
 
     Parameters
     ----------
-    counts : (n, ..., 3), integers that fit the packing
+    counts : (n, ..., m), integers that fit the packing, m its number of axes
     first : number of the first sample since the start
-    packing : three integers of 20 bits and a number of 4 in 4 words, or of 24 and 8 in 5 words; most significant first
+    packing : three integers of 20 bits and a number of 4 in 4 words; or m integers of 24 bits and a number of 8, in 5, 4 or 2
+        words, the number in the last 8 bits; most significant first
 
     Returns
     -------
-    (n, ..., 4) or (n, ..., 5)
+    (n, ..., words)
     """
     shape = (-1,) + (1,) * (counts.ndim - 2)
     number = (np.arange(first, first + len(counts)) % SEQUENCE[packing]).astype(np.uint64).reshape(shape)
     mask = np.uint64((1 << BITS[packing]) - 1)
+    if packing in {"int24x1", "int24x2"}:
+        packed = np.zeros(counts.shape[:-1], dtype=np.uint64) | number
+        for axis in range(counts.shape[-1]):
+            packed |= (counts[..., axis].astype(np.uint64) & mask) << np.uint64(_LEFT[packing] - BITS[packing] * axis)
+        words = packed.astype(">u8")[..., None].view(">u2").astype(np.uint16)
+        return words[..., -WORDS_PER_SAMPLE[packing] :]
     x, y, z = (counts[..., axis].astype(np.uint64) & mask for axis in range(3))
     if packing == "int20x3":
         packed = (x << np.uint64(44)) | (y << np.uint64(24)) | (z << np.uint64(4)) | number
@@ -143,8 +153,14 @@ def pack_samples(counts: Counts, first: int, packing: Packing) -> Words:
 
 
 def unpack_samples(words: Words, packing: Packing) -> tuple[Counts, Counts]:
-    """The counts (n, 3) and the low bits of the sample numbers (n,) in words (n·4,) or (n·5,)."""
+    """The counts (n, m) of m axes and the low bits of the sample numbers (n,) in words (n·w,), w for each sample."""
     table = words.reshape(-1, WORDS_PER_SAMPLE[packing]).astype(np.int64)
+    sign = 1 << (BITS[packing] - 1)
+    if packing in {"int24x1", "int24x2"}:
+        places = (_LEFT[packing] - BITS[packing] * axis for axis in range(OUTPUTS[packing]))
+        whole = sum(table[:, -1 - k] << (16 * k) for k in range(table.shape[1]))
+        counts = np.stack([(whole >> place) & ((1 << BITS[packing]) - 1) for place in places], axis=-1)
+        return (counts ^ sign) - sign, table[:, -1] & 0xFF
     if packing == "int20x3":
         x = (table[:, 0] << 4) | (table[:, 1] >> 12)
         y = ((table[:, 1] & 0xFFF) << 8) | (table[:, 2] >> 8)
@@ -155,6 +171,5 @@ def unpack_samples(words: Words, packing: Packing) -> tuple[Counts, Counts]:
         y = ((table[:, 1] & 0xFF) << 16) | table[:, 2]
         z = (table[:, 3] << 8) | (table[:, 4] >> 8)
         number = table[:, 4] & 0xFF
-    sign = 1 << (BITS[packing] - 1)
     counts = np.stack((x, y, z), axis=-1)
     return (counts ^ sign) - sign, number

@@ -62,7 +62,7 @@ def expected_errors(effects: Sequence[str], state: State, covariance: Array, *, 
         across = inverse @ (np.swapaxes(h, -1, -2) @ s)
         inverse = inverse + across @ square @ np.swapaxes(across, -1, -2)
     return Expected(
-        names=tuple(design.local_names(sensor, axis, values) for axis in range(3)),
+        names=tuple(design.local_names(sensor, axis, values) for axis in state.axes),
         errors=np.sqrt(np.diagonal(inverse, axis1=-2, axis2=-1)),
         shared_names=design.shared_names(station),
         shared_errors=shared,
@@ -85,7 +85,9 @@ def expected_gain(effects: Sequence[str], state: State, covariance: Array) -> Ar
 def _whitened(sensor: Sequence[SensorEffect], state: State, values: design.Values, white: Array) -> tuple[Array, Array]:
     """Whitened columns (3, n, p) of the sensor's effects, and the inverses (3, p, p) of their products."""
     h = white @ design.local_columns(sensor, state, values)
-    return h, np.stack([inverted(part, design.local_names(sensor, axis, values)) for axis, part in enumerate(h)])
+    return h, np.stack(
+        [inverted(part, design.local_names(sensor, axis, values)) for axis, part in zip(state.axes, h, strict=True)]
+    )
 
 
 def inverted(columns: Array, names: Sequence[tuple[str, str]]) -> Array:

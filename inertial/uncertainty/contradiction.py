@@ -63,13 +63,13 @@ def common_evidence(columns: Array, changes: Array, left: Array, covariance: Arr
 
     Parameters
     ----------
-    columns : (units, 3, n, p), H; changes : (units, n, 3, q), J per stated uncertainty
+    columns : (units, m, n, p), H, of m axes; changes : (units, n, m, q), J per stated uncertainty
     left : (units, n, 3), outputs or residuals; covariance : (units, 3, n, n), of the noise of every output
     """
     count = changes.shape[-1]
     information, projection = np.zeros((count, count)), np.zeros(count)
     for unit in range(len(left)):
-        for axis in range(3):
+        for axis in range(columns.shape[1]):
             white = whitener(covariance[unit, axis])
             base, _ = np.linalg.qr(white @ columns[unit, axis])
             own = white @ changes[unit, :, axis, :]

@@ -12,7 +12,7 @@ import numpy as np
 
 from inertial.arrays import Array
 from inertial.correction import predict
-from inertial.design import Values
+from inertial.design import Values, of_axes
 from inertial.frames import rotation_x, rotation_z
 from inertial.state import T_REFERENCE, State
 
@@ -113,7 +113,7 @@ class MeasurementModel:
         if state.temperature is not None and np.any(errors.temperature):
             moved = replace(moved, temperature=state.temperature - errors.temperature)
         out = predict(self.effects, moved, self.coefficients, self.nonlinear)
-        return out * (1.0 + errors.gain) + np.asarray(errors.offset)
+        return out * (1.0 + errors.gain) + of_axes(np.asarray(errors.offset), state.axes, -1)
 
 
 def true_force(state: State, errors: Errors) -> Array:

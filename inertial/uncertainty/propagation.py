@@ -10,9 +10,10 @@ import numpy as np
 
 from inertial import design
 from inertial.arrays import Array, Flags
+from inertial.design import of_axes
 from inertial.fits.linear import response_matrix
 from inertial.noise.dwells import whitener
-from inertial.state import State
+from inertial.state import ALL_AXES, State
 from inertial.uncertainty.influences import MeasurementModel, Sensitivity
 
 
@@ -22,7 +23,7 @@ class FitDesign:
 
     columns : (..., 3, n, p), H; gain : (..., 3, p, n), G; names : per axis, (effect id, coefficient) of the p columns
     shared : (..., 3, n, s), columns of parameters that the lot shares; none where s = 0
-    whitening : (n, n), root of the weights
+    whitening : (n, n), root of the weights; axes : the m axes with an output, in the place of three
     """
 
     columns: Array
@@ -30,6 +31,7 @@ class FitDesign:
     names: tuple[tuple[tuple[str, str], ...], ...]
     shared: Array
     whitening: Array
+    axes: tuple[int, ...] = ALL_AXES
 
     def coefficient_errors(self, changes: Array) -> Array:
         """Errors of the coefficients, (..., 3, p, q), of changes of the outputs (..., n, 3, q)."""
@@ -84,7 +86,7 @@ def fit_design(model: MeasurementModel, state: State, covariance: Array, used: F
     columns = design.local_columns(sensor, state, model.nonlinear)
     there = np.ones(columns.shape[-2], dtype=bool) if used is None else used
     columns = columns[..., there, :]
-    names = tuple(design.local_names(sensor, axis, model.nonlinear) for axis in range(3))
+    names = tuple(design.local_names(sensor, axis, model.nonlinear) for axis in state.axes)
     white = whitener(covariance)
     h = white @ columns
     scale = np.linalg.norm(h, axis=-2, keepdims=True)
@@ -93,9 +95,16 @@ def fit_design(model: MeasurementModel, state: State, covariance: Array, used: F
     gain = np.linalg.solve(gram, np.swapaxes(scaled, -1, -2)) @ white / np.swapaxes(scale, -1, -2)
     shared = np.zeros((*columns.shape[:-1], 0))
     if station:
-        response = response_matrix(model.coefficients, names)
+        response = response_matrix(model.coefficients, names, state.axes)
         shared = design.shared_columns(station, state, model.nonlinear, response)[..., there, :]
-    return FitDesign(columns, gain, names, shared, white)
+    return FitDesign(columns, gain, names, shared, white, state.axes)
+
+
+_GENERATORS = np.array(
+    [[[0, 0, 0], [0, 0, -1], [0, 1, 0]], [[0, 0, 1], [0, 0, 0], [-1, 0, 0]], [[0, -1, 0], [1, 0, 0], [0, 0, 0]]],
+    dtype=np.float64,
+)
+"""Rotations about x, y and z by a small angle."""
 
 
 @dataclass(frozen=True)
@@ -104,16 +113,19 @@ class Propagated:
 
     coefficients : (..., 3, p, q); names : per axis, (effect id, coefficient)
     source : the influences, of the same q columns
+    axes : the m axes with an output, in the place of three
     """
 
     coefficients: Array
     names: tuple[tuple[tuple[str, str], ...], ...]
     source: Sensitivity
     response: Array
+    axes: tuple[int, ...] = ALL_AXES
 
     def _inverse(self) -> Array:
-        """K⁻¹, (..., 3, 3), g per unit of the output."""
-        return np.asarray(np.linalg.inv(self.response), dtype=np.float64)
+        """K⁻¹ of the axes with an output, (..., m, m), g per unit of the output."""
+        own = of_axes(of_axes(self.response, self.axes, -1), self.axes, -2)
+        return np.asarray(np.linalg.inv(own), dtype=np.float64)
 
     def covariance(self) -> Array:
         """Covariance of the coefficients of all axes in one vector, (..., 3p, 3p)."""
@@ -125,11 +137,21 @@ class Propagated:
         return _turned(-self._inverse(), columns @ self.coefficients)
 
     def rotation(self) -> Array:
-        """The antisymmetric part of K⁻¹·δK at 25 °C, (..., 3, 3, q): a rotation of the whole unit."""
-        moved = np.moveaxis(response_matrix(np.moveaxis(self.coefficients, -1, 0), self.names), 0, -1)
+        """The antisymmetric part of K⁻¹·δK at 25 °C, (..., m, 3, q): a rotation of the whole unit.
+
+        With fewer than three outputs it is the rotation nearest to K⁻¹·δK by least squares: of one axis all that turns its row.
+        """
+        moved = np.moveaxis(response_matrix(np.moveaxis(self.coefficients, -1, 0), self.names, self.axes), 0, -1)
+        moved = of_axes(moved, self.axes, -3)
         flat = moved.reshape(*moved.shape[:-2], -1)
         relative = np.matmul(self._inverse(), flat).reshape(moved.shape)
-        return 0.5 * (relative - np.swapaxes(relative, -3, -2))
+        if len(self.axes) == len(ALL_AXES):
+            return 0.5 * (relative - np.swapaxes(relative, -3, -2))
+        rows = np.matmul(self._inverse(), of_axes(self.response, self.axes, -2))
+        turned = np.moveaxis(np.matmul(rows[..., None, :, :], _GENERATORS), -3, -1)  # (..., m, 3, 3 rotations)
+        span = turned.reshape(*turned.shape[:-3], -1, turned.shape[-1])
+        nearest = span @ np.linalg.pinv(span) @ relative.reshape(*relative.shape[:-3], -1, relative.shape[-1])
+        return nearest.reshape(relative.shape)
 
     def user_errors(self, columns: Array, force: Array, *, intrinsic: bool = False) -> Array:
         """Errors that a user meets, (..., m, 3, q), g, at forces (m, 3) with the columns (..., 3, m, p).
@@ -141,7 +163,7 @@ class Propagated:
         errors = self.output_errors(columns)
         if not intrinsic:
             return errors
-        rotation = np.moveaxis(self.rotation(), -2, -3)  # (..., j, i, q)
+        rotation = np.moveaxis(self.rotation(), -2, -3)  # (..., 3, m, q)
         turned = np.matmul(force, rotation.reshape(*rotation.shape[:-2], -1))
         return errors + turned.reshape(*turned.shape[:-1], *rotation.shape[-2:])
 
@@ -157,12 +179,15 @@ def propagated(design_: FitDesign, source: Sensitivity, response: Array) -> Prop
     ----------
     response : (..., 3, 3), output per g
     """
-    return Propagated(design_.coefficient_errors(source.changes), design_.names, source, response)
+    return Propagated(design_.coefficient_errors(source.changes), design_.names, source, response, design_.axes)
 
 
 def norm_errors(errors: Array, force: Array) -> Array:
-    """Errors of the magnitude, (..., m, q), of errors (..., m, 3, q) at forces (m, 3)."""
-    along = force / np.linalg.norm(force, axis=-1, keepdims=True)
+    """Errors of the magnitude, (..., m, q), of errors (..., m, k, q) at forces (m, k) along k axes; of one axis its errors."""
+    if force.shape[-1] == 1:
+        return errors[..., 0, :]
+    size = np.linalg.norm(force, axis=-1, keepdims=True)
+    along = force / np.where(size > 0.0, size, 1.0)
     return np.einsum("...mi,...miq->...mq", along, errors)
 
 

@@ -107,6 +107,11 @@ class Acquisition:
                     f"slot {unit.slot}: '{identity.serial}' sits there, '{unit.serial}' is needed; "
                     "seat the unit, or correct the lot"
                 )
+            if identity.axes != self.recipe.sensor_axes:
+                raise OperatorNeeded(
+                    f"slot {unit.slot}: unit {unit.serial} has {identity.axes} axes, the recipe says {self.recipe.sensor_axes}; "
+                    "correct 'sensor_axes' in the recipe, or set the slot of the reader"
+                )
             self.identities[unit.serial] = identity
         if not self.identities:
             raise OperatorNeeded(
@@ -237,7 +242,7 @@ class Acquisition:
             if output is None:
                 self.give_up(unit.serial, f"slot {unit.slot}: not recorded")
             else:
-                record.keep(unit.serial, Samples(0, output, overflow=False))
+                record.keep(unit.serial, Samples(0, output[:, : self.recipe.sensor_axes], overflow=False))
         samples, readings = self.tables(record)
         return record, pd.concat([samples, recording.reference_frame(record.number, record.start)]), readings
 

@@ -122,7 +122,7 @@ class Record:
 
         In a static dwell an outlier was changed in transmission, or the unit was knocked.
         """
-        outputs = np.concatenate([np.zeros((0, 3)), *(part.outputs for part in self.parts.get(serial, []))])
+        outputs = _joined(self.parts.get(serial, []))
         first = first_outlier(outputs, lsb, full_scale)
         if first is None:
             return ""
@@ -135,11 +135,14 @@ class Record:
         return sum(len(part.outputs) for part in self.parts.get(serial, []))
 
     def samples(self, units: Sequence[Unit]) -> pd.DataFrame:
-        """The samples of these units, one row each; a sample's time follows from its number since the start."""
+        """The samples of these units, one row each; a sample's time follows from its number since the start.
+
+        Axes without an output are NaN.
+        """
         units = [unit for unit in units if self._held(unit.serial)]
         counts = [self._held(unit.serial) for unit in units]
         parts = [part for unit in units for part in self.parts[unit.serial]]
-        table = np.concatenate([np.zeros((0, 3)), *(part.outputs for part in parts)])
+        table = _joined(parts)
         since = np.concatenate(
             [np.zeros(0), *(part.first + np.arange(len(part.outputs), dtype=float) for part in parts)]
         )
@@ -150,7 +153,14 @@ class Record:
             "kind": pd.Series([self.kind], dtype="str").repeat(len(table)).reset_index(drop=True),
             "time_s": self.start + (since + 1.0) / self.rate,
         }
-        return pd.DataFrame(columns | {axis: table[:, i] for i, axis in enumerate(AXES)})
+        return pd.DataFrame(
+            columns | {axis: table[:, i] if i < table.shape[1] else np.nan for i, axis in enumerate(AXES)}
+        )
+
+
+def _joined(parts: Sequence[Samples]) -> NDArray[np.float64]:
+    """Outputs (n, m) of all parts; (0, 3) without any."""
+    return np.concatenate([part.outputs for part in parts]) if parts else np.zeros((0, len(AXES)))
 
 
 def readings_row(record: Record, unit: Unit, identity: Identity, status: str) -> dict[str, object]:

@@ -64,7 +64,7 @@ def _summaries(job: Job, run: Run) -> pd.DataFrame:
         readings = run.table("readings")
         tumbled = set(readings.loc[readings["kind"] != PROCEDURE, "record"])
         selection = None if len(tumbled) == readings["record"].nunique() else tumbled
-        summaries = summarised(records.samples(selection), readings, job.recipe.zero_output)
+        summaries = summarised(records.samples(selection), readings, job.recipe.zero_output, job.recipe.sensor_axes)
         _looked_at.clear()
         _looked_at[key] = summaries
     return summaries

@@ -97,7 +97,7 @@ class _Kept:
 def _once(recipe: Recipe, chosen: Scene, seed: int, repeat: int, progress: Progress) -> list[pd.DataFrame]:
     """Dwells and temperatures of one run."""
     units = [Unit(serial=f"DEMO-{k + 1}", slot=k) for k in range(UNITS)]
-    lot = Lot(units=units, device=recipe.device, seed=seed, repeat=repeat)
+    lot = Lot(units=units, device=recipe.device, sensor_axes=recipe.sensor_axes, seed=seed, repeat=repeat)
     kept = _Kept()
     with open_station(_station(chosen, seed), lot) as station:
         capture(station, recipe, lot, kept, progress=progress)

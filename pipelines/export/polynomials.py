@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import numpy as np
@@ -60,6 +60,23 @@ class UnitCalibration:
     def letters(self) -> tuple[str, ...]:
         """Letters of the axes that have an output."""
         return tuple(AXES[axis] for axis in self.axes)
+
+    @property
+    def with_every_axis(self) -> UnitCalibration:
+        """The calibration with three outputs: that of an axis without one is the force along it in g, 0 where it is not known."""
+        if len(self.axes) == len(AXES):
+            return self
+        own = list(self.axes)
+        bias, response = np.zeros((ORDER, len(AXES))), np.zeros((ORDER, len(AXES), 3))
+        response[0] = np.eye(len(AXES))
+        bias[:, own], response[:, own] = self.bias, self.response
+        return replace(self, bias=bias, response=response)
+
+    def with_forces(self, output: Array, force: Array) -> Array:
+        """Outputs (3,) of :attr:`with_every_axis`, from those of the axes that have one, under a known force (3,), g."""
+        whole = np.array(force, dtype=np.float64)
+        whole[list(self.axes)] = output
+        return whole
 
     @property
     def certified(self) -> str:

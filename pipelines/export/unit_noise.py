@@ -20,7 +20,7 @@ TERMS = ("N", "B", "K")
 class UnitNoise:
     """Terms of IEEE Std 952 of x, y and z: the value where it is identified, else its upper limit (95 %).
 
-    value : (3,) by symbol: N in µg/√Hz (two-sided: σ(τ) = N/√τ), B in µg, K in µg/√s; NaN for an axis without noise
+    value : (3,) by symbol: N in µg/√Hz (two-sided: σ(τ) = N/√τ), B in µg, K in µg/√s; NaN for an axis without noise or output
     identified : (3,) by symbol
     rate_hz : of the static record
     """
@@ -46,11 +46,15 @@ def noise_of_units(run: Run) -> dict[str, UnitNoise]:
     rows = {(str(r["unit"]), str(r["term"]), str(r["axis"])): r for r in rows_of(table)}
     noises: dict[str, UnitNoise] = {}
     for unit in dict.fromkeys(key[0] for key in rows):
-        own = {symbol: [rows[unit, symbol, axis] for axis in AXES] for symbol in TERMS}
+        own = {symbol: [rows.get((unit, symbol, axis), NO_AXIS) for axis in AXES] for symbol in TERMS}
         value = {s: np.array([float(r["value"] if r["identified"] else r["high"]) for r in own[s]]) for s in TERMS}
         identified = {s: np.array([bool(r["identified"]) for r in own[s]]) for s in TERMS}
         noises[unit] = UnitNoise(value, identified, float(rates.iloc[0]))
     return noises
+
+
+NO_AXIS = {"value": np.nan, "high": np.nan, "identified": True}
+"""Of a term of an axis without an output."""
 
 
 @dataclass(frozen=True)

@@ -279,6 +279,6 @@ def _refuse_unknown_device(job: Job) -> None:
         from stations.plant.faults.catalogue import build_fault
         from stations.plant.preset import load_preset  # a station of hardware has no plant
 
-        load_preset(job.lot.device, job.station.simulation.preset_overrides)
+        load_preset(job.lot.device, job.station.simulation.preset_overrides).with_axes(job.lot.sensor_axes)
         for fault in job.station.simulation.faults:
             build_fault(fault, [unit.serial for unit in job.lot.units])

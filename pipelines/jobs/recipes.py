@@ -65,7 +65,7 @@ def resolved(file: RecipeFile, source: str, folder: Path | None = None, line: Li
     fit_poses = _resolve(file.poses, "p", "poses", source)
     verification = _resolve(file.verification, "v", "verification", source)
     if file.tumbles:
-        _refuse_flat_plan(fit_poses, file.span_min_g)
+        _refuse_flat_plan(fit_poses, file.span_min_g, file.sensor_axes)
         _refuse_coincidence(fit_poses, verification, source)
     shared = file.model_dump(
         exclude={"poses", "verification", "verification_repeats", "static_pose", "model", "effects"}
@@ -92,7 +92,7 @@ def refuse_unusable_poses(recipe: Recipe, source: str) -> None:
         The axis or the poses, and what is needed.
     """
     if recipe.tumbles:
-        _refuse_flat_plan(recipe.poses, recipe.span_min_g)
+        _refuse_flat_plan(recipe.poses, recipe.span_min_g, recipe.sensor_axes)
         _refuse_coincidence(recipe.poses, recipe.verification, source)
 
 
@@ -161,7 +161,8 @@ def lot_of(
         )
     units = [Unit(serial=serial, slot=slot) for serial, slot in zip(named, slots or range(len(named)), strict=True)]
     try:
-        return Lot(units=units, device=recipe.device, seed=recipe.seed if seed is None else seed, repeat=repeat)
+        kind = {"device": recipe.device, "sensor_axes": recipe.sensor_axes}
+        return Lot(units=units, **kind, seed=recipe.seed if seed is None else seed, repeat=repeat)
     except ValidationError as problem:
         raise explain(problem, "lot", Lot) from None
 
@@ -247,8 +248,8 @@ def directions(chosen: Sequence[Pose]) -> NDArray[np.float64]:
     return force_from_angles(angles[:, 0], angles[:, 1])
 
 
-def _refuse_flat_plan(chosen: Sequence[Pose], needed_g: float) -> None:
-    spans = np.ptp(directions(chosen), axis=0)
+def _refuse_flat_plan(chosen: Sequence[Pose], needed_g: float, axes: int) -> None:
+    spans = np.ptp(directions(chosen), axis=0)[:axes]
     worst = int(np.argmin(spans))
     if spans[worst] < needed_g:
         axis = AXES[worst]

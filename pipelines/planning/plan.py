@@ -178,7 +178,7 @@ def _alone(state: State, reasons: dict[str, str]) -> bool:
 def _coefficient_rows(expected: Expected) -> list[dict[str, Any]]:
     """One row per coefficient and axis; parameters of the station have axis ``*``."""
     rows: list[dict[str, Any]] = []
-    for axis, letter in enumerate(AXES):
+    for axis, letter in enumerate(AXES[: len(expected.names)]):
         place: dict[str, int] = {}
         for column, (effect, name) in enumerate(expected.names[axis]):
             k = place.setdefault(effect, 0)

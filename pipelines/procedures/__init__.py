@@ -6,7 +6,7 @@ procedure: recipes, capture, the stage ``procedures``, limits, the report and th
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib import import_module
 from inspect import isabstract
 from pkgutil import iter_modules
@@ -29,6 +29,7 @@ from schemas.errors import RecipeInvalid, close_matches, did_you_mean
 from schemas.recipe import Recipe
 from schemas.station import StationConfig
 from schemas.toml_files import explain
+from schemas.units import AXES
 
 __all__ = [
     "FIGURES",
@@ -119,10 +120,23 @@ def parts_of(recipe: Recipe) -> list[Part]:
                 close=close_matches(kind, PROCEDURES),
             )
         try:
-            parts.append(PROCEDURES[kind].part.model_validate(content))
+            part = PROCEDURES[kind].part.model_validate(content)
+            _refuse_missing_axes(where, part, PROCEDURES[kind], AXES[: recipe.sensor_axes])
+            parts.append(part)
         except ValidationError as problem:
             raise explain(problem, f"{where} ({kind})", PROCEDURES[kind].part) from None
     return parts
+
+
+def _refuse_missing_axes(where: str, part: Part, procedure: Procedure, letters: Sequence[str]) -> None:
+    """Refuse a procedure of an axis that the device does not have."""
+    missing = procedure.missing_axes(part, letters)
+    if missing:
+        raise RecipeInvalid(
+            f"{where} ({part.kind}): it measures axis {', '.join(missing)}, the device has {', '.join(letters)} (sensor_axes); "
+            "name another axis, or leave the procedure out",
+            key="sensor_axes",
+        )
 
 
 Ability = TypeVar("Ability", bound=Procedure)

@@ -57,6 +57,11 @@ class Procedure(ABC):
     def steps(self, part: Any, recipe: Recipe) -> list[ProcedureStep]:
         """The records of the procedure, in order."""
 
+    def missing_axes(self, part: Any, letters: Sequence[str]) -> list[str]:
+        """The axes that a part measures and that a device with these does not have: here the one that it names."""
+        named = [part.axis] if hasattr(part, "axis") else getattr(part, "axes", [])
+        return [axis for axis in named if axis not in letters]
+
     def check(self, part: Any, recipe: Recipe, station: StationConfig) -> None:  # noqa: B027 - most have nothing to refuse
         """Refuse what the station cannot perform; :class:`schemas.errors.RecipeInvalid` names the key."""
 

@@ -13,11 +13,11 @@ from inertial.dynamics.stability import StabilityFigures, block_means, stability
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace
 from pipelines.procedures.base import InG, NominalScale, RecordByRecord, scale_of
 from pipelines.procedures.figures import FigureSpec, FigureValue, UnitOutcome, with_uncertainty, worst
-from pipelines.procedures.recorded import Device, ProcedureStep, Taken, numbers, point_rows
+from pipelines.procedures.recorded import Device, ProcedureStep, Taken, axes_of, numbers, point_rows
 from schemas.bounds import Positive
 from schemas.poses import Pose
 from schemas.recipe import Recipe
-from schemas.units import AXES, MICRO
+from schemas.units import MICRO
 
 
 class BiasStabilityPart(NominalScale):
@@ -53,7 +53,7 @@ class BiasStability(InG, RecordByRecord):
     def points(self, part: BiasStabilityPart, one: Taken, device: Device) -> Iterator[dict[str, Any]]:
         """Means of 1 s in µg from the start of the record."""
         size, scale = round(part.rate_hz), scale_of(part, device, one.unit)
-        for i, axis in enumerate(AXES):
+        for i, axis in enumerate(one.own.letters):
             second = block_means(one.own.output[:, i], size) / scale[i] * MICRO
             k = np.arange(second.size)
             time = one.own.time[0] + k * size / part.rate_hz
@@ -83,7 +83,7 @@ class BiasStability(InG, RecordByRecord):
         """Means of 10 s and of 100 s of every axis over time, each about its mean."""
         short: list[Trace] = []
         long: list[Trace] = []
-        for axis in AXES:
+        for axis in axes_of(points):
             own = points[points["axis"] == axis]
             seconds, value = numbers(own, "setting", "value")
             time, value = seconds / 60.0, value - value.mean()

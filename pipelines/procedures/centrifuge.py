@@ -156,12 +156,13 @@ class CentrifugeTest(InG, OnEquipment, RecordByRecord):
         rate = np.radians(one.record.samples[REFERENCE].output[:, 0].mean())
         radius = one.record.step.setting["radius_m"]
         force = one.record.step.setting["direction"] * radius * rate**2 / 9.80665
-        raw = one.own.output[:, INPUT]
-        output = raw / scale_of(part, device, one.unit)[INPUT]
+        axis = INPUT if len(one.own.letters) > INPUT else 0  # a device without z is mounted by its x
+        raw = one.own.output[:, axis]
+        output = raw / scale_of(part, device, one.unit)[axis]
         clipped = device.at_end(raw) > 0
         error = float(np.hypot(output.std(ddof=1) / np.sqrt(output.size), 1e-6 * part.point_ppm * abs(force)))
         yield {
-            "unit": one.unit, "axis": "z", "series": "output", "point": one.number, "setting": float(force),
+            "unit": one.unit, "axis": one.own.letters[axis], "series": "output", "point": one.number, "setting": float(force),
             "value": np.nan if clipped else float(output.mean()), "uncertainty": error,
             "spread": float(output.std(ddof=1)), "radius_m": radius,
         }  # fmt: skip

@@ -70,11 +70,16 @@ def on_equipment(
 class UnitRecord:
     """The samples of one unit, or of the reference, in one record.
 
-    time : (n,), s on the station's clock; output : (n, 3), unit of the output, or g for the reference
+    time : (n,), s on the station's clock; output : (n, m) of the axes with an output, in its unit, or g for the reference
     """
 
     time: Array
     output: Array
+
+    @property
+    def letters(self) -> tuple[str, ...]:
+        """The axes with an output, in order."""
+        return AXES[: self.output.shape[1]]
 
     @property
     def rate_hz(self) -> float:
@@ -139,14 +144,20 @@ class Device:
 
 
 def procedure_record(
-    number: int, step: ProcedureStep, samples: Iterable[pd.DataFrame], readings: pd.DataFrame
+    number: int, step: ProcedureStep, samples: Iterable[pd.DataFrame], readings: pd.DataFrame, axes: int = len(AXES)
 ) -> ProcedureRecord:
-    """One record: samples by unit from its tables, one or several of a long record."""
+    """One record: samples by unit from its tables, one or several of a long record.
+
+    Parameters
+    ----------
+    axes : number of axes of the units with an output; the reference has three
+    """
     parts: dict[str, list[tuple[Array, Array]]] = {}
     for table in samples:
         output, time = table[list(AXES)].to_numpy(dtype=float), table["time_s"].to_numpy(dtype=float)
         for unit, rows in table.groupby("unit", sort=False).indices.items():
-            parts.setdefault(str(unit), []).append((time[rows], output[rows]))
+            own = output[rows] if unit == REFERENCE else output[rows, :axes]
+            parts.setdefault(str(unit), []).append((time[rows], own))
     joined = {
         unit: UnitRecord(np.concatenate([t for t, _ in own]), np.concatenate([o for _, o in own]))
         for unit, own in parts.items()
@@ -167,6 +178,12 @@ FIGURE_TEXTS, FIGURE_NUMBERS = "unit procedure figure axis unit_text note", "val
 def numbers(rows: pd.DataFrame, *names: str) -> list[NDArray[np.float64]]:
     """Columns of points as arrays: setting, value and uncertainty where none is named."""
     return [rows[name].to_numpy(dtype=float) for name in names or ("setting", "value", "uncertainty")]
+
+
+def axes_of(points: pd.DataFrame) -> list[str]:
+    """The sensor axes that have points, in order."""
+    known = set(points["axis"].tolist())
+    return [axis for axis in AXES if axis in known]
 
 
 def point_rows(**columns: Any) -> list[dict[str, Any]]:

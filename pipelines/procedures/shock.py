@@ -209,15 +209,16 @@ def _setting(part: ShockPart, peak_g: float, direction: float) -> dict[str, floa
 
 def bias_points(one: Taken, scale: np.ndarray) -> list[dict[str, Any]]:
     """Mean of every axis in µg, its uncertainty from the scatter of ten parts; ``setting`` is 0 before, 1 after."""
-    output, rate = one.own.output / scale * MICRO, one.own.rate_hz
-    noise = [noise_columns(short_noise(output[:, i], rate)) for i in range(3)]
+    letters, rate = one.own.letters, one.own.rate_hz
+    output = one.own.output / scale[: len(letters)] * MICRO
+    noise = [noise_columns(short_noise(output[:, i], rate)) for i in range(len(letters))]
     return point_rows(
         unit=one.unit,
-        axis=AXES,
+        axis=letters,
         series="bias",
         point=one.number,
         setting=0.0 if one.record.step.name == "before" else 1.0,
-        value=[output[:, i].mean() for i in range(3)],
+        value=[output[:, i].mean() for i in range(len(letters))],
         uncertainty=error_of_mean(output),
         window_s=len(output) / rate,
         time_s=float(one.own.time.mean()),

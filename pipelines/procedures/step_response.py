@@ -20,6 +20,7 @@ from pipelines.procedures.recorded import (
     ProcedureStep,
     Records,
     UnitRecord,
+    axes_of,
     numbers,
     on_equipment,
     point_rows,
@@ -27,7 +28,6 @@ from pipelines.procedures.recorded import (
 )
 from schemas.bounds import Positive
 from schemas.recipe import Recipe
-from schemas.units import AXES
 
 SETTLING, OVERSHOOT, RISE = "step_settling_ms", "step_overshoot_percent", "step_rise_ms"
 BEFORE_SHARE = 0.25  # of the step's duration, recorded before the edge
@@ -95,7 +95,7 @@ class StepResponse(OnEquipment, FromWaveforms):
                 for record, edge in zip(records, edges, strict=True)
                 if unit in record.samples
             ]
-            for i, axis in enumerate(AXES):
+            for i, axis in enumerate(own[0][0].letters if own else ()):
                 rows += [one | {"unit": unit, "axis": axis} for one in _averaged(part, own, i, device)]
         return point_table(rows)
 
@@ -121,7 +121,7 @@ class StepResponse(OnEquipment, FromWaveforms):
         last: list[Trace] = []
         settled = float("nan")
         most = 5.0 * part.band_percent
-        for axis, width in zip(AXES, WIDTHS, strict=True):
+        for axis, width in zip(axes_of(points), WIDTHS, strict=False):
             own = points[points["axis"] == axis].sort_values("setting")
             time, value = 1e3 * own["setting"].to_numpy(dtype=float), 100.0 * own["value"].to_numpy(dtype=float)
             whole.append(Trace(f"axis {axis}", time, value, "line", axis, width=width))

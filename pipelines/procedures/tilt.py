@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Annotated, Any, Literal, cast
 
 import numpy as np
@@ -14,11 +15,10 @@ from inertial.errors import NotIdentified
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Role, Trace, level
 from pipelines.procedures.base import Part, RecordByRecord
 from pipelines.procedures.figures import FigureSpec, FigureValue, Texts, UnitOutcome, worst
-from pipelines.procedures.recorded import Device, ProcedureStep, Taken, numbers, point_rows
+from pipelines.procedures.recorded import Device, ProcedureStep, Taken, axes_of, numbers, point_rows
 from schemas.bounds import NotNegative, Positive
 from schemas.poses import Pose
 from schemas.recipe import Recipe
-from schemas.units import AXES
 
 FEWEST_ANGLES = 6
 MICRO, MILLI = 1e6, 1e3
@@ -82,12 +82,17 @@ class Tilt(RecordByRecord):
             for p in poses
         ]
 
+    def missing_axes(self, part: TiltPart, letters: Sequence[str]) -> list[str]:
+        """Both axes in the plane where the device has neither."""
+        plane = _plane(part)
+        return [] if any(axis in letters for axis in plane) else list(plane)
+
     def points(self, part: TiltPart, one: Taken, device: Device) -> list[dict[str, Any]]:
         """Mean output of every axis at an angle, which is the encoder's."""
         output = one.own.output
         return point_rows(
             unit=one.unit,
-            axis=AXES,
+            axis=one.own.letters,
             series="output",
             point=one.number,
             setting=float(one.reading["outer_deg"]),
@@ -100,8 +105,8 @@ class Tilt(RecordByRecord):
         """Figures of the axes in the plane, and their largest residuals."""
         if still := _still(part, rows):
             raise NotIdentified(f"the output of axis {' and '.join(still)} is constant; check the unit")
-        fits = {axis: _fit(part, rows[rows["axis"] == axis]) for axis in _plane(part)}
-        linear = {axis: _fit(part, rows[rows["axis"] == axis], orders=1) for axis in _plane(part)}
+        fits = {axis: _fit(part, rows[rows["axis"] == axis]) for axis in _turned(part, rows)}
+        linear = {axis: _fit(part, rows[rows["axis"] == axis], orders=1) for axis in fits}
         # of the whole model: what K2 and K3 leave in a sine's residual is no wander
         values = [worst([_linearity(axis, one) for axis, one in fits.items()]), _orthogonality(part, fits)]
         if part.orders == 3:
@@ -113,9 +118,13 @@ class Tilt(RecordByRecord):
 
     def of_lot(self, part: TiltPart, points: pd.DataFrame) -> Texts:
         """What the plane leaves open."""
+        turned = _turned(part, points)
         open_in, open_out = "; ".join(left_open(in_plane=True)), "; ".join(left_open(in_plane=False))
         return [
-            ("not determined by this plane", f"axes {' and '.join(_plane(part))}: {open_in}"),
+            (
+                "not determined by this plane",
+                f"{'axes' if len(turned) > 1 else 'axis'} {' and '.join(turned)}: {open_in}",
+            ),
             ("not determined by this plane", f"axis {part.about}, about which the unit turns: {open_out}"),
         ]
 
@@ -125,7 +134,7 @@ class Tilt(RecordByRecord):
             return None
         turn = np.linspace(-np.pi, np.pi, 361)
         traces = [level(np.array([-180.0, 180.0]), 0.0)]
-        for axis in _plane(part):
+        for axis in _turned(part, points):
             rows = points[points["axis"] == axis]
             one, whole = _fit(part, rows, orders=1), _fit(part, rows)
             residual, error = MICRO * one.residuals / one.scale[0], 2.0 * MICRO * whole.spread / one.scale[0]
@@ -145,10 +154,17 @@ def _plane(part: TiltPart) -> tuple[str, str]:
     return ("y", "z") if part.about == "x" else ("x", "z")
 
 
+def _turned(part: TiltPart, rows: pd.DataFrame) -> list[str]:
+    """The axes in the plane that have an output."""
+    return [axis for axis in axes_of(rows) if axis in _plane(part)]
+
+
 def _still(part: TiltPart, rows: pd.DataFrame) -> list[str]:
     """The axes in the plane whose output is the same at every angle: it has no scale to refer anything to."""
     return [
-        axis for axis in _plane(part) if np.ptp(rows.loc[rows["axis"] == axis, "value"].to_numpy(dtype=float)) == 0.0
+        axis
+        for axis in _turned(part, rows)
+        if np.ptp(rows.loc[rows["axis"] == axis, "value"].to_numpy(dtype=float)) == 0.0
     ]
 
 
@@ -183,6 +199,10 @@ def _residual(axis: str, one: TiltFit) -> tuple[str, str]:
 
 
 def _orthogonality(part: TiltPart, fits: dict[str, TiltFit]) -> FigureValue:
+    if len(fits) < len(_plane(part)):
+        return FigureValue.not_determined(
+            "tilt_orthogonality_mrad", "*", "one axis in the plane has an output, two are needed"
+        )
     first, second = _plane(part)
     a, b = fits[first].phase, fits[second].phase
     apart = (a[0] - b[0] + np.pi) % (2.0 * np.pi) - np.pi

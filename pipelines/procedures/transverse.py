@@ -97,6 +97,10 @@ class TransverseTest(InG, OnEquipment, Evaluated):
         level, angle, seconds = one["level_g"], one["angle_deg"], step.lasting_s or 0.0
         return equipment.sine_across(one["frequency_hz"], level, int(one["axis"]), angle, seconds, slots)
 
+    def missing_axes(self, part: TransversePart, letters: Sequence[str]) -> list[str]:
+        """The response across is that of the other axes."""
+        return [axis for axis in AXES if axis not in letters]
+
     def reduce(self, part: TransversePart, records: Records, device: Device) -> pd.DataFrame:
         """In-phase output of the axis over the driven acceleration, in %, at every angle."""
         rows: list[dict[str, Any]] = []

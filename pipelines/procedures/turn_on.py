@@ -12,7 +12,7 @@ from inertial.dynamics.stability import error_of_mean, repeatability
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace, level
 from pipelines.procedures.base import InG, NominalScale, RecordByRecord, scale_of
 from pipelines.procedures.figures import FigureSpec, FigureValue, UnitOutcome, worst
-from pipelines.procedures.recorded import Device, ProcedureStep, Taken, at_rest, numbers, point_rows
+from pipelines.procedures.recorded import Device, ProcedureStep, Taken, at_rest, axes_of, numbers, point_rows
 from schemas.bounds import Positive, Wait
 from schemas.recipe import Recipe
 from schemas.units import AXES, MICRO
@@ -63,14 +63,15 @@ class TurnOn(InG, RecordByRecord):
 
     def points(self, part: TurnOnPart, one: Taken, device: Device) -> list[dict[str, Any]]:
         """Mean of a cycle in µg; its uncertainty from the scatter of ten parts of the window."""
-        output = one.own.output / scale_of(part, device, one.unit) * MICRO
+        letters = one.own.letters
+        output = one.own.output / scale_of(part, device, one.unit)[: len(letters)] * MICRO
         return point_rows(
             unit=one.unit,
-            axis=AXES,
+            axis=letters,
             series="mean",
             point=one.number,
             setting=one.number + 1.0,
-            value=[output[:, i].mean() for i in range(3)],
+            value=[output[:, i].mean() for i in range(len(letters))],
             uncertainty=error_of_mean(output),
         )
 
@@ -90,7 +91,7 @@ class TurnOn(InG, RecordByRecord):
     def chart(self, part: TurnOnPart, points: pd.DataFrame) -> Chart:
         """Mean of every cycle about the mean of all, with the standard deviation of each axis."""
         traces: list[Trace] = []
-        for k, axis in enumerate(AXES):
+        for k, axis in enumerate(axes_of(points)):
             own = points[points["axis"] == axis]
             cycle, value, error = numbers(own)
             value = value - value.mean()

@@ -16,10 +16,10 @@ from inertial.errors import NotIdentified
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace, between
 from pipelines.procedures.base import InG, NominalScale, RecordByRecord, scale_of
 from pipelines.procedures.figures import FigureSpec, FigureValue, UnitOutcome, worst
-from pipelines.procedures.recorded import Device, ProcedureStep, Taken, at_rest, numbers, point_rows
+from pipelines.procedures.recorded import Device, ProcedureStep, Taken, at_rest, axes_of, numbers, point_rows
 from schemas.bounds import Positive
 from schemas.recipe import Recipe
-from schemas.units import AXES, MICRO
+from schemas.units import MICRO
 
 
 class WarmUpPart(NominalScale):
@@ -61,7 +61,7 @@ class WarmUp(InG, RecordByRecord):
         """Means of 1 s in µg over the time since power-on."""
         size, scale = round(part.rate_hz), scale_of(part, device, one.unit)
         begun = float(one.reading["since_power_s"]) - 0.5 * float(one.reading["duration_s"])
-        for i, axis in enumerate(AXES):
+        for i, axis in enumerate(one.own.letters):
             second = block_means(one.own.output[:, i], size) / scale[i] * MICRO
             noise = float(np.std(np.diff(second), ddof=1) / np.sqrt(2.0)) if second.size > 2 else np.nan
             k = np.arange(second.size)
@@ -78,7 +78,7 @@ class WarmUp(InG, RecordByRecord):
         """Output about its final value over the time since power-on, with the band."""
         time = points["setting"].to_numpy(dtype=float)
         traces = [between(time, -part.band_ug, part.band_ug, f"band ± {part.band_ug:g} µg")]
-        for axis in AXES:
+        for axis in axes_of(points):
             own = points[points["axis"] == axis]
             since, value = numbers(own, "setting", "value")
             final = value[int(0.8 * value.size) :].mean()

@@ -18,7 +18,6 @@ from pipelines.certificates.programmed import TOP, add
 from pipelines.certificates.validity import Calibration
 from pipelines.chain.certify import certify
 from pipelines.export import UnitCalibration, unit_calibrations
-from pipelines.export.polynomials import refuse_fewer_axes
 from pipelines.programming.outcome import Choice, ProgrammingOutcome
 from pipelines.programming.process import Programmer
 from schemas.errors import WrongUse
@@ -39,14 +38,13 @@ def chosen_units(run: Run, serials: Sequence[str]) -> list[tuple[int, UnitCalibr
     slots = {unit["serial"]: int(unit["slot"]) for unit in run.about["lot"]["units"]}
     once = tuple(dict.fromkeys(serials))  # a device that is named twice is written once
     calibrations = unit_calibrations(run, once, failed=False, revoked=True)
-    refuse_fewer_axes(calibrations, "program: the block")
     allowed = [unit for unit in calibrations if not _revoked(unit)]
     revoked = [unit for unit in calibrations if _revoked(unit)]
     if revoked and (serials or not allowed):
         raise WrongUse(
             f"program: unit {revoked[0].unit}: {revoked[0].certified}, a valid calibration is needed; measure the unit again"
         )
-    return [(slots[unit.unit], unit) for unit in allowed]
+    return [(slots[unit.unit], unit.with_every_axis) for unit in allowed]
 
 
 def _revoked(unit: UnitCalibration) -> bool:

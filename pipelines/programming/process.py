@@ -276,12 +276,12 @@ class Programmer:
                 outcomes,
                 "verify",
                 lambda one, f=force, m=plain, t=temperatures, p=pose.name: require_in_pose(
-                    one, InPose(p, f, m[one.slot], t[one.slot]), self.choice.tolerance_ug
+                    one, InPose(p, f, one.unit.with_forces(m[one.slot], f), t[one.slot]), self.choice.tolerance_ug
                 ),
             )
 
     def _means(self, outcomes: Sequence[ProgrammingOutcome]) -> dict[int, Array]:
-        """Mean outputs (3,) by slot, over a dwell of the recipe."""
+        """Mean outputs (m,) of the axes with an output by slot, over a dwell of the recipe."""
         reader, clock, recipe = self.station.reader, self.station.clock, self.recipe
         clock.sleep(recipe.settle_s)
         reader.start(recipe.rate_hz)

@@ -9,6 +9,7 @@ from decimal import Decimal
 from typing import Any
 
 from inertial.uncertainty.rounding import rounded
+from schemas.units import AXES
 
 MINUS = "−"
 THIN = "\u202f"  # narrow no-break space between groups of three digits
@@ -71,3 +72,9 @@ def side_by_side(
         line["cells"][axis] = cell(row)
         line["names"] += [] if row["name"] in line["names"] else [row["name"]]
     return list(lines.values())
+
+
+def axes_of(lines: Iterable[Mapping[str, Any]]) -> list[str]:
+    """The sensor axes that have a cell in one of the lines, in order."""
+    known = {axis for line in lines for axis in line["cells"]}
+    return [axis for axis in AXES if axis in known]

@@ -15,7 +15,7 @@ from pipelines.drawing.mollweide import project, sphere
 from pipelines.planning.context import PlanContext
 from pipelines.planning.documents import worst_axes
 from pipelines.report.budget_plots import shares_plot
-from pipelines.report.numbers import scientific, side_by_side, significant
+from pipelines.report.numbers import axes_of, scientific, side_by_side, significant
 from pipelines.report.templates import template
 from pipelines.schedule.timing import temperatures
 from schemas.decisions import LARGEST_ERROR
@@ -30,12 +30,14 @@ def render_plan(document: dict[str, Any], context: PlanContext) -> str:
     document : of :func:`pipelines.planning.plan.plan`
     context : the recipe on the station
     """
+    lines = side_by_side(document["coefficients"], lambda row: significant(row["uncertainty_ug"]), "unit")
     return template("plan.html").render(
         document=document,
         recipe=context.recipe,
         number=significant,
         scientific=scientific,
-        coefficients=side_by_side(document["coefficients"], lambda row: significant(row["uncertainty_ug"]), "unit"),
+        coefficients=lines,
+        axes=axes_of(lines),
         seen=[row for row in document["effects"] if row["seen"]],
         unseen=[row for row in document["effects"] if not row["seen"]],
         **pictures(document, context),
@@ -160,7 +162,7 @@ def sight_chart(effects: list[dict[str, Any]]) -> Chart:
         Trace(
             f"sensor axis {axis}", np.array([row["left_by_axis"][k] for row in shown]), place + 0.2 * (1 - k), role=axis
         )
-        for k, axis in enumerate(AXES)
+        for k, axis in enumerate(AXES[: len(shown[0]["left_by_axis"]) if shown else 0])
     ]
     across = PlotAxis("v, fraction of the effect that remains after the model", low=-0.02, high=1.02)
     along = PlotAxis("", names=tuple(str(row["effect"]) for row in shown), low=-0.6, high=len(shown) - 0.4)

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from inertial.design import of_axes
 from inertial.fits.linear import fit_lot
 from inertial.frames import force_from_angles
 from inertial.quantities import BY_COLUMN, LEFT_ALONE, Quantity
@@ -83,6 +84,7 @@ def state_of(
         slot=np.zeros(()),
         covariates=_recorded(recorded_columns(station.devices.reader) if recorded is None else recorded, time.size),
         history=_history(stretches, station) if history else None,
+        axes=tuple(range(recipe.sensor_axes)),
         **left,
     )
 
@@ -144,7 +146,7 @@ def refuse_unidentified(recipe: Recipe, recorded: Iterable[str] = ()) -> None:
         The model depends on a column that is not recorded.
     """
     state = planned_state(recipe, recorded=recorded)
-    fit_lot(recipe.effects, state, state.force.copy())
+    fit_lot(recipe.effects, state, of_axes(state.force, state.axes, -1).copy())
 
 
 class Planned(NamedTuple):

@@ -9,7 +9,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from inertial.design import of_axes
 from inertial.distributions import chi2_upper
+from inertial.fits.linear import own_terms
 from inertial.noise.allan import AllanCurve, overlapping
 from inertial.noise.flicker import FLICKER_FLOOR
 from inertial.noise.terms import NoiseTerms, fit_terms, model_deviation
@@ -17,7 +19,7 @@ from pipelines.stages.static_record import Coarse, StaticSeries, Warmed, remark,
 from pipelines.tables.calibration import Calibration, read_calibration
 from pipelines.tables.frames import empty_table
 from pipelines.tables.samples import by_record
-from schemas.units import AXES, MICRO
+from schemas.units import MICRO
 
 Array = NDArray[np.float64]
 
@@ -130,7 +132,7 @@ def static_record(
     calibration = read_calibration(coefficients, covariance)
     records = set(static["record"])
     size = -(-int(static.loc[static["unit"].isin(calibration.units), "n"].max()) // MOST_SAMPLES)
-    series = StaticSeries(calibration.units, size)
+    series = StaticSeries(calibration.units, size, calibration.letters)
     for record, tables in by_record(samples):
         for table in tables:
             if record in records:
@@ -165,7 +167,8 @@ def _channels(
     history: pd.DataFrame | None,
 ) -> list[StaticChannel]:
     output = series.of(unit)
-    scale = np.diagonal(calibration.response[calibration.units.index(unit)]) / MICRO
+    own = of_axes(calibration.response[calibration.units.index(unit)], calibration.axes, -2)
+    scale = own_terms(own, calibration.axes) / MICRO
     if len(static):
         start = float(static["start_s"].iloc[0])
         time = np.asarray(start + (np.arange(len(output)) + 0.5) * series.size / rate, dtype=np.float64)
@@ -181,7 +184,7 @@ def _channels(
             warmth=_warmth(warm, float(np.ptp(warm.change[:, axis]) / abs(scale[axis])) if len(output) else 0.0),
             silent=_why_silent(output[:, axis]),
         )
-        for axis, letter in enumerate(AXES)
+        for axis, letter in enumerate(calibration.letters)
     ]
 
 

@@ -64,7 +64,7 @@ def procedures(
         if not own:
             continue
         records = (
-            procedure_record(record, step, samples({record}), _answered(readings, record, accepted))
+            procedure_record(record, step, samples({record}), _answered(readings, record, accepted), recipe.sensor_axes)
             for record, step in own
         )
         table, outcome = analysed(procedure, part, records, device, accepted)

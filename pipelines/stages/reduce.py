@@ -12,7 +12,7 @@ from inertial.frames import force_from_angles
 from inertial.quantities import ANGLE_COLUMNS, BY_ATTRIBUTE, READINGS
 from pipelines.tables.dwell_table import covariates
 from pipelines.tables.samples import PROCEDURE, STATIC
-from pipelines.tables.summaries import MEANS, SPREADS
+from pipelines.tables.summaries import MEANS, SPREADS, there
 from schemas.errors import DataRejected
 from schemas.units import AXES, STANDARD_GRAVITY_M_S2
 
@@ -55,7 +55,9 @@ def reduce(
     follows : how the outputs follow the measured supply; they are referred to the nominal one then
     """
     accepted = set(verdicts.loc[~verdicts["refused"], "unit"])
-    means = summaries.loc[summaries["unit"].isin(accepted), ["unit", "record", *MEANS, *SPREADS, "n"]]
+    means = summaries.loc[
+        summaries["unit"].isin(accepted), ["unit", "record", *there(summaries, (*MEANS, *SPREADS)), "n"]
+    ]
     static = readings[readings["unit"].isin(accepted) & ~readings["kind"].isin([STATIC, PROCEDURE])]
     # a covariate with a missing reading cannot be used by a model; it stays in the readings
     recorded = [column for column in covariates(readings) if static[column].notna().all()]
@@ -85,4 +87,6 @@ def at_nominal_supply(dwells: pd.DataFrame, follows: FollowedSupply) -> pd.DataF
             f"the output follows it; check the meter of slot {row['slot']}, or take ratio_measured out of [uncertainty]"
         )
     ratio = follows.ratio(supply)
-    return dwells.assign(**{name: dwells[name].to_numpy(dtype=float) / ratio for name in (*MEANS, *SPREADS)})
+    return dwells.assign(
+        **{name: dwells[name].to_numpy(dtype=float) / ratio for name in there(dwells, (*MEANS, *SPREADS))}
+    )

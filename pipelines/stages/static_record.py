@@ -72,30 +72,30 @@ class StaticSeries:
     The Allan deviation of means is that of the samples themselves, from an averaging time of ``size`` samples on.
     """
 
-    def __init__(self, units: Sequence[str], size: int) -> None:
-        self.size = max(size, 1)
-        self._rest: dict[str, Array] = {unit: np.zeros((0, 3)) for unit in units}
+    def __init__(self, units: Sequence[str], size: int, letters: Sequence[str] = AXES) -> None:
+        self.size, self._letters = max(size, 1), list(letters)
+        self._rest: dict[str, Array] = {unit: np.zeros((0, len(letters))) for unit in units}
         self._means: dict[str, list[Array]] = {unit: [] for unit in units}
-        self.digits = {unit: tuple(Digits() for _ in AXES) for unit in units}
+        self.digits = {unit: tuple(Digits() for _ in letters) for unit in units}
 
     def add(self, samples: pd.DataFrame) -> None:
         """Adds the samples that follow the earlier ones."""
-        output = samples[list(AXES)].to_numpy(dtype=float)
+        output = samples[self._letters].to_numpy(dtype=float)
         for unit, rows in samples.groupby("unit", sort=False).indices.items():
             if unit in self._rest:
                 joined = np.concatenate((self._rest[str(unit)], output[rows]))
                 whole = len(joined) // self.size * self.size
-                self._means[str(unit)].append(joined[:whole].reshape(-1, self.size, 3).mean(axis=1))
+                self._means[str(unit)].append(joined[:whole].reshape(-1, self.size, len(self._letters)).mean(axis=1))
                 self._rest[str(unit)] = joined[whole:]
                 for axis, digits in enumerate(self.digits[str(unit)]):
                     digits.add(output[rows, axis])
 
     def of(self, unit: str) -> Array:
-        """Outputs (n, 3) of a unit; none where it was not recorded."""
-        return np.concatenate(self._means[unit] or [np.zeros((0, 3))])
+        """Outputs (n, m) of a unit; none where it was not recorded."""
+        return np.concatenate(self._means[unit] or [np.zeros((0, len(self._letters)))])
 
     def values(self) -> Array:
-        """Outputs (units, 3, n), as long as the shortest."""
+        """Outputs (units, m, n), as long as the shortest."""
         series = [self.of(unit) for unit in self._means]
         shortest = min(len(one) for one in series)
         return np.stack([one[:shortest].T for one in series])
@@ -105,7 +105,7 @@ class StaticSeries:
 class Warmed:
     """The response of an output to the temperature of the static record, by the tempco of the model.
 
-    change : (n, 3), of the output, its mean taken out; zero if unknown
+    change : (n, m), of the output, its mean taken out; zero if unknown
     span_K : by which the smoothed temperature moved, NaN where it was not read often enough
     known : whether the model has a tempco
     """
@@ -128,7 +128,7 @@ def warmed(
     time : (n,), s, of the values
     reading : row of the static record: angles of the table
     """
-    still = np.zeros((time.size, 3))
+    still = np.zeros((time.size, len(calibration.axes)))
     own = None if history is None or not time.size else _smoothed(history, unit, float(time[0]), float(time[-1]))
     effects = [e for e in design.split(calibration.effects)[0] if "temperature" in e.id]
     if own is None:
@@ -143,7 +143,8 @@ def warmed(
         return Warmed(still, span, known=False)
     place = calibration.units.index(unit)
     felt = force_along_axes(calibration.response[place], force)
-    columns = design.local_columns(effects, State(force=force, time=when, temperature=temperature, felt=felt), {})
+    state = State(force=force, time=when, temperature=temperature, felt=felt, axes=calibration.axes)
+    columns = design.local_columns(effects, state, {})
     coefficients = np.concatenate([calibration.value(e.id)[place] for e in effects], axis=-1)
     change = np.einsum("anp,ap->na", columns, coefficients)
     along = np.stack([np.interp(time, when, part) for part in change.T], axis=1)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from inertial.frames import force_from_angles
 from inertial.pointing import _force, contradicts, pointing_error
 from pipelines.tables.samples import PROCEDURE, STATIC
-from pipelines.tables.summaries import HIGHS, LOWS, means
+from pipelines.tables.summaries import HIGHS, LOWS, means, there
 from schemas.lot import Unit
 from schemas.units import AXES
 
@@ -139,7 +139,7 @@ def _fault_of(own: Mapping[Any, Any] | None, unit: str, n: int, full: float) -> 
     if own["wild_count"]:
         where = f"on {AXES[own['wild_axis']]} in row {own['wild_row']} ({own['wild_count']} such values)"
         return "not_finite", f"{own['wild_value']} {where}", "measure again"
-    still = [k for k in range(len(AXES)) if own[LOWS[k]] == own[HIGHS[k]]]
+    still = [k for k in range(len(AXES)) if LOWS[k] in own and own[LOWS[k]] == own[HIGHS[k]]]
     if there >= FEWEST_TO_JUDGE and still:
         finding = f"constant output {own[LOWS[still[0]]]:g} {unit} on {AXES[still[0]]}"
         return "stuck_output", finding, "check wiring and power of the slot"
@@ -180,7 +180,7 @@ def _dead_channels(means: pd.DataFrame, readings: pd.DataFrame) -> list[DataFaul
         if len(rows) < FEWEST_TO_JUDGE // 2:
             continue
         explained = _explained_by_force(rows)
-        dead = np.flatnonzero((explained < FORCE_EXPLAINS) & _turned(rows))
+        dead = np.flatnonzero((explained < FORCE_EXPLAINS) & _turned(rows)[: explained.size])
         if dead.size:
             axis = AXES[dead[0]]
             reason = (
@@ -198,10 +198,10 @@ def _turned(rows: pd.DataFrame) -> NDArray[np.bool_]:
 
 
 def _explained_by_force(rows: pd.DataFrame) -> NDArray[np.float64]:
-    """Share of each axis' variance inside the soaks that a linear function of the force explains, (3,)."""
+    """Share of each output's variance inside the soaks that a linear function of the force explains, (m,)."""
     force = force_from_angles(*np.radians(rows[["outer_deg", "inner_deg"]].to_numpy()).T)
     soaks = (rows["soak"].to_numpy()[:, None] == np.unique(rows["soak"].to_numpy())).astype(float)
-    output = np.nan_to_num(rows[list(AXES)].to_numpy(dtype=float), posinf=0.0, neginf=0.0)
+    output = np.nan_to_num(rows[there(rows, AXES)].to_numpy(dtype=float), posinf=0.0, neginf=0.0)
     inside = output - soaks @ np.linalg.lstsq(soaks, output, rcond=None)[0]
     design = np.column_stack([force, soaks])
     left = output - design @ np.linalg.lstsq(design, output, rcond=None)[0]
@@ -215,7 +215,13 @@ def pointing_of(means: pd.DataFrame, readings: pd.DataFrame) -> float:
     Parameters
     ----------
     means : unit, record and the mean outputs x, y, z; a unit with a gap in a soak does not count there
+
+    Returns
+    -------
+    0 for devices with fewer than three axes: the error is seen by the angles between their outputs.
     """
+    if len(there(means, AXES)) < len(AXES):
+        return 0.0
     static = readings[(readings["kind"] != STATIC)].drop_duplicates("record").set_index("record").sort_index()
     return max((_of_soak(means, rows) for _, rows in static.groupby("soak")), default=0.0)
 

@@ -46,6 +46,11 @@ class Calibration:
         """Per axis, (effect id, coefficient) of the p columns."""
         return column_names(self.effects, self.nonlinear, self.axes)
 
+    @property
+    def letters(self) -> tuple[str, ...]:
+        """Letters of the axes with an output, in order."""
+        return tuple(AXES[axis] for axis in self.axes)
+
     @cached_property
     def response(self) -> NDArray[np.float64]:
         """The matrix K of each unit, (units, 3, 3), output per g."""

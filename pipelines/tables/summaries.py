@@ -23,7 +23,9 @@ FEWEST_FOR_OUTLIERS = 20
 WHOLE = "record n wild_count wild_axis wild_row clipped clipped_axis"
 
 
-def summarised(samples: Iterable[pd.DataFrame], readings: pd.DataFrame, zero_output: float = 0.0) -> pd.DataFrame:
+def summarised(
+    samples: Iterable[pd.DataFrame], readings: pd.DataFrame, zero_output: float = 0.0, axes: int = len(AXES)
+) -> pd.DataFrame:
     """One row for each record and unit with samples, in the order of the samples.
 
     Columns: ``unit``, ``record``, ``kind``, ``n``; mean ``out_x`` …, standard deviation ``sd_x`` … (n − 1 in its divisor),
@@ -36,9 +38,14 @@ def summarised(samples: Iterable[pd.DataFrame], readings: pd.DataFrame, zero_out
     samples : one table per record, or several of a long one; each is read once
     readings : full scale of every unit in every record, where it answered
     zero_output : nominal output at 0 g, from which the full scale extends both ways; output unit
+    axes : number of axes with an output; the others have no columns
     """
     full = readings[readings["status"] == "ok"].set_index(["record", "unit"])["full_scale"]
-    rows = [row for record, tables in by_record(samples) for row in _of_record(record, tables, full, zero_output)]
+    rows = [
+        row
+        for record, tables in by_record(samples)
+        for row in _of_record(record, tables, full, zero_output, AXES[:axes])
+    ]
     return pd.DataFrame(rows) if rows else empty_table(texts="unit kind", numbers=NUMBERS, whole=WHOLE)
 
 
@@ -49,30 +56,32 @@ def unit_means(table: pd.DataFrame) -> dict[str, Array]:
 
 
 def _of_record(
-    record: int, tables: Iterator[pd.DataFrame], full: pd.Series, zero_output: float
+    record: int, tables: Iterator[pd.DataFrame], full: pd.Series, zero_output: float, letters: Sequence[str]
 ) -> Iterator[dict[str, Any]]:
     """The rows of one record, from all of its tables."""
     known: dict[str, dict[str, Any]] = {}
     for table in tables:
-        for unit, part in _parts(table, record, full, zero_output):
+        for unit, part in _parts(table, record, full, zero_output, letters):
             head = {"unit": unit, "record": record, "kind": str(table["kind"].iloc[0])}
             known[unit] = _joined(known[unit], part) if unit in known else head | part
     for row in known.values():
         flat = {name: value for name, value in row.items() if not isinstance(value, np.ndarray)}
         columns = zip((MEANS, SPREADS, LOWS, HIGHS), ("mean", "sd", "low", "high"), strict=True)
-        yield flat | {name: float(value) for names, key in columns for name, value in zip(names, row[key], strict=True)}
+        yield flat | {
+            name: float(value) for names, key in columns for name, value in zip(names, row[key], strict=False)
+        }
 
 
 def _parts(
-    table: pd.DataFrame, record: int, full: pd.Series, zero_output: float
+    table: pd.DataFrame, record: int, full: pd.Series, zero_output: float, letters: Sequence[str]
 ) -> Iterator[tuple[str, dict[str, Any]]]:
     """The rows of one table for each of its units, in order of unit."""
     groups = table.groupby("unit", sort=True)
-    values = groups[list(AXES)]
+    values = groups[list(letters)]
     mean, sd, low, high = (
         statistic.to_numpy() for statistic in (values.mean(), values.std(ddof=1), values.min(), values.max())
     )
-    output = table[list(AXES)].to_numpy(dtype=float)
+    output = table[list(letters)].to_numpy(dtype=float)
     for k, (unit, places) in enumerate(groups.indices.items()):
         own = output[places]
         limit = float(full.get((record, unit), 0.0))
@@ -152,6 +161,12 @@ def first_outlier(output: Array, lsb: float, full_scale: float) -> Outlier | Non
 
 
 def means(summaries: pd.DataFrame, kinds_but: Sequence[str] = ()) -> pd.DataFrame:
-    """Unit, record and mean samples x, y, z, without some kinds."""
+    """Unit, record and mean samples x, y, z of the axes with an output, without some kinds."""
     kept = summaries[~summaries["kind"].isin(list(kinds_but))]
-    return kept[["unit", "record", *MEANS]].rename(columns=dict(zip(MEANS, AXES, strict=True)))
+    names = dict(zip(there(kept, MEANS), AXES, strict=False))
+    return kept[["unit", "record", *names]].rename(columns=names)
+
+
+def there(table: pd.DataFrame, names: Sequence[str]) -> list[str]:
+    """The columns of axes that have an output."""
+    return [name for name in names if name in table.columns]

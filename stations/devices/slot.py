@@ -7,14 +7,14 @@ from numpy.typing import NDArray
 
 from schemas.errors import LinkLost, StationRefused, StationTimeout
 from stations.clock import Clock
-from stations.codec import SEQUENCE, WORDS_PER_SAMPLE, Packing, named, unpack_samples
+from stations.codec import OUTPUTS, SEQUENCE, WORDS_PER_SAMPLE, Packing, named, unpack_samples
 from stations.devices.memory import UnitMemory
 from stations.devices.registers import Registers
 
 LONGEST_READ = 125  # registers in one request
 FEWEST_COUNTS, MOST_COUNTS = 100, 2**31  # in a full scale; a wrong word order gives values outside
 UNITS = {"volt": "V", "lsb": "LSB", "g": "g", "m_s2": "m/s^2"}
-PACKINGS: dict[str, Packing] = {"int20x3": "int20x3", "int24x3": "int24x3"}
+PACKINGS: dict[str, Packing] = {name: name for name in OUTPUTS}
 
 
 @dataclass(frozen=True)
@@ -28,10 +28,15 @@ class Identity:
     full_scale: float
     capacity: int
 
+    @property
+    def axes(self) -> int:
+        """The number of axes with an output: x, x and y, or all three."""
+        return OUTPUTS[self.packing]
+
 
 @dataclass(frozen=True)
 class Samples:
-    """Samples of a slot: first number since the start, outputs (n, 3) in the unit of the output, and whether any were lost."""
+    """Samples of a slot: first number since the start, outputs (n, m) of m axes in their unit, and whether any were lost."""
 
     first: int
     outputs: NDArray[np.float64]
@@ -115,7 +120,7 @@ class Slot:
             self._acknowledged = head
 
     def _window(self, first: int, head: int, identity: Identity) -> NDArray[np.float64]:
-        """Counts (n, 3) of the samples numbered ``first`` to ``head`` − 1; gaps raise :class:`SamplesLost`."""
+        """Counts (n, m) of the samples numbered ``first`` to ``head`` − 1; gaps raise :class:`SamplesLost`."""
         fifo = self._registers.profile.fifo
         if fifo is None:
             raise StationRefused(

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from stations.codec import WORDS_PER_SAMPLE, Counts, Packing, pack_samples
+from stations.codec import OUTPUTS, WORDS_PER_SAMPLE, Counts, Packing, pack_samples
 from stations.plant.device import PlantDevices, rotate
 from stations.plant.dynamics import Dynamics
 from stations.plant.fixture import Fixture
@@ -157,7 +157,7 @@ class Sampler:
     def _fill(self, n: int) -> None:
         number = np.arange(self.head + 1, self.head + n + 1)
         counts = self._source.samples(self._start_us * 1e-6 + (number + self._lost) / self.rate, self.rate)
-        packed = pack_samples(counts, self.head + self._skipped, self.packing)
+        packed = pack_samples(counts[..., : OUTPUTS[self.packing]], self.head + self._skipped, self.packing)
         self._ring[:, (number - 1) % self.capacity] = np.swapaxes(packed, 0, 1)
         self.head += n
 

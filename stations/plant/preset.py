@@ -13,6 +13,7 @@ from schemas.own_files import own_file, own_names
 from schemas.strict import Strict
 from schemas.toml_files import explain, parse_toml, read_text
 from schemas.validity import Stability
+from stations.codec import BITS, OUTPUTS, Packing
 
 Positive = Annotated[FiniteFloat, Field(gt=0.0)]
 NotNegative = Annotated[FiniteFloat, Field(ge=0.0)]
@@ -47,7 +48,7 @@ class Preset(Strict):
     natural_frequency_hz: Positive
     damping: Positive
     shock_limit_g: Positive
-    packing: Literal["int20x3", "int24x3"]
+    packing: Packing
     bias_mean_g: FiniteFloat | tuple[FiniteFloat, FiniteFloat, FiniteFloat]
     bias_sd_g: NotNegative | tuple[NotNegative, NotNegative, NotNegative]
     scale_sd_ppm: NotNegative
@@ -59,6 +60,19 @@ class Preset(Strict):
     thermometer_noise_K: NotNegative
     offset_step: Annotated[int, Field(ge=0)] = 0
     stability: Stability | None = None
+
+    def with_axes(self, axes: int) -> "Preset":
+        """The device with the outputs of its first axes alone, as the reader's converter sends them."""
+        if axes == OUTPUTS[self.packing]:
+            return self
+        packings = [name for name, number in OUTPUTS.items() if number == axes and BITS[name] == BITS[self.packing]]
+        if not packings:
+            raise RecipeInvalid(
+                f"sensor_axes: {axes} of device {self.name}, its digital output sends {OUTPUTS[self.packing]}; leave it out, or "
+                "name an analogue device",
+                key="sensor_axes",
+            )
+        return self.model_copy(update={"packing": packings[0]})
 
     @property
     def passband_hz(self) -> float:
@@ -81,7 +95,7 @@ class Preset(Strict):
     @property
     def largest_count(self) -> int:
         """The largest code of the converter."""
-        return 2 ** (19 if self.packing == "int20x3" else 23) - 1
+        return 2 ** (BITS[self.packing] - 1) - 1
 
     @property
     def lsb(self) -> float:

@@ -60,7 +60,7 @@ class World:
         self.emergency_stop = False
         self.powered = True
         self._switched_us = 0  # when the devices' supply was last switched
-        self.preset: Preset = load_preset(lot.device, sim.preset_overrides)
+        self.preset: Preset = load_preset(lot.device, sim.preset_overrides).with_axes(lot.sensor_axes)
         self.serials = [unit.serial for unit in lot.units]
         self.slots = [unit.slot for unit in lot.units]
         self.seats = list(range(len(lot.units)))  # index of the unit that really sits in the place of each unit

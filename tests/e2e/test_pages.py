@@ -122,7 +122,11 @@ def test_profile_and_links_of_the_guide_to_devices_are_such() -> None:
 def test_figures_of_the_simulated_station_are_those_of_the_text() -> None:
     text = pages.text("docs/explanation/simulated-station.md")
     assert [kind for kind in HIDDEN if f"`{kind}`" not in text] == []
-    assert [Sampler(None, 1, form, 48000).capacity for form in ("int20x3", "int24x3")] == [12000, 9600]
+    assert [Sampler(None, 1, form, 48000).capacity for form in ("int20x3", "int24x3", "int24x1")] == [
+        12000,
+        9600,
+        24000,
+    ]
     qa700 = load_preset("QA700")
     assert round(1e6 * qa700.lsb / qa700.scale, 1) == 3.9
 

@@ -8,7 +8,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from schemas.profile import Register
-from stations.codec import BITS, NotEncodable, decode, encode, pack_samples, unpack_samples
+from stations.codec import (
+    BITS,
+    OUTPUTS,
+    WORDS_PER_SAMPLE,
+    NotEncodable,
+    decode,
+    encode,
+    pack_samples,
+    unpack_samples,
+)
 
 ORDERS = st.sampled_from(["high_first", "low_first", "high_first_swapped", "low_first_swapped"])
 RANGES = {
@@ -56,12 +65,15 @@ def test_lists_come_back(order, values):
     assert decode(eight, order, encode(eight, order, values)) == values
 
 
-@given(st.sampled_from(["int20x3", "int24x3"]), st.integers(0, 10**6), st.data())
+@given(st.sampled_from(sorted(OUTPUTS)), st.integers(0, 10**6), st.data())
 def test_packed_samples_come_back_with_their_numbers(packing, first, data):
     top = 2 ** (BITS[packing] - 1)
     one = st.integers(-top, top - 1)
-    counts = np.array(data.draw(st.lists(st.tuples(one, one, one), min_size=1, max_size=40)), dtype=np.int64)
+    counts = np.array(
+        data.draw(st.lists(st.tuples(*[one] * OUTPUTS[packing]), min_size=1, max_size=40)), dtype=np.int64
+    )
     words = pack_samples(counts, first, packing)
+    assert words.shape == (len(counts), WORDS_PER_SAMPLE[packing])
     unpacked, numbers = unpack_samples(words.reshape(-1), packing)
     assert np.array_equal(unpacked, counts)
     assert np.array_equal(numbers, (first + np.arange(len(counts))) % (16 if packing == "int20x3" else 256))

@@ -13,12 +13,14 @@ import numpy as np
 
 from pipelines.export.fixed_point import ONE, fixed_point
 from pipelines.export.omissions import comment, largest_error_ug
-from pipelines.export.polynomials import ORDER, UnitCalibration
+from pipelines.export.polynomials import ORDER, UnitCalibration, refuse_fewer_axes
 from pipelines.export.settings import ExportSettings
 from schemas.errors import WrongUse
+from schemas.units import AXES
 
 NAME = "c"
 SUFFIX = ".h"
+FEWER_AXES = True
 
 _PACKED = {"double": "d", "float": "f", "q24": "i"}
 _COUNTS_BITS = 48  # of the factor from counts to fixed point
@@ -28,6 +30,8 @@ def write(units: Sequence[UnitCalibration], run: str, settings: ExportSettings) 
     """The header as text, in double or single precision or in fixed point (``--arithmetic``)."""
     kind = settings.arithmetic
     fixed = kind == "q24"
+    if fixed or settings.firmware.low_pass or settings.firmware.bias:
+        refuse_fewer_axes(units, "export: --arithmetic q24, --filter or --track")
     real, suffix = ("float", "f") if kind == "float" else ("double", "")
     head, tail = _template("q24" if fixed else "real").split("@UNITS@\n")
     blocks = [_fixed_unit(unit) if fixed else _real_unit(unit, kind) for unit in units]
@@ -58,16 +62,28 @@ def _filled(text: str, names: dict[str, str]) -> str:
 
 def _real_unit(unit: UnitCalibration, kind: str) -> str:
     exact = np.float32 if kind == "float" else np.float64
-    bias, response = unit.bias.astype(exact), unit.response.astype(exact)
+    whole = unit.with_every_axis
+    bias, response = whole.bias.astype(exact), whole.response.astype(exact)
     limits = np.array(unit.temperatures, dtype=exact)
     literal = _literal(exact)
     crc = checksum(unit.unit, _PACKED[kind], [*limits, *bias.ravel(), *response.ravel()])
     low, high = (literal(value) for value in limits)
     return (
-        f"/* {comment(unit.unit)}: {comment(unit.certified)} */\n"
+        f"/* {comment(unit.unit)}: {comment(unit.certified)}{_of_fewer_axes(unit)} */\n"
         f"static const tumbleline_calibration tumbleline_{_symbol(unit)} = {{\n"
         f'    "{unit.unit}", {low}, {high},\n    {_braces(bias, literal)},\n    {_braces(response, literal)},\n'
         f"    0x{crc:08X}u\n}};\n"
+    )
+
+
+def _of_fewer_axes(unit: UnitCalibration) -> str:
+    """What a caller gives for the axes without an output; empty where there are none."""
+    without = [k for k in range(len(AXES)) if k not in unit.axes]
+    places = " and ".join(f"output[{k}]" for k in without)
+    return (
+        f"\n * axes {', '.join(unit.letters)}; {places}: force along that axis in g, 0 where it is not known"
+        if without
+        else ""
     )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pipelines.report.context import UnitContext
-from pipelines.report.numbers import significant
+from pipelines.report.numbers import axes_of, significant
 from pipelines.report.templates import fill
 from pipelines.tables.frames import rows_of
 
@@ -18,9 +18,9 @@ MEASURANDS = {
 }
 TEMPLATE = """\
 <table>
-<tr><th>measurand</th><th class="n">U x</th><th class="n">U y</th><th class="n">U z</th><th>unit</th></tr>
+<tr><th>measurand</th>{% for axis in axes %}<th class="n">U {{ axis }}</th>{% endfor %}<th>unit</th></tr>
 {% for line in lines %}
-<tr><td>{{ line.name }}</td>{% for axis in ["x", "y", "z"] %}<td class="n">{{ line.cells[axis] }}</td>{% endfor %}<td>µg</td></tr>
+<tr><td>{{ line.name }}</td>{% for axis in axes %}<td class="n">{{ line.cells[axis] }}</td>{% endfor %}<td>µg</td></tr>
 {% endfor %}
 </table>
 <p class="note">U with k = {{ coverage }}. The coefficient is the same for all; flicker and random walk between the record and the later time are added. The later
@@ -42,4 +42,4 @@ def render(unit: UnitContext) -> str | None:
         }
         for column, name in MEASURANDS.items()
     ]
-    return fill(TEMPLATE, lines=lines, coverage=f"{coverage:g}")
+    return fill(TEMPLATE, lines=lines, axes=axes_of(lines), coverage=f"{coverage:g}")

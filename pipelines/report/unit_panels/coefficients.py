@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from pipelines.report.context import UnitContext
-from pipelines.report.numbers import side_by_side, with_uncertainty
+from pipelines.report.numbers import axes_of, side_by_side, with_uncertainty
 from pipelines.report.templates import fill
 from pipelines.tables.frames import rows_of
 
@@ -14,11 +14,11 @@ ORDER = 30
 TITLE = "Coefficients"
 TEMPLATE = """\
 <table>
-<tr><th>effect</th><th class="n">x</th><th class="n">y</th><th class="n">z</th><th>unit</th></tr>
+<tr><th>effect</th>{% for axis in axes %}<th class="n">{{ axis }}</th>{% endfor %}<th>unit</th></tr>
 {% for line in lines %}
 <tr><td>{{ line.effect }}</td>
-{% if "*" in line.cells %}<td class="n" colspan="3">{{ line.cells["*"].name }} = {{ line.cells["*"].value }}</td>
-{% else %}{% for axis in ["x", "y", "z"] %}<td class="n"><small>{{ line.cells[axis].name }}</small> {{ line.cells[axis].value }} <small>± {{ line.cells[axis].uncertainty }}</small></td>{% endfor %}{% endif %}
+{% if "*" in line.cells %}<td class="n" colspan="{{ axes | length }}">{{ line.cells["*"].name }} = {{ line.cells["*"].value }}</td>
+{% else %}{% for axis in axes %}<td class="n"><small>{{ line.cells[axis].name }}</small> {{ line.cells[axis].value }} <small>± {{ line.cells[axis].uncertainty }}</small></td>{% endfor %}{% endif %}
 <td>{{ line.unit }}</td></tr>
 {% endfor %}
 </table>
@@ -37,4 +37,4 @@ def render(unit: UnitContext) -> str | None:
         return {"name": row["name"], "value": value, "uncertainty": expanded}
 
     lines = side_by_side(rows_of(unit.tables["coefficients"]), cell)
-    return fill(TEMPLATE, lines=lines, coverage=f"{coverage:g}")
+    return fill(TEMPLATE, lines=lines, axes=axes_of(lines), coverage=f"{coverage:g}")

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from pipelines.report.context import UnitContext
-from pipelines.report.numbers import significant
+from pipelines.report.numbers import axes_of, significant
 from pipelines.report.templates import fill
 from pipelines.tables.frames import rows_of
 
@@ -25,9 +25,9 @@ NAMES = {
 }
 TEMPLATE = """\
 <table>
-<tr><th>term</th><th class="n">x</th><th class="n">y</th><th class="n">z</th><th>unit</th></tr>
+<tr><th>term</th>{% for axis in axes %}<th class="n">{{ axis }}</th>{% endfor %}<th>unit</th></tr>
 {% for line in lines %}
-<tr><td>{{ line.name }}</td>{% for axis in ["x", "y", "z"] %}<td class="n">{{ line.cells[axis] }}</td>{% endfor %}<td>{{ line.unit }}</td></tr>
+<tr><td>{{ line.name }}</td>{% for axis in axes %}<td class="n">{{ line.cells[axis] }}</td>{% endfor %}<td>{{ line.unit }}</td></tr>
 {% endfor %}
 </table>
 <p class="note">In brackets: 95 % interval. ≤: not identified, upper limit. –: not determined.{% for note in notes %}<br>{{ note }}{% endfor %}</p>
@@ -43,7 +43,8 @@ def render(unit: UnitContext) -> str | None:
         if len(own):
             cells = {row["axis"]: _cell(row) for row in rows_of(own)}
             lines.append({"name": name, "unit": own["unit_text"].iloc[0], "cells": cells})
-    return fill(TEMPLATE, lines=lines, notes=list(dict.fromkeys(_notes(rows)))) if lines else None
+    notes = list(dict.fromkeys(_notes(rows)))
+    return fill(TEMPLATE, lines=lines, axes=axes_of(lines), notes=notes) if lines else None
 
 
 def _notes(rows: pd.DataFrame) -> list[str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pipelines.stages.figures.base import FigureKind, UnitTables, Value, effect_in_model
+from schemas.recipe import Recipe
 
 ORDERS = {"second_order": 2, "third_order": 3, "fourth_order": 4, "fifth_order": 5}
 POINTS = 2001
@@ -22,6 +23,10 @@ def _orthogonality(tables: UnitTables) -> Value | None:
     angles = [lot.angle(unit, first, second) for first, second in ((0, 1), (1, 2), (2, 0))]
     values = [Value(1e3 * one[0], 1e3 * one[1]) for one in angles if one is not None]
     return max(values, key=lambda value: value.reach(tables.guard)) if values else None
+
+
+def _three_axes(recipe: Recipe) -> str:
+    return effect_in_model("misalignment")(recipe) or ("" if recipe.sensor_axes == 3 else "sensor_axes = 3")
 
 
 def _linearity(tables: UnitTables) -> Value | None:
@@ -62,11 +67,11 @@ def _thermal_stability(tables: UnitTables) -> Value | None:
     if not read.size or not np.ptp(read) > 0.0:
         return None
     theta = np.linspace(read.min(), read.max(), LEVELS) - REFERENCE_C
-    curve, errors = np.zeros((3, LEVELS)), np.zeros(3)
+    curve, errors = np.zeros((1, LEVELS)), np.zeros(1)
     for power, effect in enumerate(IN_TEMPERATURE, start=1):
         coefficients, spread, scale = tables.coefficients.lot.effect(effect, tables.coefficients.unit)
         if coefficients.shape[-1]:
-            curve += 1e6 * (coefficients / scale)[:, :1] * theta**power
+            curve = curve + 1e6 * (coefficients / scale)[:, :1] * theta**power
             errors = (1e6 * spread / scale)[:, 0] if power == 1 else errors
     spans = np.ptp(curve, axis=1) / np.ptp(read)
     worst = int(np.argmax(spans + tables.guard * errors))
@@ -99,7 +104,7 @@ FIGURES = (
         label="deviation of the angle between two axes from 90°, worst",
         order=72,
         value=_orthogonality,
-        missing=effect_in_model("misalignment"),
+        missing=_three_axes,
     ),
     FigureKind(
         name="linearity_pct_FS",

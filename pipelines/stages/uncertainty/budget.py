@@ -8,8 +8,11 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from inertial.design import of_axes
+from inertial.fits.linear import own_terms
 from inertial.fits.wander import wander_kernels
 from inertial.frames import angles_from_force
+from inertial.state import ALL_AXES
 from inertial.uncertainty.influences import MeasurementModel, sensitivity
 from inertial.uncertainty.propagation import fit_design, propagated
 from pipelines.stages.uncertainty.budget_terms import BudgetTables, BudgetTerms
@@ -63,7 +66,7 @@ def conditions(lot: LotArrays, dwells: pd.DataFrame, response: Array, terms: Bud
     read = lot.state.temperature if lot.state.temperature is not None else np.full(lot.dwells.size, terms.room_C)
     mean = np.broadcast_to(read, (len(lot.units), lot.dwells.size)).mean(axis=0)
     target = np.array([mean[soak == one].mean() for one in soak])
-    scale = np.abs(np.diagonal(response, axis1=-2, axis2=-1)).reshape(-1, 3).mean(axis=0)
+    scale = np.abs(_own_scale(response, lot.state.axes)).reshape(-1, len(lot.state.axes)).mean(axis=0)
     return DwellConditions(lot.state, soak, target, terms.soak_min_s, terms.room_C, scale)
 
 
@@ -75,7 +78,7 @@ def propagate(
         raise ValueError("no uncertainty is stated")
     used = lot.of_kind("dwell")
     model = MeasurementModel(calibration.effects, calibration.coefficients, calibration.nonlinear)
-    physical = with_device_temperature(model, calibration.response, terms.stability)
+    physical = with_device_temperature(model, calibration.response, terms.stability, calibration.axes)
     own, scattered = influences(terms.stated, at, terms.stability)
     whole = sensitivity(physical, lot.state, own, scattered)
     design = fit_design(model, lot.state, dwell_noise(lot, wander, used), used)
@@ -88,7 +91,14 @@ def propagate(
     )
 
 
-def with_device_temperature(model: MeasurementModel, response: Array, stability: Stability | None) -> MeasurementModel:
+def _own_scale(response: Array, axes: tuple[int, ...]) -> Array:
+    """The response of each axis with an output to the force along itself, (..., m), of responses (..., 3, 3)."""
+    return own_terms(of_axes(response, axes, -2), axes)
+
+
+def with_device_temperature(
+    model: MeasurementModel, response: Array, stability: Stability | None, axes: tuple[int, ...] = ALL_AXES
+) -> MeasurementModel:
     """The model with the stated temperature coefficients of the device, for those that the model lacks."""
     if stability is None:
         return model
@@ -98,7 +108,7 @@ def with_device_temperature(model: MeasurementModel, response: Array, stability:
         ("scale_temperature", stability.scale_temperature_ppm_K),
     ):
         if effect not in effects and value > 0.0:
-            own = value / MICRO * np.abs(np.diagonal(response, axis1=-2, axis2=-1))[..., None]
+            own = value / MICRO * np.abs(_own_scale(response, axes))[..., None]
             coefficients = np.concatenate([coefficients, own], axis=-1)
             effects.append(effect)
     return MeasurementModel(effects, coefficients, model.nonlinear)

@@ -75,7 +75,7 @@ def _evidence(
     """The evidence on the common influences, the places of those that are judged, and those along the force (the last ones)."""
     calibration, state = tables.calibrated(), lot.state
     model = MeasurementModel(calibration.effects, calibration.coefficients, calibration.nonlinear)
-    physical = with_device_temperature(model, calibration.response, terms.stability)
+    physical = with_device_temperature(model, calibration.response, terms.stability, calibration.axes)
     if stated.pose is not None:  # their repeatability also where the budget leaves it to the scatter of the fit
         stated = stated.model_copy(update={"pose": stated.pose.model_copy(update={"seen_in_residuals": False})})
     inputs, scattered = influences(stated, conditions(lot, tables.dwells, calibration.response, terms), terms.stability)

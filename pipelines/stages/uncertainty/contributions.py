@@ -22,7 +22,7 @@ class DwellConditions:
 
     state : all dwells of the lot; soak : (n,), number of the soak of each dwell; target_C : (n,), its temperature
     soak_s : time at a temperature before its first dwell; room_C : before the first soak
-    scale : (3,), output per g
+    scale : (m,), output per g, of the axes with an output
     """
 
     state: State
@@ -170,7 +170,7 @@ def _electrical(
 ) -> Iterator[tuple[str, Errors, float]]:
     if stated.supply is not None and stability is not None and stability.ratiometric > 0.0:
         yield "supply", Errors(gain=stability.ratiometric), stated.supply.standard().u
-    own = [(axis, float(at.scale[axis])) for axis in range(3)]
+    own = [(axis, float(scale)) for axis, scale in zip(at.state.axes, at.scale, strict=True)]
     if stated.reader is not None:
         yield "reader_gain", Errors(gain=1.0), stated.reader.standard("gain").u
         for name, part in (("reader_offset", "offset"), ("reader_inl", "inl")):

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial import design
+from inertial.fits.linear import own_terms
 from inertial.frames import angles_from_force
 from inertial.state import State
 from inertial.uncertainty.propagation import Propagated, norm_errors, rms_over
@@ -111,7 +112,7 @@ def part_of(
     decisions : whether the parts that a verification shows are left out where no decision depends on them
     """
     dof = np.full(len(lot.units), float(np.sum(np.asarray(tables.wander["dof"], dtype=float))))
-    scale = np.abs(np.diagonal(calibration.response, axis1=-2, axis2=-1))
+    scale = np.abs(own_terms(design.of_axes(calibration.response, calibration.axes, -2), calibration.axes))
     if part == "coefficients":
         yield from _coefficients(calibration, variances, scale, dof)
     elif part == "angles":
@@ -130,10 +131,9 @@ def _coefficients(
 ) -> Iterator[BudgetQuantity]:
     spread = np.sqrt(np.diagonal(calibration.covariance, axis1=-2, axis2=-1))
     for effect, unit in EFFECTS.items():
-        for axis, letter in enumerate(AXES):
-            own = [k for k, (name, _) in enumerate(calibration.names[axis]) if name == effect]
-            for place, column in enumerate(own):
-                along = letter + AXES[(axis + 1 + place) % 3] if effect == "misalignment" else letter
+        for axis, letter in enumerate(calibration.letters):
+            for column in [k for k, (name, _) in enumerate(calibration.names[axis]) if name == effect]:
+                along = letter + calibration.names[axis][column][1][-1] if effect == "misalignment" else letter
                 factor = MICRO / scale[:, axis]
                 value = factor * calibration.coefficients[:, axis, column]
                 parts = factor[:, None] * variances.fit.coefficients[:, axis, column, :]
@@ -143,7 +143,7 @@ def _coefficients(
 
 def _angles(calibration: Calibration, variances: VarianceParts, scale: Array, dof: Array) -> Iterator[BudgetQuantity]:
     """Deviation from 90° of the angle between two axes, (m_ij + m_ji): independent of the seat."""
-    if "misalignment" not in calibration.effects:
+    if "misalignment" not in calibration.effects or len(calibration.axes) < len(AXES):
         return
     noise = calibration.covariance
     for i, j in ((0, 1), (1, 2), (2, 0)):
@@ -167,16 +167,19 @@ def _outputs(
     errors = variances.fit.user_errors(columns, state.force, intrinsic=terms.certificate.frame == "intrinsic")
     noise = output_noise(calibration, columns)
     zero = np.zeros(len(lot.units))
-    for axis, letter in enumerate(AXES):
+    for axis, letter in enumerate(calibration.letters):
         yield _worst("output", letter, errors[..., axis, :], noise[..., axis, axis], zero, dof)
+    if len(calibration.axes) < len(AXES):
+        return  # the norm of the force is that of three
     along = state.force / np.linalg.norm(state.force, axis=-1, keepdims=True)
     of_norm = np.einsum("mi,umij,mj->um", along, noise, along)
     yield _worst("output", "norm", norm_errors(errors, state.force), of_norm, zero, dof)
 
 
 def output_noise(calibration: Calibration, columns: Array) -> Array:
-    """Covariance of the corrected output by the noise of the fit, (units, m, 3, 3), µg²."""
-    inverse = np.linalg.inv(calibration.response)
+    """Covariance of the corrected output by the noise of the fit, (units, m, k, k), µg², of the k axes with an output."""
+    axes = calibration.axes
+    inverse = np.linalg.inv(design.of_axes(design.of_axes(calibration.response, axes, -1), axes, -2))
     own = np.swapaxes(np.sum(np.matmul(columns, calibration.covariance) * columns, axis=-1), -1, -2)
     return MICRO**2 * np.einsum("uij,umj,ukj->umik", inverse, own, inverse)
 
@@ -218,6 +221,7 @@ def certified_range(lot: LotArrays, terms: BudgetTerms) -> State:
         outer=outer,
         inner=inner,
         slot=np.zeros(()),
+        axes=state.axes,
         covariates={name: np.full(len(many), float(np.median(values))) for name, values in state.covariates.items()},
     )
 
@@ -247,7 +251,7 @@ def _verification(
     shown = MICRO * variances.fit.shown_errors(columns, variances.verification) if split else None
     hidden = variances.visible < UNSEEN if split else None
     rows = tables.verification
-    for axis, letter in enumerate(AXES):
+    for axis, letter in enumerate(calibration.letters):
         own = rows[f"error_{letter}_ug"].to_numpy().reshape(len(lot.units), -1)
         noise, expected, freedom = (
             rows[name.format(letter)].to_numpy().reshape(len(lot.units), -1)[:, 0] for name in OF_UNITS
@@ -272,13 +276,14 @@ def _verification(
             errors = AxisErrors(one.value, expected, freedom, own.mean(axis=1), fixed, flat.T @ flat)
             one = replace(one, shown=seen, unseen=unshown, axis_errors=errors)
         yield one
-    along = norm_errors(true / MICRO, force)
+    seen_force = design.of_axes(force, calibration.axes, -1)
+    along = norm_errors(true / MICRO, seen_force)
     value, noise = _worst_pose(lot, tables)
     worst = _worst("verification_norm", "norm", along, np.zeros(along.shape[:-1]) + noise[:, None] ** 2, value, dof)
     if shown is None or hidden is None:
         yield worst
         return
-    seen = norm_errors(shown / MICRO, force) * MICRO
+    seen = norm_errors(shown / MICRO, seen_force) * MICRO
     yield replace(
         worst,
         shown=_all(np.sqrt(np.max(np.sum(seen**2, axis=-1), axis=-1)), lot),
@@ -310,7 +315,7 @@ def _period(
     time = np.broadcast_to(lot.state.time, (len(lot.units), used.size))[:, used]
     span = float(np.ptp(time[0])) + terms.dwell_s
     axes: list[AxisErrors] = []
-    for letter in AXES:
+    for letter in lot.letters:
         own = next(q for q in errors if q.name == "bias_error" and q.axis == letter)
         whole = [one for unit in lot.units if (one := period_of(tables, terms, unit, letter, span)) is not None]
         if len(whole) != len(lot.units) or own.axis_errors is None:
@@ -318,7 +323,7 @@ def _period(
         names = dict.fromkeys(name for one in whole for name in one)
         later = {name: np.array([one.get(name, 0.0) for one in whole]) for name in names}
         axes.append(replace(own.axis_errors, later=later))
-    for letter, axis in zip(AXES, axes, strict=True):
+    for letter, axis in zip(lot.letters, axes, strict=True):
         parts = {"run": axis.run, "budget": axis.fixed, **axis.later}
         none = np.zeros((len(lot.units), 0))
         yield BudgetQuantity(

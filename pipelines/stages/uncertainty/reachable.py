@@ -85,8 +85,11 @@ def reachable(planned: PlannedDwells, terms: BudgetTerms, effects: Sequence[str]
     if terms.stated is None:
         return []
     nominal = _nominal(effects, planned.fit, 0.0 if terms.stability is None else terms.stability.zero_level_g)
-    model = with_device_temperature(nominal, np.eye(3), terms.stability)
-    at = DwellConditions(planned.fit, planned.soak, planned.target_C, terms.soak_min_s, terms.room_C, np.ones(3))
+    axes = planned.fit.axes
+    model = with_device_temperature(nominal, np.eye(3), terms.stability, axes)
+    at = DwellConditions(
+        planned.fit, planned.soak, planned.target_C, terms.soak_min_s, terms.room_C, np.ones(len(axes))
+    )
     source = sensitivity(model, planned.fit, *influences(terms.stated, at, terms.stability))
     fit = fit_design(nominal, planned.fit, planned.covariance)
     propagation = propagated(fit, source, np.eye(3))
@@ -94,7 +97,7 @@ def reachable(planned: PlannedDwells, terms: BudgetTerms, effects: Sequence[str]
     noise = fit.gain @ planned.covariance @ np.swapaxes(fit.gain, -1, -2)
     out: list[Reach] = []
     for effect, unit in EFFECTS.items():
-        for axis, letter in enumerate(AXES):
+        for axis, letter in enumerate(AXES[k] for k in axes):
             for column in [k for k, (name, _) in enumerate(fit.names[axis]) if name == effect]:
                 own = float(np.sqrt(noise[axis, column, column]))
                 out.append(_reach(effect, letter, unit, own, propagation.coefficients[axis, column], names))
@@ -107,7 +110,7 @@ def _nominal(effects: Sequence[str], state: State, zero_level_g: float) -> Measu
     usual = {"scale": 1.0, "bias": zero_level_g}
     sensor, station = design.split(effects)
     values = design.starting_values([*sensor, *station], state)
-    names = [design.local_names(sensor, axis, values) for axis in range(3)]
+    names = [design.local_names(sensor, axis, values) for axis in state.axes]
     coefficients = np.array([[usual.get(effect, 0.0) for effect, _ in own] for own in names])
     return MeasurementModel(tuple(effects), coefficients, values)
 
@@ -137,7 +140,7 @@ def _errors(
     later = after_run(terms, float(np.ptp(planned.fit.time)) + terms.dwell_s, planned.instability_ug)
     if later is not None:
         later = {name: value for name, value in later.items() if value > 0.0}
-    for axis, letter in enumerate(AXES):
+    for axis, letter in enumerate(AXES[k] for k in state.axes):
         own = errors[..., axis, :]
         parts = {group: MICRO * float(rms_over(own[..., names == group])) for group in dict.fromkeys(names.tolist())}
         u = _combined(parts)
@@ -158,7 +161,7 @@ def _errors(
 
 def _norm(errors: Array, state: State, names: Array) -> Reach:
     """Magnitude at the pose of the verification where it is least certain."""
-    along = MICRO * norm_errors(errors, state.force)
+    along = MICRO * norm_errors(errors, design.of_axes(state.force, state.axes, -1))
     worst = along[int(np.argmax(np.sum(along**2, axis=-1)))]
     parts = {group: float(np.sqrt(np.sum(worst[names == group] ** 2))) for group in dict.fromkeys(names.tolist())}
     return Reach("verification_norm", "norm", "µg", float(np.sqrt(np.sum(worst**2))), parts)

@@ -5,7 +5,8 @@ import math
 import numpy as np
 
 from schemas.profile import Profile
-from schemas.units import STANDARD_GRAVITY_M_S2
+from schemas.units import AXES, STANDARD_GRAVITY_M_S2
+from stations.codec import OUTPUTS
 from stations.plant.bench import Bench, Waveforms
 from stations.plant.controller import ResultFiles
 from stations.plant.device import stream
@@ -21,7 +22,7 @@ IDLE_S = 900.0  # without a line for so long the machine stops by itself
 
 
 def simulated(world: World, profile: Profile) -> "Centrifuge":
-    """A centrifuge in front of the world's bench; its input axis is z, radial."""
+    """A centrifuge in front of the world's bench; its input axis is z, or x of a device without z, radial."""
     return Centrifuge(world)
 
 
@@ -132,7 +133,8 @@ class Centrifuge:
         force = self._direction * (arm + self._direction * offsets) * omega**2 / STANDARD_GRAVITY_M_S2
         wobble = bench.stream_at(self._start_us, 10).standard_normal()
         force = force * (1.0 + 2e-6 * float(wobble))
-        outputs = bench.steady(force, 2, self._seconds, RECORD_HZ, self._start_us)
+        radial = 2 if OUTPUTS[self._world.preset.packing] == len(AXES) else 0  # a device without z is mounted by its x
+        outputs = bench.steady(force, radial, self._seconds, RECORD_HZ, self._start_us)
         rng = bench.stream_at(self._start_us, 9)
         reference = np.zeros((round(self._seconds * 10.0), 3))
         reference[:, 0] = self._to * (1.0 + 1e-6 * rng.standard_normal(len(reference)))

@@ -1,0 +1,169 @@
+"""A device with one axis from its recipe to certificate and memory, beside the same devices as triads."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from in_process import document_of, given, text_of
+
+from pipelines.archive import Archive
+from schemas.errors import UNUSABLE
+
+RECIPE = """
+name = "{name}"
+device = "sf1500"
+units = ["SF-01", "SF-02", "SF-03"]
+local_gravity_m_s2 = 9.80665
+poses = "fibonacci24"
+verification = [[35.0, 15.0], [70.0, 140.0], [105.0, -100.0]]
+temperatures_C = [0.0, 50.0]
+settle_s = 1.0
+dwell_s = 2.0
+rate_hz = 50.0
+static_record_s = 60.0
+effects = ["bias", "scale", "misalignment", "bias_temperature", "scale_temperature"]
+limits = "own.limits.toml"
+"""
+LIMITS = """
+name = "own"
+rule = "guarded_acceptance"
+grade = "consumer"
+[figures]
+verification_norm_ug = { max = 5000.0, unit = "µg" }
+"""
+ONE = 'device = "sf1500"\nsensor_axes = 1\n'
+
+
+@pytest.fixture(scope="module")
+def measured(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, str]]:
+    """The archive, and the run of each recipe: of the triads, and of their first axis alone."""
+    folder = tmp_path_factory.mktemp("axes")
+    (folder / "own.limits.toml").write_text(LIMITS, encoding="utf-8")
+    runs = {}
+    for name in ("three", "one"):
+        text = RECIPE.format(name=name)
+        text = text if name == "three" else text.replace('device = "sf1500"\n', ONE)
+        (folder / f"{name}.toml").write_text(text, encoding="utf-8")
+        document = document_of("run", folder / f"{name}.toml", "--archive", folder / "archive", "--json")
+        runs[name] = document["run"]
+    return folder, runs
+
+
+def table(measured: tuple[Path, dict[str, str]], name: str, which: str) -> pd.DataFrame:
+    folder, runs = measured
+    return Archive(folder / "archive").run(runs[which]).table(name)
+
+
+def test_one_axis_has_the_outputs_and_coefficients_of_that_axis_of_a_triad(measured) -> None:
+    one, three = (table(measured, "dwells", which) for which in ("one", "three"))
+    assert [name for name in one if name.startswith(("out_", "sd_")) and name != "out_unit"] == ["out_x", "sd_x"]
+    assert np.array_equal(one["out_x"], three["out_x"])
+    key = ["unit", "axis", "effect", "name"]
+    own, triad = (table(measured, "coefficients", which).set_index(key) for which in ("one", "three"))
+    assert set(own.index.get_level_values("axis")) == {"x"}
+    assert {"Kxy", "Kxz"} <= set(own.index.get_level_values("name"))
+    both = own.join(triad, suffixes=("", "_triad"))
+    # the weights differ: a triad's noise is estimated from three axes
+    apart = (both["value"] - both["value_triad"]).abs() / both["standard_error_triad"]
+    assert apart.max() < 1.0
+
+
+def test_the_budget_of_one_axis_is_that_of_the_axis_of_a_triad(measured) -> None:
+    rows = [
+        table(measured, "uncertainties", which).set_index(["unit", "quantity", "axis"]) for which in ("one", "three")
+    ]
+    both = rows[0].join(rows[1], suffixes=("", "_triad"))
+    stated = both[both["u_b"] > 0.0]
+    assert {"bias", "scale", "misalignment", "output", "bias_error"} <= set(stated.index.get_level_values("quantity"))
+    ratio = (stated["u_b"] / stated["u_b_triad"]).groupby("quantity")
+    for name in ("bias", "scale", "misalignment"):
+        assert np.allclose(ratio.get_group(name), 1.0, atol=0.05)
+    for name in (
+        "output",
+        "bias_error",
+    ):  # of a triad, the symmetric part of what its axes answer across is an error, too
+        assert (ratio.get_group(name) < 1.01).all()
+        assert (ratio.get_group(name) > 0.7).all()
+    assert "orthogonality" not in rows[0].index.get_level_values("quantity")
+
+
+def test_noise_verdict_and_grades_are_those_of_one_axis(measured) -> None:
+    assert set(table(measured, "noise", "one")["axis"]) == {"x"}
+    assert set(table(measured, "residuals", "one")["axis"]) == {"x"}
+    assert (table(measured, "grades", "one")["outcome"] == "pass").all()
+    folder, runs = measured
+    found = document_of("diagnose", runs["one"], "--archive", folder / "archive", "--json")
+    assert found["adequate"] is True
+    assert found["classes"] == []
+
+
+def test_samples_of_an_axis_that_is_not_there_are_no_numbers(measured) -> None:
+    folder, runs = measured
+    records = Archive(folder / "archive").run(runs["one"]).records
+    assert records is not None
+    first = next(records.samples([0]))
+    assert np.isfinite(first["x"]).all()
+    assert first[["y", "z"]].isna().all(axis=None)
+
+
+def test_its_certificate_and_its_memory_hold_one_axis(measured) -> None:
+    folder, runs = measured
+    archive = ("--archive", folder / "archive")
+    assert "SF-01/1" in text_of("certify", runs["one"], *archive)
+    shown = document_of("show", "SF-01", *archive, "--json")
+    assert {row["axis"] for row in shown["calibration"]["coefficients"]} == {"x"}
+    exported = text_of("export", runs["one"], *archive, "--format", "c")
+    assert "axes x; output[1] and output[2]: force along that axis in g" in exported
+    assert "2 of 2" not in exported
+    programmed = document_of("program", runs["one"], *archive, "--units", "SF-01", "--yes", "--json")
+    assert [unit["outcome"] for unit in programmed["units"]] == ["proved"]
+
+
+def test_its_plan_speaks_of_one_axis(measured) -> None:
+    folder, _ = measured
+    planned = document_of("plan", folder / "one.toml", "--page", folder / "plan.html", "--json")
+    assert {row["axis"] for row in planned["coefficients"]} == {"x"}
+    assert {len(row["left_by_axis"]) for row in planned["effects"]} == {1}
+    page = (folder / "plan.html").read_text(encoding="utf-8")
+    assert "error x, 1σ" in page
+    assert "error y, 1σ" not in page
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('device = "sf1500"', 'device = "adxl355"', "sensor_axes: 1 of device ADXL355, its digital output sends 3"),
+        (
+            "static_record_s = 60.0",
+            'procedures = [{ kind = "multi_position" }, { kind = "transverse" }]',
+            "it measures axis y, z, the device has x",
+        ),
+        (
+            "static_record_s = 60.0",
+            'procedures = [{ kind = "multi_position" }, { kind = "sweep", axis = "z" }]',
+            "it measures axis z, the device has x",
+        ),
+        ("sensor_axes = 1", "sensor_axes = 4", "sensor_axes"),
+    ],
+)
+def test_what_a_device_with_one_axis_cannot_do_is_said(
+    measured, old: str, new: str, words: str, tmp_path: Path
+) -> None:
+    text = (measured[0] / "one.toml").read_text(encoding="utf-8")
+    assert old in text
+    (tmp_path / "other.toml").write_text(text.replace(old, new), encoding="utf-8")
+    (tmp_path / "own.limits.toml").write_text(LIMITS, encoding="utf-8")
+    status, _, err = given("run", tmp_path / "other.toml", "--archive", tmp_path / "archive")
+    assert status == UNUSABLE
+    assert words in " ".join(err.split())
+    assert not (tmp_path / "archive").exists()
+
+
+def test_a_limit_of_angles_between_axes_is_refused_for_one(measured, tmp_path: Path) -> None:
+    (tmp_path / "one.toml").write_text((measured[0] / "one.toml").read_text(encoding="utf-8"), encoding="utf-8")
+    limits = LIMITS + 'orthogonality_mrad = { max = 5.0, unit = "mrad" }\n'
+    (tmp_path / "own.limits.toml").write_text(limits, encoding="utf-8")
+    status, _, err = given("run", tmp_path / "one.toml", "--archive", tmp_path / "archive")
+    assert status == UNUSABLE
+    assert "orthogonality_mrad needs sensor_axes = 3" in " ".join(err.split())
