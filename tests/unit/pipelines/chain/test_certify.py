@@ -65,7 +65,9 @@ def test_the_run_is_named_before_it_is_signed(run: Run, typed: Typed, monkeypatc
 
     with monkeypatch.context() as patch:
         patch.setattr(certifying, "refuse_unsound", refused)
-        assert f"certify: run {run.id}, measured on {end_of(run)}, 3 units: A1, A2, A3" in typed("certify").stderr
+        stopped = typed("certify")
+    assert str(stopped.exception) == "stopped before anything was written"
+    assert f"certify: run {run.id}, measured on {end_of(run)}, 3 units: A1, A2, A3" in stopped.stderr
     done = typed("certify", "--json")
     assert f"certify: run {run.id}, measured on {end_of(run)}" in done.stderr
     assert json.loads(done.stdout)["run"] == run.id
