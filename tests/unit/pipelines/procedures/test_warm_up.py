@@ -7,9 +7,9 @@ import numpy as np
 from pipelines.archive import Archive
 from pipelines.capture.capture import capture
 from pipelines.jobs.recipes import load_recipe
-from pipelines.procedures import PROCEDURES, parts_of, roles_of
+from pipelines.procedures import parts_of, roles_of
 from pipelines.procedures.recorded import nominal_device, procedure_record
-from pipelines.procedures.warm_up import _figure
+from pipelines.procedures.warm_up import PROCEDURE, WarmUpPart, _figure
 from pipelines.schedule.steps import steps
 from schemas.lot import Lot, Unit
 from schemas.progress import silent
@@ -53,7 +53,8 @@ def test_temperature_switching_and_start_of_the_record_do_not_move_the_warm_up_t
         for k, step in enumerate(steps(recipe))
         if step.order is not None
     ]
-    points = PROCEDURES["warm_up"].reduce(part, own, nominal_device(readings))
+    assert isinstance(part, WarmUpPart)
+    points = PROCEDURE.reduce(part, own, nominal_device(readings))
     true = TAU_S * np.log(1e6 * SIZE_G / BAND_UG)
     errors = [_figure(part, str(axis), rows).value - true for (_, axis), rows in points.groupby(["unit", "axis"])]
     assert len(errors) == 12
