@@ -419,19 +419,26 @@ def test_an_emergency_stop_that_a_person_holds_is_seen():
         assert verdicts(ignored)["reports its emergency stop"] == "differs"
 
 
-def test_ctrl_c_leaves_the_device_as_it_was_and_a_page_that_says_so(tmp_path):
-    with served_device("oriental_az", silence_s=0.0) as (port, plant):
+@pytest.mark.parametrize("name", ["oriental_az", pytest.param("watlow_f4t", marks=pytest.mark.slow)])
+def test_ctrl_c_leaves_the_device_as_it_was_and_a_page_that_says_so(name, tmp_path):
+    axis = load_profile(name).kind == "axis"
+    with served_device(name, silence_s=0.0) as (port, plant):
         # the axis is on its way for twenty seconds, so that a busy machine does not come too late
-        process = started("oriental_az", port, tmp_path, ["", "", "", "", "LINK"], "--watch", "20", "--silence", "20")
+        answers = ["", "", "", "", "LINK"] if axis else ["", "", "SET"]
+        process = started(name, port, tmp_path, answers, "--watch", "20", "--silence", "20")
+
+        def changed():
+            return plant.outer.moving(plant.now) if axis else plant.fixture.chamber.set_point != 23.0
+
         deadline = time.monotonic() + 60.0
-        while time.monotonic() < deadline and not plant.outer.moving(plant.now):
+        while time.monotonic() < deadline and not changed():
             time.sleep(0.02)
-        assert plant.outer.moving(plant.now)
+        assert changed()
         process.send_signal(signal.SIGINT)
         out, errors = process.communicate(timeout=30)
         assert process.returncode == 130, errors
-        assert not plant.outer.moving(plant.now)
-        assert plant.outer.encoder(plant.now) < GOALS_DEG["LINK"] - 0.1
+        assert not changed()
+        assert not axis or plant.outer.encoder(plant.now) < GOALS_DEG["LINK"] - 0.1
     document = read_conformance(tmp_path / "out" / "conformance.json")
     assert document["complete"] is False
     assert document["ended"] == "interrupted"
@@ -452,3 +459,15 @@ def instrument(profile):
         own = ANSWERS.get(query) or ",".join(["1"] * fields + [*texts, *low][:1])
         lines.append(f"      - {{q: {json.dumps(query)}, r: {json.dumps(own)}}}")
     return "\n".join(['spec: "1.1"', *lines, "resources:", f"  {SUPPLY}: {{device: own}}", ""])
+
+
+@each(["scpi_supply", "scpi_exciter", "scpi_step_generator"])
+def test_every_scpi_profile_is_read_from_a_second_simulator(name, tmp_path, monkeypatch):
+    profile = load_profile(name)
+    (tmp_path / "instruments.yaml").write_text(instrument(profile), encoding="utf-8")
+    monkeypatch.setenv("TUMBLELINE_VISA", f"{tmp_path / 'instruments.yaml'}@sim")
+    bring_up = BringUp(profile, device_at(f"visa:{SUPPLY}", profile, 1), Scripted(), timeout_s=0.5)
+    bring_up.run()
+    read = [p for p in bring_up.findings.points if p.part == "register"]
+    assert len(read) == len(profile.commands)
+    assert [p for p in read if p.verdict == "differs" and "no answer" in p.found] == []

@@ -162,7 +162,7 @@ def lot(tmp_path_factory: pytest.TempPathFactory) -> SimpleNamespace:
 def test_a_lot_of_the_analogue_part_passes_or_fails_by_its_own_errors(lot: SimpleNamespace):
     grades = lot.run.table("grades")
     failed = grades[grades["outcome"] != "pass"]
-    assert len(failed) <= 2
+    assert len(failed) <= 1
     assert all("bias_temperature_ug_K fail" in reason for reason in failed["reasons"])
 
 
@@ -178,7 +178,8 @@ def test_the_true_bias_and_scale_lie_within_their_stated_uncertainty(lot: Simple
                 error = 1e6 * (of[unit, axis, name] - true) / scale
                 within.append(abs(error) <= expanded[unit, axis, name])
                 size.append(abs(error))
-    assert np.mean(within) >= 0.75  # 36 figures, but the units of a lot share the error of their station's meter
+    # 36 figures; 0.75 with uncertainties half as large. The units share the error of their meter: of this station 0.7 u
+    assert np.mean(within) >= 0.9
     assert np.max(size) < 1000.0  # without the measurement the spread of the supplies is 5000 µg of bias
 
 

@@ -307,9 +307,33 @@ def test_a_forgery_is_found(root: Path, forge: Callable[[Path], str]) -> None:
         assert len(paths) == (2 if forge in TWICE else 1), paths
 
 
+def a_link_to_a_table_elsewhere(root: Path) -> None:
+    place = runs(root)[0].path / "dwells.parquet"
+    place.rename(root.parent / "dwells.parquet")
+    place.symlink_to(root.parent / "dwells.parquet")
+
+
+def a_link_to_a_run_elsewhere(root: Path) -> None:
+    place = runs(root)[0].path
+    shutil.move(place, root.parent / "elsewhere")
+    place.symlink_to(root.parent / "elsewhere")
+
+
+def a_run_copied_in_without_its_seal(root: Path) -> None:
+    path = runs(root)[0].path
+    shutil.copytree(path, root.parent / "copy")
+    shutil.rmtree(path)
+    (root.parent / "copy" / "sealed.json").unlink()
+    (root.parent / "copy").rename(path)
+
+
+LINKS_AND_COPIES = (a_link_to_a_table_elsewhere, a_link_to_a_run_elsewhere, a_run_copied_in_without_its_seal)
+"""That ``verify`` finds them is tested by itself."""
+
+
 @pytest.mark.parametrize("root", ["unsigned"], indirect=True)  # where no signature helps
-@pytest.mark.parametrize("forge", OF_A_RUN, ids=lambda one: one.__name__)
-def test_a_forged_run_is_not_certified(root: Path, forge: Callable[[Path], str]) -> None:
+@pytest.mark.parametrize("forge", [*OF_A_RUN, *LINKS_AND_COPIES], ids=lambda one: one.__name__)
+def test_a_forged_run_is_not_certified(root: Path, forge: Callable[[Path], object]) -> None:
     name = runs(root)[0].id
     before = sorted(root.glob("calibrations/*/*/*.json"))
     forge(root)

@@ -1,11 +1,13 @@
 """Samples on their way: lost answers, changed bytes, counters that contradict each other."""
 
 import pytest
+from each import each
 from small_station import MemorySink, lot_of, quiet_progress, short_recipe
 
 from pipelines.capture.capture import capture
 from schemas.errors import StationRefused
 from schemas.event import MemoryLog
+from schemas.fault import FaultOrder
 from schemas.station import load_station
 from stations.opening import make_plant, serve_plant
 from stations.plant.faults import proxy, wire
@@ -85,3 +87,19 @@ def test_a_slot_that_forgets_what_was_taken_is_refused() -> None:
         station.clock.sleep(1.0)
         with pytest.raises(StationRefused, match="reports 50 of 200 samples as read, 100 is needed"):
             slot.take()
+
+
+@each(
+    [
+        (FaultOrder(kind="swapped_words", serial="U000"), lambda reader: reader.slots[0].identity(), "word order"),
+        (FaultOrder(kind="exceptions_off", device="reader"), lambda reader: reader.start(100.0), "sampling is stopped"),
+    ],
+    lambda row: row[2],
+)
+def test_words_in_the_wrong_order_are_no_identity_and_a_reader_that_does_not_start_is_refused(row) -> None:
+    fault, asked, words = row
+    config, lot = load_station(), lot_of(1)
+    plant = make_plant(config, lot)
+    plant.inject(fault)
+    with serve_plant(config, lot, plant) as station, pytest.raises(StationRefused, match=words):
+        asked(station.reader)

@@ -124,6 +124,12 @@ def test_soaks_tell_how_far_they_went_beyond():
     assert 0.0 <= soaks[1]["device_overshoot_K"] < soaks[1]["air_overshoot_K"]
 
 
+def test_a_device_of_the_station_that_is_silent_for_a_moment_costs_no_run():
+    sink, events = run({"kind": "silent", "at_s": DURING, "for_s": 8.0, "device": "chamber"})
+    assert len(sink.records) == 4
+    assert kinds(events) == ["suspended"]
+
+
 @pytest.mark.parametrize("records", [1, 2])
 def test_a_run_killed_around_a_pause_goes_on_bit_for_bit(records):
     fault = DISTURBANCES["door"]

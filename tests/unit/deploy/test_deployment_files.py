@@ -159,6 +159,17 @@ def test_every_folder_that_a_container_writes_is_a_named_volume() -> None:
     assert {f"/var/lib/{folder}" for folder in made} == {place for own in mounted.values() for place in own.values()}
 
 
+def test_the_database_of_a_plant_is_an_image_by_digest_with_its_password_in_a_file() -> None:
+    database, server = PLANT["services"]["database"], PLANT["services"]["server"]
+    assert re.fullmatch(r"docker\.io/library/postgres@\$\{POSTGRES_DIGEST:\?[^}]+\}", database["image"])
+    assert database["user"] == "999:999"
+    assert database["environment"]["POSTGRES_PASSWORD_FILE"] == "/run/secrets/postgres-password"
+    assert not [key for key in database["environment"] if key == "POSTGRES_PASSWORD"]
+    assert server["environment"]["TUMBLELINE_ORCHESTRATOR_DATABASE"] == "/run/secrets/prefect-database"
+    assert set(PLANT["secrets"]) == {"postgres-password", "prefect-database"}
+    assert set(PLANT["volumes"]) == {"database"}
+
+
 def test_the_base_image_has_a_digest_or_is_not_built() -> None:
     assert re.findall(r"^FROM (\S+)$", CONTAINERFILE, re.MULTILINE) == ["docker.io/library/python@${PYTHON_DIGEST}"]
     assert re.findall(r"^ARG (.*)$", CONTAINERFILE, re.MULTILINE) == ["PYTHON_DIGEST"]  # with no value of its own

@@ -171,3 +171,9 @@ def test_velocity_random_walk_is_sixty_times_the_density():
     assert got.q_n == pytest.approx((25e-6 * PER_G) ** 2)
     assert got.q_b == pytest.approx((20e-6 * PER_G) ** 2)
     assert got.velocity[0] == pytest.approx(np.hypot(0.01471, 20e-6 * PER_G * 3600.0), rel=1e-3)
+
+
+def test_a_term_that_is_not_identified_has_no_figure_of_its_own():
+    got = navigation_error({"N": None, "B": 1.0}, "mg", np.array([1.0]))
+    assert got.velocity_random_walk is None
+    assert got.q_n is None

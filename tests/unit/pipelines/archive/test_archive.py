@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 
 import pandas as pd
@@ -122,6 +123,15 @@ def test_a_key_takes_in_what_its_stage_uses_by_name_or_by_discovery_and_nothing_
     for name in ("inertial.no_such_module", "no_such_package", "inertial.counts.number_of"):
         with pytest.raises(LookupError, match=name):
             sources((name,))
+
+
+def test_every_source_is_that_of_the_module_of_its_name():
+    found = sources(("inertial", "schemas", "stations", "pipelines"))
+    assert len(found) > 900
+    for name in [*found][::9]:
+        spec = find_spec(name)
+        assert spec is not None, name
+        assert found[name] == Path(spec.origin or ""), name
 
 
 def test_no_module_is_imported_for_its_source():

@@ -7,6 +7,7 @@ from capture_double import CaptureDouble, measured_run, small_job
 from typer.testing import CliRunner
 
 from pipelines.archive import Archive, Run
+from pipelines.capture.interruptions import interruptions
 from pipelines.cli import app
 from pipelines.cli.summary import summary
 from pipelines.report import render
@@ -55,3 +56,15 @@ def test_they_are_on_the_report_and_on_the_terminal(run: Run) -> None:
     shown = CliRunner().invoke(app, ["show", run.id, "--archive", str(run.archive.root)])
     assert "3 pauses (3.5 min waited), the door was opened 2 times" in shown.stdout
     assert "measured again 2 times" in shown.stdout
+
+
+def test_a_run_without_any_says_so_and_one_that_did_not_note_them_says_that(run: Run) -> None:
+    table = Run.table
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Run, "table", lambda one, name: table(one, name).iloc[: 0 if name == "events" else None])
+        none = {"door_opened": 0, "pauses": 0, "paused_s": 0.0, "repeated_dwells": [], "events": []}
+        assert interruptions(run) == none
+        assert "nothing paused the run" in render(run)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Run, "tables", lambda _self: ["grades"])
+        assert interruptions(run) is None

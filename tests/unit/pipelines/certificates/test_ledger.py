@@ -176,6 +176,15 @@ def ask(run: Run, *arguments: str) -> tuple[int, dict]:
     return result.exit_code, json.loads(result.stdout)
 
 
+def test_only_units_that_passed_are_certified_and_the_others_are_named(run: Run) -> None:
+    status, document = ask(run, "certify", run.id)
+    assert status == 1
+    assert {one["serial"] for one in document["certified"]} == {"A1", "A2"}
+    assert list(document["left_out"]) == ["A3"]
+    with pytest.raises(WrongUse, match=r"unit A3 of run .* did not pass"):
+        ask(run, "certify", run.id, "--units", "A3")
+
+
 def test_show_tells_the_calibration_of_a_date_with_its_coefficients_origin_and_end(run: Run) -> None:
     ask(run, "certify", run.id, "--units", "A1,A2")
     status, shown = ask(run, "show", "A1", "--at", day(100))

@@ -59,6 +59,20 @@ def end_of(run: Run) -> str:
     return str(run.manifest("readings")["when"])[:10]
 
 
+def test_the_run_is_named_before_it_is_signed(run: Run, typed: Typed, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(*_args: object) -> None:
+        raise WrongUse("stopped before anything was written")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(certifying, "refuse_unsound", refused)
+        stopped = typed("certify")
+    assert str(stopped.exception) == "stopped before anything was written"
+    assert f"certify: run {run.id}, measured on {end_of(run)}, 3 units: A1, A2, A3" in stopped.stderr
+    done = typed("certify", "--json")
+    assert f"certify: run {run.id}, measured on {end_of(run)}" in done.stderr
+    assert json.loads(done.stdout)["run"] == run.id
+
+
 def test_a_certificate_begins_at_the_measurement_or_later_and_lasts_no_longer_than_is_allowed(
     run: Run, typed: Typed
 ) -> None:
@@ -191,6 +205,17 @@ def test_show_export_and_verify_name_who_did_not_sign(
     refused = typed("certify", run.id, "--months", "6").exception
     assert isinstance(refused, ArchiveUnusable)
     assert "a signature by the own key, or by one given with --key, is needed" in str(refused)
+
+
+def test_an_edit_behind_a_signature_stops_show_and_export(
+    run: Run, typed: Typed, keys: dict[str, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sign(run, keys["own"])
+    path = run.path / "coefficients.json"
+    path.write_bytes(files.json_bytes({**json.loads(path.read_text()), "who": "somebody else"}))
+    monkeypatch.setenv(VARIABLE, str(keys["own"]))
+    for words in (("show", run.id), ("export", run.id)):
+        assert "was edited after it was signed" in str(typed(*words).exception)
 
 
 def test_a_run_of_a_station_with_another_key_is_certified_where_that_key_is_trusted(

@@ -9,9 +9,13 @@ from each import each
 from root_process import ROOT
 from typer.testing import CliRunner
 
-from pipelines.cli import app
+from inertial.counts import size_text
+from inertial.planning.ranges import UnseenRange
+from pipelines.cli import app, flowing
+from pipelines.diagnosis.confirmation import fall_of
 from pipelines.importers.exchange import read_dwells
 from pipelines.jobs.recipes import load_recipe
+from pipelines.report.unit_panels.budget import without_nothing
 from schemas.errors import DataRejected, RecipeInvalid
 from schemas.key_list import keys_of
 from schemas.recipe import FaultOrder
@@ -54,6 +58,27 @@ def test_what_cannot_be_is_refused_with_what_is_needed(tmp_path: Path, monkeypat
     said = refused(["inspect", str(dwells)], tmp_path, monkeypatch)
     assert "column out_y: found oops, a finite number is needed" in said
     assert f"tumbleline compare {dwells}" in refused(["fit", str(dwells)], tmp_path, monkeypatch)
+
+
+def test_numbers_have_three_digits_and_no_exponent() -> None:
+    assert str(UnseenRange("tau", "s", 1118.0, 3000.0)) == "tau 1120 to 3000 s"
+    assert str(UnseenRange("tau", "s", 36000.0, 36000.0)) == "tau 36000 s"
+    assert str(UnseenRange("tau", "s", 0.0123, 0.5)) == "tau 0.0123 to 0.5 s"
+    sizes = {1: "1 byte", 512: "512 bytes", 2_000: "2.00 kB", 18721670: "18.7 MB", 123_456_789_000: "123 GB"}
+    assert {size: size_text(size) for size in sizes} == sizes
+    for fall, error, text in (
+        (97.13, 2.8, "falls by 97.1 ± 5.6 (k = 2) µg"),
+        (-6.41, 0.7, "rises by 6.4 ± 1.4 (k = 2) µg"),
+        (123.4, None, "falls by 123 µg"),
+    ):
+        assert fall_of(fall, error) == f"the error {text}"
+
+
+def test_a_contribution_of_nothing_is_not_among_the_largest_and_a_help_is_broken_by_the_terminal_alone() -> None:
+    text = "noise of the dwells 99 %, references, as far as verification cannot show them 1 %, seat of the fixture 0 %"
+    assert without_nothing(text) == text.removesuffix(", seat of the fixture 0 %")
+    assert without_nothing("noise of the dwells 80 %, supply 20 %") == "noise of the dwells 80 %, supply 20 %"
+    assert flowing("One line\nand its end.\n\n- a list\n- stays") == "One line and its end.\n\n- a list\n- stays"
 
 
 def test_patterns_and_expanded_uncertainties_of_a_schema_are_explained_in_words() -> None:

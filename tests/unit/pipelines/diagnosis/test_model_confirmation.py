@@ -12,6 +12,7 @@ from inertial.criticism.left_out import LeftOut
 from inertial.criticism.reproduced_change import ReproducedChange
 from pipelines.diagnosis import confirmation
 from pipelines.diagnosis.confirmation import text_of
+from pipelines.diagnosis.sentences import why_recommended
 
 ROW = {"removed": []}
 
@@ -30,6 +31,21 @@ def test_an_effect_is_recommended_only_where_dwells_left_out_are_predicted_no_wo
     before: float, after: float, predicts: object
 ) -> None:
     assert Named(SimpleNamespace(), 1.0, before, after).predicts is predicts
+
+
+@each([
+    (10.0, 9.0, ["third_order"], []),
+    (10.0, 12.0, [], ["third_order is not recommended: the error on dwells left out rises from 10.0 to 12.0 µg."]),
+    (None, None, ["third_order"],
+     [("third_order is recommended by its evidence alone: no dwells left out can judge it; "
+       "confirm with a fresh run of the same units.")]),
+])  # fmt: skip
+def test_it_is_said_why_an_effect_is_recommended_or_not(row: tuple) -> None:
+    before, after, recommended, lines = row
+    fault = {"effects": ["bad_dwell"], "scope": "data", "heldout_after_ug": None}
+    effect = {"effects": ["third_order", "odd_quadratic"], "scope": "sensor"}
+    effect |= {"heldout_before_ug": before, "heldout_after_ug": after}
+    assert why_recommended({"classes": [fault, effect], "recommended": recommended}) == lines
 
 
 def test_a_gain_in_density_does_not_confirm_an_error_that_rises() -> None:

@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 
 from inertial.data_errors.handling.not_soaked import NotSoaked
-from pipelines.inquiry.inquiry import NO_FOLLOW_UP, ending_of
+from pipelines.inquiry.inquiry import NO_FOLLOW_UP, ending_of, no_follow_up
 
 
 def joint(
@@ -37,6 +37,20 @@ def test_an_inquiry_ends_by_what_was_judged_and_not_where_a_class_is_open() -> N
     for groups, end in classes.items():
         ending = ending_of(joint(None) if groups is None else joint(False, *map(list, groups)))
         assert (ending.end if ending else None) == end
+
+
+def test_what_no_dwells_left_out_judge_is_named_and_said_to_be_unconfirmed() -> None:
+    one = joint(False, ["cross_coupling"])
+    one.document["classes"][0] |= {"scope": "sensor", "heldout_after_ug": None}
+    one.document["recommended"] = []
+    ending = ending_of(one)
+    assert ending.text.endswith("no dwells left out can judge cross_coupling: confirm with a fresh run")
+
+
+def test_a_class_that_no_follow_up_parts_for_sure_is_not_called_impossible_to_part() -> None:
+    group = ["third_order", "clipping"]
+    assert "no follow-up was found" in no_follow_up(joint(False, group))
+    assert no_follow_up(joint(False, group, twins=(("third_order", "clipping"),))).startswith("no measurement on this")
 
 
 def test_a_device_that_had_not_soaked_follows_by_about_its_own_coefficients() -> None:

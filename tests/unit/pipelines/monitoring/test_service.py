@@ -30,6 +30,7 @@ from pipelines.monitoring.queue_numbers import OpenRun, QueueNumbers
 from pipelines.monitoring.service import alerting, application
 from pipelines.monitoring.snapshot import Monitor, Snapshot, StationNumbers, read_stations
 from schemas.errors import WrongUse
+from schemas.log_lines import log_line
 from stations.safety.lease_files import lease_file, new_holder, write_holder
 
 DEPLOY = ROOT / "deploy" / "monitoring"
@@ -296,6 +297,17 @@ def test_alerts_are_posted_as_they_come_and_go_on_after_a_refusal_and_an_unexpec
                 break
             threading.Event().wait(0.02)
     assert [one["kind"] for one in accepted] == ["unsafe"]
+
+
+def test_messages_are_text_or_json(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("TUMBLELINE_LOG", raising=False)
+    assert log_line("line-1: it is", queue="line-1") == "tumbleline: line-1: it is\n"
+    monkeypatch.setenv("TUMBLELINE_LOG", "json")
+    line = log_line("a\n“b”", "error", queue="line-1")
+    assert line.count("\n") == 1
+    content = json.loads(line)
+    assert (content["message"], content["level"], content["queue"]) == ("a\n“b”", "error", "line-1")
+    assert datetime.fromisoformat(content["when"]).tzinfo is not None
 
 
 def test_a_command_tells_its_error_as_json_on_request() -> None:

@@ -2,9 +2,11 @@
 
 import json
 import shutil
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 from capture_double import CaptureDouble, measured_run, small_job, small_run
@@ -227,3 +229,47 @@ def test_chooses_runs_by_what_they_are(run: Run) -> None:
 def test_says_why_a_selection_names_nothing(row: tuple[list[str], str], original: Run) -> None:
     with pytest.raises(WrongUse, match=row[1]):
         selected(original.archive, row[0])
+
+
+@pytest.fixture
+def imported(tmp_path: Path) -> Run:
+    """Six faces of one unit as another's recording, kept as an import."""
+    from pipelines.diagnosis.import_document import import_document
+
+    rng = np.random.default_rng(3)
+    faces = {"+x": (1, 0, 0), "-x": (-1, 0, 0), "+y": (0, 1, 0), "-y": (0, -1, 0), "+z": (0, 0, 1), "-z": (0, 0, -1)}
+    frames = [
+        pd.DataFrame(np.array(up) + 0.01 + rng.normal(0.0, 1e-3, (200, 3)), columns=["x", "y", "z"]).assign(face=face)
+        for face, up in faces.items()
+    ]
+    table = pd.concat(frames, ignore_index=True)
+    table.assign(t=0.01 * table.index).to_csv(tmp_path / "six.csv", index=False)
+    how: dict[str, object] = {
+        "columns": {"time": "t", "x": "x", "y": "y", "z": "z", "dwell": "face"},
+        "units": {"output": "g", "time": "s"},
+        "unit": "SN1",
+        "poses": {face: face for face in faces},
+        "local_gravity_m_s2": 9.80665,
+    }
+    archive = tmp_path / "imports"
+    return Archive(archive).run(
+        import_document([tmp_path / "six.csv"], how, "test", "", str(archive), None, nullcontext)["run"]
+    )
+
+
+def test_imported_dwells_are_fitted_with_the_plain_model_and_graded_where_limits_are_named(
+    imported: Run, tmp_path: Path
+) -> None:
+    outcome = again(imported.archive, imported.id, ModelChange())
+    new = imported.archive.run(outcome.new)
+    assert outcome.because[0]["what"] == "not fitted yet"
+    bias = new.table("coefficients").query("effect == 'bias'")
+    assert bias["value"].to_numpy() == pytest.approx(0.01, abs=5e-4)
+    assert check(new.archive, new.id).same
+    assert again(new.archive, new.id, ModelChange()).new == new.id
+    limits = tmp_path / "limits.toml"
+    limits.write_text('name = "plain"\n[figures]\nzero_g_offset_mg = { max = 5.0, unit = "mg" }\n')
+    outcome = again(imported.archive, imported.id, change_from_options(limits=str(limits)))
+    grades = imported.archive.run(outcome.new).table("grades")
+    assert grades["outcome"].tolist() == ["fail"]
+    assert "zero_g_offset_mg fail" in grades["reasons"].iloc[0]

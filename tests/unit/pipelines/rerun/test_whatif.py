@@ -135,6 +135,13 @@ def test_a_fit_of_measured_data_is_no_measurement_and_no_fresh_run(
     assert fresh_tasks(both, own.address, change) == []
 
 
+def test_a_model_that_was_there_already_is_no_better(archive: Archive, tmp_path: Path) -> None:
+    same = change_from_options("", model_file(tmp_path, GOOD[:-1]))
+    document = what_if(archive, same)
+    assert document["verdict"] == "no better"
+    assert document["total"]["fresh_rms_ug"][0] == pytest.approx(document["total"]["fresh_rms_ug"][1])
+
+
 def test_a_lot_that_the_model_cannot_be_fitted_to_is_named(archive: Archive, tmp_path: Path) -> None:
     document = what_if(archive, change_from_options("", model_file(tmp_path, (*GOOD, "bias_temperature_quadratic"))))
     assert document["verdict"] == "nothing to judge"

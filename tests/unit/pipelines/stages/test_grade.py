@@ -31,6 +31,22 @@ def limits(rule: str = "guarded_acceptance") -> Limits:
     return parse_limits(TEXT.format(rule=rule), "limits test", UNITS)
 
 
+def test_names_value_uncertainty_limit_margin_and_rule() -> None:
+    decision = decide(limits(), "bias_error_ug", 130.0, 5.0)
+    assert decision.sentence == "bias_error_ug fail: 130 ± 10 µg, limit 100 µg, margin -30 µg"
+    undecided = decide(limits(), "bias_error_ug", 95.0, 5.0)
+    assert undecided.sentence == (
+        "bias_error_ug not accepted: inside the guard band, 95 ± 10 µg, limit 100 µg, probability of exceeding it 16 %: "
+        "measure longer, or again"
+    )
+    beyond = decide(limits(), "bias_error_ug", 105.0, 5.0)
+    assert beyond.sentence == (
+        "bias_error_ug not accepted: above the limit by less than its uncertainty, 105 ± 10 µg, limit 100 µg, probability of "
+        "exceeding it 84 %: measure longer, or again"
+    )
+    assert decision.rule == "ILAC-G8:09/2019 guarded acceptance, w = U with k = 2"
+
+
 @each([
     ('"µg"', '"mg"', "the limit is in mg, the figure is in µg"),
     ("bias_error_ug", "bias_eror_ug", "did you mean bias_error_ug"),

@@ -199,3 +199,13 @@ def test_a_state_after_every_event_is_that_of_all_events_at_once() -> None:
         once.add(event)
     assert often.state(9) == once.state(9)
     assert once.recorded(often.state(9)) == (EVENTS, 9)
+
+
+def test_a_state_is_compact_json() -> None:
+    journal = Journal("station")
+    text = zlib.decompress(journal.state(3)).decode()
+    assert text == json.dumps({"version": 1, "belongs_to": "station", "now_us": 3, "events": []}, separators=(",", ":"))
+    journal.add(EVENTS[0])
+    assert json.loads(zlib.decompress(journal.state(3)))["events"] == [
+        {"at_us": 1, "device_id": 2, "address": 100, "words": [1, 2, 3]}
+    ]

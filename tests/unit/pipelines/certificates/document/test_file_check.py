@@ -16,6 +16,7 @@ from cryptography.exceptions import InvalidSignature
 from cryptography.hazmat.primitives import hashes
 from cryptography.hazmat.primitives.asymmetric import ec, utils
 from cryptography.hazmat.primitives.serialization import Encoding
+from each import each
 from laboratory import laboratory_file
 from pydantic import TypeAdapter
 from signing_keys import made_key, openssl_accepts, pem, self_signed
@@ -235,6 +236,29 @@ def test_no_altered_text_or_attribute_is_accepted_by_the_archive(
     count, accepted = accepted_alterations(made, tmp_path, step, monkeypatch)
     assert count > least
     assert accepted == []
+
+
+FORGERIES = (
+    (b"no device was measured", b"a device was measured", ""),
+    (b"SIMULATED: ", b"Measured: ", ""),
+    (b"The results relate only", b"This accredited laboratory says: the results relate only", ""),
+    (b"JCGM 100:2008", b"ISO 16063-11", ""),
+    (b"temperature of the chamber", b"temperature of the item, too", ""),
+    (b"guard", b"no guard", ""),
+    (b"Example Sensor Works", b"Accredited Sensor Works", "speaks of accreditation"),
+)
+
+
+@each(FORGERIES)
+def test_a_forged_statement_condition_or_rule_is_named_by_the_archive(
+    forgery: tuple[bytes, bytes, str], issued: Issued, tmp_path: Path
+) -> None:
+    old, new, said = forgery
+    xml = (issued.folder / "A1_1.xml").read_bytes()
+    assert old in xml
+    (tmp_path / "forged.xml").write_bytes(xml.replace(old, new, 1))
+    found = checked(tmp_path / "forged.xml", "--archive", issued.run.archive.root, status=1)
+    assert said in wrong(found)["archive"]
 
 
 def test_a_name_that_was_changed_is_never_proven_and_found_with_the_laboratorys_file(
