@@ -7,8 +7,8 @@ import numpy as np
 from schemas.profile import Profile
 from schemas.units import STANDARD_GRAVITY_M_S2
 from stations.plant.bench import Bench, Waveforms
-from stations.plant.controller import ResultFiles
 from stations.plant.device import stream
+from stations.plant.equipment import ResultFiles
 from stations.plant.world import World
 
 UNKNOWN, WRONG = "NA:CMD ERR", "NA:PARA ERR"
