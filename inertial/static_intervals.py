@@ -5,8 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from inertial.arrays import Array, Flags, Index
-from inertial.record_faults import runs_of
+from inertial.arrays import Array, Flags, Index, runs_of
 
 _BINS = 256  # of the histogram of log scatter (Otsu's threshold)
 
