@@ -50,6 +50,7 @@ SHORT: dict[str, str] = {
     "shock_and_spin": "centrifuge 9",
     "discovery": "names --archives 6",
     "scoreboard": "--seed 1 --share 0.1 --only hand",
+    "hand_turned": "friction --runs 2",
 }
 
 

@@ -37,7 +37,7 @@ class Hand:
     force : (39, 3), g; rng : of the unit
     """
 
-    def __init__(self, seed: int, minutes: float, span: float) -> None:
+    def __init__(self, seed: int, minutes: float, span: float, *, rests: bool = False) -> None:
         self.rng = np.random.default_rng([seed, 0x4A4D])
         share = self.rng.uniform(0.7, 1.3, DWELLS)
         each = 60.0 * minutes * share / share.sum()
@@ -49,14 +49,18 @@ class Hand:
         about = np.concatenate([faces[self.rng.permutation(6)] for _ in range(DWELLS // 6 + 1)])[:DWELLS]
         tilt = np.where(self.rng.random(DWELLS) < 0.4, 0.2, 1.2)[:, None]
         self.force = Rotation.from_rotvec(tilt * self.rng.standard_normal((DWELLS, 3))).apply(about)
-        self.case = 25.0 + self._course(60.0 * minutes, span)
+        self.case = 25.0 + self._course(60.0 * minutes, span, rests=rests)
 
-    def _course(self, whole: float, span: float) -> Floats:
-        """A hot-air gun and a freezer: up, down, up, as a person does it."""
+    def _course(self, whole: float, span: float, *, rests: bool) -> Floats:
+        """A hot-air gun and a freezer: up, down, up, as a person does it, who rests for half of the time or never."""
         if not span:
             return np.zeros(len(self.t))
         knots = np.array([-600.0, 0.0, 0.3, 0.65, 1.0]) * np.array([1.0, 1.0, whole, whole, whole])
         levels = span * np.array([0.0, 0.0, self.rng.uniform(0.8, 1.0), -self.rng.uniform(0.3, 0.6), 0.6])
+        if rests:
+            arrived = 0.5 * (knots[1:-1] + knots[2:])
+            knots = np.concatenate([knots[:2], np.stack([arrived, knots[2:]], axis=1).ravel()])
+            levels = np.concatenate([levels[:2], np.repeat(levels[2:], 2)])
         return lagged(np.interp(self.t, knots, levels), 40.0)
 
     def at(self, course: Floats) -> Floats:
@@ -97,14 +101,22 @@ def element_lags(hand: Hand) -> Floats:
 
 
 def sticks_and_slips(hand: Hand) -> Floats:
-    """A die attach with dry friction (Jenkin's element): it holds its strain until the mismatch slips it, since yesterday."""
-    slips = hand.rng.uniform(4.0, 14.0)
-    held = 25.0 + hand.rng.uniform(-30.0, 30.0)
-    strain = np.empty(len(hand.t))
-    for k, warm in enumerate(hand.case):
-        held = min(max(held, warm - slips), warm + slips)
-        strain[k] = warm - held
-    return hand.at(strain)[:, None] * hand.gains()
+    """A die attach with dry friction: the shear force of the bond by Dahl's law over all temperatures since it was cured.
+
+    dF/du = k·(1 − F/Fs·sgn du) with the mismatch u of die and case, which is proportional to the temperature: asperities bend
+    before they slip, and there is no edge at which the bond begins to slip (P. R. Dahl, Solid friction damping of mechanical
+    vibrations, AIAA Journal 14 (1976) 1675, with his exponent of 1). Random: the way Fs/k over which the force turns, 4 to
+    14 K, which is 0.1 to 0.4 µm for 10 ppm/K at 3 mm from the middle of the die; the temperature of curing; one to four stays
+    between −5 and 55 °C since then. While the temperature moves at one rate the force is that of a lag.
+    """
+    turns = hand.rng.uniform(4.0, 14.0)
+    stays = hand.rng.uniform(-5.0, 55.0, hand.rng.integers(1, 5))
+    course = np.concatenate([[hand.rng.uniform(120.0, 175.0), 25.0], stays, hand.case])
+    force = np.zeros(len(course))  # free of stress while it cures; in units of Fs
+    for k, change in enumerate(np.diff(course)):
+        limit = np.sign(change)
+        force[k + 1] = limit + (force[k] - limit) * np.exp(-abs(change) / turns)  # exact for a change in one direction
+    return hand.at(force[-len(hand.t) :])[:, None] * hand.gains()
 
 
 def switched_domains(hand: Hand) -> Floats:
@@ -144,14 +156,15 @@ EFFECTS: dict[str, tuple[Effect, float, float, frozenset[str]]] = {
 """Effect, minutes, span of the temperature, names in the catalogue that are right."""
 
 
-def make(name: str, seed: int, size: float = 10.0) -> pd.DataFrame:
+def make(name: str, seed: int, size: float = 10.0, *, rests: bool = False) -> pd.DataFrame:
     """The dwells of a recording.
 
     size : RMS of the effect in the magnitude of the force, in multiples of a dwell's noise, after what bias, sensitivity and,
-    where the temperature moves, their linear dependence on it take up
+        where the temperature moves, their linear dependence on it take up
+    rests : the temperature rests half of the time; else it moves all the time, at rates that hardly differ
     """
     effect, minutes, span, _ = EFFECTS[name]
-    hand = Hand(seed, minutes, span)
+    hand = Hand(seed, minutes, span, rests=rests)
     added = effect(hand)
     warm = hand.at(hand.case)
     theta = warm - 25.0
@@ -205,11 +218,12 @@ def main() -> None:
     parser.add_argument("--runs", type=int, default=8)
     parser.add_argument("--first", type=int, default=0, help="number of the first seed")
     parser.add_argument("--size", type=float, default=10.0, help="of the effect, in multiples of a dwell's noise")
+    parser.add_argument("--rests", action="store_true", help="the temperature rests for half of the time")
     parser.add_argument("names", nargs="*", default=list(EFFECTS))
     given = parser.parse_args()
     warnings.simplefilter("ignore")
     for name in given.names:
-        rows = [judged(name, make(name, given.first + k, given.size)) for k in range(given.runs)]
+        rows = [judged(name, make(name, given.first + k, given.size, rests=given.rests)) for k in range(given.runs)]
         said = ", ".join(f"{key} {sum(row[key] for row in rows)}" for key in rows[0])
         print(f"{name}: {len(rows)} recordings, {said}", flush=True)
 

@@ -1,4 +1,4 @@
-"""Types of arrays by what their elements are."""
+"""Types of arrays by what their elements are, and where flags stand in a row."""
 
 from __future__ import annotations
 
@@ -11,3 +11,9 @@ Flags = NDArray[np.bool_]
 Index = NDArray[np.int64]
 Places = NDArray[np.intp]
 Texts = NDArray[np.object_]
+
+
+def runs_of(inside: Flags) -> tuple[Index, Index]:
+    """Starts and ends (one past the last) of the stretches of True."""
+    steps = np.diff(np.concatenate([[0], inside.astype(np.int8), [0]]))
+    return np.flatnonzero(steps == 1).astype(np.int64), np.flatnonzero(steps == -1).astype(np.int64)

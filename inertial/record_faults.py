@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.ndimage import median_filter
 
-from inertial.arrays import Array, Flags, Index
+from inertial.arrays import Array, Flags, Index, runs_of
 
 _MOST_DISTINCT = 200_000
 _BLOCK = 64  # samples over which the share of equal neighbours is measured
@@ -202,9 +202,3 @@ def _wings(x: Array, step: float) -> tuple[Index, Index, int]:
             offsets[at[0]] = power
     rows, columns = np.nonzero(hits)
     return (calm[rows] * _BLOCK + columns).astype(np.int64), offsets[hits], calm.size * _BLOCK
-
-
-def runs_of(inside: Flags) -> tuple[Index, Index]:
-    """Starts and ends (one past the last) of the stretches of True."""
-    steps = np.diff(np.concatenate([[0], inside.astype(np.int8), [0]]))
-    return np.flatnonzero(steps == 1).astype(np.int64), np.flatnonzero(steps == -1).astype(np.int64)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from inertial.arrays import Array, Flags, Index
+from inertial.arrays import Array, Flags, Index, runs_of
 
 _BINS = 256  # of the histogram of log scatter (Otsu's threshold)
 
@@ -70,7 +70,7 @@ def find(
     limit = _threshold(sd, quiet) if threshold is None else threshold
     inside = _spread(sd <= limit, width, data.shape[0])
     trim = round(0.5 * window_s * rate_hz)  # taken off both ends, where the hand still lets go
-    start, stop = _runs(inside)
+    start, stop = runs_of(inside)
     # the ends of the record are no hand's doing: nothing is trimmed there
     start = np.where(start > 0, start + trim, start)
     stop = np.where(stop < data.shape[0], stop - trim, stop)
@@ -120,9 +120,3 @@ def _spread(still: Flags, width: int, n: int) -> Flags:
     np.add.at(edges, starts, 1)
     np.add.at(edges, starts + width, -1)
     return np.cumsum(edges[:-1]) > 0
-
-
-def _runs(inside: Flags) -> tuple[Index, Index]:
-    """Starts and ends of the stretches of True."""
-    steps = np.diff(np.concatenate([[0], inside.astype(np.int8), [0]]))
-    return np.flatnonzero(steps == 1).astype(np.int64), np.flatnonzero(steps == -1).astype(np.int64)

@@ -10,12 +10,13 @@ from inertial.errors import NotIdentified
 
 TEN_PERCENT = 1.0 - 2.0 * float(np.arcsin(0.1)) / np.pi
 """0.936: part of a half sine's duration between its 10 % points."""
+STANDARD_GRAVITY = 9.80665  # m/s²
 TOP = 0.9  # of the largest sample: the part of the pulse through which the parabola is laid
 
 
-def velocity_change(peak_g: float, duration_s: float, standard_gravity: float = 9.80665) -> float:
+def velocity_change(peak_g: float, duration_s: float) -> float:
     """Velocity change of a half sine in m/s: 2AD/π."""
-    return 2.0 * peak_g * standard_gravity * duration_s / np.pi
+    return 2.0 * peak_g * STANDARD_GRAVITY * duration_s / np.pi
 
 
 @dataclass(frozen=True)

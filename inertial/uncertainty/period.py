@@ -57,6 +57,6 @@ def bounded_walk(deviation: float, correlation: float, gap: float) -> float:
     return deviation * float(np.sqrt(2.0 * -np.expm1(-gap / correlation)))
 
 
-def logarithmic(per_decade: float, gap: float, onset: float = DAY_S) -> float:
-    """Change by ageing A·log₁₀(1 + t/τ), the unit of A."""
-    return per_decade * float(np.log10(1.0 + gap / onset))
+def logarithmic(per_decade: float, gap: float) -> float:
+    """Change by ageing A·log₁₀(1 + t/day), the unit of A."""
+    return per_decade * float(np.log10(1.0 + gap / DAY_S))

@@ -61,7 +61,7 @@ def command(
     record = publish(store, change, first, device=device, station=station, reason=reason, force=force)
     lines = [
         f"release {record.number}: {_name(record)} for {_where(record)} from {record.since:%Y-%m-%d %H:%M} UTC",
-        f"  {', '.join(record.effects or ())}",
+        f"  {', '.join(record.model.effects or ())}",
         f"  evidence: {record.evidence or 'none'}{', forced' if record.forced else ''}",
     ]
     give({"archive": str(store.root), **record.document()}, lines, as_json=as_json)
@@ -93,7 +93,7 @@ def _print(store: Archive, records: list[Release], valid: set[int]) -> None:
 
 
 def _name(record: Release) -> str:
-    return f"{record.model_name} version {record.model_version}"
+    return f"{record.model.model_name} version {record.model.model_version}"
 
 
 def _where(record: Release) -> str:

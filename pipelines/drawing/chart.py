@@ -114,7 +114,7 @@ class Plot:
 class Chart:
     """Plots side by side in ``columns`` columns, one colour scale for all.
 
-    title : description for screen readers · height : of one row, in pixels of a page
+    title : description for screen readers · height : of one row, in pixels of a page · note : a line below the plots
     """
 
     title: str

@@ -20,6 +20,7 @@ DAY_MS = 86_400_000.0
 GAP_X, GAP_PX = 0.078, 74.0
 SPHERE_GAP_X, SPHERE_GAP_PX = 0.012, 26.0
 DECADES = 100.0  # a logarithmic axis that spans more has a label at each decade
+NOTE_PX = 22  # room for the line below
 MOST_NAMES = 40  # names along the width of a figure
 NARROW_D = 20.0  # closer dates get a margin
 CONFIG = {
@@ -70,6 +71,14 @@ def plotly_figure(chart: Chart, *, webgl: bool = True) -> dict[str, Any]:
     if all(plot.sphere for plot in chart.plots):
         layout["margin"] |= {"l": 8, "b": 8, "t": 34}
         layout["height"] = chart.height * chart.rows + 20
+    if chart.note:
+        below = layout["margin"]["b"]
+        layout["margin"]["b"] += NOTE_PX
+        layout["height"] += NOTE_PX
+        layout["annotations"].append({
+            "text": _safe(chart.note), "x": 0, "y": 0, "xref": "paper", "yref": "paper", "xanchor": "left",
+            "yanchor": "top", "showarrow": False, "yshift": -below,
+        })  # fmt: skip
     return {"data": data, "layout": layout, "config": CONFIG}
 
 

@@ -80,6 +80,9 @@ def svg_text(chart: Chart) -> str:
         parts += [DRAW[trace.style](trace, place, chart.scale) for trace in plot.traces]
         parts.append(text_at(place.left, y + TOP - 9.0, plot.title, 'font-weight="600"') if plot.title else "")
     height = head + tall * chart.rows
+    if chart.note:
+        height += LINE
+        parts.append(text_at(0.0, height - 6.0, chart.note, f'fill="{QUIET}"'))
     if chart.scale is not None:
         parts.append(_bar(chart.scale, wide + 16.0, head + 0.12 * (height - head), 0.76 * (height - head)))
     return part(chart.title, height, "".join(parts))

@@ -29,10 +29,11 @@ SCHEMA = 1
 
 
 @dataclass(frozen=True, kw_only=True)
-class Release(ModelChange):
+class Release:
     """One record: model, first day of use, device and station (empty: all), reason, and evidence."""
 
     number: int
+    model: ModelChange
     since: datetime
     device: str
     station: str
@@ -55,9 +56,9 @@ class Release(ModelChange):
         """The record for JSON."""
         return {
             "release": self.number,
-            "model": self.model_name,
-            "version": self.model_version,
-            "effects": list(self.effects or ()),
+            "model": self.model.model_name,
+            "version": self.model.model_version,
+            "effects": list(self.model.effects or ()),
             "from": self.since.isoformat(),
             "device": self.device,
             "station": self.station,
@@ -193,7 +194,7 @@ def line_model(archive: Archive, device: str, station: str, when: datetime | Non
             f"(released: {known}); release one with 'tumbleline release', or name effects in the recipe",
             key="model",
         )
-    return in_force.of_model()
+    return in_force.model.of_model()
 
 
 def planned_recipe(name: str, effects: str, model: Path | None, archive: str | None, station: str) -> Recipe:
@@ -224,12 +225,10 @@ def _read(archive: Archive, number: int) -> Release:
     content = files.read_json(_place(archive, number))
     model = content["model"]
     as_written = ("device", "station", "reason", "evidence", "forced", "who", "when")
+    formulas = tuple(FormulaSpec.model_validate(one) for one in model["formulas"])
     return Release(
-        tuple(model["effects"]),
-        tuple(FormulaSpec.model_validate(one) for one in model["formulas"]),
-        model["model_name"],
-        model["model_version"],
         number=number,
+        model=ModelChange(tuple(model["effects"]), formulas, model["model_name"], model["model_version"]),
         since=datetime.fromisoformat(content["from"]),
         **{key: content[key] for key in as_written},
     )

@@ -57,17 +57,14 @@ class Side:
 
 @dataclass(frozen=True)
 class LotComparison:
-    """A lot under the old and the new model; without sides where it could not be judged."""
+    """A lot under the old and the new model.
+
+    sides : the old and the new one; none where the lot could not be judged
+    """
 
     entry: SelectedRun
-    old: Side | None = None
-    new: Side | None = None
+    sides: tuple[Side, ...] = ()
     error: str = ""
-
-    @property
-    def sides(self) -> list[Side]:
-        """The old and the new side; none where the lot could not be judged."""
-        return [] if self.old is None or self.new is None else [self.old, self.new]
 
 
 @dataclass(frozen=True)
@@ -96,7 +93,7 @@ def judged(part: Batch) -> list[LotComparison]:
     for run in (BufferedRun(archive, run_id) for run_id in part.runs):
         entry = entry_of(run.id, run.about)
         try:
-            lots.append(LotComparison(entry, *_both(run, part.change)))
+            lots.append(LotComparison(entry, _both(run, part.change)))
         except (TumblelineError, InertialError) as problem:
             lots.append(LotComparison(entry, error=str(problem)))
     return lots

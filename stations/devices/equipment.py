@@ -27,6 +27,10 @@ REFERENCE = "@reference"
 REFERENCE_SLOT = 999
 NEEDED = ("rate_hz", "reference", "reference_rate_hz", "reference_unit")
 STANDARD_GRAVITY = {"g": 1.0, "m/s^2": 9.80665}
+FLAT_SHARE = 5e-4
+"""Of the samples of Gaussian vibration within a thousandth of an extreme: a range of 3.3 σ has so many."""
+FEWEST_FLAT = 20
+FLAT_SHARE_OF_SINE = 0.1  # of the samples of a sine: it has less
 
 
 class RecordingSpoilt(StationError):
@@ -149,14 +153,6 @@ class RecordingEquipment(Equipment):
         if path in {before, "NONE"}:
             raise RecordingSpoilt(f"{self.name}: no {what}, the trigger was missed; check the recorder")
         return read_recording(Path(path), list(slots), self.name, units)
-
-
-Array = NDArray[np.float64]
-FLAT_SHARE = (
-    5e-4  # of the samples of Gaussian vibration within a thousandth of an extreme: a range of 3.3 σ has so many
-)
-FEWEST_FLAT = 20
-FLAT_SHARE_OF_SINE = 0.1  # of the samples of a sine: it has less
 
 
 def refuse_motion(profile: Profile, name: str, frequency: float, level_g: float) -> None:

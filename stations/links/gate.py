@@ -30,7 +30,15 @@ class Permit:
     patience_s: float
 
     def require(self, order: str, since: float | None) -> None:
-        """Refuses a command that must not be sent now, before it is sent."""
+        """Refuses a command that must not be sent now, before it is sent.
+
+        Raises
+        ------
+        LeaseLost
+            This process may not drive the station.
+        StationTimeout
+            The reading that the command depends on is too old.
+        """
         self.held()
         late = 0.0 if since is None else steady() - since
         if not late <= self.patience_s:
@@ -52,7 +60,15 @@ class GatedLink:
         self._permit = permit
 
     def read(self, device_id: int, address: int, count: int, what: str, space: Space = "holding") -> list[int]:
-        """Words of registers, or bits; a run that has lost its lease is refused before the read."""
+        """Words of registers, or bits; a run that has lost its lease is refused before the read.
+
+        Raises
+        ------
+        LeaseLost
+            The run may not drive the station; nothing was sent.
+        StationTimeout, LinkLost, StationRefused
+            The link's: no answer, no connection or no valid answer after all attempts, or a refusal of the device.
+        """
         if self._permit is not None:
             self._permit.alive()
         return self._link.read(device_id, address, count, what, space)
@@ -72,6 +88,17 @@ class GatedLink:
         Parameters
         ----------
         since : time of the reading that the command depends on; a command that is too late is refused
+
+        Raises
+        ------
+        StationRefused
+            There is no such device or no such writable registers, and nothing was sent; or the device refused.
+        LeaseLost
+            The run may not drive the station; nothing was sent.
+        StationTimeout
+            The command is too late, and was not sent; or no answer came, and whether the device acted is unknown.
+        LinkLost
+            The link's: no connection, a lost one, or no valid answer.
         """
         profile = self._profiles.get(device_id)
         if profile is None:
@@ -108,7 +135,17 @@ class GatedLines:
         self._permit = permit
 
     def ask(self, question: str, what: str) -> str:
-        """The answer to a query that the profile contains."""
+        """The answer to a query that the profile contains.
+
+        Raises
+        ------
+        StationRefused
+            The profile has no such query, and nothing was sent; or the device refused.
+        LeaseLost
+            The run may not drive the station; nothing was sent.
+        StationTimeout, LinkLost
+            The link's: no answer, or no connection, after all attempts.
+        """
         if question not in self._queries:
             raise self._refusal(question, what)
         if self._permit is not None:
@@ -116,7 +153,17 @@ class GatedLines:
         return self._link.ask(question, what)
 
     def tell(self, order: str, what: str) -> str:
-        """Sends a command that the profile contains, once."""
+        """Sends a command that the profile contains, once.
+
+        Raises
+        ------
+        StationRefused
+            The profile has no such command or value, and nothing was sent; or the device refused.
+        LeaseLost
+            The run may not drive the station; nothing was sent.
+        StationTimeout, LinkLost
+            The link's: no answer, or a lost connection; whether the device acted is unknown.
+        """
         if not any(_fits(command, order) for command in self._commands):
             raise self._refusal(order, what)
         if self._permit is None:

@@ -181,5 +181,8 @@ def rotation(vector: Array) -> Array:
 
 
 def keyed_normal(seed: int, channel: int, tick: int, n: int) -> NDArray[np.float64]:
-    """``n`` standard normal numbers that depend on seed, channel and tick only."""
+    """``n`` standard normal numbers that depend on seed, channel and tick only.
+
+    A stream would move on with every reading; a plant that is resumed without its readings, or is read more often, draws these.
+    """
     return np.random.Generator(np.random.Philox(key=seed, counter=[0, 0, channel, tick])).standard_normal(n)

@@ -11,6 +11,7 @@ from scipy.signal import cont2discrete, lfilter, lfilter_zi
 from stations.plant.preset import Preset
 
 Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
 
 
 def output_pole_hz(preset: Preset) -> float:
@@ -59,10 +60,6 @@ class Dynamics:
         """The response to the next samples of force, (n, units, 3), g."""
         out, self._state = lfilter(self._b, self._a, force, axis=0, zi=self._state)
         return out
-
-
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,7 @@
-"""The run's side of its watchdog: starts the process, checks it with each heartbeat, replaces it where it is gone."""
+"""The run's side of its watchdog: starts the process, checks it with each heartbeat, replaces it where it is gone.
+
+:func:`start_module` and :func:`close_pipes` are also those of the keeper of a bring-up, ``stations/bringup/keeper.py``.
+"""
 
 import json
 import os

@@ -38,6 +38,7 @@ class Hand:
     """One unit turned by hand, with an effect of ten times the noise."""
 
     effect: str
+    rests: bool = False
 
 
 AnyWorld = World | Blind | Case | Strange | Hand | Recording
@@ -68,7 +69,7 @@ def made(world: AnyWorld, seed: int) -> MadeLot:
         told = Told((), tuple(strange.truth.get("units", ())), tuple(strange.truth.get("dwells", ())))
         return MadeLot(strange.dwells, strange.history, (told,))
     if isinstance(world, Hand):
-        return MadeLot(turned_by_hand(world.effect, seed))
+        return MadeLot(turned_by_hand(world.effect, seed, rests=world.rests))
     recording = recorded(world, seed)
     return MadeLot(recording.dwells, None, (Told(("bad_dwell",), (), recording.spoilt),))
 

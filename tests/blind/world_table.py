@@ -301,8 +301,10 @@ def rows_of_other_generators() -> Iterator[Row]:
         yield Row(Strange("null"), seed, "one temperature that wanders", physics=True, also=also)
     also = changes.may_be_of_the_station
     yield Row(Strange("encoder_slips", 20.0), 95_001, "encoder slips", physics=True, also=also)
-    for effect in ("warm_up", "temperature_curve", "lag", "friction", "cubic"):
-        yield Row(Hand(effect), 77, f"{effect} by hand", physics=True, also=changes.right_of(effect))
+    for world in (*map(Hand, ("warm_up", "temperature_curve", "lag", "cubic")), Hand("friction", rests=True)):
+        yield Row(world, 77, f"{world.effect} by hand", physics=True, also=changes.right_of(world.effect))
+    # without a rest of the temperature friction and a lag are one class
+    yield Row(Hand("friction"), 77, "friction without rests by hand", named=("thermal_hysteresis",), physics=True)
     warm = Recording(40, "white 280, B 30", warm_up=2000.0)
     for seed in (5_150_006, 5_150_012):
         yield Row(warm, seed, "warm-up", named=("warm_up",), physics=True, also=changes.one_class_is_named)

@@ -42,17 +42,13 @@ class BiasNoise:
     widened: float
 
 
-def bias_measurands(noise: BiasNoise, switch_on: float | None = None) -> dict[str, Array]:
+def bias_measurands(noise: BiasNoise) -> dict[str, Array]:
     """Standard uncertainties of the bias by measurand, (units, 3) each, by the names of :data:`COLUMNS`.
 
     ``record``: the mean over the dwells' own time, which the coefficient follows: what both share of the wander is no error.
     ``long``: the mean over the day after it; flicker and random walk until then are added. ``switch_on``: the mean of a day after
-    the device was switched off and on; not a number where no repeatability of switching on is stated, never zero. The last column
-    is no uncertainty but the coefficient K of the random walk that goes on after the record, µg/√s.
-
-    Parameters
-    ----------
-    switch_on : standard deviation of the bias from one switch-on to the next, µg
+    the device was switched off and on; not a number, never zero, since a record does not show how switching on repeats. The last
+    column is no uncertainty but the coefficient K of the random walk that goes on after the record, µg/√s.
     """
     time, first, start = noise.time, float(noise.time.min()), float(noise.every.min())
     length = float(np.ptp(time))
@@ -70,7 +66,7 @@ def bias_measurands(noise: BiasNoise, switch_on: float | None = None) -> dict[st
     record, at_end = (np.sqrt(np.maximum(part, 0.0)) for part in (square, later))
     wander = np.hypot(noise.flicker, noise.excess)
     long = of_a_day(at_end, wander, time, widened=noise.widened)
-    again = np.full_like(record, np.nan) if switch_on is None else np.hypot(long, switch_on)
+    again = np.full_like(record, np.nan)
     walk = noise.carried / np.sqrt(max(float(np.ptp(noise.every)), 1e-9))
     values = (instability(wander, time), record, long, np.full_like(record, DAY_S), again, walk)
     return dict(zip(COLUMNS, values, strict=True))

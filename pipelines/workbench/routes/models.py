@@ -53,7 +53,7 @@ def release(request: Request, body: RequestBody) -> JSONResponse:
     """Release a model to the line; refused without a what-if that says "better"."""
     words = {name: str(body.get(name, "")).strip() for name in ("name", "since", "device", "station", "reason")}
     record = models.release(workbench_of(request).settings, **words)
-    name = f"{record.model_name} version {record.model_version}"
+    name = f"{record.model.model_name} version {record.model.model_version}"
     return JSONResponse({"done": f"release {record.number}: {name} from {record.since:%Y-%m-%d}"})
 
 

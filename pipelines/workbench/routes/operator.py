@@ -20,7 +20,7 @@ from schemas.station import BUILT_IN, load_station
 
 
 @dataclass(frozen=True)
-class Bench:
+class StationOfPage:
     """A station of the operator's page.
 
     file : None for the built-in one · slots : number of them
@@ -37,7 +37,7 @@ class Bench:
         return str(self.file or "")
 
 
-def stations_of(settings: WorkbenchSettings) -> list[Bench]:
+def stations_of(settings: WorkbenchSettings) -> list[StationOfPage]:
     """The stations in the order of the command line; two of one name are told apart by their files.
 
     Raises
@@ -48,7 +48,7 @@ def stations_of(settings: WorkbenchSettings) -> list[Bench]:
     configs = [(file, load_station(file)) for file in settings.stations or (None,)]
     names = [config.name for _, config in configs]
     return [
-        Bench(
+        StationOfPage(
             file,
             config.name if names.count(config.name) == 1 else str(file or BUILT_IN),
             config.devices.slots.count,
@@ -58,7 +58,7 @@ def stations_of(settings: WorkbenchSettings) -> list[Bench]:
     ]
 
 
-def station_named(known: Sequence[Bench], name: str) -> Bench:
+def station_named(known: Sequence[StationOfPage], name: str) -> StationOfPage:
     """The station of this name; the first for none.
 
     Raises
@@ -75,7 +75,7 @@ def station_named(known: Sequence[Bench], name: str) -> Bench:
     return station
 
 
-def station_at(known: Sequence[Bench], address: str) -> Bench:
+def station_at(known: Sequence[StationOfPage], address: str) -> StationOfPage:
     """The station of a lot; the first for a lot of a station that this workbench was not started with."""
     return next((one for one in known if one.address == address), known[0])
 

@@ -31,7 +31,7 @@ STEP_DEG = 0.5
 """Grid of the angles of a pose that is dragged: a hand aims no better on a map of 400 pixels."""
 
 
-def dragged_to(settings: WorkbenchSettings, page: PlanPage, name: str, x: float, y: float) -> PlanPage:
+def dragged_to(settings: WorkbenchSettings, state: PlanPage, name: str, x: float, y: float) -> PlanPage:
     """The page with a pose at a place of the map; of the two ways to turn there, the one nearer to the pose's present angles.
 
     Raises
@@ -43,16 +43,16 @@ def dragged_to(settings: WorkbenchSettings, page: PlanPage, name: str, x: float,
     if force is None:
         raise WrongUse(f"plan: pose {shown(name, 40)} was dropped outside of the sphere; drop it inside the outline")
     outer, inner = (float(value) for value in np.degrees(angles_from_force(force)))
-    recipe = _recipe(settings, page)
+    recipe = _recipe(settings, state)
     present = next((p for p in (*recipe.poses, *recipe.verification) if p.name == name), None)
     other = (-outer, inner - 180.0 if inner > 0.0 else inner + 180.0)
     ways = [(outer, inner), other]
     if present is not None:
         ways.sort(key=lambda way: abs(way[0] - present.outer_deg) + abs(way[1] - present.inner_deg))
-    return turned_to(settings, page, name, *(STEP_DEG * round(angle / STEP_DEG) for angle in ways[0]))
+    return turned_to(settings, state, name, *(STEP_DEG * round(angle / STEP_DEG) for angle in ways[0]))
 
 
-def turned_to(settings: WorkbenchSettings, page: PlanPage, name: str, outer: float, inner: float) -> PlanPage:
+def turned_to(settings: WorkbenchSettings, state: PlanPage, name: str, outer: float, inner: float) -> PlanPage:
     """The page with a pose at these angles, degrees; checked as a recipe is.
 
     Raises
@@ -60,13 +60,13 @@ def turned_to(settings: WorkbenchSettings, page: PlanPage, name: str, outer: flo
     TumblelineError
         There is no such pose, or the recipe cannot work with it there.
     """
-    kept = tuple(text for text in page.pose if next(iter(moves_of([text], "plan"))) != name)
-    new = page.model_copy(update={"pose": (*kept, f"{name}={outer:g},{inner:g}"), "edit": name})
+    kept = tuple(text for text in state.pose if next(iter(moves_of([text], "plan"))) != name)
+    new = state.model_copy(update={"pose": (*kept, f"{name}={outer:g},{inner:g}"), "edit": name})
     _recipe(settings, new)
     return new
 
 
-def save_recipe(settings: WorkbenchSettings, page: PlanPage, name: str) -> Path:
+def save_recipe(settings: WorkbenchSettings, state: PlanPage, name: str) -> Path:
     """The file of the recipe with its moved poses; an existing file is not replaced.
 
     Raises
@@ -82,20 +82,20 @@ def save_recipe(settings: WorkbenchSettings, page: PlanPage, name: str) -> Path:
     place = settings.folder / f"{name}.toml"
     if place.exists():
         raise WrongUse(f"recipe: {place} exists already; choose another name")
-    recipe = _recipe(settings, page)
-    limits = limits_from(recipe.limits, folder_of(page.recipe), settings.folder)
-    moved = ", ".join(page.pose) or "no pose is moved"
+    recipe = _recipe(settings, state)
+    limits = limits_from(recipe.limits, folder_of(state.recipe), settings.folder)
+    moved = ", ".join(state.pose) or "no pose is moved"
     new = recipe.model_copy(update={"name": name, "limits": limits})
-    text = recipe_text(new, [f"Recipe {page.recipe} with poses moved by hand (outer, inner in degrees): {moved}."])
+    text = recipe_text(new, [f"Recipe {state.recipe} with poses moved by hand (outer, inner in degrees): {moved}."])
     settings.folder.mkdir(parents=True, exist_ok=True)
     files.publish(place, text.encode(), "recipe", files.ELSEWHERE)
     return place
 
 
-def _recipe(settings: WorkbenchSettings, page: PlanPage) -> Recipe:
+def _recipe(settings: WorkbenchSettings, state: PlanPage) -> Recipe:
     """The recipe of a page; formulas of its model are known during the call only."""
     with effects.additions_forgotten():
-        return recipe_of(requests.plan(settings, page)[1])[1]
+        return recipe_of(requests.plan(settings, state)[1])[1]
 
 
 router = APIRouter()

@@ -8,8 +8,8 @@ from schemas.profile import Profile
 from schemas.units import AXES, STANDARD_GRAVITY_M_S2
 from stations.codec import OUTPUTS
 from stations.plant.bench import Bench, Waveforms
-from stations.plant.controller import ResultFiles
 from stations.plant.device import stream
+from stations.plant.equipment import ResultFiles
 from stations.plant.world import World
 
 UNKNOWN, WRONG = "NA:CMD ERR", "NA:PARA ERR"

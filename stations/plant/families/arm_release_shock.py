@@ -4,7 +4,7 @@ import numpy as np
 
 from schemas.profile import Profile
 from stations.plant.bench import FINE_HZ, Waveforms
-from stations.plant.controller import ResultFiles
+from stations.plant.equipment import ResultFiles
 from stations.plant.world import World
 
 UNKNOWN, WRONG, REFUSED = "NA:CMD ERR", "NA:PARA ERR", "NA:NOT ARMED"

@@ -4,7 +4,7 @@ import math
 
 from schemas.profile import Profile
 from stations.plant.bench import Waveforms
-from stations.plant.controller import DONE, UNDEFINED, ResultFiles, ScpiDevice, exciter_reach
+from stations.plant.equipment import DONE, UNDEFINED, ResultFiles, ScpiDevice, exciter_reach
 from stations.plant.world import World
 
 SETTLE_S = 0.3

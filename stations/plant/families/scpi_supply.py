@@ -1,7 +1,7 @@
 """The simulated programmable power supply of the devices."""
 
 from schemas.profile import Profile
-from stations.plant.controller import DONE, UNDEFINED, ScpiDevice
+from stations.plant.equipment import DONE, UNDEFINED, ScpiDevice
 from stations.plant.world import World
 
 DROP = 0.9  # of the set voltage, where the current limit holds it

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from schemas.profile import Profile
 from schemas.vibration_profile import load_vibration_profile
 from stations.plant.bench import Waveforms
-from stations.plant.controller import ResultFiles, exciter_reach
+from stations.plant.equipment import ResultFiles, exciter_reach
 from stations.plant.world import World
 
 UNKNOWN, WRONG, BUSY = "NA:CMD ERR", "NA:PARA ERR", "NA:BUSY"

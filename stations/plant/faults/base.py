@@ -84,10 +84,13 @@ class Fault:
         """Changes the world when the fault begins."""
         if self.kind.effect is not None:
             self._effect = self.kind.effect(self, world, **self.figures)
-            self.ends(world)
+            self._next_part()
 
     def ends(self, world: World) -> None:
-        """Goes on to the next part of the effect: from its beginning to its end, and to nothing where it has none."""
+        """Undoes the change when the fault ends, where its kind says how."""
+        self._next_part()
+
+    def _next_part(self) -> None:
         if self._effect is not None:
             next(self._effect, None)
 

@@ -1,4 +1,8 @@
-"""Errors of table, encoder and fixture, the same for every device or for every device in a slot; errors of the references."""
+"""Errors of table, encoder and fixture, the same for every device or for every device in a slot; errors of the references.
+
+The truth is independent of the fit because an error acts where it arises: it turns the angles, the vertical or the force before
+a device answers, by a rotation or its second order. The fit's columns, linear in a coefficient, are not used and not imported.
+"""
 
 import math
 from dataclasses import dataclass, field

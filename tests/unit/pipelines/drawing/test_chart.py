@@ -4,6 +4,7 @@ import base64
 import csv
 import io
 import re
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -55,6 +56,17 @@ def test_the_numbers_of_a_figure_are_those_of_its_csv_and_its_labels_those_of_it
     config = figure["config"]  # nothing leaves the page
     assert (config["showSendToCloud"], config["plotlyServerURL"], config["displaylogo"]) == (False, "", False)
     assert "geo" not in str(figure["layout"])
+
+
+def test_the_note_of_a_chart_stands_below_its_plots() -> None:
+    plain, noted = chart(), replace(chart(), note="3 of 5 are <not> drawn")
+    before, after = plotly_figure(plain)["layout"], plotly_figure(noted)["layout"]
+    room = after["height"] - before["height"]
+    assert room == after["margin"]["b"] - before["margin"]["b"] > 0
+    assert after["annotations"][-1]["text"] == "3 of 5 are &lt;not&gt; drawn"
+    assert ">3 of 5 are &lt;not&gt; drawn</text>" in svg_text(noted)
+    heights = [float(re.search(r'viewBox="0 0 \S+ (\S+)"', svg_text(one))[1]) for one in (plain, noted)]
+    assert heights[1] > heights[0]
 
 
 def test_names_become_no_markup_and_no_formula_of_a_spreadsheet() -> None:

@@ -85,7 +85,7 @@ def test_a_model_with_the_missing_effect_is_better_on_fresh_runs_and_in_yield(be
 def test_the_new_side_is_what_a_rerun_makes(archive: Archive, better: tuple[ModelChange, dict]) -> None:
     change, _ = better
     run = archive.runs()[0].id
-    side = judged(Batch(archive.address, (run,), change))[0].new
+    side = judged(Batch(archive.address, (run,), change))[0].sides[1]
     made = archive.run(again(archive, run, change).new)
     assert side.calibration is not None
     stored = read_calibration(made.table("coefficients"), made.table("covariance"))
@@ -216,7 +216,8 @@ def test_verdicts_on_models_that_are_equally_good_are_seldom_better(archive: Arc
     verdicts: Counter[str] = Counter()
     for _ in range(1000):
         squares = rng.chisquare(18, (6, 2)) * 25.0
-        sides = [replace(side, verified={u: (s[k], 18) for u, s in zip(units, squares, strict=True)}) for k in (0, 1)]
-        verdicts[summary([LotComparison(entry, *sides)], [])["verdict"]] += 1
+        errors = [{u: (s[k], 18) for u, s in zip(units, squares, strict=True)} for k in (0, 1)]
+        sides = tuple(replace(side, verified=verified) for verified in errors)
+        verdicts[summary([LotComparison(entry, sides)], [])["verdict"]] += 1
     assert verdicts["better"] <= 40  # 25 expected
     assert verdicts["worse"] <= 40
