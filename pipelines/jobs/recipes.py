@@ -161,8 +161,8 @@ def lot_of(
         )
     units = [Unit(serial=serial, slot=slot) for serial, slot in zip(named, slots or range(len(named)), strict=True)]
     try:
-        kind = {"device": recipe.device, "sensor_axes": recipe.sensor_axes}
-        return Lot(units=units, **kind, seed=recipe.seed if seed is None else seed, repeat=repeat)
+        chosen, axes = recipe.seed if seed is None else seed, recipe.sensor_axes
+        return Lot(units=units, device=recipe.device, sensor_axes=axes, seed=chosen, repeat=repeat)
     except ValidationError as problem:
         raise explain(problem, "lot", Lot) from None
 

@@ -10,6 +10,7 @@ from in_process import document_of, given, text_of
 from pipelines.archive import Archive
 from schemas.errors import UNUSABLE
 
+DEPLOY = Path(__file__).resolve().parents[2] / "deploy"
 RECIPE = """
 name = "{name}"
 device = "sf1500"
@@ -128,6 +129,30 @@ def test_its_plan_speaks_of_one_axis(measured) -> None:
     page = (folder / "plan.html").read_text(encoding="utf-8")
     assert "error x, 1σ" in page
     assert "error y, 1σ" not in page
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("kind", "figures", "effect"),
+    [
+        ("cubic_transfer", "hardening = 400e-6", "third_order"),
+        ("warm_up", "size = 0.0009, tau = 1500.0", "warm_up"),
+    ],
+)
+def test_what_one_axis_hides_is_named(kind: str, figures: str, effect: str, tmp_path: Path) -> None:
+    awry = (DEPLOY / "stations" / "simulated-awry.toml").read_text(encoding="utf-8")
+    begin, end = awry.index("# A spring that hardens"), awry.index("# The noise of the chapter")
+    own = f'[[simulation.hidden]]\nkind = "{kind}"\nfigures = {{ {figures} }}\n'
+    (tmp_path / "awry.toml").write_text(awry[:begin] + own + awry[end:], encoding="utf-8")
+    text = (DEPLOY / "recipes" / "qa700-single-axis.toml").read_text(encoding="utf-8")
+    (tmp_path / "one.toml").write_text(text.replace('"qa700.limits.toml"', '"own.limits.toml"'), encoding="utf-8")
+    (tmp_path / "own.limits.toml").write_text(LIMITS, encoding="utf-8")
+    archive = tmp_path / "archive"
+    station = ("--station", tmp_path / "awry.toml")
+    run = document_of("run", tmp_path / "one.toml", *station, "--archive", archive, "--json")
+    found = document_of("diagnose", run["run"], "--archive", archive, "--json")
+    assert found["adequate"] is False
+    assert found["recommended"] == [effect]
 
 
 @pytest.mark.parametrize(
