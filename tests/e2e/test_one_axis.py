@@ -152,7 +152,7 @@ def test_what_one_axis_hides_is_named(kind: str, figures: str, effect: str, tmp_
     run = document_of("run", tmp_path / "one.toml", *station, "--archive", archive, "--json")
     found = document_of("diagnose", run["run"], "--archive", archive, "--json")
     assert found["adequate"] is False
-    assert effect in found["classes"][0]
+    assert effect in found["classes"][0]["effects"]
     assert len(found["classes"]) == 1
 
 
