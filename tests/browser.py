@@ -1,6 +1,7 @@
 """A workbench in a process of its own, and Debian's chromium opposite; playwright drives it and downloads nothing."""
 
 import gzip
+import json
 import os
 import shutil
 import signal
@@ -8,7 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -101,6 +102,9 @@ def served(archive: Path, folder: Path, *stations: Path) -> Iterator[Served]:
         yield one
     finally:
         one.end()
+        for state in folder.glob("lots/*/state.json"):  # the process of a lot that asks for a hand outlives the server
+            with suppress(ProcessLookupError):
+                os.kill(json.loads(state.read_text(encoding="utf-8"))["pid"], signal.SIGKILL)
 
 
 def clip(width: int, height: int) -> dict[str, float]:
