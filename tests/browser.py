@@ -103,8 +103,10 @@ def served(archive: Path, folder: Path, *stations: Path) -> Iterator[Served]:
     finally:
         one.end()
         for state in folder.glob("lots/*/state.json"):  # the process of a lot that asks for a hand outlives the server
-            with suppress(ProcessLookupError):
-                os.kill(json.loads(state.read_text(encoding="utf-8"))["pid"], signal.SIGKILL)
+            number = json.loads(state.read_text(encoding="utf-8")).get("pid", 0)
+            with suppress(OSError):
+                if number and str(folder) in Path(f"/proc/{number}/cmdline").read_text(encoding="utf-8"):
+                    os.kill(number, signal.SIGKILL)
 
 
 def clip(width: int, height: int) -> dict[str, float]:
