@@ -50,6 +50,10 @@ class Ledger:
         """
         return calibrations_of(e for e in self.events(serial) if not known or e.when[:10] <= known)
 
+    def valid_at(self, serial: str, day: str, known: str = "") -> Calibration | None:
+        """The valid calibration of a unit on a day; None without one."""
+        return next((one for one in self.calibrations(serial, known) if one.holds(day)), None)
+
     def all(self) -> Iterator[Calibration]:
         """Every calibration of every unit."""
         for events in self.histories():

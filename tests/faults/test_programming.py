@@ -24,7 +24,6 @@ from pipelines.archive.signatures import VARIABLE
 from pipelines.certificates import Ledger
 from pipelines.certificates.days import today
 from pipelines.certificates.programmed import programming, unproved
-from pipelines.certificates.validity import Calibration
 from pipelines.chain.certify import certify
 from pipelines.cli import app
 from pipelines.export import UnitCalibration
@@ -69,20 +68,16 @@ def copies(run: Run, unit: int = 0) -> list[bytes]:
     return [struct.pack(">192H", *plant.flash[unit].read(copy, plant.now_us)) for copy in (0, 1)]
 
 
-def valid_now(ledger: Ledger, serial: str) -> Calibration | None:
-    return next((one for one in ledger.calibrations(serial) if one.holds(today())), None)
-
-
 def test_a_lot_is_written_proved_and_certified_again(run: Run) -> None:
-    ledger = Ledger(run.archive.root)
+    ledger, day = Ledger(run.archive.root), today()
     first = certify(ledger, run, ["A1", "A2"]).events
     done, given = programmed(run)
     assert {one.outcome for one in done.values()} == {"proved"}, [one.reason for one in done.values()]
-    held = valid_now(ledger, "A1")
+    held = ledger.valid_at("A1", day)
     assert held.certificate == given["A1"] == "A1/3"  # certified, ended, certified again
     assert held.until == first[0].until
     assert set(given) == {"A1", "A2"}  # A3 was not certified, and is not by this
-    assert valid_now(ledger, "A3") is None
+    assert ledger.valid_at("A3", day) is None
     block = unpack(copies(run)[0])
     assert (block.unit, block.sequence, block.certificate) == ("A1", 1, 3)
     for one in done.values():
@@ -140,7 +135,7 @@ def test_a_fault_leaves_the_valid_copy_and_no_certificate(
         assert unproved(run.archive.root, "A1") == ""
         return
     assert "A1" not in given
-    assert valid_now(Ledger(run.archive.root), "A1") is None
+    assert Ledger(run.archive.root).valid_at("A1", today()) is None
     with pytest.raises(WrongUse, match="unit A1: the writing of its memory failed"):
         certify(Ledger(run.archive.root), run, ["A1"])
     assert "A1" in certify(Ledger(run.archive.root), run).left_out
@@ -285,13 +280,13 @@ def test_a_process_that_is_killed_leaves_the_unit_not_certified_until_it_is_writ
     environment = {**os.environ, VARIABLE: ""}
     done = subprocess.run(words, cwd=ROOT, check=False, capture_output=True, text=True, env=environment)
     assert done.returncode == -signal.SIGKILL, done.stderr
-    assert valid_now(ledger, "A1") is None
+    assert ledger.valid_at("A1", today()) is None
     assert "has no end" in unproved(run.archive.root, "A1")
     with pytest.raises(WrongUse, match="has no end"):
         certify(ledger, run, ["A1"])
     again, given = programmed(run, ("A1",))
     assert again["A1"].outcome == "proved", again["A1"].reason
-    held = valid_now(ledger, "A1")
+    held = ledger.valid_at("A1", today())
     assert held.certificate == given["A1"] == "A1/3"
     written = again["A1"].block
     assert written.certificate == 3
@@ -335,7 +330,7 @@ def test_nothing_is_written_while_the_emergency_stop_is_pressed_or_the_door_open
     with pytest.raises(refusal):
         programmed(run, ("A1",))
     assert programming(run.archive.root, "A1") == []
-    assert valid_now(ledger, "A1") is not None
+    assert ledger.valid_at("A1", today()) is not None
 
 
 def test_a_device_that_is_named_twice_is_written_once(run: Run) -> None:
@@ -375,7 +370,7 @@ def test_an_older_run_is_not_written_over_a_newer_certified_one(run: Run, change
     words = rf"certificate A1/3 is of run {re.escape(other.id)}.*not after it; write that run"
     with pytest.raises(WrongUse, match=words):
         programmed(run, ("A1",))
-    held = valid_now(ledger, "A1")
+    held = ledger.valid_at("A1", today())
     assert held.run == other.id
     assert programming(run.archive.root, "A1") == []
     programmed(run, ("A2",))  # the other units are not concerned
@@ -411,7 +406,7 @@ def test_a_certificate_that_comes_in_between_does_not_leave_a_number_that_the_de
         done, given = programmed(run, ("A1",))
     assert given == {}
     assert (done["A1"].outcome, done["A1"].step) == ("failed", "certify")
-    assert valid_now(ledger, "A1") is None
+    assert ledger.valid_at("A1", today()) is None
     again, given = programmed(run, ("A1",))
     written = again["A1"].block
     assert again["A1"].outcome == "proved"
@@ -424,7 +419,7 @@ def test_a_door_that_is_opened_ends_the_verification(run: Run) -> None:
     with pytest.raises(OperatorNeeded, match="door is open"):
         programmed(run, ("A1",))
     assert [entry["event"] for entry in programming(run.archive.root, "A1")] == ["begun", "failed"]
-    assert valid_now(Ledger(run.archive.root), "A1") is None
+    assert Ledger(run.archive.root).valid_at("A1", today()) is None
 
 
 def test_a_failure_that_cannot_be_recorded_hides_neither_its_cause_nor_the_other_units(
