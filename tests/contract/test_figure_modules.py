@@ -45,7 +45,7 @@ def table(kept):
 
 def yielded(kept) -> list[str]:
     """Figures for which the recipe of the kept run lacks nothing."""
-    recipe = SimpleNamespace(**kept.about["recipe"])
+    recipe = SimpleNamespace(sensor_axes=3, **kept.about["recipe"])
     return [name for name, kind in FIGURES.items() if not kind.missing(recipe)]
 
 
@@ -70,9 +70,15 @@ def test_the_table_has_the_figures_in_their_order(kept, table) -> None:
 
 @each(FIGURES)
 def test_a_figure_says_what_a_recipe_lacks(name: str) -> None:
-    bare = SimpleNamespace(static_record_s=0.0, verification=[], effects=[], tumbles=True)
+    bare = SimpleNamespace(static_record_s=0.0, verification=[], effects=[], tumbles=True, sensor_axes=3)
     missing = FIGURES[name].missing(bare)
-    whole = {"static_record_s": 3600.0, "verification": ["v1"], "stability": object(), "tumbles": True}
+    whole = {
+        "static_record_s": 3600.0,
+        "verification": ["v1"],
+        "stability": object(),
+        "tumbles": True,
+        "sensor_axes": 3,
+    }
     full = SimpleNamespace(**whole, effects=[missing.split()[1]] if missing else [])
     assert FIGURES[name].missing(full) == ""
     limits = limits_of({"name": "one", "figures": {name: {"max": 1.0, "unit": UNITS[name]}}}, UNITS)

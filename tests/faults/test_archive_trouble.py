@@ -15,7 +15,7 @@ from each import each
 from in_process import given
 from root_process import ROOT
 
-from pipelines.archive import Archive, Run, hash_chain, keys
+from pipelines.archive import Archive, Run, hash_chain, provenance
 from pipelines.certificates import Ledger
 from pipelines.chain.certify import certify
 from pipelines.chain.runner import Runner
@@ -121,7 +121,7 @@ def test_a_clock_that_goes_backwards_loses_nothing_and_is_told(tmp_path: Path, m
         def now(cls, tz=None):
             return datetime.now(tz) - timedelta(days=1)
 
-    monkeypatch.setattr(keys, "datetime", Yesterday)
+    monkeypatch.setattr(provenance, "datetime", Yesterday)
     later = Runner(small_job(tmp_path, ("seed = 5", "seed = 6")), store, measure=CaptureDouble())
     list(later.all())
     report = verify(store, keys={})

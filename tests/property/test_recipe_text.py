@@ -109,6 +109,7 @@ def recipe_files(draw):
         rate_hz=draw(numbers(100.0, 4000.0)),
         static_record_s=draw(numbers(0.0, 5000.0)),
         static_temperature_C=draw(numbers(-40.0, 85.0)),
+        sensor_axes=draw(st.integers(1, 3)),
         zero_output=draw(numbers(-5.0, 5.0)),
         span_min_g=draw(numbers(1.0, 1.4)),
         effects=draw(st.lists(st.sampled_from(EFFECTS), min_size=1, unique=True)),
