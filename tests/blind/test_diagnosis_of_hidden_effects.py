@@ -30,7 +30,7 @@ LARGE: dict[str, tuple[int, dict[str, tuple[float, float]]]] = {
     "faults": (
         32,
         {"fault caught, unit blocked": (96.0, 100.0)},
-    ),  # units exchanged in the middle are exchanged back, not blocked
+    ),  # exchanged units are exchanged back, not blocked
 }
 """Number of runs of each deal, and the least and largest percentage of its figures."""
 FALSE_ALARM = "false fault alarm on a clean run"
