@@ -191,9 +191,9 @@ def rows_of_single_axes() -> Iterator[Row]:
         change = changes.in_middle_soak(
             *((unit, "xyz"[axis], 900e-6 * float(sizes[unit, axis])) for unit, axis in chosen)
         )
-        yield Row(
-            World(), JUMPS + 3, f"curve, {label}", named=("bias_temperature_quadratic",), physics=True, change=change
-        )
+        also = changes.curve_or_step_of_the_unit
+        named = ("bias_temperature_quadratic",) if label == "y of all" else ()
+        yield Row(World(), JUMPS + 3, f"curve, {label}", named=named, physics=True, also=also, change=change)
 
 
 def rows_of_steps() -> Iterator[Row]:
