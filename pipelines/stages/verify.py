@@ -62,7 +62,7 @@ def verify_tables(
     truth = lot.state.force + station_change(model, lot.state, calibration.shared, calibration.nonlinear)
     axes = lot.state.axes
     corrected, truth = of_axes(corrected, axes, -1), of_axes(truth, axes, -1)
-    norm, expected_norm = _sizes(corrected), _sizes(of_axes(lot.state.force, axes, -1))
+    norm, expected_norm = sizes(corrected), sizes(of_axes(lot.state.force, axes, -1))
     toward = (corrected / norm[..., None])[:, unseen]
     scale = np.abs(own_terms(of_axes(calibration.response, axes, -2), axes))[:, None, :]
     reading = (lot.standard_error / scale)[:, unseen]
@@ -80,8 +80,8 @@ def verify_tables(
     return verification_rows(lot, unseen, columns, by_axis, expected)
 
 
-def _sizes(force: Array) -> Array:
-    """Norm of the force, g; of a single axis the force along it, with its sign."""
+def sizes(force: Array) -> Array:
+    """Norm of forces (..., m), g; of a single axis the force along it, with its sign."""
     return force[..., 0] if force.shape[-1] == 1 else np.linalg.norm(force, axis=-1)
 
 

@@ -33,6 +33,23 @@ grade = "consumer"
 [figures]
 verification_norm_ug = { max = 5000.0, unit = "µg" }
 """
+LABORATORY = """
+[laboratory]
+name = "Example Sensor Works"
+address = "Am Kornfeld 7, 38116 Braunschweig"
+country = "DE"
+email = "calibration@example.com"
+place = "laboratory"
+[customer]
+name = "Example Drones Ltd"
+address = "12 Mill Lane, Cambridge"
+email = "quality@example.org"
+[signatory]
+name = "J. Example"
+role = "Head of calibration"
+[item]
+manufacturer = "Colibrys"
+"""
 ONE = 'device = "sf1500"\nsensor_axes = 1\n'
 
 
@@ -193,3 +210,16 @@ def test_a_limit_of_angles_between_axes_is_refused_for_one(measured, tmp_path: P
     status, _, err = given("run", tmp_path / "one.toml", "--archive", tmp_path / "archive")
     assert status == UNUSABLE
     assert "orthogonality_mrad needs sensor_axes = 3" in " ".join(err.split())
+
+
+def test_its_certificate_speaks_of_the_error_along_its_axis(measured, tmp_path: Path) -> None:
+    folder, runs = measured
+    archive = ("--archive", folder / "archive")
+    given("certify", runs["one"], *archive)
+    (tmp_path / "laboratory.toml").write_text(LABORATORY, encoding="utf-8")
+    text_of("certificate", "SF-02", *archive, "--laboratory", tmp_path / "laboratory.toml", "--output", tmp_path)
+    [document] = tmp_path.glob("*.xml")
+    text = document.read_text(encoding="utf-8")
+    assert "error of the corrected output, verification (largest of the poses)" in text
+    assert "norm of gravity" not in text
+    assert "|a|" not in text

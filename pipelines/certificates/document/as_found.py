@@ -8,10 +8,11 @@ import numpy as np
 
 from inertial.arrays import Array
 from inertial.correction import correct
-from inertial.design import carried_over
+from inertial.design import carried_over, of_axes
 from pipelines.archive import Run
 from pipelines.certificates import Calibration
 from pipelines.certificates.document.content import Adjustment
+from pipelines.stages.verify import sizes
 from pipelines.tables.calibration import read_calibration
 from pipelines.tables.dwells import lot_arrays
 from schemas.errors import TumblelineError
@@ -71,6 +72,7 @@ def _errors(run: Run, source: Run, unit: str) -> Array:
     corrected = correct(
         calibration.effects, lot.state, lot.output, calibration.coefficients, carried_over(calibration.nonlinear)
     )
-    error = MICRO * (np.linalg.norm(corrected, axis=-1) - np.linalg.norm(lot.state.force, axis=-1))
+    axes = lot.state.axes
+    error = MICRO * (sizes(of_axes(corrected, axes, -1)) - sizes(of_axes(lot.state.force, axes, -1)))
     unseen = lot.of_kind("verification")
     return error.reshape(-1)[unseen] if unseen.any() else error.reshape(-1)

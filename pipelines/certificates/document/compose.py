@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import isfinite, nan
 from typing import Any
 
@@ -19,6 +20,7 @@ from pipelines.certificates.document.content import (
     Contribution,
     ReferenceStandard,
     Result,
+    letters_of,
 )
 from pipelines.certificates.document.laboratory import LaboratoryFile
 from pipelines.certificates.document.numbers import probability, significant
@@ -28,11 +30,13 @@ from pipelines.certificates.stated_budget import Row, StatedBudget, edge, stated
 from pipelines.stages.figures import FIGURES
 from pipelines.stages.uncertainty.contributions import left_out
 from pipelines.stages.uncertainty.tables import LABELS
+from pipelines.tables.calibration import EVERY_AXIS
 from pipelines.tables.frames import rows_of
 from schemas.decisions import BOUND, GRADES, LARGEST_ERROR, MEDIAN, exceedance
 from schemas.errors import ArchiveUnusable, WrongUse
 from schemas.reference import Reference
 from schemas.uncertainty import Uncertainty
+from schemas.units import AXES
 
 QUANTITIES = {
     "bias": "bias at the reference temperature",
@@ -46,6 +50,11 @@ QUANTITIES = {
     "verification_norm": "error of the norm of gravity, verification (largest of the poses)",
     "bias_error_period": "error of the corrected output to be expected over the stated period (standard deviation)",
 }
+OF_FEWER_AXES = {
+    QUANTITIES["verification_norm"]: "error of the corrected output, verification (largest of the poses)",
+    "| |a| − g |": "error of the corrected output",
+}
+"""Words for the norm of gravity, of a device that has no three axes to measure it."""
 BUDGETS = ("bias", "scale", "output", "bias_error_period")
 """Quantities whose budget a certificate prints."""
 SOURCES = {
@@ -90,7 +99,9 @@ def compose(run: Run, calibration: Calibration, known: list[Calibration], who: L
     _refuse(run, calibration)
     budget = stated_budget(run, serial)
     recipe, station = about.get("recipe") or {}, about.get("station") or {}
-    coefficients = [_coefficient(row) for row in rows_of(run.table("coefficients")) if row["unit"] == serial]
+    own = [row for row in rows_of(run.table("coefficients")) if row["unit"] == serial]
+    held = [row["name"] for row in own if (row["effect"], row["axis"]) == ("misalignment", EVERY_AXIS)]
+    coefficients = [_coefficient(row) for row in own if row["effect"] != "misalignment" or row["axis"] != EVERY_AXIS]
     first, last = measured_span(run) or (measured_on(run), measured_on(run))
     return CertificateContent(
         number=calibration.certificate,
@@ -112,7 +123,7 @@ def compose(run: Run, calibration: Calibration, known: list[Calibration], who: L
         results=tuple(_result(row, coefficients) for row, _ in budget.quantities if row["quantity"] != LARGEST_ERROR),
         budgets=tuple(_budget(row, parts) for row, parts in budget.quantities if row["quantity"] in BUDGETS),
         coefficients=tuple(coefficients),
-        conformity=tuple(_conformity(row) for row in budget.decisions),
+        conformity=tuple(_conformity(row, letters_of(coefficients)) for row in budget.decisions),
         decision_rule="; ".join(dict.fromkeys(row["rule"] for row in budget.decisions)),
         limits=str((about.get("limits") or {}).get("name", "")),
         grade_statement=_grade_statement(budget, event.grade),
@@ -122,7 +133,7 @@ def compose(run: Run, calibration: Calibration, known: list[Calibration], who: L
         if budget.customer_agreed
         else "",
         adequacy=event.adequacy,
-        left_out=_left_out(run),
+        left_out=_left_out(run, held),
         uncertainty_note=UNCERTAINTY,
         declaration=DECLARATION,
         software=f"Tumbleline {(about.get('software') or {}).get('tumbleline', 'version not known')}",
@@ -153,6 +164,13 @@ def _quantity(row: Row) -> str:
     return QUANTITIES.get(row["quantity"], str(row["quantity"]))
 
 
+def _of_axes(text: str, letters: str) -> str:
+    """A text that speaks of the norm of gravity, for a device with these axes."""
+    for old, new in OF_FEWER_AXES.items() if len(letters) < len(AXES) else ():
+        text = text.replace(old, new)
+    return text
+
+
 def _result(row: Row, coefficients: list[Coefficient]) -> Result:
     """A quantity of the budget; the scale, which the budget has relative to itself, as a sensitivity in units of the output."""
     value, unit, expanded = row["value"], row["unit_text"], row["expanded"]
@@ -160,9 +178,10 @@ def _result(row: Row, coefficients: list[Coefficient]) -> Result:
     if scale:
         value, unit, expanded = scale[0].value, scale[0].unit, abs(scale[0].value) * 1e-6 * expanded
     bare = row["quantity"] in {"output", "scale"} and not scale
+    letters = letters_of(coefficients)
     return Result(
-        quantity=_quantity(row),
-        axis=row["axis"],
+        quantity=_of_axes(_quantity(row), letters),
+        axis=letters if row["axis"] == "norm" and len(letters) < len(AXES) else row["axis"],
         unit=unit,
         value=None if bare else value,
         expanded=expanded,
@@ -199,8 +218,9 @@ def _source(text: str) -> str:
     return text
 
 
-def _conformity(row: Row) -> Conformity:
+def _conformity(row: Row, letters: str) -> Conformity:
     label = FIGURES[row["figure"]].label if row["figure"] in FIGURES else row["figure"]
+    label = _of_axes(label, letters)
     least = isfinite(row.get("least", nan))
     return Conformity(
         figure=f"{label} (least value, accepted from)" if least else label,
@@ -256,12 +276,19 @@ def _traceability(budget: StatedBudget, stated_entries: dict[str, Any]) -> str:
     return f"{text} Without a standard of their own, by the sources in the budgets ({source}): {named}."
 
 
-def _left_out(run: Run) -> str:
-    """The contributions that the statement of the references lacks: U counts them as zero."""
+def _left_out(run: Run, held: Sequence[str]) -> str:
+    """The contributions that the statement of the references lacks: U counts them as zero; and what the poses do not show.
+
+    Parameters
+    ----------
+    held : directions in which the poses do not show the response across
+    """
     terms = run.manifest("budget")["parameters"].get("uncertainty") or {}
     names = left_out(Uncertainty.model_validate(terms))
     named = ", ".join(LABELS.get(name, name) for name in names)
-    return f"Not stated, and not contained in the uncertainties U: {named}." if names else ""
+    unstated = f"Not stated, and not contained in the uncertainties U: {named}." if names else ""
+    unseen = f"Not determined by the poses, and taken for zero: misalignment along {', '.join(held)}." if held else ""
+    return " ".join(filter(None, (unstated, unseen)))
 
 
 def _method(run: Run, recipe: dict[str, Any], who: LaboratoryFile) -> str:

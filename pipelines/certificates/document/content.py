@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from pipelines.certificates.document.laboratory import LaboratoryFile
 from schemas.strict import Strict
+from schemas.units import AXES
 
 
 class Result(Strict):
@@ -55,6 +58,12 @@ class Contribution(Strict):
     unit: str
     share: float
     source: str
+
+
+def letters_of(coefficients: Sequence[Coefficient]) -> str:
+    """The axes that have coefficients of their own, in order."""
+    known = {one.axis for one in coefficients}
+    return "".join(axis for axis in AXES if axis in known)
 
 
 class BudgetTable(Strict):

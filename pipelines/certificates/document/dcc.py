@@ -7,10 +7,11 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
-from pipelines.certificates.document.content import CertificateContent, Conformity, Result
+from pipelines.certificates.document.content import CertificateContent, Conformity, Result, letters_of
 from pipelines.certificates.document.numbers import least_of, si_unit
 from schemas.errors import TumblelineError
 from schemas.library import library
+from schemas.units import AXES
 
 EXTRA, WHERE = "pdf", "certificate"
 SI_ADDRESS = "https://ptb.de/si/v2.0.0/SI_Format.xsd"
@@ -263,7 +264,8 @@ def _conditions(w: _Writer, parent: Any, c: CertificateContent) -> None:
     ):
         if rms is not None:
             box = w.add(parent, "influenceCondition")
-            w.text(box, "name", f"RMS error of the norm of gravity {text}")
+            what = "corrected output" if len(letters_of(c.coefficients)) < len(AXES) else "norm of gravity"
+            w.text(box, "name", f"RMS error of the {what} {text}")
             w.add(box, "status", status)
             w.real(w.add(w.add(box, "data"), "quantity"), rms, "µg")
 
