@@ -63,7 +63,7 @@ def measured(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, 
         text = RECIPE.format(name=name)
         text = text if name == "three" else text.replace('device = "sf1500"\n', ONE)
         (folder / f"{name}.toml").write_text(text, encoding="utf-8")
-        document = document_of("run", folder / f"{name}.toml", "--archive", folder / "archive", "--json")
+        document = document_of("run", folder / f"{name}.toml", "--direct", "--archive", folder / "archive", "--json")
         runs[name] = document["run"]
     return folder, runs
 
@@ -166,7 +166,7 @@ def test_what_one_axis_hides_is_named(kind: str, figures: str, effect: str, tmp_
     (tmp_path / "own.limits.toml").write_text(LIMITS, encoding="utf-8")
     archive = tmp_path / "archive"
     station = ("--station", tmp_path / "awry.toml")
-    run = document_of("run", tmp_path / "one.toml", *station, "--archive", archive, "--json")
+    run = document_of("run", tmp_path / "one.toml", *station, "--direct", "--archive", archive, "--json")
     found = document_of("diagnose", run["run"], "--archive", archive, "--json")
     assert found["adequate"] is False
     assert effect in found["classes"][0]["effects"]
