@@ -86,9 +86,9 @@ def visibilities(
     noise = None if covariance is None else _Noise(state, base, whitener(covariance))
     names = [n for n in (candidates or catalogue.catalogue()) if n not in set(base)]
     remainders, aliases = _beside(state, base, names)
-    nothing = (0.0,) * len(state.axes)
     return [
-        _visibility(n, remainders[n] or nothing, error if noise is None else noise, aliases.get(n, {})) for n in names
+        _visibility(n, remainders[n], error if noise is None else noise, aliases.get(n, {}), len(state.axes))
+        for n in names
     ]
 
 
@@ -209,16 +209,14 @@ def _stacked(state: State, axes: Sequence[Array]) -> Array:
 
 
 def _visibility(
-    name: str, remainder: "_Remainder | tuple[float, ...]", noise: float | _Noise, cosines: Mapping[str, float]
+    name: str, remainder: "_Remainder | None", noise: float | _Noise, cosines: Mapping[str, float], axes: int
 ) -> Visibility:
     breaker = catalogue.get(name).breaker
     alias = tuple(other for other, cosine in cosines.items() if cosine > ALIAS)
     exact = tuple(other for other in alias if cosines[other] > EXACT)
-    if not isinstance(remainder, _Remainder):
-        return Visibility(name, False, 0.0, remainder, float("inf"), alias, breaker)
-    if remainder.remaining_fraction <= SEEN:
-        nothing = tuple(0.0 for _ in remainder.by_axis)
-        return Visibility(name, False, remainder.remaining_fraction, nothing, float("inf"), alias, breaker)
+    if remainder is None or remainder.remaining_fraction <= SEEN:
+        fraction = 0.0 if remainder is None else remainder.remaining_fraction
+        return Visibility(name, False, fraction, (0.0,) * axes, float("inf"), alias, breaker)
     if isinstance(noise, _Noise):
         information = noise.information(remainder.columns)
     else:

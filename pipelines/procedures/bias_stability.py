@@ -13,11 +13,11 @@ from inertial.dynamics.stability import StabilityFigures, block_means, stability
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace
 from pipelines.procedures.base import InG, NominalScale, RecordByRecord, scale_of
 from pipelines.procedures.figures import FigureSpec, FigureValue, UnitOutcome, with_uncertainty, worst
-from pipelines.procedures.recorded import Device, ProcedureStep, Taken, axes_of, numbers, point_rows
+from pipelines.procedures.recorded import Device, ProcedureStep, Taken, numbers, point_rows
 from schemas.bounds import Positive
 from schemas.poses import Pose
 from schemas.recipe import Recipe
-from schemas.units import MICRO
+from schemas.units import MICRO, axes_among
 
 
 class BiasStabilityPart(NominalScale):
@@ -83,7 +83,7 @@ class BiasStability(InG, RecordByRecord):
         """Means of 10 s and of 100 s of every axis over time, each about its mean."""
         short: list[Trace] = []
         long: list[Trace] = []
-        for axis in axes_of(points):
+        for axis in axes_among(points["axis"]):
             own = points[points["axis"] == axis]
             seconds, value = numbers(own, "setting", "value")
             time, value = seconds / 60.0, value - value.mean()

@@ -180,12 +180,6 @@ def numbers(rows: pd.DataFrame, *names: str) -> list[NDArray[np.float64]]:
     return [rows[name].to_numpy(dtype=float) for name in names or ("setting", "value", "uncertainty")]
 
 
-def axes_of(points: pd.DataFrame) -> list[Literal["x", "y", "z"]]:
-    """The sensor axes that have points, in order."""
-    known = set(points["axis"].tolist())
-    return [axis for axis in AXES if axis in known]
-
-
 def point_rows(**columns: Any) -> list[dict[str, Any]]:
     """Rows of points from columns in their order; what is one value, not a sequence, is that of every row."""
     count = max(np.size(one) for one in columns.values())

@@ -20,7 +20,6 @@ from pipelines.procedures.recorded import (
     ProcedureStep,
     Records,
     UnitRecord,
-    axes_of,
     numbers,
     on_equipment,
     point_rows,
@@ -28,6 +27,7 @@ from pipelines.procedures.recorded import (
 )
 from schemas.bounds import Positive
 from schemas.recipe import Recipe
+from schemas.units import axes_among
 
 SETTLING, OVERSHOOT, RISE = "step_settling_ms", "step_overshoot_percent", "step_rise_ms"
 BEFORE_SHARE = 0.25  # of the step's duration, recorded before the edge
@@ -121,7 +121,7 @@ class StepResponse(OnEquipment, FromWaveforms):
         last: list[Trace] = []
         settled = float("nan")
         most = 5.0 * part.band_percent
-        for axis, width in zip(axes_of(points), WIDTHS, strict=False):
+        for axis, width in zip(axes_among(points["axis"]), WIDTHS, strict=False):
             own = points[points["axis"] == axis].sort_values("setting")
             time, value = 1e3 * own["setting"].to_numpy(dtype=float), 100.0 * own["value"].to_numpy(dtype=float)
             whole.append(Trace(f"axis {axis}", time, value, "line", axis, width=width))

@@ -15,10 +15,11 @@ from inertial.errors import NotIdentified
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Role, Trace, level
 from pipelines.procedures.base import Part, RecordByRecord
 from pipelines.procedures.figures import FigureSpec, FigureValue, Texts, UnitOutcome, worst
-from pipelines.procedures.recorded import Device, ProcedureStep, Taken, axes_of, numbers, point_rows
+from pipelines.procedures.recorded import Device, ProcedureStep, Taken, numbers, point_rows
 from schemas.bounds import NotNegative, Positive
 from schemas.poses import Pose
 from schemas.recipe import Recipe
+from schemas.units import axes_among
 
 FEWEST_ANGLES = 6
 MICRO, MILLI = 1e6, 1e3
@@ -156,7 +157,7 @@ def _plane(part: TiltPart) -> tuple[str, str]:
 
 def _turned(part: TiltPart, rows: pd.DataFrame) -> list[str]:
     """The axes in the plane that have an output."""
-    return [axis for axis in axes_of(rows) if axis in _plane(part)]
+    return [axis for axis in axes_among(rows["axis"]) if axis in _plane(part)]
 
 
 def _still(part: TiltPart, rows: pd.DataFrame) -> list[str]:

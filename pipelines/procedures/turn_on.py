@@ -12,10 +12,10 @@ from inertial.dynamics.stability import error_of_mean, repeatability
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace, level
 from pipelines.procedures.base import InG, NominalScale, RecordByRecord, scale_of
 from pipelines.procedures.figures import FigureSpec, FigureValue, UnitOutcome, worst
-from pipelines.procedures.recorded import Device, ProcedureStep, Taken, at_rest, axes_of, numbers, point_rows
+from pipelines.procedures.recorded import Device, ProcedureStep, Taken, at_rest, numbers, point_rows
 from schemas.bounds import Positive, Wait
 from schemas.recipe import Recipe
-from schemas.units import AXES, MICRO
+from schemas.units import AXES, MICRO, axes_among
 
 REPEATABILITY, UPPER = "turn_on_repeatability_ug", "turn_on_upper_limit_ug"
 MOST_CYCLES = 20  # of which each has a tick
@@ -91,7 +91,7 @@ class TurnOn(InG, RecordByRecord):
     def chart(self, part: TurnOnPart, points: pd.DataFrame) -> Chart:
         """Mean of every cycle about the mean of all, with the standard deviation of each axis."""
         traces: list[Trace] = []
-        for k, axis in enumerate(axes_of(points)):
+        for k, axis in enumerate(axes_among(points["axis"])):
             own = points[points["axis"] == axis]
             cycle, value, error = numbers(own)
             value = value - value.mean()

@@ -16,10 +16,10 @@ from inertial.errors import NotIdentified
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace, between
 from pipelines.procedures.base import InG, NominalScale, RecordByRecord, scale_of
 from pipelines.procedures.figures import FigureSpec, FigureValue, UnitOutcome, worst
-from pipelines.procedures.recorded import Device, ProcedureStep, Taken, at_rest, axes_of, numbers, point_rows
+from pipelines.procedures.recorded import Device, ProcedureStep, Taken, at_rest, numbers, point_rows
 from schemas.bounds import Positive
 from schemas.recipe import Recipe
-from schemas.units import MICRO
+from schemas.units import MICRO, axes_among
 
 
 class WarmUpPart(NominalScale):
@@ -78,7 +78,7 @@ class WarmUp(InG, RecordByRecord):
         """Output about its final value over the time since power-on, with the band."""
         time = points["setting"].to_numpy(dtype=float)
         traces = [between(time, -part.band_ug, part.band_ug, f"band ± {part.band_ug:g} µg")]
-        for axis in axes_of(points):
+        for axis in axes_among(points["axis"]):
             own = points[points["axis"] == axis]
             since, value = numbers(own, "setting", "value")
             final = value[int(0.8 * value.size) :].mean()

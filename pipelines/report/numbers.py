@@ -6,10 +6,10 @@ import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from decimal import Decimal
-from typing import Any
+from typing import Any, Literal
 
 from inertial.uncertainty.rounding import rounded
-from schemas.units import AXES
+from schemas.units import axes_among
 
 MINUS = "−"
 THIN = "\u202f"  # narrow no-break space between groups of three digits
@@ -74,7 +74,6 @@ def side_by_side(
     return list(lines.values())
 
 
-def axes_of(lines: Iterable[Mapping[str, Any]]) -> list[str]:
+def axes_of(lines: Iterable[Mapping[str, Any]]) -> list[Literal["x", "y", "z"]]:
     """The sensor axes that have a cell in one of the lines, in order."""
-    known = {axis for line in lines for axis in line["cells"]}
-    return [axis for axis in AXES if axis in known]
+    return axes_among(axis for line in lines for axis in line["cells"])

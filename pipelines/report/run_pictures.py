@@ -9,7 +9,7 @@ import pandas as pd
 
 from pipelines.drawing.chart import Chart, ColourScale, Plot, PlotAxis, Role, Trace, level, measured_curve
 from pipelines.report.smooth_curve import smooth
-from schemas.units import AXES
+from schemas.units import AXES, axes_among
 
 Against = Literal["force", "unit_C", "time", "pose"]
 
@@ -80,7 +80,7 @@ def _residuals(title: str, residuals: pd.DataFrame, against: Against, size: floa
     """Residuals of all axes; points of a named unit can be selected."""
     poses = list(dict.fromkeys(residuals.sort_values("dwell")["pose"].astype(str)))
     traces: list[Trace] = []
-    for axis in _measured(residuals):
+    for axis in axes_among(residuals["axis"]):
         own = residuals[residuals["axis"] == axis]
         y, role = own["residual_ug"].to_numpy(float), cast("Role", axis)
         if against == "pose":
@@ -93,12 +93,6 @@ def _residuals(title: str, residuals: pd.DataFrame, against: Against, size: floa
     zero = level(np.concatenate([trace.x for trace in traces]), 0.0, dashed=False)
     names = tuple(poses) if against == "pose" else ()
     return Plot(title, PlotAxis(AGAINST[against], names=names), PlotAxis(RESIDUAL), (zero, *traces))
-
-
-def _measured(table: pd.DataFrame) -> list[str]:
-    """The sensor axes that a table has rows of, in order."""
-    known = set(table["axis"].tolist())
-    return [axis for axis in AXES if axis in known]
 
 
 def _told(rows: pd.DataFrame) -> tuple[str, ...]:
@@ -150,7 +144,7 @@ def _verification(rows: pd.DataFrame) -> Plot:
 def allan_plot(allan: pd.DataFrame, title: str = "") -> Plot:
     """Allan deviation with its 68 % band, the fitted noise terms, and slopes −½ and +½ as guides."""
     traces: list[Trace] = []
-    for axis in _measured(allan):
+    for axis in axes_among(allan["axis"]):
         own = allan[allan["axis"] == axis].sort_values("tau_s")
         tau, deviation, low, high, fitted = (
             own[name].to_numpy(float) for name in ("tau_s", "deviation_ug", "low_ug", "high_ug", "fitted_ug")

@@ -9,9 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from inertial.design import of_axes
 from inertial.distributions import chi2_upper
-from inertial.fits.linear import own_terms
 from inertial.noise.allan import AllanCurve, overlapping
 from inertial.noise.flicker import FLICKER_FLOOR
 from inertial.noise.terms import NoiseTerms, fit_terms, model_deviation
@@ -167,8 +165,7 @@ def _channels(
     history: pd.DataFrame | None,
 ) -> list[StaticChannel]:
     output = series.of(unit)
-    own = of_axes(calibration.response[calibration.units.index(unit)], calibration.axes, -2)
-    scale = own_terms(own, calibration.axes) / MICRO
+    scale = calibration.scale[calibration.units.index(unit)] / MICRO
     if len(static):
         start = float(static["start_s"].iloc[0])
         time = np.asarray(start + (np.arange(len(output)) + 0.5) * series.size / rate, dtype=np.float64)

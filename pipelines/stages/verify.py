@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from inertial.correction import correct, station_change
 from inertial.design import of_axes
-from inertial.fits.linear import own_terms
 from pipelines.stages.rms_error import OF_UNITS, rms_columns
 from pipelines.tables.calibration import Calibration, read_calibration
 from pipelines.tables.dwells import LotArrays, LotTables
@@ -64,7 +63,7 @@ def verify_tables(
     corrected, truth = of_axes(corrected, axes, -1), of_axes(truth, axes, -1)
     norm, expected_norm = sizes(corrected), sizes(of_axes(lot.state.force, axes, -1))
     toward = (corrected / norm[..., None])[:, unseen]
-    scale = np.abs(own_terms(of_axes(calibration.response, axes, -2), axes))[:, None, :]
+    scale = np.abs(calibration.scale)[:, None, :]
     reading = (lot.standard_error / scale)[:, unseen]
     by_axis = MICRO * (corrected - truth)[:, unseen]
     spread = predictions if isinstance(predictions, np.ndarray) else _expected(predictions, lot.units)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from inertial import design, effects
 from inertial.design import Values
 from inertial.effects import SensorEffect, StationEffect
-from inertial.fits.linear import LotFit, response_matrix
+from inertial.fits.linear import LotFit, own_terms, response_matrix
 from inertial.state import ALL_AXES, State
 from pipelines.tables.frames import picked
 from schemas.errors import DataRejected
@@ -55,6 +55,11 @@ class Calibration:
     def response(self) -> NDArray[np.float64]:
         """The matrix K of each unit, (units, 3, 3), output per g."""
         return response_matrix(self.coefficients, self.names, self.axes)
+
+    @cached_property
+    def scale(self) -> NDArray[np.float64]:
+        """Response of each of the m axes to the force along itself, (units, m), output per g."""
+        return own_terms(design.of_axes(self.response, self.axes, -2), self.axes)
 
     def value(self, effect: str) -> NDArray[np.float64]:
         """Coefficients of one effect, (units, 3, columns of the effect)."""

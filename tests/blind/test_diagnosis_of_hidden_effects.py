@@ -27,12 +27,10 @@ LARGE: dict[str, tuple[int, dict[str, tuple[float, float]]]] = {
     "covariate_curve": (15, {}),
     "withheld": (21, {}),
     "invisible": (18, {"invisible effect named": (0.0, 0.0)}),
-    "faults": (
-        32,
-        {"fault caught, unit blocked": (96.0, 100.0)},
-    ),  # exchanged units are exchanged back, not blocked
+    "faults": (32, {"fault caught, unit blocked": (100.0, 100.0)}),
 }
 """Number of runs of each deal, and the least and largest percentage of its figures."""
+NOT_REACHED = {"faults": "of 32 one, exchanged units, is exchanged back and named, not blocked"}
 FALSE_ALARM = "false fault alarm on a clean run"
 
 
@@ -65,7 +63,15 @@ def test_names_what_hides_and_nothing_where_nothing_hides():
 
 @pytest.mark.slow
 @pytest.mark.timeout(3600)
-@pytest.mark.parametrize("deal", LARGE)
+@pytest.mark.parametrize(
+    "deal",
+    [
+        pytest.param(
+            name, marks=[pytest.mark.xfail(strict=True, reason=NOT_REACHED[name])] if name in NOT_REACHED else []
+        )
+        for name in LARGE
+    ],
+)
 def test_keeps_its_figures_over_many_runs(deal: str) -> None:
     count, wanted = LARGE[deal]
     shares, _ = figures({deal: count})

@@ -49,7 +49,12 @@ def wrong(row: Row, lot: MadeLot, document: dict) -> list[str]:
     return told or ([row.also.__name__] if row.also and not row.also(document, lot) else [])
 
 
-@pytest.mark.parametrize("row", [pytest.param(r, id=str(r), marks=() if r.fast else pytest.mark.slow) for r in ROWS])
+def marks(row: Row) -> list[pytest.MarkDecorator]:
+    slow = [] if row.fast else [pytest.mark.slow]
+    return slow + ([pytest.mark.xfail(strict=True, reason=row.not_reached)] if row.not_reached else [])
+
+
+@pytest.mark.parametrize("row", [pytest.param(r, id=str(r), marks=marks(r)) for r in ROWS])
 def test_a_world_gets_its_verdict(row: Row) -> None:
     lot = made(row.world, row.seed)
     document = diagnose(row.change(lot.dwells.copy()) if row.change else lot.dwells, lot.history)

@@ -286,17 +286,7 @@ def linear_coefficients_are_named(document: dict, _: MadeLot) -> bool:
 
 
 def may_be_of_the_station(document: dict, _: MadeLot) -> bool:
-    scopes = {group["scope"] for group in document["classes"]} - {"data"}
-    return bool(scopes) and scopes <= {"station", "sensor or station"}
-
-
-def curve_or_step_of_the_unit(document: dict, _: MadeLot) -> bool:
-    """In three soaks a curve over temperature is a step and a slope: of one unit alone a step is the likelier reading."""
-    [first] = document["classes"]
-    return "bias_temperature_quadratic" in first["effects"] or (first["effects"], first["units"]) == (
-        ["bias_step"],
-        ["W005"],
-    )
+    return {group["scope"] for group in document["classes"]} - {"data"} == {"sensor or station"}
 
 
 def right_of(effect: str) -> Check:

@@ -86,6 +86,7 @@ class Row:
     told : of each fault "names" (a class has its name), "units", "near" (within one dwell), "dwells"
     physics : whether an effect, and not only errors of data, may be named
     unexplained : drivers of which one is told; empty: nothing is unexplained
+    not_reached : what the present judge says in place of this; the row fails, and a judge that reaches it is told
     """
 
     world: AnyWorld
@@ -103,6 +104,7 @@ class Row:
     also: Check | None = None
     change: Callable[[pd.DataFrame], pd.DataFrame] | None = None
     fast: bool = False
+    not_reached: str = ""
 
     def __str__(self) -> str:
         return f"{self.label}-{self.seed}"

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from pipelines.certificates.document.laboratory import LaboratoryFile
 from schemas.strict import Strict
-from schemas.units import AXES
+from schemas.units import axes_among
 
 
 class Result(Strict):
@@ -62,8 +62,7 @@ class Contribution(Strict):
 
 def letters_of(coefficients: Sequence[Coefficient]) -> str:
     """The axes that have coefficients of their own, in order."""
-    known = {one.axis for one in coefficients}
-    return "".join(axis for axis in AXES if axis in known)
+    return "".join(axes_among(one.axis for one in coefficients))
 
 
 class BudgetTable(Strict):

@@ -10,9 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.design import of_axes
 from inertial.distributions import normal_tail
-from inertial.fits.linear import own_terms
 from inertial.state import ALL_AXES
 from inertial.uncertainty.deviation_law import DeviationLaw
 from pipelines.tables.calibration import Calibration
@@ -62,8 +60,7 @@ class LotCoefficients:
         self.zero_g = zero_g
         self.stated = stated
         self._calibration = calibration
-        own = of_axes(calibration.response, calibration.axes, -2)
-        self._scale = np.abs(own_terms(own, calibration.axes))[..., None]
+        self._scale = np.abs(calibration.scale)[..., None]
         self._values: dict[str, NDArray[np.float64]] = {}
         self._errors: dict[str, NDArray[np.float64]] = {}
         self._noise: dict[str, NDArray[np.float64]] = {}

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial import design
-from inertial.fits.linear import own_terms
 from inertial.frames import angles_from_force
 from inertial.state import State
 from inertial.uncertainty.propagation import Propagated, norm_errors, rms_over
@@ -112,7 +111,7 @@ def part_of(
     decisions : whether the parts that a verification shows are left out where no decision depends on them
     """
     dof = np.full(len(lot.units), float(np.sum(np.asarray(tables.wander["dof"], dtype=float))))
-    scale = np.abs(own_terms(design.of_axes(calibration.response, calibration.axes, -2), calibration.axes))
+    scale = np.abs(calibration.scale)
     if part == "coefficients":
         yield from _coefficients(calibration, variances, scale, dof)
     elif part == "angles":

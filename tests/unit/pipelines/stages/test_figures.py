@@ -29,7 +29,7 @@ def calibration(values: np.ndarray, errors: np.ndarray) -> SimpleNamespace:
     return SimpleNamespace(
         units=("A",),
         axes=(0, 1, 2),
-        response=np.eye(3)[None],
+        scale=np.ones((1, 3)),
         value=lambda e: of(e, values),
         standard_error=lambda e: of(e, errors),
     )
