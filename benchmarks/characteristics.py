@@ -136,7 +136,7 @@ def looks(runs: int, first: int) -> Iterator[str]:
 def rivals(runs: int, first: int) -> Iterator[str]:
     """How often the wrong one of two effects leads by the width of a class, at the distance where it does so most often."""
     rng, draws = np.random.default_rng(SEED + first), 200_000 * runs
-    for width in (10.0, decisions.CLASS_WIDTH):
+    for width in (decisions.CLEAR_LEAD, 10.0, decisions.CLASS_WIDTH):
         # difference of two chi-squares of nested fits whose means differ by D: normal, mean D, variance 4·D
         apart = width
         leads = apart + 2.0 * np.sqrt(apart) * rng.standard_normal(draws) < -width
@@ -233,6 +233,7 @@ SAME = {
     "ENOUGH": "ADEQUATE_ABOVE",
     "REFUTED": "CONFIRMED",
     "BLOCKS": "LEFT_OUT",
+    "CLEAR_LEAD": "CLASS_WIDTH",
 }
 """Numbers that are measured with another."""
 

@@ -9,7 +9,7 @@ from inertial import decisions
 from inertial.criticism.field import Candidates, Rival
 from inertial.criticism.jumps import Jumps, jumps_in_place_of
 from inertial.criticism.search import judge, judge_refined, ranked, scanned, size_of
-from inertial.decisions import CLASS_WIDTH
+from inertial.decisions import CLASS_WIDTH, CLEAR_LEAD
 from inertial.estimation.alternative import Handling
 from inertial.estimation.candidate import Candidate
 from inertial.estimation.model import Model
@@ -54,7 +54,7 @@ class EffectClass:
         if self.of_data:
             return "data"
         scopes = {m.term.effect.scope for m in self.physics} | ({"station"} if self.alike else set())
-        return "sensor or station" if {"sensor", "station"} <= scopes else self.simplest.effect.scope
+        return "sensor or station" if {"sensor", "station"} <= scopes else self.proposed.effect.scope
 
     @property
     def ids(self) -> tuple[str, ...]:
@@ -62,9 +62,10 @@ class EffectClass:
         return tuple(m.term.effect.id for m in self.members)
 
     @property
-    def simplest(self) -> Term:
-        """The member to recommend; handling errors come before effects."""
-        return min(self.members, key=lambda m: m.term.effect.simplicity).term
+    def proposed(self) -> Term:
+        """The member to recommend: the simplest of those that the best does not lead clearly; handling errors come first."""
+        near = [m for m in self.members if m.score < CLEAR_LEAD or isinstance(m.term.effect, Handling)]
+        return min(near, key=lambda m: m.term.effect.simplicity).term
 
     @property
     def physics(self) -> tuple[Member, ...]:

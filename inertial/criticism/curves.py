@@ -78,7 +78,7 @@ def _curve(space: Space, candidate: Candidate, ways: int) -> tuple[Array, int]:
 
 def _evened(gram: Array, size: Array) -> Array:
     """Transformation (p, r) to columns of equal size and no correlation over the lot, without the part that the model absorbs."""
-    scale = np.maximum(size, 1e-300)
+    scale = np.maximum(size, 1e-150)  # its square is a number, too
     values, vectors = np.linalg.eigh(gram / np.outer(scale, scale))
     keep = values > 1e-6 * values[-1]
     return (vectors[:, keep] / np.sqrt(values[keep])) / scale[:, None]

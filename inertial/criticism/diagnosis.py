@@ -76,6 +76,7 @@ def diagnose(lot: Lot, effects: Sequence[str], rng: Generator) -> Diagnosis:
     """
     verdict = judged(lot, effects, rng)
     run, drivers, base, final = verdict.run, verdict.drivers, verdict.search.base, verdict.final
+    beside = verdict.beside
     fields, problem = verdict.search.field, base.problem
     classes = _classes(fields, base, final)
     named = _named(problem, base, classes)
@@ -84,7 +85,7 @@ def diagnose(lot: Lot, effects: Sequence[str], rng: Generator) -> Diagnosis:
     where = (
         ()
         if silent
-        else places(problem, drivers, base.at(final.noise), final.space.variance, _beyond_pose(base, drivers, final))
+        else places(problem, drivers, base.at(beside.noise), beside.space.variance, _beyond_pose(base, drivers, beside))
     )
     charged = tuple(p for p in where if p.log_p + np.log(len(drivers)) < np.log(ADEQUATE_ABOVE))
     every = [*run.handled, *named]
@@ -168,7 +169,7 @@ def _named(problem: Problem, base: Model, classes: Sequence[EffectClass]) -> tup
 def _covariate(classes: Sequence[EffectClass]) -> Unexplained | None:
     """A significant dependence on a recorded column of unknown cause."""
     for group in classes:
-        best = group.simplest
+        best = group.proposed
         if isinstance(best.effect, Covariate):
             return Unexplained(best.effect.column, "line" if best.first == 1 else "curve", group.log_p)
     return None

@@ -13,8 +13,9 @@ from inertial.design import of_axes
 from inertial.effects.covariate import COVARIATE_PREFIX
 from inertial.estimation.alternative import by_block, of_outputs, rotated_force
 from inertial.estimation.candidate import Candidate
+from inertial.estimation.likelihood import shared_noise
 from inertial.estimation.model import Model
-from inertial.estimation.penalty import PER_COEFFICIENT, cost_of_model, log_p_value
+from inertial.estimation.penalty import PER_COEFFICIENT, PER_COLUMN, cost_of_model, log_p_value
 from inertial.estimation.problem import Problem
 from inertial.estimation.term import Term
 from inertial.quantities import is_clock
@@ -31,6 +32,7 @@ _LEVELS = 14  # number of groups of values from which on a driver is continuous
 _VISITS = 1.5  # smallest mean number of visits to each level
 _CENTRES = np.linspace(0.0, 1.0, 21)  # of bumps and hinges, over the driver's range
 _WIDTHS = (0.02, 0.05, 0.1)  # of bumps, of that range
+_PROMISING = 6  # suspects at each noise whose curves are fitted
 _SHARPEST = 3  # suspects that are tested with bumps and hinges
 
 
@@ -154,6 +156,22 @@ def better_curve(base: Model, chosen: Sequence[Term], field: Sequence[Suspect]) 
     return (best, kept) if replaced and best.cost + doubt < whole else None
 
 
+def curve_in_noise(base: Model, field: Sequence[Suspect]) -> CurveFit | None:
+    """The curve that explains far better, with the noise beside it, what a model has as noise; None if there is none.
+
+    A tide that all units share is no random walk, and what each move leaves is no louder noise; but beside a model without it the
+    noise is estimated so that it can be, and no test at that noise sees it.
+    """
+    fits = [s.fitted(base) for s in _promising(base, field)]
+    if not fits:
+        return None
+    best = min(fits, key=lambda f: f.cost)
+    paid = PER_COEFFICIENT * best.rank + PER_COLUMN * (best.model.local.shape[-1] - base.local.shape[-1])
+    # of noise that units share all of them follow a curve by chance when one does
+    ahead = (cost_of_model(base) - best.cost + paid) / shared_noise(best.model) - paid
+    return best if ahead > decisions.CURVE_AHEAD else None
+
+
 def unexplained_by(base: Model, fit: CurveFit, looks: int) -> Unexplained:
     """The dependence that a curve beside a model is, the best of so many curves."""
     before = base.at(fit.model.noise)
@@ -163,11 +181,14 @@ def unexplained_by(base: Model, fit: CurveFit, looks: int) -> Unexplained:
 
 
 def _promising(base: Model, field: Sequence[Suspect]) -> list[Suspect]:
-    """The suspects whose own curves, block by block, reduce the residual most; the others cannot be best."""
-    space = base.space
-    worth = [float(np.max(space.gain(s.candidate).drop)) for s in field]
-    order = np.argsort(worth)[::-1]
-    return [field[i] for i in order[:6]]
+    """The suspects whose own curves, block by block, reduce the residual most, at the noise of a model and with less wander."""
+    less = base.noise.shares.times(decisions.LESS_FLICKER, decisions.LESS_WALK)
+    spaces = [base.space] if less == base.noise.shares else [base.space, base.at(base.noise_at(less))]
+    picked: dict[int, Suspect] = {}
+    for space in spaces:
+        worth = [float(np.max(space.gain(s.candidate).drop)) for s in field]
+        picked |= {int(i): field[i] for i in np.argsort(worth)[::-1][:_PROMISING] if worth[i] > 0.0}
+    return list(picked.values())
 
 
 def _with_others(

@@ -14,7 +14,7 @@ from inertial.criticism.evidence import GROSS, not_judged
 from inertial.criticism.examination import EffectSearch, ExaminedRun, examined
 from inertial.criticism.lot_part import LotPart
 from inertial.criticism.search import SearchResult
-from inertial.criticism.unknown import Suspect, Unexplained, better_curve, unexplained_by
+from inertial.criticism.unknown import Suspect, Unexplained, better_curve, curve_in_noise, unexplained_by
 from inertial.data_errors.removed_dwells import BadDwell
 from inertial.data_errors.tails import with_tails
 from inertial.decisions import ADEQUATE_ABOVE, NAMED_BELOW
@@ -41,6 +41,7 @@ class Verdict:
     run, search, drivers : the examined lot, the search for effects in it, and the recorded quantities
     result : of the search; without effects where the data cannot judge the model
     final : the model with all identified effects
+    beside : the same with a curve that would else count as noise; drivers are judged at its noise
     unexplained : a driver that no effect explains
     removed : single dwells that were left out, those marked that are tails of the noise
     rms : of the residuals of the judged model; floor : of the noise of the measurement, white and wander
@@ -55,6 +56,7 @@ class Verdict:
     drivers: list[Driver]
     result: SearchResult
     final: Model
+    beside: Model
     unexplained: Unexplained | None
     removed: tuple[BadDwell, ...]
     rms: float
@@ -124,19 +126,21 @@ def _judged(lot: Lot, effects: Sequence[str], rng: Generator, barred: frozenset[
     if unjudged:
         # data that cannot judge the model cannot identify missing effects either
         searched = SearchResult(base, (), searched.ladder)
+    final, unexplained, curved = searched.model, None, None
+    if not unjudged and (searched.added or not passed):
+        final, unexplained = _with_curves(search.part, base, searched, drivers)
     # a drift can hide where adequacy does not look
-    sound = passed is True and not searched.added and run.drift is None
-    final, unexplained = (
-        (searched.model, None) if sound or unjudged else _with_curves(search.part, base, searched, drivers)
-    )
-    if unexplained is None and run.drift is not None and not unjudged:
-        unexplained = run.drift
+    unexplained = unexplained or (None if unjudged else run.drift)
+    if not (unjudged or searched.added or unexplained):
+        unexplained, curved = _taken_for_noise(search.part)
+    sound = passed is True and not searched.added and unexplained is None and run.drift is None
     return Verdict(
         run=run,
         search=search,
         drivers=drivers,
         result=searched,
         final=final,
+        beside=final if curved is None or curved.problem is not base.problem else curved,
         unexplained=unexplained,
         removed=removed,
         rms=rms,
@@ -197,6 +201,13 @@ def _with_curves(
     return final, Unexplained(
         best.name, shape, log_p, best.part, curved.floor(), cost_of_model(curved), base.problem.covariance.there
     )
+
+
+def _taken_for_noise(part: LotPart) -> tuple[Unexplained, Model] | tuple[None, None]:
+    """The driver of a curve that the model has as noise, and the model with the curve; None if there is none."""
+    suspected = part.suspected([])
+    fit = curve_in_noise(part.base, suspected)
+    return (None, None) if fit is None else (unexplained_by(part.base, fit, len(suspected)), fit.model)
 
 
 def _curve_in_place_of(

@@ -177,7 +177,7 @@ def document(
         "influence": influence_of(diagnosis, names),
         "without_influence": without_influence(diagnosis.carried),
         "removed": removed_of(diagnosis, names),
-        "recommended": [n.effects.simplest.effect.id for n in diagnosis.named if not n.effects.of_data and n.predicts],
+        "recommended": [n.effects.proposed.effect.id for n in diagnosis.named if not n.effects.of_data and n.predicts],
         "leave_out": leave_out_of(diagnosis, names),
         "warnings": warnings,
         "unexplained": None

@@ -42,7 +42,7 @@ def classes_of(diagnosis: Diagnosis, names: Names) -> list[dict[str, Any]]:
     rows = [_class(n, names) for n in diagnosis.handled]
     rows += [_bad_dwell(diagnosis, d, names) for d in diagnosis.removed if not d.tail]
     fitted = _fitted_parameters(diagnosis)
-    return [*rows, *(_class(n, names) | fitted.get(n.effects.simplest.effect.id, {}) for n in diagnosis.named)]
+    return [*rows, *(_class(n, names) | fitted.get(n.effects.proposed.effect.id, {}) for n in diagnosis.named)]
 
 
 def _fitted_parameters(diagnosis: Diagnosis) -> dict[str, dict[str, Any]]:
@@ -50,7 +50,7 @@ def _fitted_parameters(diagnosis: Diagnosis) -> dict[str, dict[str, Any]]:
 
     A search has them at its own noise and beside other terms: one value under one name needs one estimate.
     """
-    added = [n.effects.simplest for n in diagnosis.named if not n.effects.of_data]
+    added = [n.effects.proposed for n in diagnosis.named if not n.effects.of_data]
     if not any(term.values for term in added):
         return {}
     known = catalogue.catalogue()
@@ -68,7 +68,7 @@ def _fitted_parameters(diagnosis: Diagnosis) -> dict[str, dict[str, Any]]:
 
 def _class(named: Named, names: Names) -> dict[str, Any]:
     group = named.effects
-    simplest = group.simplest
+    proposed = group.proposed
     scope = group.scope
     row: dict[str, Any] = {
         "effects": list(group.ids),
@@ -78,9 +78,9 @@ def _class(named: Named, names: Names) -> dict[str, Any]:
         "heldout_before_ug": known(MICRO * named.heldout_before),
         "p_value": probability(group.log_p),
         "size_ug": MICRO * group.size,
-        "nonlinear": {} if scope == "data" else dict(simplest.values),
-        "nonlinear_of": None if scope == "data" or not simplest.values else simplest.effect.id,
-        "plausible": _plausible(group.size, simplest.effect.typical_ug),
+        "nonlinear": {} if scope == "data" else dict(proposed.values),
+        "nonlinear_of": None if scope == "data" or not proposed.values else proposed.effect.id,
+        "plausible": _plausible(group.size, proposed.effect.typical_ug),
     }
     row |= {"influence": _dwells(named.carried, names), "without_influence": without_influence(named.carried)}
     if named.evidence:

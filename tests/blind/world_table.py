@@ -258,6 +258,12 @@ def rows_of_physics() -> Iterator[Row]:
         yield Row(RAMP_HIDDEN[f"ramps_{name}"], SEED, f"ramps_{name}", named=(name,), physics=True)
     # each unit and axis is pushed by its own amount: the mean of the lot looks like two wrong angles
     yield Row(Case("withheld", 4), 8080, "brownout", first=(), unexplained=frozenset({"supply_V"}))
+    # a day's course that all units share, and what each move leaves: no random walk and no louder noise, as they were taken for
+    for index, seed, driver in ((5, 771, "time_s"), (12, 771, "time_s"), (11, 771, "since_move_s")):
+        yield Row(
+            Case("withheld", index), seed, f"{driver} in the noise", first=(), adequate=(False,),
+            unexplained=frozenset({driver}), fast=index == 5,
+        )  # fmt: skip
     # a fault is no less told for an effect outside the catalogue; the second had ended with an IndexError
     for fault, seed in (("unit_moved", 930_004), ("wrong_pose", 930_008)):
         world = World(hidden=(("scale_warms_up", 2.0),), fault=fault, amount=0.5)

@@ -9,8 +9,10 @@ from inertial import effects
 from inertial.criticism.curves import fit_curve
 from inertial.criticism.drivers import across, curve, forces_along, transfer
 from inertial.criticism.examination import ExaminedRun
-from inertial.criticism.unknown import wide_suspects
+from inertial.criticism.unknown import curve_in_noise, suspects, wide_suspects
 from inertial.estimation.comparison import estimate
+from inertial.estimation.likelihood import shared_noise
+from inertial.estimation.model import Model
 from inertial.estimation.term import Term
 from pipelines.tables.dwells import lot_of, measured
 
@@ -62,3 +64,36 @@ def test_an_effect_that_died_away_long_ago_leaves_the_range_of_numbers_quietly(s
     fit = estimate(model.with_term(Term(effects.get("warm_up"), (("tau", 10.0),))))
     before = estimate(model)
     np.testing.assert_allclose(fit.local[:, 1], before.local[:, 1], rtol=1e-5)
+
+
+def lot_with(common: np.ndarray | float, own: np.ndarray | float = 0.0) -> Model:
+    """A model beside a lot with something, µg, (n,) that all units and axes share, or (4, n, 3) of their own."""
+    made = make(World(units=4), SEED + 90)
+    order = made.dwells.sort_values(["unit", "dwell"]).index
+    added = np.broadcast_to(1e-6 * (np.ravel(common)[None, :, None] + own), (4, len(order) // 4, 3)).reshape(-1, 3)
+    dwells = made.dwells.copy()
+    dwells.loc[order, ["out_x", "out_y", "out_z"]] += added
+    return ExaminedRun(lot_of(measured(dwells, made.history), square=False), BASE).model()
+
+
+def test_a_course_that_units_share_is_no_random_walk_and_walks_are_no_course() -> None:
+    n = len(make(World(units=4), SEED + 90).dwells) // 4
+    rng = np.random.default_rng(SEED + 91)
+    day = 80.0 * np.sin(np.linspace(0.0, 6.0 * np.pi, n))
+    model = lot_with(day)
+    fit = curve_in_noise(model, suspects(model.problem))
+    assert fit is not None
+    assert fit.driver in {"time_s", "since_power_s"}
+    floor = 1e-6 * make(World(units=4), SEED + 90).floor_ug
+    assert fit.model.floor() == pytest.approx(floor, rel=0.15)
+    assert model.floor() > 1.5 * floor
+    walks = 40.0 / np.sqrt(n) * np.cumsum(rng.standard_normal((4, n, 3)), axis=1)
+    model = lot_with(0.0, walks)
+    assert curve_in_noise(model, suspects(model.problem)) is None
+
+
+def test_noise_of_single_dwells_that_units_share_follows_no_driver() -> None:
+    n = len(make(World(units=4), SEED + 90).dwells) // 4
+    model = lot_with(60.0 * np.random.default_rng(SEED + 92).standard_normal(n))
+    assert shared_noise(model) > 3.0
+    assert curve_in_noise(model, suspects(model.problem)) is None
