@@ -59,6 +59,10 @@ class ConRelRes:
         """What a reader makes of n."""
         return self.start * (1.0 + 2.0 * self.tolerance) ** code
 
+    def stated(self, value: float) -> float:
+        """What a reader makes of a value."""
+        return self.value(self.code(value))
+
 
 SENSITIVITY = ConRelRes("sensitivity", "V/(m/s²)", 5e-7, 1.5e-4, 16)
 HIGH_PASS = ConRelRes("high-pass frequency", "Hz", 0.005, 0.03, 8)
@@ -81,7 +85,7 @@ class DataSheet:
     """What a run does not contain, and the day on which it was measured.
 
     manufacturer : number given by IEEE; model : the maker's number; version : letter and number; mass_g : of the sensor
-    initials : of who calibrated; period_days : to the next calibration, that of the certificate where None
+    initials : of who calibrated; period_days : to the next calibration; None: not stated, and 0 in the page
     """
 
     manufacturer: int
@@ -147,7 +151,6 @@ class Accelerometer:
 
     axis: int
     sensitivity: float
-    period_days: int
     high_pass_hz: float = HIGH_PASS.start
     reference_hz: float = REFERENCE.start
     reference_C: float = 25.0
@@ -163,7 +166,7 @@ def page(sheet: DataSheet, serial: int, one: Accelerometer) -> bytes:
         (SENSITIVITY.code(abs(one.sensitivity)), 16), (HIGH_PASS.code(one.high_pass_hz), 8), (one.axis, 2),
         (MASS.code(sheet.mass_g), 6), (int(one.sensitivity < 0.0), 1), (0, 1),  # no transfer function
         (REFERENCE.code(one.reference_hz), 8), (round(2.0 * (one.reference_C - 15.0)), 5),
-        (sheet.days_after_1998, 16), (_letters(sheet.initials), 15), (one.period_days, 12),
+        (sheet.days_after_1998, 16), (_letters(sheet.initials), 15), (sheet.period_days or 0, 12),
         (0, 11),  # place of the measurement
         (_END, 2), (_NO_USER_DATA, 1),
     ]  # fmt: skip

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -68,13 +69,13 @@ def write(units: Sequence[UnitCalibration], run: str, settings: ExportSettings) 
                 f"export: output of unit {unit.unit} is in {unit.out_unit}, V is needed for TEDS, whose template 25 states "
                 "V/(m/s²); export json, csv or c"
             )
-        period = _period(unit, sheet)
+        own = _with_period(unit, sheet)
         stated = {
-            letter: Accelerometer(axis, float(unit.response[0, row, axis]) / STANDARD_GRAVITY_M_S2, period)
+            letter: Accelerometer(axis, float(unit.response[0, row, axis]) / STANDARD_GRAVITY_M_S2)
             for row, (axis, letter) in enumerate(zip(unit.axes, unit.letters, strict=True))
         }
-        files |= {f"{unit.unit}-{letter}.teds": page(sheet, serial, one) for letter, one in stated.items()}
-        text = [*_heading(unit, run, sheet, serial, period), *_axes(stated), *_left_out(unit, stated)]
+        files |= {f"{unit.unit}-{letter}.teds": page(own, serial, one) for letter, one in stated.items()}
+        text = [*_heading(unit, run, own, serial), *_axes(stated), *_left_out(unit, stated)]
         files[f"{unit.unit}.txt"] = "".join(f"{comment(line)}\n" for line in text).encode()
     return files
 
@@ -90,24 +91,25 @@ def _serial(unit: str) -> int:
     return int(digits[0])
 
 
-def _period(unit: UnitCalibration, sheet: DataSheet) -> int:
-    """Days to the next calibration: those given, else those of the certificate."""
-    days = sheet.period_days if unit.certificate is None else sheet.period_days or unit.certificate.stated_days
+def _with_period(unit: UnitCalibration, sheet: DataSheet) -> DataSheet:
+    """The data sheet with the days to the next calibration: those given, else those of the certificate."""
+    days = sheet.period_days or (unit.certificate.stated_days if unit.certificate else None)
     if days is None:
         raise WrongUse(
             f"export: unit {unit.unit} is not certified, so nothing states its period of calibration, TEDS needs it; add "
             "period_days=DAYS to --teds, or certify the run"
         )
-    return days
+    return replace(sheet, period_days=days)
 
 
-def _heading(unit: UnitCalibration, run: str, sheet: DataSheet, serial: int, period: int) -> list[str]:
-    mass = MASS.value(MASS.code(sheet.mass_g))
+def _heading(unit: UnitCalibration, run: str, sheet: DataSheet, serial: int) -> list[str]:
+    mass = MASS.stated(sheet.mass_g)
     return [
         f"accelerometer {unit.unit}, run {run}: IEEE 1451.4 basic TEDS and template 25, {PAGE_BYTES} bytes for each axis",
         unit.certified,
         f"manufacturer {sheet.manufacturer}, model {sheet.model}, version {sheet.version}, serial number {serial}",
-        f"mass {mass:.3g} g ({sheet.mass_g:g} g given); calibrated {sheet.measured} by {sheet.initials}, period {period} days",
+        f"mass {mass:.3g} g ({sheet.mass_g:g} g given)",
+        f"calibrated {sheet.measured} by {sheet.initials}, period {sheet.period_days} days",
         f"reference 25 °C and {REFERENCE.start:g} Hz, high-pass {HIGH_PASS.start:g} Hz: the lowest there is; measured at 0 Hz",
         "template 25 says constant-current supply and AC coupling: an instrument that reads it may switch both on",
     ]
@@ -118,7 +120,7 @@ def _axes(stated: dict[str, Accelerometer]) -> list[str]:
     for letter, one in stated.items():
         polarity = "negative" if one.sensitivity < 0.0 else "positive"
         measured = abs(one.sensitivity)
-        value = _read(measured)
+        value = SENSITIVITY.stated(measured)
         lines.append(
             f"axis {letter}: {value:.6g} V/(m/s²), {polarity}; measured {measured:.6g}, "
             f"{1e6 * (value / measured - 1.0):+.0f} ppm by rounding"
@@ -131,15 +133,10 @@ def _left_out(unit: UnitCalibration, stated: dict[str, Accelerometer]) -> list[s
     whole = unit.with_every_axis
     scale = np.ones(3)
     for one in stated.values():
-        scale[one.axis] = STANDARD_GRAVITY_M_S2 * np.copysign(_read(abs(one.sensitivity)), one.sensitivity)
+        scale[one.axis] = STANDARD_GRAVITY_M_S2 * np.copysign(SENSITIVITY.stated(abs(one.sensitivity)), one.sensitivity)
 
     def applied(output: Array, temperature: float) -> Array:
         return output / scale
 
     parts = omitted(whole, (BIAS, BIAS_T, SCALE_T, ACROSS, ACROSS_T))
     return comment_lines(parts, largest_error_ug(whole, applied))
-
-
-def _read(sensitivity: float) -> float:
-    """What a reader makes of a sensitivity."""
-    return SENSITIVITY.value(SENSITIVITY.code(sensitivity))

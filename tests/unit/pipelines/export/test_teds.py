@@ -6,7 +6,9 @@ from datetime import date, timedelta
 import numpy as np
 import pytest
 from each import each
+from ledger_events import event
 
+from pipelines.certificates.validity import Calibration
 from pipelines.export import ExportSettings, UnitCalibration, export_files
 from pipelines.export.polynomials import ORDER
 from pipelines.export.teds import Accelerometer, DataSheet, data_sheet, page
@@ -54,8 +56,8 @@ def test_the_bits_of_a_maker_come_out() -> None:
     flag = sum(width for _, width in FIELDS[:14])
     assert theirs[flag] == "1"
     theirs = theirs[:flag] + "0" + theirs[flag + 1 + 38 :]
-    one = Accelerometer(0, 0.09585849228848693, 365, high_pass_hz=0.248, reference_hz=159.75, reference_C=23.0)
-    image = page(DataSheet(17, 4507, "B5", 4.6005, "HH", "2022-11-07"), 30985, one)
+    one = Accelerometer(0, 0.09585849228848693, high_pass_hz=0.248, reference_hz=159.75, reference_C=23.0)
+    image = page(DataSheet(17, 4507, "B5", 4.6005, "HH", "2022-11-07", 365), 30985, one)
     ours = "".join(f"{byte:08b}"[::-1] for byte in image[1:])
     assert ours.startswith(theirs.rstrip("0"))
     assert "1" not in ours[len(theirs) :]
@@ -129,8 +131,23 @@ def test_a_sensitivity_outside_the_template_is_refused() -> None:
 
 
 def test_a_period_comes_from_the_certificate_or_is_asked_for() -> None:
+    open_sheet = replace(SHEET, period_days=None)
     with pytest.raises(WrongUse, match=r"unit SN 0042 is not certified.*period_days=DAYS"):
-        files(unit(), sheet=replace(SHEET, period_days=None))
+        files(unit(), sheet=open_sheet)
+    for until, sheet, days in (
+        ("2027-05-01", open_sheet, 365),
+        ("2026-11-01", open_sheet, 184),
+        ("2027-05-01", SHEET, 365),
+    ):
+        made = files(
+            replace(unit(), certificate=Calibration(event(start="2026-05-01", until=until), until)), sheet=sheet
+        )
+        assert decoded(made["SN_0042-x.teds"])["period"] == days
+    with pytest.raises(WrongUse, match="period_days: found 9131, 1 to 4094"):
+        files(
+            replace(unit(), certificate=Calibration(event(start="2026-05-01", until="2051-05-01"), "2051-05-01")),
+            sheet=open_sheet,
+        )
 
 
 @each(
