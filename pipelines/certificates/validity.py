@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from datetime import date
 from typing import TYPE_CHECKING, Any, Literal
 
 from pipelines.certificates.days import today
@@ -56,6 +57,11 @@ class Calibration:
     def stated_until(self) -> str:
         """The day after the last as it was certified."""
         return self.event.until
+
+    @property
+    def stated_days(self) -> int:
+        """Its length as it was certified."""
+        return (date.fromisoformat(self.stated_until) - date.fromisoformat(self.start)).days
 
     @property
     def state(self) -> Literal["valid", "superseded", "revoked"]:

@@ -70,6 +70,13 @@ def command(
     low_pass: Annotated[str, option("--filter KIND", "c: low-pass of the force, as in correct; with --rate.")] = "",
     cutoff: Annotated[float | None, option("--cutoff HZ", "c: its -3 dB frequency, as in correct.", min=1e-9)] = None,
     turn_on: Annotated[float | None, option("--turn-on UG", "c, with --track: as in correct.", min=0.0)] = None,
+    teds: Annotated[
+        str,
+        option(
+            "--teds KEY=VALUE,…",
+            "teds: manufacturer, model, version (A1), mass_g, initials, and period_days where no certificate states it.",
+        ),
+    ] = "",
     step: Annotated[float, option("--step S", "c, with --track: as in correct.", min=1e-3)] = 1.0,
     archive: ArchiveOption = None,
     *,
@@ -84,7 +91,9 @@ def command(
     revoked calibrations are left out. An option that begins with names of formats is for these formats.
     """
     from pipelines.certificates.coefficient_remarks import signature_remarks
+    from pipelines.certificates.measured import measured_on
     from pipelines.export import FORMATS, ExportSettings, device_ids, export_files, unit_calibrations
+    from pipelines.export.teds import data_sheet
     from pipelines.jobs.model_files import use_formulas_of
 
     form = "json" if as_json else form
@@ -96,6 +105,8 @@ def command(
     chosen = unit_calibrations(source, serials, failed=failed, revoked=revoked)
     ids = device_ids(device_id, [c.unit for c in chosen])
     settings = ExportSettings(nominal, ids, sensor, arithmetic, rate, counts_per_g)
+    if form == "teds":
+        settings = replace(settings, data_sheet=data_sheet(teds, measured_on(source)))
     if low_pass or track:
         settings = replace(
             settings, firmware=_firmware(source, chosen, form, (low_pass, cutoff, rate), (track, step, turn_on))
@@ -146,8 +157,8 @@ def _write(files: dict[str, bytes], output: Path | None) -> None:
     if output is None or output == STANDARD_OUTPUT:
         if others:
             raise WrongUse(
-                f"export: {len(files)} units, each needs a file of its own in this format; give a folder with --output, or "
-                "choose a unit with --units"
+                f"export: {len(files)} files in this format, one can be printed; give a folder with --output, or choose a unit "
+                "with --units"
             )
         if name.endswith(BINARY):
             raise WrongUse(f"export: {name} is not text and cannot be printed; give a file with --output")

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from pipelines.export.firmware import Firmware
 from pipelines.export.polynomials import UnitCalibration
+from pipelines.export.teds import DataSheet
 from schemas.errors import WrongUse, did_you_mean
 from schemas.foreign import shown
 
@@ -26,6 +27,7 @@ class ExportSettings:
     rate_hz : of the receiver's samples; that of the static record where None
     counts_per_g : acceleration of 1 g in counts of Betaflight's driver (``acc_1G``)
     firmware : low-pass and filter of the bias in exported C code
+    data_sheet : what TEDS state beside a calibration
     """
 
     nominal: float | None = None
@@ -35,6 +37,7 @@ class ExportSettings:
     rate_hz: float | None = None
     counts_per_g: int = 2048
     firmware: Firmware = field(default_factory=Firmware)
+    data_sheet: DataSheet | None = None
 
     def __post_init__(self) -> None:
         """Refuses settings outside their range."""

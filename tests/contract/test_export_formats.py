@@ -10,6 +10,7 @@ from typer.testing import CliRunner
 from pipelines.cli import app
 from pipelines.export import FORMATS, ExportSettings, UnitCalibration, export_files
 from pipelines.export.polynomials import ORDER
+from pipelines.export.teds import DataSheet
 from pipelines.export.unit_noise import TERMS, UnitNoise
 from schemas.errors import WrongUse
 
@@ -18,16 +19,18 @@ GUIDE = Path(__file__).resolve().parents[2] / "docs" / "how-to" / "export.md"
 
 def calibration(unit: str, left_out: tuple[str, ...] = ()) -> UnitCalibration:
     bias, response = np.zeros((ORDER, 3)), np.zeros((ORDER, 3, 3))
-    bias[0], response[0] = (100.0, -50.0, 25.0), 256000.0 * np.eye(3)
+    bias[0], response[0] = (1e-4, -5e-5, 2e-5), 0.3 * np.eye(3)  # volts, which every format can hold
     noise = UnitNoise(
         dict.fromkeys(TERMS, np.array([16.0, 17.0, 18.0])), dict.fromkeys(TERMS, np.array([True, True, False])), 100.0
     )
-    return UnitCalibration(
-        unit, "pass", "industrial", "LSB", bias, response, (-10.0, 60.0), left_out, None, noise, 524287.0
-    )
+    return UnitCalibration(unit, "pass", "industrial", "V", bias, response, (-10.0, 60.0), left_out, None, noise, 1.5)
 
 
-SETTINGS = ExportSettings(nominal=256000.0, device_ids={"SN1": 1310988, "SN2": 1310996})
+SETTINGS = ExportSettings(
+    nominal=0.3,
+    device_ids={"SN1": 1310988, "SN2": 1310996},
+    data_sheet=DataSheet(17, 4507, "B5", 4.6, "QA", "2026-05-01", 365),
+)
 
 
 def written(name: str, units: list[UnitCalibration]) -> dict[str, bytes]:
@@ -42,7 +45,7 @@ def test_a_format_names_every_unit_and_ends_its_last_line(name: str) -> None:
     assert all(file.endswith(FORMATS[name].SUFFIX) for file in files)
     if getattr(FORMATS[name], "ONE_UNIT", False):
         assert len(files) == 2
-    assert all(content.endswith(b"\n") for file, content in files.items() if not file.endswith(".mat"))
+    assert all(content.endswith(b"\n") for content in files.values() if b"\0" not in content)
 
 
 @each(FORMATS)

@@ -131,7 +131,7 @@ def test_exports_need_a_nominal_scale_and_a_file_for_each_unit(measured: Archive
     assert by_preset == given(*one, "--nominal", "256000")[1]
     told = refused(*one, "--nominal", "-1")
     assert "nominal scale of unit A1: -1, a positive output per g is needed" in told
-    assert "3 units, each needs a file of its own" in refused(*words, "ardupilot", "--failed")
+    assert "3 files in this format" in refused(*words, "ardupilot", "--failed")
     assert "is not text" in refused(*words, "matlab", "--failed")
 
 

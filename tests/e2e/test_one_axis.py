@@ -121,6 +121,28 @@ def test_its_certificate_and_its_memory_hold_one_axis(measured) -> None:
     assert [unit["outcome"] for unit in programmed["units"]] == ["proved"]
 
 
+def test_its_teds_state_the_sensitivity_of_one_axis(measured, tmp_path: Path) -> None:
+    folder, runs = measured
+    teds = "manufacturer=17,model=1500,version=A1,mass_g=40,initials=QA,period_days=365"
+    words = ("export", runs["one"], "--archive", folder / "archive", "--format", "teds", "--teds", teds)
+    text_of(*words, "--output", tmp_path)
+    assert sorted(file.name for file in tmp_path.iterdir()) == sorted(
+        f"SF-0{unit}{ending}" for unit in (1, 2, 3) for ending in ("-x.teds", ".txt")
+    )
+    rows = table(measured, "coefficients", "one").set_index(["unit", "effect"])
+    for number in (1, 2, 3):
+        image = (tmp_path / f"SF-0{number}-x.teds").read_bytes()
+        assert len(image) == 32
+        assert sum(image) % 256 == 0
+        bits = int.from_bytes(image[1:], "little")
+        assert bits >> 40 & 0xFFFFFF == number
+        scale = rows.loc[(f"SF-0{number}", "scale"), "value"]
+        assert 5e-7 * 1.0003 ** (bits >> 76 & 0xFFFF) == pytest.approx(scale / 9.80665, rel=1.5e-4)
+    status, _, err = given(*words[:-2])
+    assert status == UNUSABLE
+    assert "--teds: found no manufacturer, model" in " ".join(err.split())
+
+
 def test_its_plan_speaks_of_one_axis(measured) -> None:
     folder, _ = measured
     planned = document_of("plan", folder / "one.toml", "--page", folder / "plan.html", "--json")

@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 
 from pipelines.export import FORMATS, ExportSettings, UnitCalibration, export_files
 from pipelines.export.polynomials import ORDER
+from pipelines.export.teds import DataSheet
 from pipelines.export.unit_noise import TERMS, UnitNoise
 from pipelines.export.waveforms import WRITERS, Channel, write_waveforms
 from pipelines.importers import files
@@ -111,18 +112,22 @@ def test_dwells_in_any_order_are_the_same_and_checked_once_is_checked(frame: pd.
 
 @st.composite
 def calibrations(draw: st.DrawFn, unit: str) -> UnitCalibration:
-    """A calibration of small errors, about a nominal of 256 000 LSB/g."""
+    """A calibration of small errors, about a nominal of 0.3 V/g."""
     rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
-    bias, response = 100.0 * rng.normal(size=(ORDER, 3)), np.zeros((ORDER, 3, 3))
+    bias, response = 1e-4 * rng.normal(size=(ORDER, 3)), np.zeros((ORDER, 3, 3))
     bias[1:] *= 1e-4
-    response[0] = 256000.0 * (np.eye(3) + 1e-3 * rng.normal(size=(3, 3)))
+    response[0] = 0.3 * (np.eye(3) + 1e-3 * rng.normal(size=(3, 3)))
     noise = UnitNoise(
         dict.fromkeys(TERMS, rng.uniform(5.0, 50.0, 3)), dict.fromkeys(TERMS, np.ones(3, dtype=bool)), 100.0
     )
-    return UnitCalibration(unit, "pass", "industrial", "LSB", bias, response, (-10.0, 60.0), (), None, noise, 524287.0)
+    return UnitCalibration(unit, "pass", "industrial", "V", bias, response, (-10.0, 60.0), (), None, noise, 1.5)
 
 
-SETTINGS = ExportSettings(nominal=256000.0, device_ids={"SN1": 1310988, "SN2": 1310996})
+SETTINGS = ExportSettings(
+    nominal=0.3,
+    device_ids={"SN1": 1310988, "SN2": 1310996},
+    data_sheet=DataSheet(17, 4507, "B5", 4.6, "QA", "2026-05-01", 365),
+)
 
 
 @pytest.mark.parametrize("form", FORMATS)
@@ -131,7 +136,7 @@ SETTINGS = ExportSettings(nominal=256000.0, device_ids={"SN1": 1310988, "SN2": 1
 def test_an_export_depends_on_its_calibrations_alone(form: str, one: UnitCalibration, other: UnitCalibration) -> None:
     written = export_files(form, [one, other], "run-1", SETTINGS)
     assert written == export_files(form, [one, other], "run-1", SETTINGS)
-    assert written != export_files(form, [other, one], "run-1", SETTINGS) or len(written) == 2
+    assert written != export_files(form, [other, one], "run-1", SETTINGS) or len(written) > 1
 
 
 @FEW

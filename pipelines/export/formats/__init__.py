@@ -16,15 +16,17 @@ from schemas.errors import WrongUse
 class Format(Protocol):
     """A module that writes calibrations in one format.
 
-    SUFFIX : of the file's name; ONE_UNIT where a file holds one unit; COMPLETE where it names effects that have no polynomial;
-    FEWER_AXES where it holds devices with one axis or two
+    SUFFIX : of the file's name, several where it makes several files for a unit and names them; ONE_UNIT where a file holds one
+    unit; COMPLETE where it names effects that have no polynomial; FEWER_AXES where it holds devices with one axis or two
     """
 
     NAME: str
-    SUFFIX: str
+    SUFFIX: str | tuple[str, ...]
 
-    def write(self, units: Sequence[UnitCalibration], run: str, settings: ExportSettings) -> str | bytes:
-        """The calibrations as the content of a file."""
+    def write(
+        self, units: Sequence[UnitCalibration], run: str, settings: ExportSettings
+    ) -> str | bytes | dict[str, bytes]:
+        """The calibrations as the content of a file, or of several by name."""
         ...
 
 
@@ -54,13 +56,16 @@ def export_files(
     files: dict[str, bytes] = {}
     for group in groups:
         content = form.write(group, run, chosen)
-        stem = re.sub(r"[^\w.-]", "_", group[0].unit) if len(groups) > 1 else "calibration"
-        if f"{stem}{form.SUFFIX}" in files:
-            raise WrongUse(
-                f"export: two units have the file name {stem}{form.SUFFIX}, one each is needed; export them one by one "
-                "with --units"
-            )
-        files[f"{stem}{form.SUFFIX}"] = content if isinstance(content, bytes) else content.encode()
+        stem = group[0].unit if len(groups) > 1 else "calibration"
+        made = content if isinstance(content, dict) else {f"{stem}{form.SUFFIX}": content}
+        for asked, data in made.items():
+            name_of_file = re.sub(r"[^\w.-]", "_", asked)
+            if name_of_file in files:
+                raise WrongUse(
+                    f"export: two units have the file name {name_of_file}, one each is needed; export them one by one with "
+                    "--units"
+                )
+            files[name_of_file] = data if isinstance(data, bytes) else data.encode()
     return files
 
 

@@ -1,0 +1,142 @@
+"""TEDS: IEEE 1451.4 basic TEDS and template 25 of each axis with a voltage output, as bytes of a memory, with a text."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from inertial.arrays import Array
+from pipelines.export.omissions import (
+    ACROSS,
+    ACROSS_T,
+    BIAS,
+    BIAS_T,
+    SCALE_T,
+    comment,
+    comment_lines,
+    largest_error_ug,
+    omitted,
+)
+from pipelines.export.polynomials import UnitCalibration
+from pipelines.export.settings import ExportSettings
+from pipelines.export.teds import (
+    HIGH_PASS,
+    HIGHEST_SERIAL,
+    MASS,
+    PAGE_BYTES,
+    REFERENCE,
+    SENSITIVITY,
+    Accelerometer,
+    DataSheet,
+    data_sheet,
+    page,
+)
+from schemas.errors import WrongUse
+from schemas.units import STANDARD_GRAVITY_M_S2
+
+NAME = "teds"
+SUFFIX = (".teds", ".txt")
+FEWER_AXES = True
+
+
+def write(units: Sequence[UnitCalibration], run: str, settings: ExportSettings) -> dict[str, bytes]:
+    """The files by name: a page of memory for each axis of a unit, and a text for each unit.
+
+    Template 25 is for one axis and states its sensitivity at 25 °C; the text says what that leaves out. The high-pass and the
+    reference frequency are the lowest that can be stated: a calibration at rest is one at 0 Hz.
+
+    Raises
+    ------
+    WrongUse
+        The output is not in V, the data sheet is missing, or a serial number has no digits of its own at its end.
+    """
+    sheet = settings.data_sheet or data_sheet("", "")  # which refuses, as no key is given
+    files: dict[str, bytes] = {}
+    owners: dict[int, str] = {}
+    for unit in units:
+        serial = _serial(unit.unit)
+        if serial in owners:
+            raise WrongUse(
+                f"export: units {owners[serial]} and {unit.unit}: TEDS hold the digits at the end of a serial number, {serial} "
+                "for both, different ones are needed; export them one by one with --units, with different models"
+            )
+        owners[serial] = unit.unit
+        if unit.out_unit != "V":
+            raise WrongUse(
+                f"export: output of unit {unit.unit} is in {unit.out_unit}, V is needed for TEDS, whose template 25 states "
+                "V/(m/s²); export json, csv or c"
+            )
+        own = _with_period(unit, sheet)
+        stated = {
+            letter: Accelerometer(axis, float(unit.response[0, row, axis]) / STANDARD_GRAVITY_M_S2)
+            for row, (axis, letter) in enumerate(zip(unit.axes, unit.letters, strict=True))
+        }
+        files |= {f"{unit.unit}-{letter}.teds": page(own, serial, one) for letter, one in stated.items()}
+        text = [*_heading(unit, run, own, serial), *_axes(stated), *_left_out(unit, stated)]
+        files[f"{unit.unit}.txt"] = "".join(f"{comment(line)}\n" for line in text).encode()
+    return files
+
+
+def _serial(unit: str) -> int:
+    """The digits at the end of a serial number."""
+    digits = re.search(r"[0-9]+$", unit)
+    if digits is None or int(digits[0]) > HIGHEST_SERIAL:
+        raise WrongUse(
+            f"export: serial number '{unit}': TEDS hold the digits at its end, a number up to {HIGHEST_SERIAL} is needed; export "
+            "json"
+        )
+    return int(digits[0])
+
+
+def _with_period(unit: UnitCalibration, sheet: DataSheet) -> DataSheet:
+    """The data sheet with the days to the next calibration: those given, else those of the certificate."""
+    days = sheet.period_days or (unit.certificate.stated_days if unit.certificate else None)
+    if days is None:
+        raise WrongUse(
+            f"export: unit {unit.unit} is not certified, so nothing states its period of calibration, TEDS needs it; add "
+            "period_days=DAYS to --teds, or certify the run"
+        )
+    return replace(sheet, period_days=days)
+
+
+def _heading(unit: UnitCalibration, run: str, sheet: DataSheet, serial: int) -> list[str]:
+    mass = MASS.stated(sheet.mass_g)
+    return [
+        f"accelerometer {unit.unit}, run {run}: IEEE 1451.4 basic TEDS and template 25, {PAGE_BYTES} bytes for each axis",
+        unit.certified,
+        f"manufacturer {sheet.manufacturer}, model {sheet.model}, version {sheet.version}, serial number {serial}",
+        f"mass {mass:.3g} g ({sheet.mass_g:g} g given)",
+        f"calibrated {sheet.measured} by {sheet.initials}, period {sheet.period_days} days",
+        f"reference 25 °C and {REFERENCE.start:g} Hz, high-pass {HIGH_PASS.start:g} Hz: the lowest there is; measured at 0 Hz",
+        "template 25 says constant-current supply and AC coupling: an instrument that reads it may switch both on",
+    ]
+
+
+def _axes(stated: dict[str, Accelerometer]) -> list[str]:
+    lines: list[str] = []
+    for letter, one in stated.items():
+        polarity = "negative" if one.sensitivity < 0.0 else "positive"
+        measured = abs(one.sensitivity)
+        value = SENSITIVITY.stated(measured)
+        lines.append(
+            f"axis {letter}: {value:.6g} V/(m/s²), {polarity}; measured {measured:.6g}, "
+            f"{1e6 * (value / measured - 1.0):+.0f} ppm by rounding"
+        )
+    return lines
+
+
+def _left_out(unit: UnitCalibration, stated: dict[str, Accelerometer]) -> list[str]:
+    """What a reader's V / sensitivity leaves of the calibration, µg; the axes without an output are known."""
+    whole = unit.with_every_axis
+    scale = np.ones(3)
+    for one in stated.values():
+        scale[one.axis] = STANDARD_GRAVITY_M_S2 * np.copysign(SENSITIVITY.stated(abs(one.sensitivity)), one.sensitivity)
+
+    def applied(output: Array, temperature: float) -> Array:
+        return output / scale
+
+    parts = omitted(whole, (BIAS, BIAS_T, SCALE_T, ACROSS, ACROSS_T))
+    return comment_lines(parts, largest_error_ug(whole, applied))

@@ -1,0 +1,188 @@
+"""IEEE 1451.4: what a data sheet in a sensor states beside its calibration, and the bits of basic TEDS and template 25.
+
+Fields follow one another without gaps, each with its lowest bit first. A page of the memory has 32 bytes; the first makes their
+sum 0 modulo 256. Sources that agree, read in 2026: NI, "An Overview of IEEE 1451.4 Transducer Electronic Data Sheets" (widths of
+basic TEDS; units, ranges and tolerances of template 25); the readers SDLMA-Core ``teds.py`` (fields and widths; the bits of a
+4507 B accelerometer, which settle selectors, polarity and initials) and Zetlab ``TEDS.cpp`` (widths, checksum); L-Card
+``ltedsapi_stdtmpl.h`` (meaning of the enumerations).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass, fields
+from datetime import date
+from math import log, log1p
+from typing import Any
+
+from schemas.errors import WrongUse, did_you_mean
+from schemas.foreign import shown
+
+PAGE_BYTES = 32
+HIGHEST_SERIAL = 2**24 - 1
+_EXAMPLE = "--teds manufacturer=17,model=4507,version=B5,mass_g=4.6,initials=QA"
+_EPOCH = date(1998, 1, 1)
+_TEMPLATE = 25
+_END = 3  # selector: no further template
+_NO_USER_DATA = 1
+
+
+@dataclass(frozen=True)
+class ConRelRes:
+    """A number with constant relative resolution: start·(1 + 2·tolerance)ⁿ with n in some bits."""
+
+    what: str
+    unit: str
+    start: float
+    tolerance: float
+    bits: int
+
+    def code(self, value: float) -> int:
+        """The n nearest to a value above 0.
+
+        Raises
+        ------
+        WrongUse
+            No n is that near. The published ranges end one below all ones.
+        """
+        n = round(log(value / self.start) / log1p(2.0 * self.tolerance))
+        highest = 2**self.bits - 2
+        if not 0 <= n <= highest:
+            raise WrongUse(
+                f"export: {self.what}: found {value:g} {self.unit}, template {_TEMPLATE} states {self.start:g} to "
+                f"{self.value(highest):.3g} {self.unit}; correct it, or export another format"
+            )
+        return n
+
+    def value(self, code: int) -> float:
+        """What a reader makes of n."""
+        return self.start * (1.0 + 2.0 * self.tolerance) ** code
+
+    def stated(self, value: float) -> float:
+        """What a reader makes of a value."""
+        return self.value(self.code(value))
+
+
+SENSITIVITY = ConRelRes("sensitivity", "V/(m/s²)", 5e-7, 1.5e-4, 16)
+HIGH_PASS = ConRelRes("high-pass frequency", "Hz", 0.005, 0.03, 8)
+MASS = ConRelRes("mass", "g", 0.1, 0.1, 6)
+REFERENCE = ConRelRes("reference frequency", "Hz", 0.35, 0.0175, 8)
+
+
+_RANGES = {
+    "manufacturer": (17, 16381),
+    "model": (0, 32767),
+    "mass_g": (MASS.start, MASS.value(2**MASS.bits - 2)),
+    "period_days": (1, 4094),
+    "days_after_1998": (0, 65534),
+}
+_TEXTS = {"version": (r"[A-Z](\d|[1-5]\d|6[0-3])", "A0 to Z63"), "initials": (r"[A-Z]{1,3}", "one to three of A to Z")}
+
+
+@dataclass(frozen=True)
+class DataSheet:
+    """What a run does not contain, and the day on which it was measured.
+
+    manufacturer : number given by IEEE; model : the maker's number; version : letter and number; mass_g : of the sensor
+    initials : of who calibrated; period_days : to the next calibration; None: not stated, and 0 in the page
+    """
+
+    manufacturer: int
+    model: int
+    version: str
+    mass_g: float
+    initials: str
+    measured: str
+    period_days: int | None = None
+
+    def __post_init__(self) -> None:
+        """Refuses what the bits cannot hold."""
+        for key, (low, high) in _RANGES.items():
+            value = getattr(self, key)
+            if value is not None and not low <= value <= high:
+                raise WrongUse(f"export: TEDS: {key}: found {value}, {low:g} to {high:.5g} is needed; correct it")
+        for key, (pattern, needed) in _TEXTS.items():
+            if not re.fullmatch(pattern, getattr(self, key), flags=re.ASCII):
+                raise WrongUse(
+                    f"export: TEDS: {key}: found '{shown(getattr(self, key))}', {needed} is needed; correct it"
+                )
+
+    @property
+    def days_after_1998(self) -> int:
+        """The day of the measurement, from 1 January 1998."""
+        return (date.fromisoformat(self.measured) - _EPOCH).days
+
+
+def data_sheet(text: str, measured: str) -> DataSheet:
+    """The data sheet from ``KEY=VALUE,…`` and the day of the measurement.
+
+    Raises
+    ------
+    WrongUse
+        A key is unknown or missing, or a value is none of those that the bits hold.
+    """
+    pairs = [part.partition("=") for part in text.split(",") if part.strip()]
+    given = {key.strip(): value.strip() for key, _, value in pairs}
+    known = [one.name for one in fields(DataSheet) if one.name != "measured"]
+    for key in given:
+        if key not in known:
+            raise WrongUse(f"--teds: no key is called '{shown(key)}'; {did_you_mean(key, known)}")
+    if missing := [key for key in known if not given.get(key) and key != "period_days"]:
+        raise WrongUse(f"--teds: found no {', '.join(missing)}, a run does not contain it; add it, as in {_EXAMPLE}")
+    kinds = {"manufacturer": int, "model": int, "mass_g": float, "period_days": int}
+    values: dict[str, Any] = dict(given)
+    for key in values.keys() & kinds:
+        try:
+            values[key] = kinds[key](given[key])
+        except ValueError:
+            raise WrongUse(
+                f"--teds: {key}: found '{shown(given[key])}', a number is needed; correct it, as in {_EXAMPLE}"
+            ) from None
+    return DataSheet(**values, measured=measured)
+
+
+@dataclass(frozen=True)
+class Accelerometer:
+    """What template 25 states of one axis: an accelerometer with fixed sensitivity, without transfer function.
+
+    sensitivity : V/(m/s²), negative where the output falls with the force; axis : 0 to 2; reference_C : 15 to 30 °C
+    """
+
+    axis: int
+    sensitivity: float
+    high_pass_hz: float = HIGH_PASS.start
+    reference_hz: float = REFERENCE.start
+    reference_C: float = 25.0
+
+
+def page(sheet: DataSheet, serial: int, one: Accelerometer) -> bytes:
+    """The 32 bytes with basic TEDS and template 25."""
+    letter, number = sheet.version[0], int(sheet.version[1:])
+    basic = [(sheet.manufacturer, 14), (sheet.model, 15), (_letters(letter), 5), (number, 6), (serial, 24)]
+    template = [
+        (0, 2), (_TEMPLATE, 8),  # selector of a template of IEEE
+        (0, 1), (0, 1),  # accelerometer, no switching of the sensitivity
+        (SENSITIVITY.code(abs(one.sensitivity)), 16), (HIGH_PASS.code(one.high_pass_hz), 8), (one.axis, 2),
+        (MASS.code(sheet.mass_g), 6), (int(one.sensitivity < 0.0), 1), (0, 1),  # no transfer function
+        (REFERENCE.code(one.reference_hz), 8), (round(2.0 * (one.reference_C - 15.0)), 5),
+        (sheet.days_after_1998, 16), (_letters(sheet.initials), 15), (sheet.period_days or 0, 12),
+        (0, 11),  # place of the measurement
+        (_END, 2), (_NO_USER_DATA, 1),
+    ]  # fmt: skip
+    content = _packed([*basic, *template]).ljust(PAGE_BYTES - 1, b"\0")
+    return bytes([-sum(content) % 256]) + content
+
+
+def _letters(text: str) -> int:
+    """Letters of five bits, A = 1; a blank is 0."""
+    return sum((ord(letter) - ord("A") + 1) << (5 * k) for k, letter in enumerate(text))
+
+
+def _packed(parts: Iterable[tuple[int, int]]) -> bytes:
+    """Values of some bits each, one after another."""
+    whole = at = 0
+    for value, bits in parts:
+        whole |= value << at
+        at += bits
+    return whole.to_bytes(-(-at // 8), "little")
