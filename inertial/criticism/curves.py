@@ -18,17 +18,25 @@ _TURNS = 8  # alternating estimates of sizes and shape
 class CurveFit:
     """A common curve beside a model.
 
+    candidate : the columns that it was made of
     part : what of the output follows the driver, as in :class:`inertial.criticism.drivers.Driver`
     model : the model with the curve in it
     rank : number of coefficients, of sizes and shape
     cost : penalised deviance, on the scale of the search
+    period : of a swing with the time, s; None of another curve
     """
 
     driver: str
+    candidate: Candidate
     model: Model
     rank: int
     cost: float
     part: Part = "bias"
+    period: float | None = None
+
+    def columns(self) -> Candidate:
+        """The candidate, as the columns of a driver."""
+        return self.candidate
 
 
 def fit_curve(model: Model, driver: str, candidate: Candidate, ways: int = 1) -> CurveFit:
@@ -41,14 +49,14 @@ def fit_curve(model: Model, driver: str, candidate: Candidate, ways: int = 1) ->
     """
     if candidate.shared:
         fitted = model.with_shared_curves(candidate.of_blocks[:, :, 0, :])
-        return CurveFit(driver, fitted, fitted.space.shared_rank, cost_of_model(fitted))
+        return CurveFit(driver, candidate, fitted, fitted.space.shared_rank, cost_of_model(fitted))
     noise, fitted, rank = model.noise, model, 0
     for _ in range(2):
         columns, rank = _curve(model.at(noise), candidate, ways)
         fitted = model.with_curves(columns)
         noise = fitted.noise
     shape = rank - ways * model.problem.blocks
-    return CurveFit(driver, fitted, rank, cost_of_model(fitted) + PER_COEFFICIENT * shape)
+    return CurveFit(driver, candidate, fitted, rank, cost_of_model(fitted) + PER_COEFFICIENT * shape)
 
 
 def _curve(space: Space, candidate: Candidate, ways: int) -> tuple[Array, int]:

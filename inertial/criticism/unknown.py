@@ -28,6 +28,7 @@ _TURNED_KNOTS = 2  # of the same for the fixture's rotation, whose every column 
 _FORCE_KNOTS = 7  # of the same over the force along an axis
 _HARMONICS = 5  # of a table angle
 _CYCLES = np.arange(1.0, 14.1, 0.5)  # of a swing within the run
+_BETWEEN = (0.125, 0.05, 0.02)  # steps of the cycles between two of them
 _LEVELS = 14  # number of groups of values from which on a driver is continuous
 _VISITS = 1.5  # smallest mean number of visits to each level
 _CENTRES = np.linspace(0.0, 1.0, 21)  # of bumps and hinges, over the driver's range
@@ -44,6 +45,7 @@ class Unexplained:
     floor : noise of the measurement with the dependence in the model, g
     cost : penalised deviance of that model, on the scale of the search
     there : (blocks, n), the measurements that it is of; None where it is not known
+    period : of a swing with the time, s; None of another curve
     """
 
     driver: str
@@ -53,6 +55,7 @@ class Unexplained:
     floor: float = float("inf")
     cost: float = float("inf")
     there: Flags | None = field(default=None, compare=False, repr=False)
+    period: float | None = None
 
 
 @dataclass(frozen=True)
@@ -62,6 +65,7 @@ class Suspect:
     values : (blocks, n), the driver itself, 0 … 1 over the run; None if it is not a single quantity
     ways : ways in which each block feels the dependence, as for :func:`inertial.criticism.curves.fit_curve`
     part : what of the output follows the driver
+    period : of a swing with the time, s; None of another curve
     """
 
     driver: str
@@ -69,10 +73,12 @@ class Suspect:
     values: Array | None = None
     ways: int = 1
     part: Part = "bias"
+    period: float | None = None
 
     def fitted(self, model: Model) -> CurveFit:
         """The best curve of the driver beside a model."""
-        return replace(fit_curve(model, self.driver, self.candidate, self.ways), part=self.part)
+        fit = fit_curve(model, self.driver, self.candidate, self.ways)
+        return replace(fit, part=self.part, period=self.period)
 
 
 def suspects(problem: Problem) -> list[Suspect]:
@@ -95,8 +101,8 @@ def suspects(problem: Problem) -> list[Suspect]:
         own = own_forces(problem).reshape(problem.blocks, problem.n)
         suspected.append(Suspect("pose", _columns(curve(own, _KNOTS)), _unit_range(own)))
         suspected += _table(problem)
-    suspected += [Suspect("time_s", _alike(problem, _swing(state.time, c))) for c in _CYCLES]
-    return suspected
+    whole = max(float(np.ptp(state.time)), 1.0)
+    return [*suspected, *(_swing(problem, whole / cycles) for cycles in _CYCLES)]
 
 
 def wide_suspects(problem: Problem) -> list[Suspect]:
@@ -165,7 +171,7 @@ def curve_in_noise(base: Model, field: Sequence[Suspect]) -> CurveFit | None:
     fits = [s.fitted(base) for s in _promising(base, field)]
     if not fits:
         return None
-    best = min(fits, key=lambda f: f.cost)
+    best = _tuned(base, min(fits, key=lambda f: f.cost))
     paid = PER_COEFFICIENT * best.rank + PER_COLUMN * (best.model.local.shape[-1] - base.local.shape[-1])
     # of noise that units share all of them follow a curve by chance when one does
     ahead = (cost_of_model(base) - best.cost + paid) / shared_noise(best.model) - paid
@@ -177,7 +183,8 @@ def unexplained_by(base: Model, fit: CurveFit, looks: int) -> Unexplained:
     before = base.at(fit.model.noise)
     drop = max(before.rss - fit.model.space.rss, 0.0)
     log_p = log_p_value(before, drop, fit.rank) + float(np.log(looks))
-    return Unexplained(fit.driver, "curve", log_p, fit.part, fit.model.floor(), fit.cost, base.problem.covariance.there)
+    there = base.problem.covariance.there
+    return Unexplained(fit.driver, "curve", log_p, fit.part, fit.model.floor(), fit.cost, there, fit.period)
 
 
 def _promising(base: Model, field: Sequence[Suspect]) -> list[Suspect]:
@@ -234,7 +241,9 @@ def _sharp(model: Model, suspect: Suspect) -> CurveFit | None:
     if best < len(_WIDTHS) * len(_CENTRES):
         column = _narrowed(model, z, _CENTRES[best % len(_CENTRES)], _WIDTHS[best // len(_CENTRES)])
     fitted = model.with_curves(column)
-    return CurveFit(suspect.driver, fitted, int(gain.rank[best]) + 2, cost_of_model(fitted) + 2.0 * PER_COEFFICIENT)
+    cost = cost_of_model(fitted) + 2.0 * PER_COEFFICIENT
+    columns = Candidate(column[:, :, None, :], shared=False)
+    return CurveFit(suspect.driver, columns, fitted, int(gain.rank[best]) + 2, cost)
 
 
 def _narrowed(model: Model, z: Array, centre: float, width: float) -> Array:
@@ -293,10 +302,26 @@ def along_force(problem: Problem, columns: Array) -> Array:
     return wide.reshape(problem.blocks, problem.n, -1)
 
 
-def _swing(time: Array, cycles: float) -> Array:
-    """Sine and cosine of so many cycles in the run."""
-    phase = 2.0 * np.pi * cycles * (time - time.min()) / max(float(np.ptp(time)), 1.0)
-    return np.stack([np.sin(phase), np.cos(phase)], axis=-1)
+def _swing(problem: Problem, period: float) -> Suspect:
+    """Sine and cosine of the time with a period, s."""
+    time = problem.lot.state.time
+    phase = 2.0 * np.pi * (time - time.min()) / period
+    return Suspect("time_s", _alike(problem, np.stack([np.sin(phase), np.cos(phase)], axis=-1)), period=period)
+
+
+def _tuned(base: Model, fit: CurveFit) -> CurveFit:
+    """A swing with its period between those of the grid; any other curve as it is."""
+    if fit.period is None:
+        return fit
+    whole = float(np.ptp(base.problem.lot.state.time))
+    space, cycles = base.at(fit.model.noise), whole / fit.period
+    for reach in _BETWEEN:
+        near = [_swing(base.problem, whole / (cycles + step * reach)) for step in (-2, -1, 0, 1, 2)]
+        worth = [float(space.gain(suspect.candidate).drop[0]) for suspect in near]
+        cycles += (int(np.argmax(worth)) - 2) * reach
+    tuned = _swing(base.problem, whole / cycles).fitted(base)
+    tuned = replace(tuned, rank=tuned.rank + 1, cost=tuned.cost + PER_COEFFICIENT)
+    return tuned if tuned.cost < fit.cost else fit
 
 
 def _table(problem: Problem) -> list[Suspect]:

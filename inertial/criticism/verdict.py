@@ -9,6 +9,7 @@ from numpy.random import Generator
 from inertial import decisions
 from inertial import effects as catalogue
 from inertial.criticism.adequacy import adequacy
+from inertial.criticism.curves import CurveFit
 from inertial.criticism.drivers import Driver, looks_of
 from inertial.criticism.evidence import GROSS, not_judged
 from inertial.criticism.examination import EffectSearch, ExaminedRun, examined
@@ -133,6 +134,8 @@ def _judged(lot: Lot, effects: Sequence[str], rng: Generator, barred: frozenset[
     unexplained = unexplained or (None if unjudged else run.drift)
     if not (unjudged or searched.added or unexplained):
         unexplained, curved = _taken_for_noise(search.part)
+        if curved is not None and search.part.field is search.field:
+            drivers.append(Driver(curved.driver, curved.columns, None, curved.part))
     sound = passed is True and not searched.added and unexplained is None and run.drift is None
     return Verdict(
         run=run,
@@ -140,7 +143,7 @@ def _judged(lot: Lot, effects: Sequence[str], rng: Generator, barred: frozenset[
         drivers=drivers,
         result=searched,
         final=final,
-        beside=final if curved is None or curved.problem is not base.problem else curved,
+        beside=final if curved is None or search.part.field is not search.field else curved.model,
         unexplained=unexplained,
         removed=removed,
         rms=rms,
@@ -203,11 +206,11 @@ def _with_curves(
     )
 
 
-def _taken_for_noise(part: LotPart) -> tuple[Unexplained, Model] | tuple[None, None]:
-    """The driver of a curve that the model has as noise, and the model with the curve; None if there is none."""
+def _taken_for_noise(part: LotPart) -> tuple[Unexplained, CurveFit] | tuple[None, None]:
+    """The driver of a curve that the model has as noise, and the curve; None if there is none."""
     suspected = part.suspected([])
     fit = curve_in_noise(part.base, suspected)
-    return (None, None) if fit is None else (unexplained_by(part.base, fit, len(suspected)), fit.model)
+    return (None, None) if fit is None else (unexplained_by(part.base, fit, len(suspected)), fit)
 
 
 def _curve_in_place_of(

@@ -22,11 +22,12 @@ _PARTS = {
 def what_follows(unexplained: Unexplained) -> str:
     """What of the output follows the driver, as text."""
     verb = "follow" if unexplained.part == "axes" else "follows"
-    return f"{_PARTS[unexplained.part]} {verb} {unexplained.driver}"
+    swing = "" if unexplained.period is None else f" with a period of {unexplained.period / 60.0:.3g} min"
+    return f"{_PARTS[unexplained.part]} {verb} {unexplained.driver}{swing}"
 
 
 def offer(unexplained: Unexplained, state: State) -> dict[str, Any] | None:
-    """A formula that follows the driver: a line, or a cubic about the middle of its range; None if the driver is no single one.
+    """A formula that follows the driver: a line, a swing, or a cubic about the middle of its range; None if it is no single one.
 
     Of the scale factor and the axes it is times the forces along and across the axis; of the transfer curve the quantity is times
     the square and the cube of the force.
@@ -42,6 +43,10 @@ def offer(unexplained: Unexplained, state: State) -> dict[str, Any] | None:
         return None
     part = unexplained.part
     columns = [name] if unexplained.shape == "line" else _cubic(name, values)
+    if unexplained.period is not None:
+        columns = [
+            f"{wave}({2.0 * np.pi / unexplained.period / QUANTITIES[name][1]:.6g} * {name})" for wave in ("sin", "cos")
+        ]
     if part == "scale":
         columns = [f"f*{_factor(c)}" for c in columns]
     elif part == "axes":
