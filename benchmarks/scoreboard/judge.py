@@ -95,11 +95,12 @@ def blind(product: Path, lots: Path) -> Callable[[str, str, int], Outcome]:
     module.case = lambda *key: kept(lots, repr(key), lambda: make(*key))
 
     def judged(bed: str, name: str, seed: int) -> Outcome:
-        _, score, _, _ = module.one(module.Job(name, seed % 1000, seed // 1000, "tumbleline"))
-        one = score.exact is not None
+        _, score, document, sealed = module.one(module.Job(name, seed % 1000, seed // 1000, "tumbleline"))
+        one, faulty = score.exact is not None, bool(sealed["faults"])
         outcome = {
             "in class": score.in_class if one else None,
             "exact": score.exact,
+            "recommended": sorted(document["recommended"]) == sorted(score.truth) if one and not faulty else None,
             "fresh run ≤ 1.05 of the true model's": None if score.oracle_ratio is None else score.oracle_ratio <= 1.05,
             "named something": score.named_something if name.startswith("null") else None,
             "not adequate": score.called_inadequate if name.startswith("null") else None,

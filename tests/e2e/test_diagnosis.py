@@ -4,6 +4,7 @@ import json
 import re
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 from capture_double import small_run
@@ -18,7 +19,7 @@ from pipelines.jobs.recipes import load_recipe
 from schemas.errors import RecipeInvalid
 
 from physics import OUTSIDE  # isort: skip
-from benchmarks.truth import Spec, make_run
+from benchmarks.truth import Spec, case, make_run
 
 from world import World, make  # isort: skip
 
@@ -177,6 +178,25 @@ def test_the_suggested_formula_explains_what_no_effect_does(tmp_path: Path, name
     assert before["rms_ug"] > 2.5 * made.floor_ug
     assert after["rms_ug"] < 1.1 * made.floor_ug
     assert after["fresh_rms_ug"] < 0.6 * before["fresh_rms_ug"]  # the day of the fresh run wanders, too
+
+
+@pytest.mark.usefixtures("no_next_measurement")
+def test_the_course_of_a_day_is_offered_with_its_period_and_makes_the_model_adequate(tmp_path: Path) -> None:
+    run = case("withheld", 5, 771)
+    run.dwells.to_parquet(tmp_path / "dwells.parquet")
+    run.history.to_parquet(tmp_path / "history.parquet")
+    data = (tmp_path / "dwells.parquet", "--history", tmp_path / "history.parquet", "--effects")
+    document = document_of("diagnose", *data, "bias,scale,misalignment", status=1)
+    floor = run.sealed.floor_ug
+    assert document["error"]["floor_ug"] == pytest.approx(floor, rel=0.05)
+    assert document["where"][0]["driver"] == "time_s"
+    assert document["where"][0]["share"] > 0.9
+    offer, rate = document["offer"], 2.0 * np.pi * 3600.0 / run.sealed.effects[0].parameters["period_s"]
+    assert float(offer["columns"][0].split("(")[1].split()[0]) == pytest.approx(rate, rel=0.01)
+    formula = ("--formula", f"{offer['id']}={'; '.join(offer['columns'])}")
+    after = document_of("diagnose", *data, f"bias,scale,misalignment,{offer['id']}", *formula, status=0)
+    assert after["adequate"] is True
+    assert after["error"]["rms_ug"] == pytest.approx(floor, rel=0.05)
 
 
 @pytest.mark.usefixtures("no_next_measurement")
