@@ -32,7 +32,7 @@ NOISE_ONLY = (
 
 LEGEND = {
     "residual_rms_ug": "fit: rms residual of the dwells that are fitted",
-    "verification_norm_ug": "verify: largest | |a| − g | of a pose not used, mean of its dwells",
+    "verification_norm_ug": "verify: largest error in a pose not used, mean of its dwells",
     "bias_error_ug": "error: rms of the worst axis in these poses",
     "bias_error_period_ug": "period: 95 % bound of the largest rms error of an axis at the end of the period of validity",
 }

@@ -136,9 +136,9 @@ def _verification(rows: pd.DataFrame) -> Plot:
     texts = tuple(f"pose {pose}: {value:.4g} µg" for pose, value in zip(rows["pose"], rows["error_ug"], strict=True))
     traces = (
         Trace("expected, k = 2", number, -expanded, "band", "muted", high=expanded),
-        Trace("magnitude − g", number, rows["error_ug"].to_numpy(float), role="ink", size=6.0, texts=texts),
+        Trace("error", number, rows["error_ug"].to_numpy(float), role="ink", size=6.0, texts=texts),
     )
-    return Plot("poses not used by the fit", PlotAxis("verification dwell"), PlotAxis("|a| − g / µg"), traces)
+    return Plot("poses not used by the fit", PlotAxis("verification dwell"), PlotAxis("error / µg"), traces)
 
 
 def allan_plot(allan: pd.DataFrame, title: str = "") -> Plot:
@@ -202,7 +202,7 @@ def lot_chart(verification: pd.DataFrame, poses: pd.DataFrame, units: list[str],
         traces += [level(ends, sign * limit_ug, "limit", "limit") for sign in (-1.0, 1.0)]
     axis = PlotAxis("", names=tuple(units), low=-0.5, high=len(units) - 0.5)
     return Chart(
-        "Error on poses not used by the fit", (Plot("", axis, PlotAxis("|a| − g / µg"), tuple(traces)),), height=280
+        "Error on poses not used by the fit", (Plot("", axis, PlotAxis("error / µg"), tuple(traces)),), height=280
     )
 
 
