@@ -5,7 +5,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from inertial.estimation.alternative import Array, Handling, after, tilts, times, without
+from inertial.estimation.alternative import Array, Handling, after, pose_errors, times, without
 from inertial.estimation.lot import Lot
 
 AXES = "xyz"
@@ -87,8 +87,8 @@ class OfOneAxis(Handling):
         return self.change(lot, slope, **place)
 
 
-class AnglesOff(Handling):
-    """Wrong angles of the table in some dwells, for all units: two angles identify the dwells, and do not correct them.
+class DirectionOff(Handling):
+    """A wrong direction in some dwells, for all units: its two errors identify the dwells, and do not correct them.
 
     which : the dwells that are off, and that they are left out
     """
@@ -97,13 +97,15 @@ class AnglesOff(Handling):
     which: ClassVar[str]
 
     def change(self, lot: Lot, slope: Array | None, **place: float) -> Array:
-        """Errors of the two angles in the dwells."""
+        """The two errors in the dwells."""
         here = np.isin(np.arange(lot.state.time.shape[1]), self.dwells(lot, **place))
-        return tilts(lot.state) * here[:, None, None]
+        return pose_errors(lot.state) * here[:, None, None]
 
     def describe(self, lot: Lot, size: Array, **place: float) -> str:
-        """The two angles."""
+        """The two angles of a table; of stated forces the angle between the two directions."""
         angles = np.degrees(size)
+        if lot.state.outer is None:
+            return f"the pose was off by about {float(np.linalg.norm(angles)):.3f}° {self.which}"
         return f"the pose was off by about {angles[0]:+.3f}° (outer) and {angles[1]:+.3f}° (inner) {self.which}"
 
     def mended(self, lot: Lot, size: Array, **place: float) -> Lot | None:

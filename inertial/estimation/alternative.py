@@ -194,6 +194,27 @@ def tilts(state: State) -> Array:
     return np.stack([by_outer, by_inner], axis=-1)
 
 
+def pose_errors(state: State) -> Array:
+    """What a pose that is off adds to the forces of a dwell, (units or 1, n, 3, 2), g per rad: two errors of its direction.
+
+    Of the two angles of a table; of forces that are stated, and the same for all units, along two directions across each force.
+    No columns where neither is known.
+    """
+    if state.outer is not None and state.inner is not None:
+        return tilts(state)
+    force = common(np.broadcast_to(state.force, (*state.time.shape, 3)))
+    if len(force) > 1:
+        return np.zeros((*state.force.shape, 0))
+    # of dwells of one pose the same, though their forces may be some µg apart
+    least = np.eye(3)[np.argmin(np.round(np.abs(force), 3), axis=-1)]
+    first = np.cross(least, force)
+    first *= np.linalg.norm(force, axis=-1, keepdims=True) / np.maximum(
+        np.linalg.norm(first, axis=-1, keepdims=True), 1e-12
+    )
+    second = np.cross(force, first) / np.maximum(np.linalg.norm(force, axis=-1, keepdims=True), 1e-12)
+    return np.stack([first, second], axis=-1)
+
+
 def poses(lot: "Lot") -> Places:
     """Number of the pose of each dwell, (n,)."""
     force = lot.state.force.reshape(-1, *lot.state.force.shape[-2:])[0]

@@ -1,11 +1,11 @@
 import numpy as np
 
-from inertial.data_errors.changes import AnglesOff
-from inertial.estimation.alternative import poses
+from inertial.data_errors.changes import DirectionOff
+from inertial.estimation.alternative import pose_errors, poses
 from inertial.estimation.lot import Lot
 
 
-class PoseOff(AnglesOff):
+class PoseOff(DirectionOff):
     """A pose that is wrong every time, for all units."""
 
     id = "pose_off"
@@ -15,8 +15,8 @@ class PoseOff(AnglesOff):
     fewest_units = 1
 
     def places(self, lot: Lot) -> list[dict[str, float]]:
-        """Every pose with more than one dwell; none if the angles are unknown."""
-        if lot.state.outer is None or lot.state.inner is None:
+        """Every pose with more than one dwell; none if the directions are unknown."""
+        if not pose_errors(lot.state).shape[-1]:
             return []
         there = np.isfinite(lot.error).all(axis=-1).any(axis=0)
         number, count = np.unique(poses(lot)[there], return_counts=True)
