@@ -158,12 +158,15 @@ def size_where_it_acts(model: Model, term: Term) -> float:
 
 
 def contest(field: Candidates, model: Model, barred: str = "", finalists: int = _FINALISTS) -> list[Rival]:
-    """Rivals, best first: those that are best at the model's noise or with less wander, each then with its own noise."""
+    """Rivals, best first: those that are best at the model's noise, with less wander or none, each then with its own noise."""
     leave = {*(t.effect.id for t in model.terms if not isinstance(t.effect, Handling)), barred}
     chosen: dict[str, Term] = {}
     noise = model.noise
     less = noise.shares.times(decisions.LESS_FLICKER, decisions.LESS_WALK)
     others = [noise] if less == noise.shares else [noise, model.noise_at(less)]
+    if noise.shares.walk:
+        # what a few dwells have of a drift can be a walk from end to end: without any wander the drift is seen
+        others.append(model.noise_at(noise.shares.times(0.0, 0.0)))
     for looked in scanned(field, [model.at(other) for other in others], leave):
         for term, _ in looked[:finalists]:
             chosen.setdefault(term.effect.id, term)

@@ -17,10 +17,11 @@ _EVERY = 160
 def every_dwell(lot: Lot) -> list[int]:
     """Dwells from which on a bias may have changed.
 
-    A jump that is missed by one dwell explains half of itself, and a step in time between two dwells all of it.
+    A jump that is missed by one dwell explains half of itself, and a step in time between two dwells all of it. A jump after the
+    first dwell, or before the last, is one bad dwell.
     """
     n = lot.state.time.shape[1]
-    return list(range(1, n)) if n <= _EVERY else times(lot)
+    return list(range(2, n - 1)) if n <= _EVERY else times(lot)
 
 
 class Change(Handling):

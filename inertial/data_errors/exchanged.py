@@ -1,4 +1,4 @@
-"""Pairs of units whose readings were exchanged from a dwell on, by their residuals after a plain fit.
+"""Pairs of units whose readings were exchanged for a range of dwells, by their residuals after a plain fit.
 
 What one of the two has too much the other lacks, so that their residuals are opposite; with the readings exchanged back they
 vanish. A look at all pairs costs one product of the residuals with themselves.
@@ -72,23 +72,42 @@ class PlainFit:
             if alike[a, partner[a]] < _OPPOSITE:
                 yield a, int(partner[a])
 
-    def instants(self, one: int, other: int, around: int = AROUND) -> list[int]:
-        """Dwells about the one from which on an exchange of two units leaves least; none if it leaves too much."""
+    def ranges(self, one: int, other: int, around: int = AROUND) -> list[tuple[int, int]]:
+        """Ranges of dwells (first, end) in which an exchange of two units leaves least; none if it leaves too much.
+
+        The end of most is that of the record; units that came back into their seats before it were exchanged for a while. Beside
+        the best range others whose first or whose last dwell is near.
+        """
         pair = [one, other]
         both = np.all(self.there[pair], axis=0, keepdims=True).T
         apart = np.where(both, self.of_other(one, other) - self.output[pair], 0.0)
         n = both.size
-        dwells = np.arange(EDGE, n - EDGE + 1)
-        after = (np.arange(n) >= dwells[:, None]).astype(np.float64)
-        squares = np.zeros(dwells.size)
+        first, end = np.arange(EDGE, n - EDGE + 1), np.append(np.arange(2 * EDGE, n - EDGE + 1), n)
+        squares = np.zeros((first.size, end.size))
         for difference, basis, rest in zip(apart, self.basis[pair], self.left[pair], strict=True):
             # ‖r + c‖² of the columns c = P·H·d, from running sums: cᵀc = dᵀHd − (QᵀHd)², rᵀc = rᵀHd
             for axis in range(difference.shape[-1]):
                 change = difference[:, axis]
-                along = after @ (basis * change[:, None])
-                squares += after @ change**2 - np.sum(along**2, axis=1) + 2.0 * (after @ (rest[:, axis] * change))
+                single = _running(change * (change + 2.0 * rest[:, axis]))
+                along = _running(basis * change[:, None])
+                squares += single[end] - single[first][:, None]
+                squares -= np.sum(along[end] ** 2, axis=-1) + np.sum(along[first] ** 2, axis=-1)[:, None]
+                squares += 2.0 * along[first] @ along[end].T
+        squares = np.where(end - first[:, None] < EDGE, np.inf, squares)
         whole = float(np.sum(self.left[pair] ** 2))
-        best = int(np.argmin(squares)) if squares.size else 0
-        if whole <= 0.0 or not squares.size or whole + float(squares[best]) > _LEFT * whole:
+        if whole <= 0.0 or not first.size:
             return []
-        return dwells[max(best - around, 0) : best + around + 1].tolist()
+        lasting, best = int(np.argmin(squares[:, -1])), np.unravel_index(int(np.argmin(squares)), squares.shape)
+        found: list[tuple[int, int]] = []
+        for a, b in {(lasting, end.size - 1), (int(best[0]), int(best[1]))}:
+            if whole + float(squares[a, b]) <= _LEFT * whole:
+                near = [(k, b) for k in range(a - around, a + around + 1)]
+                near += [(a, k) for k in range(b - around, b + around + 1) if b < end.size - 1]
+                inside = {(k, m) for k, m in near if 0 <= k < first.size and 0 <= m < end.size}
+                found += [(int(first[k]), int(end[m])) for k, m in sorted(inside) if np.isfinite(squares[k, m])]
+        return sorted(found, key=lambda one: float(squares[one[0] - EDGE, np.searchsorted(end, one[1])]))
+
+
+def _running(values: Array) -> Array:
+    """Sums (n + 1, …) of the values (n, …) before each place."""
+    return np.concatenate([np.zeros((1, *values.shape[1:])), np.cumsum(values, axis=0)])

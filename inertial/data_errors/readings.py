@@ -82,6 +82,23 @@ class Readings:
         return np.sqrt(np.sum(self.fits[:, :, 1:] ** 2, axis=(1, 2)) / len(self.axes))
 
     @cached_property
+    def misfit_when_warm(self) -> Array:
+        """The misfit to a robust fit with slopes over the temperature, (units, n, 3), g; :attr:`misfit` where none was recorded.
+
+        Of a sensor of 1 mg/K the dwells of a cold soak would else be far from those of the others.
+        """
+        warm = self.temperature if self.temperature is not None else self.chamber
+        if warm is None or not self.turned or not np.isfinite(warm[self.there]).all():
+            return self.misfit
+        left = np.empty_like(self.output)
+        for unit, theta in enumerate(warm - np.nanmean(warm, axis=1, keepdims=True)):
+            force = shown_force(self.force, self.axes)[unit]
+            x = np.concatenate([np.ones((len(force), 1)), force], axis=-1)
+            x = np.concatenate([x, theta[:, None] * x], axis=-1)
+            left[unit] = self.output[unit] - x @ robust_fit(force, self.output[unit], theta).T
+        return left / np.where(self.scale > 0.0, self.scale, 1.0)[:, None, None]
+
+    @cached_property
     def misfit(self) -> Array:
         """Output less the robust fit, over the unit's scale: g, (units, n, 3)."""
         design = np.concatenate([np.ones((*self.force.shape[:2], 1)), self.force], axis=-1)

@@ -12,7 +12,7 @@ def outliers(readings: Readings) -> Iterator[Fault]:
     """Single dwells far off on one axis alone, where no scatter was recorded to show spikes."""
     if readings.spread is not None:
         return
-    size = np.abs(readings.misfit)
+    size = np.abs(readings.misfit_when_warm)
     typical = np.nanmedian(size, axis=1, keepdims=True)
     out = np.any(size > np.maximum(0.005, 40.0 * typical), axis=-1)
     for unit, row in enumerate(np.asarray(out)):

@@ -23,7 +23,7 @@ def wrong_poses(readings: Readings) -> Iterator[Fault]:
         ratio = np.nanmedian(size / np.where(typical > 0.0, typical, np.inf), axis=0, keepdims=True)
         out &= ratio < _COMMON
     # of two units that were exchanged the search for effects reports it, too
-    swapped = set(_exchanged_from_a_dwell_on(readings)) if out.any() else set[int]()
+    swapped = set(_exchanged(readings)) if out.any() else set[int]()
     for unit, row in enumerate(out):
         places = np.flatnonzero(row)
         if not places.size or places.size > 0.4 * row.size or unit in swapped:
@@ -36,14 +36,14 @@ def wrong_poses(readings: Readings) -> Iterator[Fault]:
         yield Fault(name, unit, places_of(places[turned]), text)
 
 
-def _exchanged_from_a_dwell_on(readings: Readings) -> Iterator[int]:
-    """Units that have the readings of another one from a dwell on."""
+def _exchanged(readings: Readings) -> Iterator[int]:
+    """Units that have the readings of another one in a range of dwells."""
     warm = readings.temperature if readings.temperature is not None else readings.chamber
     theta = None if warm is None or not np.isfinite(warm[readings.there]).all() else warm
     output = readings.output
     fit = PlainFit(output, readings.force, theta, readings.there, lambda one, other: output[[other, one]])
     for pair in fit.pairs():
-        if fit.instants(*pair):
+        if fit.ranges(*pair):
             yield from pair
 
 

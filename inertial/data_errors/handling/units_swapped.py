@@ -14,34 +14,36 @@ class UnitsSwapped(Handling):
 
     id = "units_swapped"
     symbol = "a ↔ b"
-    equation = "(E_b − E_a)·H(t − t0) in unit a, the opposite in unit b"
+    equation = "E_b − E_a in unit a, the opposite in unit b, from a dwell on or for a while"
     breaker = "the serial numbers of both units in their seats, and a pose of the first half once more"
     hides_behind = ("misalignment_temperature", "scale_temperature_quadratic")
     in_part = False
     of_one = 1.25  # part of a difference between two units is no exchange
 
     def places(self, lot: Lot) -> list[dict[str, float]]:
-        """Pairs whose residuals by a plain fit are opposite to each other and vanish with an exchange, at the best dwells."""
+        """Pairs whose residuals by a plain fit are opposite to each other and vanish with an exchange, in the best dwells."""
         fit = _plain_fit(lot)
         return [
-            {"unit": float(a), "other": float(b), "dwell": float(k)} for a, b in fit.pairs() for k in fit.instants(a, b)
+            {"unit": float(a), "other": float(b), "dwell": float(first), "until": float(end)}
+            for a, b in fit.pairs()
+            for first, end in fit.ranges(a, b)
         ]
 
     def placed(self, lot: Lot, **place: float) -> dict[str, float]:
-        """At the dwell from which on an exchange leaves least: between dwells that were left out all were equally good."""
-        near = _plain_fit(lot).instants(int(place["unit"]), int(place["other"]), around=0)
-        return {**place, "dwell": float(near[0])} if near else place
+        """In the dwells in which an exchange leaves least: between dwells that were left out all were equally good."""
+        near = _plain_fit(lot).ranges(int(place["unit"]), int(place["other"]), around=0)
+        return {**place, "dwell": float(near[0][0]), "until": float(near[0][1])} if near else place
 
     def looks(self, lot: Lot, places: int) -> int:
-        """Every pair at every dwell."""
+        """Every pair in every range of dwells."""
         units, n = lot.state.time.shape
-        return units * (units - 1) // 2 * (n - 2 * EDGE + 1)
+        return units * (units - 1) // 2 * (n - 2 * EDGE + 1) ** 2 // 2
 
     def change(self, lot: Lot, slope: Array | None, **place: float) -> Array:
-        """The difference of the readings of the two units, from the dwell on."""
-        one, other, after = _places(lot, **place)
+        """The difference of the readings of the two units, in the dwells."""
+        one, other, then = _places(lot, **place)
         column = np.zeros((*lot.state.time.shape, len(lot.state.axes), 1))
-        column[[one, other], ..., 0] = (lot.output[[one, other]] - _of_other(lot, one, other)) * after[:, None]
+        column[[one, other], ..., 0] = (lot.output[[one, other]] - _of_other(lot, one, other)) * then[:, None]
         return column
 
     def columns(self, lot: Lot, slope: Array | None, **place: float) -> Array:
@@ -49,9 +51,11 @@ class UnitsSwapped(Handling):
         return by_block(self.change(lot, slope, **place))
 
     def describe(self, lot: Lot, size: Array, **place: float) -> str:
-        one, other, after = _places(lot, **place)
-        apart = 1e6 * float(np.sqrt(np.mean((lot.output[one, after] - _of_other(lot, one, other)[0, after]) ** 2)))
-        return f"exchanged before this dwell, readings {apart:.0f} µg apart; they are exchanged back"
+        one, other, then = _places(lot, **place)
+        apart = 1e6 * float(np.sqrt(np.mean((lot.output[one, then] - _of_other(lot, one, other)[0, then]) ** 2)))
+        back = int(place["until"] - place["dwell"])
+        back = "" if place["until"] >= then.size else f" for {back} dwells"
+        return f"exchanged before this dwell{back}, readings {apart:.0f} µg apart; they are exchanged back"
 
     def settled(self, lot: Lot, size: Array, misfit: Misfit, **place: float) -> Lot | None:
         """With the readings exchanged back: the temperatures, too, if the model fits better with them."""
@@ -63,10 +67,15 @@ class UnitsSwapped(Handling):
 
 
 def _places(lot: Lot, **place: float) -> tuple[int, int, Flags]:
-    """The two units, and the dwells (n,) from which on both were measured as the other."""
+    """The two units, and the dwells (n,) in which both were measured as the other."""
     one, other = int(place["unit"]), int(place["other"])
     there = np.isfinite(lot.error[[one, other]]).all(axis=(0, 2))
-    return one, other, there & (np.arange(lot.state.time.shape[1]) >= place["dwell"])
+    return one, other, there & _within(lot.state.time.shape[1], **place)
+
+
+def _within(n: int, **place: float) -> Flags:
+    """Dwells (n,) from the first of an exchange to its end."""
+    return (np.arange(n) >= place["dwell"]) & (np.arange(n) < place["until"])
 
 
 def _plain_fit(lot: Lot) -> PlainFit:
@@ -82,30 +91,33 @@ def _of_other(lot: Lot, one: int, other: int) -> Array:
 
 
 def _outputs_exchanged(lot: Lot, **place: float) -> Lot:
-    """The lot with the outputs of two units exchanged from a dwell on, and what is known of their noise."""
-    one, other, after = _places(lot, **place)
+    """The lot with the outputs of two units exchanged in the dwells, and what is known of their noise."""
+    one, other, then = _places(lot, **place)
     output, error = lot.output.copy(), lot.error.copy()
-    pair, late = [one, other], after[:, None]
-    output[pair] = np.where(late, _of_other(lot, one, other), lot.output[pair])
-    error[pair] = np.where(late, lot.error[[other, one]], lot.error[pair])
+    pair, here = [one, other], then[:, None]
+    output[pair] = np.where(here, _of_other(lot, one, other), lot.output[pair])
+    error[pair] = np.where(here, lot.error[[other, one]], lot.error[pair])
     return replace(lot, output=output, error=error)
 
 
 def _temperatures_exchanged(state: State, **place: float) -> State:
-    """A state with the temperatures of two units exchanged from a dwell on."""
+    """A state with the temperatures of two units exchanged in the dwells."""
     pair = [int(place["unit"]), int(place["other"])]
     if state.temperature is None:
         return state
-    start = float(state.time[pair, int(place["dwell"])].min())
-    after = np.arange(state.time.shape[1]) >= place["dwell"]
+    n = state.time.shape[1]
     history = state.history
     if history is not None and history.temperature.ndim > 1:
-        history = History(history.time, _exchanged(history.temperature, pair, history.time >= start))
-    return replace(state, temperature=_exchanged(state.temperature, pair, after), history=history, memory={})
+        start = float(state.time[pair, int(place["dwell"])].min())
+        end = np.inf if place["until"] >= n else float(state.time[pair, int(place["until"])].min())
+        then = (history.time >= start) & (history.time < end)
+        history = History(history.time, _exchanged(history.temperature, pair, then))
+    then = _within(n, **place)
+    return replace(state, temperature=_exchanged(state.temperature, pair, then), history=history, memory={})
 
 
-def _exchanged(values: Array, pair: list[int], after: Flags) -> Array:
+def _exchanged(values: Array, pair: list[int], then: Flags) -> Array:
     """Values (units, m) with two rows exchanged in some columns (m,)."""
     changed = values.copy()
-    changed[pair] = np.where(after, values[pair[::-1]], values[pair])
+    changed[pair] = np.where(then, values[pair[::-1]], values[pair])
     return changed
