@@ -7,6 +7,7 @@ import pandas as pd
 from world_row import Check, MadeLot
 
 from benchmarks.hand_turned import EFFECTS
+from inertial.frames import force_from_angles
 
 
 def raised(dwells: pd.DataFrame, unit: int, axis: str, size: float, dwells_from: int = 0, until: int = 999) -> None:
@@ -25,6 +26,34 @@ def in_middle_soak(*axes: tuple[int, str, float]) -> Callable[[pd.DataFrame], pd
         return dwells
 
     return change
+
+
+def stated_forces(dwells: pd.DataFrame) -> pd.DataFrame:
+    """The forces of the poses in place of the angles of the table."""
+    outer, inner = (np.radians(dwells[name].to_numpy()) for name in ("outer_deg", "inner_deg"))
+    names = ["force_x", "force_y", "force_z"]
+    dwells[names] = force_from_angles(outer, inner)
+    return dwells.drop(columns=["outer_deg", "inner_deg"])
+
+
+def exchanged_for_a_soak(dwells: pd.DataFrame) -> pd.DataFrame:
+    """The first two units are in each other's seats in the second of three soaks, and go back."""
+    middle = (dwells["dwell"] >= 24) & (dwells["dwell"] < 48)
+    one, other = (np.flatnonzero(middle & (dwells["unit"] == name)) for name in dwells["unit"].unique()[:2])
+    felt = [dwells.columns.get_loc(name) for name in dwells if name.startswith(("out_", "sd_", "unit_C"))]
+    felt = [k for k in felt if dwells.columns[k] != "out_unit"]
+    readings = dwells.iloc[one, felt].to_numpy()
+    dwells.iloc[one, felt] = dwells.iloc[other, felt].to_numpy()
+    dwells.iloc[other, felt] = readings
+    return dwells
+
+
+def exchange_is_told(document: dict, lot: MadeLot) -> bool:
+    """The pair, as an error of handling or as a fault of both units."""
+    pair = set(lot.dwells["unit"].unique()[:2])
+    told = [one for one in document["classes"] if "units_swapped" in one["effects"]]
+    blocked = {unit for one in document["blocked_by"] if one["fault"] == "units_swapped" for unit in one["units"]}
+    return blocked == pair or [set(one["units"]) for one in told] == [pair]
 
 
 def last_unit_jumps(dwells: pd.DataFrame) -> pd.DataFrame:

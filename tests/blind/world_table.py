@@ -82,6 +82,17 @@ def rows_of_dwells_and_poses() -> Iterator[Row]:
     for degrees in (0.1, 2.0, 20.0):
         world = World(fault="wrong_pose", amount=degrees)
         yield Row(world, POSES + 70, f"pose off {degrees:g}°", first=("wrong_pose",), told="dwells")
+    # the same where the forces are stated, and no angles of a table
+    for name, first in (("pose_2deg", "wrong_pose"), ("pose_off_one_unit", "pose_off")):
+        yield Row(
+            FAULTS[name], POSES + 1, f"{name} of stated forces", first=(first,), told="dwells", recommended=(),
+            change=changes.stated_forces, fast=True,
+        )  # fmt: skip
+    for seed in (SEED + 5, SEED + 6, SEED + 7):
+        yield Row(
+            World(units=3), seed, "two units exchanged for a soak", recommended=(),
+            change=changes.exchanged_for_a_soak, also=changes.exchange_is_told, fast=seed == SEED + 5,
+        )  # fmt: skip
     for name in ("pose_off_one_unit", "pose_off_one_unit_12", "pose_off_two_units"):
         for seed in (1, 2, 3):
             yield Row(

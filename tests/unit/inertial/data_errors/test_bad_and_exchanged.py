@@ -1,5 +1,6 @@
 """Faults of data and errors of handling: tails of the noise, coarse digits, exchanged units."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -8,9 +9,11 @@ from made_worlds import BASE, HIDDEN, NULLS, Noise, World, lot_in, make
 from scipy import integrate, stats
 
 from inertial.data_errors import tails
+from inertial.data_errors.handling.bias_jump import BiasJump
 from inertial.data_errors.handling.units_swapped import UnitsSwapped
 from inertial.data_errors.removed_dwells import BadDwell
 from inertial.data_errors.tails import with_tails
+from inertial.estimation.alternative import common, pose_errors
 from pipelines.tables.sound_lot import sound_lot
 
 GATE = 5.4
@@ -106,3 +109,52 @@ def test_no_pair_is_searched_where_no_units_were_exchanged(world: World) -> None
     lots = (make(world, 6_300_020 + seed) for seed in range(2))
     assert [UnitsSwapped().places(lot_in(one)) for one in lots] == [[]] * 2
     assert not UnitsSwapped().possible(np.array([0.5]))
+
+
+def test_units_in_each_others_seats_for_a_while_are_found_with_both_ends() -> None:
+    lot = lot_in(make(World(units=4), 6_300_040))
+    output = lot.output.copy()
+    scale = np.ones((4, 3)) if lot.scale is None else lot.scale
+    output[[1, 2], 20:44] = (scale[[2, 1], None] / scale[[1, 2], None] * output[[2, 1]])[:, 20:44]
+    places = UnitsSwapped().places(replace(lot, output=output))
+    assert {(place["unit"], place["other"]) for place in places} == {(1.0, 2.0)}
+    first = places[0]
+    assert (first["dwell"], first["until"]) == (20.0, 44.0)
+    settled = UnitsSwapped().settled(replace(lot, output=output), np.ones(1), lambda *_, **__: 0.0, **first)
+    assert settled is not None
+    np.testing.assert_allclose(settled.output, lot.output)
+
+
+@pytest.mark.parametrize("stated", [False, True])
+def test_a_pose_that_is_off_has_two_columns_across_its_force(*, stated: bool) -> None:
+    state = lot_in(make(World(units=2), 6_300_050)).state
+    state = replace(state, outer=None, inner=None) if stated else state
+    columns = pose_errors(state)
+    force = common(np.broadcast_to(state.force, (*state.time.shape, 3)))
+    assert columns.shape == (*force.shape, 2)
+    np.testing.assert_allclose(np.einsum("unik,uni->unk", columns, force), 0.0, atol=1e-12)
+    if stated:
+        length = np.repeat(np.linalg.norm(force, axis=-1)[..., None], 2, axis=-1)
+        np.testing.assert_allclose(np.linalg.norm(columns, axis=-2), length)
+        own = np.stack([state.force.reshape(-1, *state.force.shape[-2:])[0]] * 2)
+        own[1, :, 0] *= -1.0
+        assert (
+            pose_errors(replace(state, force=own)).shape[-1] == 0
+        )  # seats of their own: a pose is no direction of all
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_sensor_that_follows_the_temperature_has_no_spikes(seed: int) -> None:
+    made = make(World(units=4, soaks=(25.0, 26.0, -10.0, 24.0)), 6_300_060 + seed)
+    dwells = made.dwells.drop(columns=["sd_x", "sd_y", "sd_z", "n"])
+    for axis in "xyz":
+        dwells[f"out_{axis}"] += 1e-3 * (dwells["unit_C"] - 25.0)
+    assert [fault.name for fault in sound_lot(dwells, made.history, BASE)[1]] == []
+    dwells.loc[dwells.index[7], "out_y"] += 0.012
+    assert [fault.name for fault in sound_lot(dwells, made.history, BASE)[1]] == ["spikes"]
+
+
+def test_a_bias_that_jumps_has_two_dwells_on_either_side() -> None:
+    lot = lot_in(make(World(units=1), 6_300_070))
+    jumps = {place["dwell"] for place in BiasJump().places(lot)}
+    assert (min(jumps), max(jumps)) == (2.0, lot.state.time.shape[1] - 2.0)
