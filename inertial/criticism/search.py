@@ -121,13 +121,19 @@ def anything(field: Candidates, model: Model) -> bool:
 
 def convincing(field: Candidates, model: Model, rival: Rival) -> bool:
     """Whether a rival is significant over all tests, exceeds its price, and is large enough to matter."""
+    return (
+        evident(field, rival)
+        and size_where_it_acts(model, rival.term) > MATERIAL * model.with_term(rival.term).scatter()
+    )
+
+
+def evident(field: Candidates, rival: Rival) -> bool:
+    """Whether a rival is significant over all tests and exceeds its price, however small it is."""
     effect = rival.term.effect
     rare = JUMPS_RARE if isinstance(effect, Handling) and effect.of_one_axis else 0.0
     if rival.log_p + 0.5 * rare + np.log(max(field.looks, 1)) > np.log(NAMED_BELOW):
         return False
-    if -rival.cost - rare < np.log(max(field.problem.count, 1)):
-        return False
-    return size_where_it_acts(model, rival.term) > MATERIAL * model.with_term(rival.term).scatter()
+    return -rival.cost - rare >= float(np.log(max(field.problem.count, 1)))
 
 
 def size_of(model: Model, term: Term) -> float:

@@ -14,7 +14,7 @@ from inertial.criticism.drivers import Driver, looks_of
 from inertial.criticism.evidence import GROSS, not_judged
 from inertial.criticism.examination import EffectSearch, ExaminedRun, examined
 from inertial.criticism.lot_part import LotPart
-from inertial.criticism.search import SearchResult
+from inertial.criticism.search import SearchResult, evident, judge
 from inertial.criticism.unknown import Suspect, Unexplained, better_curve, curve_in_noise, unexplained_by
 from inertial.data_errors.removed_dwells import BadDwell
 from inertial.data_errors.tails import with_tails
@@ -127,6 +127,8 @@ def _judged(lot: Lot, effects: Sequence[str], rng: Generator, barred: frozenset[
     if unjudged:
         # data that cannot judge the model cannot identify missing effects either
         searched = SearchResult(base, (), searched.ladder)
+    if not (unjudged or passed or searched.added):
+        searched = _with_a_small_effect(search, base)
     final, unexplained, curved = searched.model, None, None
     if not unjudged and (searched.added or not passed):
         final, unexplained = _with_curves(search.part, base, searched, drivers)
@@ -204,6 +206,20 @@ def _with_curves(
     return final, Unexplained(
         best.name, shape, log_p, best.part, curved.floor(), cost_of_model(curved), base.problem.covariance.there
     )
+
+
+def _with_a_small_effect(search: EffectSearch, base: Model) -> SearchResult:
+    """The search that found nothing, with the best evident effect of those too small to be searched for.
+
+    Beside an adequate model, or a larger effect, what is small is the remainder of an imperfect driver. Where the model is not
+    adequate and nothing else says why, it is the answer.
+    """
+    for rival in search.result.ladder:
+        if isinstance(rival.term.effect, Handling):
+            continue
+        if evident(search.field, judge(search.field, base, rival.term)):
+            return replace(search.result, added=(rival.term,), model=base.with_term(rival.term))
+    return search.result
 
 
 def _taken_for_noise(part: LotPart) -> tuple[Unexplained, CurveFit] | tuple[None, None]:
