@@ -57,3 +57,12 @@ def test_six_faces_have_one_verdict(rng: np.random.Generator, tilt_deg: float, a
     assert set(Archive(None).run(imported["run"]).table("verdict")["verdict"]) == {
         "not judged" if adequate is None else "not adequate"
     }
+
+
+@pytest.mark.parametrize("moves", [True, False])
+def test_labels_of_a_file_name_its_faces(rng: np.random.Generator, *, moves: bool) -> None:
+    path = recorded(rng, "labels.csv", moves=moves)
+    command = document_of("improve", path, "--yes", status=1)["recording"]["command"]
+    assert "dwell=pose" in command
+    assert "--poses p0=+x,p1=-x,p2=+y,p3=-y,p4=+z,p5=-z" in command
+    assert command.startswith(document_of("inspect", path)["command"].split(" --gaps")[0])
