@@ -18,7 +18,6 @@ from pipelines.importers.guesses import Guesses, measurable
 from pipelines.importers.mapping import TIME_UNITS
 from pipelines.importers.proposal import ASSUMED_HZ, Proposal, columns_and_units, for_fit, of_stops
 from pipelines.importers.record_time import gap_limit
-from schemas.units import AXES
 
 
 @dataclass(frozen=True)
@@ -150,22 +149,27 @@ def of_content(
     )  # fmt: skip
 
 
+_OUTPUT_UNIT = "the unit of the output: --units output=g|mg|m/s^2|V|mV|LSB"
+
+
 def _open(guessed: Guesses, output: Array | None) -> list[str]:
     """What the file does not state of its outputs."""
     open_ = [guessed.triad.doubt] if guessed.triad.doubt else []
     if output is None:
         if guessed.single and not guessed.output.meaning:
-            open_.append("the unit of the output: --units output=g|mg|m/s^2|V|mV|LSB")
+            open_.append(_OUTPUT_UNIT)
         if guessed.single or open_:
+            return open_
+        if guessed.few:
+            found = " and ".join(f"{axis}: {column}" for axis, column in guessed.few.items())
+            open_.append(
+                f"{found} taken for a device of fewer than three axes, which an import takes by --axes and 'tumbleline fit RUN' "
+                "fits; a record at rest has its noise by 'tumbleline allan' and 'tumbleline psd'"
+            )
+            open_.append(_OUTPUT_UNIT)
             return open_
         missing = [axis for axis in "xyz" if not guessed.column(axis)]
         open_.append(f"columns of acceleration were not recognised: map {' and '.join(missing)} by name or number")
-        few = len([one for one in guessed.columns.values() if one.meaning != "time"])
-        if few < len(AXES):
-            open_.append(
-                f"{few} column{'s' if few > 1 else ''} beside the time: an import needs three axes; a record at rest of fewer "
-                "has its noise by 'tumbleline allan' and 'tumbleline psd'"
-            )
         return open_
     bits = unit_check.unsigned_bits(output)
     if bits:
@@ -173,7 +177,7 @@ def _open(guessed: Guesses, output: Array | None) -> list[str]:
             f"signed words of {bits} bits were read without their sign: subtract {2**bits} from {2 ** (bits - 1)} on"
         )
     if not guessed.output.meaning:
-        open_.append("the unit of the output: --units output=g|mg|m/s^2|V|mV|LSB")
+        open_.append(_OUTPUT_UNIT)
     elif guessed.output.reason.endswith(unit_check.DOUBT):
         open_.append(f"the unit of the output; {guessed.output.meaning} is a guess, {guessed.output.reason}")
     return open_
