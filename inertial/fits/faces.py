@@ -1,4 +1,4 @@
-"""Six faces: bias and scale in closed form, the published method, and the least-squares fit that also shows its lack of fit."""
+"""Six faces: bias and scale in closed form, the published method, and the least squares that show the lack of fit."""
 
 from dataclasses import dataclass
 
@@ -33,10 +33,6 @@ class Faces:
     """(3,) output unit."""
     response: Array
     """(3, 3) K, output unit per unit of gravity."""
-    bias_error: Array
-    """(3,) standard errors from the lack of fit, output unit."""
-    response_error: Array
-    """(3, 3) standard errors from the lack of fit."""
     residuals: Array
     """(6, 3) means less model, output unit: +x, +y, +z, -x, -y, -z by output."""
     rms: Array
@@ -74,7 +70,7 @@ def faces(up: ArrayLike, down: ArrayLike, gravity: float, standard_error: ArrayL
     """Bias and response from all eighteen means, with the lack of fit that six degrees of freedom show.
 
     Each output has six means and four unknowns. A bias that differs between the pairs (a tilted face, a second-order
-    term, a temperature that moved) shows in the residuals; its size goes into the standard errors.
+    term, a temperature that moved) shows in the residuals.
 
     Parameters
     ----------
@@ -87,11 +83,10 @@ def faces(up: ArrayLike, down: ArrayLike, gravity: float, standard_error: ArrayL
     theta = np.asarray(np.linalg.lstsq(design, means, rcond=None)[0], dtype=np.float64)
     residuals = means - design @ theta
     rms = np.sqrt(np.sum(residuals**2, axis=0) / 2.0)
-    errors = np.sqrt(np.diagonal(np.linalg.inv(design.T @ design)))[:, None] * rms
     pure = np.full(3, np.nan) if standard_error is None else np.asarray(standard_error, dtype=np.float64)
     # the samples' own degrees of freedom are many: chi-square over 2 is F with 2 and infinity
     p_value = np.where(np.isnan(pure), np.nan, f_distribution.sf((rms / pure) ** 2, 2, 1e9))
-    return Faces(theta[0], theta[1:].T, errors[0], errors[1:].T, residuals, rms, pure, p_value)
+    return Faces(theta[0], theta[1:].T, residuals, rms, pure, p_value)
 
 
 @dataclass(frozen=True)

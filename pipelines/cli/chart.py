@@ -46,15 +46,26 @@ def chart(title: str, lines: Sequence[Line], width: int, height: int, span: tupl
     low, high = min(values) - room, max(values) + room
     columns = max(10, width - MARGIN - 2)
     cells = _drawn(lines, shown, (columns, height), span, (low, high))
+    labels = _labels(low, high, height)
     for row in range(height):
-        at = high - (high - low) * row / (height - 1)
-        label = f"{at:{MARGIN - 1}.1f} " if row % 2 == 0 else " " * MARGIN
+        label = f"{labels[row]:>{MARGIN - 1}} " if row % 2 == 0 else " " * MARGIN
         text.append(f"{label}│", style="dim")
         for column in range(columns):
             mask, style = cells.get((row, column), (0, ""))
             text.append(chr(BLANK + mask) if mask else " ", style=style)
         text.append("\n")
     return text.append(_times(span, columns), style="dim")
+
+
+def _labels(low: float, high: float, height: int) -> list[str]:
+    """The value of every row from the top, with the decimal places by which rows two apart differ, one at least.
+
+    Where the margin has no room for so many, as powers of ten.
+    """
+    values = [high - (high - low) * row / (height - 1) for row in range(height)]
+    places = max(1, math.ceil(-math.log10(2.0 * (high - low) / (height - 1))))
+    labels = [f"{round(value, places) + 0.0:.{places}f}" for value in values]  # no minus before a zero
+    return labels if max(map(len, labels)) < MARGIN else [f"{value:.1e}" for value in values]
 
 
 def _drawn(

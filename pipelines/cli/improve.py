@@ -106,7 +106,7 @@ def command(
     document["next"] = next_lines(document, target, find, after=document["after"] or document["diagnosis"])
     if recording is not None:
         document["recording"] = recording
-        document["next"] = document["next"] or next_of_recording(document, archive)
+        document["next"] = next_of_recording(document, archive)
     show = print_recording if brief else print_improvement
     conclude(document, show, as_json=as_json, passed=bool(document["adequate"] and not document["refuted"]))
 

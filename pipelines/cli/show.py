@@ -25,6 +25,13 @@ EXAMPLES = (
 )
 
 MANY = 40
+NOTES = {
+    "coefficients": (
+        "standard_error: k = 1, of the value that wander moves about; the bias as the mean of this record alone, which an import "
+        "prints with k = 2, has bias_record_u_ug of the table wander"
+    ),
+}
+"""What the columns of a table mean where their names alone mislead."""
 
 
 def command(
@@ -97,6 +104,8 @@ def _show_table(run: Run, name: str, *, as_json: bool) -> None:
     print_table([str(column) for column in frame.columns], lines, title=f"{run.id}: {name}")
     if len(frame) > MANY:
         say(f"{number_of(len(frame) - MANY, 'more row')}; print all rows with --json")
+    if name in NOTES and "wander" in run.tables():
+        say(NOTES[name], style="dim")
 
 
 MADE = ("stage", "code", "key", "libraries", "schema", "inputs", "parameters", "who", "where", "when")

@@ -36,6 +36,7 @@ from pipelines.parallel import keep_memory
 from pipelines.tables.dwells import Measured
 from pipelines.tables.fewer_axes import sentences, shows_misalignment
 from pipelines.tables.sound_lot import error_of, every_unit_faulty, gaps, generator, probability, sound_lot
+from pipelines.tables.stated_poses import told
 from schemas.errors import DataRejected
 
 DEFAULT = ("bias", "scale", "misalignment")
@@ -159,16 +160,14 @@ def document(
         *gaps(measurement, faults, left_out),
         *without_history(measurement, terms),
     ]
+    error = error_of(diagnosis.rms, diagnosis.floor, diagnosis.log_p)
+    adequate, reason, error = told(diagnosis.base, diagnosis.adequate, diagnosis.unjudged, error)
     return {
-        "adequate": diagnosis.adequate,
-        "reason": diagnosis.unjudged or None,
+        "adequate": adequate,
+        "reason": reason or None,
         "blocked_by": blocked,
         "evidence": evidence_of(diagnosis, names),
-        "error": {
-            **error_of(diagnosis.rms, diagnosis.floor, diagnosis.log_p),
-            "white_noise_ug": white_noise_of(diagnosis.base),
-            **noise_of(diagnosis.final),
-        },
+        "error": {**error, "white_noise_ug": white_noise_of(diagnosis.base), **noise_of(diagnosis.final)},
         "where": [
             {"driver": p.driver, "axes": list(p.axes), "share": round(p.share, 4), "p_value": probability(p.log_p)}
             for p in diagnosis.where

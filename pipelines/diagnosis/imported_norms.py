@@ -15,7 +15,7 @@ from inertial.counts import degrees_of_freedom
 from inertial.state import T_REFERENCE
 from inertial.uncertainty.rounding import equal
 from pipelines.diagnosis.diagnose import default_model, diagnose
-from pipelines.importers.faces import six_faces
+from pipelines.diagnosis.imported_faces import six_faces
 from pipelines.importers.judged import FitAnswer, gravity_of, imported_dwells
 from pipelines.importers.mapping import Mapping
 from pipelines.importers.plane import plane, shown_turn

@@ -39,7 +39,9 @@ def verdict(document: dict[str, Any]) -> str:
         return f"NOT ADEQUATE: the run has faults of the data: {'; '.join(spoilt)}; without them {without}{rest}."
     if named:
         return f"{told}; missing: {', and '.join(named)}."
-    rest = "no effect and no recorded quantity explains the residual: its cause is not recorded, or its noise is not understood"
+    rest = document.get("reason") or (
+        "no effect and no recorded quantity explains the residual: its cause is not recorded, or its noise is not understood"
+    )
     if document["unexplained"]:
         rest = f"{document['unexplained']['text']}, and no effect of the catalogue explains it"
     return f"{told}; {rest}."

@@ -20,6 +20,7 @@ _FINE = re.compile(r"sample_?time_?fine", re.IGNORECASE)
 """Counter of Xsens devices in units of 100 µs (MT Low Level Communication Protocol, MTData2, SampleTimeFine)."""
 FINE_HZ = 1e4
 _AXIS = re.compile(r"(?:^|[_ .])[xyz](?:$|[_ .])", re.IGNORECASE)
+_LETTER = re.compile(r"(?:^a?|acc|[_ .])([xyz])(?:$|[_ .\[(])", re.IGNORECASE)
 _SPREAD = re.compile(r"^(?:sd|std|sigma|s)[_ .]*(?:acc\w*?|a|out)?[_ .]*([xyz])$", re.IGNORECASE)
 _OF_SENSOR = re.compile(r"imu|acc|gyr|gtemp|sensor|die|chip|mpu|unit", re.IGNORECASE)
 _FASTEST_K_S = 2.0
@@ -55,6 +56,7 @@ class Guesses:
 
     columns : column → guess · time_unit, output : units with their reasons; empty if unknown · sheet : whether each row is a
     position, by a label of its own or by its distance from its neighbours · triad : what was seen of the three axes
+    few : axis → column of a device with one axis or two
     """
 
     columns: dict[str, Guess]
@@ -62,6 +64,7 @@ class Guesses:
     output: Guess
     sheet: bool = False
     triad: triads.Triad = field(default_factory=triads.Triad)
+    few: dict[str, str] = field(default_factory=dict[str, str])
 
     @property
     def dwells(self) -> bool:
@@ -93,7 +96,8 @@ def guesses(content: Content) -> Guesses:
     sheet = _sheet(table, numeric, guessed)
     positions = not _column(guessed, "time") and triads.are_positions(found.sphere, len(table))
     output = _output(content, numeric, guessed, found.sphere)
-    return Guesses(guessed, _time_unit(content, numeric, guessed), output, sheet or positions, found)
+    few = _few_axes(content, numeric, guessed)
+    return Guesses(guessed, _time_unit(content, numeric, guessed), output, sheet or positions, found, few)
 
 
 def _sheet(table: pd.DataFrame, numeric: dict[str, Array], guessed: dict[str, Guess]) -> bool:
@@ -192,6 +196,17 @@ def _axes(content: Content, numeric: dict[str, Array], guessed: dict[str, Guess]
     for axis, name in zip("xyz", found.names, strict=False):
         guessed[name] = Guess(axis, found.reason)
     return found
+
+
+def _few_axes(content: Content, numeric: dict[str, Array], guessed: dict[str, Guess]) -> dict[str, str]:
+    """The columns of a device with one axis or two: all that is left of a record in time; the axis by its name, else in order."""
+    if not _column(guessed, "time") or any(_column(guessed, axis) for axis in "xyz"):
+        return {}
+    left = [name for name, numbers in numeric.items() if not guessed[name].meaning and not _is_index(numbers)]
+    left = [name for name in left if triads.may_be_output(name, content.units.get(name, ""))]
+    named = [found[1].lower() if (found := _LETTER.search(name)) else "" for name in left]
+    letters = named if all(named) and len(set(named)) == len(named) else list("xyz"[: len(left)])
+    return dict(sorted(zip(letters, left, strict=True))) if len(left) in (1, 2) else {}
 
 
 def _is_index(numbers: Array) -> bool:

@@ -75,7 +75,9 @@ def columns_and_units(content: Content, guessed: guesses.Guesses, path: Path) ->
     """Columns, units and serial number; COLUMN, UNIT and HZ where the file shows none."""
     names = list(guessed.columns)
     columns = {meaning: _mapped(column, names) for meaning in MAPPED if (column := guessed.column(meaning))}
-    columns |= {axis: "COLUMN" for axis in "xyz" if not guessed.column(axis) and not guessed.single}
+    columns |= {axis: _mapped(column, names) for axis, column in guessed.few.items()}
+    if not (guessed.single or guessed.few):
+        columns |= {axis: "COLUMN" for axis in "xyz" if not guessed.column(axis)}
     units = {"output": guessed.output.meaning or "UNIT"}
     time = guessed.column("time")
     if time and guessed.time_unit.meaning:
@@ -85,8 +87,8 @@ def columns_and_units(content: Content, guessed: guesses.Guesses, path: Path) ->
     heat = TEMPERATURE.get(content.units.get(guessed.column("temperature"), "").strip().lower(), "degC")
     units |= {"temperature": heat} if heat != "degC" else {}
     keys: dict[str, Any] = {"columns": columns, "units": units, "unit": serial_of(path)}
-    if guessed.single:
-        keys["axes"] = ["x"]
+    if guessed.single or guessed.few:
+        keys["axes"] = sorted(guessed.few) or ["x"]
     if guessed.dwells:
         keys["rows"] = "dwells"
     elif not time:

@@ -18,7 +18,6 @@ from pipelines.importers.guesses import Guesses, measurable
 from pipelines.importers.mapping import TIME_UNITS
 from pipelines.importers.proposal import ASSUMED_HZ, Proposal, columns_and_units, for_fit, of_stops
 from pipelines.importers.record_time import gap_limit
-from schemas.units import AXES
 
 
 @dataclass(frozen=True)
@@ -26,6 +25,7 @@ class Recognition:
     """A recording as it is recognised.
 
     source : the files · time, output : (n,) s and (n, 3) of the rows with all numbers; None where there are none
+    labels : of these rows, where a column marks the dwells
     gaps : in time · stops : None where no record was searched · faults : of the samples · open : what the file does not state
     keys : of the mapping, with words in capitals for what is open · is_exchange : a table of dwells, read as it is
     """
@@ -43,6 +43,7 @@ class Recognition:
     faults: sample_faults.SampleFaults | None = None
     open: tuple[str, ...] = ()
     keys: dict[str, Any] | None = None
+    labels: tuple[str, ...] | None = None
 
     @property
     def import_command(self) -> str:
@@ -53,30 +54,44 @@ class Recognition:
         """The import with a fit, where nothing has to be added but what may be assumed; None otherwise."""
         if self.keys is None or self.output is None or any(text != _NO_CLOCK for text in self.open):
             return None
-        means, stops, keys, duration = None, self.stops, self.keys, None
-        found: stretches.Stretches | None = None
-        time = np.arange(len(self.output)) / ASSUMED_HZ if self.time is None else self.time
         if self.guessed.dwells:
-            means = self.output
-        else:
-            stops = self.stops or _stops(self.output, time)
-            keys = self.keys if self.stops else _with_stops(self.keys, self.output, stops)
-            duration = float(time[-1] - time[0])
-            found = stretches.by_positions(self.output, keys["positions"], "") if "positions" in keys else None
-            found = stops.found if found is None and stops is not None else found
-            if found is not None and len(found):
-                pairs = zip(found.first, found.last, strict=True)
-                means = np.stack([self.output[a:b].mean(axis=0) for a, b in pairs])
+            named = self.guessed.column("dwell")
+            whole = bool(named) and len(self.content.table) == len(self.output)
+            own = [f"dwell {k}" for k in range(len(self.output))]
+            return self._proposal(
+                self.keys, self.output, self.content.table[named].astype(str).tolist() if whole else own
+            )
+        time = np.arange(len(self.output)) / ASSUMED_HZ if self.time is None else self.time
+        stops = self.stops or _stops(self.output, time)
+        if self.labels is not None and stops is not None:
+            found, every = stretches.labelled(self.labels, _edges(time), stops.found)
+            proposal = self._of_stretches(self.keys, found, time)
+            if every or proposal.fit == "faces":  # named faces leave the other labels out
+                return proposal
+        keys: dict[str, Any] = {**self.keys, "columns": {**self.keys["columns"]}}
+        keys["columns"].pop("dwell", None)  # positions without a name are those that the search finds
+        keys = keys if self.stops and self.labels is None else _with_stops(keys, self.output, stops)
+        found = stretches.by_positions(self.output, keys["positions"], "") if "positions" in keys else None
+        found = stops.found if found is None and stops is not None else found
+        proposal = self._of_stretches(keys, found, time)
+        handled = _handling(stops, time) if stops is not None and proposal.fit else ""
+        return replace(proposal, remarks=(*proposal.remarks, handled)) if handled else proposal
+
+    def _of_stretches(self, keys: dict[str, Any], found: stretches.Stretches | None, time: Array) -> Proposal:
+        """The import with a fit of a record's static stretches."""
+        duration = float(time[-1] - time[0])
+        if found is None or not len(found) or self.output is None:
+            return self._proposal(keys, None, [], duration)
+        pairs = zip(found.first, found.last, strict=True)
+        means = np.stack([self.output[first:last].mean(axis=0) for first, last in pairs])
+        return self._proposal(keys, means, found.labels, duration)
+
+    def _proposal(
+        self, keys: dict[str, Any], means: Array | None, labels: Sequence[str], duration: float | None = None
+    ) -> Proposal:
         warm = self.guessed.column("temperature")
         heat = measurable(values.as_numbers(self.content.table[warm], warm)) if warm else None
-        named = self.guessed.column("dwell")
-        count = 0 if means is None else len(means)
-        whole = bool(named) and len(self.content.table) == count
-        own = [f"dwell {k}" for k in range(count)] if found is None else [*found.labels]
-        labels = self.content.table[named].astype(str).tolist() if whole else own
-        proposal = for_fit(keys, self.guessed, means, labels, duration, heat)
-        handled = "" if stops is None or duration is None or not proposal.fit else _handling(stops, time)
-        return replace(proposal, remarks=(*proposal.remarks, handled)) if handled else proposal
+        return for_fit(keys, self.guessed, means, labels, duration, heat)
 
 
 _NO_CLOCK = "the rate of the samples: no column of time was recognised and the file states no interval; --rate HZ"
@@ -117,8 +132,12 @@ def of_content(
     gaps = int(np.count_nonzero(steps > gap_limit(steps)))
     faults = sample_faults.look(kept) if kept is not None and len(kept) > 3 and not guessed.dwells else None
     stops = _stops(kept, own) if kept is not None and own is not None and not guessed.dwells else None
+    named = guessed.column("dwell")
+    labels = None
+    if named and kept is not None and not guessed.dwells:
+        labels = tuple(np.asarray(content.table[named].astype(str), dtype=np.str_)[whole].tolist())
     keys = columns_and_units(content, guessed, paths[0])
-    if stops is not None and kept is not None:
+    if stops is not None and kept is not None and labels is None:  # what marks the dwells is not searched for
         keys = _with_stops(keys, kept, stops)
     for more in stated:
         keys |= more
@@ -126,8 +145,11 @@ def of_content(
     keys |= {"faulty": "leave-out"} if faults else {}
     open_ += _open(guessed, kept)
     return Recognition(
-        tuple(paths), content, source, guessed, False, own, kept, gaps, _rate(own), stops, faults, tuple(open_), keys
+        tuple(paths), content, source, guessed, False, own, kept, gaps, _rate(own), stops, faults, tuple(open_), keys, labels
     )  # fmt: skip
+
+
+_OUTPUT_UNIT = "the unit of the output: --units output=g|mg|m/s^2|V|mV|LSB"
 
 
 def _open(guessed: Guesses, output: Array | None) -> list[str]:
@@ -135,17 +157,19 @@ def _open(guessed: Guesses, output: Array | None) -> list[str]:
     open_ = [guessed.triad.doubt] if guessed.triad.doubt else []
     if output is None:
         if guessed.single and not guessed.output.meaning:
-            open_.append("the unit of the output: --units output=g|mg|m/s^2|V|mV|LSB")
+            open_.append(_OUTPUT_UNIT)
         if guessed.single or open_:
+            return open_
+        if guessed.few:
+            found = " and ".join(f"{axis}: {column}" for axis, column in guessed.few.items())
+            open_.append(
+                f"{found} taken for a device of fewer than three axes, which an import takes by --axes and 'tumbleline fit RUN' "
+                "fits; a record at rest has its noise by 'tumbleline allan' and 'tumbleline psd'"
+            )
+            open_.append(_OUTPUT_UNIT)
             return open_
         missing = [axis for axis in "xyz" if not guessed.column(axis)]
         open_.append(f"columns of acceleration were not recognised: map {' and '.join(missing)} by name or number")
-        few = len([one for one in guessed.columns.values() if one.meaning != "time"])
-        if few < len(AXES):
-            open_.append(
-                f"{few} column{'s' if few > 1 else ''} beside the time: an import needs three axes; a record at rest of fewer "
-                "has its noise by 'tumbleline allan' and 'tumbleline psd'"
-            )
         return open_
     bits = unit_check.unsigned_bits(output)
     if bits:
@@ -153,7 +177,7 @@ def _open(guessed: Guesses, output: Array | None) -> list[str]:
             f"signed words of {bits} bits were read without their sign: subtract {2**bits} from {2 ** (bits - 1)} on"
         )
     if not guessed.output.meaning:
-        open_.append("the unit of the output: --units output=g|mg|m/s^2|V|mV|LSB")
+        open_.append(_OUTPUT_UNIT)
     elif guessed.output.reason.endswith(unit_check.DOUBT):
         open_.append(f"the unit of the output; {guessed.output.meaning} is a guess, {guessed.output.reason}")
     return open_
@@ -214,8 +238,13 @@ def _stops(output: Array, time: Array) -> stretches.Stops | None:
     steps = np.diff(time)
     if len(output) < 3 or np.any(steps < 0.0) or not np.any(steps > 0.0):
         return None
-    edges = [0, *(np.flatnonzero(steps > gap_limit(steps)) + 1).tolist(), len(output)]
-    return stretches.found_stops(output, time, edges)
+    return stretches.found_stops(output, time, _edges(time))
+
+
+def _edges(time: Array) -> list[int]:
+    """The samples before which time has a gap, with the first and one past the last."""
+    steps = np.diff(time)
+    return [0, *(np.flatnonzero(steps > gap_limit(steps)) + 1).tolist(), len(time)]
 
 
 def _handling(stops: stretches.Stops, time: Array) -> str:

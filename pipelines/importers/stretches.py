@@ -26,6 +26,10 @@ _ENOUGH = 6
 """Stops from which a longer window is preferred: the faces of a cube."""
 
 
+_AT_REST = 0.5
+"""Part of a labelled stretch inside found stops, from which it is at rest: a search leaves its ends out."""
+
+
 @dataclass(frozen=True)
 class Stretches:
     """Static stretches: first and one past the last sample, and label of each; remarks on how they were found."""
@@ -149,6 +153,17 @@ def _by_labels(labels: Sequence[str], edges: list[int]) -> Stretches:
     first = sorted({*(np.flatnonzero(names[1:] != names[:-1]) + 1).tolist(), *edges[:-1]})
     last = [*first[1:], names.size]
     return Stretches(tuple(first), tuple(last), tuple(str(names[k]) for k in first))
+
+
+def labelled(labels: Sequence[str], edges: list[int], found: Stretches) -> tuple[Stretches, bool]:
+    """The stretches of a label that lie in found stops for the most part, and whether all do: a label may mark the moves."""
+    named = _by_labels(labels, edges)
+    still = np.zeros(len(labels), dtype=bool)
+    for first, last in zip(found.first, found.last, strict=True):
+        still[first:last] = True
+    pairs = zip(named.first, named.last, strict=True)
+    resting = [k for k, (first, last) in enumerate(pairs) if np.mean(still[first:last]) >= _AT_REST]
+    return named.only(resting), len(resting) == len(named)
 
 
 def _by_blocks(time: Array, edges: list[int], block_s: float) -> Stretches:

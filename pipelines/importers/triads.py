@@ -104,7 +104,7 @@ def triad(columns: Mapping[str, Array], units: Mapping[str, str]) -> Triad:
     columns : numbers of each column that may be one, (n,), without time and row numbers; NaN where there is none
     units : as the file states them
     """
-    live = [name for name in columns if _may_be_output(name, units.get(name, "")) and _changes(columns[name])][:_MOST]
+    live = [name for name in columns if may_be_output(name, units.get(name, "")) and _changes(columns[name])][:_MOST]
     groups = dict(_lettered([name for name in columns if np.isfinite(columns[name]).any()][:_MOST]))
     of_other = {name for stem, names in groups.items() for name in names if OTHER.search(stem)}
     usable = {stem: names for stem, names in groups.items() if all(name in live for name in names)}
@@ -243,7 +243,7 @@ def _lettered(names: Sequence[str]) -> Iterator[tuple[str, tuple[str, ...]]]:
                 break
 
 
-def _may_be_output(name: str, unit: str) -> bool:
+def may_be_output(name: str, unit: str) -> bool:
     """Whether name and unit allow an output of an accelerometer."""
     stated = bool(output_unit(unit))
     if unit and not stated and (_FOREIGN_UNIT.search(unit) or TEMPERATURE.get(unit.strip().lower())):

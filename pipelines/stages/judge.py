@@ -14,6 +14,7 @@ from inertial import effects as catalogue
 from inertial.errors import InertialError
 from pipelines.tables.frames import empty_table, rows_of
 from pipelines.tables.sound_lot import error_of, every_unit_faulty, generator, sound_lot
+from pipelines.tables.stated_poses import told
 from schemas.errors import DataRejected, RecipeInvalid
 from schemas.tables import ADEQUATE, NOT_ADEQUATE, NOT_JUDGED
 
@@ -70,7 +71,8 @@ def adequacy(dwells: pd.DataFrame, history: pd.DataFrame | None, effects: Sequen
         verdict = judged(lot, effects, generator())
     units = len(measurement.units) - len(faulty)
     error = error_of(verdict.rms, verdict.floor, verdict.log_p)
-    return _document(verdict.adequate, verdict.unjudged or None, error, verdict.named, units, faulty)
+    adequate, reason, error = told(verdict.search.base, verdict.adequate, verdict.unjudged, error)
+    return _document(adequate, reason or None, error, verdict.named, units, faulty)
 
 
 def told_by(diagnosis: Mapping[str, Any], units: int) -> AdequacyDocument:

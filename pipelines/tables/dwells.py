@@ -204,7 +204,8 @@ def lot_of(measurement: Measured, like: Measured | None = None, *, square: bool 
     error = np.where(there[..., None], _white_error(readings, scale, output), np.inf)
     felt, run = _felt_with_temperature(measurement, response, scale)
     state = replace(measurement.state, felt=felt, output_run=run, memory={})
-    return Lot(state, np.where(there[..., None], output, 0.0), error, response, scale=scale)
+    recorded = readings.spread is not None and readings.count is not None
+    return Lot(state, np.where(there[..., None], output, 0.0), error, response, recorded=recorded, scale=scale)
 
 
 def _columns(force: Array) -> int:

@@ -309,9 +309,16 @@ def test_one_pose_says_what_it_shows_and_is_not_told_to_fit_a_scale() -> None:
 
 
 def test_faces_without_a_known_noise_print_no_number_that_is_none() -> None:
-    means = FACES @ np.diag([1.01, 0.99, 1.0]) + [0.02, -0.01, 0.03]
-    for verdict, order in (("CANNOT BE JUDGED", [0, 1, 2, 3, 4, 5]), ("NOT ADEQUATE", [0, 1, 3, 4, 5, 2])):
-        frame = pd.DataFrame(means[order], columns=["x", "y", "z"]).assign(face=["xp", "xm", "yp", "ym", "zp", "zm"])
+    means = FACES @ np.diag([1.01, 0.99, 1.0]) + [0.02, -0.01, 0.03] + 1e-4 * np.sin(np.arange(18.0).reshape(6, 3))
+    orders = {
+        "6 degrees of freedom": range(6),
+        "+y exchanged": [2, 1, 0, 3, 4, 5],
+        "fault axis_flip": [0, 1, 3, 4, 5, 2],
+    }
+    for verdict, order in orders.items():
+        frame = pd.DataFrame(means[list(order)], columns=["x", "y", "z"]).assign(
+            face=["xp", "xm", "yp", "ym", "zp", "zm"]
+        )
         _, said, _ = given(
             "import", written(frame), "--map", "x=x,y=y,z=z,dwell=face", "--rows", "dwells", "--units", "output=g",
             "--unit", "S1", "--poses", UP, "--local-g", "9.81", "--fit", "faces",

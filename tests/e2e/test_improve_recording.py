@@ -95,3 +95,22 @@ def test_six_faces_are_named_by_what_they_read_and_two_exchanged_labels_are_told
     poses = ",".join(f"{label}={face}" for label, face in labels.items())
     answer = document_of("import", "six.csv", *how, "--poses", poses, "--local-g", G, "--fit", "faces", status=1)
     assert "with +x and +y exchanged they agree" in answer["reason"]
+
+
+def test_a_changed_model_is_not_shown_with_the_coefficients_of_the_import(rng: np.random.Generator) -> None:
+    """A cubic term of 4 mg/g³, taken for scale by the fit of the import."""
+    force = rng.standard_normal((24, 3))
+    force /= np.linalg.norm(force, axis=1, keepdims=True)
+    output = 1.012 * force + 4e-3 * force**3 + np.array([0.02, -0.01, 0.03])
+    parts = [rng.normal(one, spread, (count, 3)) for one in output for count, spread in ((100, 0.05), (250, 1e-4))]
+    frame = pd.DataFrame(np.concatenate(parts), columns=list("xyz"))
+    frame.insert(0, "time_s", np.arange(len(frame)) / 50.0)
+    frame.to_csv("cubic.csv", index=False)
+    status, said, _ = given("improve", "cubic.csv", "--yes")
+    assert status == 0
+    assert "missing: third_order; added" in said
+    assert "scale 0.1" not in said
+    assert "residual of the norm by dwell" not in said
+    run = Archive(None).runs()[-1].id
+    assert f"tumbleline fit {run} --model model.toml" in said
+    assert "scale 0.1031" in given("fit", run, "--model", "model.toml")[1]  # 1.012 over 9.80665

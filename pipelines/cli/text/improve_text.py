@@ -91,9 +91,10 @@ def print_recording(document: dict[str, Any]) -> None:
     one, judged = document["recording"], document["after"] or document["diagnosis"]
     _recognised(one)
     print_verdict(judged)
-    _picture(one)
+    if not document["added"]:  # residuals and coefficients are those of the model of the import
+        _picture(one)
     for line in one["lines"]:
-        if line.startswith("CHECK") or ": bias" in line:
+        if line.startswith("CHECK") or (": bias" in line and not document["added"]):
             say(f"  {line}", style="yellow" if line.startswith("CHECK") else "")
     for text in filter(None, (sentences.evidence_text(judged), sentences.undetected(judged))):
         say(f"  {text}", style="dim")
@@ -104,8 +105,12 @@ def print_recording(document: dict[str, Any]) -> None:
 
 
 def next_of_recording(document: dict[str, Any], archive: str | None) -> list[str]:
-    """The command to give next: without faulty dwells, else the coefficients, else the whole diagnosis."""
+    """The commands to give next: the fit of a changed model; without faulty dwells, else the coefficients, else the diagnosis."""
     run, words = document["recording"]["run"], archive_words(archive)
+    if document["added"]:
+        return [command_line("fit", run, "--model", document["file"], *words), *document["next"]]
+    if document["next"]:
+        return document["next"]
     judged = document["after"] or document["diagnosis"]
     left = [f"{one['unit']}:{one['dwell']}" for one in (judged["leave_out"] or {"dwells": []})["dwells"]]
     for fault in judged["blocked_by"]:

@@ -182,10 +182,29 @@ def test_a_sheet_of_positions_is_proposed_as_dwells_and_unknown_axes_stand_in_ca
     assert document["open"] == []
     assert "dwell=Position" in document["command"]
     assert document["command"].endswith("--rows dwells")
-    (tmp_path / "a.csv").write_text("time,ax\n" + "".join(f"{0.01 * k:.2f},0.{k}\n" for k in range(20)))
+    (tmp_path / "a.csv").write_text("time,gyro\n" + "".join(f"{0.01 * k:.2f},0.{(7 * k) % 10}\n" for k in range(20)))
     document = inspect([tmp_path / "a.csv"]).document
     assert "x=COLUMN,y=COLUMN,z=COLUMN" in document["command"]
-    assert any("needs three axes" in one for one in document["open"])
+
+
+@pytest.mark.parametrize(
+    ("heads", "mapped"),
+    [
+        (("a",), "x=a --units output=UNIT,time=s --unit S --axes x"),
+        (("acc_x", "acc_z"), "x=acc_x,z=acc_z --units output=UNIT,time=s --unit S --axes x,z"),
+        (("temp", "az"), "temperature=temp,z=az --units output=UNIT,time=s --unit S --axes z"),
+    ],
+)
+def test_a_record_of_one_axis_or_two_is_proposed_by_its_columns(
+    heads: tuple[str, ...], mapped: str, tmp_path: Path, rng: np.random.Generator
+) -> None:
+    table = pd.DataFrame(rng.normal(1.0, 1e-3, (400, len(heads))), columns=list(heads))
+    table.insert(0, "time", 0.02 * np.arange(400))
+    table.to_csv(tmp_path / "S.csv", index=False)
+    document = inspect([tmp_path / "S.csv"]).document
+    assert document["command"].endswith(f"--map time=time,{mapped}")
+    assert any("fewer than three axes" in one and "--axes" in one for one in document["open"])
+    assert not any("were not recognised" in one for one in document["open"])
 
 
 def test_clocks_of_labelled_parts_that_restart_are_continued(rng: np.random.Generator) -> None:

@@ -1,0 +1,147 @@
+"""Six labelled faces: the fit and the noise of every other model, the published method beside it, and the verdict."""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+import pandas as pd
+from threadpoolctl import threadpool_limits
+
+from inertial.arrays import Array
+from inertial.fits.faces import Faces, faces, ferraris
+from inertial.quantities import OUTPUT_COLUMNS, SPREAD_COLUMNS
+from inertial.uncertainty.rounding import equal
+from pipelines.diagnosis.diagnose import diagnose
+from pipelines.importers.judged import FitAnswer, gravity_of, imported_dwells
+from pipelines.importers.mapping import FACES, Mapping
+from pipelines.importers.record import Imported
+from pipelines.stages.fit import fit
+from pipelines.stages.judge import told_by, verdict_table
+from schemas.errors import DataRejected
+from schemas.units import AXES, MICRO, STANDARD_GRAVITY_M_S2
+
+MODEL = ("bias", "scale", "misalignment")
+COVERAGE = 2.0
+"""Factor k of the printed uncertainties: the standard errors of a fit hold Student's factor for it already."""
+GROSS = 0.05
+"""Smallest part of gravity along a face placed by hand: cos 18° is 0.95."""
+_OWN = 0.9
+"""Share of its own axis in the response of an output: 25° of a hand."""
+_NOISELESS = 1e-6
+"""Noise over gravity that is put in for means without a recorded one: far below any scatter, which alone counts then."""
+
+
+def six_faces(data: Imported, mapping: Mapping) -> FitAnswer:
+    """Bias, scale and misalignment of six labelled faces, with the published method and the lack of fit of each output."""
+    dwells = imported_dwells(data)
+    gravity = gravity_of(mapping)
+    up, down, error = _by_face(dwells, mapping)
+    published, plain = ferraris(up, down, gravity), faces(up, down, gravity, error)
+    with threadpool_limits(1):
+        tables = fit(_with_noise(dwells, plain), None, MODEL)
+    verdict = diagnose(dwells, None, MODEL)
+    bias, response = _values(tables["coefficients"], "value")
+    bias_u, response_u = _values(tables["coefficients"], "standard_error")
+    per_g = np.linalg.norm(plain.response, axis=1)
+    why = verdict["reason"] or ""
+    share = float(np.max(plain.rms / (per_g * gravity)))
+    if not share <= GROSS:
+        why = (
+            f"the faces disagree by {100.0 * share:.3g} % of gravity, far beyond noise; check the labels of the faces"
+            f"{_exchanged(up, down, gravity)}"
+        )
+    document = {
+        "adequate": verdict["adequate"],
+        "reason": why or None,
+        "error": {**verdict["error"], "coverage_factor": COVERAGE},
+        "evidence": verdict["evidence"],
+        "published": {
+            "scale_per_m_s2": (np.diagonal(published.scale) / STANDARD_GRAVITY_M_S2).tolist(),
+            "rotation": published.rotation.tolist(),
+            "bias": published.bias.tolist(),
+        },
+        "least_squares": {
+            "bias": bias.tolist(),
+            "bias_u": bias_u.tolist(),
+            "response_per_g": response.tolist(),
+            "response_u": response_u.tolist(),
+            "residuals": plain.residuals.tolist(),
+            "rms_ug": (MICRO * plain.rms / per_g).tolist(),
+            "samples_ug": (MICRO * plain.pure_error / per_g).tolist(),
+            "p_value": plain.p_value.tolist(),
+        },
+    }
+    lines = [_line(k, (bias[k], bias_u[k], float(published.bias[k])), plain, data.out_unit) for k in range(3)]
+    lines += [f"data fault {one['fault']}: {one['evidence']}" for one in verdict["blocked_by"]]
+    lines += [why] if why else []
+    rows = [{str(name): value for name, value in row.items()} for row in tables.pop("coefficients").to_dict("records")]
+    tables["verdict"] = verdict_table(told_by(verdict, 1), MODEL)
+    return FitAnswer("faces", verdict["adequate"], document, tuple(lines), rows, MODEL, tables)
+
+
+def _with_noise(dwells: pd.DataFrame, plain: Faces) -> pd.DataFrame:
+    """The dwells with their noise; where it is not recorded, with one so small that the scatter about the fit decides."""
+    if {*SPREAD_COLUMNS, "n"} <= set(dwells.columns):
+        return dwells
+    made = dwells.assign(n=1)
+    made[list(SPREAD_COLUMNS)] = _NOISELESS * float(np.abs(plain.response).max())
+    return made
+
+
+def _values(coefficients: pd.DataFrame, column: str) -> tuple[Array, Array]:
+    """Bias (3,) and response (3, 3) of a column of the table of coefficients."""
+    bias, response = np.zeros(3), np.zeros((3, 3))
+    for row in coefficients.to_dict("records"):
+        axis = AXES.index(row["axis"])
+        if row["effect"] == "bias":
+            bias[axis] = row[column]
+        else:
+            response[axis, axis if row["effect"] == "scale" else AXES.index(row["name"][-1])] = row[column]
+    return bias, response
+
+
+def _exchanged(up: Array, down: Array, gravity: float) -> str:
+    """The two labels whose exchange makes the faces agree; empty where there are none.
+
+    The response has to be that of axes that read themselves, or an exchange of a whole axis would fit as well.
+    """
+    means = np.concatenate([up, down])
+    names = [f"{sign}{axis}" for sign in "+-" for axis in AXES]
+    agreeing: list[str] = []
+    for one, other in combinations(range(len(names)), 2):
+        order = np.arange(len(names))
+        order[[one, other]] = order[[other, one]]
+        fit = faces(means[order[:3]], means[order[3:]], gravity)
+        size = np.linalg.norm(fit.response, axis=1)
+        own = np.diagonal(fit.response) / size
+        if float(np.max(fit.rms / (size * gravity))) < GROSS and float(np.min(own)) > _OWN:
+            agreeing.append(f"{names[one]} and {names[other]}")
+    return f"; with {agreeing[0]} exchanged they agree" if len(agreeing) == 1 else ""
+
+
+def _by_face(dwells: pd.DataFrame, mapping: Mapping) -> tuple[Array, Array, Array]:
+    """Means (3, 3) with each axis up and down, and the standard error of a mean by output."""
+    faces_there = {mapping.poses.get(str(label), ""): k for k, label in enumerate(dwells["pose"])}
+    missing = [face for face in FACES if face not in faces_there]
+    if missing or len(dwells) != len(FACES):
+        raise DataRejected(
+            f"import: {len(dwells)} dwells, faces {', '.join(missing) or 'none'} missing; each of {', '.join(FACES)} is needed "
+            "once; name them with --poses LABEL=+x,…"
+        )
+    means = dwells[list(OUTPUT_COLUMNS)].to_numpy(dtype=np.float64)
+    up, down = (means[[faces_there[f"{sign}{axis}"] for axis in AXES]] for sign in "+-")
+    if not {*SPREAD_COLUMNS, "n"} <= set(dwells.columns):
+        return up, down, np.full(3, np.nan)
+    variance = dwells[list(SPREAD_COLUMNS)].to_numpy(dtype=np.float64) ** 2
+    return up, down, np.sqrt(np.mean(variance / dwells["n"].to_numpy(dtype=np.float64)[:, None], axis=0))
+
+
+def _line(k: int, bias: tuple[float, float, float], plain: Faces, unit: str) -> str:
+    """An output as text; ``bias``: its value, its standard error, and the bias of the published method."""
+    value, error, published = bias
+    told = f"{AXES[k]}: bias {value:.7g} ± {COVERAGE * error:.2g} {unit} (k = {COVERAGE:g}; published method {published:.7g})"
+    misfit = f"lack of fit {plain.rms[k]:.3g}"
+    if not np.isfinite(plain.p_value[k]):
+        return f"{told}; {misfit} {unit}"
+    return f"{told}; {misfit}, the samples allow {plain.pure_error[k]:.2g} {unit} (p {equal(plain.p_value[k])})"
