@@ -1,5 +1,6 @@
 """A device with one axis from its recipe to certificate and memory, beside the same devices as triads."""
 
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -215,6 +216,23 @@ def test_a_limit_of_angles_between_axes_is_refused_for_one(measured, tmp_path: P
     status, _, err = given("run", tmp_path / "one.toml", "--archive", tmp_path / "archive")
     assert status == UNUSABLE
     assert "orthogonality_mrad needs sensor_axes = 3" in " ".join(err.split())
+
+
+def test_a_discovery_in_runs_of_one_axis_says_that_no_lot_can_be_used_and_why(
+    measured, tmp_path: Path, recwarn: pytest.WarningsRecorder
+) -> None:
+    folder, runs = measured
+    shutil.copytree(folder / "archive", tmp_path / "archive")
+    shutil.rmtree(Archive(tmp_path / "archive").run(runs["three"]).path)
+    archive = ("--archive", tmp_path / "archive")
+    text = " ".join(text_of("discover", *archive, "--html", tmp_path / "page.html").split())
+    reason = "no lot can be used: its devices have fewer than three axes (1 run)"
+    assert reason in text
+    assert "e^" not in text
+    assert "model of each lot" not in text
+    assert reason in (tmp_path / "page.html").read_text(encoding="utf-8")
+    assert document_of("discover", *archive, "--json")["error_control"]["log_e_needed"] is None
+    assert not [one for one in recwarn if "divide" in str(one.message)]
 
 
 def test_its_certificate_speaks_of_the_error_along_its_axis(measured, tmp_path: Path) -> None:
