@@ -218,6 +218,17 @@ def test_a_limit_of_angles_between_axes_is_refused_for_one(measured, tmp_path: P
     assert "orthogonality_mrad needs sensor_axes = 3" in " ".join(err.split())
 
 
+@pytest.mark.parametrize("command", ["simulate", "correct"])
+def test_a_command_that_needs_three_axes_names_itself(measured, command: str, tmp_path: Path) -> None:
+    folder, runs = measured
+    (tmp_path / "in.csv").write_text("time_s,x,y,z\n0,0,0,1\n0.01,0,0,1\n", encoding="utf-8")
+    words = (tmp_path / "in.csv", "--calibration", f"{runs['one']}:SF-01", "--archive", folder / "archive")
+    status, _, err = given(command, *words, "--output", tmp_path / "out.csv")
+    assert status == UNUSABLE
+    text = " ".join(err.split())
+    assert f"{command}: it needs three axes, and unit SF-01 has x alone" in text
+
+
 def test_a_discovery_in_runs_of_one_axis_says_that_no_lot_can_be_used_and_why(
     measured, tmp_path: Path, recwarn: pytest.WarningsRecorder
 ) -> None:
