@@ -78,7 +78,8 @@ def channels_of(run: Run, number: int, unit: str) -> list[Channel]:
         interval = float((time[-1] - time[0]) / (time.size - 1))
         for k, axis in enumerate(AXES):
             values = np.concatenate([one[axis].to_numpy(dtype=float) for one in rows])
-            channels.append(Channel(f"{label} {axis}", text, group, values, interval, k))
+            if np.isfinite(values).any():  # an axis without an output has no samples
+                channels.append(Channel(f"{label} {axis}", text, group, values, interval, k))
     return _same_length(channels)
 
 

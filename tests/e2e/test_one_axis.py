@@ -229,6 +229,17 @@ def test_a_command_that_needs_three_axes_names_itself(measured, command: str, tm
     assert f"{command}: it needs three axes, and unit SF-01 has x alone" in text
 
 
+def test_its_waveforms_have_one_channel(measured, tmp_path: Path) -> None:
+    folder, runs = measured
+    archive = ("--archive", folder / "archive")
+    for name, letters in (("one", "x"), ("three", "xyz")):
+        path = tmp_path / f"{name}.csv"
+        said = "".join(text_of("waveforms", runs[name], "--record", "0", *archive, "--output", path).split())
+        names = [f"SF-01 {letter}" for letter in letters]
+        assert said.endswith(f"{path.name}:{','.join(names)}".replace(" ", ""))
+        assert [column.split(" [")[0] for column in pd.read_csv(path).columns] == ["time", *names]
+
+
 def test_a_discovery_in_runs_of_one_axis_says_that_no_lot_can_be_used_and_why(
     measured, tmp_path: Path, recwarn: pytest.WarningsRecorder
 ) -> None:
