@@ -152,6 +152,20 @@ def test_its_plan_speaks_of_one_axis(measured) -> None:
     page = (folder / "plan.html").read_text(encoding="utf-8")
     assert "error x, 1σ" in page
     assert "error y, 1σ" not in page
+    text = " ".join(text_of("plan", folder / "one.toml").split())
+    for name in ("Kxy", "Kxz"):
+        assert f"misalignment {name}, µg/g" in text
+    assert "error in a verification pose all" in text
+    for words in ("magnitude", ">norm<", "verification norm", ", norm"):
+        assert words not in page
+
+
+def test_its_report_speaks_of_its_axis(measured) -> None:
+    folder, runs = measured
+    report = Archive(folder / "archive").run(runs["one"]).report.read_bytes().decode()
+    assert "error on poses not used, worst pose</td><td>all</td>" in report
+    for words in ("error of the magnitude", "difference between the magnitude", ">norm</td>"):
+        assert words not in report
 
 
 @pytest.mark.slow

@@ -9,7 +9,7 @@ import numpy as np
 
 from inertial.uncertainty.rounding import rounded
 from pipelines.report.context import UnitContext
-from pipelines.report.numbers import significant
+from pipelines.report.numbers import axis_word, significant
 from pipelines.report.templates import fill
 from pipelines.stages.uncertainty.tables import LABELS, has_uncertainty
 from pipelines.tables.frames import rows_of
@@ -26,7 +26,7 @@ NAMES = {
     "orthogonality": "angle between axes, from 90°",
     "output": "corrected output, worst of the certified range",
     "bias_error": "error on poses not used, for the user",
-    "verification_norm": "error of the magnitude, worst pose",
+    "verification_norm": "error on poses not used, worst pose",
     "bias_error_period": "error expected over the period of validity",
     LARGEST_ERROR: "largest error of the axes over the period of validity",
 }
@@ -60,7 +60,7 @@ def _line(row: dict[str, Any]) -> dict[str, Any]:
     )
     return {
         "name": NAMES.get(row["quantity"], row["quantity"]),
-        "axis": row["axis"],
+        "axis": axis_word(row["axis"]),
         "value": "" if row["quantity"] in WITHOUT_VALUE else value,
         "a": significant(row["u_a"]) if stated else "",
         "b": significant(row["u_b"]) if stated else "",
