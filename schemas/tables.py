@@ -178,8 +178,9 @@ TABLES: dict[str, Table] = {
         {
             **each(text(), "unit", "quantity", "axis", "frame"),
             **each(ANY_TEXT, "unit_text", "largest"),
-            **each(NUMBER, "value", "u_a", "u_b", "u", "k", "expanded"),
-            **each(GAPS, "dof", "shown", "unseen"),
+            **each(NUMBER, "value", "u_a", "u_b", "u"),
+            # no k and U of a value that is a standard deviation or a bound by itself
+            **each(GAPS, "k", "expanded", "dof", "shown", "unseen"),
         },
         key=("unit", "quantity", "axis"),
     ),

@@ -12,7 +12,7 @@ class BiasTemperatureCubic(SensorEffect):
     source = "temperature model b(T) = b0 + kT·θ + kT2·θ², S(T) = S0·(1 + αT·θ)"
     typical_ug = (10.0, 5000.0)
     hides_behind = ("thermal_kink",)
-    breaker = "at least five temperatures"
+    breaker = "at least five temperatures, on the way up and back"
     same_on_axes = True
     simplicity = 7
     after = ("bias_temperature",)

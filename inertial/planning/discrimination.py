@@ -30,7 +30,7 @@ class Discrimination:
 
     base : indices of the base model's columns in the normal matrix
     rivals : per rival, the indices of its columns
-    sizes : per rival, (3, k), its coefficients per axis in units of the columns; zero on an axis that it does not act on
+    sizes : per rival, (axes, k), its coefficients per axis in units of the columns; zero on an axis that it does not act on
     chi_square : χ² of the wrong rival over the lot that counts as enough
     units : number of units in the lot, all with effects of that size
     """
@@ -42,7 +42,7 @@ class Discrimination:
     units: int = 1
 
     def separations(self, matrix: Array) -> Array:
-        """χ² (..., pairs) of every wrong rival, summed over axes and units, of normal matrices (..., 3, p, p)."""
+        """χ² (..., pairs) of every wrong rival, summed over axes and units, of normal matrices (..., axes, p, p)."""
         pairs = [
             (true, wrong) for true in range(len(self.rivals)) for wrong in range(len(self.rivals)) if wrong != true
         ]
@@ -66,7 +66,7 @@ class Discrimination:
         return own.max(axis=-1) + _OTHERS * own.mean(axis=-1)
 
     def _remaining_chi_square(self, matrix: Array, true: int, wrong: int) -> Array:
-        """χ² (..., 3) of the true rival after a fit of the base model and the wrong rival."""
+        """χ² (..., axes) of the true rival after a fit of the base model and the wrong rival."""
         of_true, fitted = list(self.rivals[true]), [*self.base, *self.rivals[wrong]]
         size = self.sizes[true]
         whole = np.einsum("ak,...akl,al->...a", size, matrix[..., of_true, :][..., of_true], size)

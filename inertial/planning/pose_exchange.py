@@ -41,7 +41,7 @@ _PASSES = 12
 class PlanSlots:
     """Slots of a plan and the candidates for them.
 
-    rows : (n, c, 3, p), design rows of every candidate in every slot, in units of the required errors: error · column
+    rows : (n, c, axes, p), design rows of every candidate in every slot, in units of the required errors: error · column
     weight : (n, n), inverse of the covariance of the dwell means, 1/g²
     travel : (c, c), s, move from one candidate to another
     seconds : s, station time without moves
@@ -57,7 +57,7 @@ class PlanSlots:
     fixed: Flags
 
     def matrix(self, choice: Places) -> Array:
-        """Normal matrices (3, p, p) of a plan; the diagonal of the inverse is variance over required variance."""
+        """Normal matrices (axes, p, p) of a plan; the diagonal of the inverse is variance over required variance."""
         h = np.swapaxes(self.rows[np.arange(choice.size), choice], 0, 1)
         return np.swapaxes(h, -1, -2) @ (self.weight @ h)
 
@@ -67,7 +67,7 @@ class PlanSlots:
 
 
 def ratios(matrix: Array) -> Array:
-    """Standard errors over the required errors, (..., 3, p), of normal matrices (..., 3, p, p)."""
+    """Standard errors over the required errors, (..., axes, p), of normal matrices (..., axes, p, p)."""
     return np.sqrt(np.diagonal(_inverse(matrix), axis1=-2, axis2=-1))
 
 
@@ -79,8 +79,8 @@ def _inverse(matrix: Array) -> Array:
 
 def _d(matrix: Array) -> Array:
     """Log of the geometric mean of the variances over the axes of the confidence ellipsoid."""
-    p = matrix.shape[-1]
-    return -np.linalg.slogdet(matrix)[1].sum(axis=-1) / (3.0 * p)
+    axes, p = matrix.shape[-3:-1]
+    return -np.linalg.slogdet(matrix)[1].sum(axis=-1) / (axes * p)
 
 
 def _a(matrix: Array) -> Array:
@@ -106,7 +106,7 @@ def exchanged(slots: PlanSlots, choice: Places, criterion: Criterion | Callable[
     ----------
     choice : (n,), the starting plan
     criterion : objective to minimise: "D" the volume of the confidence ellipsoid, "A" the mean square ratio to the required
-        errors, "worst" the largest ratio; or a function of normal matrices (..., 3, p, p) that returns the log of a variance
+        errors, "worst" the largest ratio; or a function of normal matrices (..., axes, p, p) that returns the log of a variance
     """
     value = criterion if callable(criterion) else CRITERIA[criterion]
     best = choice.copy()

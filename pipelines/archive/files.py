@@ -99,7 +99,8 @@ def publish(path: Place, data: bytes, what: str = "archive", remedy: str = IN_AR
     what, remedy : beginning and end of the error message.
     """
     with writing(path, what, remedy):
-        if isinstance(path, ObjectPath):
+        # a pipe or a device is written to, not replaced by a file
+        if isinstance(path, ObjectPath) or (path.exists() and not path.is_file() and not path.is_dir()):
             path.write_bytes(data)
             return
         with _aside(path.parent) as aside:

@@ -103,7 +103,7 @@ def command(
     store = Archive(archive)
     run = store.run(name)
     use_formulas_of(run)
-    fit = fit_of_unit(run, unit, failed=failed, revoked=revoked)
+    fit = fit_of_unit(run, unit, "correct", failed=failed, revoked=revoked)
     with error_console().status(f"reading {file.name}"):
         recording = read_recording(file, [c.strip() for c in columns.split(",") if c.strip()], time=time, rate_hz=rate)
     terms = archived_terms(run.about)

@@ -8,7 +8,7 @@ from pathlib import Path
 from pkgutil import iter_modules
 from typing import TYPE_CHECKING, Annotated
 
-from pipelines.archive import Archive, Run
+from pipelines.archive import Archive, Run, files
 from pipelines.cli.options import ArchiveOption, JsonOption, RunArgument, option
 from pipelines.cli.printing import STANDARD_OUTPUT, print_text, remark
 from schemas.errors import WrongUse, did_you_mean
@@ -111,9 +111,9 @@ def command(
         settings = replace(
             settings, firmware=_firmware(source, chosen, form, (low_pass, cutoff, rate), (track, step, turn_on))
         )
-    files = export_files(form, chosen, source.id, settings)
+    contents = export_files(form, chosen, source.id, settings)
     _print_certificates(source, chosen, signature_remarks(source, [c.unit for c in chosen]))
-    _write(files, output)
+    _write(contents, output)
 
 
 def _firmware(
@@ -151,31 +151,24 @@ def _firmware(
     return Firmware(made, models, step)
 
 
-def _write(files: dict[str, bytes], output: Path | None) -> None:
+def _write(contents: dict[str, bytes], output: Path | None) -> None:
     """Write the files: one to standard output, a file or a folder, several to a folder only."""
-    (name, content), *others = files.items()
+    (name, content), *others = contents.items()
     if output is None or output == STANDARD_OUTPUT:
         if others:
             raise WrongUse(
-                f"export: {len(files)} files in this format, one can be printed; give a folder with --output, or choose a unit "
-                "with --units"
+                f"export: {len(contents)} files in this format, one can be printed; give a folder with --output, or choose a "
+                "unit with --units"
             )
         if name.endswith(BINARY):
             raise WrongUse(f"export: {name} is not text and cannot be printed; give a file with --output")
         print_text(content.decode())
         return
-    try:
-        if others:
-            output.mkdir(parents=True, exist_ok=True)
-        folder = output.is_dir()
-        for file, data in files.items():
-            (output / file if folder else output).write_bytes(data)
-    except OSError as problem:
-        raise WrongUse(
-            f"export: {output} cannot be written ({problem.strerror}); give another file with --output"
-        ) from None
+    folder = bool(others) or output.is_dir()
+    for file, data in contents.items():
+        files.publish(output / file if folder else output, data, "export", "give another file with --output")
     if folder:
-        remark(f"export: {len(files)} files in {output}")
+        remark(f"export: {len(contents)} files in {output}")
 
 
 def _print_certificates(run: Run, chosen: Sequence[UnitCalibration], signers: Sequence[str]) -> None:

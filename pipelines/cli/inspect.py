@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from inertial.counts import number_of
 from pipelines.cli.options import GroupOption, JoinOption, JsonOption, argument, option
-from pipelines.cli.printing import conclude, error_console, print_table, say
+from pipelines.cli.printing import conclude, error_console, print_table, publish, say
 from schemas.errors import WrongUse
 
 if TYPE_CHECKING:
@@ -90,9 +90,9 @@ def _write(inspection: Inspection, picture: Path | None, page: Path | None) -> N
             raise WrongUse(
                 "inspect: no samples of acceleration over time were recognised, nothing can be drawn; leave out --picture"
             )
-        picture.write_bytes(drawn(chart, picture.suffix.lower()))
+        publish(picture, drawn(chart, picture.suffix.lower()), "picture")
     if page is not None:
-        page.write_text(recording.page(inspection), encoding="utf-8")
+        publish(page, recording.page(inspection), "page")
 
 
 def _print(one: InspectDocument) -> None:

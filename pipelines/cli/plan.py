@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import contextlib
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from typer.core import TyperGroup
 
+from pipelines.archive import files
 from pipelines.cli import options
 from pipelines.cli.options import argument, option
 from pipelines.cli.printing import conclude, give, is_standard_output, print_text, remark
@@ -236,7 +236,7 @@ def optimise(
     document["limits_missing"] = missing_limits(base, home)
     text = written(optimum, target, home, document)
     if not printed:
-        save(target, text)
+        files.publish(target, text.encode(), "plan", files.ELSEWHERE)
     if page is not None:
         write_page(page, document["plan"], optimum.planned)
         document["page"] = str(page)
@@ -246,23 +246,11 @@ def optimise(
         give(document, print_optimum, as_json=as_json)
 
 
-def save(path: Path, text: str) -> None:
-    """Write a file; a folder that does not exist or cannot be written to is wrong use."""
-    from schemas.errors import WrongUse
-
-    try:
-        path.write_text(text, encoding="utf-8")
-    except OSError as problem:
-        raise WrongUse(
-            f"plan: {path} cannot be written ({problem.strerror}); give a file in a folder that exists and is writable"
-        ) from None
-
-
 def write_page(page: Path, document: dict[str, Any], context: PlanContext) -> None:
     """Write the page."""
     from pipelines.report.plan import render_plan
 
-    save(page, render_plan(document, context))
+    files.publish(page, render_plan(document, context).encode(), "plan", files.ELSEWHERE)
 
 
 def write_pictures(folder: Path, document: dict[str, Any], context: PlanContext) -> None:
@@ -270,8 +258,6 @@ def write_pictures(folder: Path, document: dict[str, Any], context: PlanContext)
     from pipelines.drawing.vector import alone
     from pipelines.report.plan import pictures
 
-    with contextlib.suppress(OSError):  # what is wrong with the folder is said where a picture cannot be written to it
-        folder.mkdir(parents=True, exist_ok=True)
     for name, text in pictures(document, context).items():
         if text:
-            save(folder / f"{document['recipe']}-{name}.svg", alone(text))
+            files.publish(folder / f"{document['recipe']}-{name}.svg", alone(text).encode(), "plan", files.ELSEWHERE)

@@ -57,7 +57,7 @@ def command(
     name, _, unit = calibration.partition(":")
     run = Archive(archive).run(name)
     use_formulas_of(run)
-    fit = fit_of_unit(run, unit, failed=failed, revoked=False)
+    fit = fit_of_unit(run, unit, "simulate", failed=failed, revoked=False)
     with error_console().status(f"reading {file.name}"):
         recording = read_recording(file, FORCE_COLUMNS, time=time, rate_hz=rate)
     low_pass = None if bandwidth is None else _low_pass(bandwidth, rate_and_gaps(recording.time)[0])

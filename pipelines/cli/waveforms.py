@@ -53,17 +53,14 @@ def command(
 
 def _one_text(form: str, channels: list[Channel], suffix: str) -> str:
     """The file of a format of text; refused for others, and where each clock has a file of its own."""
-    from tempfile import TemporaryDirectory
+    from pipelines.export.waveforms import files_of_waveforms
 
-    from pipelines.export.waveforms import write_waveforms
-
-    with TemporaryDirectory() as folder:
-        paths = write_waveforms(form, channels, Path(folder) / f"record{suffix}")
-        try:
-            (text,) = (path.read_bytes().decode() for path in paths)
-        except ValueError:
-            raise WrongUse(
-                f"waveforms: format {form} gives {len(paths)} files or no text, one of text is needed for standard output; "
-                "name a file with --output"
-            ) from None
+    made = files_of_waveforms(form, channels, Path(f"record{suffix}"))
+    try:
+        (text,) = (data.decode() for data in made.values())
+    except ValueError:
+        raise WrongUse(
+            f"waveforms: format {form} gives {len(made)} files or no text, one of text is needed for standard output; "
+            "name a file with --output"
+        ) from None
     return text

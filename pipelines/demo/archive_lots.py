@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from inertial import poses
 from inertial.frames import force_from_angles
-from pipelines.archive import Archive, code_hash, stage_key
+from pipelines.archive import Archive, code_hash, files, stage_key
 from pipelines.archive.keys import digest
 
 Array = NDArray[np.float64]
@@ -177,7 +177,7 @@ def write_lots(folder: Path, line: Line, lots: int, progress: Callable[[int], No
         write_run(archive, number, station, dwells, about)
         progress(number + 1)
     units = folder / "units.csv"
-    pd.concat(known, ignore_index=True).to_csv(units, index=False)
+    files.publish(units, pd.concat(known, ignore_index=True).to_csv(index=False).encode(), "demo", files.ELSEWHERE)
     return DemoArchive(folder / "archive", units, lots)
 
 

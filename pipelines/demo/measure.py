@@ -5,6 +5,7 @@ Drivers and registers are those of a production station; only the physics is sim
 
 from __future__ import annotations
 
+import io
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ import numpy as np
 import pandas as pd
 
 from inertial import poses
+from pipelines.archive import files
 from pipelines.capture.capture import capture
 from pipelines.demo.scenes import Scene
 from pipelines.jobs.recipes import load_recipe
@@ -49,7 +51,9 @@ class DemoLot:
     def write(self, folder: Path) -> None:
         """The four tables as Parquet files."""
         for name in ("dwells", "history", "fresh", "fresh_history"):
-            getattr(self, name).to_parquet(folder / f"{name.replace('_', '-')}.parquet", index=False)
+            sink = io.BytesIO()
+            getattr(self, name).to_parquet(sink, index=False)
+            files.publish(folder / f"{name.replace('_', '-')}.parquet", sink.getvalue(), "demo", files.ELSEWHERE)
 
 
 def measure(chosen: Scene, seed: int, progress: Progress = silent) -> DemoLot:

@@ -30,7 +30,7 @@ from pipelines.diagnosis.result_rows import BAD_DWELL
 from pipelines.tables.dwells import Measured, lot_of, measured
 from pipelines.tables.sound_lot import generator
 from schemas.errors import DataRejected
-from schemas.units import MICRO
+from schemas.units import AXES, MICRO
 
 
 def compare(
@@ -84,9 +84,7 @@ def _compared(
             u: {"rms_ug": MICRO * rms(r), "fresh_rms_ug": None}
             for u, r in zip(measurement.units, left.reshape(len(measurement.units), -1), strict=True)
         },
-        "by_axis": {"norm": MICRO * rms(left)}
-        if problem.lot.radial
-        else {axis: MICRO * rms(left[i::3]) for i, axis in enumerate("xyz")},
+        "by_axis": {name: MICRO * rms(left[i :: problem.per_unit]) for i, name in enumerate(_series_of_unit(problem))},
         "by_pose": _by_pose(measurement, left),
         "nonlinear": {t.effect.id: t.keywords for t in model.terms if t.keywords},
         "nonlinear_interval": intervals(model),
@@ -117,6 +115,11 @@ def _compared(
             for name in _remember(again, model.terms)
         ]
     return answer
+
+
+def _series_of_unit(problem: Problem) -> tuple[str, ...]:
+    """Names of the blocks of one unit: its axes with an output, or the norm."""
+    return ("norm",) if problem.lot.radial else tuple(AXES[axis] for axis in problem.axes)
 
 
 def without_history(measurement: Measured, terms: Sequence[Term]) -> list[str]:

@@ -31,7 +31,7 @@ class ErrorControl(TypedDict):
 
     alpha: Annotated[float, "probability that an archive without anything hidden ever shows one"]
     hypotheses: int
-    log_e_needed: Annotated[float, "natural logarithm of the evidence"]
+    log_e_needed: Annotated[float | None, "natural logarithm of the evidence; null: no lot can be used"]
     valid: Annotated[str, "when it may be looked at: every night"]
 
 

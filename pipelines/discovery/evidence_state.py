@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -54,12 +55,12 @@ class Evidences:
     night: int = 0
 
     def needed(self, driver: str) -> float:
-        """Logarithm of the evidence from which on a hypothesis of a driver counts."""
+        """Logarithm of the evidence from which on a hypothesis of a driver counts; infinite where no lot gives hypotheses."""
         generation = self.generations.get(driver, 0)
         drivers = Counter(self.generations.values())[generation] or 1
         of_station = len(STATION_DRIVERS) * len(self.of_station) if generation == 0 else 0
         hypotheses = drivers * AXES * len(self.columns) + of_station
-        return float(np.log(hypotheses / (ALPHA * 0.5 ** (generation + 1))))
+        return math.inf if not hypotheses else float(np.log(hypotheses / (ALPHA * 0.5 ** (generation + 1))))
 
 
 def hypothesis(state: Evidences, place: int) -> tuple[str, int, str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -167,7 +168,7 @@ class Findings:
             "error_control": {
                 "alpha": ALPHA,
                 "hypotheses": len(state.sensor.drivers) * state.sensor.count,
-                "log_e_needed": round(state.needed(MEAN), 2),
+                "log_e_needed": round(state.needed(MEAN), 2) if state.sensor.count else None,
                 "valid": "every night",
             },
             "discoveries": rows,
@@ -379,7 +380,11 @@ class Findings:
     def _warnings(self) -> list[str]:
         out: list[str] = []
         lots = len(self.state.order)
-        if lots < FIRST:
+        reasons = Counter(reason for _, reason in self.source.left_out())
+        if not lots and reasons:
+            counted = "; ".join(f"{reason} ({number_of(count, 'run')})" for reason, count in reasons.most_common())
+            out.append(f"no lot can be used: {counted}")
+        elif lots < FIRST:
             out.append(
                 f"{number_of(lots, 'lot')}; the earliest discovery is possible at {FIRST}, of drivers at about 60"
             )

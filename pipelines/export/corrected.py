@@ -106,12 +106,13 @@ class Corrected:
     white: Array | None = None
 
 
-def fit_of_unit(run: Run, unit: str, *, failed: bool, revoked: bool) -> FitOfUnit:
+def fit_of_unit(run: Run, unit: str, what: str, *, failed: bool, revoked: bool) -> FitOfUnit:
     """The fitted coefficients of one unit; as in an export, a unit that failed or was revoked is refused.
 
     Parameters
     ----------
     unit : may be empty where the run has one unit
+    what : the command that needs it, at the beginning of messages
     """
     missing = [name for name in ("coefficients", "covariance") if name not in run.tables()]
     if missing:
@@ -127,7 +128,7 @@ def fit_of_unit(run: Run, unit: str, *, failed: bool, revoked: bool) -> FitOfUni
         )
     serial = unit or next(iter(calibration.units))
     exported = unit_calibrations(run, (serial,), failed=failed, revoked=revoked)[0]
-    refuse_fewer_axes([exported], "correct: it")
+    refuse_fewer_axes([exported], f"{what}: it")
     u = calibration.units.index(serial)
     p = calibration.coefficients.shape[-1]
     covariance: Array = np.asarray(block_diag(*list(calibration.covariance[u])), dtype=np.float64)

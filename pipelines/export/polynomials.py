@@ -127,11 +127,11 @@ def unit_calibrations(
 
 
 def refuse_fewer_axes(units: Sequence[UnitCalibration], what: str) -> None:
-    """Refuse a correction that needs three outputs for a device with one axis or two."""
+    """Refuse what needs three outputs for a device with one axis or two; ``what`` begins the message."""
     for unit in units:
         if len(unit.axes) < len(AXES):
             raise WrongUse(
-                f"{what} corrects three axes, and unit {unit.unit} has {', '.join(unit.letters)} alone; "
+                f"{what} needs three axes, and unit {unit.unit} has {', '.join(unit.letters)} alone; "
                 "'tumbleline export --format json' has its coefficients"
             )
 

@@ -1,18 +1,23 @@
-"""Waveforms of a record as files of other programs: the channels of a captured record, and one writer for each format."""
+"""Waveforms of a record as files of other programs: the channels of a captured record, and one writer for each format.
+
+A writer gives the bytes of the file, so that all formats are written in one way: complete or not at all.
+"""
 
 from __future__ import annotations
 
+import io
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 
 from inertial.arrays import Array
-from pipelines.archive import Run
+from pipelines.archive import Run, files
 from schemas.errors import WrongUse, did_you_mean
 from schemas.library import library
 from schemas.units import AXES
@@ -73,7 +78,8 @@ def channels_of(run: Run, number: int, unit: str) -> list[Channel]:
         interval = float((time[-1] - time[0]) / (time.size - 1))
         for k, axis in enumerate(AXES):
             values = np.concatenate([one[axis].to_numpy(dtype=float) for one in rows])
-            channels.append(Channel(f"{label} {axis}", text, group, values, interval, k))
+            if np.isfinite(values).any():  # an axis without an output has no samples
+                channels.append(Channel(f"{label} {axis}", text, group, values, interval, k))
     return _same_length(channels)
 
 
@@ -88,31 +94,33 @@ def _same_length(channels: list[Channel]) -> list[Channel]:
 
 
 class Writer(NamedTuple):
-    """A format: the suffix of its files, whether a file has one clock for all channels, and what writes one."""
+    """A format: the suffix of its files, whether a file has one clock for all channels, and what makes its bytes."""
 
     suffix: str
     one_clock: bool
-    write: Callable[[Sequence[Channel], Path], None]
+    made: Callable[[Sequence[Channel]], bytes]
 
 
-def _csv(channels: Sequence[Channel], path: Path) -> None:
+def _csv(channels: Sequence[Channel]) -> bytes:
     """Time in s and a column for each channel, the unit in brackets; 17 digits, which represent every double exactly."""
     columns = {"time [s]": channels[0].time}
     columns |= {f"{one.name} [{one.unit}]": one.samples for one in channels}
-    pd.DataFrame(columns).to_csv(path, index=False, float_format="%.17g")
+    return pd.DataFrame(columns).to_csv(index=False, lineterminator="\n", float_format="%.17g").encode()
 
 
-def _hdf5(channels: Sequence[Channel], path: Path) -> None:
+def _hdf5(channels: Sequence[Channel]) -> bytes:
     """A dataset for each channel with the attributes ``unit`` and ``sample_interval_s``, and ``time`` in s."""
     h5py = library("h5py", "hdf5", "waveforms: an HDF5 file")
-    with h5py.File(path, "w") as file:
+    sink = io.BytesIO()
+    with h5py.File(sink, "w") as file:
         file.create_dataset("time", data=channels[0].time).attrs["unit"] = "s"
         for one in channels:
             stored = file.create_dataset(one.name, data=one.samples)
             stored.attrs["unit"], stored.attrs["sample_interval_s"] = one.unit, one.interval_s
+    return sink.getvalue()
 
 
-def _lvm(channels: Sequence[Channel], path: Path) -> None:
+def _lvm(channels: Sequence[Channel]) -> bytes:
     """LabVIEW measurement file: text with ``Delta_X`` and the unit of each channel in the header; 17 digits."""
     count, end = len(channels), "***End_of_Header***"
     head = [
@@ -137,10 +145,10 @@ def _lvm(channels: Sequence[Channel], path: Path) -> None:
     ]
     rows = np.column_stack([channels[0].time, *(one.samples for one in channels)])
     body = ["\t".join(f"{value:.17g}" for value in row) for row in rows.tolist()]
-    path.write_text("\n".join([*head, *body, ""]), encoding="utf-8")
+    return "\n".join([*head, *body, ""]).encode()
 
 
-def _mat(channels: Sequence[Channel], path: Path) -> None:
+def _mat(channels: Sequence[Channel]) -> bytes:
     """MATLAB 5: a vector for each channel, ``time`` in s, the units as texts; blanks in names become underscores."""
     from scipy.io import savemat  # a third of a second
 
@@ -148,10 +156,12 @@ def _mat(channels: Sequence[Channel], path: Path) -> None:
     for one in channels:
         name = "".join(letter if letter.isalnum() else "_" for letter in one.name)
         content |= {name: one.samples, f"{name}_unit": one.unit}
-    savemat(path, content, oned_as="column")
+    sink = io.BytesIO()
+    savemat(sink, content, oned_as="column")
+    return sink.getvalue()
 
 
-def _tdms(channels: Sequence[Channel], path: Path) -> None:
+def _tdms(channels: Sequence[Channel]) -> bytes:
     """A group for each clock, channels with ``wf_increment``, ``wf_start_offset`` and ``unit_string``."""
     nptdms = library("nptdms", "tdms", "waveforms: a TDMS file")
     made: list[Any] = []
@@ -159,8 +169,10 @@ def _tdms(channels: Sequence[Channel], path: Path) -> None:
         about = {"wf_increment": one.interval_s, "wf_start_offset": one.start_s}
         about |= {"wf_samples": len(one.samples), "unit_string": one.unit}
         made.append(nptdms.ChannelObject(one.group, one.name, one.samples, about))
-    with nptdms.TdmsWriter(str(path)) as file:
+    sink = io.BytesIO()
+    with nptdms.TdmsWriter(sink) as file:
         file.write_segment([nptdms.RootObject({}), *made])
+    return sink.getvalue()
 
 
 ACCELERATIONS = ("g", "m/s^2")
@@ -168,48 +180,55 @@ TIME, ACCELERATION, UNKNOWN = 17, 12, 0
 DOUBLE = 4  # ordinate of double precision, real
 
 
-def _uff58(channels: Sequence[Channel], path: Path) -> None:
+def _uff58(channels: Sequence[Channel]) -> bytes:
     """Universal file, dataset 58: time records (function type 1) in binary, which keeps every double.
 
     The interval has 6 digits, the name is identification line 1, the axis the direction of the response. Source: SDRC Universal
     File Formats, dataset 58: abscissa type 17 is time, ordinate type 12 acceleration, 0 unknown.
     """
     pyuff = library("pyuff", "uff", "waveforms: a universal file (UFF)")
-    path.unlink(missing_ok=True)
-    file = pyuff.UFF(str(path))
-    for number, one in enumerate(channels, start=1):
-        known = ACCELERATION if one.unit in ACCELERATIONS else UNKNOWN
-        content = {
-            "type": 58, "binary": 1, "func_type": 1, "rsp_node": number, "rsp_dir": one.axis + 1, "ref_node": 0, "ref_dir": 0,
-            "data": np.asarray(one.samples, dtype=np.float64), "x": one.time, "num_pts": len(one.samples), "id1": one.name,
-            "rsp_ent_name": "NONE", "ref_ent_name": "NONE", "abscissa_spacing": 1, "abscissa_min": one.start_s,
-            "abscissa_inc": one.interval_s, "abscissa_spec_data_type": TIME, "abscissa_axis_units_lab": "s",
-            "ordinate_spec_data_type": known, "ordinate_axis_units_lab": one.unit, "orddenom_spec_data_type": UNKNOWN,
-            "ord_data_type": DOUBLE,
-        }  # fmt: skip
-        with warnings.catch_warnings():  # pyuff leaves the file to the collector; its "overwrite" loses binary samples
-            warnings.simplefilter("ignore", ResourceWarning)
-            file.write_sets(content, "add")
+    # pyuff writes to a path only
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "waveforms.uff"
+        file = pyuff.UFF(str(path))
+        for number, one in enumerate(channels, start=1):
+            known = ACCELERATION if one.unit in ACCELERATIONS else UNKNOWN
+            content = {
+                "type": 58, "binary": 1, "func_type": 1, "rsp_node": number, "rsp_dir": one.axis + 1, "ref_node": 0, "ref_dir": 0,
+                "data": np.asarray(one.samples, dtype=np.float64), "x": one.time, "num_pts": len(one.samples), "id1": one.name,
+                "rsp_ent_name": "NONE", "ref_ent_name": "NONE", "abscissa_spacing": 1, "abscissa_min": one.start_s,
+                "abscissa_inc": one.interval_s, "abscissa_spec_data_type": TIME, "abscissa_axis_units_lab": "s",
+                "ordinate_spec_data_type": known, "ordinate_axis_units_lab": one.unit, "orddenom_spec_data_type": UNKNOWN,
+                "ord_data_type": DOUBLE,
+            }  # fmt: skip
+            with (
+                warnings.catch_warnings()
+            ):  # pyuff leaves the file to the collector; its "overwrite" loses binary samples
+                warnings.simplefilter("ignore", ResourceWarning)
+                file.write_sets(content, "add")
+        return path.read_bytes()
 
 
-def _wav(channels: Sequence[Channel], path: Path) -> None:
+def _wav(channels: Sequence[Channel]) -> bytes:
     """WAV, 64-bit float: the rate and the channels in order. It states neither unit nor scale, and only whole rates."""
     from scipy.io import wavfile  # a third of a second
 
     rate = 1.0 / channels[0].interval_s
     if abs(rate - round(rate)) > 1e-6 * rate:
         raise WrongUse(f"waveforms: {rate:.6g} Hz, a WAV file has whole rates only; choose another format")
-    wavfile.write(path, round(rate), np.column_stack([one.samples for one in channels]))
+    sink = io.BytesIO()
+    wavfile.write(sink, round(rate), np.column_stack([one.samples for one in channels]))
+    return sink.getvalue()
 
 
 WRITERS = {
-    "csv": Writer(".csv", one_clock=True, write=_csv),
-    "hdf5": Writer(".h5", one_clock=True, write=_hdf5),
-    "lvm": Writer(".lvm", one_clock=True, write=_lvm),
-    "mat": Writer(".mat", one_clock=True, write=_mat),
-    "tdms": Writer(".tdms", one_clock=False, write=_tdms),
-    "uff58": Writer(".uff", one_clock=False, write=_uff58),
-    "wav": Writer(".wav", one_clock=True, write=_wav),
+    "csv": Writer(".csv", one_clock=True, made=_csv),
+    "hdf5": Writer(".h5", one_clock=True, made=_hdf5),
+    "lvm": Writer(".lvm", one_clock=True, made=_lvm),
+    "mat": Writer(".mat", one_clock=True, made=_mat),
+    "tdms": Writer(".tdms", one_clock=False, made=_tdms),
+    "uff58": Writer(".uff", one_clock=False, made=_uff58),
+    "wav": Writer(".wav", one_clock=True, made=_wav),
 }
 
 
@@ -220,8 +239,8 @@ def writer_of(form: str) -> Writer:
     return WRITERS[form]
 
 
-def write_waveforms(form: str, channels: Sequence[Channel], path: Path) -> list[Path]:
-    """Write the channels and return the paths: one file, or one for each clock where the format holds only one.
+def files_of_waveforms(form: str, channels: Sequence[Channel], path: Path) -> dict[Path, bytes]:
+    """The files of the channels: one, or one for each clock where the format holds only one.
 
     Raises
     ------
@@ -234,12 +253,17 @@ def write_waveforms(form: str, channels: Sequence[Channel], path: Path) -> list[
     clocks = list(dict.fromkeys((one.interval_s, len(one.samples), one.group) for one in channels))
     shared = len({(interval, count) for interval, count, _ in clocks}) == 1
     if shared or not writer.one_clock:
-        writer.write(channels, path)
-        return [path]
-    written: list[Path] = []
+        return {path: writer.made(channels)}
+    made: dict[Path, bytes] = {}
     for interval, count, group in clocks:
         own = [one for one in channels if (one.interval_s, len(one.samples), one.group) == (interval, count, group)]
-        place = path.with_name(f"{path.stem}_{group}{path.suffix}")
-        writer.write(own, place)
-        written.append(place)
-    return written
+        made[path.with_name(f"{path.stem}_{group}{path.suffix}")] = writer.made(own)
+    return made
+
+
+def write_waveforms(form: str, channels: Sequence[Channel], path: Path) -> list[Path]:
+    """Write the files of the channels, each complete or not at all, and return their paths."""
+    made = files_of_waveforms(form, channels, path)
+    for place, data in made.items():
+        files.publish(place, data, "waveforms", files.ELSEWHERE)
+    return list(made)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from pipelines.jobs.recipes import load_limits
+from pipelines.jobs.recipes import load_limits, lot_of
 from pipelines.procedures import refuse_unusable
 from pipelines.schedule.planned_state import planned_dwells
 from pipelines.stages.uncertainty.budget_terms import BudgetTerms, terms_of
@@ -148,7 +148,7 @@ def refuse_beyond_station(recipe: Recipe, station: StationConfig) -> None:
 
 
 def refused_by_run(recipe: Recipe, station: StationConfig, folder: Path) -> list[str]:
-    """What 'tumbleline run' refuses in a recipe that can be planned: limits that cannot be read, ranges of the station.
+    """What 'tumbleline run' refuses in a recipe that can be planned: limits, serial numbers, ranges of the station.
 
     Parameters
     ----------
@@ -157,6 +157,8 @@ def refused_by_run(recipe: Recipe, station: StationConfig, folder: Path) -> list
     messages: list[str] = []
     for check in (
         lambda: load_limits(recipe, folder),
+        # without units in the recipe they are given to the run
+        lambda: lot_of(recipe, ()) if recipe.units else None,
         lambda: refuse_beyond_station(recipe, station),
         lambda: refuse_unusable(recipe, station),
     ):

@@ -157,13 +157,14 @@ class _BoundSearch:
         rows = self._rows(when, heat)[..., self.columns]
         covariance = dwell_covariance(when, piece_s, self.against.noise, slowest=self.slowest)
         flat = np.moveaxis(rows, 0, 1).reshape(when.size, -1)
-        solved = np.moveaxis(np.linalg.solve(covariance, flat).reshape(when.size, 3, -1), 1, 0)
+        solved = np.moveaxis(np.linalg.solve(covariance, flat).reshape(when.size, len(rows), -1), 1, 0)
         errors = self.requirement.ratio_to_required(np.swapaxes(rows, -1, -2) @ solved)
         return float(errors.max()), self.names[self.columns[int(np.argmax(errors.max(axis=0)))]]
 
     def _rows(self, time: Array, heat: Array) -> Array:
-        """Columns (3, n, p) at zero force, in units of the required errors."""
-        state = settled_state(np.zeros((time.size, 3)), time, heat, np.zeros((time.size, 2)), RESTED_S)
+        """Columns (axes, n, p) at zero force, in units of the required errors."""
+        axes = self.against.state.axes
+        state = settled_state(np.zeros((time.size, 3)), time, heat, np.zeros((time.size, 2)), RESTED_S, axes)
         columns = design.local_columns(self.sensor, state, design.starting_values(self.sensor, state))
         return columns * self.requirement.errors[:, None, :]
 

@@ -264,7 +264,7 @@ class RecipeSearch:
         """The recipe of a design after an exchange of poses, on the station."""
         slots, start = self.timed.slots(plan)
         choice = exchanged(slots, start, self.requirement.objective)
-        choice = spanned(self.timed.force, choice, plan.fixed, self.recipe.span_min_g)
+        choice = spanned(self.timed.force, choice, plan.fixed, self.recipe.span_min_g, self.recipe.sensor_axes)
         context = self._context(self._recipe(plan, choice))
         return self.reaching(context) if plan.ramp else context
 

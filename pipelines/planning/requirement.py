@@ -62,7 +62,7 @@ QUARTERS = 4
 class Requirement:
     """What a recipe must achieve, and what it may consist of.
 
-    errors : (3, p), g per unit of the column, largest standard error of each coefficient; with ``discrimination`` the scale of
+    errors : (axes, p), g per unit of the column, largest standard error of each coefficient; with ``discrimination`` the scale of
         each column
     see : ids of effects that must be visible beside the model
     levels : °C, temperatures that every recipe includes
@@ -85,7 +85,7 @@ class Requirement:
     discrimination: Discrimination | None = None
 
     def ratio_to_required(self, matrix: Array) -> Array:
-        """Errors over the required ones, (..., 3, p), or per pair of rivals, of normal matrices (..., 3, p, p); met at ≤ 1."""
+        """Errors over the required ones, (..., axes, p), or per pair, of normal matrices (..., axes, p, p); met at ≤ 1."""
         return ratios(matrix) if self.discrimination is None else self.discrimination.ratio_to_required(matrix)
 
     @property

@@ -46,7 +46,7 @@ def _up_and_down(levels: Sequence[float]) -> list[float]:
 
 
 def reference_errors(against: PlanContext, recipe: Recipe) -> Array:
-    """Expected standard errors (3, p), g per unit of the column, of a recipe's model under the textbook plan.
+    """Expected standard errors (axes, p), g per unit of the column, of a recipe's model under the textbook plan.
 
     Coefficients of effects that the textbook plan cannot identify (third_order on faces) have the errors of the recipe itself.
     """

@@ -94,6 +94,7 @@ class TimedDesign:
             np.argmax(np.min(np.abs(self.force), axis=1))
         )  # the pose whose smallest component is largest
         self._spread = spread(self.force)
+        self._axes = tuple(range(recipe.sensor_axes))
         self._sensor, _ = design.split(requirement.effects or tuple(recipe.effects))
         self._verification = len({(p.outer_deg, p.inner_deg) for p in recipe.verification})
 
@@ -127,7 +128,7 @@ class TimedDesign:
         flat = np.moveaxis(rows, 0, 1).reshape(time.size, -1)
         solved = np.linalg.solve(self.covariance(time, plan.dwell_s), flat)
         n, width = time.size, rows.shape[-1]
-        left, right = (np.moveaxis(x.reshape(n, 3, width), 1, 0) for x in (flat, solved))
+        left, right = (np.moveaxis(x.reshape(n, -1, width), 1, 0) for x in (flat, solved))
         ratio = self.requirement.ratio_to_required(np.swapaxes(left, -1, -2) @ right)
         return self.within(ratio, heat) if plan.ramp else ratio, seconds
 
@@ -137,7 +138,7 @@ class TimedDesign:
         return np.maximum(ratio, 1.0 + missed) if missed > 0.0 else ratio
 
     def pose_independent(self) -> Flags:
-        """Columns (3, p) that do not depend on the pose: bias and its dependence on temperature and time."""
+        """Columns (axes, p) that do not depend on the pose: bias and its dependence on temperature and time."""
         every = np.arange(len(self.force))
         rows = self._columns(
             np.full(every.size, 1000.0), np.full(every.size, max(self.requirement.levels)), self.force, every
@@ -150,7 +151,9 @@ class TimedDesign:
         time, heat, seconds = self._times(plan, choice)
         n, c = time.size, len(self.force)
         every = np.tile(np.arange(c), n)
-        rows = self._columns(np.repeat(time, c), np.repeat(heat, c), self.force[every], every).reshape(3, n, c, -1)
+        rows = self._columns(np.repeat(time, c), np.repeat(heat, c), self.force[every], every).reshape(
+            len(self._axes), n, c, -1
+        )
         weight = np.asarray(np.linalg.inv(self.covariance(time, plan.dwell_s)), dtype=np.float64)
         without_travel = seconds - float(np.sum(self.travel[choice[:-1], choice[1:]]))
         return PlanSlots(np.moveaxis(rows, 0, 2), weight, self.travel, without_travel, plan.group, plan.fixed), choice
@@ -210,10 +213,10 @@ class TimedDesign:
         return soaked(StationPose(air=last, device=last), at, self.station, recipe.soak_min_s)[0]
 
     def _columns(self, time: Array, heat: Array, force: Array, choice: Choice) -> Array:
-        """Design columns (3, n, p) in units of the required errors."""
+        """Design columns (axes, n, p) in units of the required errors."""
         angles = np.radians(self.requirement.candidates[choice])
         gravity = self.recipe.local_gravity_m_s2 / STANDARD_GRAVITY_M_S2
-        state = settled_state(gravity * force, time, heat, angles, self.recipe.settle_s)
+        state = settled_state(gravity * force, time, heat, angles, self.recipe.settle_s, self._axes)
         columns = design.local_columns(self._sensor, state, design.starting_values(self._sensor, state))
         return columns * self.requirement.errors[:, None, :]
 
@@ -261,17 +264,18 @@ def spread(force: Array) -> Choice:
     return np.array(chosen, dtype=np.intp)
 
 
-def spanned(force: Array, choice: Choice, fixed: Flags, needed_g: float) -> Choice:
-    """A plan (n,) of candidates with the required span of specific force on every axis, as few poses as possible replaced.
+def spanned(force: Array, choice: Choice, fixed: Flags, needed_g: float, axes: int) -> Choice:
+    """A plan (n,) of candidates with the required span of specific force on the axes, as few poses as possible replaced.
 
     Parameters
     ----------
     force : (c, 3), of the candidates
     fixed : (n,), slots that are not changed
     needed_g : g, required difference of the largest and smallest component
+    axes : number of axes with an output: the other components need no span
     """
     changed, free = choice.copy(), ~fixed
-    for axis in np.flatnonzero(np.ptp(force[choice], axis=0) < needed_g):
+    for axis in np.flatnonzero(np.ptp(force[choice], axis=0)[:axes] < needed_g):
         for far in (int(np.argmax(force[:, axis])), int(np.argmin(force[:, axis]))):
             nearest = np.argmax(np.where(free, force[changed] @ force[far], -np.inf))
             if free.any():
@@ -294,7 +298,7 @@ def fewest_dwells(timed: TimedDesign, design: PlanDesign, allowed: Array) -> Pla
     Parameters
     ----------
     design : soaks and dwell length; its counts are replaced
-    allowed : (3, p) or (pairs,), largest ratio to the required errors, as returned by :meth:`TimedDesign.ratio_and_seconds`;
+    allowed : (axes, p) or (pairs,), largest ratio to the required errors, as returned by :meth:`TimedDesign.ratio_and_seconds`;
         above 1 where an exchange of poses is expected to improve it
     """
 

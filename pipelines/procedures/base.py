@@ -67,12 +67,7 @@ class Procedure(ABC):
 
 
 class Evaluated(Procedure):
-    """A procedure with figures of its own; those of others come from the stages ``fit``, ``noise`` and ``grade``.
-
-    axis : of figures that are not determined, where the part names none
-    """
-
-    axis: ClassVar[str] = "*"
+    """A procedure with figures of its own; those of others come from the stages ``fit``, ``noise`` and ``grade``."""
 
     @abstractmethod
     def reduce(self, part: Any, records: Records, device: Device) -> pd.DataFrame:
@@ -99,13 +94,15 @@ class Evaluated(Procedure):
             try:
                 figures[unit], texts = self.of_unit(part, unit, rows, device)
             except NotIdentified as problem:
-                figures[unit], texts = self.nothing(part, str(problem)), []
+                measured = rows["axis"].unique()
+                axis = str(measured[0]) if len(measured) == 1 else ""
+                figures[unit], texts = self.nothing(part, str(problem), axis), []
             findings += [Finding(unit, *text) for text in texts]
         return Outcome(figures, [*findings, *(Finding("", *text) for text in self.of_lot(part, points))])
 
     def nothing(self, part: Any, note: str, axis: str = "") -> list[FigureValue]:
-        """Every figure without a value, with the reason; for no axis in particular the part's, or the procedure's."""
-        axis = axis or getattr(part, "axis", self.axis)
+        """Every figure without a value, with the reason; for no axis in particular the part's, or all."""
+        axis = axis or getattr(part, "axis", "*")
         return [FigureValue.not_determined(spec.name, axis, note) for spec in self.figures]
 
 

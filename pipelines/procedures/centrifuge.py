@@ -94,7 +94,6 @@ class CentrifugeTest(InG, OnEquipment, RecordByRecord):
     )
     source = "IEEE Std 836 (centrifuge), IEEE Std 1293"
     roles = ("centrifuge",)
-    axis = "z"
     part = CentrifugePart
     figures = (
         FigureSpec(
@@ -169,6 +168,7 @@ class CentrifugeTest(InG, OnEquipment, RecordByRecord):
 
     def of_unit(self, part: CentrifugePart, unit: str, rows: pd.DataFrame, device: Device) -> UnitOutcome:
         """Coefficients; the whole polynomial where the input is reversed."""
+        axis = str(rows["axis"].iloc[0])
         lost = int(rows["value"].isna().sum())
         if lost:
             raise NotIdentified(
@@ -181,10 +181,10 @@ class CentrifugeTest(InG, OnEquipment, RecordByRecord):
             raise NotIdentified("the output does not follow the acceleration; check cable and mounting")
         if part.radii_m:
             radii = fitted_radii(rows, 1e-6 * part.radius_um)
-            figures, texts = figures_of_radii(radii, part.full_scale_g), texts_of_radii(radii, part.radii)
+            figures, texts = figures_of_radii(radii, axis, part.full_scale_g), texts_of_radii(radii, part.radii)
         else:
             fit = fitted(part, rows)
-            figures = figures_of_radius(fit, part.full_scale_g, part.radius_m, 1e-6 * part.radius_um)
+            figures = figures_of_radius(fit, axis, part.full_scale_g, part.radius_m, 1e-6 * part.radius_um)
             texts = texts_of_radius(fit, part.radius_m, both=part.reversed)
         return figures, [*texts, *diagnosis_text(judged(part, rows))]
 

@@ -29,31 +29,33 @@ def fitted_radii(rows: pd.DataFrame, radius_error_m: float) -> RadiiFit:
     return fit_radii(force, radius, value, error, radius_error_m)
 
 
-def figures_of_polynomial(fit: Polynomial, full_scale_g: float, radius_percent: float = 0.0) -> list[FigureValue]:
+def figures_of_polynomial(
+    fit: Polynomial, axis: str, full_scale_g: float, radius_percent: float = 0.0
+) -> list[FigureValue]:
     """Linearity, K2, K3 and sensitivity; ``radius_percent`` is the uncertainty of a single radius."""
     k1, k2, k3 = (fit.of(name) for name in ("scale", "second_order", "third_order"))
     linearity, error = linearity_percent(fit, full_scale_g), linearity_error(fit, full_scale_g)
     spread = float(np.hypot(100.0 * k1[1], radius_percent))
     return [
-        FigureValue("centrifuge_linearity_percent", "z", linearity, error),
-        FigureValue("centrifuge_second_order_ug_g2", "z", MICRO * k2[0], MICRO * k2[1]),
-        FigureValue("centrifuge_third_order_ug_g3", "z", MICRO * k3[0], MICRO * k3[1]),
-        FigureValue("centrifuge_sensitivity_percent", "z", 100.0 * (k1[0] - 1.0), spread),
+        FigureValue("centrifuge_linearity_percent", axis, linearity, error),
+        FigureValue("centrifuge_second_order_ug_g2", axis, MICRO * k2[0], MICRO * k2[1]),
+        FigureValue("centrifuge_third_order_ug_g3", axis, MICRO * k3[0], MICRO * k3[1]),
+        FigureValue("centrifuge_sensitivity_percent", axis, 100.0 * (k1[0] - 1.0), spread),
     ]
 
 
-def figures_of_radii(fit: RadiiFit, full_scale_g: float) -> list[FigureValue]:
+def figures_of_radii(fit: RadiiFit, axis: str, full_scale_g: float) -> list[FigureValue]:
     """The figures: linearity, K2, K3 and sensitivity are the unit's own, without arm and mounting."""
     mass, consistency = OF_RADII
     offset, spread = fit.mass_offset_m
     figures = [
-        *figures_of_polynomial(fit.unit, full_scale_g),
-        FigureValue(mass, "z", MICRO * offset, MICRO * spread),
+        *figures_of_polynomial(fit.unit, axis, full_scale_g),
+        FigureValue(mass, axis, MICRO * offset, MICRO * spread),
     ]
     if fit.consistency is None:
-        return [*figures, FigureValue.not_determined(consistency, "z", ONE_MOUNTING)]
+        return [*figures, FigureValue.not_determined(consistency, axis, ONE_MOUNTING)]
     value, error = fit.consistency
-    return [*figures, FigureValue(consistency, "z", MICRO * value, MICRO * error)]
+    return [*figures, FigureValue(consistency, axis, MICRO * value, MICRO * error)]
 
 
 def texts_of_radii(fit: RadiiFit, radii: Sequence[float]) -> list[tuple[str, str]]:
@@ -109,12 +111,12 @@ def _apart(fit: RadiiFit, x: Any, radius: float, force: Any) -> Any:
 
 
 def figures_of_radius(
-    fit: Polynomial, full_scale_g: float, radius_m: float, radius_error_m: float
+    fit: Polynomial, axis: str, full_scale_g: float, radius_m: float, radius_error_m: float
 ) -> list[FigureValue]:
     """Figures of a unit at one radius; those that need two are not determined."""
     return [
-        *figures_of_polynomial(fit, full_scale_g, 100.0 * radius_error_m / radius_m),
-        *(FigureValue.not_determined(name, "z", ONE_RADIUS) for name in OF_RADII),
+        *figures_of_polynomial(fit, axis, full_scale_g, 100.0 * radius_error_m / radius_m),
+        *(FigureValue.not_determined(name, axis, ONE_RADIUS) for name in OF_RADII),
     ]
 
 

@@ -56,6 +56,8 @@ def side_by_side(
 ) -> list[dict[str, Any]]:
     """Lines with ``effect``, ``unit``, ``names`` of the coefficient and ``cells`` by axis; ``*`` for one that axes share.
 
+    ``title`` is the effect, with the names where it has several lines.
+
     Parameters
     ----------
     rows : in the order of a fit: the k-th coefficient of an effect on each axis is in its k-th line
@@ -71,7 +73,16 @@ def side_by_side(
         count[effect, axis] += 1
         line["cells"][axis] = cell(row)
         line["names"] += [] if row["name"] in line["names"] else [row["name"]]
+    several = {effect for effect, number in lines if number > 0}
+    for line in lines.values():
+        names = f" {', '.join(line['names'])}" if line["effect"] in several else ""
+        line["title"] = f"{line['effect']}{names}"
     return list(lines.values())
+
+
+def axis_word(axis: str) -> str:
+    """An axis for people: the figure that is called ``norm`` is of all axes that the device has, be they one, two or three."""
+    return "all" if axis == "norm" else axis
 
 
 def axes_of(lines: Iterable[Mapping[str, Any]]) -> list[Literal["x", "y", "z"]]:

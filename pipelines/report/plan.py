@@ -15,8 +15,9 @@ from pipelines.drawing.mollweide import project, sphere
 from pipelines.planning.context import PlanContext
 from pipelines.planning.documents import worst_axes
 from pipelines.report.budget_plots import shares_plot
-from pipelines.report.numbers import axes_of, scientific, side_by_side, significant
+from pipelines.report.numbers import axes_of, axis_word, scientific, side_by_side, significant
 from pipelines.report.templates import template
+from pipelines.report.unit_panels.budget import NAMES
 from pipelines.schedule.timing import temperatures
 from schemas.decisions import LARGEST_ERROR
 from schemas.units import AXES
@@ -38,6 +39,8 @@ def render_plan(document: dict[str, Any], context: PlanContext) -> str:
         scientific=scientific,
         coefficients=lines,
         axes=axes_of(lines),
+        names=NAMES,
+        axis_word=axis_word,
         seen=[row for row in document["effects"] if row["seen"]],
         unseen=[row for row in document["effects"] if not row["seen"]],
         **pictures(document, context),
@@ -61,10 +64,14 @@ def _budget(reach: dict[str, Any] | None) -> str:
     if reach is None:
         return ""
     worst = worst_axes(reach)
-    titles = {"bias_error": "error by the references", "bias_error_period": "error over the period"}
+    titles = {
+        "bias_error": "error by the references",
+        "bias_error_period": "error over the period",
+        "verification_norm": "error in a verification pose",
+    }
     worst.pop(LARGEST_ERROR, None)  # made of the same contributions
     return shares_plot(
-        {f"{titles.get(q, q)}, {row['axis']}": row["shares"] for q, row in worst.items() if row["shares"]}
+        {f"{titles.get(q, q)}, {axis_word(row['axis'])}": row["shares"] for q, row in worst.items() if row["shares"]}
     )
 
 

@@ -89,13 +89,16 @@ def state_of(
     )
 
 
-def settled_state(force: Array, time: Array, temperature: Array, angles: Array, since_move_s: float) -> State:
+def settled_state(
+    force: Array, time: Array, temperature: Array, angles: Array, since_move_s: float, axes: tuple[int, ...]
+) -> State:
     """Dwells of a device that was switched on at time zero and has settled to every temperature: what a search of plans looks at.
 
     Parameters
     ----------
     force : (n, 3), g; time : (n,), s; temperature : (n,), °C, of the device and of the air
     angles : (n, 2), rad, outer and inner; since_move_s : s, time at rest before every dwell
+    axes : those with an output
     """
     return State(
         force=force,
@@ -106,6 +109,7 @@ def settled_state(force: Array, time: Array, temperature: Array, angles: Array, 
         since_move=np.full(time.size, since_move_s),
         outer=angles[:, 0],
         inner=angles[:, 1],
+        axes=axes,
     )
 
 

@@ -1,5 +1,6 @@
 """A device with one axis from its recipe to certificate and memory, beside the same devices as triads."""
 
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -151,6 +152,20 @@ def test_its_plan_speaks_of_one_axis(measured) -> None:
     page = (folder / "plan.html").read_text(encoding="utf-8")
     assert "error x, 1σ" in page
     assert "error y, 1σ" not in page
+    text = " ".join(text_of("plan", folder / "one.toml").split())
+    for name in ("Kxy", "Kxz"):
+        assert f"misalignment {name}, µg/g" in text
+    assert "error in a verification pose all" in text
+    for words in ("magnitude", ">norm<", "verification norm", ", norm"):
+        assert words not in page
+
+
+def test_its_report_speaks_of_its_axis(measured) -> None:
+    folder, runs = measured
+    report = Archive(folder / "archive").run(runs["one"]).report.read_bytes().decode()
+    assert "error on poses not used, worst pose</td><td>all</td>" in report
+    for words in ("error of the magnitude", "difference between the magnitude", ">norm</td>"):
+        assert words not in report
 
 
 @pytest.mark.slow
@@ -215,6 +230,45 @@ def test_a_limit_of_angles_between_axes_is_refused_for_one(measured, tmp_path: P
     status, _, err = given("run", tmp_path / "one.toml", "--archive", tmp_path / "archive")
     assert status == UNUSABLE
     assert "orthogonality_mrad needs sensor_axes = 3" in " ".join(err.split())
+
+
+@pytest.mark.parametrize("command", ["simulate", "correct"])
+def test_a_command_that_needs_three_axes_names_itself(measured, command: str, tmp_path: Path) -> None:
+    folder, runs = measured
+    (tmp_path / "in.csv").write_text("time_s,x,y,z\n0,0,0,1\n0.01,0,0,1\n", encoding="utf-8")
+    words = (tmp_path / "in.csv", "--calibration", f"{runs['one']}:SF-01", "--archive", folder / "archive")
+    status, _, err = given(command, *words, "--output", tmp_path / "out.csv")
+    assert status == UNUSABLE
+    text = " ".join(err.split())
+    assert f"{command}: it needs three axes, and unit SF-01 has x alone" in text
+
+
+def test_its_waveforms_have_one_channel(measured, tmp_path: Path) -> None:
+    folder, runs = measured
+    archive = ("--archive", folder / "archive")
+    for name, letters in (("one", "x"), ("three", "xyz")):
+        path = tmp_path / f"{name}.csv"
+        said = "".join(text_of("waveforms", runs[name], "--record", "0", *archive, "--output", path).split())
+        names = [f"SF-01 {letter}" for letter in letters]
+        assert said.endswith(f"{path.name}:{','.join(names)}".replace(" ", ""))
+        assert [column.split(" [")[0] for column in pd.read_csv(path).columns] == ["time", *names]
+
+
+def test_a_discovery_in_runs_of_one_axis_says_that_no_lot_can_be_used_and_why(
+    measured, tmp_path: Path, recwarn: pytest.WarningsRecorder
+) -> None:
+    folder, runs = measured
+    shutil.copytree(folder / "archive", tmp_path / "archive")
+    shutil.rmtree(Archive(tmp_path / "archive").run(runs["three"]).path)
+    archive = ("--archive", tmp_path / "archive")
+    text = " ".join(text_of("discover", *archive, "--html", tmp_path / "page.html").split())
+    reason = "no lot can be used: its devices have fewer than three axes (1 run)"
+    assert reason in text
+    assert "e^" not in text
+    assert "model of each lot" not in text
+    assert reason in (tmp_path / "page.html").read_text(encoding="utf-8")
+    assert document_of("discover", *archive, "--json")["error_control"]["log_e_needed"] is None
+    assert not [one for one in recwarn if "divide" in str(one.message)]
 
 
 def test_its_certificate_speaks_of_the_error_along_its_axis(measured, tmp_path: Path) -> None:

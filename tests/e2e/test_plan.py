@@ -140,7 +140,7 @@ def test_the_page_of_a_plan_opens_without_a_network(faces: Path, tmp_path: Path)
     assert text.count("<svg") == 5
     assert not re.search(r"(src|href)=.http", text)
     assert "β in 90° steps" in text
-    _, _, err = given("plan", faces, "--page", tmp_path / "none" / "plan.html")
+    _, _, err = given("plan", faces, "--page", tmp_path / "plan.html" / "plan.html")
     assert "cannot be written" in err
 
 

@@ -29,7 +29,7 @@ from pipelines.certificates.measured import measured_on, measured_span
 from pipelines.certificates.stated_budget import Row, StatedBudget, edge, stated_budget
 from pipelines.stages.figures import FIGURES
 from pipelines.stages.uncertainty.contributions import left_out
-from pipelines.stages.uncertainty.tables import LABELS
+from pipelines.stages.uncertainty.tables import LABELS, has_uncertainty
 from pipelines.tables.calibration import EVERY_AXIS
 from pipelines.tables.frames import rows_of
 from schemas.decisions import BOUND, GRADES, LARGEST_ERROR, MEDIAN, exceedance
@@ -183,15 +183,15 @@ def _result(row: Row, coefficients: list[Coefficient]) -> Result:
         axis=letters if row["axis"] == "norm" and len(letters) < len(AXES) else row["axis"],
         unit=unit,
         value=None if bare else value,
-        expanded=expanded,
-        k=row["k"],
+        expanded=expanded if has_uncertainty(row) else None,
+        k=row["k"] if has_uncertainty(row) else None,
         dof=row["dof"] if isfinite(row["dof"]) else None,
     )
 
 
 def _budget(row: Row, parts: list[Row]) -> BudgetTable:
     # contributions to the error over the period add up to the result, not to the result's own u
-    deviation = row["quantity"] == "bias_error_period"
+    deviation = not has_uncertainty(row)
     return BudgetTable(
         quantity=f"{_quantity(row)}, {row['axis']}",
         unit=row["unit_text"],

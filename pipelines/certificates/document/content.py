@@ -12,15 +12,16 @@ from schemas.units import axes_among
 class Result(Strict):
     """A result with its expanded uncertainty (7.8.2.1 m, 7.8.4.1 a).
 
-    value, expanded : in ``unit``; None: a figure that is an uncertainty by itself; k : coverage factor, probability 95 %
+    value : in ``unit``; None: a figure that is an uncertainty by itself
+    expanded : in ``unit``, k : coverage factor, probability 95 %; None of a standard deviation, which has no uncertainty
     """
 
     quantity: str
     axis: str
     unit: str
     value: float | None
-    expanded: float
-    k: float
+    expanded: float | None
+    k: float | None
     dof: float | None
 
 

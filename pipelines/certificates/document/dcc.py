@@ -115,7 +115,7 @@ class _Writer:
             self.add(real, "label", label if known is not None else f"{label} in {unit}".strip(), space=SI)
         self.add(real, "value", repr(float(value) * factor), space=SI)
         self.add(real, "unit", text, space=SI)
-        if result is not None and result.value is not None:
+        if result is not None and result.value is not None and result.expanded is not None:
             own = self.add(real, "expandedUnc", space=SI)
             self.add(own, "uncertainty", repr(result.expanded * factor), space=SI)
             self.add(own, "coverageFactor", repr(result.k), space=SI)
@@ -223,7 +223,8 @@ def _measured(w: _Writer, parent: Any, c: CertificateContent) -> None:
         if result.value is None:
             w.text(own, "description", "expanded uncertainty")
         data = w.add(w.add(own, "data"), "quantity")
-        w.real(data, result.expanded if result.value is None else result.value, result.unit, result=result)
+        shown = result.expanded if result.value is None else result.value
+        w.real(data, shown or 0.0, result.unit, result=result)
     own = w.add(results, "result")
     w.text(own, "name", "coefficients of the fit, as archived; their uncertainty is in the results above")
     box = w.add(w.add(own, "data"), "list")

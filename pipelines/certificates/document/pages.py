@@ -134,6 +134,9 @@ def _as_found(a: Adjustment) -> dict[str, Any]:
 def _results(c: CertificateContent) -> dict[str, Any]:
     rows: list[list[str]] = []
     for one in c.results:
+        if one.expanded is None or one.k is None:
+            rows.append([one.quantity, one.axis, significant(one.value or 0.0), "", one.unit, ""])
+            continue
         value, expanded = with_uncertainty(one.value, one.expanded)
         rows.append([one.quantity, one.axis, value, expanded, one.unit, f"{one.k:.2f}"])
     heads = ["quantity", "axis", "value", "U", "unit", "k"]

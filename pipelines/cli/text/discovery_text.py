@@ -17,7 +17,8 @@ def print_discoveries(document: DiscoverDocument, *, reach: bool = False) -> Non
     say(
         f"{number_of(pooled['lots'], 'lot')} of {document['device']}, {number_of(pooled['units'], 'unit calibration')}{period}"
     )
-    say(f"model of each lot: {', '.join(document['model'])}", style="dim")
+    if document["model"]:
+        say(f"model of each lot: {', '.join(document['model'])}", style="dim")
     for row in pooled["left_out"][:_SHOWN_OUT]:
         say(f"left out  {row['run']}: {row['reason']}", style="dim")
     if len(pooled["left_out"]) > _SHOWN_OUT:
@@ -29,11 +30,12 @@ def print_discoveries(document: DiscoverDocument, *, reach: bool = False) -> Non
         say(headline(row), style="yellow" if row["id"] in document["new"] else "")
         say(f"    {scope_text(row)}")
     _beside(document)
-    say(
-        f"a discovery needs evidence of e^{short(control['log_e_needed'])}: where nothing is hidden, the probability that one "
-        f"ever appears is at most {100.0 * control['alpha']:g} %, however often it is looked at",
-        style="dim",
-    )
+    if control["log_e_needed"] is not None:
+        say(
+            f"a discovery needs evidence of e^{short(control['log_e_needed'])}: where nothing is hidden, the probability that "
+            f"one ever appears is at most {100.0 * control['alpha']:g} %, however often it is looked at",
+            style="dim",
+        )
     for text in document["warnings"]:
         say(text, style="yellow")
     if document["discoveries"] and not document["looking_back"]:

@@ -129,7 +129,7 @@ def _coefficient_lines(rows: list[dict[str, Any]]) -> list[list[str]]:
     lines = side_by_side(rows, lambda row: short(row["uncertainty_ug"]), "unit")
     axes = [["*" if "*" in line["cells"] else "x", "y", "z"] for line in lines]
     return [
-        [f"{line['effect']}, {line['unit']}", *(line["cells"].get(axis, "") for axis in own)]
+        [f"{line['title']}, {line['unit']}", *(line["cells"].get(axis, "") for axis in own)]
         for line, own in zip(lines, axes, strict=True)
     ]
 
@@ -153,7 +153,7 @@ TITLES = {
     "misalignment": "misalignment",
     "bias_temperature": "bias over temperature",
     "scale_temperature": "scale over temperature",
-    "verification_norm": "magnitude in a verification pose",
+    "verification_norm": "error in a verification pose",
     "bias_error": "error by the references alone",
     "bias_error_period": "error over the period, RMS",
     LARGEST_ERROR: "largest error of an axis over the period, 95 % bound",
@@ -167,10 +167,18 @@ def print_reach(reach: dict[str, Any] | None) -> None:
     if reach is None:
         say("uncertainty: noise only, the station states no [uncertainty]; no grade above consumer, no certificate")
         return
+    from pipelines.report.numbers import axis_word
+
     worst = worst_axes(reach)
     of_period = {"bias_error_period", LARGEST_ERROR}  # bounds themselves
     lines = [
-        [TITLES[name], row["axis"], short(row["u"]), "" if name in of_period else short(row["expanded"]), row["unit"]]
+        [
+            TITLES[name],
+            axis_word(row["axis"]),
+            short(row["u"]),
+            "" if name in of_period else short(row["expanded"]),
+            row["unit"],
+        ]
         for name, row in worst.items()
     ]
     print_table(["quantity, worst axis", "axis", "u", "U, k = 2", "unit"], lines)

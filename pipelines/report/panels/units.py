@@ -33,8 +33,8 @@ TEMPLATE = """\
 {% if unit.reasons %}<tr><td></td><td colspan="9"><ul class="reasons">{% for reason in unit.reasons %}<li>{{ reason }}</li>{% endfor %}</ul></td></tr>{% endif %}
 {% endfor %}
 </table>
-<p class="note">Decided by {{ rule }}. fit: residual of the model on the poses it was fitted to. verification: largest difference between the magnitude of the corrected
-specific force and local gravity on poses that the fit has not used, mean over the dwells of a pose. N and B: noise of the worst
+<p class="note">Decided by {{ rule }}. fit: residual of the model on the poses it was fitted to. verification: largest error of the corrected
+specific force (of the magnitude of three axes, along the axes of fewer) on poses that the fit has not used, mean over the dwells of a pose. N and B: noise of the worst
 axis, an upper limit where the record does not identify the term.</p>
 """
 

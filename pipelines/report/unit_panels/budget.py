@@ -9,10 +9,11 @@ import numpy as np
 
 from inertial.uncertainty.rounding import rounded
 from pipelines.report.context import UnitContext
-from pipelines.report.numbers import significant
+from pipelines.report.numbers import axis_word, significant
 from pipelines.report.templates import fill
-from pipelines.stages.uncertainty.tables import LABELS
+from pipelines.stages.uncertainty.tables import LABELS, has_uncertainty
 from pipelines.tables.frames import rows_of
+from schemas.decisions import LARGEST_ERROR
 
 ORDER = 47
 TITLE = "Uncertainty"
@@ -25,8 +26,9 @@ NAMES = {
     "orthogonality": "angle between axes, from 90°",
     "output": "corrected output, worst of the certified range",
     "bias_error": "error on poses not used, for the user",
-    "verification_norm": "error of the magnitude, worst pose",
+    "verification_norm": "error on poses not used, worst pose",
     "bias_error_period": "error expected over the period of validity",
+    LARGEST_ERROR: "largest error of the axes over the period of validity",
 }
 WITHOUT_VALUE = ("scale", "output")
 TEMPLATE = """\
@@ -45,21 +47,25 @@ def render(unit: UnitContext) -> str | None:
     rows = unit.tables.get("uncertainties")
     if rows is None or rows.empty:
         return None
-    worst = set(rows.groupby("quantity", sort=False)["expanded"].idxmax().dropna())
+    size = rows["expanded"].where(rows["expanded"] > 0.0, rows["value"])  # a standard deviation has no U
+    worst = set(size.groupby(rows["quantity"], sort=False).idxmax())
     lines = [{**_line(row), "worst": at in worst} for at, row in zip(rows.index, rows_of(rows), strict=True)]
     return fill(TEMPLATE, lines=lines)
 
 
 def _line(row: dict[str, Any]) -> dict[str, Any]:
-    value, expanded = rounded(float(row["value"]), float(row["expanded"]))
+    stated = has_uncertainty(row)
+    value, expanded = (
+        rounded(float(row["value"]), float(row["expanded"])) if stated else (significant(row["value"], 4), "")
+    )
     return {
         "name": NAMES.get(row["quantity"], row["quantity"]),
-        "axis": row["axis"],
+        "axis": axis_word(row["axis"]),
         "value": "" if row["quantity"] in WITHOUT_VALUE else value,
-        "a": significant(row["u_a"]),
-        "b": significant(row["u_b"]),
-        "dof": "∞" if not np.isfinite(row["dof"]) or row["dof"] > 1e4 else f"{int(row['dof'])}",
-        "k": f"{row['k']:.2f}",
+        "a": significant(row["u_a"]) if stated else "",
+        "b": significant(row["u_b"]) if stated else "",
+        "dof": "" if not stated else "∞" if not np.isfinite(row["dof"]) or row["dof"] > 1e4 else f"{int(row['dof'])}",
+        "k": f"{row['k']:.2f}" if stated else "",
         "expanded": expanded,
         "unit": row["unit_text"],
         "largest": without_nothing(row["largest"]),

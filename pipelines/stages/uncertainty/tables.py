@@ -100,6 +100,14 @@ def rows_of_quantities(
     }
 
 
+def has_uncertainty(row: Mapping[str, Any]) -> bool:
+    """Whether a row of ``uncertainties`` has a U: a standard deviation or a bound over the period of validity has none.
+
+    Earlier versions stored 0 for it.
+    """
+    return bool(row["expanded"] > 0.0)
+
+
 def groups_of(variances: VarianceParts) -> dict[str, NDArray[np.intp]]:
     """The places among the influences of every contribution, in order."""
     names = np.array(variances.fit.source.contributions, dtype=object)
@@ -238,13 +246,13 @@ def _sum_rows(
     largest: list[list[str]] = []
     for one, own in zip(quantities, parts, strict=True):
         a = np.asarray(one.noise, dtype=float)
-        if one.extra:  # an expected RMS: its contributions make its value, its uncertainty is that of the RMS
-            b, dof = np.zeros_like(a), np.asarray(one.dof_noise, dtype=float)
+        none = np.full_like(a, np.nan)
+        if one.extra:  # an expected RMS: its contributions make its value, and it has no uncertainty of its own
+            b, dof = np.zeros_like(a), none
         else:
             stated = [k for k, kind in enumerate(own.about["type"]) if kind == "B"]
             b, dof = np.sqrt(_summed(own.u[:, stated] ** 2)), effective_degrees(own.u, own.dof)
-        u, k = np.hypot(a, b), coverage_factors(dof)
-        none = np.full_like(a, np.nan)
+        u, k = np.hypot(a, b), none if one.extra else coverage_factors(dof)
         row = {"value": one.value, "u_a": a, "u_b": b, "u": u, "dof": dof, "k": k, "expanded": k * u,
                "shown": none if one.shown is None else one.shown,
                "unseen": none if one.unseen is None else one.unseen}  # fmt: skip

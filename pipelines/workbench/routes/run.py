@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from fastapi import APIRouter, Request
 from starlette.responses import Response
 
 from pipelines.certificates.ledger import stated
+from pipelines.stages.judge import verdict_of
 from pipelines.tables.frames import rows_of
-from pipelines.workbench.pages import asked, page, run_table, saved_as, table_csv
+from pipelines.workbench.pages import Workbench, asked, page, run_table, saved_as, table_csv
 from pipelines.workbench.state import MissingPage, RunPage
 from schemas.errors import TumblelineError, WrongUse
 
@@ -41,12 +44,19 @@ def run(request: Request) -> Response:
         certificates = {}
         problems.append(str(problem))
     events = rows_of(run_table(bench, stored.id, "events")) if "events" in tables else []
-    # where it was judged since the server began
-    diagnosed, _ = bench.work("diagnose", MissingPage(source=stored.id), [])
     return page(
         request, "run.html", state, problems, run=stored, about=about, grades=grades, cells=cells, shown=SHOWN, tables=tables,
-        certificates=certificates, events=events, adequate=None if diagnosed is None else diagnosed.document["adequate"],
+        certificates=certificates, events=events, judged=_judged(bench, stored.id, tables),
     )  # fmt: skip
+
+
+def _judged(bench: Workbench, run: str, tables: Sequence[str]) -> tuple[bool | None, str]:
+    """Whether the model is adequate, and why it cannot be judged: of the archive, else of a diagnosis since the server began."""
+    verdict = verdict_of(run_table(bench, run, "verdict")) if "verdict" in tables else None
+    if verdict is not None:
+        return verdict["adequate"], verdict["reason"] or ""
+    diagnosed, _ = bench.work("diagnose", MissingPage(source=run), [])
+    return (None, "") if diagnosed is None else (diagnosed.document["adequate"], diagnosed.document["reason"] or "")
 
 
 @router.get("/run/table/{name}.csv")

@@ -13,7 +13,8 @@ from pipelines.audit.calibrations import day_of
 from pipelines.certificates import Ledger
 from pipelines.drawing import Chart
 from pipelines.report import run_pictures
-from pipelines.report.numbers import side_by_side, with_uncertainty
+from pipelines.report.numbers import axis_word, side_by_side, with_uncertainty
+from pipelines.report.unit_panels.budget import NAMES
 from pipelines.stages.figures import FIGURES
 from pipelines.tables.frames import rows_of
 from pipelines.workbench.pages import (
@@ -65,7 +66,7 @@ def unit(request: Request) -> Response:
         before=units[place - 1] if place else "", after=units[place + 1] if place + 1 < len(units) else "",
         coefficients=side_by_side(own.get("coefficients", []), _expanded), parameters=parameters,
         coverage=float((run.about.get("limits") or {}).get("coverage_factor", COVERAGE)),
-        labels={name: kind.label for name, kind in FIGURES.items()},
+        names=NAMES, axis_word=axis_word, labels={name: kind.label for name, kind in FIGURES.items()},
         certificates=Ledger(bench.archive).calibrations(state.unit)[-CERTIFICATES:][::-1],
     )  # fmt: skip
 

@@ -39,6 +39,11 @@ def test_what_cannot_be_is_refused_with_what_is_needed(tmp_path: Path, monkeypat
     assert "'tumbleline run' refuses this recipe" in said
     assert "298 °C, the chamber of station simulated reaches -40 to 85 °C" in said
     assert CliRunner().invoke(app, ["plan", hot]).exit_code == 0  # a plan tells and does not refuse
+    units = load_recipe(recipe).units
+    for bad in ("LN 01", ""):
+        serials = recipe_file(tmp_path, (f'"{units[0]}"', f'"{bad}"'), name="serials.toml")
+        said = refused(["plan", serials], tmp_path, monkeypatch)
+        assert "'tumbleline run' refuses this recipe: lot: " in said, bad
     mine = recipe_file(tmp_path, ('"consumer"', '"mine.toml"'), name="limits.toml")
     assert "no file and no built-in limits are called 'mine.toml'" in refused(["plan", mine], tmp_path, monkeypatch)
     (tmp_path / "mine.toml").write_text('name = "m"\n[figures.residual_rms]\nmax = 1\nunit = "µg"\n', encoding="utf-8")

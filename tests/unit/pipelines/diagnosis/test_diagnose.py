@@ -34,6 +34,20 @@ def test_an_effect_that_is_not_there_does_not_look_like_progress_on_a_fresh_run(
     assert more["heldout_rms_ug"] > plain["heldout_rms_ug"]
 
 
+@pytest.mark.parametrize("letters", ["x", "xy", "xyz"])
+@pytest.mark.parametrize("units", [1, 3])
+def test_the_error_by_axis_is_that_of_each_axis_with_an_output(rng, letters: str, units: int) -> None:
+    noise_ug = {"x": 10.0, "y": 30.0, "z": 90.0}
+    table = lots.lot(rng, units=units, noise_ug=1.0, temperatures=(25.0, 25.0))
+    for axis, size in noise_ug.items():
+        table[f"out_{axis}"] += rng.normal(0.0, 1e-6 * size, len(table))
+    table = table.drop(columns=[f"{name}_{axis}" for axis in set("xyz") - set(letters) for name in ("out", "sd")])
+    error = compare(table, ["bias", "scale", "misalignment"])["by_axis"]
+    assert list(error) == list(letters)
+    for axis in letters:
+        assert error[axis] == pytest.approx(noise_ug[axis], rel=0.4)
+
+
 def test_the_same_data_give_the_same_answer_and_what_a_model_or_a_fresh_run_lacks_is_said(rng):
     table = lots.lot(rng, hidden=cubic)
     assert diagnose(table) == diagnose(table.sample(frac=1.0, random_state=1))

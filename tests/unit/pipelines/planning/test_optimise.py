@@ -11,6 +11,8 @@ from inertial.noise.dwells import DwellNoise, dwell_covariance
 from pipelines.jobs.model_files import STARTING_MODEL
 from pipelines.jobs.recipes import load_recipe
 from pipelines.planning.context import plan_context
+from pipelines.planning.lower_bound import lower_bound
+from pipelines.planning.optimise import RecipeSearch
 from pipelines.planning.plan import identified
 from pipelines.planning.requirement import Requirement, candidates
 from pipelines.planning.textbook import reference_errors, textbook
@@ -30,6 +32,23 @@ def timed():
     against = plan_context(textbook(base, (-10.0, 60.0)), STATION, NOISE)
     requirement = Requirement(reference_errors(against, base), (), (-10.0, 60.0), candidates(STATION))
     return TimedDesign(base, STATION, NOISE, requirement, slowest=float(against.state.time[-1]))
+
+
+@pytest.mark.parametrize("axes", [1, 2, 3])
+def test_only_axes_with_an_output_are_designed_for(timed: TimedDesign, axes: int) -> None:
+    """In every part of the search, the axes of a device with fewer have the numbers of these axes of a triad."""
+    recipe = timed.recipe.model_copy(update={"sensor_axes": axes})
+    against = plan_context(textbook(recipe, (-10.0, 60.0)), STATION, NOISE)
+    requirement = replace(timed.requirement, errors=timed.requirement.errors[:axes])
+    fewer = TimedDesign(recipe, STATION, NOISE, requirement, slowest=timed.slowest)
+    design = PlanDesign((25.0, -10.0, 60.0, 25.0), (6,) * 4, 2.0)
+    assert np.allclose(fewer.ratio_and_seconds(design)[0], timed.ratio_and_seconds(design)[0][:axes])
+    assert np.array_equal(fewer.pose_independent(), timed.pose_independent()[:axes])
+    (slots, choice), (of_three, _) = fewer.slots(design), timed.slots(design)
+    assert np.allclose(slots.matrix(choice), of_three.matrix(choice)[:axes])
+    search = RecipeSearch(recipe, against, requirement)
+    assert search.reached(search.designed(design)).shape == requirement.errors.shape
+    assert lower_bound(recipe, against, requirement) is not None
 
 
 def test_no_soak_has_a_dwell_too_many(timed: TimedDesign) -> None:
@@ -57,9 +76,10 @@ def test_a_plan_that_reaches_too_little_is_widened_by_few_poses():
     flat = np.flatnonzero(np.abs(force[:, 2]) < 0.4)[:8].astype(np.intp)
     fixed = np.zeros(8, dtype=bool)
     fixed[[0, 7]] = True
-    choice = spanned(force, flat, fixed, 1.4)
+    choice = spanned(force, flat, fixed, 1.4, 3)
     assert np.ptp(force[flat], axis=0).min() < 1.4 <= np.ptp(force[choice], axis=0).min()
     assert np.array_equal(choice[fixed], flat[fixed])
+    assert np.array_equal(spanned(force, flat, fixed, 1.4, 2), flat)  # z has no output
 
 
 def test_what_the_textbook_plan_cannot_identify_is_wanted_as_the_recipe_knows_it():

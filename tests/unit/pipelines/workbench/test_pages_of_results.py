@@ -10,7 +10,7 @@ from asgi_client import AsgiClient
 from capture_double import small_run
 
 from benchmarks.generated_archive import write_archive
-from pipelines.archive import Archive
+from pipelines.archive import Archive, Run
 from pipelines.demo.archive_lots import Hidden, Line, write_lots
 from pipelines.discovery.attributes import add_attributes
 from pipelines.report.numbers import significant, with_uncertainty
@@ -68,6 +68,26 @@ def test_a_discovery_is_on_the_page_with_its_levels(tmp_path: Path, monkeypatch:
     assert rows[0].startswith("level,size_ug")
     assert rows[1].startswith("W02,")
     assert client.get("/discover/levels-D7.csv").status_code == 422
+
+
+@pytest.mark.parametrize(
+    ("verdict", "reason", "shown"),
+    [
+        ("adequate", "", ">adequate</span>"),
+        ("not adequate", "", ">not adequate</span>"),
+        ("not judged", "too few dwells", "adequacy not judged: too few dwells"),
+    ],
+)
+def test_the_page_of_a_run_has_the_verdict_of_its_archive(
+    verdict: str, reason: str, shown: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = small_run(tmp_path)
+    own = run.table("verdict").assign(verdict=verdict, reason=reason)
+    read = Run.table
+    monkeypatch.setattr(Run, "table", lambda self, name: own if name == "verdict" else read(self, name))
+    settings = WorkbenchSettings(archive=str(run.archive.root), folder=tmp_path / "bench", token=TOKEN)
+    page = AsgiClient(create_app(settings), "http://127.0.0.1:8321").get(f"/run?run={run.id}")
+    assert shown in page.text
 
 
 def test_figures_and_coefficients_have_their_expanded_uncertainty_once(tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ from dataclasses import replace
 from datetime import date
 from io import BytesIO
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -32,6 +33,7 @@ from pipelines.certificates.stated_budget import StatedBudget
 from pipelines.chain.certify import certify
 from pipelines.cli import app
 from pipelines.report.numbers import with_uncertainty as report_rounding
+from pipelines.report.unit_panels.budget import render as budget_panel
 from schemas.errors import RecipeInvalid, WrongUse
 from schemas.reference import Reference
 
@@ -182,6 +184,29 @@ def test_a_budget_adds_up_and_names_contributions_sources_and_effects_in_words_a
     assert "bias temperature" in text
     for key in ("bias_temperature", "slot_rotation_mrad", "switch_on", "scale_temperature"):
         assert key not in text.replace("\n", "")
+
+
+def test_a_standard_deviation_has_no_uncertainty_on_paper_in_xml_and_in_the_archive(
+    made: Run, c: CertificateContent, xml: bytes
+) -> None:
+    tree = etree.fromstring(xml)
+    stated = tree.xpath("//si:expandedUnc/si:uncertainty", namespaces=NAMES)
+    assert min(float(one.text) for one in stated) > 0.0
+    words = "to be expected over the stated period"
+    own = tree.xpath(f"//dcc:result[contains(dcc:name/dcc:content, '{words}')]", namespaces=NAMES)
+    assert len(own) == 3
+    for one in own:
+        assert one.find(".//si:value", NAMES) is not None
+        assert one.find(".//si:expandedUnc", NAMES) is None
+    [table] = [table for part in page_content(c)["parts"] if part.get("title") == "Results" for table in part["tables"]]
+    rows = [row for row in table["rows"] if words in row[0]]
+    assert [(row[3], row[5]) for row in rows] == [("", "")] * 3
+    of_period = made.table("uncertainties").query("quantity.str.contains('period|largest')")
+    assert len(of_period)
+    assert of_period[["dof", "k", "expanded"]].isna().all(axis=None)
+    panel = budget_panel(SimpleNamespace(tables={"uncertainties": made.table("uncertainties")})) or ""
+    assert "bias_error" not in panel
+    assert ">0<" not in panel
 
 
 def test_values_of_the_xml_are_those_of_the_archive_in_si_units(made: Run, xml: bytes) -> None:
