@@ -102,7 +102,7 @@ class Mapping(BaseModel):
     measured: date | None = None
     """Day of the measurement."""
     zero_output: Annotated[float, Field(ge=-LARGEST, le=LARGEST)] = 0.0
-    """Nominal output at 0 g, in the output's unit."""
+    """Nominal output at 0 g, in the unit of the file's outputs."""
     face: Literal["", "+x", "+y", "+z", "-x", "-y", "-z"] = ""
     """The face that is up all the time, for a record in one pose."""
     block_s: Annotated[float, Field(ge=SHORTEST_BLOCK_S, le=LONGEST_WAIT_S)] | None = None
@@ -112,7 +112,7 @@ class Mapping(BaseModel):
     window_s: Annotated[float, Field(ge=SHORTEST_BLOCK_S, le=LONGEST_WAIT_S)] | None = None
     """Length of the sliding window of the search for dwells."""
     threshold: Annotated[float, Field(gt=0.0, le=LARGEST)] | None = None
-    """Standard deviation of a window that means motion, in the unit of the output."""
+    """Standard deviation of a window that means motion, in the unit of the file's outputs."""
     shortest_s: Annotated[float, Field(ge=SHORTEST_BLOCK_S, le=LONGEST_WAIT_S)] | None = None
     """Shortest dwell."""
     gaps: Literal["refuse", "split"] = "refuse"
@@ -163,6 +163,15 @@ class Mapping(BaseModel):
         if set(mapped) != set(self.axes):
             raise ValueError(
                 f"axes are {', '.join(self.axes)}, and {', '.join(mapped) or 'no output'} mapped; each needs a column of its own"
+            )
+        alone = [
+            name
+            for name, axis in zip(SPREAD_COLUMNS, NEEDED, strict=True)
+            if name in self.columns and axis not in mapped
+        ]
+        if alone:
+            raise ValueError(
+                f"{alone[0]} without {alone[0][-1]}; a standard deviation belongs to an output: map it too"
             )
         if len(self.signs) not in {len(self.axes), len(NEEDED)}:
             raise ValueError(f"{len(self.signs)} signs for {len(self.axes)} axes; one for each axis is needed")

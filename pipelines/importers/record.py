@@ -10,7 +10,7 @@ import pandas as pd
 
 from inertial import frames
 from inertial.arrays import Array, Index
-from inertial.quantities import FORCE_COLUMNS
+from inertial.quantities import FORCE_COLUMNS, SPREAD_COLUMNS
 from pipelines.importers import clocks, exchange, pose_check, sample_faults, unit_check, values
 from pipelines.importers.content import Content
 from pipelines.importers.documents import SampleFaultDocument
@@ -73,7 +73,7 @@ def imported(
     remarks = (*content.remarks, *dropped, *other)
     out_unit, factor = OUTPUT_UNITS[mapping.units.output]
     serials = _serials(columns, mapping, where)
-    extras = _extras(columns, mapping, where, content)
+    extras = _extras(columns, mapping, where, content) | _spreads(columns, mapping, where, content)
     if mapping.rows == "dwells":
         return _as_dwells(columns, raw * factor, serials, extras, mapping, content, where, remarks)
     clock = seconds(columns, mapping, content, where)
@@ -194,7 +194,7 @@ def _extras(columns: dict[str, pd.Series], mapping: Mapping, where: str, content
     """Temperature, other known columns and covariates by the names of the tables."""
     extras: dict[str, Array] = {}
     for meaning, column in columns.items():
-        if meaning in ("time", *AXES, "unit", "dwell"):
+        if meaning in ("time", *AXES, "unit", "dwell", *SPREAD_COLUMNS):
             continue
         name = MEANINGS.get(meaning, meaning)
         numbers = values.finite(column, where, content, flags=meaning not in MEANINGS)
@@ -203,6 +203,17 @@ def _extras(columns: dict[str, pd.Series], mapping: Mapping, where: str, content
         values.refuse_outside(numbers, name, where)
         extras[name] = numbers
     return extras
+
+
+def _spreads(columns: dict[str, pd.Series], mapping: Mapping, where: str, content: Content) -> dict[str, Array]:
+    """Standard deviations, in the unit and the order of axes of the outputs that they belong to."""
+    factor, spreads = OUTPUT_UNITS[mapping.units.output][1], {}
+    for letter, axis in zip(mapping.letters, mapping.axes, strict=True):
+        if f"sd_{axis}" in columns:
+            name = f"sd_{letter}"
+            spreads[name] = factor * values.finite(columns[f"sd_{axis}"], where, content)
+            values.refuse_outside(spreads[name], name, where)
+    return spreads
 
 
 def _celsius(values: Array, unit: str) -> Array:

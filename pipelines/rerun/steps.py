@@ -31,6 +31,7 @@ from pipelines.rerun.import_steps import (
     judge_step,
     plane_step,
     verify_step,
+    zero_of_import,
 )
 from pipelines.stages.figures import UNITS
 from pipelines.stages.grade import refuse_limits_without_figures
@@ -163,8 +164,7 @@ def _imported(run: Run, change: ModelChange, left_out: Dwells) -> Plan:
     steps = [import_step(data, left_out, run), fit_step(model, data), judge_step(model, data), verify_step(data)]
     terms = archived_terms({**about, **(stated if limits else {})})
     steps += [budget_step(terms, data)] if terms else []
-    zero = float((about.get("mapping") or {}).get("zero_output", 0.0))
-    steps += [grade_step(limits, zero, budgeted=terms is not None)] if limits else []
+    steps += [grade_step(limits, zero_of_import(about), budgeted=terms is not None)] if limits else []
     recipe = {**model, **({"limits": change.limits_name} if change.limits else {})}
     hashes = {name: run.manifest(name)["sha256"] for name in data.read()}
     code = {step.name: step.code for step in steps}

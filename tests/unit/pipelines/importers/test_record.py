@@ -11,7 +11,8 @@ from pipelines.importers import clocks
 from pipelines.importers.content import Content
 from pipelines.importers.mapping import build
 from pipelines.importers.record import imported
-from schemas.errors import DataRejected, WrongUse
+from pipelines.importers.stated_units import refuse_contradiction
+from schemas.errors import DataRejected, RecipeInvalid, WrongUse
 
 
 @each(range(8))
@@ -135,3 +136,20 @@ def test_day_and_month_that_cannot_be_told_apart_matter_only_where_the_date_chan
     stamps[17] = "2026-13-45"
     with pytest.raises(DataRejected, match=r"row 18, column 't': found '2026-13-45', a time is needed"):
         seconds(stamps)
+
+
+def test_standard_deviations_in_another_unit_than_their_outputs_are_refused(rng: np.random.Generator) -> None:
+    names = ["x", "y", "z", "sd_x", "sd_y", "sd_z"]
+    frame = pd.DataFrame(rng.normal(size=(12, 6)), columns=names)
+    mapping = build({"columns": {name: name for name in names}, "units": {"output": "V"}}, "t")
+    outputs = dict.fromkeys("xyz", "V")
+    for stated in ("µV", "mV"):
+        content = Content(frame, units=outputs | {"sd_y": stated})
+        with pytest.raises(WrongUse, match=f"column 'sd_y' .* states {stated}, V is the unit of the output"):
+            refuse_contradiction(mapping, content, "f.csv")
+    refuse_contradiction(mapping, Content(frame, units=outputs | {"sd_x": "V", "sd_y": "n=400"}), "f.csv")
+
+
+def test_a_standard_deviation_of_an_output_that_is_not_mapped_is_refused() -> None:
+    with pytest.raises(RecipeInvalid, match="sd_y without y"):
+        build({"columns": {"x": "a", "sd_y": "b"}, "units": {"output": "V"}, "axes": ["x"]}, "t")
