@@ -69,7 +69,9 @@ def imported(
     raw = np.column_stack([values.finite(columns[axis], where, content) for axis in mapping.axes])
     raw = raw * [1.0 if sign == "+" else -1.0 for sign in mapping.signs[: len(mapping.axes)]]
     three = len(mapping.axes) == len(AXES)
-    other = unit_check.refuse_other_unit(raw, mapping.units.output, where) if three else ()  # the norm is that of three
+    other: tuple[str, ...] = ()
+    if three:  # the norm is that of three
+        other = unit_check.refuse_other_unit(raw, mapping.units.output, where, means=mapping.rows == "dwells")
     remarks = (*content.remarks, *dropped, *other)
     out_unit, factor = OUTPUT_UNITS[mapping.units.output]
     serials = _serials(columns, mapping, where)

@@ -153,3 +153,24 @@ def test_standard_deviations_in_another_unit_than_their_outputs_are_refused(rng:
 def test_a_standard_deviation_of_an_output_that_is_not_mapped_is_refused() -> None:
     with pytest.raises(RecipeInvalid, match="sd_y without y"):
         build({"columns": {"x": "a", "sd_y": "b"}, "units": {"output": "V"}, "axes": ["x"]}, "t")
+
+
+def of_size(rng: np.random.Generator, size: float) -> pd.DataFrame:
+    """Means of twelve positions with this norm, which are not whole numbers."""
+    out = rng.normal(size=(12, 3))
+    return pd.DataFrame(size * out / np.linalg.norm(out, axis=1, keepdims=True), columns=["ax", "ay", "az"])
+
+
+IN_COUNTS = {"columns": {"x": "ax", "y": "ay", "z": "az"}, "units": {"output": "LSB"}, "unit": "A1"}
+
+
+def test_means_of_counts_need_not_be_whole_numbers_and_their_unit_is_asked_about(rng: np.random.Generator) -> None:
+    found = imported(of_size(rng, 1033.0), build({**IN_COUNTS, "rows": "dwells"}, "t"), "f.csv")
+    assert found.out_unit == "LSB"
+    assert [one for one in found.remarks if "the norm of the output is 1033, as gravity in mg; LSB was given" in one]
+
+
+@pytest.mark.parametrize(("size", "rows"), [(1.01, "dwells"), (9.8, "dwells"), (1033.0, "samples")])
+def test_fewer_counts_per_g_than_converters_have_and_parts_of_a_count_are_refused(size, rows, rng) -> None:
+    with pytest.raises(DataRejected, match="are not whole numbers, counts are needed"):
+        imported(of_size(rng, size), build({**IN_COUNTS, "rows": rows, "rate_hz": 1.0}, "t"), "f.csv")
