@@ -283,7 +283,8 @@ def _as_dwells(
 
 def _finished(frame: pd.DataFrame, mapping: Mapping) -> pd.DataFrame:
     """The columns that every dwell has, and the reference if poses are stated."""
-    frame = frame.assign(slot=0, kind="dwell", soak=0, out_unit=OUTPUT_UNITS[mapping.units.output][0])
+    frame = frame if "slot" in frame else frame.assign(slot=0)
+    frame = frame.assign(kind="dwell", soak=0, out_unit=OUTPUT_UNITS[mapping.units.output][0])
     if TILT in frame.columns:
         return _tilted(frame, mapping)
     if not (mapping.poses or mapping.face):

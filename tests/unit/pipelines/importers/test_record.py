@@ -6,6 +6,7 @@ import pandas as pd
 import pytest
 from each import each
 
+from inertial.quantities import RECORDED
 from pipelines.diagnosis.diagnose import default_model, diagnose
 from pipelines.importers import clocks
 from pipelines.importers.content import Content
@@ -153,6 +154,19 @@ def test_standard_deviations_in_another_unit_than_their_outputs_are_refused(rng:
 def test_a_standard_deviation_of_an_output_that_is_not_mapped_is_refused() -> None:
     with pytest.raises(RecipeInvalid, match="sd_y without y"):
         build({"columns": {"x": "a", "sd_y": "b"}, "units": {"output": "V"}, "axes": ["x"]}, "t")
+
+
+@pytest.mark.parametrize("rows", ["dwells", "samples"])
+@pytest.mark.parametrize("name", ["column", "mapped"])
+def test_recorded_quantities_of_a_file_are_kept_as_they_are_stated(name: str, rows: str, rng) -> None:
+    quantities = [row for row in RECORDED if row.mapped]
+    file = of_size(rng, 1.0).assign(**{row.label: rng.integers(1, 9, 12).astype(float) for row in quantities})
+    columns = IN_COUNTS["columns"] | {"dwell": "no"} | {getattr(row, name): row.label for row in quantities}
+    content = IN_COUNTS | {"columns": columns, "units": {"output": "g"}, "rows": rows, "rate_hz": 1.0}
+    dwells = imported(file.assign(no=range(12)), build(content, "t"), "f.csv").dwells
+    assert dwells is not None
+    for row in quantities:
+        np.testing.assert_array_equal(dwells[row.column], file[row.label])
 
 
 def of_size(rng: np.random.Generator, size: float) -> pd.DataFrame:
