@@ -14,6 +14,7 @@ from inertial.quantities import FORCE_COLUMNS, SPREAD_COLUMNS
 from pipelines.importers import clocks, exchange, pose_check, sample_faults, unit_check, values
 from pipelines.importers.content import Content
 from pipelines.importers.documents import SampleFaultDocument
+from pipelines.importers.dwell_numbers import dwell_numbers
 from pipelines.importers.held_out import with_held_out
 from pipelines.importers.mapping import FACES, MEANINGS, OUTPUT_UNITS, TILT, Mapping
 from pipelines.importers.record_time import backwards, gaps_of, seconds, time_doubts
@@ -107,9 +108,11 @@ def imported(
     record[bad] = 0
     intervals, record, short = sample_faults.without_short(intervals, record)
     samples["record"] = record
-    dwells = _means(samples, intervals, tuple(extras), mapping) if len(intervals) else None
-    if dwells is not None:
-        remarks = (*remarks, *pose_check.refuse_or_remark(dwells, mapping, where))
+    dwells = None
+    if len(intervals):
+        numbers, numbered = dwell_numbers(intervals.labels, [serials[0]] * len(intervals))
+        dwells = _means(samples, intervals, numbers, tuple(extras), mapping)
+        remarks = (*remarks, *numbered, *pose_check.refuse_or_remark(dwells, mapping, where))
         dwells, held = with_held_out(dwells, mapping.verify, where)
         remarks = (*remarks, *held)
     remarks = (
@@ -224,22 +227,24 @@ def _celsius(values: Array, unit: str) -> Array:
     return (values - 32.0) / 1.8 if unit == "degF" else values
 
 
-def _means(samples: pd.DataFrame, intervals: Stretches, extras: tuple[str, ...], mapping: Mapping) -> pd.DataFrame:
-    """Dwells in the exchange format."""
+def _means(
+    samples: pd.DataFrame, intervals: Stretches, numbers: Index, extras: tuple[str, ...], mapping: Mapping
+) -> pd.DataFrame:
+    """Dwells in the exchange format; ``numbers``: of the intervals."""
     letters = mapping.letters
     m = len(letters)
-    numbers = samples[[*letters, *extras]].to_numpy(dtype=np.float64)
+    recorded = samples[[*letters, *extras]].to_numpy(dtype=np.float64)
     time, record = samples["time_s"].to_numpy(dtype=np.float64), samples["record"].to_numpy()
     inside = [
         a + np.flatnonzero(record[a:b] == k + 1)
         for k, (a, b) in enumerate(zip(intervals.first, intervals.last, strict=True))
     ]
-    mean = np.stack([numbers[rows].mean(axis=0) for rows in inside])
-    sd = np.stack([numbers[rows, :m].std(axis=0, ddof=1) if rows.size > 1 else np.zeros(m) for rows in inside])
+    mean = np.stack([recorded[rows].mean(axis=0) for rows in inside])
+    sd = np.stack([recorded[rows, :m].std(axis=0, ddof=1) if rows.size > 1 else np.zeros(m) for rows in inside])
     frame = pd.DataFrame(
         {
             "unit": samples["unit"].iloc[0],
-            "dwell": np.arange(len(intervals)),
+            "dwell": numbers,
             "time_s": [float(time[rows].mean()) for rows in inside],
             **{f"out_{axis}": mean[:, k] for k, axis in enumerate(letters)},
             **{f"sd_{axis}": sd[:, k] for k, axis in enumerate(letters)},
@@ -270,13 +275,14 @@ def _as_dwells(
         time = seconds(columns, mapping, content, where, dwells=True).seconds
         backwards(time, serials, where, together=True)  # units may follow one another, or alternate
         time = time - float(time.min())
-    frame = pd.DataFrame({"unit": serials, "dwell": count, "time_s": time})
-    frame[[f"out_{axis}" for axis in mapping.letters]] = output
     labels = columns["dwell"].astype(str).tolist() if "dwell" in columns else [f"dwell {k}" for k in count]
+    numbers, numbered = dwell_numbers(labels, serials)
+    frame = pd.DataFrame({"unit": serials, "dwell": numbers, "time_s": time})
+    frame[[f"out_{axis}" for axis in mapping.letters]] = output
     sound, still = sample_faults.sound_dwells(extras, labels, mapping, where)
     frame = _finished(frame.assign(record=count, pose=labels, **extras), mapping)
     dwells = exchange.checked(frame[sound].reset_index(drop=True), where=where, foreign=True)
-    remarks = (*remarks, *still, *pose_check.refuse_or_remark(dwells, mapping, where))
+    remarks = (*remarks, *numbered, *still, *pose_check.refuse_or_remark(dwells, mapping, where))
     dwells, held = with_held_out(dwells, mapping.verify, where)
     return Imported(None, dwells, OUTPUT_UNITS[mapping.units.output][0], (*remarks, *held))
 

@@ -188,3 +188,46 @@ def test_means_of_counts_need_not_be_whole_numbers_and_their_unit_is_asked_about
 def test_fewer_counts_per_g_than_converters_have_and_parts_of_a_count_are_refused(size, rows, rng) -> None:
     with pytest.raises(DataRejected, match="are not whole numbers, counts are needed"):
         imported(of_size(rng, size), build({**IN_COUNTS, "rows": rows, "rate_hz": 1.0}, "t"), "f.csv")
+
+
+AS_LABELS = "labels only"
+
+
+@pytest.mark.parametrize(
+    ("labels", "numbers", "remark"),
+    [
+        ([3, 5, 8, 3, 5, 8], [3, 5, 8, 3, 5, 8], ""),
+        ([3.0, 5.0, 8.0, 3.0, 5.0, 9.0], [3, 5, 8, 3, 5, 9], ""),
+        (["up", "down", "1", "up", "down", "1"], [0, 1, 2, 0, 1, 2], ""),
+        ([0.5, 1.5, 2.5, 0.5, 1.5, 2.5], [0, 1, 2, 0, 1, 2], ""),
+        ([1, 2, 1, 1, 2, 1], [0, 1, 2, 0, 1, 2], "repeat or go back"),
+        ([2, 1, 3, 2, 1, 3], [0, 1, 2, 0, 1, 2], "repeat or go back"),
+        ([1, 2, 3, 4, 5, 6], [0, 1, 2, 0, 1, 2], "run on from unit to unit"),
+    ],
+)
+def test_dwells_have_the_numbers_of_the_file_where_these_number_them(labels, numbers, remark: str, rng) -> None:
+    file = of_size(rng, 1.0).head(6).assign(no=labels, serial=["A1"] * 3 + ["B1"] * 3)
+    columns = IN_COUNTS["columns"] | {"dwell": "no", "unit": "serial"}
+    content = {"columns": columns, "units": {"output": "g"}, "rows": "dwells"}
+    found = imported(file, build(content, "t"), "f.csv")
+    assert found.dwells is not None
+    assert found.dwells["dwell"].tolist() == numbers
+    assert found.dwells["pose"].tolist() == [str(one) for one in labels]
+    assert [one for one in found.remarks if AS_LABELS in one and remark in one] or not remark
+    assert remark or not [one for one in found.remarks if AS_LABELS in one]
+
+
+def test_labelled_samples_have_the_numbers_of_their_labels(rng: np.random.Generator) -> None:
+    file = pd.concat([of_size(rng, 1.0).head(3) for _ in range(8)], ignore_index=True).assign(
+        no=np.repeat([2, 3, 7, 9], 6)
+    )
+    columns = IN_COUNTS["columns"] | {"dwell": "no"}
+    content = IN_COUNTS | {
+        "columns": columns,
+        "units": {"output": "g"},
+        "rate_hz": 10.0,
+        "poses": {"3": "+x", "9": "+z"},
+    }
+    found = imported(file, build({**content, "local_gravity_m_s2": 9.81}, "t"), "f.csv")
+    assert found.dwells is not None
+    assert found.dwells["dwell"].tolist() == [3, 9]
