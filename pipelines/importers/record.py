@@ -10,7 +10,7 @@ import pandas as pd
 
 from inertial import frames
 from inertial.arrays import Array, Index
-from inertial.quantities import FORCE_COLUMNS, SPREAD_COLUMNS
+from inertial.quantities import ANGLE_COLUMNS, BY_COLUMN, FORCE_COLUMNS, SPREAD_COLUMNS
 from pipelines.importers import clocks, exchange, pose_check, sample_faults, unit_check, values
 from pipelines.importers.content import Content
 from pipelines.importers.documents import SampleFaultDocument
@@ -239,8 +239,11 @@ def _means(
         a + np.flatnonzero(record[a:b] == k + 1)
         for k, (a, b) in enumerate(zip(intervals.first, intervals.last, strict=True))
     ]
-    mean = np.stack([recorded[rows].mean(axis=0) for rows in inside])
-    sd = np.stack([recorded[rows, :m].std(axis=0, ddof=1) if rows.size > 1 else np.zeros(m) for rows in inside])
+    turning = [name == TILT or (name in BY_COLUMN and BY_COLUMN[name].unit == "°") for name in extras]
+    angles = m + np.flatnonzero(turning)
+    parts = [_of_one_turn(recorded[rows], angles) for rows in inside]
+    mean = np.stack([part.mean(axis=0) for part in parts])
+    sd = np.stack([part[:, :m].std(axis=0, ddof=1) if len(part) > 1 else np.zeros(m) for part in parts])
     frame = pd.DataFrame(
         {
             "unit": samples["unit"].iloc[0],
@@ -256,6 +259,13 @@ def _means(
         }
     )
     return _finished(frame, mapping)
+
+
+def _of_one_turn(samples: Array, angles: Index) -> Array:
+    """Samples (k, c) whose columns of angles, °, are within half a turn of the first sample: the mean of ±180° is not 0°."""
+    apart = samples[:, angles] - samples[0, angles]
+    samples[:, angles] -= 360.0 * np.rint(apart / 360.0)
+    return samples
 
 
 def _as_dwells(
@@ -294,7 +304,7 @@ def _finished(frame: pd.DataFrame, mapping: Mapping) -> pd.DataFrame:
     if TILT in frame.columns:
         return _tilted(frame, mapping)
     if not (mapping.poses or mapping.face):
-        return frame
+        return _turned(frame, mapping)
     if mapping.norm_g is None:
         raise WrongUse("import: poses are stated, local gravity is needed with them; give --local-g M/S2")
     up = [mapping.poses.get(label, mapping.face) for label in frame["pose"]]
@@ -304,9 +314,22 @@ def _finished(frame: pd.DataFrame, mapping: Mapping) -> pd.DataFrame:
     return frame
 
 
+def _turned(frame: pd.DataFrame, mapping: Mapping) -> pd.DataFrame:
+    """The force at the angles of a table, as that of a station, where the file has angles and no force."""
+    if not set(ANGLE_COLUMNS) <= set(frame.columns) or set(FORCE_COLUMNS) & set(frame.columns):
+        return frame
+    outer, inner = np.radians(frame[[*ANGLE_COLUMNS]].to_numpy(dtype=np.float64)).T
+    return _with_force(frame, frames.force_from_angles(outer, inner), mapping)
+
+
+def _with_force(frame: pd.DataFrame, force: Array, mapping: Mapping) -> pd.DataFrame:
+    """The dwells with a force (n, 3), in units of local gravity; that is the standard value where it is not given."""
+    gravity = 1.0 if mapping.norm_g is None else mapping.norm_g
+    return frame.assign(**{name: gravity * force[:, k] for k, name in enumerate(FORCE_COLUMNS)})
+
+
 def _tilted(frame: pd.DataFrame, mapping: Mapping) -> pd.DataFrame:
     """The force of a single axis turned in one plane: g·sin of its angle above the horizontal along it, g·cos of it across."""
     angle = np.radians(frame[TILT].to_numpy(dtype=np.float64))
-    gravity = 1.0 if mapping.norm_g is None else mapping.norm_g
     force = frames.without_rounding(np.stack([np.sin(angle), np.cos(angle), 0.0 * angle], axis=-1))
-    return frame.drop(columns=TILT).assign(**{name: gravity * force[:, k] for k, name in enumerate(FORCE_COLUMNS)})
+    return _with_force(frame.drop(columns=TILT), force, mapping)

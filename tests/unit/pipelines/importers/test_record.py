@@ -6,14 +6,16 @@ import pandas as pd
 import pytest
 from each import each
 
-from inertial.quantities import RECORDED
+from inertial.quantities import FORCE_COLUMNS, RECORDED
 from pipelines.diagnosis.diagnose import default_model, diagnose
 from pipelines.importers import clocks
 from pipelines.importers.content import Content
 from pipelines.importers.mapping import build
 from pipelines.importers.record import imported
 from pipelines.importers.stated_units import refuse_contradiction
+from pipelines.tables.dwell_table import DwellTable, state_of_table
 from schemas.errors import DataRejected, RecipeInvalid, WrongUse
+from schemas.units import STANDARD_GRAVITY_M_S2
 
 
 @each(range(8))
@@ -231,3 +233,31 @@ def test_labelled_samples_have_the_numbers_of_their_labels(rng: np.random.Genera
     found = imported(file, build({**content, "local_gravity_m_s2": 9.81}, "t"), "f.csv")
     assert found.dwells is not None
     assert found.dwells["dwell"].tolist() == [3, 9]
+
+
+@pytest.mark.parametrize(
+    ("stated", "gravity"), [({}, 1.0), ({"local_gravity_m_s2": 9.81}, 9.81 / STANDARD_GRAVITY_M_S2)]
+)
+@pytest.mark.parametrize("rows", ["dwells", "samples"])
+def test_angles_of_a_table_become_the_force_that_a_diagnosis_of_the_file_reads(stated, gravity, rows: str, rng) -> None:
+    angles = {"outer_deg": rng.uniform(-180.0, 180.0, 12), "inner_deg": [180.0, *rng.uniform(-180.0, 180.0, 11)]}
+    file = of_size(rng, 1.0).assign(no=range(12), **angles)
+    columns = IN_COUNTS["columns"] | {"dwell": "no", "outer": "outer_deg", "inner": "inner_deg"}
+    if rows == "samples":
+        file = pd.concat([file, file.assign(inner_deg=file["inner_deg"] - 360.0)]).sort_values("no", ignore_index=True)
+    content = IN_COUNTS | {"columns": columns, "units": {"output": "g"}, "rows": rows, "rate_hz": 1.0} | stated
+    dwells = imported(file, build(content, "t"), "f.csv").dwells
+    assert dwells is not None
+    plain = pd.DataFrame({"unit": "A1", "dwell": range(12), "time_s": np.arange(12.0), **angles})
+    reference, state = state_of_table(DwellTable(plain.assign(out_x=0.0, out_y=0.0, out_z=0.0)))
+    assert reference == "angles"
+    np.testing.assert_allclose(dwells[[*FORCE_COLUMNS]], gravity * state.force[0], atol=1e-12)
+
+
+def test_a_force_that_a_file_states_beside_angles_is_kept(rng: np.random.Generator) -> None:
+    file = of_size(rng, 1.0).assign(outer_deg=0.0, inner_deg=0.0, fx=0.6, fy=0.0, fz=0.8)
+    named = {"outer": "outer_deg", "inner": "inner_deg", "force_x": "fx", "force_y": "fy", "force_z": "fz"}
+    content = {**IN_COUNTS, "columns": IN_COUNTS["columns"] | named, "units": {"output": "g"}, "rows": "dwells"}
+    dwells = imported(file, build(content, "t"), "f.csv").dwells
+    assert dwells is not None
+    np.testing.assert_array_equal(dwells[[*FORCE_COLUMNS]], np.tile([0.6, 0.0, 0.8], (12, 1)))
