@@ -192,6 +192,13 @@ def test_angles_of_a_table_are_poses_for_a_fit_as_for_a_diagnosis() -> None:
     fitted, of_file = document_of("fit", run, status=0), document_of("diagnose", "table.csv", status=0)
     assert fitted["adequate"] is of_file["adequate"] is True
     assert document_of("diagnose", run)["error"] == pytest.approx(of_file["error"])
+    bare = document_of(
+        "import", *words[:2], f"{COLUMNS},outer=outer_deg,inner=inner_deg", *words[3:], "--rows", "dwells"
+    )["run"]
+    why = refused("fit", bare)
+    assert "its dwells have no sd_x, sd_y, sd_z, n; a fit of known poses weights dwells by" in why
+    assert f"'tumbleline diagnose {bare}'" in why
+    text_of("diagnose", bare)
 
 
 def test_samples_in_the_hand_become_dwells_that_agree_with_the_truth() -> None:
