@@ -119,12 +119,12 @@ RECORDED: tuple[Quantity, ...] = (
     ),
     Quantity(
         "since_move_s", "since_move", "s", "time since the last move",
-        formula="since_move", meaning="time since the table last moved, s", usual=2.0, reading=5,
+        formula="since_move", meaning="time since the table last moved, s", mapped="since_move", usual=2.0, reading=5,
         lowest=0.0, highest=LARGEST_TIME_S,
     ),
     Quantity(
         "since_power_s", "since_power", "s", "time since power-on", clock=True, shown=HOURS,
-        formula="since_power", meaning="time since power-on, s", usual=600.0, reading=6,
+        formula="since_power", meaning="time since power-on, s", mapped="since_power", usual=600.0, reading=6,
         lowest=0.0, highest=LARGEST_TIME_S,
     ),
     Quantity(
@@ -140,7 +140,7 @@ RECORDED: tuple[Quantity, ...] = (
     # of runs that switch their devices off and on: it tells apart what a power-on changes, and is no driver by itself
     Quantity(
         "power_off_s", "power_off", "s", "time without power", driver=False, joined="max",
-        lowest=0.0, highest=LARGEST_TIME_S,
+        mapped="power_off", lowest=0.0, highest=LARGEST_TIME_S,
     ),
     Quantity(
         "outer_deg", "outer", "°", "outer angle", factor=math.pi / 180.0, driver=False, mapped="outer",
@@ -155,7 +155,7 @@ RECORDED: tuple[Quantity, ...] = (
         "heading_deg", "heading", "°", "heading of the placement", factor=math.pi / 180.0, driver=False, mapped="heading",
         lowest=-_MANY_TURNS_DEG, highest=_MANY_TURNS_DEG,
     ),
-    Quantity("slot", "slot", "", "slot", once=True, driver=False, lowest=0.0, highest=2.0**53),
+    Quantity("slot", "slot", "", "slot", once=True, driver=False, mapped="slot", lowest=0.0, highest=2.0**53),
     Quantity("humidity_pct", "", "% RH", "relative humidity", usual=45.0, spread=3.0),
     Quantity("pressure_hPa", "", "hPa", "air pressure", usual=1013.0, spread=3.0),
 )  # fmt: skip

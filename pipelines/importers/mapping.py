@@ -25,12 +25,12 @@ MEANINGS: dict[str, str] = {
     "tilt": TILT,
     **{name: name for name in (*SPREAD_COLUMNS, *FORCE_COLUMNS)},
 }
-"""Further names of a mapping and the columns that they become."""
+"""Further names of a mapping and the columns that they become; a column may be mapped by its own name, too."""
+_OF_COLUMN = {column: meaning for meaning, column in MEANINGS.items()}
 KNOWN = ("time", *NEEDED, "unit", "dwell", *MEANINGS)
 RESERVED = frozenset({
     *("record", "kind", "pose", "soak", "out_unit", "status", "rate_hz", *OUTPUT_COLUMNS),
-    *("outer_command_deg", "inner_command_deg", *MEANINGS.values()),
-    *(row.column for row in RECORDED if row.attribute),
+    *("outer_command_deg", "inner_command_deg", "time_s"),
 })  # fmt: skip
 """Columns that the tables of an import have with a meaning of their own: no covariate may have these names."""
 SHORTEST_BLOCK_S = 1e-3
@@ -102,7 +102,7 @@ class Mapping(BaseModel):
     measured: date | None = None
     """Day of the measurement."""
     zero_output: Annotated[float, Field(ge=-LARGEST, le=LARGEST)] = 0.0
-    """Nominal output at 0 g, in the output's unit."""
+    """Nominal output at 0 g, in the unit of the file's outputs."""
     face: Literal["", "+x", "+y", "+z", "-x", "-y", "-z"] = ""
     """The face that is up all the time, for a record in one pose."""
     block_s: Annotated[float, Field(ge=SHORTEST_BLOCK_S, le=LONGEST_WAIT_S)] | None = None
@@ -112,7 +112,7 @@ class Mapping(BaseModel):
     window_s: Annotated[float, Field(ge=SHORTEST_BLOCK_S, le=LONGEST_WAIT_S)] | None = None
     """Length of the sliding window of the search for dwells."""
     threshold: Annotated[float, Field(gt=0.0, le=LARGEST)] | None = None
-    """Standard deviation of a window that means motion, in the unit of the output."""
+    """Standard deviation of a window that means motion, in the unit of the file's outputs."""
     shortest_s: Annotated[float, Field(ge=SHORTEST_BLOCK_S, le=LONGEST_WAIT_S)] | None = None
     """Shortest dwell."""
     gaps: Literal["refuse", "split"] = "refuse"
@@ -127,16 +127,21 @@ class Mapping(BaseModel):
     @field_validator("columns")
     @classmethod
     def _complete(cls, value: dict[str, str]) -> dict[str, str]:
-        for name in value:
-            if name in RESERVED and name not in KNOWN:
-                meaning = next((meaning for meaning, column in MEANINGS.items() if column == name), "")
-                hint = f"map it as '{meaning}'" if meaning else "choose another name for the covariate"
+        columns: dict[str, str] = {}
+        for name, column in value.items():
+            meaning = _OF_COLUMN.get(name, name)
+            if meaning in columns:
+                raise ValueError(f"{meaning} is mapped twice, once by the name of its column; remove one")
+            columns[meaning] = column
+            if name in RESERVED:
+                other = {"time_s": "time", **dict(zip(OUTPUT_COLUMNS, NEEDED, strict=True))}.get(name)
+                hint = f"map it as '{other}'" if other else "choose another name for the covariate"
                 raise ValueError(f"'{shown(name)}' is the name of a column that an import writes itself; {hint}")
             if not (name.isprintable() and 0 < len(name) <= LONGEST_NAME):
                 raise ValueError(
                     f"'{shown(name)}': a name of 1 to {LONGEST_NAME} printable characters is needed; choose another"
                 )
-        return value
+        return columns
 
     @field_validator("axes")
     @classmethod
@@ -163,6 +168,15 @@ class Mapping(BaseModel):
         if set(mapped) != set(self.axes):
             raise ValueError(
                 f"axes are {', '.join(self.axes)}, and {', '.join(mapped) or 'no output'} mapped; each needs a column of its own"
+            )
+        alone = [
+            name
+            for name, axis in zip(SPREAD_COLUMNS, NEEDED, strict=True)
+            if name in self.columns and axis not in mapped
+        ]
+        if alone:
+            raise ValueError(
+                f"{alone[0]} without {alone[0][-1]}; a standard deviation belongs to an output: map it too"
             )
         if len(self.signs) not in {len(self.axes), len(NEEDED)}:
             raise ValueError(f"{len(self.signs)} signs for {len(self.axes)} axes; one for each axis is needed")

@@ -10,10 +10,11 @@ import pandas as pd
 
 from inertial import frames
 from inertial.arrays import Array, Index
-from inertial.quantities import FORCE_COLUMNS
+from inertial.quantities import ANGLE_COLUMNS, BY_COLUMN, FORCE_COLUMNS, SPREAD_COLUMNS
 from pipelines.importers import clocks, exchange, pose_check, sample_faults, unit_check, values
 from pipelines.importers.content import Content
 from pipelines.importers.documents import SampleFaultDocument
+from pipelines.importers.dwell_numbers import dwell_numbers
 from pipelines.importers.held_out import with_held_out
 from pipelines.importers.mapping import FACES, MEANINGS, OUTPUT_UNITS, TILT, Mapping
 from pipelines.importers.record_time import backwards, gaps_of, seconds, time_doubts
@@ -69,11 +70,13 @@ def imported(
     raw = np.column_stack([values.finite(columns[axis], where, content) for axis in mapping.axes])
     raw = raw * [1.0 if sign == "+" else -1.0 for sign in mapping.signs[: len(mapping.axes)]]
     three = len(mapping.axes) == len(AXES)
-    other = unit_check.refuse_other_unit(raw, mapping.units.output, where) if three else ()  # the norm is that of three
+    other: tuple[str, ...] = ()
+    if three:  # the norm is that of three
+        other = unit_check.refuse_other_unit(raw, mapping.units.output, where, means=mapping.rows == "dwells")
     remarks = (*content.remarks, *dropped, *other)
     out_unit, factor = OUTPUT_UNITS[mapping.units.output]
     serials = _serials(columns, mapping, where)
-    extras = _extras(columns, mapping, where, content)
+    extras = _extras(columns, mapping, where, content) | _spreads(columns, mapping, where, content)
     if mapping.rows == "dwells":
         return _as_dwells(columns, raw * factor, serials, extras, mapping, content, where, remarks)
     clock = seconds(columns, mapping, content, where)
@@ -105,9 +108,11 @@ def imported(
     record[bad] = 0
     intervals, record, short = sample_faults.without_short(intervals, record)
     samples["record"] = record
-    dwells = _means(samples, intervals, tuple(extras), mapping) if len(intervals) else None
-    if dwells is not None:
-        remarks = (*remarks, *pose_check.refuse_or_remark(dwells, mapping, where))
+    dwells = None
+    if len(intervals):
+        numbers, numbered = dwell_numbers(intervals.labels, [serials[0]] * len(intervals))
+        dwells = _means(samples, intervals, numbers, tuple(extras), mapping)
+        remarks = (*remarks, *numbered, *pose_check.refuse_or_remark(dwells, mapping, where))
         dwells, held = with_held_out(dwells, mapping.verify, where)
         remarks = (*remarks, *held)
     remarks = (
@@ -194,7 +199,7 @@ def _extras(columns: dict[str, pd.Series], mapping: Mapping, where: str, content
     """Temperature, other known columns and covariates by the names of the tables."""
     extras: dict[str, Array] = {}
     for meaning, column in columns.items():
-        if meaning in ("time", *AXES, "unit", "dwell"):
+        if meaning in ("time", *AXES, "unit", "dwell", *SPREAD_COLUMNS):
             continue
         name = MEANINGS.get(meaning, meaning)
         numbers = values.finite(column, where, content, flags=meaning not in MEANINGS)
@@ -205,28 +210,44 @@ def _extras(columns: dict[str, pd.Series], mapping: Mapping, where: str, content
     return extras
 
 
+def _spreads(columns: dict[str, pd.Series], mapping: Mapping, where: str, content: Content) -> dict[str, Array]:
+    """Standard deviations, in the unit and the order of axes of the outputs that they belong to."""
+    factor, spreads = OUTPUT_UNITS[mapping.units.output][1], {}
+    for letter, axis in zip(mapping.letters, mapping.axes, strict=True):
+        if f"sd_{axis}" in columns:
+            name = f"sd_{letter}"
+            spreads[name] = factor * values.finite(columns[f"sd_{axis}"], where, content)
+            values.refuse_outside(spreads[name], name, where)
+    return spreads
+
+
 def _celsius(values: Array, unit: str) -> Array:
     if unit == "K":
         return values - 273.15
     return (values - 32.0) / 1.8 if unit == "degF" else values
 
 
-def _means(samples: pd.DataFrame, intervals: Stretches, extras: tuple[str, ...], mapping: Mapping) -> pd.DataFrame:
-    """Dwells in the exchange format."""
+def _means(
+    samples: pd.DataFrame, intervals: Stretches, numbers: Index, extras: tuple[str, ...], mapping: Mapping
+) -> pd.DataFrame:
+    """Dwells in the exchange format; ``numbers``: of the intervals."""
     letters = mapping.letters
     m = len(letters)
-    numbers = samples[[*letters, *extras]].to_numpy(dtype=np.float64)
+    recorded = samples[[*letters, *extras]].to_numpy(dtype=np.float64)
     time, record = samples["time_s"].to_numpy(dtype=np.float64), samples["record"].to_numpy()
     inside = [
         a + np.flatnonzero(record[a:b] == k + 1)
         for k, (a, b) in enumerate(zip(intervals.first, intervals.last, strict=True))
     ]
-    mean = np.stack([numbers[rows].mean(axis=0) for rows in inside])
-    sd = np.stack([numbers[rows, :m].std(axis=0, ddof=1) if rows.size > 1 else np.zeros(m) for rows in inside])
+    turning = [name == TILT or (name in BY_COLUMN and BY_COLUMN[name].unit == "°") for name in extras]
+    angles = m + np.flatnonzero(turning)
+    parts = [_of_one_turn(recorded[rows], angles) for rows in inside]
+    mean = np.stack([part.mean(axis=0) for part in parts])
+    sd = np.stack([part[:, :m].std(axis=0, ddof=1) if len(part) > 1 else np.zeros(m) for part in parts])
     frame = pd.DataFrame(
         {
             "unit": samples["unit"].iloc[0],
-            "dwell": np.arange(len(intervals)),
+            "dwell": numbers,
             "time_s": [float(time[rows].mean()) for rows in inside],
             **{f"out_{axis}": mean[:, k] for k, axis in enumerate(letters)},
             **{f"sd_{axis}": sd[:, k] for k, axis in enumerate(letters)},
@@ -238,6 +259,13 @@ def _means(samples: pd.DataFrame, intervals: Stretches, extras: tuple[str, ...],
         }
     )
     return _finished(frame, mapping)
+
+
+def _of_one_turn(samples: Array, angles: Index) -> Array:
+    """Samples (k, c) whose columns of angles, °, are within half a turn of the first sample: the mean of ±180° is not 0°."""
+    apart = samples[:, angles] - samples[0, angles]
+    samples[:, angles] -= 360.0 * np.rint(apart / 360.0)
+    return samples
 
 
 def _as_dwells(
@@ -257,24 +285,26 @@ def _as_dwells(
         time = seconds(columns, mapping, content, where, dwells=True).seconds
         backwards(time, serials, where, together=True)  # units may follow one another, or alternate
         time = time - float(time.min())
-    frame = pd.DataFrame({"unit": serials, "dwell": count, "time_s": time})
-    frame[[f"out_{axis}" for axis in mapping.letters]] = output
     labels = columns["dwell"].astype(str).tolist() if "dwell" in columns else [f"dwell {k}" for k in count]
+    numbers, numbered = dwell_numbers(labels, serials)
+    frame = pd.DataFrame({"unit": serials, "dwell": numbers, "time_s": time})
+    frame[[f"out_{axis}" for axis in mapping.letters]] = output
     sound, still = sample_faults.sound_dwells(extras, labels, mapping, where)
     frame = _finished(frame.assign(record=count, pose=labels, **extras), mapping)
     dwells = exchange.checked(frame[sound].reset_index(drop=True), where=where, foreign=True)
-    remarks = (*remarks, *still, *pose_check.refuse_or_remark(dwells, mapping, where))
+    remarks = (*remarks, *numbered, *still, *pose_check.refuse_or_remark(dwells, mapping, where))
     dwells, held = with_held_out(dwells, mapping.verify, where)
     return Imported(None, dwells, OUTPUT_UNITS[mapping.units.output][0], (*remarks, *held))
 
 
 def _finished(frame: pd.DataFrame, mapping: Mapping) -> pd.DataFrame:
     """The columns that every dwell has, and the reference if poses are stated."""
-    frame = frame.assign(slot=0, kind="dwell", soak=0, out_unit=OUTPUT_UNITS[mapping.units.output][0])
+    frame = frame if "slot" in frame else frame.assign(slot=0)
+    frame = frame.assign(kind="dwell", soak=0, out_unit=OUTPUT_UNITS[mapping.units.output][0])
     if TILT in frame.columns:
         return _tilted(frame, mapping)
     if not (mapping.poses or mapping.face):
-        return frame
+        return _turned(frame, mapping)
     if mapping.norm_g is None:
         raise WrongUse("import: poses are stated, local gravity is needed with them; give --local-g M/S2")
     up = [mapping.poses.get(label, mapping.face) for label in frame["pose"]]
@@ -284,9 +314,22 @@ def _finished(frame: pd.DataFrame, mapping: Mapping) -> pd.DataFrame:
     return frame
 
 
+def _turned(frame: pd.DataFrame, mapping: Mapping) -> pd.DataFrame:
+    """The force at the angles of a table, as that of a station, where the file has angles and no force."""
+    if not set(ANGLE_COLUMNS) <= set(frame.columns) or set(FORCE_COLUMNS) & set(frame.columns):
+        return frame
+    outer, inner = np.radians(frame[[*ANGLE_COLUMNS]].to_numpy(dtype=np.float64)).T
+    return _with_force(frame, frames.force_from_angles(outer, inner), mapping)
+
+
+def _with_force(frame: pd.DataFrame, force: Array, mapping: Mapping) -> pd.DataFrame:
+    """The dwells with a force (n, 3), in units of local gravity; that is the standard value where it is not given."""
+    gravity = 1.0 if mapping.norm_g is None else mapping.norm_g
+    return frame.assign(**{name: gravity * force[:, k] for k, name in enumerate(FORCE_COLUMNS)})
+
+
 def _tilted(frame: pd.DataFrame, mapping: Mapping) -> pd.DataFrame:
     """The force of a single axis turned in one plane: g·sin of its angle above the horizontal along it, g·cos of it across."""
     angle = np.radians(frame[TILT].to_numpy(dtype=np.float64))
-    gravity = 1.0 if mapping.norm_g is None else mapping.norm_g
     force = frames.without_rounding(np.stack([np.sin(angle), np.cos(angle), 0.0 * angle], axis=-1))
-    return frame.drop(columns=TILT).assign(**{name: gravity * force[:, k] for k, name in enumerate(FORCE_COLUMNS)})
+    return _with_force(frame.drop(columns=TILT), force, mapping)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping as Columns
 from typing import Any
 
+from inertial.quantities import SPREAD_COLUMNS
 from pipelines.importers.content import Content
 from pipelines.importers.mapping import Mapping
 from schemas.errors import WrongUse
@@ -58,12 +59,26 @@ def refuse_contradiction(mapping: Mapping, content: Content, where: str) -> None
             f"{where}: the file states {' and '.join(sorted(stated))} for its output, but --units output={mapping.units.output} "
             "was given; leave it out, or correct it"
         )
+    _refuse_other_spreads(mapping, content, where)
     heat = column_name(list(content.table.columns), mapping.columns.get("temperature", ""))
     unit = TEMPERATURE.get(content.units.get(heat, "").strip().lower(), "")
     if unit and unit != mapping.units.temperature:
         raise WrongUse(
             f"{where}: column '{shown(heat)}' states {unit}, {mapping.units.temperature} is used; add --units temperature={unit}"
         )
+
+
+def _refuse_other_spreads(mapping: Mapping, content: Content, where: str) -> None:
+    """Refuse standard deviations in another unit than the outputs: one factor converts both."""
+    for meaning in SPREAD_COLUMNS:
+        column = column_name(list(content.table.columns), mapping.columns.get(meaning, ""))
+        text = content.units.get(column, "").strip()
+        known = output_unit(text) or (text if output_unit(text[1:]) else "")  # with a prefix, as µV
+        if known and known != mapping.units.output:
+            raise WrongUse(
+                f"{where}: column '{shown(column)}' (for {meaning}) states {shown(text)}, {mapping.units.output} is the unit of "
+                "the output, and needed for its standard deviation; convert the column"
+            )
 
 
 def _of_axes(columns: Columns[str, str], content: Content) -> set[str]:

@@ -90,13 +90,14 @@ def _scatter(x: Array) -> float:
     return float(0.5 * (high - low) / middle) if middle > 0.0 else np.inf
 
 
-def refuse_other_unit(output: Array, claimed: str, where: str) -> tuple[str, ...]:
+def refuse_other_unit(output: Array, claimed: str, where: str, *, means: bool = False) -> tuple[str, ...]:
     """Refuse a record whose norm contradicts the unit; remarks if it is only unusual.
 
     Parameters
     ----------
     output : (n, 3) in the file's own numbers.
     claimed : the given unit.
+    means : whether the numbers are means of samples: those of counts are not whole.
     """
     size = size_of(output)
     other = looks_like(size)
@@ -114,7 +115,7 @@ def refuse_other_unit(output: Array, claimed: str, where: str) -> tuple[str, ...
         )
     close = next((unit for unit, one in GRAVITY.items() if abs(size / one - 1.0) < SURE), "")
     if claimed == "LSB":
-        return _counts(output, size, close, where)
+        return _counts(output, size, close, where, may_be_parts=means and size > _FEWEST_COUNTS)
     volts = size * (1e-3 if claimed == "mV" else 1.0)
     if not VOLTS_PER_G[0] <= volts <= VOLTS_PER_G[1]:
         other = f"the unit looks like {other}" if other else "V and mV differ by a thousand"
@@ -127,7 +128,8 @@ def refuse_other_unit(output: Array, claimed: str, where: str) -> tuple[str, ...
     return ()
 
 
-def _counts(output: Array, size: float, close: str, where: str) -> tuple[str, ...]:
+def _counts(output: Array, size: float, close: str, where: str, *, may_be_parts: bool) -> tuple[str, ...]:
+    """As :func:`refuse_other_unit`, of counts; ``may_be_parts``: whether they need not be whole numbers."""
     whole = bool(np.all(output[:1000] == np.rint(output[:1000])))
     bits = unsigned_bits(output)
     if bits:
@@ -136,7 +138,7 @@ def _counts(output: Array, size: float, close: str, where: str) -> tuple[str, ..
             f"{where}: signed words of {bits} bits were read without their sign: with {2 * half} subtracted from the values of "
             f"{half} and above the norm is steady, as gravity is, and without it is not; subtract {2 * half} from these values"
         )
-    if close and not whole:
+    if close and not whole and not may_be_parts:
         raise DataRejected(
             f"{where}: the norm of the output is {size:.5g} and its values are not whole numbers, counts are needed if its "
             f"unit is LSB; the unit looks like {close}, give --units output={close}"

@@ -11,6 +11,7 @@ import pandas as pd
 from inertial.quantities import ANGLE_COLUMNS, FORCE_COLUMNS
 from pipelines.archive import Run, code_hash
 from pipelines.chain.chain import BY_NAME, Tables
+from pipelines.importers.mapping import OUTPUT_UNITS
 from pipelines.importers.plane import plane_answer
 from pipelines.stages.fit import fit
 from pipelines.stages.grade import GradeEvidence, grade
@@ -74,6 +75,13 @@ def gravity_of_import(about: dict[str, Any]) -> float:
     """Gravity where an import was measured, g; the standard value where it was not given."""
     given = (about.get("mapping") or {}).get("local_gravity_m_s2")
     return 1.0 if given is None else float(given) / STANDARD_GRAVITY_M_S2
+
+
+def zero_of_import(about: dict[str, Any]) -> float:
+    """Nominal output at 0 g in the unit of the dwells; it was stated in the unit of the file."""
+    mapping = about.get("mapping") or {}
+    zero = float(mapping.get("zero_output", 0.0))
+    return zero * OUTPUT_UNITS[mapping["units"]["output"]][1] if zero else 0.0
 
 
 def _call(

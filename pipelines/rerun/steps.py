@@ -31,6 +31,7 @@ from pipelines.rerun.import_steps import (
     judge_step,
     plane_step,
     verify_step,
+    zero_of_import,
 )
 from pipelines.stages.figures import UNITS
 from pipelines.stages.grade import refuse_limits_without_figures
@@ -46,6 +47,14 @@ from schemas.toml_files import explain
 from schemas.units import AXES
 
 PROVENANCE = ("who", "where", "when", "software", "libraries", ENTRY, "rerun_of", "because", "measured")
+_REFERENCE = "a fit needs the force at every dwell: import the file again, which adds it at the angles of a table"
+_NOISE = (
+    "a fit of known poses weights dwells by the standard deviation of their samples (sd_x, sd_y, sd_z) and their number (n): "
+    "import the file again with these columns mapped, or its samples; where neither is known, 'tumbleline diagnose {run}' judges "
+    "the model, with the noise of the residuals"
+)
+_AS_IMPORTED = "a fit needs them: import the file with 'tumbleline import FILE --rows dwells --map … --units output=…'"
+"""What a fit needs of imported dwells, and what to do where they lack it."""
 
 
 @dataclass(frozen=True)
@@ -163,8 +172,7 @@ def _imported(run: Run, change: ModelChange, left_out: Dwells) -> Plan:
     steps = [import_step(data, left_out, run), fit_step(model, data), judge_step(model, data), verify_step(data)]
     terms = archived_terms({**about, **(stated if limits else {})})
     steps += [budget_step(terms, data)] if terms else []
-    zero = float((about.get("mapping") or {}).get("zero_output", 0.0))
-    steps += [grade_step(limits, zero, budgeted=terms is not None)] if limits else []
+    steps += [grade_step(limits, zero_of_import(about), budgeted=terms is not None)] if limits else []
     recipe = {**model, **({"limits": change.limits_name} if change.limits else {})}
     hashes = {name: run.manifest(name)["sha256"] for name in data.read()}
     code = {step.name: step.code for step in steps}
@@ -208,16 +216,14 @@ def _fit_for_a_fit(run: Run) -> pd.DataFrame:
             f"run {run.id}: imported without dwells, a fit needs them; import it with poses, a face or --blocks"
         )
     dwells = run.table("dwells")
-    needed = ("kind", "pose", "out_unit")
+    by_reason = {_AS_IMPORTED: ("kind", "pose", "out_unit")}
     if has_poses(dwells):
         spreads = [SPREAD_COLUMNS[axis] for axis in output_axes(dwells.columns)]
-        needed = (*FORCE_COLUMNS, *spreads, "n", *needed)
-    missing = [name for name in needed if name not in dwells.columns]
-    if missing:
-        raise DataRejected(
-            f"run {run.id}: its dwells have no {', '.join(missing)}, a fit of known poses needs them; import it again with these "
-            "columns mapped, or judge it with 'tumbleline diagnose'"
-        )
+        by_reason = {_REFERENCE: FORCE_COLUMNS, _NOISE: (*spreads, "n"), **by_reason}
+    for reason, needed in by_reason.items():
+        missing = [name for name in needed if name not in dwells.columns]
+        if missing:
+            raise DataRejected(f"run {run.id}: its dwells have no {', '.join(missing)}; {reason.format(run=run.id)}")
     return dwells
 
 

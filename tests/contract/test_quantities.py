@@ -47,6 +47,7 @@ def test_a_row_is_whole(row, tmp_path):
     assert (row.column in KNOWN_COLUMNS) == bool(row.attribute)
     assert not row.attribute or row.attribute in {item.name for item in fields(State)}
     assert row.axis_label == LABELS[row.column]
+    assert bool(row.mapped) == (bool(row.attribute) and row.column != "time_s")  # the time has a meaning of its own
     assert not row.mapped or mapping.MEANINGS[row.mapped] == row.column
     assert not row.formula or (QUANTITIES[row.formula][0] == QUANTITIES[row.column][0] == row.attribute)
     assert not row.attribute or column_of(row.attribute) == row.column

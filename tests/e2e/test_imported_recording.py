@@ -16,6 +16,8 @@ from laboratory import LABORATORY
 from scipy.spatial.transform import Rotation
 
 from benchmarks.made_recordings import Recording, make, samples_of
+from inertial.frames import force_from_angles
+from inertial.quantities import OUTPUT_COLUMNS, SPREAD_COLUMNS
 from pipelines.archive import Archive
 from schemas.errors import DONE
 
@@ -171,6 +173,32 @@ def test_known_poses_go_the_same_way() -> None:
     unit = json.loads(given("export", fitted["run"])[1])["units"][0]
     np.testing.assert_allclose(unit["bias"][0], [0.01, -0.02, 0.03], atol=1e-4)
     text_of("report", fitted["run"], status=0)
+
+
+def test_angles_of_a_table_are_poses_for_a_fit_as_for_a_diagnosis() -> None:
+    rng = np.random.default_rng(5)
+    outer, inner = (
+        angles.ravel() for angles in np.meshgrid([0.0, 45.0, 90.0, 135.0, 180.0], [-120.0, -30.0, 60.0, 150.0])
+    )
+    force = force_from_angles(np.radians(outer), np.radians(inner))
+    dwells = make(Recording(len(outer)), 6).dwells.assign(outer_deg=outer, inner_deg=inner)
+    dwells[[*OUTPUT_COLUMNS]] = (
+        force * [1.01, 0.99, 1.0] + [0.01, -0.02, 0.03] + 3e-5 * rng.standard_normal(force.shape)
+    )
+    dwells[[*SPREAD_COLUMNS]] = np.outer(3e-5 * np.sqrt(dwells["n"]), np.ones(3))
+    dwells.assign(unit="P1", dwell=range(len(outer))).to_csv("table.csv", index=False)
+    words = ("table.csv", "--map", f"{DWELLS},outer=outer_deg,inner=inner_deg", "--units", "output=g", "--unit", "P1")
+    run = document_of("import", *words, "--rows", "dwells")["run"]
+    fitted, of_file = document_of("fit", run, status=0), document_of("diagnose", "table.csv", status=0)
+    assert fitted["adequate"] is of_file["adequate"] is True
+    assert document_of("diagnose", run)["error"] == pytest.approx(of_file["error"])
+    bare = document_of(
+        "import", *words[:2], f"{COLUMNS},outer=outer_deg,inner=inner_deg", *words[3:], "--rows", "dwells"
+    )["run"]
+    why = refused("fit", bare)
+    assert "its dwells have no sd_x, sd_y, sd_z, n; a fit of known poses weights dwells by" in why
+    assert f"'tumbleline diagnose {bare}'" in why
+    text_of("diagnose", bare)
 
 
 def test_samples_in_the_hand_become_dwells_that_agree_with_the_truth() -> None:

@@ -141,9 +141,18 @@ def test_files_that_are_no_tables_are_refused(row: tuple[bytes, str], tmp_path: 
         ({"local_gravity_m_s2": 1.0}, "local_gravity_m_s2"),
         ({"unitt": "A"}, "not known; did you mean unit"),
         *(
-            ({"columns": {**CONTENT["columns"], name: "t"}}, f"'{name}' is the name of a column that an import writes")
-            for name in ("record", "slot", "time_s", "out_x", "unit_C", "kind")
+            (
+                {"columns": {**CONTENT["columns"], name: "t"}},
+                f"'{name}' is the name of a column that an import writes.*{cure}",
+            )
+            for name, cure in (
+                ("record", "another name"),
+                ("kind", "another name"),
+                ("time_s", "map it as 'time'"),
+                ("out_x", "map it as 'x'"),
+            )
         ),
+        ({"columns": {**CONTENT["columns"], "temperature": "t", "unit_C": "u"}}, "temperature is mapped twice"),
     ]
 )
 def test_mappings_with_a_slip_are_refused(row: tuple[dict, str]) -> None:

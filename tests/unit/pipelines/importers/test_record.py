@@ -6,12 +6,16 @@ import pandas as pd
 import pytest
 from each import each
 
+from inertial.quantities import FORCE_COLUMNS, RECORDED
 from pipelines.diagnosis.diagnose import default_model, diagnose
 from pipelines.importers import clocks
 from pipelines.importers.content import Content
 from pipelines.importers.mapping import build
 from pipelines.importers.record import imported
-from schemas.errors import DataRejected, WrongUse
+from pipelines.importers.stated_units import refuse_contradiction
+from pipelines.tables.dwell_table import DwellTable, state_of_table
+from schemas.errors import DataRejected, RecipeInvalid, WrongUse
+from schemas.units import STANDARD_GRAVITY_M_S2
 
 
 @each(range(8))
@@ -135,3 +139,125 @@ def test_day_and_month_that_cannot_be_told_apart_matter_only_where_the_date_chan
     stamps[17] = "2026-13-45"
     with pytest.raises(DataRejected, match=r"row 18, column 't': found '2026-13-45', a time is needed"):
         seconds(stamps)
+
+
+def test_standard_deviations_in_another_unit_than_their_outputs_are_refused(rng: np.random.Generator) -> None:
+    names = ["x", "y", "z", "sd_x", "sd_y", "sd_z"]
+    frame = pd.DataFrame(rng.normal(size=(12, 6)), columns=names)
+    mapping = build({"columns": {name: name for name in names}, "units": {"output": "V"}}, "t")
+    outputs = dict.fromkeys("xyz", "V")
+    for stated in ("µV", "mV"):
+        content = Content(frame, units=outputs | {"sd_y": stated})
+        with pytest.raises(WrongUse, match=f"column 'sd_y' .* states {stated}, V is the unit of the output"):
+            refuse_contradiction(mapping, content, "f.csv")
+    refuse_contradiction(mapping, Content(frame, units=outputs | {"sd_x": "V", "sd_y": "n=400"}), "f.csv")
+
+
+def test_a_standard_deviation_of_an_output_that_is_not_mapped_is_refused() -> None:
+    with pytest.raises(RecipeInvalid, match="sd_y without y"):
+        build({"columns": {"x": "a", "sd_y": "b"}, "units": {"output": "V"}, "axes": ["x"]}, "t")
+
+
+@pytest.mark.parametrize("rows", ["dwells", "samples"])
+@pytest.mark.parametrize("name", ["column", "mapped"])
+def test_recorded_quantities_of_a_file_are_kept_as_they_are_stated(name: str, rows: str, rng) -> None:
+    quantities = [row for row in RECORDED if row.mapped]
+    file = of_size(rng, 1.0).assign(**{row.label: rng.integers(1, 9, 12).astype(float) for row in quantities})
+    columns = IN_COUNTS["columns"] | {"dwell": "no"} | {getattr(row, name): row.label for row in quantities}
+    content = IN_COUNTS | {"columns": columns, "units": {"output": "g"}, "rows": rows, "rate_hz": 1.0}
+    dwells = imported(file.assign(no=range(12)), build(content, "t"), "f.csv").dwells
+    assert dwells is not None
+    for row in quantities:
+        np.testing.assert_array_equal(dwells[row.column], file[row.label])
+
+
+def of_size(rng: np.random.Generator, size: float) -> pd.DataFrame:
+    """Means of twelve positions with this norm, which are not whole numbers."""
+    out = rng.normal(size=(12, 3))
+    return pd.DataFrame(size * out / np.linalg.norm(out, axis=1, keepdims=True), columns=["ax", "ay", "az"])
+
+
+IN_COUNTS = {"columns": {"x": "ax", "y": "ay", "z": "az"}, "units": {"output": "LSB"}, "unit": "A1"}
+
+
+def test_means_of_counts_need_not_be_whole_numbers_and_their_unit_is_asked_about(rng: np.random.Generator) -> None:
+    found = imported(of_size(rng, 1033.0), build({**IN_COUNTS, "rows": "dwells"}, "t"), "f.csv")
+    assert found.out_unit == "LSB"
+    assert [one for one in found.remarks if "the norm of the output is 1033, as gravity in mg; LSB was given" in one]
+
+
+@pytest.mark.parametrize(("size", "rows"), [(1.01, "dwells"), (9.8, "dwells"), (1033.0, "samples")])
+def test_fewer_counts_per_g_than_converters_have_and_parts_of_a_count_are_refused(size, rows, rng) -> None:
+    with pytest.raises(DataRejected, match="are not whole numbers, counts are needed"):
+        imported(of_size(rng, size), build({**IN_COUNTS, "rows": rows, "rate_hz": 1.0}, "t"), "f.csv")
+
+
+AS_LABELS = "labels only"
+
+
+@pytest.mark.parametrize(
+    ("labels", "numbers", "remark"),
+    [
+        ([3, 5, 8, 3, 5, 8], [3, 5, 8, 3, 5, 8], ""),
+        ([3.0, 5.0, 8.0, 3.0, 5.0, 9.0], [3, 5, 8, 3, 5, 9], ""),
+        (["up", "down", "1", "up", "down", "1"], [0, 1, 2, 0, 1, 2], ""),
+        ([0.5, 1.5, 2.5, 0.5, 1.5, 2.5], [0, 1, 2, 0, 1, 2], ""),
+        ([1, 2, 1, 1, 2, 1], [0, 1, 2, 0, 1, 2], "repeat or go back"),
+        ([2, 1, 3, 2, 1, 3], [0, 1, 2, 0, 1, 2], "repeat or go back"),
+        ([1, 2, 3, 4, 5, 6], [0, 1, 2, 0, 1, 2], "run on from unit to unit"),
+    ],
+)
+def test_dwells_have_the_numbers_of_the_file_where_these_number_them(labels, numbers, remark: str, rng) -> None:
+    file = of_size(rng, 1.0).head(6).assign(no=labels, serial=["A1"] * 3 + ["B1"] * 3)
+    columns = IN_COUNTS["columns"] | {"dwell": "no", "unit": "serial"}
+    content = {"columns": columns, "units": {"output": "g"}, "rows": "dwells"}
+    found = imported(file, build(content, "t"), "f.csv")
+    assert found.dwells is not None
+    assert found.dwells["dwell"].tolist() == numbers
+    assert found.dwells["pose"].tolist() == [str(one) for one in labels]
+    assert [one for one in found.remarks if AS_LABELS in one and remark in one] or not remark
+    assert remark or not [one for one in found.remarks if AS_LABELS in one]
+
+
+def test_labelled_samples_have_the_numbers_of_their_labels(rng: np.random.Generator) -> None:
+    file = pd.concat([of_size(rng, 1.0).head(3) for _ in range(8)], ignore_index=True).assign(
+        no=np.repeat([2, 3, 7, 9], 6)
+    )
+    columns = IN_COUNTS["columns"] | {"dwell": "no"}
+    content = IN_COUNTS | {
+        "columns": columns,
+        "units": {"output": "g"},
+        "rate_hz": 10.0,
+        "poses": {"3": "+x", "9": "+z"},
+    }
+    found = imported(file, build({**content, "local_gravity_m_s2": 9.81}, "t"), "f.csv")
+    assert found.dwells is not None
+    assert found.dwells["dwell"].tolist() == [3, 9]
+
+
+@pytest.mark.parametrize(
+    ("stated", "gravity"), [({}, 1.0), ({"local_gravity_m_s2": 9.81}, 9.81 / STANDARD_GRAVITY_M_S2)]
+)
+@pytest.mark.parametrize("rows", ["dwells", "samples"])
+def test_angles_of_a_table_become_the_force_that_a_diagnosis_of_the_file_reads(stated, gravity, rows: str, rng) -> None:
+    angles = {"outer_deg": rng.uniform(-180.0, 180.0, 12), "inner_deg": [180.0, *rng.uniform(-180.0, 180.0, 11)]}
+    file = of_size(rng, 1.0).assign(no=range(12), **angles)
+    columns = IN_COUNTS["columns"] | {"dwell": "no", "outer": "outer_deg", "inner": "inner_deg"}
+    if rows == "samples":
+        file = pd.concat([file, file.assign(inner_deg=file["inner_deg"] - 360.0)]).sort_values("no", ignore_index=True)
+    content = IN_COUNTS | {"columns": columns, "units": {"output": "g"}, "rows": rows, "rate_hz": 1.0} | stated
+    dwells = imported(file, build(content, "t"), "f.csv").dwells
+    assert dwells is not None
+    plain = pd.DataFrame({"unit": "A1", "dwell": range(12), "time_s": np.arange(12.0), **angles})
+    reference, state = state_of_table(DwellTable(plain.assign(out_x=0.0, out_y=0.0, out_z=0.0)))
+    assert reference == "angles"
+    np.testing.assert_allclose(dwells[[*FORCE_COLUMNS]], gravity * state.force[0], atol=1e-12)
+
+
+def test_a_force_that_a_file_states_beside_angles_is_kept(rng: np.random.Generator) -> None:
+    file = of_size(rng, 1.0).assign(outer_deg=0.0, inner_deg=0.0, fx=0.6, fy=0.0, fz=0.8)
+    named = {"outer": "outer_deg", "inner": "inner_deg", "force_x": "fx", "force_y": "fy", "force_z": "fz"}
+    content = {**IN_COUNTS, "columns": IN_COUNTS["columns"] | named, "units": {"output": "g"}, "rows": "dwells"}
+    dwells = imported(file, build(content, "t"), "f.csv").dwells
+    assert dwells is not None
+    np.testing.assert_array_equal(dwells[[*FORCE_COLUMNS]], np.tile([0.6, 0.0, 0.8], (12, 1)))
