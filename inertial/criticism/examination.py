@@ -15,7 +15,7 @@ from inertial.criticism.left_out import LeftOut, left_out
 from inertial.criticism.lot_part import LotPart, part_of
 from inertial.criticism.search import SearchResult, convincing, judge, search
 from inertial.criticism.unknown import Unexplained
-from inertial.data_errors.bad_dwells import bad_dwells
+from inertial.data_errors.bad_dwells import any_of_all, bad_dwells
 from inertial.data_errors.handling import alternatives
 from inertial.data_errors.removed_dwells import BadDwell, without
 from inertial.decisions import CLASS_WIDTH, RISES
@@ -133,11 +133,13 @@ def examined(
     run.removed = bad_beside_effects(run.model(), run.effects)
     searched = mended(run)
     for _ in range(_TURNS):
-        if not run.handled and not searched.result.added:
+        # a dwell that is off in most units had been left to a pose that is wrong; nothing was found, so each unit's is bad
+        of_all = not run.handled and not searched.result.added
+        if of_all and not any_of_all(run.model()):
             break
         # dwells that an effect or a handling error explains are not bad; with it in the model smaller ones become visible
         whole = Problem(run.lot, slope=searched.base.problem.slope)
-        kept = bad_dwells(replaced(Model(whole, searched.model.terms, near=searched.model.noise)))
+        kept = bad_dwells(replaced(Model(whole, searched.model.terms, near=searched.model.noise)), of_all=of_all)
         same = {d.place for d in kept} == {d.place for d in run.removed}
         if same and not _placed_again(run, searched.model) and not _dropped(run, searched):
             break

@@ -36,14 +36,20 @@ _LEAST_DOF = 6
 """Degrees of freedom of a unit below which none of its dwells can be identified as bad."""
 
 
-def bad_dwells(model: Model) -> list[BadDwell]:
-    """The dwells that disagree with a model and its noise; the noise is estimated again without them."""
+def bad_dwells(model: Model, *, of_all: bool = False) -> list[BadDwell]:
+    """The dwells that disagree with a model and its noise; the noise is estimated again without them.
+
+    Parameters
+    ----------
+    of_all : dwells that disagree in most units, too; else these are left to a pose that is wrong
+    """
     if model.problem.lot.radial:
         return bad_norms(model)
     bad: list[BadDwell] = []
     remaining = model
     for _ in range(_ROUNDS):
-        more = _round(remaining, max(int(MOST_BAD * model.problem.lot.state.time.size) + 1, _AT_LEAST) - len(bad))
+        most = max(int(MOST_BAD * model.problem.lot.state.time.size) + 1, _AT_LEAST)
+        more = _round(remaining, most - len(bad), of_all=of_all)
         if not more:
             break
         bad += more
@@ -51,9 +57,20 @@ def bad_dwells(model: Model) -> list[BadDwell]:
     return bad
 
 
-def _round(model: Model, most: int) -> list[BadDwell]:
-    """Dwells that stand out at one noise, the largest first, each deleted before the next."""
+def any_of_all(model: Model) -> bool:
+    """Whether a dwell disagrees in most units, by more than chance over all dwells."""
+    if model.problem.lot.radial:
+        return False
     deletion = _Deletion(model.space, model.problem.per_unit)
+    if deletion.units < _SEVERAL:
+        return False
+    limit = float(chi2_upper(BAD_DWELL / deletion.n, deletion.axes))
+    return bool(np.max(np.median(deletion.statistic(), axis=0)) > limit)
+
+
+def _round(model: Model, most: int, *, of_all: bool) -> list[BadDwell]:
+    """Dwells that stand out at one noise, the largest first, each deleted before the next."""
+    deletion = _Deletion(model.space, model.problem.per_unit, of_all=of_all)
     if deletion.units < _SEVERAL:
         deletion.left_to_poses = deletion.off_every_time(poses(model.problem.lot))
     bad: list[BadDwell] = []
@@ -72,10 +89,11 @@ class _Deletion:
     """Deletion statistics of every dwell of every unit, dwells deleted one by one.
 
     left_to_poses : (n,), dwells that are left to the alternatives that concern a pose
+    of_all : whether dwells that disagree in most units are not left to them
     """
 
-    def __init__(self, space: Space, axes: int) -> None:
-        self.space, self.axes = space, axes
+    def __init__(self, space: Space, axes: int, *, of_all: bool = False) -> None:
+        self.space, self.axes, self.of_all = space, axes, of_all
         blocks, n = space.residual.shape
         self.there = space.covariance.there.copy()
         self.units, self.n = blocks // axes, n
@@ -109,11 +127,9 @@ class _Deletion:
 
     def worst(self) -> tuple[int, int, Array] | None:
         """Unit and dwell that stand out most, with their deviations (axes,); None where none does by more than chance."""
-        known = self.there & (self.size > 1e-9 * self.size.max())
-        drop = np.where(known, self.left**2 / np.where(known, self.size, 1.0), 0.0)
-        squares = self._studentised(drop)
+        squares = self._squares()
         statistic = squares.sum(axis=1)
-        if self.units >= _SEVERAL:
+        if self.units >= _SEVERAL and not self.of_all:
             together = np.median(statistic, axis=0) > float(chi2_upper(COMMON, self.axes))
             statistic = np.where(together, 0.0, statistic)
         statistic = np.where(self.left_to_poses, 0.0, statistic)
@@ -123,6 +139,15 @@ class _Deletion:
         chance = float(f_tail(statistic[unit, dwell] / self.axes, self.axes, max(freedom, 1.0))) * self.looks
         outlier = int(unit), int(dwell), np.sqrt(squares[unit, :, dwell])
         return outlier if chance < BAD_DWELL and dof >= _LEAST_DOF else None
+
+    def statistic(self) -> Array:
+        """Chi-square of each dwell of each unit, (units, n)."""
+        return self._squares().sum(axis=1)
+
+    def _squares(self) -> Array:
+        """Its parts by axis, (units, axes, n)."""
+        known = self.there & (self.size > 1e-9 * self.size.max())
+        return self._studentised(np.where(known, self.left**2 / np.where(known, self.size, 1.0), 0.0))
 
     def _studentised(self, drop: Array) -> Array:
         """Squares of each dwell over a variance without it, (units, axes, n)."""
