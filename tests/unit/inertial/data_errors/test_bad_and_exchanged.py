@@ -8,7 +8,9 @@ import pytest
 from made_worlds import BASE, HIDDEN, NULLS, Noise, World, lot_in, make
 from scipy import integrate, stats
 
+from inertial.criticism.examination import ExaminedRun, examined
 from inertial.data_errors import tails
+from inertial.data_errors.bad_dwells import any_of_all
 from inertial.data_errors.handling.bias_jump import BiasJump
 from inertial.data_errors.handling.units_swapped import UnitsSwapped
 from inertial.data_errors.removed_dwells import BadDwell
@@ -158,3 +160,17 @@ def test_a_bias_that_jumps_has_two_dwells_on_either_side() -> None:
     lot = lot_in(make(World(units=1), 6_300_070))
     jumps = {place["dwell"] for place in BiasJump().places(lot)}
     assert (min(jumps), max(jumps)) == (2.0, lot.state.time.shape[1] - 2.0)
+
+
+@pytest.mark.parametrize("units", [3, 8])
+def test_a_dwell_that_is_off_in_every_unit_in_its_own_way_is_no_noise(units: int) -> None:
+    made = make(World(units=units), 61)
+    dwells = made.dwells.copy()
+    here = dwells["dwell"] == 30
+    off = 1e-3 * np.random.default_rng(61).standard_normal((int(here.sum()), 3))
+    dwells.loc[here, ["out_x", "out_y", "out_z"]] += off
+    assert any_of_all(ExaminedRun(lot_in(replace(made, dwells=dwells)), BASE).model())
+    run, _ = examined(lot_in(replace(made, dwells=dwells)), BASE)
+    assert {dwell.dwell for dwell in run.removed} == {30}
+    assert len(run.removed) >= units - 1
+    assert not any_of_all(ExaminedRun(lot_in(made), BASE).model())
