@@ -48,7 +48,10 @@ def sound_lot(
     """
     measurement = measured(condense(dwells), history)
     faults = find_faults(measurement.readings) if measurement.reference != "norm" else []
-    faults = [fault for fault in faults if not _on_purpose(measurement, fault, left_out)]
+    numbers = [int(number) for number in measurement.dwells]
+    faults = [
+        fault.named(measurement.units, numbers) for fault in faults if not _on_purpose(measurement, fault, left_out)
+    ]
     blocked = {f.unit for f in faults}
     sound = [u for u in range(len(measurement.units)) if u not in blocked]
     if not sound:

@@ -17,11 +17,14 @@ def changed_units(readings: Readings) -> Iterator[Fault]:
         places = tuple(range(split.place, int(np.flatnonzero(readings.there[unit])[-1]) + 1))
         partner = next((v for v, other in splits.items() if v != unit and exchanged(split, other)), None)
         if partner is not None:
-            evidence = f"from dwell {split.place} on it has the calibration of unit {partner}"
+            evidence = f"from dwell {{dwell[{split.place}]}} on it has the calibration of unit {{unit[{partner}]}}"
             yield Fault("units_swapped", unit, places, evidence)
         elif not 0.75 < split.ratio < 1.33:
             yield Fault(
-                "wrong_range", unit, places, f"scale changes by a factor {split.ratio:.3g} at dwell {split.place}"
+                "wrong_range",
+                unit,
+                places,
+                f"scale changes by a factor {split.ratio:.3g} at dwell {{dwell[{split.place}]}}",
             )
 
 

@@ -17,7 +17,10 @@ def clock(readings: Readings) -> Iterator[Fault]:
             places = np.flatnonzero(row)[back + 1]
             step = float(np.diff(time[row])[back[0]])
             yield Fault(
-                "clock_jitter", unit, places_of(places), f"time steps back by {-step:.1f} s at dwell {places[0]}"
+                "clock_jitter",
+                unit,
+                places_of(places),
+                f"time steps back by {-step:.1f} s at dwell {{dwell[{places[0]}]}}",
             )
 
 

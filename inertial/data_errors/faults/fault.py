@@ -1,7 +1,7 @@
 """A data fault of one unit, and a test for one kind of them."""
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,12 +11,19 @@ from inertial.data_errors.readings import Readings
 
 @dataclass(frozen=True)
 class Fault:
-    """A data fault of one unit: its name, its dwells, and the evidence."""
+    """A data fault of one unit: its name, its dwells, and the evidence.
+
+    Units and dwells are places in the lot; in the evidence, too: ``{unit[1]}``, ``{dwell[32]}``.
+    """
 
     name: str
     unit: int
     dwells: tuple[int, ...]
     evidence: str
+
+    def named(self, units: Sequence[str], dwells: Sequence[int]) -> "Fault":
+        """The same with the serials and the numbers of dwells in its evidence."""
+        return replace(self, evidence=self.evidence.format(unit=units, dwell=dwells))
 
 
 @dataclass(frozen=True)

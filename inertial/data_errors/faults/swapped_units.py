@@ -25,7 +25,7 @@ def swapped_units(readings: Readings) -> Iterator[Fault]:
     for (one, other), places in exchanged.items():
         if len(places) >= max(3, n // 20):
             for unit, partner in ((one, other), (other, one)):
-                evidence = f"{len(places)} dwells have the bias and scale of unit {partner}"
+                evidence = f"{len(places)} dwells have the bias and scale of unit {{unit[{partner}]}}"
                 yield Fault("units_swapped", unit, tuple(places), evidence)
 
 

@@ -58,9 +58,9 @@ def _which_pose(force: Array, places: Places, felt: Array) -> tuple[str, str]:
         for j in range(i + 1, len(places)):
             b = places[j]
             if np.linalg.norm(felt[i] - force[b]) < 0.05 and np.linalg.norm(felt[j] - force[a]) < 0.05:
-                return "swapped_dwells", f"dwells {a} and {b} have exchanged poses"
+                return "swapped_dwells", f"dwells {{dwell[{a}]}} and {{dwell[{b}]}} have exchanged poses"
     angle = np.degrees(np.arccos(np.clip(np.sum(felt[0] * force[places[0]]), -1.0, 1.0)))
-    return "wrong_pose", f"dwell {places[0]} was measured {angle:.1f}° from the commanded pose"
+    return "wrong_pose", f"dwell {{dwell[{places[0]}]}} was measured {angle:.1f}° from the commanded pose"
 
 
 LOOK = Look(wrong_poses, ("swapped_dwells", "wrong_pose"), order=100)
