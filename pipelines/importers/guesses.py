@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pandas as pd
 
-from inertial.arrays import Array
+from inertial.arrays import Array, Flags
 from inertial.quantities import ANGLE_COLUMNS, FORCE_COLUMNS, KNOWN_COLUMNS, LARGEST, SPREAD_COLUMNS
-from pipelines.importers import clocks, triads, unit_check, values
+from pipelines.importers import clocks, named_columns, triads, unit_check, values
 from pipelines.importers.clocks import typical_step
 from pipelines.importers.content import Content
 from pipelines.importers.stated_units import TEMPERATURE, output_unit
@@ -74,7 +74,8 @@ class Guesses:
     @property
     def single(self) -> str:
         """The output of a table of a device with one axis: it has its reference beside it, a force or an angle; else empty."""
-        return self.column("x") if self.column("force_x") or self.column("tilt") else ""
+        known = self.column("force_x") or self.column("tilt")
+        return self.column("x") if known and not self.column("y") else ""
 
     def column(self, meaning: str) -> str:
         """The column with a meaning; empty if there is none."""
@@ -90,18 +91,48 @@ def guesses(content: Content) -> Guesses:
     table = content.table
     guessed: dict[str, Guess] = {str(name): Guess("", "") for name in table.columns}
     numeric = {str(name): one for name in table.columns if (one := _numbers(table[name])) is not None}
-    _time(table, numeric, guessed)
+    inside = _named(table, numeric, guessed)
+    _time(table, numeric, guessed, inside)
     found = triads.Triad() if _single_axis(numeric, guessed) else _axes(content, numeric, guessed)
     _others(content, table, numeric, guessed)
-    sheet = _sheet(table, numeric, guessed)
+    sheet = _sheet(table, numeric, guessed, inside)
     positions = not _column(guessed, "time") and triads.are_positions(found.sphere, len(table))
-    output = _output(content, numeric, guessed, found.sphere)
-    few = _few_axes(content, numeric, guessed)
-    return Guesses(guessed, _time_unit(content, numeric, guessed), output, sheet or positions, found, few)
+    rows = Guesses(guessed, Guess("", ""), Guess("", ""), sheet or positions, found)
+    if rows.dwells:
+        _of_dwells(numeric, guessed, inside)
+    output = _output(content, numeric, guessed, found.sphere, means=rows.dwells)
+    time_unit = _time_unit(content, numeric, guessed, dwells=rows.dwells)
+    return replace(rows, time_unit=time_unit, output=output, few=_few_axes(content, numeric, guessed))
 
 
-def _sheet(table: pd.DataFrame, numeric: dict[str, Array], guessed: dict[str, Guess]) -> bool:
+def _named(table: pd.DataFrame, numeric: dict[str, Array], guessed: dict[str, Guess]) -> Flags:
+    """Note the columns whose name tells; which steps from row to row (n − 1,) stay in one unit."""
+    serial = named_columns.serials(table)
+    if serial:
+        guessed[serial] = Guess("unit", "its name")
+    for name, meaning in named_columns.MEANING_OF.items():
+        sound = name in numeric and name != serial and bool(np.isfinite(numeric[name]).all())
+        if sound and name not in named_columns.OF_DWELLS:
+            guessed[name] = Guess(meaning, "its name")
+    return named_columns.of_one_unit(table, serial)
+
+
+def _of_dwells(numeric: dict[str, Array], guessed: dict[str, Guess], inside: Flags) -> None:
+    """Note what is read so in a table of dwells alone: the number of samples, and the numbers of the dwells."""
+    for name in named_columns.OF_DWELLS:
+        if name in numeric and not guessed[name].meaning:
+            guessed[name] = Guess(named_columns.MEANING_OF[name], "its name")
+    free = [name for name, guess in guessed.items() if not guess.meaning]
+    number = "" if _column(guessed, "dwell") else named_columns.numbers_of_dwells(numeric, inside, free)
+    if number:
+        guessed[number] = Guess("dwell", "it numbers the rows of each unit")
+
+
+def _sheet(table: pd.DataFrame, numeric: dict[str, Array], guessed: dict[str, Guess], inside: Flags) -> bool:
     """Whether the rows are positions, each with a label of its own; the labels are then those of the dwells."""
+    label = _column(guessed, "dwell")
+    if label and named_columns.numbers_of_dwells(numeric, inside, [label]):
+        return True
     if _column(guessed, "time") or not all(_column(guessed, axis) for axis in "xyz") or len(table) > _MOST_POSITIONS:
         return False
     for name in table.columns:
@@ -123,17 +154,22 @@ def _numbers(column: pd.Series) -> Array | None:
     return numbers if np.mean(np.isfinite(numbers)) > 0.5 else None
 
 
-def _grows(numbers: Array) -> bool:
-    steps = np.diff(numbers[np.isfinite(numbers)])
+def _grows(numbers: Array, inside: Flags | None = None) -> bool:
+    """Whether numbers (n,) only increase, with few exceptions, in all rows or in the steps of one unit."""
+    there = np.isfinite(numbers)
+    steps = np.diff(numbers[there]) if inside is None else np.diff(numbers)[inside & there[1:] & there[:-1]]
     return steps.size > 1 and bool(np.mean(steps >= 0.0) > 0.99) and bool(np.any(steps > 0.0))
 
 
-def _time(table: pd.DataFrame, numeric: dict[str, Array], guessed: dict[str, Guess]) -> None:
-    for name in guessed:
+def _time(table: pd.DataFrame, numeric: dict[str, Array], guessed: dict[str, Guess], inside: Flags) -> None:
+    if _column(guessed, "time"):
+        return
+    free = [name for name, guess in guessed.items() if not guess.meaning]
+    for name in free:
         if values.is_moment(table[name]) or (name not in numeric and _reads_as_time(table[name])):
             guessed[name] = Guess("time", "stamps of date or time")
             return
-    growing = [name for name, numbers in numeric.items() if _grows(numbers)]
+    growing = [name for name in free if name in numeric and (_grows(numeric[name]) or _grows(numeric[name], inside))]
     fine = [name for name in growing if _FINE.search(name)]
     named = fine or [name for name in growing if _TIME.search(name) and not triads.COUNT.search(name)]
     if named:
@@ -215,7 +251,7 @@ def _is_index(numbers: Array) -> bool:
 
 
 def _others(content: Content, table: pd.DataFrame, numeric: dict[str, Array], guessed: dict[str, Guess]) -> None:
-    warm = _temperature(content, numeric, guessed)
+    warm = "" if _column(guessed, "temperature") else _temperature(content, numeric, guessed)
     if warm:
         guessed[warm] = Guess("temperature", "its name or unit")
     for name in list(guessed):
@@ -246,7 +282,7 @@ def _temperature(content: Content, numeric: dict[str, Array], guessed: dict[str,
     return max(warm, key=rank, default="")
 
 
-def _time_unit(content: Content, numeric: dict[str, Array], guessed: dict[str, Guess]) -> Guess:
+def _time_unit(content: Content, numeric: dict[str, Array], guessed: dict[str, Guess], *, dwells: bool) -> Guess:
     name = _column(guessed, "time")
     if not name or name not in numeric:
         return Guess("", "")
@@ -254,6 +290,8 @@ def _time_unit(content: Content, numeric: dict[str, Array], guessed: dict[str, G
         return Guess("samples", f"counts of {1e6 / FINE_HZ:.0f} µs, by its name")
     numbers = numeric[name][np.isfinite(numeric[name])]
     seen = clocks.recognised(numbers, name, content.units.get(name, ""))
+    if dwells and (not seen.unit or seen.reason.startswith("steps")):
+        return Guess("s", "rows are dwells, and no other unit is stated")
     if seen.unit or not seen.possible:
         return Guess(seen.unit, seen.reason)
     step, possible = typical_step(numbers), seen.possible
@@ -276,6 +314,8 @@ def _output(
     numeric: dict[str, Array],
     guessed: dict[str, Guess],
     sphere: triads.Sphere | None,
+    *,
+    means: bool,
 ) -> Guess:
     """The unit of the output; one that the numbers do not settle is a guess with a doubt, which the user has to confirm."""
     names = [name for axis in "xyz" for name, guess in guessed.items() if guess.meaning == axis]
@@ -289,7 +329,7 @@ def _output(
     if not len(output):
         return Guess("", "")
     size = sphere.radius if sphere is not None and sphere.fits else unit_check.size_of(output)
-    return Guess(*unit_check.unit_of(output, size))
+    return Guess(*unit_check.unit_of(output, size, means=means))
 
 
 def guesses_of_dwells(table: pd.DataFrame) -> Guesses:

@@ -12,12 +12,16 @@ from typing import Any
 import numpy as np
 
 from inertial.arrays import Array
+from inertial.quantities import FORCE_COLUMNS
 from pipelines.importers import guesses, stretches
 from pipelines.importers.content import Content
+from pipelines.importers.named_columns import MEANING_OF
 from pipelines.importers.stated_units import TEMPERATURE
 from schemas.units import STANDARD_GRAVITY_M_S2
 
-MAPPED = ("time", "x", "y", "z", "sd_x", "sd_y", "sd_z", "n", "force_x", "tilt", "temperature", "dwell")
+_FIRST = ("unit", "time", "x", "y", "z", "sd_x", "sd_y", "sd_z", "n", "force_x", "tilt", "temperature", "dwell")
+MAPPED = tuple(dict.fromkeys((*_FIRST, *MEANING_OF.values())))
+"""Meanings that a proposal maps, in their order."""
 ASSUMED_HZ = 100.0
 """Rate of samples without a clock: it decides how long a stop is, and nothing else of a fit to its means."""
 FEWEST_OF_NORM = 10
@@ -59,7 +63,7 @@ class Proposal:
         words = ["tumbleline", "import", *(str(path) for path in paths)]
         words += ["--map", ",".join(f"{meaning}={name}" for meaning, name in self.keys["columns"].items())]
         words += ["--units", ",".join(f"{what}={unit}" for what, unit in self.keys["units"].items())]
-        words += ["--unit", self.keys["unit"]]
+        words += [] if "unit" in self.keys["columns"] else ["--unit", self.keys["unit"]]
         words += ["--axes", ",".join(self.keys["axes"])] if "axes" in self.keys else []
         poses = self.keys.get("poses", {})
         words += ["--poses", ",".join(f"{label}={face}" for label, face in poses.items())] if poses else []
@@ -80,9 +84,9 @@ def columns_and_units(content: Content, guessed: guesses.Guesses, path: Path) ->
         columns |= {axis: "COLUMN" for axis in "xyz" if not guessed.column(axis)}
     units = {"output": guessed.output.meaning or "UNIT"}
     time = guessed.column("time")
-    if time and guessed.time_unit.meaning:
+    if time and guessed.time_unit.meaning and not (guessed.dwells and guessed.time_unit.meaning == "s"):
         units["time"] = guessed.time_unit.meaning
-    elif time and content.table[time].dtype.kind in "fiu":
+    elif time and not guessed.dwells and content.table[time].dtype.kind in "fiu":
         units["time"] = "UNIT"
     heat = TEMPERATURE.get(content.units.get(guessed.column("temperature"), "").strip().lower(), "degC")
     units |= {"temperature": heat} if heat != "degC" else {}
@@ -131,6 +135,8 @@ def for_fit(
         assumed.append(
             f"no clock: {ASSUMED_HZ:g} Hz assumed to find the stops; the coefficients do not depend on it (--rate HZ)"
         )
+    if has_reference(keys):  # the import is fitted as a run is
+        return Proposal(keys, "", tuple(assumed))
     gravity = f"local gravity not stated: {STANDARD_GRAVITY_M_S2:.5f} m/s² taken; scale factors are relative to it (--local-g)"
     own = {"local_gravity_m_s2": STANDARD_GRAVITY_M_S2}
     sphere = guessed.triad.sphere
@@ -143,6 +149,11 @@ def for_fit(
         told = "six faces taken as vertical: a tilt of 1° is 17 mg in the bias"
         return Proposal(keys | {"poses": poses} | own, "faces", (*assumed, gravity, told))
     return Proposal(keys, "", tuple(assumed), (), 0 if means is None else len(means))
+
+
+def has_reference(keys: dict[str, Any]) -> bool:
+    """Whether the pose of every dwell is known: by the face that is up, its force, or the angles of a table."""
+    return "face" in keys or any(set(names) <= set(keys["columns"]) for names in (FORCE_COLUMNS, ("outer", "inner")))
 
 
 def _six_faces(means: Array, labels: Sequence[str], centre: Array) -> dict[str, str]:

@@ -38,17 +38,22 @@ def looks_like(size: float) -> str:
     return next((unit for unit, one in GRAVITY.items() if LIKELY[0] < size / one < LIKELY[1]), "")
 
 
-def unit_of(output: Array, size: float) -> tuple[str, str]:
-    """The probable unit of a record (n, 3) in which gravity has a size, and the reason; it ends in DOUBT where it is a guess."""
+def unit_of(output: Array, size: float, *, means: bool = False) -> tuple[str, str]:
+    """The probable unit of a record (n, 3) in which gravity has a size, and the reason; it ends in DOUBT where it is a guess.
+
+    ``means``: whether the numbers are means of samples, which are not whole where the samples are counts.
+    """
     whole = bool(np.all(output[:1000] == np.rint(output[:1000])))
-    likely = looks_like(size)
+    likely, power = looks_like(size), np.log2(max(size, 1e-300))
+    of_two = size > _FEWEST_COUNTS and bool(abs(power - np.rint(power)) < _NEAR_POWER)
     if likely and not (whole and likely != "mg"):
         doubt = f", though whole numbers may be counts{DOUBT}" if whole else ""
+        if means and of_two and abs(size - 2.0 ** np.rint(power)) < abs(size - GRAVITY[likely]):
+            doubt = f", though means of counts are closer to {2.0 ** np.rint(power):g}{DOUBT}"
         return likely, f"its norm is {size:.5g}, gravity in {likely} is {GRAVITY[likely]:.5g}{doubt}"
     if whole:
         return "LSB", f"whole numbers with a norm of {size:.5g}"
-    power = np.log2(max(size, 1e-300))
-    if size > _FEWEST_COUNTS and abs(power - np.rint(power)) < _NEAR_POWER:
+    if of_two:
         return "LSB", f"its norm is {size:.5g}, close to a power of two: means of counts"
     if VOLTS_PER_G[0] <= size <= VOLTS_PER_G[1]:
         return "V", f"its norm is {size:.5g}, no size of gravity, but one of volts{DOUBT}"

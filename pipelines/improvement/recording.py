@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pipelines.importers.mapping import build
+from pipelines.importers.proposal import has_reference
 from pipelines.importers.recognition import Recognition, recognise
 from schemas.errors import DataRejected, WrongUse
 
@@ -45,7 +46,7 @@ def bring_in(paths: list[Path], archive: str | None, working: Working, group: st
         raise WrongUse(
             f"{name}: not recognised without doubt: {'; '.join(seen.open)}; complete the command: {seen.import_command}"
         )
-    if not proposal.fit and "face" not in proposal.keys:
+    if not proposal.fit and not has_reference(proposal.keys):
         raise DataRejected(f"{name}: {_too_little(seen, proposal)}")
     build(proposal.keys, name)
     done = import_document(paths, proposal.keys, name, proposal.fit, archive, None, working)

@@ -16,7 +16,9 @@ from each import each
 from hand import G, Hand, sensed
 from scipy.io import savemat
 
+from pipelines.importers.mapping import build
 from pipelines.importers.recognition import Recognition, recognise
+from pipelines.importers.record import imported
 
 Rng = np.random.Generator
 
@@ -293,3 +295,76 @@ def test_a_clock_that_writes_in_bursts_is_one_record_and_a_pause_is_a_gap(rng: R
     assert burst.rate_hz == pytest.approx(8.0 / 0.0135, rel=0.01)
     assert burst.guessed.column("temperature") == "gtemp"
     assert recognise([logger_of_imu(rng, tmp_path)]).gaps == 1
+
+
+IN_EXCHANGE_FORMAT = {
+    "unit": "unit", "dwell": "dwell", "time": "time_s", "n": "n", "duration": "duration_s", "temperature": "unit_C",
+    "slot": "slot", "outer": "outer_deg", "inner": "inner_deg", "since_move": "since_move_s", "since_power": "since_power_s",
+    "sd_x": "sd_x", "sd_y": "sd_y", "sd_z": "sd_z", "humidity_pct": "humidity_pct",
+}  # fmt: skip
+
+
+def dwells_of_units(rng: Rng, scale: float = 1.0) -> pd.DataFrame:
+    """Dwells of three units in the exchange format, one unit after the other, but for the names of the outputs."""
+    rows, time = 3 * 24, np.tile(90.0 * np.arange(24), 3) + 1800.0
+    columns = {
+        "unit": np.repeat(["S1", "S2", "S3"], 24),
+        "slot": np.repeat(range(3), 24),
+        "dwell": np.tile(range(3, 27), 3),
+    }
+    columns |= {
+        "time_s": time,
+        "duration_s": 40.0,
+        "n": 400,
+        "since_power_s": time,
+        "since_move_s": rng.uniform(30.0, 60.0, rows),
+    }
+    columns |= {"outer_deg": rng.uniform(0.0, 180.0, rows), "inner_deg": rng.uniform(-180.0, 180.0, rows)}
+    named(columns, "ax ay az", accelerations(rng, np.tile(Hand(rng, stops=24).stops, (3, 1)), scale))
+    named(columns, "sd_x sd_y sd_z", rng.uniform(0.001, 0.002, (rows, 3)) * scale)
+    columns |= {"unit_C": 25.0 + rng.uniform(size=rows), "humidity_pct": rng.uniform(40.0, 50.0, rows)}
+    return pd.DataFrame(columns)
+
+
+@each([{}, {"unit": "Serial No", "dwell": "no", "time_s": "t", "unit_C": "sensor temperature"}], str)
+def test_columns_named_as_in_the_exchange_format_serials_and_numbers_of_dwells_are_recognised(
+    renamed, rng, tmp_path
+) -> None:
+    file = dwells_of_units(rng).rename(columns=renamed)
+    file.to_csv(tmp_path / "lot.csv", index=False)
+    seen = recognise([tmp_path / "lot.csv"])
+    expected = {meaning: renamed.get(name, name) for meaning, name in IN_EXCHANGE_FORMAT.items()}
+    assert seen.keys is not None
+    assert seen.keys["columns"] == expected | {"x": "ax", "y": "ay", "z": "az"}
+    assert (seen.keys["units"], seen.keys["rows"], seen.open) == ({"output": "g"}, "dwells", ())
+    assert "--unit " not in seen.import_command
+    proposal = seen.for_fit()
+    assert proposal is not None
+    assert proposal.fit == ""  # its poses are known
+    dwells = imported(file, build(proposal.keys, "t"), "lot.csv").dwells
+    assert dwells is not None
+    assert sorted(set(dwells["unit"])) == ["S1", "S2", "S3"]
+    assert dwells["dwell"].tolist() == [*range(3, 27)] * 3
+
+
+def test_names_of_the_exchange_format_in_a_record_of_samples_are_no_dwells(rng: Rng, tmp_path: Path) -> None:
+    hand = Hand(rng)
+    columns = {
+        "n": np.arange(hand.n),
+        "unit": np.repeat("mg", hand.n),
+        "time_s": hand.time,
+        "supply_V": np.full(hand.n, 3.3),
+    }
+    named(columns, "ax ay az", np.round(accelerations(rng, hand.force, 1000.0), 2))
+    seen = recognise([csv(tmp_path / "a.csv", columns)])
+    assert seen.keys is not None
+    assert seen.keys["columns"] == {"time": "time_s", "x": "ax", "y": "ay", "z": "az", "supply": "supply_V"}
+    assert "rows" not in seen.keys
+
+
+def test_means_of_counts_close_to_gravity_in_mg_are_asked_about(rng: Rng, tmp_path: Path) -> None:
+    for scale, doubt in ((1024.0, True), (1000.0, False)):
+        dwells_of_units(rng, scale).to_csv(tmp_path / "lot.csv", index=False)
+        seen = recognise([tmp_path / "lot.csv"])
+        assert [one for one in seen.open if "means of counts are closer to 1024" in one] or not doubt
+        assert bool(seen.open) == doubt
