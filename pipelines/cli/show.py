@@ -27,8 +27,8 @@ EXAMPLES = (
 MANY = 40
 NOTES = {
     "coefficients": (
-        "standard_error: k = 1, of the value that wander moves about; of the bias as the mean of this record: bias_record_u_ug of "
-        "the table wander"
+        "standard_error: k = 1, of the value that wander moves about; of the bias as the mean of this record: bias_record_u_ug "
+        "of the table wander"
     ),
 }
 """What the columns of a table mean where their names alone mislead."""
