@@ -34,10 +34,6 @@ class CurveFit:
     part: Part = "bias"
     period: float | None = None
 
-    def columns(self) -> Candidate:
-        """The candidate, as the columns of a driver."""
-        return self.candidate
-
 
 def fit_curve(model: Model, driver: str, candidate: Candidate, ways: int = 1) -> CurveFit:
     """The best common curve of a driver added to a model, with the noise estimated again.

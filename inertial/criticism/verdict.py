@@ -137,7 +137,8 @@ def _judged(lot: Lot, effects: Sequence[str], rng: Generator, barred: frozenset[
     if not (unjudged or searched.added or unexplained):
         unexplained, curved = _taken_for_noise(search.part)
         if curved is not None and search.part.field is search.field:
-            drivers.append(Driver(curved.driver, curved.columns, None, curved.part))
+            columns = curved.candidate
+            drivers.append(Driver(curved.driver, lambda: columns, None, curved.part))
     sound = passed is True and not searched.added and unexplained is None and run.drift is None
     return Verdict(
         run=run,

@@ -4,11 +4,11 @@ What one of the two has too much the other lacks, so that their residuals are op
 vanish. A look at all pairs costs one product of the residuals with themselves.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
-from inertial.arrays import Array, Flags
+from inertial.arrays import Array, Flags, Places
 
 EDGE = 3
 """Dwells at both ends within which no exchange can be detected."""
@@ -18,6 +18,9 @@ AROUND = 3
 
 _OPPOSITE = -0.5
 """Correlation of the residuals of two units below which they may have been exchanged."""
+
+_TOGETHER = 256
+"""First dwells of a range that are looked at together: a record of ten thousand dwells has fifty million ranges."""
 
 _LEFT = 0.5
 """Share of the squares of both that is left with the readings exchanged back."""
@@ -79,33 +82,56 @@ class PlainFit:
         the best range others whose first or whose last dwell is near.
         """
         pair = [one, other]
-        both = np.all(self.there[pair], axis=0, keepdims=True).T
-        apart = np.where(both, self.of_other(one, other) - self.output[pair], 0.0)
-        n = both.size
+        changes = self._changes(pair)
+        n = self.there.shape[1]
         first, end = np.arange(EDGE, n - EDGE + 1), np.append(np.arange(2 * EDGE, n - EDGE + 1), n)
-        squares = np.zeros((first.size, end.size))
-        for difference, basis, rest in zip(apart, self.basis[pair], self.left[pair], strict=True):
-            # ‖r + c‖² of the columns c = P·H·d, from running sums: cᵀc = dᵀHd − (QᵀHd)², rᵀc = rᵀHd
-            for axis in range(difference.shape[-1]):
-                change = difference[:, axis]
-                single = _running(change * (change + 2.0 * rest[:, axis]))
-                along = _running(basis * change[:, None])
-                squares += single[end] - single[first][:, None]
-                squares -= np.sum(along[end] ** 2, axis=-1) + np.sum(along[first] ** 2, axis=-1)[:, None]
-                squares += 2.0 * along[first] @ along[end].T
-        squares = np.where(end - first[:, None] < EDGE, np.inf, squares)
         whole = float(np.sum(self.left[pair] ** 2))
         if whole <= 0.0 or not first.size:
             return []
-        lasting, best = int(np.argmin(squares[:, -1])), np.unravel_index(int(np.argmin(squares)), squares.shape)
-        found: list[tuple[int, int]] = []
-        for a, b in {(lasting, end.size - 1), (int(best[0]), int(best[1]))}:
-            if whole + float(squares[a, b]) <= _LEFT * whole:
-                near = [(k, b) for k in range(a - around, a + around + 1)]
-                near += [(a, k) for k in range(b - around, b + around + 1) if b < end.size - 1]
-                inside = {(k, m) for k, m in near if 0 <= k < first.size and 0 <= m < end.size}
-                found += [(int(first[k]), int(end[m])) for k, m in sorted(inside) if np.isfinite(squares[k, m])]
-        return sorted(found, key=lambda one: float(squares[one[0] - EDGE, np.searchsorted(end, one[1])]))
+        lasting = (int(first[np.argmin(_left_by(changes, first, end[-1:])[:, 0])]), n)
+        each = [_best_of(changes, first[k : k + _TOGETHER], end) for k in range(0, first.size, _TOGETHER)]
+        found: dict[tuple[int, int], float] = {}
+        for a, b in {lasting, min(each)[1]}:
+            if whole + float(_left_by(changes, np.array([a]), np.array([b]))[0, 0]) > _LEFT * whole:
+                continue
+            near = [(k, b) for k in range(a - around, a + around + 1)]
+            near += [(a, k) for k in range(b - around, b + around + 1) if b < n]
+            for k, m in near:
+                if first[0] <= k <= first[-1] and k + EDGE <= m <= (n if b == n else n - EDGE):
+                    found[k, m] = float(_left_by(changes, np.array([k]), np.array([m]))[0, 0])
+        return sorted(found, key=lambda one: found[one])
+
+    def _changes(self, pair: list[int]) -> list[tuple[Array, Array]]:
+        """Running sums for each unit and axis, of dᵀd + 2·rᵀd, (n + 1,), and of Qᵀd, (n + 1, k).
+
+        d is the readings of the other unit less its own, r what the fit leaves, Q the basis of the fit.
+        """
+        both = np.all(self.there[pair], axis=0, keepdims=True).T
+        apart = np.where(both, self.of_other(*pair) - self.output[pair], 0.0)
+        sums: list[tuple[Array, Array]] = []
+        for difference, basis, rest in zip(apart, self.basis[pair], self.left[pair], strict=True):
+            for change, left in zip(difference.T, rest.T, strict=True):
+                sums.append((_running(change * (change + 2.0 * left)), _running(basis * change[:, None])))
+        return sums
+
+
+def _left_by(changes: Sequence[tuple[Array, Array]], first: Places, end: Places) -> Array:
+    """What exchanges in ranges of dwells add to the squares of two units, (first, end); infinite where a range is too short.
+
+    ‖r + c‖² of the columns c = P·H·d, from running sums: cᵀc = dᵀHd − (QᵀHd)², rᵀc = rᵀHd.
+    """
+    squares = np.zeros((first.size, end.size))
+    for single, along in changes:
+        squares += single[end] - single[first][:, None] + 2.0 * along[first] @ along[end].T
+        squares -= np.sum(along[end] ** 2, axis=-1) + np.sum(along[first] ** 2, axis=-1)[:, None]
+    return np.where(end - first[:, None] < EDGE, np.inf, squares)
+
+
+def _best_of(changes: Sequence[tuple[Array, Array]], first: Places, end: Places) -> tuple[float, tuple[int, int]]:
+    """The range that leaves least, and what it adds."""
+    squares = _left_by(changes, first, end)
+    a, b = np.unravel_index(int(np.argmin(squares)), squares.shape)
+    return float(squares[a, b]), (int(first[a]), int(end[b]))
 
 
 def _running(values: Array) -> Array:

@@ -91,11 +91,10 @@ class Readings:
         if warm is None or not self.turned or not np.isfinite(warm[self.there]).all():
             return self.misfit
         left = np.empty_like(self.output)
+        force = shown_force(self.force, self.axes)
         for unit, theta in enumerate(warm - np.nanmean(warm, axis=1, keepdims=True)):
-            force = shown_force(self.force, self.axes)[unit]
-            x = np.concatenate([np.ones((len(force), 1)), force], axis=-1)
-            x = np.concatenate([x, theta[:, None] * x], axis=-1)
-            left[unit] = self.output[unit] - x @ robust_fit(force, self.output[unit], theta).T
+            fitted = design(force[unit], theta) @ robust_fit(force[unit], self.output[unit], theta).T
+            left[unit] = self.output[unit] - fitted
         return left / np.where(self.scale > 0.0, self.scale, 1.0)[:, None, None]
 
     @cached_property
@@ -104,6 +103,12 @@ class Readings:
         design = np.concatenate([np.ones((*self.force.shape[:2], 1)), self.force], axis=-1)
         model = np.einsum("unp,uip->uni", design, self.fits)
         return (self.output - model) / np.where(self.scale > 0.0, self.scale, 1.0)[:, None, None]
+
+
+def design(force: Array, theta: Array | None = None) -> Array:
+    """Columns (n, 4) of bias and response to a force (n, 3), g; with a temperature (n,), K, their slopes after them, (n, 8)."""
+    x = np.concatenate([np.ones((len(force), 1)), force], axis=-1)
+    return x if theta is None else np.concatenate([x, theta[:, None] * x], axis=-1)
 
 
 def robust_fit(force: Array, output: Array, theta: Array | None = None) -> Array:
@@ -116,10 +121,7 @@ def robust_fit(force: Array, output: Array, theta: Array | None = None) -> Array
     theta : (n,), temperature above the reference, K: the slopes of all four over it are fitted too, and follow them, (3, 8)
     """
     there = np.isfinite(output).all(axis=-1)
-    x = np.concatenate([np.ones((len(force), 1)), force], axis=-1)
-    if theta is not None:
-        x = np.concatenate([x, theta[:, None] * x], axis=-1)
-    x, y = x[there], output[there]
+    x, y = design(force, theta)[there], output[there]
     weight = np.ones(len(y))
     coefficients = np.zeros((x.shape[1], output.shape[-1]))
     for turn in range(_ROUNDS):

@@ -14,7 +14,7 @@ from inertial.arrays import Array
 from inertial.decisions import TOGETHER, UNITS_TOGETHER
 from inertial.design import of_axes
 from inertial.distributions import chi2_quantile
-from inertial.estimation.alternative import Handling, by_block, tilts
+from inertial.estimation.alternative import Handling, by_block, pose_errors
 from inertial.estimation.bases import unit_columns
 from inertial.estimation.comparison import estimate, residuals
 from inertial.estimation.model import Model
@@ -128,18 +128,18 @@ def of_station(term: Term) -> bool:
 
 
 def scatter_of_poses(model: Model) -> float:
-    """Variance of the table's angles from dwell to dwell, as all units see it, over that of the units' own noise; one at least.
+    """Variance of the directions of the poses, as all units see it, over that of the units' own noise; one at least.
 
-    Of each dwell by itself the two angles are fitted that all units share. Where the table comes to rest within some
-    microradians, their chi-square is larger than the noise of the units makes it, in many dwells; the quantiles over the dwells
-    are not raised by one wrong pose. What is said of the station has to stand out of this scatter.
+    Of each dwell by itself the two errors of its direction that all units share are fitted. Where a table comes to rest within
+    some microradians, their chi-square is larger than the noise of the units makes it, in many dwells; the quantiles over the
+    dwells are not raised by one wrong pose. What is said of the station has to stand out of this scatter.
     """
     lot = model.problem.lot
     units, n = lot.state.time.shape
-    if units < 2 or lot.radial or lot.state.outer is None or lot.state.inner is None:
+    change = pose_errors(lot.state)
+    if units < 2 or lot.radial or not change.shape[-1]:
         return 1.0
     there = np.flatnonzero(np.isfinite(lot.error).all(axis=-1).any(axis=0))
-    change = tilts(lot.state)
     columns = by_block(of_axes(np.broadcast_to(change, (units, n, 3, change.shape[-1])), lot.state.axes, 2))
     gain = model.space.gain_of_dwells(columns, there)
     drop = gain.drop[gain.rank == 2]

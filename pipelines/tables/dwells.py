@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from inertial.data_errors.readings import Readings, robust_fit
+from inertial.data_errors.readings import Readings, design, robust_fit
 from inertial.estimation.problem import Lot
 from inertial.fits.linear import force_along_axes, of_every_axis, own_terms
 from inertial.frames import shown_force
@@ -232,9 +232,7 @@ def _felt_with_temperature(measurement: Measured, response: Array, scale: Array)
     force = np.broadcast_to(state.force, run.shape)
     shown = shown_force(force, axes)
     for unit, theta in enumerate(np.broadcast_to(state.theta, run.shape[:2])):
-        x = np.concatenate([np.ones((len(theta), 1)), shown[unit]], axis=-1)
-        there = readings.there[unit]
-        if np.linalg.matrix_rank(np.concatenate([x, theta[:, None] * x], axis=-1)[there]) < _columns(shown):
+        if np.linalg.matrix_rank(design(shown[unit], theta)[readings.there[unit]]) < _columns(shown):
             continue  # the poses of the soaks do not determine the axes and their gain's run
         own = robust_fit(shown[unit], readings.output[unit], theta)
         felt[unit] = force_along_axes(of_every_axis(own[:, 1:4], axes), force[unit])

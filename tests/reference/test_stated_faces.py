@@ -71,7 +71,6 @@ def test_the_bias_of_six_faces_lies_within_its_uncertainty(rng, kind, hand_deg, 
     """
     errors, stated = biases(rng, kind, hand_deg, lots)
     assert np.mean(np.abs(errors) < COVERAGE * stated) >= least
-    if (
-        kind != "walk" or hand_deg
-    ):  # of a walk the fit states the bias at any time of it, not the mean over the record alone
+    # of a walk the fit states the bias at any time of it, not the mean over the record alone
+    if kind != "walk" or hand_deg:
         assert np.sqrt(np.mean(stated**2) / np.mean(errors**2)) < (3.5 if hand_deg else 2.0)

@@ -16,6 +16,7 @@ from inertial.data_errors.handling.units_swapped import UnitsSwapped
 from inertial.data_errors.removed_dwells import BadDwell
 from inertial.data_errors.tails import with_tails
 from inertial.estimation.alternative import common, pose_errors
+from inertial.estimation.likelihood import scatter_of_poses
 from pipelines.tables.sound_lot import sound_lot
 
 GATE = 5.4
@@ -174,3 +175,12 @@ def test_a_dwell_that_is_off_in_every_unit_in_its_own_way_is_no_noise(units: int
     assert {dwell.dwell for dwell in run.removed} == {30}
     assert len(run.removed) >= units - 1
     assert not any_of_all(ExaminedRun(lot_in(made), BASE).model())
+
+
+def test_a_table_at_rest_within_some_microradians_is_seen_in_stated_forces_as_in_angles() -> None:
+    lot = lot_in(make(NULLS["rest20"], 6_300_080))
+    stated = replace(lot, state=replace(lot.state, outer=None, inner=None, memory={}))
+    scatters = [scatter_of_poses(ExaminedRun(each, BASE).model()) for each in (lot, stated)]
+    assert min(scatters) > 1.3
+    assert scatters[1] == pytest.approx(scatters[0], rel=0.25)
+    assert scatter_of_poses(ExaminedRun(lot_in(make(NULLS["white"], 6_300_080)), BASE).model()) < 1.3
