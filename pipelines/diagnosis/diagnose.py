@@ -186,6 +186,7 @@ def document(
             "shape": diagnosis.unexplained.shape,
             "part": diagnosis.unexplained.part,
             "text": what_follows(diagnosis.unexplained),
+            "period_s": diagnosis.unexplained.period,
             "p_value": probability(diagnosis.unexplained.log_p),
         },
         "unseen": list(diagnosis.unseen),

@@ -140,6 +140,7 @@ class UnexplainedExcess(TypedDict):
     p_value: float
     part: NotRequired[Annotated[str, "what follows the driver: bias, scale, axes or transfer, the transfer curve"]]
     text: NotRequired[Annotated[str, "the same as a sentence without its end"]]
+    period_s: NotRequired[Annotated[float | None, "of a swing with the time, s; null of another curve"]]
 
 
 class NextMeasurement(TypedDict):

@@ -216,7 +216,8 @@ def unexplained_text(document: dict[str, Any]) -> str:
     unexplained = document["unexplained"]
     if not unexplained:
         return ""
-    return f"{unexplained['text']} as a {unexplained['shape']} (p {equal(unexplained['p_value'])})."
+    shape = "" if unexplained.get("period_s") else f" as a {unexplained['shape']}"
+    return f"{unexplained['text']}{shape} (p {equal(unexplained['p_value'])})."
 
 
 def not_separated(document: dict[str, Any]) -> str:

@@ -161,12 +161,14 @@ def driver_chart(left: LotResiduals, drivers: list[DriverValues], temperature: A
             x = values[:, column] if values.ndim > 1 else values
             traces = [level(x, 0.0, dashed=False)]
             for label, residual in shown:
-                traces += _against(x, residual[column], label, turned, several=len(shown) > 1)
+                traces += _against(x, residual[column], label, turned, series.period, several=len(shown) > 1)
             plots.append(Plot(_named(axis) if row == 0 else "", PlotAxis(series.label), across, tuple(traces)))
     return Chart("Residuals against recorded quantities", tuple(plots), len(left.axes), height=235)
 
 
-def _against(x: Array, y: Array, label: str, turned: Index | None, *, several: bool) -> Iterator[Trace]:
+def _against(
+    x: Array, y: Array, label: str, turned: Index | None, period: float | None, *, several: bool
+) -> Iterator[Trace]:
     """Points of one model, by the way the temperature was reached where that is known, and a smooth curve."""
     role = cast("Role", label)
     groups: list[tuple[Flags, Symbol, str]] = [(np.isfinite(y), "circle", "")]
@@ -179,7 +181,7 @@ def _against(x: Array, y: Array, label: str, turned: Index | None, *, several: b
             yield Trace(
                 ", ".join(words) or "residual", x[rows], y[rows], role=role, symbol=symbol, size=4.5, legend=bool(words)
             )
-    yield from smooth(label, x, y, role)
+    yield from smooth(label, x, y, role, period)
 
 
 def quantity_chart(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -56,11 +56,15 @@ class LotResiduals:
 
 @dataclass(frozen=True)
 class DriverValues:
-    """A driver's values (units, n), or (units, n, 3) where it is one per axis, with a label for people."""
+    """A driver's values (units, n), or (units, n, 3) where it is one per axis, with a label for people.
+
+    period : of a swing that the residual follows, in the unit of the values; None of another curve
+    """
 
     name: str
     label: str
     values: Array
+    period: float | None = None
 
 
 def lot_residuals(diagnosis: Diagnosis, units: tuple[str, ...]) -> LotResiduals:
@@ -110,7 +114,11 @@ def drivers_shown(diagnosis: Diagnosis) -> list[DriverValues]:
     """Drivers with a picture: those of the added effects, those that the residual follows, then the usual ones if they vary."""
     known = {one.name: one for one in recorded_quantities(diagnosis.problem)}
     forces, named = quantities_of_added(diagnosis)
-    first = [] if diagnosis.unexplained is None else [diagnosis.unexplained.driver]
+    unknown = diagnosis.unexplained
+    first = [] if unknown is None else [unknown.driver]
+    if unknown is not None and unknown.period is not None and unknown.driver in known:
+        period = unknown.period * shown_factor(unknown.driver)
+        known[unknown.driver] = replace(known[unknown.driver], period=period)
     names = [*first, *named, *(p.driver for p in diagnosis.where[:5])]
     drivers = list(forces)
     for name in dict.fromkeys([*names, *ALWAYS]):
@@ -165,7 +173,7 @@ def bands_without_zero(left: LotResiduals, drivers: list[DriverValues]) -> list[
         axes: list[str] = []
         for column, axis in enumerate(left.axes):
             x = values[:, column] if values.ndim > 1 else values
-            _, low, high = band(x, left.after[left.shown, column])
+            _, low, high = band(x, left.after[left.shown, column], series.period)
             if bool(np.any(low > 0.0) or np.any(high < 0.0)):
                 axes.append(axis)
         if axes:

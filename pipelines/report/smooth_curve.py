@@ -11,9 +11,9 @@ from pipelines.drawing.chart import Role, Trace
 _KNOTS = 5
 
 
-def smooth(name: str, x: Array, y: Array, role: Role) -> list[Trace]:
+def smooth(name: str, x: Array, y: Array, role: Role, period: float | None = None) -> list[Trace]:
     """The marks of :func:`band` and of its middle; none where there are too few points."""
-    places, low, high = band(x, y)
+    places, low, high = band(x, y, period)
     if not places.size:
         return []
     return [
@@ -22,21 +22,33 @@ def smooth(name: str, x: Array, y: Array, role: Role) -> list[Trace]:
     ]
 
 
-def band(x: Array, y: Array) -> tuple[Array, Array, Array]:
-    """Smooth curve through points with its 95 % band: (places, low, high); empty where there are too few."""
+def band(x: Array, y: Array, period: float | None = None) -> tuple[Array, Array, Array]:
+    """Smooth curve through points with its 95 % band: (places, low, high); empty where there are too few.
+
+    Parameters
+    ----------
+    period : of a swing that the points follow, in the unit of x; then the curve is one
+    """
     there = np.isfinite(x) & np.isfinite(y)
     x, y = x[there], y[there]
     if x.size < 3 * _KNOTS or np.unique(np.round(x, 9)).size < 3:
         return np.zeros(0), np.zeros(0), np.zeros(0)
     groups = _groups(x)
-    places = np.linspace(x.min(), x.max(), 80) if groups > 3 else np.unique(x)
-    both = _basis(np.concatenate([x, places]), x.size, groups)
+    places = np.linspace(x.min(), x.max(), 200 if period else 80) if period or groups > 3 else np.unique(x)
+    whole = np.concatenate([x, places])
+    both = _swing(whole, period) if period else _basis(whole, x.size, groups)
     design, at = both[: x.size], both[x.size :]
     coefficients, _, rank, _ = np.linalg.lstsq(design, y, rcond=1e-9)
     left = y - design @ coefficients
     variance = float(left @ left) / max(x.size - int(rank), 1)
     spread = 1.96 * np.sqrt(variance * np.einsum("ij,jk,ik->i", at, np.linalg.pinv(design.T @ design, rcond=1e-10), at))
     return places, at @ coefficients - spread, at @ coefficients + spread
+
+
+def _swing(values: Array, period: float) -> Array:
+    """Constant, sine and cosine."""
+    phase = 2.0 * np.pi * values / period
+    return np.stack([np.ones(values.size), np.sin(phase), np.cos(phase)], axis=-1)
 
 
 def _groups(values: Array) -> int:

@@ -191,7 +191,10 @@ def test_the_course_of_a_day_is_offered_with_its_period_and_makes_the_model_adeq
     assert document["error"]["floor_ug"] == pytest.approx(floor, rel=0.05)
     assert document["where"][0]["driver"] == "time_s"
     assert document["where"][0]["share"] > 0.9
-    offer, rate = document["offer"], 2.0 * np.pi * 3600.0 / run.sealed.effects[0].parameters["period_s"]
+    period = run.sealed.effects[0].parameters["period_s"]
+    assert document["unexplained"]["period_s"] == pytest.approx(period, rel=0.01)
+    assert "min (p < 0.001)" in text_of("diagnose", *data, "bias,scale,misalignment")
+    offer, rate = document["offer"], 2.0 * np.pi * 3600.0 / period
     assert float(offer["columns"][0].split("(")[1].split()[0]) == pytest.approx(rate, rel=0.01)
     formula = ("--formula", f"{offer['id']}={'; '.join(offer['columns'])}")
     after = document_of("diagnose", *data, f"bias,scale,misalignment,{offer['id']}", *formula, status=0)
