@@ -134,7 +134,7 @@ def read(
     if isinstance(source, pd.DataFrame):
         if is_exchange(source.columns) and not columns:
             past = history if isinstance(history, pd.DataFrame) else None if history is None else read_history(history)
-            return _kept(checked(source, where="DataFrame", foreign=True), past, "DataFrame", archive)
+            return _kept(checked(source, where="DataFrame", foreign=True), past, "DataFrame", archive, units)
         return replace(_imported(_as_file(source), columns, units, serial or "A", archive, stated), command="")
     from pipelines.importers.files import is_file
 
@@ -147,7 +147,7 @@ def read(
         beside = history if isinstance(history, str | Path) else ""
         dwells, past, _ = dwells_and_history(str(path), str(beside), None)
         past = checked_history(history, "history", foreign=True) if isinstance(history, pd.DataFrame) else past
-        return _kept(dwells, past, path.name, archive)
+        return _kept(dwells, past, path.name, archive, units)
     return _imported(path, columns, units, serial, archive, stated)
 
 
@@ -158,18 +158,18 @@ def _is_table_of_dwells(path: Path) -> bool:
     return is_exchange(files.read(path)[0].columns)
 
 
-def _kept(dwells: pd.DataFrame, history: pd.DataFrame | None, name: str, archive: str | Path | None) -> Recording:
+def _kept(
+    dwells: pd.DataFrame,
+    history: pd.DataFrame | None,
+    name: str,
+    archive: str | Path | None,
+    units: Mapping[str, str] | None,
+) -> Recording:
     """A table of dwells as a run."""
-    from pipelines.importers.keep import keep_tables, lot_of_import
+    from pipelines.importers.keep import complete_table, keep_table_of_dwells
 
-    tables = {"dwells": dwells} if history is None else {"dwells": dwells, "history": history}
-    digest = hashlib.sha256()
-    for one in tables.values():
-        digest.update(one.to_csv(index=False).encode())
-    serials = list(dict.fromkeys(dwells["unit"].astype(str)))
-    about = {"name": f"dwells of {', '.join(serials[:3])}", "lot": lot_of_import(serials), "remarks": []}
-    run = keep_tables("import", digest.hexdigest(), {"dwells": name}, about, tables, _place(archive))
-    return Recording(run)
+    dwells, told = complete_table(dwells, (units or {}).get("output", ""))
+    return Recording(keep_table_of_dwells(dwells, history, name, _place(archive)), told)
 
 
 def _place(archive: str | Path | None) -> str:

@@ -7,7 +7,11 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
+
 from pipelines.importers.content import Content
+from pipelines.importers.exchange import is_exchange
+from pipelines.importers.files import SourceFile
 from pipelines.importers.mapping import Mapping
 from schemas.errors import WrongUse
 from schemas.foreign import shown
@@ -45,6 +49,8 @@ def import_document(
         content, source, breaks = sources.read(
             paths, join=str(keys.get("join", "")), time=time, group=str(keys.get("group", ""))
         )
+        if "columns" not in keys and is_exchange(content.table.columns):
+            return _table_of_dwells(content.table, keys, paths[0], source, fit, archive)
         how = _mapping(keys, content, where, name)
         data = record.imported(content.table, how, name, content, breaks)
     judged = None
@@ -73,6 +79,41 @@ def import_document(
         **({} if judged is None else judged.document),
         "lines": [] if judged is None else list(judged.lines),
         "dwell_list": dwell_rows(data, judged, how),
+    }
+
+
+def _table_of_dwells(
+    table: pd.DataFrame, keys: dict[str, Any], path: Path, source: SourceFile, fit: str, archive: str | None
+) -> dict[str, Any]:
+    """A table of dwells in the exchange format, which states by its columns what a mapping would."""
+    from pipelines.diagnosis.inputs import history_beside
+    from pipelines.importers.exchange import checked, read_history
+    from pipelines.importers.keep import complete_table, keep_table_of_dwells
+
+    if fit or set(keys) - {"units"}:
+        more = [*sorted(set(keys) - {"units"}), *(["fit"] if fit else [])]
+        raise WrongUse(
+            f"import: {path.name} is a table of dwells in the exchange format, which takes --units output=… alone (found "
+            f"{', '.join(more)}); import it without them, then 'tumbleline fit RUN', or map its columns with --map"
+        )
+    beside = history_beside(str(path))
+    dwells, told = complete_table(
+        checked(table, where=path.name, foreign=True), keys.get("units", {}).get("output", "")
+    )
+    run = keep_table_of_dwells(dwells, read_history(beside) if beside else None, path.name, archive, source)
+    return {
+        "run": run.id,
+        "source": source.as_dict(),
+        "units": list(dict.fromkeys(dwells["unit"].astype(str))),
+        "out_unit": str(dwells["out_unit"].iloc[0]) if "out_unit" in dwells.columns else "",
+        "samples": 0,
+        "dwells": len(dwells),
+        "remarks": [*told, *([f"temperatures between the dwells: {Path(beside).name}"] if beside else [])],
+        "faults": [],
+        "fit": None,
+        "adequate": None,
+        "lines": [],
+        "dwell_list": [],
     }
 
 

@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Mapping as Parameters
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
+from inertial.quantities import OUTPUT_COLUMNS, SPREAD_COLUMNS
 from pipelines.archive import Archive, Run, code_hash, stage_key
 from pipelines.importers.files import SourceFile
 from pipelines.importers.judged import FitAnswer
-from pipelines.importers.mapping import Mapping
+from pipelines.importers.mapping import OUTPUT_UNITS, Mapping
 from pipelines.importers.record import Imported
+from pipelines.importers.unit_check import DOUBT, size_of, unit_of
+from pipelines.tables.dwell_table import output_axes
+from schemas.errors import WrongUse
+from schemas.foreign import shown
 from schemas.import_references import ImportReferences
 
 
@@ -39,9 +46,60 @@ def keep_tables(
     return run
 
 
-def lot_of_import(units: list[str]) -> dict[str, Any]:
-    """The lot of an import: its units, and no device."""
-    return {"device": "imported", "units": [{"serial": unit, "slot": 0} for unit in units]}
+def lot_of_import(units: list[str], dwells: pd.DataFrame | None = None) -> dict[str, Any]:
+    """The lot of an import: its units with their slots where the dwells tell them, and no device."""
+    slots: dict[str, int] = {}
+    if dwells is not None and "slot" in dwells.columns:
+        first = dwells.drop_duplicates("unit")
+        slots = dict(zip(first["unit"].astype(str), first["slot"].astype(int), strict=True))
+    return {"device": "imported", "units": [{"serial": unit, "slot": slots.get(unit, 0)} for unit in units]}
+
+
+def keep_table_of_dwells(
+    dwells: pd.DataFrame, history: pd.DataFrame | None, name: str, archive: str | None, source: SourceFile | None = None
+) -> Run:
+    """The run that holds a table of dwells in the exchange format, complete for a fit (:func:`complete_table`)."""
+    tables = {"dwells": dwells} if history is None else {"dwells": dwells, "history": history}
+    digest = hashlib.sha256()
+    for one in tables.values():
+        digest.update(one.to_csv(index=False).encode())
+    serials = list(dict.fromkeys(dwells["unit"].astype(str)))
+    about: dict[str, Any] = {
+        "name": f"dwells of {', '.join(serials[:3])}",
+        "lot": lot_of_import(serials, dwells),
+        "remarks": [],
+    }
+    about |= {} if source is None else {"source": source.as_dict()}
+    return keep_tables("import", digest.hexdigest(), {"dwells": name}, about, tables, archive)
+
+
+def complete_table(dwells: pd.DataFrame, unit: str = "") -> tuple[pd.DataFrame, tuple[str, ...]]:
+    """A table of dwells with the kind, pose and output unit that it does not have, and what was assumed, as sentences.
+
+    Parameters
+    ----------
+    unit : of the outputs in the table; empty: that of its column ``out_unit``, else what their size at rest says beyond doubt
+    """
+    if unit and unit not in OUTPUT_UNITS:
+        raise WrongUse(f"output in '{shown(unit)}': one of {', '.join(OUTPUT_UNITS)} is needed")
+    if unit and "out_unit" in dwells.columns:
+        raise WrongUse(f"output in {unit} was given, the table has a column out_unit; leave out one of them")
+    dwells, told = dwells.copy(), []
+    outputs = [OUTPUT_COLUMNS[axis] for axis in output_axes(dwells.columns)]
+    if "out_unit" not in dwells.columns and not unit and len(outputs) == len(OUTPUT_COLUMNS):
+        values = dwells[outputs].to_numpy(dtype=np.float64)
+        likely, reason = unit_of(values, size_of(values), means=True)
+        unit = "" if reason.endswith(DOUBT) else likely
+        told += [f"outputs in {unit}: {reason}"] if unit else []
+    if unit:
+        dwells["out_unit"], factor = OUTPUT_UNITS[unit]
+        spreads = [SPREAD_COLUMNS[axis] for axis in output_axes(dwells.columns)]
+        for column in (*outputs, *(name for name in spreads if name in dwells.columns)):
+            dwells[column] *= factor
+    for column, value in (("kind", "dwell"), ("pose", "dwell " + dwells["dwell"].astype(str)), ("slot", 0)):
+        if column not in dwells.columns:
+            dwells[column] = value
+    return dwells, tuple(told)
 
 
 def keep(
@@ -63,7 +121,7 @@ def keep(
         parameters["references"] = references.model_dump(mode="json")
     about: dict[str, Any] = {"name": f"import of {', '.join(data.units[:3])}", "source": source.as_dict()}
     about |= {"mapping": parameters["mapping"], "remarks": list(data.remarks)}
-    about["lot"] = lot_of_import(data.units)
+    about["lot"] = lot_of_import(data.units, data.dwells)
     if judged is not None and judged.effects:
         model = {"effects": list(judged.effects), "formulas": [], "model_name": "", "model_version": 0}
         about["recipe"] = {"name": "import", **model}

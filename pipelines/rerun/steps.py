@@ -9,7 +9,7 @@ from typing import Any
 import pandas as pd
 from pydantic import ValidationError
 
-from inertial.quantities import FORCE_COLUMNS, SPREAD_COLUMNS
+from inertial.quantities import FORCE_COLUMNS
 from pipelines.archive import Archive, Run, code_hash
 from pipelines.archive.signatures import ENTRY
 from pipelines.chain.chain import RECORDS, STAGES, Tables
@@ -36,8 +36,7 @@ from pipelines.rerun.import_steps import (
 from pipelines.stages.figures import UNITS
 from pipelines.stages.grade import refuse_limits_without_figures
 from pipelines.stages.uncertainty.budget_terms import archived_terms
-from pipelines.tables.dwell_table import output_axes
-from pipelines.tables.leave_out import Dwells, leave_out
+from pipelines.tables.leave_out import Dwells, leave_out, of_every_unit
 from schemas.errors import DataRejected, WrongUse
 from schemas.limits import limits_of
 from schemas.lot import Lot
@@ -48,11 +47,6 @@ from schemas.units import AXES
 
 PROVENANCE = ("who", "where", "when", "software", "libraries", ENTRY, "rerun_of", "because", "measured")
 _REFERENCE = "a fit needs the force at every dwell: import the file again, which adds it at the angles of a table"
-_NOISE = (
-    "a fit of known poses weights dwells by the standard deviation of their samples (sd_x, sd_y, sd_z) and their number (n): "
-    "import the file again with these columns mapped, or its samples; where neither is known, 'tumbleline diagnose {run}' judges "
-    "the model, with the noise of the residuals"
-)
 _AS_IMPORTED = "a fit needs them: import the file with 'tumbleline import FILE --rows dwells --map … --units output=…'"
 """What a fit needs of imported dwells, and what to do where they lack it."""
 
@@ -159,7 +153,10 @@ def _capture_step(run: Run, job: ArchivedJob) -> StageCall:
 def _imported(run: Run, change: ModelChange, left_out: Dwells) -> Plan:
     """Fit, verification and, where limits are known, grades of dwells that were imported."""
     about = run.about
-    dwells = leave_out(_fit_for_a_fit(run), left_out)
+    dwells = _fit_for_a_fit(run)
+    if has_poses(dwells):
+        left_out = of_every_unit(dwells, left_out)
+    dwells = leave_out(dwells, left_out)
     data = imported(run, dwells)
     across = None if change.effects or about.get("recipe", {}).get("effects") else axis_of_plane(dwells)
     if across is not None:
@@ -218,8 +215,7 @@ def _fit_for_a_fit(run: Run) -> pd.DataFrame:
     dwells = run.table("dwells")
     by_reason = {_AS_IMPORTED: ("kind", "pose", "out_unit")}
     if has_poses(dwells):
-        spreads = [SPREAD_COLUMNS[axis] for axis in output_axes(dwells.columns)]
-        by_reason = {_REFERENCE: FORCE_COLUMNS, _NOISE: (*spreads, "n"), **by_reason}
+        by_reason = {_REFERENCE: FORCE_COLUMNS, **by_reason}
     for reason, needed in by_reason.items():
         missing = [name for name in needed if name not in dwells.columns]
         if missing:

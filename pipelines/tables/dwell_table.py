@@ -73,6 +73,10 @@ class DwellTable:
         self.outputs = tuple(OUTPUT_COLUMNS[axis] for axis in self.axes)
         self.spreads = tuple(SPREAD_COLUMNS[axis] for axis in self.axes)
 
+    def common(self) -> list[int]:
+        """Numbers of the dwells that every unit has."""
+        return [int(number) for number in self.numbers[np.bincount(self._rows[1]) == self.shape[0]]]
+
     def has(self, *names: str) -> bool:
         """Whether the table has these columns, and a value in each of their rows."""
         return all(name in self.frame.columns and self._full(name) for name in names)

@@ -27,6 +27,11 @@ from schemas.units import AXES
 Array = NDArray[np.float64]
 
 KINDS = ("dwell", "verification")
+_SHOWN = 5  # dwells that a message names
+_LEAST_G = 1e-9  # scatter of dwells that are alike to the last digit
+UNTOLD = 0.1
+"""Share of the scatter of dwells that stands for the noise of their samples where none is recorded: it must be no more than the
+noise, and scatter beyond it counts as wander, which does not average out, unless the dwells refute that."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +62,8 @@ class LotArrays:
     """Dwells of a lot without gaps.
 
     units : serials, in order; dwells : (n,) numbers; poses, kinds : (n,) names
-    output, standard_error : (units, n, 3), output unit; the error is that of white noise, sd/√n
+    output, standard_error : (units, n, 3), output unit; the error is that of white noise, sd/√n; where no samples tell it,
+        :data:`UNTOLD` of the scatter of the dwells: less than the noise, so that the residuals decide
     """
 
     units: tuple[str, ...]
@@ -150,8 +156,8 @@ def lot_arrays(
     table = DwellTable(dwells, kinds)
     if not table.units or not table.whole:
         raise DataRejected(
-            f"dwells: {table.rows} rows for {table.shape[0]} units and {table.shape[1]} dwells, every unit needs every dwell; "
-            "remove the units that lack some, or measure them again"
+            f"dwells: {table.rows} rows for {table.shape[0]} units and {table.shape[1]} dwells, every unit needs every dwell"
+            f"{_lacking(table)}; fit without these dwells (of an import with --leave-out), remove the units, or measure again"
         )
     out_units = sorted(set(table.texts("out_unit")))
     if len(out_units) != 1:
@@ -171,9 +177,26 @@ def lot_arrays(
         kinds=np.asarray(table.per_dwell("kind"), dtype=np.str_),
         state=state,
         output=table.by_axis(table.outputs),
-        standard_error=table.by_axis(table.spreads) / np.sqrt(table.grid("n"))[..., None],
+        standard_error=table.by_axis(table.spreads) / np.sqrt(table.grid("n"))[..., None]
+        if {*table.spreads, "n"} <= set(dwells.columns)
+        else _untold_error(dwells, table.shape),
         out_unit=out_units[0],
     )
+
+
+def _lacking(table: DwellTable) -> str:
+    """Which dwells some unit lacks, for a message."""
+    missing = sorted({int(number) for number in table.numbers} - set(table.common()))
+    more = " …" if len(missing) > _SHOWN else ""
+    return f" (not all have dwell {', '.join(map(str, missing[:_SHOWN]))}{more})" if missing else ""
+
+
+def _untold_error(dwells: pd.DataFrame, shape: tuple[int, int]) -> Array:
+    """:data:`UNTOLD` of the scatter of all dwells about a robust plain fit, (units, n, axes), output unit."""
+    readings = measured(dwells).readings
+    scatter = float(np.sqrt(np.nanmean(readings.misfit_when_warm**2)))
+    error = UNTOLD * max(scatter, _LEAST_G) * readings.scale
+    return np.broadcast_to(error[:, None, None], (*shape, len(readings.axes)))
 
 
 def _stated_unit(dwells: pd.DataFrame) -> str | None:

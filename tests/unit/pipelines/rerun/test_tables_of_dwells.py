@@ -1,0 +1,129 @@
+"""A table of dwells from elsewhere, as it is: without the scatter of samples, and with a bad dwell of one unit of a lot."""
+
+from contextlib import nullcontext
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from numpy.typing import NDArray
+
+from inertial.noise.flicker import flicker_kernel
+from inertial.noise.measurands import walk_kernel
+from pipelines.archive import Archive
+from pipelines.diagnosis.import_document import import_document
+from pipelines.importers.keep import complete_table
+from pipelines.jobs.model_change import ModelChange
+from pipelines.rerun.rerun import again
+from pipelines.stages.fit import fit
+from schemas.errors import DataRejected, WrongUse
+
+Array = NDArray[np.float64]
+PLAIN = ("bias", "scale", "misalignment")
+SPREAD_G = 5e-5
+GAIN = 1.01
+"""Output per g along each axis; the axes are square."""
+BIAS_G = 0.02
+
+
+def directions() -> Array:
+    """Gravity (36, 3) in 18 directions, each twice."""
+    faces = np.concatenate([np.eye(3), -np.eye(3)])
+    edges = [np.roll((0.0, one, other), turn) for turn in range(3) for one in (-1.0, 1.0) for other in (-1.0, 1.0)]
+    return np.tile(np.concatenate([faces, np.array(edges) / np.sqrt(2.0)]), (2, 1))
+
+
+def table(rng: np.random.Generator, root: Array | None = None, units: str = "ABC") -> pd.DataFrame:
+    """A lot in the exchange format without sd and n, with noise of covariance ``root`` (n, n) times its transpose, g²."""
+    force = directions()
+    n = len(force)
+    root = SPREAD_G * np.eye(n) if root is None else root
+    made: list[pd.DataFrame] = []
+    for unit in units:
+        output = GAIN * force + BIAS_G + root @ rng.normal(size=(n, 3))
+        columns = {"unit": unit, "dwell": range(n), "time_s": 40.0 * np.arange(n), "unit_C": 25.0}
+        columns |= {f"force_{axis}": force[:, k] for k, axis in enumerate("xyz")}
+        made.append(pd.DataFrame(columns | {f"out_{axis}": output[:, k] for k, axis in enumerate("xyz")}))
+    return pd.concat(made, ignore_index=True)
+
+
+def errors_over_uncertainties(root: Array, seed: int, effect: str, lots: int = 8) -> Array:
+    """Errors of an effect's coefficients in some lots over their standard errors."""
+    rng = np.random.default_rng(seed)
+    truth = {"bias": BIAS_G, "scale": GAIN}[effect]
+    fits = [fit(complete_table(table(rng, root))[0], None, PLAIN)["coefficients"] for _ in range(lots)]
+    rows = pd.concat(fits).query("effect == @effect")
+    return ((rows["value"] - truth) / rows["standard_error"]).to_numpy()
+
+
+def test_errors_are_as_large_as_the_residuals_say_where_no_samples_tell_the_noise() -> None:
+    """Within 2·u as often as k = 2 says; the scale under slow noises, of which a bias is no fixed number."""
+    n = len(directions())
+    time, white = 40.0 * np.arange(n), np.eye(n)
+    noises = {
+        "white": white,
+        "flicker": 0.2 * white + flicker_kernel(time),
+        "walk": white + 4.0 * walk_kernel(time, np.ones(n, dtype=bool)),
+    }
+    roots = {name: SPREAD_G * np.linalg.cholesky(covariance) for name, covariance in noises.items()}
+    found = {name: errors_over_uncertainties(root, 20 + k, "scale") for k, (name, root) in enumerate(roots.items())}
+    found["bias"] = errors_over_uncertainties(roots["white"], 9, "bias")
+    inside = {name: float(np.mean(np.abs(ratios) < 2.0)) for name, ratios in found.items()}
+    assert all(share > 0.88 for share in inside.values()), inside  # 95 % less three deviations of 72 values
+    # and they are not so large that they say nothing
+    assert all(np.std(ratios) > 0.6 for ratios in found.values())
+
+
+def test_a_bad_dwell_of_one_unit_is_left_out_of_the_lot(tmp_path: Path) -> None:
+    """As a diagnosis advises: the fit of a lot takes the dwells that every unit has."""
+    dwells = table(np.random.default_rng(5))
+    dwells.loc[(dwells["unit"] == "B") & (dwells["dwell"] == 7), "out_y"] += 0.004
+    path = tmp_path / "lot.csv"
+    dwells.to_csv(path, index=False)
+    done = import_document([path], {}, "", "", str(tmp_path / "archive"), None, nullcontext)
+    archive = Archive(str(tmp_path / "archive"))
+    whole = again(archive, done["run"], ModelChange())
+    without = again(archive, done["run"], ModelChange(), left_out=(("B", 7),))
+    bias = [
+        run.table("coefficients").query("unit == 'B' and axis == 'y' and effect == 'bias'")["value"].item()
+        for run in (archive.run(whole.new), archive.run(without.new))
+    ]
+    assert abs(bias[0] - BIAS_G) > 5e-5 > abs(bias[1] - BIAS_G)
+    kept = archive.run(without.new)
+    assert set(kept.about["left_out"]) == {"A:7", "B:7", "C:7"}
+    assert 7 not in set(kept.table("dwells")["dwell"])
+
+
+def test_a_lot_with_a_gap_names_the_dwell_and_the_option() -> None:
+    dwells = complete_table(table(np.random.default_rng(6)))[0]
+    gap = dwells[~((dwells["unit"] == "C") & (dwells["dwell"] == 4))]
+    with pytest.raises(
+        DataRejected, match=r"not all have dwell 4\); fit without these dwells \(of an import with --leave-out\)"
+    ):
+        fit(gap, None, PLAIN)
+
+
+def test_a_table_is_completed_with_the_unit_that_its_outputs_show() -> None:
+    dwells = table(np.random.default_rng(7), units="A")
+    complete, told = complete_table(dwells)
+    assert set(complete["out_unit"]) == {"g"}
+    assert set(complete["kind"]) == {"dwell"}
+    assert told[0].startswith("outputs in g: its norm is 1.0")
+    in_mg = dwells.assign(**{f"out_{axis}": 1e3 * dwells[f"out_{axis}"] for axis in "xyz"})
+    pd.testing.assert_frame_equal(complete_table(in_mg, "mg")[0], complete)
+    volts = dwells.assign(**{f"out_{axis}": 0.3 * dwells[f"out_{axis}"] for axis in "xyz"})
+    assert "out_unit" not in complete_table(volts)[0].columns
+    assert set(complete_table(volts, "V")[0]["out_unit"]) == {"V"}
+    with pytest.raises(WrongUse, match="output in 'gal': one of g, mg"):
+        complete_table(dwells, "gal")
+
+
+def test_an_import_of_a_table_of_dwells_takes_no_mapping(tmp_path: Path) -> None:
+    path = tmp_path / "lot.csv"
+    table(np.random.default_rng(8)).assign(slot=3).to_csv(path, index=False)
+    with pytest.raises(WrongUse, match=r"takes --units output=… alone \(found local_gravity_m_s2\)"):
+        import_document([path], {"local_gravity_m_s2": 9.8}, "", "", str(tmp_path / "archive"), None, nullcontext)
+    done = import_document([path], {"units": {"output": "mg"}}, "", "", str(tmp_path / "archive"), None, nullcontext)
+    run = Archive(str(tmp_path / "archive")).run(done["run"])
+    assert run.table("dwells")["out_x"].max() < 2e-3
+    assert [unit["slot"] for unit in run.about["lot"]["units"]] == [3, 3, 3]
