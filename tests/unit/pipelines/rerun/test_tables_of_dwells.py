@@ -59,13 +59,17 @@ def errors_over_uncertainties(root: Array, seed: int, effect: str, lots: int = 8
 def test_errors_are_as_large_as_the_residuals_say_where_no_samples_tell_the_noise() -> None:
     """Within 2·u as often as k = 2 says; the scale under slow noises, of which a bias is no fixed number."""
     n = len(directions())
-    time, white = 40.0 * np.arange(n), np.eye(n)
+    time: Array = np.arange(0.0, 40.0 * n, 40.0)
+    white: Array = np.eye(n)
     noises = {
         "white": white,
         "flicker": 0.2 * white + flicker_kernel(time),
         "walk": white + 4.0 * walk_kernel(time, np.ones(n, dtype=bool)),
     }
-    roots = {name: SPREAD_G * np.linalg.cholesky(covariance) for name, covariance in noises.items()}
+    roots: dict[str, Array] = {
+        name: np.asarray(SPREAD_G * np.linalg.cholesky(covariance), dtype=np.float64)
+        for name, covariance in noises.items()
+    }
     found = {name: errors_over_uncertainties(root, 20 + k, "scale") for k, (name, root) in enumerate(roots.items())}
     found["bias"] = errors_over_uncertainties(roots["white"], 9, "bias")
     inside = {name: float(np.mean(np.abs(ratios) < 2.0)) for name, ratios in found.items()}
