@@ -22,6 +22,15 @@ from schemas.foreign import shown
 from schemas.import_references import ImportReferences
 
 
+class _ImportedRun(Run):
+    """A run that captured nothing, which need not be begun to be known."""
+
+    @property
+    def records(self) -> None:
+        """None."""
+        return
+
+
 def keep_tables(
     kind: str,
     source_sha256: str,
@@ -39,9 +48,12 @@ def keep_tables(
     """
     inputs, code = {"source": source_sha256}, code_hash(kind)
     key = stage_key("import", inputs, parameters, code)
-    run = Archive(archive).open_run("import", about, {"key": key})
+    store = Archive(archive)
+    store.prepare()
+    run = _ImportedRun(store, store.run_name("import", {"key": key}))
     if not run.has(tuple(tables), key):
         run.save("import", key, tables, {"inputs": inputs, "parameters": parameters, "code": code})
+    run = store.open_run("import", about, {"key": key})  # last: a full disk leaves no run without its tables
     run.seal()
     return run
 

@@ -10,13 +10,14 @@ from numpy.typing import NDArray
 
 from inertial.noise.flicker import flicker_kernel
 from inertial.noise.measurands import walk_kernel
-from pipelines.archive import Archive
+from pipelines.archive import Archive, files
 from pipelines.diagnosis.import_document import import_document
 from pipelines.importers.keep import complete_table
+from pipelines.integrity import verify
 from pipelines.jobs.model_change import ModelChange
 from pipelines.rerun.rerun import again
 from pipelines.stages.fit import fit
-from schemas.errors import DataRejected, WrongUse
+from schemas.errors import ArchiveUnusable, DataRejected, WrongUse
 
 Array = NDArray[np.float64]
 PLAIN = ("bias", "scale", "misalignment")
@@ -131,3 +132,26 @@ def test_an_import_of_a_table_of_dwells_takes_no_mapping(tmp_path: Path) -> None
     run = Archive(str(tmp_path / "archive")).run(done["run"])
     assert run.table("dwells")["out_x"].max() < 2e-3
     assert [unit["slot"] for unit in run.about["lot"]["units"]] == [3, 3, 3]
+
+
+def test_a_full_disk_leaves_no_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A run of an import begins when its tables are there; the same import goes on where it was."""
+    path = tmp_path / "lot.csv"
+    table(np.random.default_rng(8)).to_csv(path, index=False)
+    publish = files.publish
+
+    def full(target: Path, data: bytes) -> None:
+        if target.suffix == ".parquet":
+            raise ArchiveUnusable("archive: no space left on device")
+        publish(target, data)
+
+    arguments = ([path], {}, "", "", str(tmp_path / "archive"), None, nullcontext)
+    with monkeypatch.context() as patched:
+        patched.setattr(files, "publish", full)
+        with pytest.raises(ArchiveUnusable):
+            import_document(*arguments)
+    archive = Archive(str(tmp_path / "archive"))
+    assert archive.runs() == []
+    assert verify(archive, keys={}).checked.findings == []
+    assert archive.run(import_document(*arguments)["run"]).table("dwells").shape[0] == 108
+    assert verify(archive, keys={}).checked.findings == []
