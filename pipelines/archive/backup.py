@@ -11,8 +11,6 @@ where the chain or its manifest states that it is sound; a capture's samples and
 record after it. Only what an archive makes again in its place (reports, seals, checkpoints) is replaced, where it can be read.
 """
 
-from __future__ import annotations
-
 import json
 import re
 import time

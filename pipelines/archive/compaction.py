@@ -5,8 +5,6 @@ folder by folder under the folder's lock, and only those that are still as they 
 time leaves every file at least once; the next compaction removes what lies twice.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import time

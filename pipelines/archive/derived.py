@@ -5,8 +5,6 @@ made again from the files of the archive, with a warning. A cache that another k
 to an unsigned archive can also forge a seal: ``tumbleline verify`` makes every cache again and compares.
 """
 
-from __future__ import annotations
-
 import json
 import logging
 from collections.abc import Mapping

@@ -4,8 +4,6 @@ On a disk a file is written under a temporary name in its folder, synchronised, 
 A reader sees the whole file or none.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

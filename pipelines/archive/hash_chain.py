@@ -4,8 +4,6 @@
 other takes the next number. A copy of the hash of the last entry, kept elsewhere, shows later whether an entry was removed.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from contextlib import nullcontext
 from typing import Any

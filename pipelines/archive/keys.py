@@ -1,7 +1,5 @@
 """Keys of stages: a hash of inputs, parameters and code. They do not contain what has no effect on a result."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections.abc import Iterable, Mapping

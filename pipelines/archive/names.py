@@ -1,7 +1,5 @@
 """Names in manifests: a file of the archive may refer to places inside the archive only."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from typing import Any
 

@@ -6,8 +6,6 @@ pack grows by half. The merged pack names those that it replaces; when it is pub
 compaction by the next one.
 """
 
-from __future__ import annotations
-
 import hashlib
 import os
 import time

@@ -7,8 +7,6 @@ that has all its files; where two packs have the same file, that of the higher n
 restores the single files.
 """
 
-from __future__ import annotations
-
 import json
 import mmap
 import re

@@ -4,8 +4,6 @@ One edited manifest fails the check of its signature, of its key, of the chain a
 folder gives one finding for each file.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import PurePosixPath

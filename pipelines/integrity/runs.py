@@ -1,7 +1,5 @@
 """Checks of one run (its tables, their manifests, the links between these) and of one capture (its records, their chain)."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -6,8 +6,6 @@ A run without an entry was copied here, or its entry was removed, or its writer 
 writer may still be active gives a remark and no finding.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Build the lineage graph from the manifests, captures and calibrations of an archive."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from pipelines.archive import Archive, Run, files

@@ -1,7 +1,5 @@
 """A lineage as W3C PROV-O (Recommendation of 30 April 2013) in JSON-LD; the context is included, so that no network is needed."""
 
-from __future__ import annotations
-
 from typing import Any
 from urllib.parse import quote
 

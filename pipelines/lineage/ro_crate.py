@@ -1,7 +1,5 @@
 """A lineage as an RO-Crate 1.1: a folder with all its files, and a description for other tools."""
 
-from __future__ import annotations
-
 import json
 from hashlib import sha256
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The target of a lineage: a unit, a run, a file of the archive, or a copy of such a file."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path

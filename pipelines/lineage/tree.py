@@ -1,7 +1,5 @@
 """A lineage as a tree for the terminal: every node with the step that made it, and below the nodes that this step used."""
 
-from __future__ import annotations
-
 from rich.text import Text
 from rich.tree import Tree
 

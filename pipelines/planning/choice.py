@@ -5,8 +5,6 @@ frequent; what a calibration takes out is what it determines: zero and gain at o
 nonlinearity in a centrifuge. What it leaves is the change from switch-on to switch-on and a share of each term in temperature.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

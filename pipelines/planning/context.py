@@ -1,7 +1,5 @@
 """A recipe on a station before it is measured: activities, dwells and procedures, and what poses of verification show besides."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any

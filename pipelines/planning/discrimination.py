@@ -1,7 +1,5 @@
 """Discrimination between rival effects as a requirement, and the separation that a recipe reaches."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import permutations
 from typing import Any

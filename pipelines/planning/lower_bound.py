@@ -6,8 +6,6 @@ other coefficients are known. A real recipe also needs moves, settling and the o
 be shorter.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import permutations

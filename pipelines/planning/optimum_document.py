@@ -1,7 +1,5 @@
 """The document of a recipe search: the recipe found beside the one that the search started from and the textbook plan."""
 
-from __future__ import annotations
-
 from collections import Counter
 from typing import Any
 

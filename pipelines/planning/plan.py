@@ -1,7 +1,5 @@
 """Visibility of effects, expected errors and station time of a recipe, before it is measured."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Sequence
 from dataclasses import replace
 from itertools import pairwise

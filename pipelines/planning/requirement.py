@@ -1,7 +1,5 @@
 """The requirement of a recipe search: required errors or discrimination, temperatures, candidate poses, poses of verification."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Orders of soaks and of ramps for a recipe: temperatures, their order, and the station time they take."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import pairwise, product
 

@@ -1,7 +1,5 @@
 """Plan designs with times: time and columns of every dwell, covariance of the means, station time, and the fewest dwells."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """A run whose tables are read once and written together, because the stages of a re-run share tables and make many."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from functools import cached_property

@@ -1,7 +1,5 @@
 """Differences between two runs: grades, coefficients and figures relative to their uncertainty, and the causes."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The JSON documents of rerun, diff, whatif and the fit of an import. A NotRequired key may be missing."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any, Literal, NotRequired
 
 from typing_extensions import TypedDict

@@ -1,7 +1,5 @@
 """The stages of the chain for a run of imported dwells, as far as what was imported with them allows."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """One archived lot under the model it was run with and under another: outcomes and errors of every unit, nothing is written."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any

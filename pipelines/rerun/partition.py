@@ -1,7 +1,5 @@
 """Batches of the runs of an archive for workers; their arguments and results are plain values."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial

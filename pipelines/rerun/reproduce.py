@@ -1,7 +1,5 @@
 """Reproduction of archived runs: every stage is computed again from its stored inputs and compared byte by byte."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

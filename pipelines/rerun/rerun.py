@@ -1,7 +1,5 @@
 """One run of the archive again: only the stages whose key changed, into a new run; the old one stays as it is."""
 
-from __future__ import annotations
-
 import time
 from dataclasses import dataclass, field
 from functools import cache

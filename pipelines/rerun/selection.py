@@ -1,7 +1,5 @@
 """Selection of runs of an archive by name or property: ``all``, beginnings of names, ``device:…``, ``since:DATE``."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, date, datetime, time

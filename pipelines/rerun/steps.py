@@ -1,7 +1,5 @@
 """What is to be done to a run of the archive: the stages of the chain for its own job, or those that imported dwells allow."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any

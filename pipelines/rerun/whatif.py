@@ -1,7 +1,5 @@
 """The effect of a model on the archive: yield and errors of all lots with old and new model, by station and kind of device."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Callable, Sequence
 from itertools import chain
