@@ -25,8 +25,7 @@ _RANGE = {
 WORDS_PER_SAMPLE: dict[Packing, int] = {"int20x3": 4, "int24x3": 5, "int24x2": 4, "int24x1": 2}
 SEQUENCE: dict[Packing, int] = {"int20x3": 16, "int24x3": 256, "int24x2": 256, "int24x1": 256}
 BITS: dict[Packing, int] = {"int20x3": 20, "int24x3": 24, "int24x2": 24, "int24x1": 24}
-OUTPUTS: dict[Packing, int] = {"int20x3": 3, "int24x3": 3, "int24x2": 2, "int24x1": 1}
-"""The number of axes of a sample."""
+OUTPUTS: dict[Packing, int] = {"int20x3": 3, "int24x3": 3, "int24x2": 2, "int24x1": 1}  # the number of axes of a sample
 _LEFT: dict[Packing, int] = {"int24x2": 40, "int24x1": 8}  # place of the first axis, bits from the last
 
 

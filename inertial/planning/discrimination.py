@@ -17,11 +17,8 @@ from inertial.arrays import Array
 _SINGULAR, _RIDGE, _TINY = 1e-11, 1e-12, 1e-300
 """Smallest eigenvalue of a determined, scaled normal matrix; ridge added to its diagonal; smallest diagonal before scaling."""
 
-_OTHERS = 0.1
-"""Weight of the other pairs beside the pair with the smallest separation."""
-
-_NEGLIGIBLE = 1e-12
-"""Fraction of a rival's own information below which its separation counts as zero."""
+_OTHERS = 0.1  # weight of the other pairs beside the pair with the smallest separation
+_NEGLIGIBLE = 1e-12  # fraction of a rival's own information below which its separation counts as zero
 
 
 @dataclass(frozen=True)

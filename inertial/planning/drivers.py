@@ -15,8 +15,7 @@ from inertial.planning.sequences import SequenceStep, StationPace, extended
 from inertial.quantities import LEFT_ALONE, RECORDED
 from inertial.state import State
 
-_OFF_S = 600.0
-"""Time without power of the trial power cycle, s."""
+_OFF_S = 600.0  # time without power of the trial power cycle, s
 
 
 def first_unit(state: State) -> State:

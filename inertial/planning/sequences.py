@@ -14,9 +14,7 @@ from inertial.quantities import LEFT_ALONE
 from inertial.state import T_REFERENCE, History, State
 from inertial.timing import Air, Drive, SoakRule, followed, settling_s, soaked
 
-_GRAIN_S = 15.0
-"""Time step of the air and device temperatures between dwells, s."""
-
+_GRAIN_S = 15.0  # time step of the air and device temperatures between dwells, s
 _STILL_K, _LONG_S = 0.02, 120.0
 """Temperature difference below which the temperatures count as constant, K, and the time step then, s."""
 

@@ -28,8 +28,7 @@ from schemas.errors import ArchiveUnusable, WrongUse
 CHAIN, INDEX, MARK = "chain", "index", "archive.json"
 STATE = "state"  # of a capture: its one file is replaced with every record
 REMADE = re.compile(r"runs/[^/]+/(report\.(json|html)|sealed\.json)|captures/[^/]+/state/.*|.*/lock|orchestrator/.*")
-_NEWEST, _WRITTEN_S = 4, 2.0
-"""Entries whose runs may be without their seal, and the time in which their writers write it."""
+_NEWEST, _WRITTEN_S = 4, 2.0  # entries whose runs may be without a seal, and the time in which their writers write it
 DERIVED = re.compile(r"discovery/(lock|scores/.*|[^/]+/(lock|state|found))")
 SEAL = re.compile(r"runs/[^/]+/sealed\.json")
 WRITTEN_ONCE = ".parquet"  # such a file is there or not; others are compared byte for byte

@@ -49,8 +49,7 @@ def libraries() -> dict[str, str]:
     return {name: version(name) for name in LIBRARIES}
 
 
-EXTENDED = {"inertial.effects": "tumbleline.effects"}
-"""Packages to which other packages add modules under an entry point."""
+EXTENDED = {"inertial.effects": "tumbleline.effects"}  # packages to which others add modules under an entry point
 
 
 def sources(modules: Iterable[str]) -> dict[str, Path]:

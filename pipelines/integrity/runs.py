@@ -15,8 +15,7 @@ from pipelines.integrity.findings import CHANGED, EDITED, FOREIGN, MISSING, Veri
 OURS = ("run.json", SEALED, "lock")
 KEYED = ("stage", "inputs", "parameters", "code", "key")
 REMOVE_FOREIGN = "remove it; import foreign files with 'tumbleline import'"
-Record = tuple[dict[str, Any], str, Place]
-"""Manifest of a record, hash of the manifest, and folder."""
+Record = tuple[dict[str, Any], str, Place]  # manifest of a record, hash of the manifest, and folder
 
 
 def check_run(run: Run, checked: VerifiedPart, schema: int) -> VerifiedPart:

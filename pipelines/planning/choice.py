@@ -20,8 +20,7 @@ COVERAGE = 2.0
 LEFT_OF_TEMPERATURE = 0.05
 """Share of a term in temperature that a calibration over temperature leaves: curvature and hysteresis. An assumption."""
 ASSUMED = "a calibration over temperature leaves {:g} % of the terms in temperature (curvature, hysteresis); a run measures it"
-_POLE = 0.5 * math.pi
-"""Noise bandwidth over −3 dB frequency of one pole."""
+_POLE = 0.5 * math.pi  # noise bandwidth over −3 dB frequency of one pole
 MILLI = 1e3
 
 

@@ -14,12 +14,8 @@ from pipelines.planning.requirement import Requirement, candidates, temperature_
 from schemas.errors import WrongUse
 from schemas.units import MICRO
 
-ENOUGH = 50.0
-"""χ² of the wrong effect over a lot from which two effects count as discriminated."""
-
-SIZE_UG = 100.0
-"""Default size of each rival where it is largest, µg."""
-
+ENOUGH = 50.0  # χ² of the wrong effect over a lot from which two effects count as discriminated
+SIZE_UG = 100.0  # default size of each rival where it is largest, µg
 CANDIDATES = 48
 """Number of candidate directions: rivals differ most between the faces and edges, so more directions are offered."""
 

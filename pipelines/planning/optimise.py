@@ -41,14 +41,9 @@ ROUNDS = 4
 ROUGH = 1.2
 """Ratio to the requirement that a starting arrangement may have, because the first exchange of poses is expected to reduce it."""
 
-NEAR = 0.985
-"""Ratio to the requirement above which no fewer dwells are tried."""
-
-SLOWER = 1.02
-"""Ratio of station time to the best recipe so far above which a design is skipped."""
-
-SPARE = 0.003
-"""Margin below the required errors: counts are whole numbers."""
+NEAR = 0.985  # ratio to the requirement above which no fewer dwells are tried
+SLOWER = 1.02  # ratio of station time to the best recipe so far above which a design is skipped
+SPARE = 0.003  # margin below the required errors: counts are whole numbers
 
 
 @dataclass(frozen=True)

@@ -7,14 +7,9 @@ from pipelines.schedule.timing import StationPose, soaked
 from schemas.station import StationConfig
 
 FEWEST, MOST = 3, 6
-MANY = 250
-"""Number of orders of each length to consider, the quickest ones."""
-
-RAMPS = (2, 3, 4, 5)
-"""Numbers of ramps in turn that are tried."""
-
-PRODUCTS = 20000
-"""Maximum number of arrangements of a given number of soaks to enumerate."""
+MANY = 250  # number of orders of each length to consider, the quickest ones
+RAMPS = (2, 3, 4, 5)  # numbers of ramps in turn that are tried
+PRODUCTS = 20000  # maximum number of arrangements of a given number of soaks to enumerate
 
 
 def orders(

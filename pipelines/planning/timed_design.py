@@ -25,23 +25,12 @@ from schemas.units import STANDARD_GRAVITY_M_S2
 Choice = NDArray[np.intp]
 
 SHORTEST_DWELL_S = 1.0
-LONGEST_DWELLS = 3.0
-"""Longest dwell to try, as a multiple of the recipe's dwell."""
-
-_GRAIN_S, _LONG_S = 2.0, 600.0
-"""Step of the table of flicker covariance, and the increment of its length, s."""
-
-FEWEST = 4
-"""Minimum number of dwells of a soak: the reference pose at both ends, and two other poses between."""
-
-MOST = 420
-"""Maximum number of dwells of a recipe: above it the search time grows faster than the gain."""
-
-REACHED = 0.04
-"""Distance from the ends of the required temperatures that a ramp may leave, in parts of their range."""
-
-_FIRST = 3
-"""The first reduction removes one part in this many of a soak's dwells."""
+LONGEST_DWELLS = 3.0  # longest dwell to try, as a multiple of the recipe's dwell
+_GRAIN_S, _LONG_S = 2.0, 600.0  # step of the table of flicker covariance, and the increment of its length, s
+FEWEST = 4  # minimum number of dwells of a soak: the reference pose at both ends, and two other poses between
+MOST = 420  # maximum number of dwells of a recipe: above it the search time grows faster than the gain
+REACHED = 0.04  # distance from the ends of the required temperatures that a ramp may leave, in parts of their range
+_FIRST = 3  # the first reduction removes one part in this many of a soak's dwells
 
 
 @dataclass(frozen=True)

@@ -27,8 +27,7 @@ from pipelines.tables.frames import ByUnit
 from schemas.errors import DataRejected, TumblelineError
 from schemas.units import MICRO
 
-Sums = dict[str, tuple[float, int]]
-"""Sum of squared errors, µg², and their number, by unit."""
+Sums = dict[str, tuple[float, int]]  # sum of squared errors, µg², and their number, by unit
 
 
 OLD_TABLES = {

@@ -12,8 +12,7 @@ from pipelines.rerun.reproduce import Reproduction, check
 from pipelines.rerun.rerun import RerunOutcome, again
 from schemas.errors import TumblelineError
 
-MOST = 32
-"""Runs in a batch; the work of one batch is lost when a worker dies."""
+MOST = 32  # runs in a batch; the work of one batch is lost when a worker dies
 
 
 @dataclass(frozen=True)

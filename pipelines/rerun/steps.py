@@ -101,8 +101,7 @@ def model_keys(change: ModelChange) -> dict[str, Any]:
 
 
 CAPTURED = ("readings", "history")
-RAW = ("validate", "reduce", "noise")
-"""Stages that read the raw samples."""
+RAW = ("validate", "reduce", "noise")  # stages that read the raw samples
 
 
 @dataclass(frozen=True)

@@ -17,12 +17,10 @@ from pipelines.rerun import lot_comparison
 from pipelines.rerun.lot_comparison import Fresh, FreshTask, LotComparison, Sums
 from pipelines.rerun.partition import parts
 
-FALLS = 0.005
-"""Smallest relative change of an error that counts."""
+FALLS = 0.005  # smallest relative change of an error that counts
 LEVEL = 0.05
 """Two-sided level of the verdict: units scatter as much, or more, in one of twenty archives where the models are equally good."""
-FEWEST = 3
-"""Units that can show a difference: two have one degree of freedom."""
+FEWEST = 3  # units that can show a difference: two have one degree of freedom
 BETTER, WORSE, EQUAL, NOTHING = "better", "worse", "no better", "nothing to judge"
 
 

@@ -18,8 +18,7 @@ USUAL: dict[str, tuple[float, float]] = {
     "Hz": (0.0, 1e6),
 }
 """What values of a unit can be on equipment of a station at rest."""
-FLOATS = (1e-12, 1e12)
-"""Magnitudes of a float with an unknown unit; words in a wrong order give any exponent."""
+FLOATS = (1e-12, 1e12)  # magnitudes of a float with an unknown unit; words in a wrong order give any exponent
 
 
 Votes = dict[WordOrder, tuple[int, int]]

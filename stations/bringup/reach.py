@@ -12,8 +12,7 @@ from stations.bringup.plausible import best_order, depends_on_order, votes
 from stations.bringup.target import Target
 from stations.links.gate import GatedLink
 
-FIRST_IDS = (*range(1, 17), 247, 255)
-"""Where makers put their devices; others are found with ``--device-id``."""
+FIRST_IDS = (*range(1, 17), 247, 255)  # where makers put their devices; others are found with ``--device-id``
 BAUDS = (19200, 9600, 38400, 57600, 115200)
 PROBES = 6
 SHIFTS = (0, -1, 1)

@@ -27,8 +27,7 @@ REFERENCE = "@reference"
 REFERENCE_SLOT = 999
 NEEDED = ("rate_hz", "reference", "reference_rate_hz", "reference_unit")
 STANDARD_GRAVITY = {"g": 1.0, "m/s^2": 9.80665}
-FLAT_SHARE = 5e-4
-"""Of the samples of Gaussian vibration within a thousandth of an extreme: a range of 3.3 σ has so many."""
+FLAT_SHARE = 5e-4  # of the samples of Gaussian vibration within 0.1 % of an extreme: a range of 3.3 σ has so many
 FEWEST_FLAT = 20
 FLAT_SHARE_OF_SINE = 0.1  # of the samples of a sine: it has less
 

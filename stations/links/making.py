@@ -19,8 +19,7 @@ from stations.profile_files import load_profile
 
 Address = tuple[str, int]
 Key = tuple[str, str, int]
-Behind = dict[int, tuple[str, Profile]]
-"""Name and profile of every device behind one address, by device id."""
+Behind = dict[int, tuple[str, Profile]]  # name and profile of every device behind one address, by device id
 
 
 class WireSource(Protocol):

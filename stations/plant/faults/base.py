@@ -48,8 +48,7 @@ class Kind:
     action: ActionKind | None = None
 
 
-KINDS: dict[str, Kind] = {}
-"""The kinds by name; each module of this folder adds its own when it is imported."""
+KINDS: dict[str, Kind] = {}  # the kinds by name; each module of this folder adds its own when it is imported
 
 
 def add(*kinds: Kind) -> None:

@@ -11,8 +11,7 @@ from schemas.fault import FaultOrder
 from stations.plant import faults
 from stations.plant.faults.base import KINDS, UNIT, Fault, Kind
 
-TIMES = ("at_s", "for_s")
-"""Keys of every order: start and duration."""
+TIMES = ("at_s", "for_s")  # keys of every order: start and duration
 
 
 @cache
