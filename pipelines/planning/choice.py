@@ -167,18 +167,16 @@ def _row(preset: Preset, need: Need, calibration: str) -> ChoiceRow:
     cannot = _cannot(preset, need)
     largest = max(terms, key=lambda name: terms[name])
     reaches = not cannot and error <= need.error_ug
-    why = cannot or ([] if reaches else [f"{largest}: {short(COVERAGE * terms[largest])} µg"])
+    noise = terms["noise in the bandwidth"]
     return {
         "device": preset.name,
         "calibration": calibration,
         "reaches": reaches,
         "error_ug": error,
         "terms_ug": terms,
-        "range_over_noise_dB": 20.0 * math.log10(MICRO * need.range_g / terms["noise in the bandwidth"])
-        if terms["noise in the bandwidth"] > 0.0
-        else None,
+        "range_over_noise_dB": 20.0 * math.log10(MICRO * need.range_g / noise) if noise > 0.0 else None,
         "cannot": cannot,
-        "why": why,
+        "why": cannot or ([] if reaches else [f"{largest}: {short(COVERAGE * terms[largest])} µg"]),
     }
 
 
@@ -189,11 +187,10 @@ def _share(term: Term, level: int) -> float:
 
 def _cannot(preset: Preset, need: Need) -> list[str]:
     """What no calibration mends."""
-    found: list[str] = []
-    if need.range_g > preset.range_g:
-        found.append(f"saturates at {preset.range_g:g} g")
-    if need.bandwidth_hz > preset.passband_hz:
-        found.append(f"passes {preset.passband_hz:.4g} Hz")
-    if need.low_C < preset.temperature_low_C or need.high_C > preset.temperature_high_C:
-        found.append(f"specified from {preset.temperature_low_C:g} to {preset.temperature_high_C:g} °C")
-    return found
+    low, high = preset.temperature_low_C, preset.temperature_high_C
+    beyond = {
+        f"saturates at {preset.range_g:g} g": need.range_g > preset.range_g,
+        f"passes {preset.passband_hz:.4g} Hz": need.bandwidth_hz > preset.passband_hz,
+        f"specified from {low:g} to {high:g} °C": need.low_C < low or need.high_C > high,
+    }
+    return [what for what, holds in beyond.items() if holds]

@@ -1,6 +1,6 @@
 """A recipe on a station before it is measured: activities, dwells and procedures, and what poses of verification show besides."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 
 from inertial.noise.dwells import DwellNoise, dwell_covariance
 from inertial.noise.flicker import FLICKER_FLOOR
-from inertial.planning.visibility import SEEN, visibilities
+from inertial.planning.visibility import visibilities
 from inertial.state import State
-from pipelines.procedures import PROCEDURES, FigureSpec, parts_of
+from pipelines.procedures import PROCEDURES, parts_of
 from pipelines.schedule.planned_state import state_of
 from pipelines.schedule.steps import steps
 from pipelines.schedule.timing import Activity, schedule, spent
 from schemas.errors import RecipeInvalid
-from schemas.limits import Limit, Limits
+from schemas.limits import Limits
 from schemas.recipe import Recipe
 from schemas.station import StationConfig
 from stations.plant.preset import load_preset
@@ -77,11 +77,12 @@ def shown_by_verification(
     if not effects or not recipe.verification:
         return set()
     every = state_of(activities, station, recipe, history=True, kinds=("dwell", "verification"))
-    shown: set[str] = set()
-    for effect in effects:
-        rest = [other for other in recipe.effects if other != effect]
-        shown |= {s.effect for s in visibilities(every, rest, 1.0, [effect]) if s.remaining_fraction > SEEN}
-    return shown
+    return {
+        s.effect
+        for effect in effects
+        for s in visibilities(every, [other for other in recipe.effects if other != effect], 1.0, [effect])
+        if s.seen
+    }
 
 
 def with_verification_hint(text: str, activities: Sequence[Activity], station: StationConfig, recipe: Recipe) -> str:
@@ -128,25 +129,23 @@ def procedure_rows(recipe: Recipe, station: StationConfig, limits: Limits | None
     for number, part in enumerate(parts_of(recipe)):
         procedure = PROCEDURES[part.kind]
         own = [activity for activity in activities if activity.step.procedure == number]
-        rows.append(
+        figures = [
             {
-                "procedure": part.kind,
-                "states": procedure.states,
-                "records": len({activity.step.record for activity in own}),
-                "minutes": round(spent(own).total, 2),
-                "temperatures_C": list(dict.fromkeys(activity.step.temperature for activity in own)),
-                "equipment": list(procedure.roles),
-                "figures": [_figure(spec, asked) for spec in procedure.figures],
+                "figure": s.name,
+                "unit": s.unit,
+                "meaning": s.meaning,
+                "limit": asked[s.name].text if s.name in asked else None,
             }
-        )
+            for s in procedure.figures
+        ]
+        row = {
+            "procedure": part.kind,
+            "states": procedure.states,
+            "records": len({activity.step.record for activity in own}),
+            "minutes": round(spent(own).total, 2),
+            "temperatures_C": list(dict.fromkeys(activity.step.temperature for activity in own)),
+            "equipment": list(procedure.roles),
+            "figures": figures,
+        }
+        rows.append(row)
     return rows
-
-
-def _figure(spec: FigureSpec, asked: Mapping[str, Limit]) -> dict[str, Any]:
-    limit = asked.get(spec.name)
-    return {
-        "figure": spec.name,
-        "unit": spec.unit,
-        "meaning": spec.meaning,
-        "limit": None if limit is None else limit.text,
-    }

@@ -17,8 +17,8 @@ from inertial.arrays import Array
 from inertial.noise.dwells import dwell_covariance
 from pipelines.planning.context import PlanContext
 from pipelines.planning.requirement import Requirement
-from pipelines.planning.soak_orders import orders, ramp_orders
-from pipelines.planning.timed_design import followed_along, short_of, soak_waits
+from pipelines.planning.soak_orders import orders
+from pipelines.planning.timed_design import followed_along, normal_matrix, short_of, soak_waits
 from pipelines.schedule.planned_state import settled_state
 from pipelines.schedule.timing import spent
 from schemas.recipe import Recipe
@@ -48,12 +48,7 @@ def lower_bound(
     None where a run as long as the textbook plan is too short, or the model has no pose-independent coefficient.
     """
     search = _BoundSearch(recipe, against, requirement)
-    optional = requirement.optional_levels
-    soak_orders = (
-        ramp_orders(requirement.levels)
-        if ramp
-        else orders(requirement.levels, against.station, recipe.soak_min_s, optional=optional)
-    )
+    soak_orders = orders(requirement, against.station, recipe.soak_min_s, ramp=ramp)
     low, high, best = round(LOWEST / STEP), round(1.0 / STEP), None
     while low <= high and search.columns.size:
         middle = (low + high) // 2
@@ -145,9 +140,7 @@ class _BoundSearch:
         """The worst ratio to the required errors and its effect, of pieces of measurement at times and temperatures (n,)."""
         rows = self._rows(when, heat)[..., self.columns]
         covariance = dwell_covariance(when, piece_s, self.against.noise, slowest=self.slowest)
-        flat = np.moveaxis(rows, 0, 1).reshape(when.size, -1)
-        solved = np.moveaxis(np.linalg.solve(covariance, flat).reshape(when.size, len(rows), -1), 1, 0)
-        errors = self.requirement.ratio_to_required(np.swapaxes(rows, -1, -2) @ solved)
+        errors = self.requirement.ratio_to_required(normal_matrix(rows, covariance))
         return float(errors.max()), self.names[self.columns[int(np.argmax(errors.max(axis=0)))]]
 
     def _rows(self, time: Array, heat: Array) -> Array:

@@ -19,7 +19,7 @@ from pipelines.planning.context import PlanContext, plan_context
 from pipelines.planning.lower_bound import lower_bound
 from pipelines.planning.plan import identified
 from pipelines.planning.requirement import Requirement, apart, numbered, turns
-from pipelines.planning.soak_orders import mirrored, orders, ramp_orders
+from pipelines.planning.soak_orders import mirrored, orders
 from pipelines.planning.textbook import PART_SEEN
 from pipelines.planning.timed_design import FEWEST, MOST, PlanDesign, TimedDesign, fewest_dwells, short_of, spanned
 from pipelines.schedule.timing import spent
@@ -156,22 +156,12 @@ class RecipeSearch:
 
     def ranked(self) -> list[tuple[PlanDesign, float]]:
         """Designs with the fewest dwells in the best orders of soaks, and their station times in s, the quickest first."""
-        requirement, recipe = self.requirement, self.recipe
-        back = requirement.discrimination is None
-        optional, station = requirement.optional_levels, self.against.station
-        soak_orders = (
-            ramp_orders(requirement.levels)
-            if self.ramp
-            else orders(requirement.levels, station, recipe.soak_min_s, optional=optional, back=back)
-        )
+        soak_orders = orders(self.requirement, self.against.station, self.recipe.soak_min_s, ramp=self.ramp)
         dwell_s = self.timed.dwell_lengths()[0]
-        likely = (
-            [
-                (0.0, order) for order in soak_orders
-            ]  # few, and a ramp that does not get far enough says nothing of a longer one
-            if self.ramp
-            else sorted((self.estimated_seconds(order, dwell_s), order) for order in soak_orders)[:LIKELY]
-        )
+        # ramps are few, and one that does not get far enough says nothing of a longer one
+        likely = [(0.0, order) for order in soak_orders]
+        if not self.ramp:
+            likely = sorted((self.estimated_seconds(order, dwell_s), order) for order in soak_orders)[:LIKELY]
         tried: list[tuple[float, PlanDesign]] = []
         for seconds, order in likely:
             if math.isfinite(seconds):
@@ -239,7 +229,7 @@ class RecipeSearch:
             before = now
             now = fewest_dwells(self.timed, plan, (1.0 - SPARE) * self.timed.ratio_and_seconds(now)[0] / reached)
             if self.ramp and worst > 1.0 and (now is None or sum(now.counts) <= sum(before.counts)):
-                # more dwells on ramps are no longer version of fewer: the devices are elsewhere at each of them
+                # more dwells on ramps are no longer a version of fewer: the devices are elsewhere at each of them
                 now = replace(before, counts=tuple(math.ceil(worst * count) for count in before.counts))
         return best
 
@@ -329,8 +319,6 @@ class RecipeSearch:
 
     def not_visible(self, context: PlanContext) -> list[str]:
         """Required effects that are not visible."""
-        seen = {
-            s.effect: s.remaining_fraction
-            for s in visibilities(context.state, self.recipe.effects, 1.0, self.requirement.see)
-        }
-        return [name for name in self.requirement.see if seen.get(name, 1.0) < PART_SEEN]
+        see = self.requirement.see
+        seen = visibilities(context.state, self.recipe.effects, 1.0, see) if see else []
+        return [s.effect for s in seen if s.remaining_fraction < PART_SEEN]

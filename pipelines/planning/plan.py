@@ -1,5 +1,6 @@
 """Visibility of effects, expected errors and station time of a recipe, before it is measured."""
 
+from collections import Counter
 from collections.abc import Collection, Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -114,15 +115,9 @@ def _bias(
 
     See :func:`pipelines.stages.uncertainty.bias_measurands.bias_measurands`.
     """
-    places = [
-        (axis, k)
-        for axis, names in enumerate(expected.names)
-        for k, (effect, _) in enumerate(names)
-        if effect == "bias"
-    ]
-    if not places:
+    axes, columns = np.nonzero(np.array([[effect == "bias" for effect, _ in names] for names in expected.names]))
+    if not axes.size:
         return None
-    axes, columns = np.array(places).T
     gain = expected_gain(context.recipe.effects, context.state, of_record)[axes, columns]
     record, later = _against_means(context, expected.errors[axes, columns] ** 2, gain)
     span = float(np.ptp(context.state.time))
@@ -176,12 +171,11 @@ def _alone(state: State, reasons: dict[str, str]) -> bool:
 def _coefficient_rows(expected: Expected) -> list[dict[str, Any]]:
     """One row per coefficient and axis; parameters of the station have axis ``*``."""
     rows: list[dict[str, Any]] = []
-    for axis, letter in enumerate(AXES[: len(expected.names)]):
-        place: dict[str, int] = {}
-        for column, (effect, name) in enumerate(expected.names[axis]):
-            k = place.setdefault(effect, 0)
+    for letter, names, errors in zip(AXES, expected.names, expected.errors.tolist(), strict=False):
+        place = Counter[str]()
+        for (effect, name), error in zip(names, errors, strict=True):
+            rows.append(_coefficient(effect, name, letter, error, place[effect]))
             place[effect] += 1
-            rows.append(_coefficient(effect, name, letter, float(expected.errors[axis, column]), k))
     shared = zip(expected.shared_names, expected.shared_errors.tolist(), strict=True)
     return [*rows, *(_coefficient(effect, name, "*", error, 0) for (effect, name), error in shared)]
 

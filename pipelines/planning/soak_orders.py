@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from itertools import pairwise, product
 
+from pipelines.planning.requirement import Requirement
 from pipelines.schedule.timing import StationPose, soaked
 from schemas.station import StationConfig
 
@@ -13,26 +14,18 @@ PRODUCTS = 20000  # maximum number of arrangements of a given number of soaks to
 
 
 def orders(
-    levels: Sequence[float],
-    station: StationConfig,
-    shortest_s: float,
-    *,
-    optional: Sequence[float] = (),
-    back: bool = True,
+    requirement: Requirement, station: StationConfig, shortest_s: float, *, ramp: bool = False
 ) -> list[tuple[float, ...]]:
-    """Orders of soaks over temperatures, the quickest first.
+    """Orders of soaks of at least ``shortest_s`` s, the quickest first; of ramps where ``ramp``.
 
-    Every order includes all levels, repeats at least one temperature (which separates drift from temperature) and both rises and
-    falls (which makes hysteresis visible).
-
-    Parameters
-    ----------
-    levels : °C, required temperatures; a single level gives one order of one soak
-    shortest_s : s, shortest soak
-    optional : °C, further temperatures that an order may include
-    back : whether a repeated temperature and a change of direction are required
+    Every order includes the levels of the requirement; a single one, without optional ones, gives one order of one soak. Except
+    for the discrimination of rivals it repeats at least one temperature (which separates drift from temperature) and both rises
+    and falls (which makes hysteresis visible).
     """
-    free = sorted({*levels, *optional})
+    if ramp:
+        return ramp_orders(requirement.levels)
+    levels, back = requirement.levels, requirement.discrimination is None
+    free = sorted({*levels, *requirement.optional_levels})
     if len(free) == 1:
         return [(free[0],)]
     candidates: list[tuple[float, ...]] = []
