@@ -69,9 +69,7 @@ def _standard(run: Run) -> pd.DataFrame:
     figures = _table(run, "figures")
     factor = (run.about.get("limits") or {}).get("coverage_factor", PLAIN_FACTOR)
     limited = figures["limit"].notna() | ("pfa" in figures)
-    return figures.assign(
-        standard_error=figures["uncertainty"].astype(float) / limited.map({True: factor, False: PLAIN_FACTOR})
-    )
+    return figures.assign(standard_error=figures["uncertainty"].astype(float) / np.where(limited, factor, PLAIN_FACTOR))
 
 
 def _changed(a: pd.DataFrame, b: pd.DataFrame, key: list[str], error: str) -> pd.DataFrame:
@@ -187,8 +185,7 @@ def _model_text(own: dict[str, Any], other: dict[str, Any]) -> str:
     """A short text for a model: its effects beyond the other model, or all its effects where neither contains the other."""
     more = [effect for effect in own["effects"] if effect not in other["effects"]]
     if more or len(own["effects"]) < len(other["effects"]):
-        kept = len(own["effects"]) - len(more)
-        return f"{kept} effects" + "".join(f" + {effect}" for effect in more)
+        return " + ".join([f"{len(own['effects']) - len(more)} effects", *more])
     return ", ".join(own["effects"]) or "none"
 
 

@@ -135,11 +135,11 @@ def _flips(lots: Sequence[LotComparison]) -> dict[str, list[dict[str, str]]]:
         old, new = judged.sides
         for unit, before in old.outcome.items():
             after = new.outcome.get(unit, "")
-            if (before == "pass") != (after == "pass"):
-                worse = before == "pass"
-                reasons = (new if worse else old).reasons[unit]
+            passed = before == "pass"
+            if passed != (after == "pass"):
+                reasons = (new if passed else old).reasons[unit]
                 row = {"run": judged.entry.id, "unit": unit, "old": before, "new": after, "reasons": reasons}
-                flips["to_fail" if worse else "to_pass"].append(row)
+                flips["to_fail" if passed else "to_pass"].append(row)
     return flips
 
 
@@ -163,12 +163,12 @@ def _verdict(
         return EQUAL, f"{sentence}; {count} cannot show that this is more than scatter, {FEWEST} are needed"
     if not _differs(ratio, LEVEL):
         return EQUAL, f"{sentence}: no more than {count} scatter"
-    groups = [row for row in rows if figure in _known(row) and _share(row[figure]) > FALLS]
-    own = [
-        [one for one in lots if (one.entry.station, one.entry.device) == (r["station"], r["device"])] for r in groups
-    ]
-    rises = [_rises(_log_ratios(figure, one, fresh), LEVEL / len(rows)) for one in own]
-    hurt = [f"{row['device']} on {row['station']}" for row, rise in zip(groups, rises, strict=True) if rise]
+    hurt: list[str] = []
+    for row in rows:
+        own = [one for one in lots if (one.entry.station, one.entry.device) == (row["station"], row["device"])]
+        grown = figure in _known(row) and _share(row[figure]) > FALLS
+        if grown and _rises(_log_ratios(figure, own, fresh), LEVEL / len(rows)):
+            hurt.append(f"{row['device']} on {row['station']}")
     return _decided(_share(total[figure]), float(ratio.mean()), hurt, sentence)
 
 
