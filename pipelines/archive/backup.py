@@ -15,6 +15,7 @@ import json
 import re
 import time
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -60,12 +61,9 @@ class _ChainAtStart:
 
     def lacks_entry_of(self, name: str, data: bytes) -> bool:
         """Whether a file is the seal of a run that names an entry written since the copy began."""
-        if not SEAL.fullmatch(name):
-            return False
-        try:
-            return name_of_entry(json.loads(data)["entry"]) not in self.entries
-        except (ValueError, TypeError, KeyError):  # 'tumbleline verify' reports it
-            return False
+        with suppress(ValueError, TypeError, KeyError):  # 'tumbleline verify' reports it
+            return bool(SEAL.fullmatch(name)) and name_of_entry(json.loads(data)["entry"]) not in self.entries
+        return False
 
 
 def copy_archive(source: Archive, target: Archive) -> Copied:
@@ -168,10 +166,9 @@ def _names(folder: Place, prefix: str, links: list[str] | None = None) -> set[st
 def _walk(folder: Place, prefix: str, links: list[str]) -> Iterator[str]:
     if not folder.is_dir():
         return
-    try:
-        inside = [path for path in folder.iterdir() if not path.name.startswith(TEMPORARY)]
-    except FileNotFoundError:  # a writer has removed or renamed it meanwhile
-        return
+    inside: list[Place] = []
+    with suppress(FileNotFoundError):  # a writer has removed or renamed it meanwhile
+        inside += [path for path in folder.iterdir() if not path.name.startswith(TEMPORARY)]
     for path in inside:
         name = f"{prefix}/{path.name}" if prefix else path.name
         if prefix and isinstance(path, Path) and path.is_symlink():  # a top folder may lie on another disk

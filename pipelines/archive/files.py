@@ -135,13 +135,11 @@ def publish_first(path: Place, data: bytes) -> bool:
     Of several processes exactly one gets true. An object store has no such operation: its callers hold a claim.
     """
     with writing(path.parent):
-        if isinstance(path, ObjectPath):
-            if path.is_file():
-                return False
-            path.write_bytes(data)
-            return True
         if path.is_file():  # also one that is packed
             return False
+        if isinstance(path, ObjectPath):
+            path.write_bytes(data)
+            return True
         with _aside(path.parent) as aside:
             _write_durably(aside, data)
             try:

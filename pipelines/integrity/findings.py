@@ -104,9 +104,8 @@ class VerifiedPart:
         self.bytes += len(data)
         schema = content.get("schema")
         if isinstance(schema, int) and schema > known_schema:
-            self.wrong(
-                NEWER, place, f"has schema {schema}, this version knows up to {known_schema}: use a newer version"
-            )
+            what = f"has schema {schema}, this version knows up to {known_schema}: use a newer version"
+            self.wrong(NEWER, place, what)
             return None
         state = check(content, self.keys)
         self.signatures[state] += 1

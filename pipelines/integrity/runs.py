@@ -104,9 +104,8 @@ def _check_others(run: Run, names: dict[str, Place], manifests: dict[str, Any], 
     for name, place in sorted(names.items()):
         manifest = run.path / f"{place.stem}.json"
         if name.startswith(files.TEMPORARY):
-            checked.remarks.append(
-                f"{checked.name(place)} is a temporary file of a killed or active writer; see 'archive clean'"
-            )
+            what = "is a temporary file of a killed or active writer; see 'archive clean'"
+            checked.remarks.append(f"{checked.name(place)} {what}")
         elif place.suffix == ".parquet" and place.stem not in manifests and not manifest.is_file():
             mark = table_mark(place)
             if mark != place.stem:

@@ -38,15 +38,10 @@ class Gatherer:
             other = self._other(name)
             if other is not None:
                 self.run(other)
-        self.graph.put(
-            ProvActivity(
-                id=f"start of {run.id}",
-                name="run again" if about.get("rerun_of") else "start",
-                used=(*settings, *(f"runs/{name}" for name in earlier if f"runs/{name}" in self.graph.nodes)),
-                made=(start,),
-                about={key: about[key] for key in (*MADE[:3], "because", "software", "libraries") if key in about},
-            )
-        )
+        used = (*settings, *(f"runs/{name}" for name in earlier if f"runs/{name}" in self.graph.nodes))
+        step = {key: about[key] for key in (*MADE[:3], "because", "software", "libraries") if key in about}
+        what = "run again" if about.get("rerun_of") else "start"
+        self.graph.put(ProvActivity(f"start of {run.id}", what, used, (start,), step))
         self._tables(run, raw, start)
 
     def calibrations(self, serial: str) -> list[str]:
@@ -62,12 +57,8 @@ class Gatherer:
     def certificates_of(self, run: Run) -> list[str]:
         """Add the certificates of the units of a run; return their ids."""
         serials = [unit["serial"] for unit in run.about.get("lot", {}).get("units", [])]
-        return [
-            self._certificate(one)
-            for serial in serials
-            for one in Ledger(self.archive).calibrations(serial)
-            if one.run == run.id
-        ]
+        own = (one for serial in serials for one in Ledger(self.archive).calibrations(serial) if one.run == run.id)
+        return [self._certificate(one) for one in own]
 
     def _other(self, name: str) -> Run | None:
         return self.archive.run(name) if name in self.archive.run_ids() else None
@@ -108,11 +99,8 @@ class Gatherer:
 
     def _tables(self, run: Run, raw: list[str], start: str) -> None:
         """Add the tables of a run, stage by stage."""
-        manifests = {
-            place.stem: files.read_json(place)
-            for place in sorted(run.path.glob("*.json"), key=lambda one: one.name)
-            if place.name not in {"run.json", SEALED}
-        }
+        places = sorted(run.path.glob("*.json"), key=lambda one: one.name)
+        manifests = {one.stem: files.read_json(one) for one in places if one.name not in {"run.json", SEALED}}
         steps: dict[str, list[str]] = {}
         for name, content in manifests.items():
             kind, ending = ("report", "html") if name == "report" else ("table", "parquet")
