@@ -17,8 +17,10 @@ from schemas.profile import TEXT_CARRIERS, Carrier, Profile, limits_of
 from schemas.station import Limits, StationConfig
 from schemas.station_devices import Device
 from stations.clock import Clock, WallClock
-from stations.devices.adapters import axis_adapter, chamber_adapter, equipment_adapter
+from stations.devices.adapters import adapter_of
+from stations.devices.chamber import ThermalChamber
 from stations.devices.commands import Commands, Values
+from stations.devices.equipment import Equipment
 from stations.devices.reader import Reader
 from stations.devices.registers import Registers
 from stations.devices.slot import Slot
@@ -167,14 +169,15 @@ def _assemble(
     }
     parts = (
         TiltTable(axes["outer"], axes["inner"], clock),
-        chamber_adapter(chamber)(
-            _values("chamber", "chamber", devices.chamber, links),
-            *tighter(limits.temperature_C, chamber, "set_point"),
+        adapter_of(chamber, "chamber", ThermalChamber)(
+            _values("chamber", "chamber", devices.chamber, links), *tighter(limits.temperature_C, chamber, "set_point")
         ),
         Reader(reader, {slot: Slot(registers) for slot, registers in banks.items()}, fastest),
     )
     equipment = {
-        role: equipment_adapter(role, profile_of(device))(_values(role.replace("_", " "), role, device, links), clock)
+        role: adapter_of(profile_of(device), role, Equipment)(
+            _values(role.replace("_", " "), role, device, links), clock
+        )
         for role, device in config.fitted().items()
         if role in roles
     }
@@ -201,7 +204,7 @@ def _axis(registers: Registers, bounds: tuple[float, float], limits: Limits) -> 
         for name, wanted in (("speed", limits.speed_deg_s), ("acceleration", limits.acceleration_deg_s2))
     )
     kept = limits.model_copy(update={"speed_deg_s": speed, "acceleration_deg_s2": acceleration})
-    return axis_adapter(profile)(registers, tighter(bounds, profile, "target"), kept)
+    return adapter_of(profile, "axis", TableAxis)(registers, tighter(bounds, profile, "target"), kept)
 
 
 def tighter(bounds: tuple[float, float], profile: Profile, name: str) -> tuple[float, float]:

@@ -9,7 +9,7 @@ from schemas.profile import Profile, Register
 from schemas.station_devices import Device
 from stations.bringup.person import Findings, Person
 from stations.bringup.plausible import best_order, depends_on_order, votes
-from stations.bringup.target import Target
+from stations.bringup.target import Target, moved
 from stations.links.gate import GatedLink
 
 FIRST_IDS = (*range(1, 17), 247, 255)  # where makers put their devices; others are found with ``--device-id``
@@ -142,11 +142,7 @@ def _at(link: GatedLink, profile: Profile, device_id: int) -> Answer | None:
     for shift, space in others:
         if min(r.address for r in profile.registers) + shift < 0:
             continue
-        moved = [
-            r.model_copy(update={"address": r.address + shift, **({"space": space} if space else {})})
-            for r in probes(profile)
-        ]
-        answer = _read(link, profile, device_id, moved)
+        answer = _read(link, profile, device_id, moved(probes(profile), shift, space))
         if answer is not None:
             answer.shift, answer.space = shift, space
             tried.append(answer)

@@ -6,7 +6,6 @@ import tempfile
 import weakref
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
 
 from scipy.io import savemat
 
@@ -64,18 +63,11 @@ class ResultFiles:
             self._folder = Path(tempfile.mkdtemp(prefix="tumbleline-results-"))
             weakref.finalize(self, shutil.rmtree, self._folder, ignore_errors=True)
         path = self._folder / f"test{number:06d}.mat"
-        if path == self._last:
-            return str(path)
-        made = recorded()
-        content: dict[str, Any] = {
-            "rate_hz": made.rate_hz,
-            "reference": made.reference,
-            "reference_rate_hz": made.reference_rate_hz,
-            "reference_unit": reference_unit,
-            **{f"slot_{slot}": made.outputs[:, k] for k, slot in enumerate(slots)},
-        }
-        savemat(path, content)
-        if self._last is not None:
-            self._last.unlink(missing_ok=True)
-        self._last = path
+        if path != self._last:
+            content = vars(recorded()) | {"reference_unit": reference_unit}
+            outputs = content.pop("outputs")
+            savemat(path, content | {f"slot_{slot}": outputs[:, k] for k, slot in enumerate(slots)})
+            if self._last is not None:
+                self._last.unlink(missing_ok=True)
+            self._last = path
         return str(path)

@@ -5,7 +5,8 @@ that is not of the format is refused with its number.
 """
 
 import json
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -109,6 +110,17 @@ class FrameFile:
         return f"device {exchange.device_id}" if device is None else device.place
 
 
+@contextmanager
+def readable(path: Path) -> Generator[None]:
+    """A block that reads a recording; :class:`DataRejected` where the system refuses."""
+    try:
+        yield
+    except OSError as problem:
+        raise DataRejected(
+            f"recording: {path} cannot be read ({problem.strerror}); name a file that is there"
+        ) from None
+
+
 def read_frames(path: Path) -> FrameFile:
     """The recording in a file.
 
@@ -117,13 +129,8 @@ def read_frames(path: Path) -> FrameFile:
     DataRejected
         It is no recording, or a line other than the last is damaged.
     """
-    try:
-        raw = path.read_bytes()
-    except OSError as problem:
-        raise DataRejected(
-            f"recording: {path} cannot be read ({problem.strerror}); name a file that is there"
-        ) from None
-    lines = raw.split(b"\n")
+    with readable(path):
+        lines = path.read_bytes().split(b"\n")
     whole, torn = lines[:-1], lines[-1]
     content = FrameFile(
         path.name, remark=f"the last line is incomplete ({len(torn)} bytes) and left out" if torn else ""

@@ -11,8 +11,6 @@ from stations.devices.equipment import (
     Recording,
     RecordingEquipment,
     RecordingSpoilt,
-    refuse_flat,
-    refuse_motion,
     tone_level,
 )
 
@@ -51,7 +49,7 @@ class ScpiGenerator(RecordingEquipment):
             The amplifier reports a fault, the reference does not follow the drive, or the level is beyond the exciter or the
             largest amplitude of the generator.
         """
-        refuse_motion(self.values.profile, self.name, frequency, level)
+        self.refuse_sine(frequency, level)
         self.write_all(function="SIN", frequency=frequency, axis=float(axis), before=0.0)
         volts = self._drive_volts(frequency, level, axis, slots)
         recording = self._record(volts, frequency, seconds, slots)
@@ -117,7 +115,6 @@ class ScpiGenerator(RecordingEquipment):
         return recording
 
     def make_safe(self) -> None:
-        """Switches the generator's output off."""
         self.values.write("output", "OFF")
 
     def _record(
@@ -146,5 +143,5 @@ class ScpiGenerator(RecordingEquipment):
         level, noise = tone_level(driven, recording.reference_rate_hz, frequency)
         if level <= SEEN * noise * np.sqrt(2.0 / driven.size):
             return 0.0
-        refuse_flat(np.abs(driven), self.name, FLAT_SHARE_OF_SINE * driven.size)
+        self.refuse_flat(np.abs(driven), FLAT_SHARE_OF_SINE * driven.size)
         return level

@@ -21,11 +21,6 @@ RECORD_HZ = 200.0
 IDLE_S = 900.0  # without a line for so long the machine stops by itself
 
 
-def simulated(world: World, profile: Profile) -> "Centrifuge":
-    """A centrifuge in front of the world's bench; its input axis is z, or x of a device without z, radial."""
-    return Centrifuge(world)
-
-
 def radius_error(bench: Bench, radius_m: float) -> float:
     """Radius of a mounting on the arm minus its nominal one, m: the same for all runs of a station."""
     if math.isclose(radius_m, RADIUS_M, abs_tol=1e-6):
@@ -36,10 +31,10 @@ def radius_error(bench: Bench, radius_m: float) -> float:
 class Centrifuge:
     """Follows the demanded rate at constant acceleration; an open interlock or a long silence brings it to rest.
 
-    Units are mounted (direction, radius) at rest only, with the interlock open.
+    Units are mounted (direction, radius) at rest only, with the interlock open; radial is their z, or x of a device without z.
     """
 
-    def __init__(self, world: World) -> None:
+    def __init__(self, world: World, profile: Profile) -> None:
         self._world = world
         self._from, self._to, self._since_us = 0.0, 0.0, 0
         self._closed, self._direction, self._asked = False, 1.0, 0.0
@@ -49,7 +44,6 @@ class Centrifuge:
         self._files = ResultFiles()
 
     def answer(self, line: str) -> tuple[str, bool]:  # noqa: PLR0911 - one a kind of line
-        """The answer to a line, and whether the line changed anything."""
         self._watch()
         head, _, value = line.partition(",")
         if line in {":read:rate? 1", ":interlock? 1", ":rec:file?", ":mode? 1", ":int? 1", ":mount? 1", ":radius? 1"}:
@@ -139,3 +133,6 @@ class Centrifuge:
         reference = np.zeros((round(self._seconds * 10.0), 3))
         reference[:, 0] = self._to * (1.0 + 1e-6 * rng.standard_normal(len(reference)))
         return Waveforms(outputs, RECORD_HZ, reference, 10.0)
+
+
+simulated = Centrifuge

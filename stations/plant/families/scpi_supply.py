@@ -20,7 +20,6 @@ class Supply(ScpiDevice):
         self._range = (command.minimum or 0.0, command.maximum or 60.0)
 
     def answer(self, line: str) -> tuple[str, bool]:
-        """The answer to a line, and whether the line changed anything."""
         head, _, value = line.removesuffix(";*OPC?").partition(" ")
         if line == "VOLT?":
             return f"{self._set:.6f}", False

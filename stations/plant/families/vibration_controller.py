@@ -31,7 +31,6 @@ class Controller:
         self._files = ResultFiles()
 
     def answer(self, line: str) -> tuple[str, bool]:  # noqa: PLR0911 - one return an order
-        """The answer to a line, and whether the line changed anything."""
         head, _, value = line.partition(" ")
         if line == "STAT?":
             state = "RUN,-" if self._world.now_us < self._until_us else "DONE,-"

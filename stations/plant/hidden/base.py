@@ -53,5 +53,5 @@ class HiddenEffect:
         """The supply of the devices is switched at ``now`` s; it is on at the start."""
 
     def output(self, force: Array, block: Block) -> Array | float:
-        """Addition to the outputs, (n, s, 3), g, under ``force`` (n, s, 3)."""
+        """Addition to the outputs, (n, s, 3) or (n, 1, 1), g, under ``force`` (n, s, 3)."""
         return 0.0
