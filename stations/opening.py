@@ -55,8 +55,6 @@ def open_station(
 
     Hardware is leased and watched meanwhile, and left in its safe state, whatever ends the context.
 
-    Parameters
-    ----------
     config : what the station is
     lot : the units in it; a simulated station makes their devices
     resume : ``Station.state()`` of an earlier session: a simulated station goes on exactly there; hardware is where it is

@@ -53,8 +53,6 @@ class Overview:
 def looked_at(config: StationConfig, lot: Lot) -> Generator[Callable[[], Overview]]:
     """A block with a function that reads the state of the station at each call; nothing moves, and no lease is needed.
 
-    Parameters
-    ----------
     lot : the units in a simulated station; hardware reports its own
     """
     from stations.opening import make_plant, open_devices, serve_plant  # noqa: PLC0415 - imported only when the state is read

@@ -50,8 +50,6 @@ class Copied:
 class _ChainAtStart:
     """The chain of the source as it was when the copy began.
 
-    Attributes
-    ----------
     entries : names of its entries
     hashes : SHA-256 of files by their names, as the newest entry that names each states it
     """
@@ -69,17 +67,11 @@ class _ChainAtStart:
 def copy_archive(source: Archive, target: Archive) -> Copied:
     """Copy the files that the target does not have yet.
 
-    Parameters
-    ----------
     target : an empty or new folder, or an earlier copy of this archive
-
-    Raises
-    ------
-    WrongUse
-        The target is the source, or lies in it.
-    ArchiveUnusable
-        The target holds something else, or an archive with another chain; a file was read differently than it was written; or
-        files of the source are damaged that are sound in the target: these are kept, and all others are copied.
+    Raises WrongUse: the target is the source, or lies in it.
+    Raises ArchiveUnusable: the target holds something else, or an archive with another chain; a file was read differently
+        than it was written; or files of the source are damaged that are sound in the target: these are kept, and all others
+        are copied.
     """
     source.refuse_none()
     _refuse_itself(source, target)

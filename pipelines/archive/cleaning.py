@@ -40,8 +40,6 @@ class Cleaned:
 def clean(archive: Archive, *, only_look: bool = False) -> Cleaned:
     """Remove the temporary files of killed writers from an archive.
 
-    Parameters
-    ----------
     only_look : remove nothing and write nothing.
     """
     done = Cleaned()

@@ -48,16 +48,9 @@ class Compacted:
 def compact(archive: Archive, before: str = "") -> Compacted:
     """Pack what is finished in a local archive.
 
-    Parameters
-    ----------
     before : only runs that began before this day; all where empty
-
-    Raises
-    ------
-    WrongUse
-        The archive is in an object store.
-    OperatorNeeded
-        A run is being measured, or another compaction is active.
+    Raises WrongUse: the archive is in an object store.
+    Raises OperatorNeeded: a run is being measured, or another compaction is active.
     """
     if not isinstance(archive.root, Path):
         raise WrongUse(

@@ -31,8 +31,6 @@ ELSEWHERE = "name another place"
 def writing(path: Place, what: str = "archive", remedy: str = IN_ARCHIVE) -> Generator[None, None, None]:
     """A block that writes below ``path``; an error of the system becomes one message.
 
-    Parameters
-    ----------
     what : what is written; the message begins with it.
     remedy : what the user can do; the message ends with it.
     """
@@ -92,8 +90,6 @@ def manifest_bytes(content: Mapping[str, Any]) -> bytes:
 def publish(path: Place, data: bytes, what: str = "archive", remedy: str = IN_ARCHIVE) -> None:
     """Write a file completely or not at all, so that it survives a power failure.
 
-    Parameters
-    ----------
     what, remedy : beginning and end of the error message.
     """
     with writing(path, what, remedy):
@@ -221,8 +217,6 @@ def writers_of(folder: Path, mode: int) -> Generator[bool, None, None]:
     The system releases the lock when a process dies. Yields whether the lock was granted; a file system
     without locks grants none.
 
-    Parameters
-    ----------
     mode : ``host.SHARED``, or ``host.EXCLUSIVE | host.AT_ONCE``.
     """
     with host.opened_folder(folder) as handle:

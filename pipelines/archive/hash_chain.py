@@ -19,8 +19,6 @@ SHARD = 1000
 def append(root: Place, kind: str, sealed: Mapping[str, str], about: Mapping[str, Any]) -> int:
     """The number of a new entry.
 
-    Parameters
-    ----------
     kind : ``run``, ``calibrations``, ``programming`` or ``release``.
     sealed : hashes of files by their place below the archive's root.
     about : who wrote it, where and when, and about what.

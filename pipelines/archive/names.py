@@ -32,10 +32,7 @@ def is_below(name: str) -> bool:
 def refuse_leading_out(content: Mapping[str, Any], where: Place) -> None:
     """Refuse a manifest with a name that could lead out of the archive.
 
-    Raises
-    ------
-    NameLeadsOut
-        With the entry and the name.
+    Raises NameLeadsOut: with the entry and the name.
     """
     for entry, name, sound in _named(content):
         if not sound:

@@ -42,8 +42,6 @@ def write_pack(
 ) -> str:
     """Write and publish one pack; the name of its zip.
 
-    Parameters
-    ----------
     root : folder of the archive
     what : end of its name: a month, or ``calibrations``
     replaced : zips of packs whose files are all in this one; from now on they may be removed

@@ -81,8 +81,6 @@ class Run:
     def save(self, stage: str, key: str, outputs: Mapping[str, pd.DataFrame], about: Mapping[str, Any]) -> None:
         """Publish the tables of a stage with a manifest beside each.
 
-        Parameters
-        ----------
         about : the stage's inputs, parameters and code, as they went into the key.
         """
         from schemas import table_check, tables  # slow to import, and only writers of tables need it
@@ -142,8 +140,6 @@ class Run:
     def table(self, name: str, columns: Sequence[str] = ()) -> pd.DataFrame:
         """A table of the run, whole and unchanged since it was written.
 
-        Parameters
-        ----------
         columns : those that the caller reads; the table may have more. All where none is named
         """
         path = self.path / f"{name}.parquet"

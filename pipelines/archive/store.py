@@ -30,8 +30,6 @@ class Size:
 class ObjectPath:
     """A place in an object store, with the methods of :class:`pathlib.Path` that the archive uses.
 
-    Parameters
-    ----------
     system : the file system of pyarrow.
     key : bucket and key, with slashes.
     scheme : begins the place's name for people.

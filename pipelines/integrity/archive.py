@@ -98,8 +98,6 @@ def verify(
     A record that was stored between two looks at its capture is no finding, and neither is a seal that is newer than the chain
     that was read.
 
-    Parameters
-    ----------
     runs : only these runs and their captures; the whole archive where empty.
     keys : public keys that are trusted, by name.
     demanded : whether a manifest without a signature by one of these is wrong.

@@ -23,8 +23,6 @@ def by_cause(
 ) -> list[IntegrityFinding]:
     """The findings by cause; each path occurs once, and consequences are listed in the finding that caused them.
 
-    Parameters
-    ----------
     differing : files that differ from what the chain sealed: of two files that disagree, these were edited
     """
     by_path: dict[str, list[IntegrityFinding]] = {}

@@ -26,8 +26,6 @@ CHANGED, MISSING, EDITED, FOREIGN, NEWER, UNREADABLE, SIGNATURE, UNCHAINED = (
 class IntegrityFinding:
     """A difference between the archive and what was written.
 
-    Parameters
-    ----------
     kind : ``changed``, ``missing``, ``edited``, ``foreign``, ``newer``, ``unreadable``, ``signature`` or ``unchained``.
     path : the file, below the archive's root.
     consequences : sentences about further findings with this cause.
@@ -45,8 +43,6 @@ class IntegrityFinding:
 class VerifiedPart:
     """Findings in a part of the archive, and the amount of data read.
 
-    Parameters
-    ----------
     remarks : information that is no finding.
     signatures : number of manifests by state of the signature (good, unknown key, bad, unsigned).
     untrusted : names of the manifests without a signature or with that of an unknown key, by state.

@@ -34,8 +34,6 @@ REMEDY = "it was copied here, its entry was removed, or its writer was killed: s
 class Chain:
     """Content of the chain.
 
-    Parameters
-    ----------
     head : hash of its last entry.
     sealed : the files that it names, with the hash that the last entry to name them gives.
     entries : what each entry seals, by its number.
@@ -51,8 +49,6 @@ class Chain:
 def check_chain(root: Place, checked: VerifiedPart, *, only: set[str] | None = None, head: str = "") -> Chain:
     """Read and check the chain; findings go into ``checked``.
 
-    Parameters
-    ----------
     only : runs whose sealed files are checked; all where None.
     head : hash of an entry from a copy kept elsewhere; it must exist.
     """

@@ -41,8 +41,6 @@ def write_crate(archive: Archive, traced: Lineage, folder: Path) -> int:
 def crate_of(traced: Lineage, contents: dict[str, bytes]) -> dict[str, Any]:
     """The description of the crate.
 
-    Parameters
-    ----------
     contents : the other files of the crate, by name.
     """
     graph = traced.graph

@@ -97,10 +97,7 @@ TERMS = (
 def need_of(range_text: str, temperature: str, error: str, bandwidth_hz: float) -> Need:
     """What is asked for, from texts such as ``4g``, ``-40..85`` and ``2mg``.
 
-    Raises
-    ------
-    WrongUse
-        A text is of another form, or a value is not positive.
+    Raises WrongUse: a text is of another form, or a value is not positive.
     """
     size = _quantity(range_text, "--range", {"g": 1.0, "mg": 1e-3})
     allowed = _quantity(error, "--error", {"ug": 1.0, "µg": 1.0, "mg": MILLI, "g": MICRO})
@@ -131,8 +128,6 @@ def _quantity(text: str, option: str, units: dict[str, float]) -> float:
 def choice(need: Need, devices: list[str]) -> ChoiceDocument:
     """The budget of every device with every calibration, those that reach the error first, with the least calibration first.
 
-    Parameters
-    ----------
     devices : presets; empty for all
     """
     known = preset_names()

@@ -47,10 +47,7 @@ class PlanContext:
 def plan_context(recipe: Recipe, station: StationConfig, noise: DwellNoise, *, slowest: float = 0.0) -> PlanContext:
     """A recipe on a station with devices of this noise; ``slowest`` as in :func:`inertial.noise.dwells.dwell_covariance`.
 
-    Raises
-    ------
-    RecipeInvalid
-        The recipe has no multi-position test, of whose dwells a plan is made.
+    Raises RecipeInvalid: the recipe has no multi-position test, of whose dwells a plan is made.
     """
     if not recipe.tumbles:
         raise RecipeInvalid(
@@ -69,8 +66,6 @@ def shown_by_verification(
 ) -> set[str]:
     """The effects that are visible with the poses of verification, of those that are not visible without them.
 
-    Parameters
-    ----------
     activities : what the station does in the recipe
     effects : those that are not visible in the dwells of the fit; the recipe's others are the model
     """
@@ -95,8 +90,6 @@ def with_verification_hint(text: str, activities: Sequence[Activity], station: S
 def noise_of(recipe: Recipe, device: str, density: float | None, wander: float | None) -> DwellNoise:
     """Noise of a preset, with given values in place of the preset's.
 
-    Parameters
-    ----------
     device : preset; the recipe's device where it is empty
     density : white noise, µg/√Hz · wander : flicker floor of the Allan deviation, µg
     """

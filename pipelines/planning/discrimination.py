@@ -32,18 +32,12 @@ def discrimination_requirement(
 ) -> Requirement:
     """The requirement that a recipe discriminates between rivals; the model of ``against`` is fitted beside them.
 
-    Parameters
-    ----------
     against : the textbook plan; its poses scale the columns
     levels : °C, the temperature range
     size_ug : contribution of each rival where it is largest, µg
     enough : χ² of the wrong rival over the recipe's lot, as a diagnosis computes it
     plan : named plan of poses to choose from
-
-    Raises
-    ------
-    WrongUse
-        Fewer than two rivals, or an effect of the station among them.
+    Raises WrongUse: fewer than two rivals, or an effect of the station among them.
     """
     model = [e for e in against.recipe.effects if e not in rivals]
     effects = (*unit_effects(model), *rivals)

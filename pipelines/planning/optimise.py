@@ -98,16 +98,10 @@ def optimise(
     orders poses are exchanged (:mod:`inertial.planning.pose_exchange`), and dwells are added or removed until the requirement is
     just met.
 
-    Parameters
-    ----------
     tolerance : ratio to the requirement up to which the nearest recipe is returned where none meets it, provided that it is
         quicker than the textbook plan
     ramp : whether the devices are measured while the chamber ramps, in place of soaks
-
-    Raises
-    ------
-    RecipeInvalid
-        No recipe that was tried meets the requirement; the message gives the smallest ratio reached.
+    Raises RecipeInvalid: no recipe that was tried meets the requirement; the message gives the smallest ratio reached.
     """
     search = RecipeSearch(recipe, against, requirement, ramp=ramp)
     best: PlanContext | None = None

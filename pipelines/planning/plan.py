@@ -36,15 +36,9 @@ NO_SWITCH_ON = "no repeatability of switching on is stated for this device"
 def plan(context: PlanContext, terms: BudgetTerms | None = None, limits: Limits | None = None) -> dict[str, Any]:
     """Document of a recipe: visibility of every effect of the catalogue, expected errors, station time; keys for other programs.
 
-    Parameters
-    ----------
     terms : what station and device state of their uncertainty; without them the document has no ``uncertainty``
     limits : that the uncertainty must allow
-
-    Raises
-    ------
-    NotIdentified
-        The recipe cannot identify its own model; the message says what is missing.
+    Raises NotIdentified: the recipe cannot identify its own model; the message says what is missing.
     """
     recipe, noise = context.recipe, context.noise
     of_record = _of_record(context)
@@ -90,8 +84,6 @@ def _of_record(context: PlanContext) -> Array:
 def _against_means(context: PlanContext, square: Array, gain: Array) -> tuple[Array, Array]:
     """Variances (k,), g², of biases as the mean of the record and, as far as the walk goes, of the day after it.
 
-    Parameters
-    ----------
     square : (k,), variances of the coefficients; gain : (k, n), what every dwell adds to them
     """
     time, noise, length = context.state.time, context.noise, context.recipe.dwell_s
@@ -136,10 +128,7 @@ def _bias(
 def identified(context: PlanContext) -> Expected:
     """The expected standard errors of a recipe's model.
 
-    Raises
-    ------
-    NotIdentified
-        The recipe cannot identify it; the message names the feature of the plan and what to add.
+    Raises NotIdentified: the recipe cannot identify it; the message names the feature of the plan and what to add.
     """
     recipe = context.recipe
     try:
@@ -231,8 +220,6 @@ def _row(visibility: Visibility, context: PlanContext, checked: Collection[str])
 def reach(context: PlanContext, covariance: Array, terms: BudgetTerms, limits: Limits | None) -> dict[str, Any] | None:
     """What a recipe can reach on its station; None where no uncertainty is stated.
 
-    Parameters
-    ----------
     covariance : (n, n), of the dwells of the fit as the fit sees them, g²
     """
     if terms.stated is None:

@@ -248,8 +248,6 @@ def spread(force: Array) -> Choice:
 def spanned(force: Array, choice: Choice, fixed: Flags, needed_g: float, axes: int) -> Choice:
     """A plan (n,) of candidates with the required span of specific force on the axes, as few poses as possible replaced.
 
-    Parameters
-    ----------
     force : (c, 3), of the candidates
     fixed : (n,), slots that are not changed
     needed_g : g, required difference of the largest and smallest component
@@ -276,8 +274,6 @@ def _flicker(dwell_s: float, longest: float) -> tuple[Array, Array, float]:
 def fewest_dwells(timed: TimedDesign, design: PlanDesign, allowed: Array) -> PlanDesign | None:
     """The design with the fewest dwells whose starting arrangement stays within the allowed ratios; None where there is none.
 
-    Parameters
-    ----------
     design : soaks and dwell length; its counts are replaced
     allowed : (axes, p) or (pairs,), largest ratio to the required errors, as returned by :meth:`TimedDesign.ratio_and_seconds`;
         above 1 where an exchange of poses is expected to improve it

@@ -54,8 +54,6 @@ class BufferedRun(Run):
     def flush(self, *, last: str = "") -> None:
         """Publish all waiting files, tables and manifests in the order in which they were made.
 
-        Parameters
-        ----------
         last : a file that is published after all others; it shows readers that the others exist.
         """
         if self._waiting:

@@ -22,10 +22,7 @@ def diff(a: Run, b: Run) -> dict[str, Any]:
     the two were independent, √(u_a² + u_b²): two analyses of one measurement are not, so there a change of one standard
     uncertainty is large.
 
-    Raises
-    ------
-    DataRejected
-        The runs have no unit in common, or nothing to compare.
+    Raises DataRejected: the runs have no unit in common, or nothing to compare.
     """
     coefficients = _changed(_table(a, "coefficients"), _table(b, "coefficients"), COEFFICIENT, "standard_error")
     figures = _changed(_standard(a), _standard(b), FIGURE, "standard_error")

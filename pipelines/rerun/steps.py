@@ -120,8 +120,6 @@ class Plan:
 def plan_of(run: Run, change: ModelChange, left_out: Dwells = ()) -> Plan:
     """What is to be done to a run, with another model or other limits where they are given.
 
-    Parameters
-    ----------
     left_out : dwells of an import that are left out, as (unit, dwell)
     """
     if run.about.get("capture"):

@@ -34,8 +34,6 @@ def evaluated(
 ) -> dict[str, Any]:
     """The what-if of a model over lots, stored in the archive as evidence; nothing of the lots themselves is changed.
 
-    Parameters
-    ----------
     runs : of the archive, with the present and with the new model
     distribute, workers : where parts are computed, see :func:`pipelines.parallel.map_partitions`
     report_progress : gets what is computed next

@@ -65,8 +65,6 @@ def _bits(register: Register, value: int) -> bool | None:
 def votes(profile: Profile, words: Mapping[str, Sequence[int]], order: WordOrder, *, orderly: bool) -> tuple[int, int]:
     """How many registers have a plausible and how many an implausible value in a word order.
 
-    Parameters
-    ----------
     words : by register, as they were read
     orderly : only registers of two words, which alone depend on the order; else all
     """

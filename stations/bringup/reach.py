@@ -42,15 +42,9 @@ class Answer:
 def reach(target: Target, findings: Findings, person: Person, *, given_id: int, search_line: bool = False) -> None:
     """Finds the device, and leaves ``target`` with the id, addresses and word order at which it answers plausibly.
 
-    Parameters
-    ----------
     given_id : device id that the person has named; 0 to look for it
     search_line : whether speed and parity of a serial line are to be found as well
-
-    Raises
-    ------
-    StationError
-        Nothing answers, or several devices could be meant.
+    Raises StationError: nothing answers, or several devices could be meant.
     """
     if target.text:
         first = target.profile.commands[0]

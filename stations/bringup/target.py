@@ -30,10 +30,7 @@ PORT = 502
 def device_at(link: str, profile: Profile, device_id: int) -> Device:
     """The device that a link names.
 
-    Raises
-    ------
-    WrongUse
-        It is not of one of the forms, or the profile is carried otherwise.
+    Raises WrongUse: it is not of one of the forms, or the profile is carried otherwise.
     """
     kind, _, rest = link.partition(":")
     content: dict[str, object] = {"profile": profile.name, "device_id": device_id}
@@ -167,10 +164,7 @@ def as_found(target: Target) -> AsFound:
 def leave_as_found(target: Target, found: AsFound) -> list[str]:
     """Stops an axis, writes back what has changed, and tells what was done.
 
-    Raises
-    ------
-    StationError
-        The device did not take an order; it may be given again.
+    Raises StationError: the device did not take an order; it may be given again.
     """
     done: list[str] = []
     if target.profile.kind == "axis" and found.moved:

@@ -39,8 +39,6 @@ class RecordingSpoilt(StationError):
 class Recording:
     """The outputs of the units by slot, and the reference sensor, each on its own time base.
 
-    Attributes
-    ----------
     outputs : (n, 3) by slot, unit of the output
     rate_hz : nominal rate of the outputs, Hz; a device with a clock of its own departs from it
     reference : (m, 3), g, in the axes of the units
@@ -68,8 +66,6 @@ class Recording:
 def read_recording(path: Path, slots: list[int], name: str, units: Mapping[str, float] = STANDARD_GRAVITY) -> Recording:
     """The recording in a result file; a file without rate or unit is refused.
 
-    Parameters
-    ----------
     slots : whose channels are wanted; one that is not there is left out
     name : of the equipment, for messages
     units : allowed units of the reference, with their number in the one that is returned

@@ -35,8 +35,6 @@ class RecordedDevice:
 class Exchange:
     """A request and what came back.
 
-    Attributes
-    ----------
     at_s : seconds since the start of the recording · seconds : until the answer, or until none was waited for any longer
     request : Modbus function and data, without address and checksum; a line of text where ``text``
     reply : likewise; None without an answer · failed : why there is none: ``silence``, ``broken: …``, ``malformed: …``
@@ -124,10 +122,7 @@ def readable(path: Path) -> Generator[None]:
 def read_frames(path: Path) -> FrameFile:
     """The recording in a file.
 
-    Raises
-    ------
-    DataRejected
-        It is no recording, or a line other than the last is damaged.
+    Raises DataRejected: it is no recording, or a line other than the last is damaged.
     """
     with readable(path):
         lines = path.read_bytes().split(b"\n")

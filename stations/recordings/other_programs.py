@@ -33,10 +33,7 @@ SECONDS = re.compile(r"^\s*\"?(\d+\.\d+)\"?\s*[,;\t ]")
 def read_recording(path: Path) -> FrameFile:
     """A recording of this program, a pcap or pcapng file, or a log of a Modbus tool, recognised by its content.
 
-    Raises
-    ------
-    DataRejected
-        It is none of these, or it holds no Modbus request.
+    Raises DataRejected: it is none of these, or it holds no Modbus request.
     """
     with readable(path), path.open("rb") as file:
         head = file.read(256)

@@ -33,8 +33,6 @@ KERNEL_NAMES = Path("/sys/dev/char")
 def addresses(config: StationConfig, *, every: bool = False) -> dict[Part, str]:
     """Addresses of table, chamber and reader of a station, in one form however the file writes them.
 
-    Parameters
-    ----------
     every : include parts that share an address with another; a lease is taken once per address
     """
     by_part: dict[Part, str] = {}

@@ -26,12 +26,8 @@ class ShockMachine(RecordingEquipment):
     def shock(self, peak: float, seconds: float, axis: int, direction: int, slots: Sequence[int]) -> Recording:
         """A half sine with a peak in g along an axis (0 to 2), up or against it (direction 1 or −1).
 
-        Raises
-        ------
-        OperatorNeeded
-            The guard door is open.
-        RecordingSpoilt
-            Missed trigger, clipped reference, or a peak outside ± 20 %.
+        Raises OperatorNeeded: the guard door is open.
+        Raises RecordingSpoilt: missed trigger, clipped reference, or a peak outside ± 20 %.
         """
         if self.values.text("door") != "CLOSED":
             raise OperatorNeeded(

@@ -22,12 +22,9 @@ class VibrationController(RecordingEquipment):
     def sine(self, frequency: float, level: float, axis: int, seconds: float, slots: Sequence[int]) -> Recording:
         """A dwell at one frequency in Hz with a peak level in g, along an axis (0 to 2) of the units.
 
-        Raises
-        ------
-        RecordingSpoilt
-            Missed trigger, clipped reference, or a level that was not reached.
-        OperatorNeeded
-            The controller has aborted: its interlock or a limit must be looked after first; or the order is beyond the exciter.
+        Raises RecordingSpoilt: missed trigger, clipped reference, or a level that was not reached.
+        Raises OperatorNeeded: the controller has aborted: its interlock or a limit must be looked after first; or the order
+            is beyond the exciter.
         """
         self.refuse_sine(frequency, level)
         self.write_all(frequency=frequency, level=level, duration=seconds, axis=float(axis))
@@ -42,10 +39,7 @@ class VibrationController(RecordingEquipment):
 
         At 0° the motion is along the next axis (x after z), at 90° along the one after it.
 
-        Raises
-        ------
-        RecordingSpoilt, OperatorNeeded
-            As for :meth:`sine`.
+        Raises RecordingSpoilt, OperatorNeeded: as for :meth:`sine`.
         """
         self.refuse_sine(frequency, level)
         self.write_all(frequency=frequency, level=level, duration=seconds, axis=float(axis), turn=angle_deg)
@@ -57,10 +51,7 @@ class VibrationController(RecordingEquipment):
     def random(self, profile: str, level: float, axis: int, seconds: float, slots: Sequence[int]) -> Recording:
         """Random vibration by a profile that the controller has, ``level`` in g rms.
 
-        Raises
-        ------
-        RecordingSpoilt, OperatorNeeded
-            As for :meth:`sine`; the exciter must follow peaks of three sigma.
+        Raises RecordingSpoilt, OperatorNeeded: as for :meth:`sine`; the exciter must follow peaks of three sigma.
         """
         self.refuse_random(profile, level)
         self.write_all(profile=profile, level=level, duration=seconds, axis=float(axis))

@@ -24,8 +24,6 @@ class Kind:
 
     A resumed plant replays the writes alone.
 
-    Parameters
-    ----------
     meaning : what happens, in one sentence
     targets : what the fault can be given for: ``unit`` (by its serial number) or the station's devices by name; empty for none
     figures : its figures with their defaults

@@ -38,9 +38,7 @@ def fault_rows() -> list[dict[str, str]]:
 def build_fault(order: FaultOrder, serials: Sequence[str]) -> Fault:
     """The fault that an order describes, for a lot of these serial numbers.
 
-    Raises
-    ------
-    RecipeInvalid : the kind, a figure or the unit does not exist, or the kind needs another target
+    Raises RecipeInvalid: the kind, a figure or the unit does not exist, or the kind needs another target
     """
     known = kinds()
     if order.kind not in known:

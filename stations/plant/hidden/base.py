@@ -12,8 +12,6 @@ Array = NDArray[np.float64]
 class Block:
     """Quantities during a block of samples: n instants, s units.
 
-    Parameters
-    ----------
     time, since_power, vibration, humidity : (n,), s, s, g rms, % of the air around the devices
     temperature : (n, s), °C of the sensing element
     memory : (n, s, 3), the result of ``slow`` of the effect for these instants
