@@ -6,7 +6,7 @@ import fcntl
 import os
 import tempfile
 from collections.abc import Generator, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, closing, contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -96,11 +96,9 @@ def open_devices(
     if protection is not None:
         permit = Permit(protection.leases.alive, protection.leases.require, config.link.timeout_s)
         require = protection.require
-    links, clock = Links(config, permit=permit), WallClock(resume, config.link.speed)
-    try:
+    clock = WallClock(resume, config.link.speed)
+    with closing(Links(config, permit=permit)) as links:
         yield replace(_assemble(config, slots, links, clock, roles), state=clock.state, exact=False, require=require)
-    finally:
-        links.close()
 
 
 def make_plant(
@@ -230,9 +228,8 @@ def one_processor() -> Generator[None]:
     with ExitStack() as stack:
         number = _claimed(stack)
         if number is not None:
-            before = os.sched_getaffinity(0)
+            stack.callback(_tie, *os.sched_getaffinity(0))
             _tie(number)
-            stack.callback(_tie, *before)
         yield
 
 

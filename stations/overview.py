@@ -1,7 +1,7 @@
 """State of a station at one instant: angles, temperatures, states, devices in the slots, and the holder of the lease."""
 
 from collections.abc import Callable, Generator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -61,8 +61,12 @@ def looked_at(config: StationConfig, lot: Lot) -> Generator[Callable[[], Overvie
         with serve_plant(config, lot, make_plant(config, lot)) as station:
             yield lambda: look_at(config, station)
         return
-    with open_devices(config, ()) as empty:
-        slots = _occupied(empty)
+    slots: list[int] = []
+    with (
+        open_devices(config, ()) as empty,
+        suppress(StationError),
+    ):  # that the reader does not answer is shown by the state
+        slots = empty.reader.occupied()
     with open_devices(config, slots) as station:
         yield lambda: look_at(config, station)
 
@@ -108,14 +112,6 @@ def _reader(now: Overview, station: Station) -> None:
             now.faults[f"slot {number}"] = str(problem)
         temperature, supply = instruments.temperature_C[number], instruments.supply_V[number]
         now.slots.append(SlotNow(number, serial, temperature, supply))
-
-
-def _occupied(station: Station) -> list[int]:
-    """Occupied slots as the reader reports them; none where it does not answer, which the state then shows."""
-    try:
-        return station.reader.occupied()
-    except StationError:
-        return []
 
 
 def _lease(now: Overview, station: Station) -> None:

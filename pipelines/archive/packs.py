@@ -238,7 +238,5 @@ def _is_contents(place: Path) -> bool:
 
 def _together(parts: list[PackedFolder]) -> PackedFolder:
     """A folder of several packs, the newest last."""
-    files: dict[str, Member] = {}
-    for one in parts:
-        files |= one.files
+    files = {name: member for one in parts for name, member in one.files.items()}
     return PackedFolder(max(one.mtime_ns for one in parts), files)

@@ -13,6 +13,7 @@ from pipelines.lineage.graph import Graph, Node, ProvActivity
 
 MADE = ("who", "where", "when", "code", "key", "software", "libraries", "schema", "parameters", "taken_from")
 RAW = "records"
+ELSEWHERE = {"recipe", "limits", "station", "signature"}  # parts of ``run.json`` with nodes of their own, or none
 
 
 class Gatherer:
@@ -30,7 +31,8 @@ class Gatherer:
         self._runs.add(run.id)
         about = run.about
         settings = self._settings(about)
-        start = self.graph.add(Node(f"runs/{run.id}", "run", run.id, f"runs/{run.id}/run.json", about=_short(about)))
+        own = {key: value for key, value in about.items() if key not in ELSEWHERE}
+        start = self.graph.add(Node(f"runs/{run.id}", "run", run.id, f"runs/{run.id}/run.json", about=own))
         earlier = [str(one) for one in (about.get("rerun_of"), *about.get("parents", ())) if one]
         earlier = [one for one in dict.fromkeys(earlier) if one != run.id]
         raw = self._capture(str(about.get("capture") or ""), about, settings)
@@ -140,8 +142,3 @@ class Gatherer:
 
 def _by(event: LedgerEntry) -> dict[str, Any]:
     return {"who": event.who, "where": event.where, "when": event.when, "reason": event.reason}
-
-
-def _short(about: dict[str, Any]) -> dict[str, Any]:
-    """The content of ``run.json`` without the parts that have their own nodes."""
-    return {key: value for key, value in about.items() if key not in {"recipe", "limits", "station", "signature"}}

@@ -148,13 +148,9 @@ def missing(state: State, effects: Sequence[str]) -> str:
         if visibility and visibility[0].remaining_fraction <= SEEN:
             reasons[effect] = reason(state, effect, rest)
     # of mutually confounded effects only the last one is reported: without it the others are identified
-    chosen = list(reasons)[-1:] if len(reasons) > 1 and not _alone(state, reasons) else list(reasons)
+    mutual = len(reasons) > 1 and any(visibilities(state, ("bias",), 1.0, [e])[0].seen for e in reasons)
+    chosen = list(reasons)[-1:] if mutual else list(reasons)
     return "; ".join(f"{effect} cannot be identified: {reasons[effect]}" for effect in chosen)
-
-
-def _alone(state: State, reasons: dict[str, str]) -> bool:
-    """Whether each of the effects is invisible by itself, not only beside the others."""
-    return all(not visibilities(state, ("bias",), 1.0, [effect])[0].seen for effect in reasons)
 
 
 def _coefficient_rows(expected: Expected) -> list[dict[str, Any]]:

@@ -148,14 +148,13 @@ def _verdict(
     figure = next(iter(_known(total)), "")
     if not figure:
         return NOTHING, "no lot has dwells that were not fitted; the models cannot be compared"
-    where = WHERE[figure]
     before, after = total["yield"]
-    old, new = total[figure]
+    old, new = map(_three, total[figure])
     yields = f"the yield from {100.0 * before:.0f} % to {100.0 * after:.0f} %"
-    sentence = f"the error {where} changes from {_three(old)} to {_three(new)} µg, {yields}"
+    sentence = f"the error {WHERE[figure]} changes from {old} to {new} µg, {yields}"
     ratio = _log_ratios(figure, lots, fresh)
     count = number_of(int(ratio.size), "unit")
-    if lost := _lost(figure, lots, fresh):
+    if lost := sum(len(old.keys() - new.keys()) for old, new in _pairs(figure, lots, fresh)):
         return WORSE, f"{sentence}; {number_of(lost, 'calibration')} of units cannot be judged with the new model"
     if ratio.size < FEWEST:
         return EQUAL, f"{sentence}; {count} cannot show that this is more than scatter, {FEWEST} are needed"
@@ -164,8 +163,9 @@ def _verdict(
     hurt: list[str] = []
     for row in rows:
         own = [one for one in lots if (one.entry.station, one.entry.device) == (row["station"], row["device"])]
-        grown = figure in _known(row) and _share(row[figure]) > FALLS
-        if grown and _rises(_log_ratios(figure, own, fresh), LEVEL / len(rows)):
+        ratios = _log_ratios(figure, own, fresh)
+        grown = figure in _known(row) and _share(row[figure]) > FALLS and ratios.size >= FEWEST and ratios.mean() > 0.0
+        if grown and _differs(ratios, LEVEL / len(rows)):
             hurt.append(f"{row['device']} on {row['station']}")
     return _decided(_share(total[figure]), float(ratio.mean()), hurt, sentence)
 
@@ -199,11 +199,6 @@ def _log_ratios(figure: str, lots: Sequence[LotComparison], fresh: dict[str, Fre
     return np.array([float(np.mean(own)) for own in by_unit.values()])
 
 
-def _lost(figure: str, lots: Sequence[LotComparison], fresh: dict[str, Fresh]) -> int:
-    """How many calibrations the old model judges and the new one does not."""
-    return sum(len(old.keys() - new.keys()) for old, new in _pairs(figure, lots, fresh))
-
-
 def _differs(ratios: NDArray[np.float64], level: float) -> bool:
     """Whether the mean of the ratios differs from zero by more than they scatter (Student's t, two-sided)."""
     from scipy import stats
@@ -213,10 +208,6 @@ def _differs(ratios: NDArray[np.float64], level: float) -> bool:
         return bool(ratios.mean() != 0.0)
     size = abs(float(ratios.mean())) * ratios.size**0.5 / spread
     return bool(2.0 * stats.t.sf(size, ratios.size - 1) < level)
-
-
-def _rises(ratios: NDArray[np.float64], level: float) -> bool:
-    return bool(ratios.size >= FEWEST and ratios.mean() > 0.0 and _differs(ratios, level))
 
 
 WHERE = {"fresh_rms_ug": "on later runs", "verification_rms_ug": "in poses that were not fitted"}

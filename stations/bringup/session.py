@@ -75,9 +75,8 @@ class BringUp:
             if self.orders and self.profile.kind in {"axis", "chamber"}:
                 self._ordered()
             else:
-                reason = (
-                    f"no orders are known for a {self.profile.kind}" if self.orders else "only readings were asked for"
-                )
+                unknown = f"no orders are known for a {self.profile.kind}"
+                reason = unknown if self.orders else "only readings were asked for"
                 self.findings.add("order", "orders", "not tried", reason)
         except BaseException as problem:
             self.ended = "interrupted" if isinstance(problem, KeyboardInterrupt) else str(problem)
