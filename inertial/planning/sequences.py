@@ -265,8 +265,7 @@ def _history(history: History | None, time: Array, temperature: Array) -> Histor
     more = np.broadcast_to(temperature, (*lead, time.size))
     later = time > history.time[-1]
     return History(
-        np.concatenate([history.time, time[later]]),
-        np.concatenate([history.temperature, more[..., later]], axis=-1),
+        np.concatenate([history.time, time[later]]), np.concatenate([history.temperature, more[..., later]], axis=-1)
     )
 
 

@@ -166,13 +166,7 @@ def _coefficient_rows(expected: Expected) -> list[dict[str, Any]]:
 
 
 def _coefficient(effect: str, name: str, axis: str, error: float, place: int) -> dict[str, Any]:
-    return {
-        "effect": effect,
-        "name": name,
-        "axis": axis,
-        "uncertainty_ug": MICRO * error,
-        "unit": _unit(effect, place),
-    }
+    return {"effect": effect, "name": name, "axis": axis, "uncertainty_ug": MICRO * error, "unit": _unit(effect, place)}
 
 
 def _unit(effect: str, place: int) -> str:

@@ -129,11 +129,7 @@ class RecordingEquipment(Equipment):
         return state
 
     def recorded(
-        self,
-        before: str,
-        slots: Sequence[int],
-        what: str = "recording",
-        units: Mapping[str, float] = STANDARD_GRAVITY,
+        self, before: str, slots: Sequence[int], what: str = "recording", units: Mapping[str, float] = STANDARD_GRAVITY
     ) -> Recording:
         """The recording of the last test; that of ``before`` means that the recorder has missed its trigger."""
         path = self.values.text("file")

@@ -94,15 +94,7 @@ class World:
         )
         self.physics.orthogonality = 0.0 if self.station_errors is None else self.station_errors.orthogonality
         self.flash = [Flash() for _ in self.serials]  # by unit, in any slot
-        self.bench = Bench(
-            self.preset,
-            self._truths,
-            self.physics.devices,
-            gravity,
-            sim.seed,
-            lot.seed,
-            self._key,
-        )
+        self.bench = Bench(self.preset, self._truths, self.physics.devices, gravity, sim.seed, lot.seed, self._key)
         fifo = load_profile(config.devices.slots.profile).fifo
         registers = fifo.registers if fifo is not None else 0
         self.sampler = Sampler(self.physics, len(self.slots), self.preset.packing, registers)
