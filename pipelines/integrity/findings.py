@@ -70,8 +70,13 @@ class VerifiedPart:
         self.signatures += other.signatures
         for state, names in other.untrusted.items():
             self.untrusted[state] += names
-        for name in ("tables", "manifests", "rows", "bytes"):
-            setattr(self, name, getattr(self, name) + getattr(other, name))
+        for name, count in other.counts.items():
+            setattr(self, name, getattr(self, name) + count)
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """The amount of data read, by its name in the document."""
+        return {name: getattr(self, name) for name in ("tables", "manifests", "rows", "bytes")}
 
     def name(self, place: Place) -> str:
         """The name of a place relative to the root of the archive."""

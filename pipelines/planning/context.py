@@ -43,6 +43,17 @@ class PlanContext:
     state: State
     covariance: NDArray[np.float64]
 
+    @property
+    def minutes(self) -> float:
+        """Station time without the static record, min."""
+        own = spent(self.activities)
+        return own.total - own.static_record
+
+    @property
+    def heat(self) -> NDArray[np.float64]:
+        """The device's temperature at the dwells of the fit (n,), °C."""
+        return np.zeros(0) if self.state.temperature is None else self.state.temperature
+
 
 def plan_context(recipe: Recipe, station: StationConfig, noise: DwellNoise, *, slowest: float = 0.0) -> PlanContext:
     """A recipe on a station with devices of this noise; ``slowest`` as in :func:`inertial.noise.dwells.dwell_covariance`.

@@ -87,13 +87,17 @@ def _columns(effects: Sequence[str], context: PlanContext) -> Array:
     return design.local_columns(sensor, context.state, design.starting_values(sensor, context.state))
 
 
+def matrix_of(requirement: Requirement, context: PlanContext) -> Array:
+    """Normal matrices (axes, p, p) of a recipe, of the columns of a requirement's effects in units of its errors."""
+    columns = _columns(requirement.effects, context) * requirement.errors[:, None, :]
+    return np.swapaxes(columns, -1, -2) @ np.linalg.solve(context.covariance, columns)
+
+
 def rival_separations(requirement: Requirement, context: PlanContext) -> list[dict[str, Any]]:
     """χ² of every wrong rival over a recipe's lot, one row per ordered pair; empty where no rivals are named."""
     if requirement.discrimination is None:
         return []
-    columns = _columns(requirement.effects, context) * requirement.errors[:, None, :]
-    matrix = np.swapaxes(columns, -1, -2) @ np.linalg.solve(context.covariance, columns)
-    separations = requirement.discrimination.separations(matrix)
+    separations = requirement.discrimination.separations(matrix_of(requirement, context))
     rivals = requirement.effects[-len(requirement.discrimination.rivals) :]
     return [
         {"true": true, "wrong": wrong, "chi_square": float(value)}

@@ -20,7 +20,6 @@ from pipelines.planning.requirement import Requirement
 from pipelines.planning.soak_orders import orders
 from pipelines.planning.timed_design import followed_along, normal_matrix, short_of, soak_waits
 from pipelines.schedule.planned_state import settled_state
-from pipelines.schedule.timing import spent
 from schemas.recipe import Recipe
 
 RESTED_S = 1e4  # s at rest before a dwell: nothing of the last move is left
@@ -65,7 +64,7 @@ class _BoundSearch:
 
     def __init__(self, recipe: Recipe, against: PlanContext, requirement: Requirement) -> None:
         self.recipe, self.against, self.requirement = recipe, against, requirement
-        self.total = 60.0 * (spent(against.activities).total - spent(against.activities).static_record)
+        self.total = 60.0 * against.minutes
         self.slowest = float(against.state.time[-1])
         self.sensor, _ = design.split(recipe.effects)
         self.names = [name for name, _ in design.local_names(self.sensor, 0)]

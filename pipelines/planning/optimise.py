@@ -9,20 +9,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial import design
 from inertial.arrays import Array
 from inertial.errors import NotIdentified
 from inertial.planning.expected import Expected
 from inertial.planning.pose_exchange import exchanged
 from inertial.planning.visibility import visibilities
 from pipelines.planning.context import PlanContext, plan_context
+from pipelines.planning.discrimination import matrix_of
 from pipelines.planning.lower_bound import lower_bound
 from pipelines.planning.plan import identified
 from pipelines.planning.requirement import Requirement, apart, numbered, turns
 from pipelines.planning.soak_orders import mirrored, orders
 from pipelines.planning.textbook import PART_SEEN
 from pipelines.planning.timed_design import FEWEST, MOST, PlanDesign, TimedDesign, fewest_dwells, short_of, spanned
-from pipelines.schedule.timing import spent
 from schemas.errors import RecipeInvalid
 from schemas.poses import SoakPart
 from schemas.recipe import Recipe
@@ -68,19 +67,7 @@ class Optimum:
     @property
     def share(self) -> float:
         """Station time over that of the textbook plan, both without the static record."""
-        return measuring_minutes(self.planned) / measuring_minutes(self.against)
-
-
-def heat_of(context: PlanContext) -> Array:
-    """The device's temperature at the dwells of the fit (n,), °C."""
-    heat = context.state.temperature
-    return np.zeros(0) if heat is None else heat
-
-
-def measuring_minutes(context: PlanContext) -> float:
-    """Station time without the static record, min."""
-    own = spent(context.activities)
-    return own.total - own.static_record
+        return self.planned.minutes / self.against.minutes
 
 
 def optimise(
@@ -215,7 +202,7 @@ class RecipeSearch:
             self.nearest = min(self.nearest, worst)
             if self.near is None or worst < self.near[0]:
                 self.near = (worst, designed)
-            if worst <= 1.0 and (best is None or measuring_minutes(designed) < measuring_minutes(best)):
+            if worst <= 1.0 and (best is None or designed.minutes < best.minutes):
                 self.unseen = self.not_visible(designed)
                 best = best if self.unseen else designed
             if NEAR < worst <= 1.0 or self.unseen:
@@ -232,12 +219,12 @@ class RecipeSearch:
         if self.near is None or self.near[0] > tolerance:
             return None
         nearest = self.near[1]
-        quicker = measuring_minutes(nearest) < measuring_minutes(self.against)
+        quicker = nearest.minutes < self.against.minutes
         return nearest if quicker and not self.not_visible(nearest) else None
 
     def slower(self, plan: PlanDesign, best: PlanContext | None) -> bool:
         """Whether a design clearly takes longer than the best recipe so far."""
-        return best is not None and self.timed.ratio_and_seconds(plan)[1] / 60.0 > SLOWER * measuring_minutes(best)
+        return best is not None and self.timed.ratio_and_seconds(plan)[1] / 60.0 > SLOWER * best.minutes
 
     def designed(self, plan: PlanDesign) -> PlanContext:
         """The recipe of a design after an exchange of poses, on the station."""
@@ -258,7 +245,7 @@ class RecipeSearch:
         low, high = min(self.requirement.levels), max(self.requirement.levels)
         own = [part.poses or [] for part in context.recipe.soaks]
         for added in range(MOST):
-            heat = heat_of(context)
+            heat = context.heat
             if not short_of(heat, self.requirement.levels):
                 break
             end = low if heat.min() - low >= high - heat.max() else high
@@ -276,11 +263,8 @@ class RecipeSearch:
         expected = identified(context)
         if self.requirement.discrimination is None:
             ratio = expected.errors / self.requirement.errors
-            return self.timed.within(ratio, heat_of(context)) if self.ramp else ratio
-        sensor, _ = design.split(self.requirement.effects)
-        rows = design.local_columns(sensor, context.state, design.starting_values(sensor, context.state))
-        rows = rows * self.requirement.errors[:, None, :]
-        return self.requirement.ratio_to_required(np.swapaxes(rows, -1, -2) @ np.linalg.solve(context.covariance, rows))
+            return self.timed.within(ratio, context.heat) if self.ramp else ratio
+        return self.requirement.ratio_to_required(matrix_of(self.requirement, context))
 
     def _recipe(self, plan: PlanDesign, choice: NDArray[np.intp]) -> Recipe:
         used = np.unique(choice)

@@ -127,7 +127,6 @@ def _grades(run: Run) -> dict[str, dict[str, Any]]:
 
 
 ORDER = ("import", "capture", *BY_NAME)
-DATA = ("records", "source")
 MODEL = ("effects", "formulas")
 
 
