@@ -278,8 +278,6 @@ def _until(history: History | None, end: float) -> History | None:
 
 
 def _joined(values: Array, more: Array) -> Array:
-    if values.shape[:-1] == more.shape[:-1]:
-        return np.concatenate([values, more], axis=-1)
     lead = np.broadcast_shapes(values.shape[:-1], more.shape[:-1])
     whole = [np.broadcast_to(v, (*lead, v.shape[-1])) for v in (values, more)]
     return np.concatenate(whole, axis=-1)

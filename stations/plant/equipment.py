@@ -6,6 +6,7 @@ import tempfile
 import weakref
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 from scipy.io import savemat
 
@@ -35,17 +36,17 @@ class ScpiDevice:
         code, self.error = self.error, 0
         return f'{code},"{TEXTS[code]}"', code != 0
 
-    def ordered(self, value: str, low: float, high: float) -> float | None:
-        """The number of an order; None, with an error, for what is no number or outside its range."""
+    def ordered(self, value: str, low: float, high: float, before: float) -> float:
+        """The number of an order; the one before, with an error, for what is no number or outside its range."""
         try:
             number = float(value)
         except ValueError:
             self.error = UNDEFINED
-            return None
-        if not low <= number <= high:
-            self.error = OUT_OF_RANGE
-            return None
-        return number
+            return before
+        if low <= number <= high:
+            return number
+        self.error = OUT_OF_RANGE
+        return before
 
 
 class ResultFiles:
@@ -64,7 +65,7 @@ class ResultFiles:
             weakref.finalize(self, shutil.rmtree, self._folder, ignore_errors=True)
         path = self._folder / f"test{number:06d}.mat"
         if path != self._last:
-            content = vars(recorded()) | {"reference_unit": reference_unit}
+            content: dict[str, Any] = vars(recorded()) | {"reference_unit": reference_unit}
             outputs = content.pop("outputs")
             savemat(path, content | {f"slot_{slot}": outputs[:, k] for k, slot in enumerate(slots)})
             if self._last is not None:

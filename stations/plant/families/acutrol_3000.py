@@ -1,6 +1,7 @@
 """The simulated centrifuge behind an ACUTROL 3000: mountings at several radii, arm stretch, proof masses, a recorder."""
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
@@ -43,18 +44,28 @@ class Centrifuge:
         self._number, self._seconds, self._start_us = 0, 0.0, 0
         self._files = ResultFiles()
 
-    def answer(self, line: str) -> tuple[str, bool]:  # noqa: PLR0911 - one a kind of line
+    def answer(self, line: str) -> tuple[str, bool]:
         self._watch()
         head, _, value = line.partition(",")
-        if line in {":read:rate? 1", ":interlock? 1", ":rec:file?", ":mode? 1", ":int? 1", ":mount? 1", ":radius? 1"}:
-            return self._report(line), False
+        reports: dict[str, Callable[[], str]] = {
+            ":read:rate? 1": lambda: f"{self.rate():.6f}",
+            ":mount? 1": lambda: f"{self._direction:.0f}",
+            ":radius? 1": lambda: f"{self._radius:.6f}",
+            ":interlock? 1": lambda: (
+                f"Fault {self._tripped}" if self._tripped else "Closed" if self._closed else "Open"
+            ),
+            ":rec:file?": self._file,
+            ":mode? 1": lambda: "rate",
+            ":int? 1": lambda: "close" if self._closed else "open",
+        }
+        if line in reports:
+            return reports[line](), False
         self._heard_us = self._world.now_us
-        if line in {":int:close 1", ":int:open 1"}:
-            self._closed = line.endswith("close 1")
-            if not self._closed:
+        if line in {":int:close 1", ":int:open 1", ":mode:off 1", ":mode:rate 1"}:
+            if line.startswith(":int:"):
+                self._closed = line.endswith("close 1")
+            if line == ":int:open 1":
                 self._go(0.0)
-            return "OK", True
-        if line in {":mode:off 1", ":mode:rate 1"}:
             return "OK", True
         try:
             number = float(value)
@@ -105,19 +116,9 @@ class Centrifuge:
         if self._to > 0.0 and self._world.now_us - self._heard_us > round(1e6 * IDLE_S):
             self._go(0.0)
 
-    def _report(self, line: str) -> str:
-        if line == ":read:rate? 1":
-            return f"{self.rate():.6f}"
-        if line in {":mount? 1", ":radius? 1"}:
-            return f"{self._direction:.0f}" if line == ":mount? 1" else f"{self._radius:.6f}"
-        if line == ":interlock? 1":
-            return f"Fault {self._tripped}" if self._tripped else ("Closed" if self._closed else "Open")
-        if line == ":rec:file?":
-            over = self._world.now_us >= self._start_us + round(1e6 * self._seconds)
-            return (
-                self._files.write(self._number, self._recorded, self._world.slots) if self._number and over else "NONE"
-            )
-        return "rate" if line == ":mode? 1" else ("close" if self._closed else "open")
+    def _file(self) -> str:
+        over = self._world.now_us >= self._start_us + round(1e6 * self._seconds)
+        return self._files.write(self._number, self._recorded, self._world.slots) if self._number and over else "NONE"
 
     def _recorded(self) -> Waveforms:
         bench = self._world.bench

@@ -45,8 +45,7 @@ class Generator(ScpiDevice):
             return self._report(line[:-1])
         head, _, value = line.removesuffix(";*OPC?").partition(" ")
         if head in NUMBERS:
-            number = self.ordered(value, *NUMBERS[head])
-            self._set[head] = self._set[head] if number is None else number
+            self._set[head] = self.ordered(value, *NUMBERS[head], self._set[head])
         elif head == "SOUR1:FUNC" and value in {"SIN", "SQU"}:
             self._function = value
         elif head == "OUTP1" and value in {"ON", "OFF"}:
