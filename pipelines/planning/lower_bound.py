@@ -16,8 +16,7 @@ from inertial import design
 from inertial.arrays import Array
 from inertial.noise.dwells import dwell_covariance
 from pipelines.planning.context import PlanContext
-from pipelines.planning.requirement import Requirement
-from pipelines.planning.soak_orders import orders
+from pipelines.planning.requirement import Requirement, orders
 from pipelines.planning.timed_design import followed_along, normal_matrix, short_of, soak_waits
 from pipelines.schedule.planned_state import settled_state
 from schemas.recipe import Recipe

@@ -18,8 +18,7 @@ from pipelines.planning.context import PlanContext, plan_context
 from pipelines.planning.discrimination import matrix_of
 from pipelines.planning.lower_bound import lower_bound
 from pipelines.planning.plan import identified
-from pipelines.planning.requirement import Requirement, apart, numbered, turns
-from pipelines.planning.soak_orders import mirrored, orders
+from pipelines.planning.requirement import Requirement, apart, mirrored, numbered, orders, turns
 from pipelines.planning.textbook import PART_SEEN
 from pipelines.planning.timed_design import FEWEST, MOST, PlanDesign, TimedDesign, fewest_dwells, short_of, spanned
 from schemas.errors import RecipeInvalid

@@ -29,8 +29,7 @@ from pipelines.jobs.recipes import load_recipe
 from pipelines.jobs.releases import release
 from pipelines.planning.context import plan_context
 from pipelines.planning.lower_bound import lower_bound
-from pipelines.planning.requirement import Requirement, apart, candidates
-from pipelines.planning.soak_orders import orders, soak_seconds
+from pipelines.planning.requirement import Requirement, apart, candidates, orders, soak_seconds
 from pipelines.planning.textbook import reference_errors, textbook
 from pipelines.schedule.steps import steps
 from pipelines.schedule.timing import minutes
