@@ -14,6 +14,7 @@ from schemas.units import STANDARD_GRAVITY_M_S2
 from stations.plant.bench import Waveforms
 
 STROKE_M, VELOCITY_M_S, ACCELERATION_G = 0.0127, 1.5, 50.0  # of the exciter
+UNKNOWN, WRONG = "NA:CMD ERR", "NA:PARA ERR"  # answers to a line that is no command, and to one with a wrong value
 DONE = "1"
 OUT_OF_RANGE, UNDEFINED = -222, -113  # SCPI-99, 21.8.10 and 21.8.9
 TEXTS = {0: "No error", OUT_OF_RANGE: "Data out of range", UNDEFINED: "Undefined header"}
@@ -23,6 +24,15 @@ def exciter_reach(frequency: float) -> float:
     """Largest peak acceleration of the exciter at a frequency in Hz, g."""
     w = 2.0 * math.pi * frequency
     return min(STROKE_M * w**2 / STANDARD_GRAVITY_M_S2, VELOCITY_M_S * w / STANDARD_GRAVITY_M_S2, ACCELERATION_G)
+
+
+def taken(settings: dict[str, float], name: str, value: str) -> tuple[str, bool]:
+    """The answer to an order of a number, which is taken over, and whether it changed anything."""
+    try:
+        settings[name] = float(value)
+    except ValueError:
+        return WRONG, False
+    return "OK", True
 
 
 class ScpiDevice:

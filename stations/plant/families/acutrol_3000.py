@@ -10,10 +10,9 @@ from schemas.units import AXES, STANDARD_GRAVITY_M_S2
 from stations.codec import OUTPUTS
 from stations.plant.bench import Bench, Waveforms
 from stations.plant.device import stream
-from stations.plant.equipment import ResultFiles
+from stations.plant.equipment import UNKNOWN, WRONG, ResultFiles
 from stations.plant.world import World
 
-UNKNOWN, WRONG = "NA:CMD ERR", "NA:PARA ERR"
 RADIUS_M = 0.5  # of the usual mounting
 HOLE_M = 20e-6  # standard deviation of a mounting's radius about its nominal one
 STANDING_DEG_S = 0.01

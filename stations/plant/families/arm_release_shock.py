@@ -4,10 +4,10 @@ import numpy as np
 
 from schemas.profile import Profile
 from stations.plant.bench import FINE_HZ, Waveforms
-from stations.plant.equipment import ResultFiles
+from stations.plant.equipment import UNKNOWN, ResultFiles, taken
 from stations.plant.world import World
 
-UNKNOWN, WRONG, REFUSED = "NA:CMD ERR", "NA:PARA ERR", "NA:NOT ARMED"
+REFUSED = "NA:NOT ARMED"
 FALL_S = 2.0
 BEFORE_S, AFTER_S = 0.06, 0.12
 JITTER = 0.03
@@ -29,11 +29,7 @@ class Machine:
         if line.endswith("?"):
             return self._report(line[:-1]), False
         if head in self._set:
-            try:
-                self._set[head] = float(value)
-            except ValueError:
-                return WRONG, False
-            return "OK", True
+            return taken(self._set, head, value)
         if head == "ARM":
             self._armed = value == "ON"
             return "OK", True

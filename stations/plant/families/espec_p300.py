@@ -3,11 +3,12 @@
 import re
 
 from schemas.profile import Profile
+from stations.plant.equipment import UNKNOWN, WRONG
 from stations.plant.world import World
 
 SET = re.compile(r"TEMP, S(-?\d+(?:\.\d+)?)")
 MODES = {"CONSTANT": True, "STANDBY": False, "OFF": False}
-UNKNOWN, OUTSIDE, WRONG = "NA:CMD ERR", "NA:DATA OUT OF RANGE", "NA:PARA ERR"
+OUTSIDE = "NA:DATA OUT OF RANGE"
 
 
 class P300:
