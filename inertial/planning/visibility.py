@@ -110,13 +110,14 @@ def _beside(
     return remainders, alias_cosines(seen)
 
 
-Information = Callable[
-    [Array], Array
-]  # root of the information (3, p), 1/g, of columns (3, n, p) beside the base model
+Information = Callable[[Array], Array]
 
 
 def _information(state: State, base: Sequence[str], error: float, covariance: Array | None) -> Information:
-    """For white noise of an error, g, or for dwell means with a covariance."""
+    """Root of the information (3, p), 1/g, of columns (3, n, p) beside the base model.
+
+    For white noise of an error, g, or for dwell means with a covariance.
+    """
     if covariance is None:
         return lambda columns: np.linalg.norm(columns, axis=-2) / error
     white = whitener(covariance)

@@ -60,7 +60,7 @@ class Recording:
             "kind": pd.Series(["procedure"] * n, dtype="str"),
             "time_s": start + (np.arange(n) + 1.0) / self.reference_rate_hz,
         }
-        return pd.DataFrame({**columns, **dict(zip("xyz", self.reference.T, strict=True))})
+        return pd.DataFrame({**columns, **dict(zip("xyz", self.reference[:, :3].T, strict=True))})
 
 
 def read_recording(path: Path, slots: list[int], name: str, units: Mapping[str, float] = STANDARD_GRAVITY) -> Recording:
