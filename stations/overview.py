@@ -67,10 +67,8 @@ def looked_at(config: StationConfig, lot: Lot) -> Generator[Callable[[], Overvie
             yield lambda: look_at(config, station)
         return
     slots: list[int] = []
-    with (
-        open_devices(config, ()) as empty,
-        suppress(StationError),
-    ):  # that the reader does not answer is shown by the state
+    # that the reader does not answer is shown by the state
+    with open_devices(config, ()) as empty, suppress(StationError):
         slots = empty.reader.occupied()
     with open_devices(config, slots) as station:
         yield lambda: look_at(config, station)

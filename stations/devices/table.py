@@ -32,9 +32,7 @@ class TableAxis(ABC):
     """One axis behind a servo drive."""
 
     needs: ClassVar[tuple[str, ...]] = ()
-    coils: ClassVar[
-        tuple[str, ...]
-    ] = ()  # that are on before commands are accepted, such as the source of commands, the servo
+    coils: ClassVar[tuple[str, ...]] = ()  # that are on before commands are accepted: source of commands, servo
 
     def __init__(self, registers: Registers, bounds: tuple[float, float], limits: Limits) -> None:
         self._registers = registers

@@ -59,7 +59,7 @@ class GatedLink:
         """Words of registers, or bits; a run that has lost its lease is refused before the read.
 
         Raises LeaseLost: the run may not drive the station; nothing was sent.
-        Raises StationTimeout, LinkLost, StationRefused: the link's: no answer, no connection or no valid answer after all
+        Raises StationTimeout, LinkLost, StationRefused: from the link: no answer, no connection or no valid answer after all
             attempts, or a refusal of the device.
         """
         if self._permit is not None:
@@ -84,7 +84,7 @@ class GatedLink:
         Raises LeaseLost: the run may not drive the station; nothing was sent.
         Raises StationTimeout: the command is too late, and was not sent; or no answer came, and whether the device acted is
             unknown.
-        Raises LinkLost: the link's: no connection, a lost one, or no valid answer.
+        Raises LinkLost: from the link: no connection, a lost one, or no valid answer.
         """
         profile = self._profiles.get(device_id)
         if profile is None:
@@ -125,7 +125,7 @@ class GatedLines:
 
         Raises StationRefused: the profile has no such query, and nothing was sent; or the device refused.
         Raises LeaseLost: the run may not drive the station; nothing was sent.
-        Raises StationTimeout, LinkLost: the link's: no answer, or no connection, after all attempts.
+        Raises StationTimeout, LinkLost: from the link: no answer, or no connection, after all attempts.
         """
         if question not in self._queries:
             raise self._refusal(question, what)
@@ -138,7 +138,7 @@ class GatedLines:
 
         Raises StationRefused: the profile has no such command or value, and nothing was sent; or the device refused.
         Raises LeaseLost: the run may not drive the station; nothing was sent.
-        Raises StationTimeout, LinkLost: the link's: no answer, or a lost connection; whether the device acted is unknown.
+        Raises StationTimeout, LinkLost: from the link: no answer, or a lost connection; whether the device acted is unknown.
         """
         if not any(_fits(command, order) for command in self._commands):
             raise self._refusal(order, what)
