@@ -22,14 +22,14 @@ PARTS = 3
 
 def build_banks(world: World, devices: Devices, equipment: Mapping[str, Device]) -> dict[int, Bank]:
     """A bank for every device id of the station that holds registers."""
-    profiles = {device.device_id: profile_of(device) for device in (devices.chamber, *equipment.values())}
+    others = [(device.device_id, profile_of(device)) for device in (devices.chamber, *equipment.values())]
     first, slots = devices.slots.device_id, profile_of(devices.slots)
     return {
         devices.outer.device_id: simulated(profile_of(devices.outer), world, world.outer),
         devices.inner.device_id: simulated(profile_of(devices.inner), world, world.inner),
         devices.reader.device_id: _reader(world, profile_of(devices.reader), devices.slots.count),
         **{first + slot: _slot(world, unit, slots) for unit, slot in enumerate(world.slots)},
-        **{device_id: simulated(profile, world) for device_id, profile in profiles.items() if profile.registers},
+        **{device_id: simulated(profile, world) for device_id, profile in others if profile.registers},
     }
 
 
