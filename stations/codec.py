@@ -25,9 +25,7 @@ _RANGE = {
 WORDS_PER_SAMPLE: dict[Packing, int] = {"int20x3": 4, "int24x3": 5, "int24x2": 4, "int24x1": 2}
 SEQUENCE: dict[Packing, int] = {"int20x3": 16, "int24x3": 256, "int24x2": 256, "int24x1": 256}
 BITS: dict[Packing, int] = {"int20x3": 20, "int24x3": 24, "int24x2": 24, "int24x1": 24}
-OUTPUTS: dict[Packing, int] = {"int20x3": 3, "int24x3": 3, "int24x2": 2, "int24x1": 1}
-"""The number of axes of a sample."""
-_LEFT: dict[Packing, int] = {"int24x2": 40, "int24x1": 8}  # place of the first axis, bits from the last
+OUTPUTS: dict[Packing, int] = {"int20x3": 3, "int24x3": 3, "int24x2": 2, "int24x1": 1}  # the number of axes of a sample
 
 
 class NotEncodable(ValueError):
@@ -128,48 +126,29 @@ def pack_samples(counts: Counts, first: int, packing: Packing) -> Words:
     -------
     (n, ..., words)
     """
-    shape = (-1,) + (1,) * (counts.ndim - 2)
-    number = (np.arange(first, first + len(counts)) % SEQUENCE[packing]).astype(np.uint64).reshape(shape)
-    mask = np.uint64((1 << BITS[packing]) - 1)
-    if packing in {"int24x1", "int24x2"}:
-        packed = np.zeros(counts.shape[:-1], dtype=np.uint64) | number
-        for axis in range(counts.shape[-1]):
-            packed |= (counts[..., axis].astype(np.uint64) & mask) << np.uint64(_LEFT[packing] - BITS[packing] * axis)
-        words = packed.astype(">u8")[..., None].view(">u2").astype(np.uint16)
-        return words[..., -WORDS_PER_SAMPLE[packing] :]
-    x, y, z = (counts[..., axis].astype(np.uint64) & mask for axis in range(3))
+    number = (np.arange(first, first + len(counts)) % SEQUENCE[packing]).reshape(-1, *(1,) * (counts.ndim - 2))
     if packing == "int20x3":
-        packed = (x << np.uint64(44)) | (y << np.uint64(24)) | (z << np.uint64(4)) | number
+        mask = np.uint64((1 << BITS[packing]) - 1)
+        x, y, z = (counts[..., axis].astype(np.uint64) & mask for axis in range(3))
+        packed = (x << np.uint64(44)) | (y << np.uint64(24)) | (z << np.uint64(4)) | number.astype(np.uint64)
         return packed.astype(">u8")[..., None].view(">u2").astype(np.uint16)
-    low = np.uint64(0xFF)
-    parts = (
-        x >> np.uint64(8),
-        ((x & low) << np.uint64(8)) | (y >> np.uint64(16)),
-        y & np.uint64(0xFFFF),
-        z >> np.uint64(8),
-        ((z & low) << np.uint64(8)) | np.broadcast_to(number, z.shape),
-    )
-    return np.stack(parts, axis=-1).astype(np.uint16)
+    data = np.zeros((*counts.shape[:-1], 2 * WORDS_PER_SAMPLE[packing]), dtype=np.uint8)
+    low = np.ascontiguousarray(counts, dtype=">i4")[..., None].view(np.uint8)[..., 1:]  # three bytes of each axis
+    data[..., : 3 * counts.shape[-1]] = low.reshape(*counts.shape[:-1], 3 * counts.shape[-1])
+    data[..., -1] = number
+    return data.view(">u2").astype(np.uint16)
 
 
 def unpack_samples(words: Words, packing: Packing) -> tuple[Counts, Counts]:
     """The counts (n, m) of m axes and the low bits of the sample numbers (n,) in words (n·w,), w for each sample."""
-    table = words.reshape(-1, WORDS_PER_SAMPLE[packing]).astype(np.int64)
+    table = words.reshape(-1, WORDS_PER_SAMPLE[packing])
     sign = 1 << (BITS[packing] - 1)
-    if packing in {"int24x1", "int24x2"}:
-        places = (_LEFT[packing] - BITS[packing] * axis for axis in range(OUTPUTS[packing]))
-        whole = sum(table[:, -1 - k] << (16 * k) for k in range(table.shape[1]))
-        counts = np.stack([(whole >> place) & ((1 << BITS[packing]) - 1) for place in places], axis=-1)
-        return (counts ^ sign) - sign, table[:, -1] & 0xFF
     if packing == "int20x3":
-        x = (table[:, 0] << 4) | (table[:, 1] >> 12)
-        y = ((table[:, 1] & 0xFFF) << 8) | (table[:, 2] >> 8)
-        z = ((table[:, 2] & 0xFF) << 12) | (table[:, 3] >> 4)
-        number = table[:, 3] & 0xF
+        one, two, three, four = table.T.astype(np.int64)
+        axes = (one << 4 | two >> 12, (two & 0xFFF) << 8 | three >> 8, (three & 0xFF) << 12 | four >> 4)
+        counts, number = np.stack(axes, axis=-1), four & 0xF
     else:
-        x = (table[:, 0] << 8) | (table[:, 1] >> 8)
-        y = ((table[:, 1] & 0xFF) << 16) | table[:, 2]
-        z = (table[:, 3] << 8) | (table[:, 4] >> 8)
-        number = table[:, 4] & 0xFF
-    counts = np.stack((x, y, z), axis=-1)
+        m, data = OUTPUTS[packing], table.astype(">u2").view(np.uint8).astype(np.int64)
+        high, middle, low = np.moveaxis(data[:, : 3 * m].reshape(-1, m, 3), -1, 0)
+        counts, number = high << 16 | middle << 8 | low, data[:, -1]
     return (counts ^ sign) - sign, number

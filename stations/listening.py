@@ -25,10 +25,7 @@ def listening(
 ) -> Generator[int]:
     """The port of a server with this handler of connections, while the context is open.
 
-    Raises
-    ------
-    StationRefused
-        The port is in use; ``who`` begins the message, ``remedy`` ends it.
+    Raises StationRefused: the port is in use; ``who`` begins the message, ``remedy`` ends it.
     """
     try:
         server = _Server((host, port), handler)

@@ -6,7 +6,7 @@ import fcntl
 import os
 import tempfile
 from collections.abc import Generator, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, closing, contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,8 +17,10 @@ from schemas.profile import TEXT_CARRIERS, Carrier, Profile, limits_of
 from schemas.station import Limits, StationConfig
 from schemas.station_devices import Device
 from stations.clock import Clock, WallClock
-from stations.devices.adapters import axis_adapter, chamber_adapter, equipment_adapter
+from stations.devices.adapters import adapter_of
+from stations.devices.chamber import ThermalChamber
 from stations.devices.commands import Commands, Values
+from stations.devices.equipment import Equipment
 from stations.devices.reader import Reader
 from stations.devices.registers import Registers
 from stations.devices.slot import Slot
@@ -53,8 +55,6 @@ def open_station(
 
     Hardware is leased and watched meanwhile, and left in its safe state, whatever ends the context.
 
-    Parameters
-    ----------
     config : what the station is
     lot : the units in it; a simulated station makes their devices
     resume : ``Station.state()`` of an earlier session: a simulated station goes on exactly there; hardware is where it is
@@ -96,11 +96,9 @@ def open_devices(
     if protection is not None:
         permit = Permit(protection.leases.alive, protection.leases.require, config.link.timeout_s)
         require = protection.require
-    links, clock = Links(config, permit=permit), WallClock(resume, config.link.speed)
-    try:
+    clock = WallClock(resume, config.link.speed)
+    with closing(Links(config, permit=permit)) as links:
         yield replace(_assemble(config, slots, links, clock, roles), state=clock.state, exact=False, require=require)
-    finally:
-        links.close()
 
 
 def make_plant(
@@ -167,14 +165,15 @@ def _assemble(
     }
     parts = (
         TiltTable(axes["outer"], axes["inner"], clock),
-        chamber_adapter(chamber)(
-            _values("chamber", "chamber", devices.chamber, links),
-            *tighter(limits.temperature_C, chamber, "set_point"),
+        adapter_of(chamber, "chamber", ThermalChamber)(
+            _values("chamber", "chamber", devices.chamber, links), *tighter(limits.temperature_C, chamber, "set_point")
         ),
         Reader(reader, {slot: Slot(registers) for slot, registers in banks.items()}, fastest),
     )
     equipment = {
-        role: equipment_adapter(role, profile_of(device))(_values(role.replace("_", " "), role, device, links), clock)
+        role: adapter_of(profile_of(device), role, Equipment)(
+            _values(role.replace("_", " "), role, device, links), clock
+        )
         for role, device in config.fitted().items()
         if role in roles
     }
@@ -201,7 +200,7 @@ def _axis(registers: Registers, bounds: tuple[float, float], limits: Limits) -> 
         for name, wanted in (("speed", limits.speed_deg_s), ("acceleration", limits.acceleration_deg_s2))
     )
     kept = limits.model_copy(update={"speed_deg_s": speed, "acceleration_deg_s2": acceleration})
-    return axis_adapter(profile)(registers, tighter(bounds, profile, "target"), kept)
+    return adapter_of(profile, "axis", TableAxis)(registers, tighter(bounds, profile, "target"), kept)
 
 
 def tighter(bounds: tuple[float, float], profile: Profile, name: str) -> tuple[float, float]:
@@ -229,9 +228,8 @@ def one_processor() -> Generator[None]:
     with ExitStack() as stack:
         number = _claimed(stack)
         if number is not None:
-            before = os.sched_getaffinity(0)
+            stack.callback(_tie, *os.sched_getaffinity(0))
             _tie(number)
-            stack.callback(_tie, *before)
         yield
 
 

@@ -1,17 +1,22 @@
-"""State of a station at one instant: angles, temperatures, states, devices in the slots, and the holder of the lease."""
+"""State of a station at one instant: angles, temperatures, slots, holder of the lease, and whether it was left safe."""
 
+import fcntl
+import time
 from collections.abc import Callable, Generator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, field
+from pathlib import Path
 from typing import Any
 
 from schemas.errors import StationError
 from schemas.lot import Lot
 from schemas.station import StationConfig
 from stations.safety.folder import state_folder
+from stations.safety.lease_files import Holder, addresses, lease_file, read_holder
 from stations.safety.leases import holders
-from stations.safety.safety_status import unsafe_reason
 from stations.station import Station
+
+AGAIN_S = 0.5
 
 
 @dataclass
@@ -53,8 +58,6 @@ class Overview:
 def looked_at(config: StationConfig, lot: Lot) -> Generator[Callable[[], Overview]]:
     """A block with a function that reads the state of the station at each call; nothing moves, and no lease is needed.
 
-    Parameters
-    ----------
     lot : the units in a simulated station; hardware reports its own
     """
     from stations.opening import make_plant, open_devices, serve_plant  # noqa: PLC0415 - imported only when the state is read
@@ -63,8 +66,10 @@ def looked_at(config: StationConfig, lot: Lot) -> Generator[Callable[[], Overvie
         with serve_plant(config, lot, make_plant(config, lot)) as station:
             yield lambda: look_at(config, station)
         return
-    with open_devices(config, ()) as empty:
-        slots = _occupied(empty)
+    slots: list[int] = []
+    # that the reader does not answer is shown by the state
+    with open_devices(config, ()) as empty, suppress(StationError):
+        slots = empty.reader.occupied()
     with open_devices(config, slots) as station:
         yield lambda: look_at(config, station)
 
@@ -112,14 +117,6 @@ def _reader(now: Overview, station: Station) -> None:
         now.slots.append(SlotNow(number, serial, temperature, supply))
 
 
-def _occupied(station: Station) -> list[int]:
-    """Occupied slots as the reader reports them; none where it does not answer, which the state then shows."""
-    try:
-        return station.reader.occupied()
-    except StationError:
-        return []
-
-
 def _lease(now: Overview, station: Station) -> None:
     """Holder of the lease, and the reason where a run has not left the station safe."""
     for holder, age in filter(None, holders(state_folder(), station.config).values()):
@@ -128,3 +125,65 @@ def _lease(now: Overview, station: Station) -> None:
         break
     if problem := unsafe_reason(state_folder(), station.config):
         now.faults["safe state"] = problem
+
+
+def unsafe_reason(folder: Path, config: StationConfig) -> str:
+    """Why the station does not count as safe; empty where it is safe, or a live run drives it.
+
+    A first finding is checked again: a lease that is being taken or released has a lock and no note for a moment.
+    """
+    if _reason(folder, config):
+        time.sleep(AGAIN_S)
+    return _reason(folder, config)
+
+
+def _reason(folder: Path, config: StationConfig) -> str:
+    for address in addresses(config).values():
+        path = lease_file(folder, address)
+        holder, taken = read_holder(path), _is_locked(path.with_suffix(".lock"))
+        text = _reason_of_lease(holder, path, address, taken=taken)
+        if text:
+            return f"station {config.name}: {text}"
+    return ""
+
+
+def _reason_of_lease(holder: Holder | None, path: Path, address: str, *, taken: bool) -> str:
+    if holder is None:
+        if not taken and not path.exists():
+            return ""
+        state = "is held by an unknown process" if taken else "cannot be read and is not held"
+        return f"the lease on {address} {state} ({path}); check the station before the next run"
+    who = f"{holder.run} (process {holder.pid} on {holder.host} since {holder.since})"
+    if holder.lives(path):
+        return _reason_of_live_holder(holder, who)
+    if taken:
+        return ""
+    return (
+        f"{who} has ended and neither it nor its watchdog has reported the station safe; check axes and chamber; the next "
+        "run or 'station check' takes over the lease and leaves the station safe"
+    )
+
+
+def _reason_of_live_holder(holder: Holder, who: str) -> str:
+    if holder.role == "watchdog":
+        return (
+            f"the watchdog of {who} is making the station safe and has not finished ({holder.trouble or 'it has just started'}); "
+            "it continues until the station is safe; check the devices that it names"
+        )
+    if holder.tripped:
+        return f"{who} does not respond; its watchdog has put the station into its safe state; end that process"
+    if holder.trouble:
+        return f"{who}: {holder.trouble}, which has not reported the station safe yet; wait a moment and check again"
+    return ""
+
+
+def _is_locked(path: Path) -> bool:
+    """Whether a process holds a lease's lock; the test itself holds it shared for a moment."""
+    try:
+        with path.open("rb") as lock:
+            fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    except OSError:
+        return False
+    return False

@@ -6,7 +6,7 @@ from importlib.resources.abc import Traversable
 
 from schemas.errors import RecipeInvalid, did_you_mean
 from schemas.own_files import own_file, own_names
-from schemas.profile import Profile, parse_profile
+from schemas.profile import Profile, WordOrder, parse_profile
 from schemas.station_devices import Carried
 from schemas.toml_files import read_text
 
@@ -24,10 +24,13 @@ def profile_names() -> list[str]:
 def profile_of(device: Carried) -> Profile:
     """The profile of a device of a station, with the word order that it is set to and the station's own largest values."""
     profile = load_profile(device.profile).limited(getattr(device, "maximum", {}))
-    if device.word_order is None:
-        return profile
+    return profile if device.word_order is None else in_order(profile, device.word_order)
+
+
+def in_order(profile: Profile, order: WordOrder) -> Profile:
+    """A profile with a word order for all its registers."""
     kept = [register.model_copy(update={"word_order": None}) for register in profile.registers]
-    return profile.model_copy(update={"word_order": device.word_order, "registers": kept})
+    return profile.model_copy(update={"word_order": order, "registers": kept})
 
 
 def recorded_columns(reader: Carried) -> list[str]:

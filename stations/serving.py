@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import socket
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack, closing, suppress
 from dataclasses import dataclass
 from functools import partial
 from threading import Event
@@ -149,11 +149,8 @@ def look(config: StationConfig, lot: Lot | None) -> list[RegisterReading]:
 
         with serve_devices(once, make_plant(config, lot)) as links:
             return list(_look(once, links))
-    links = Links(once)
-    try:
+    with closing(Links(once)) as links:
         return list(_look(once, links))
-    finally:
-        links.close()
 
 
 def _look(config: StationConfig, links: Links) -> Iterator[RegisterReading]:

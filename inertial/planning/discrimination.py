@@ -9,6 +9,7 @@ Biometrika 62 (1975) 57.
 """
 
 from dataclasses import dataclass
+from itertools import permutations
 
 import numpy as np
 
@@ -17,11 +18,8 @@ from inertial.arrays import Array
 _SINGULAR, _RIDGE, _TINY = 1e-11, 1e-12, 1e-300
 """Smallest eigenvalue of a determined, scaled normal matrix; ridge added to its diagonal; smallest diagonal before scaling."""
 
-_OTHERS = 0.1
-"""Weight of the other pairs beside the pair with the smallest separation."""
-
-_NEGLIGIBLE = 1e-12
-"""Fraction of a rival's own information below which its separation counts as zero."""
+_OTHERS = 0.1  # weight of the other pairs beside the pair with the smallest separation
+_NEGLIGIBLE = 1e-12  # fraction of a rival's own information below which its separation counts as zero
 
 
 @dataclass(frozen=True)
@@ -43,12 +41,9 @@ class Discrimination:
 
     def separations(self, matrix: Array) -> Array:
         """χ² (..., pairs) of every wrong rival, summed over axes and units, of normal matrices (..., axes, p, p)."""
-        pairs = [
-            (true, wrong) for true in range(len(self.rivals)) for wrong in range(len(self.rivals)) if wrong != true
-        ]
-        return self.units * np.stack(
-            [self._remaining_chi_square(matrix, *pair).sum(axis=-1) for pair in pairs], axis=-1
-        )
+        pairs = permutations(range(len(self.rivals)), 2)
+        each = [self._remaining_chi_square(matrix, *pair).sum(axis=-1) for pair in pairs]
+        return self.units * np.stack(each, axis=-1)
 
     def ratio_to_required(self, matrix: Array) -> Array:
         """√(required χ² / reached χ²), (..., pairs): above 1 where a pair is not discriminated yet.

@@ -15,8 +15,7 @@ from inertial.planning.sequences import SequenceStep, StationPace, extended
 from inertial.quantities import LEFT_ALONE, RECORDED
 from inertial.state import State
 
-_OFF_S = 600.0
-"""Time without power of the trial power cycle, s."""
+_OFF_S = 600.0  # time without power of the trial power cycle, s
 
 
 def first_unit(state: State) -> State:
@@ -71,16 +70,14 @@ def drivers_of(state: State, effect: AnyEffect) -> set[Driver]:
         return np.concatenate([columns_of(of, effect, values, axis) for axis in range(3)], axis=1)
 
     here = columns(state)
-    drivers: set[Driver] = set()
-    for driver, changed in _varied(state):
-        if not np.allclose(here, columns(changed), rtol=1e-6, atol=1e-9):
-            drivers.add(driver)
+    drivers: set[Driver] = {
+        driver for driver, changed in _varied(state) if not np.allclose(here, columns(changed), rtol=1e-6, atol=1e-9)
+    }
     if {"temperature", "time"} <= drivers:
         drivers.add("rate")
     if "since_power" in drivers:
         drivers.add("time")
-    turned = _reordered(state)
-    if not np.allclose(columns(turned)[::-1], here, rtol=1e-6, atol=1e-9):
+    if not np.allclose(columns(_reordered(state))[::-1], here, rtol=1e-6, atol=1e-9):
         drivers.add("order")
     return drivers
 

@@ -12,8 +12,7 @@ from inertial.errors import NotIdentified
 from inertial.noise.dwells import whitener
 from inertial.state import State
 
-_SINGULAR = 1e-11
-"""Smallest eigenvalue of the scaled normal matrix; below it a coefficient is not determined, as in a fit."""
+_SINGULAR = 1e-11  # smallest eigenvalue of a scaled normal matrix that determines all coefficients, as in a fit
 
 
 @dataclass(frozen=True)

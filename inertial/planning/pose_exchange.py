@@ -19,21 +19,11 @@ from inertial.arrays import Array, Flags, Places
 
 Criterion = Literal["D", "A", "worst"]
 
-_SHARPNESS = 12.0
-"""Exponent of the power mean that approximates the worst coefficient: dominated by it, yet smooth."""
-
-_OTHERS = 0.1
-"""Weight of the other coefficients beside the worst."""
-
-_RIDGE = 1e-9
-"""Ridge as a share of the mean eigenvalue, so that the objective is finite for a singular plan."""
-
-_GAIN = 1e-4
-"""Relative gain below which an exchange is not made."""
-
-_PASS_GAIN = 1e-3
-"""Gain of a complete pass below which the search ends."""
-
+_SHARPNESS = 12.0  # exponent of the power mean that approximates the worst coefficient: dominated by it, yet smooth
+_OTHERS = 0.1  # weight of the other coefficients beside the worst
+_RIDGE = 1e-9  # ridge as a share of the mean eigenvalue, so that the objective is finite for a singular plan
+_GAIN = 1e-4  # relative gain below which an exchange is not made
+_PASS_GAIN = 1e-3  # gain of a complete pass below which the search ends
 _PASSES = 12
 
 

@@ -28,15 +28,9 @@ ENOUGH = 0.05
 """Remaining fraction v from which a remedy counts as effective."""
 
 _MINIMAL = ("bias", "scale", "misalignment")
-_VANISHED = 1e-6
-"""RMS of a column below which it counts as zero."""
-
-_BETTER = 1.5
-"""Factor by which a remedy must increase the remaining fraction of a visible effect."""
-
-_ABSORBED = 0.05
-"""Fraction of a column's norm below which it counts as absorbed by the model."""
-
+_VANISHED = 1e-6  # RMS of a column below which it counts as zero
+_BETTER = 1.5  # factor by which a remedy must increase the remaining fraction of a visible effect
+_ABSORBED = 0.05  # fraction of a column's norm below which it counts as absorbed by the model
 _ERROR = 1e-5
 
 

@@ -14,9 +14,7 @@ from inertial.quantities import LEFT_ALONE
 from inertial.state import T_REFERENCE, History, State
 from inertial.timing import Air, Drive, SoakRule, followed, settling_s, soaked
 
-_GRAIN_S = 15.0
-"""Time step of the air and device temperatures between dwells, s."""
-
+_GRAIN_S = 15.0  # time step of the air and device temperatures between dwells, s
 _STILL_K, _LONG_S = 0.02, 120.0
 """Temperature difference below which the temperatures count as constant, K, and the time step then, s."""
 
@@ -267,8 +265,7 @@ def _history(history: History | None, time: Array, temperature: Array) -> Histor
     more = np.broadcast_to(temperature, (*lead, time.size))
     later = time > history.time[-1]
     return History(
-        np.concatenate([history.time, time[later]]),
-        np.concatenate([history.temperature, more[..., later]], axis=-1),
+        np.concatenate([history.time, time[later]]), np.concatenate([history.temperature, more[..., later]], axis=-1)
     )
 
 
@@ -281,8 +278,6 @@ def _until(history: History | None, end: float) -> History | None:
 
 
 def _joined(values: Array, more: Array) -> Array:
-    if values.shape[:-1] == more.shape[:-1]:
-        return np.concatenate([values, more], axis=-1)
     lead = np.broadcast_shapes(values.shape[:-1], more.shape[:-1])
     whole = [np.broadcast_to(v, (*lead, v.shape[-1])) for v in (values, more)]
     return np.concatenate(whole, axis=-1)

@@ -3,7 +3,7 @@
 Computed before the measurement from the same columns that the fit and the diagnosis use.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -83,13 +83,10 @@ def visibilities(
     candidates : ids of the effects; the whole catalogue where None
     covariance : (n, n), of the dwell means, g², for the floors of a generalised fit; white noise of ``error`` where None
     """
-    noise = None if covariance is None else _Noise(state, base, whitener(covariance))
+    information = _information(state, base, error, covariance)
     names = [n for n in (candidates or catalogue.catalogue()) if n not in set(base)]
     remainders, aliases = _beside(state, base, names)
-    return [
-        _visibility(n, remainders[n], error if noise is None else noise, aliases.get(n, {}), len(state.axes))
-        for n in names
-    ]
+    return [_visibility(n, remainders[n], information, aliases.get(n, {}), len(state.axes)) for n in names]
 
 
 def confounding(state: State, base: Sequence[str]) -> tuple[tuple[str, ...], Array]:
@@ -113,18 +110,35 @@ def _beside(
     return remainders, alias_cosines(seen)
 
 
-class _Noise:
-    """Base model and columns whitened by the covariance of the dwell means."""
+Information = Callable[[Array], Array]
 
-    def __init__(self, state: State, base: Sequence[str], white: Array) -> None:
-        self._white = white
-        self._span = _span(state, base, white)
 
-    def information(self, columns: Array) -> Array:
-        """Root of the information (3, p) of columns (3, n, p) beside the base model, 1/g."""
-        own = self._white @ columns
-        left = own - self._span @ (np.swapaxes(self._span, -1, -2) @ own)
-        return np.linalg.norm(left, axis=-2)
+def _information(state: State, base: Sequence[str], error: float, covariance: Array | None) -> Information:
+    """Root of the information (3, p), 1/g, of columns (3, n, p) beside the base model.
+
+    For white noise of an error, g, or for dwell means with a covariance.
+    """
+    if covariance is None:
+        return lambda columns: np.linalg.norm(columns, axis=-2) / error
+    white = whitener(covariance)
+    span = _span(state, base, white)
+    return lambda columns: np.linalg.norm(_beyond(span, white @ columns), axis=-2)
+
+
+def _beyond(span: Array, columns: Array) -> Array:
+    """Columns (3, n, p) without their part in a span (3, n, q)."""
+    return columns - span @ (np.swapaxes(span, -1, -2) @ columns)
+
+
+def _basis(columns: Array, least: float) -> Array:
+    """Orthonormal bases (3, n, p) of columns per axis; directions with singular values up to ``least`` are zero."""
+    u, s, _ = np.linalg.svd(columns, full_matrices=False)
+    return u * (s > least)[..., None, :]
+
+
+def _unit(columns: Array) -> Array:
+    size = np.linalg.norm(columns, axis=-2, keepdims=True)
+    return columns / np.where(size > 0.0, size, 1.0)
 
 
 @dataclass(frozen=True)
@@ -142,10 +156,7 @@ def _span(state: State, base: Sequence[str], white: Array | None = None) -> Arra
     """Orthonormal bases of the base model's columns per axis, (3, n, p); of the whitened columns where a whitener is given."""
     sensor, _ = design.split(base or _BASE)
     columns = design.local_columns(sensor, state, design.starting_values(sensor, state))
-    columns = columns if white is None else white @ columns
-    size = np.linalg.norm(columns, axis=-2, keepdims=True)
-    u, s, _ = np.linalg.svd(columns / np.where(size > 0.0, size, 1.0), full_matrices=False)
-    return u * (s > 1e-9)[..., None, :]
+    return _basis(_unit(columns if white is None else white @ columns), 1e-9)
 
 
 def _remainder(effect: AnyEffect, state: State, span: Array) -> _Remainder | None:
@@ -165,13 +176,8 @@ def _remainder(effect: AnyEffect, state: State, span: Array) -> _Remainder | Non
 
 def _after(span: Array, columns: Array, start: Array) -> Array:
     """Columns (3, n, p) after the base model and after the unknown initial state of a memory (3, n, k)."""
-    remainder = columns - span @ (np.swapaxes(span, -1, -2) @ columns)
-    if not start.shape[-1]:
-        return remainder
-    begin = start - span @ (np.swapaxes(span, -1, -2) @ start)
-    u, s, _ = np.linalg.svd(begin, full_matrices=False)
-    u = u * (s > 1e-9)[..., None, :]
-    return remainder - u @ (np.swapaxes(u, -1, -2) @ remainder)
+    remainder = _beyond(span, columns)
+    return _beyond(_basis(_beyond(span, start), 1e-9), remainder) if start.shape[-1] else remainder
 
 
 def _better(one: _Remainder, other: _Remainder) -> _Remainder:
@@ -209,7 +215,7 @@ def _stacked(state: State, axes: Sequence[Array]) -> Array:
 
 
 def _visibility(
-    name: str, remainder: "_Remainder | None", noise: float | _Noise, cosines: Mapping[str, float], axes: int
+    name: str, remainder: _Remainder | None, information_of: Information, cosines: Mapping[str, float], axes: int
 ) -> Visibility:
     breaker = catalogue.get(name).breaker
     alias = tuple(other for other, cosine in cosines.items() if cosine > ALIAS)
@@ -217,37 +223,19 @@ def _visibility(
     if remainder is None or remainder.remaining_fraction <= SEEN:
         fraction = 0.0 if remainder is None else remainder.remaining_fraction
         return Visibility(name, False, fraction, (0.0,) * axes, float("inf"), alias, breaker)
-    if isinstance(noise, _Noise):
-        information = noise.information(remainder.columns)
-    else:
-        information = np.linalg.norm(remainder.columns, axis=-2) / noise
+    information = information_of(remainder.columns)
     seen = information > 1e-9 * np.max(information, initial=0.0)
     size = 3.0 * remainder.before / np.sqrt(remainder.columns.shape[-2]) / np.where(seen, information, 1.0)
     # columns may have different units: take the one with the smallest detectable contribution
     axis, column = np.unravel_index(int(np.argmin(np.where(seen, size, np.inf))), size.shape)
-    floor = 3.0 / float(information[axis, column])
-    return Visibility(
-        name,
-        True,
-        remainder.remaining_fraction,
-        remainder.by_axis,
-        floor,
-        alias,
-        breaker,
-        exact,
-        int(column),
-        float(size[axis, column]),
-        remainder.unseen,
-    )
+    floor, least = 3.0 / float(information[axis, column]), float(size[axis, column])
+    fraction, by_axis, unseen = remainder.remaining_fraction, remainder.by_axis, remainder.unseen
+    return Visibility(name, True, fraction, by_axis, floor, alias, breaker, exact, int(column), least, unseen)
 
 
 def alias_cosines(seen: Mapping[str, _Remainder]) -> dict[str, dict[str, float]]:
     """Cosine of each effect's remaining columns with the span of every other's: the smallest over directions and axes."""
-    spans: dict[str, Array] = {}
-    for name, remainder in seen.items():
-        size = np.linalg.norm(remainder.columns, axis=-2, keepdims=True)
-        u, s, _ = np.linalg.svd(remainder.columns / np.where(size > 0.0, size, 1.0), full_matrices=False)
-        spans[name] = u * (s > SEEN)[..., None, :]
+    spans = {name: _basis(_unit(remainder.columns), SEEN) for name, remainder in seen.items()}
     return {name: {o: _inside(spans[name], spans[o]) for o in spans if o != name} for name in spans}
 
 

@@ -6,12 +6,4 @@ from pipelines.archive.listing import RunInfo
 from pipelines.archive.records import Records
 from pipelines.archive.run import Run
 
-__all__ = [
-    "Archive",
-    "Records",
-    "Run",
-    "RunInfo",
-    "code_hash",
-    "default_root",
-    "stage_key",
-]
+__all__ = ["Archive", "Records", "Run", "RunInfo", "code_hash", "default_root", "stage_key"]

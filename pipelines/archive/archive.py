@@ -79,8 +79,6 @@ class Archive:
     def open_run(self, name: str, about: Mapping[str, Any], decisive: object) -> Run:
         """The run of this name and of the hash of what decides its result; it is created where it does not exist.
 
-        Parameters
-        ----------
         about : what ``run.json`` says about the run.
         decisive : JSON-able; everything that the result depends on.
         """

@@ -11,12 +11,11 @@ where the chain or its manifest states that it is sound; a capture's samples and
 record after it. Only what an archive makes again in its place (reports, seals, checkpoints) is replaced, where it can be read.
 """
 
-from __future__ import annotations
-
 import json
 import re
 import time
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -30,8 +29,7 @@ from schemas.errors import ArchiveUnusable, WrongUse
 CHAIN, INDEX, MARK = "chain", "index", "archive.json"
 STATE = "state"  # of a capture: its one file is replaced with every record
 REMADE = re.compile(r"runs/[^/]+/(report\.(json|html)|sealed\.json)|captures/[^/]+/state/.*|.*/lock|orchestrator/.*")
-_NEWEST, _WRITTEN_S = 4, 2.0
-"""Entries whose runs may be without their seal, and the time in which their writers write it."""
+_NEWEST, _WRITTEN_S = 4, 2.0  # entries whose runs may be without a seal, and the time in which their writers write it
 DERIVED = re.compile(r"discovery/(lock|scores/.*|[^/]+/(lock|state|found))")
 SEAL = re.compile(r"runs/[^/]+/sealed\.json")
 WRITTEN_ONCE = ".parquet"  # such a file is there or not; others are compared byte for byte
@@ -52,8 +50,6 @@ class Copied:
 class _ChainAtStart:
     """The chain of the source as it was when the copy began.
 
-    Attributes
-    ----------
     entries : names of its entries
     hashes : SHA-256 of files by their names, as the newest entry that names each states it
     """
@@ -63,28 +59,19 @@ class _ChainAtStart:
 
     def lacks_entry_of(self, name: str, data: bytes) -> bool:
         """Whether a file is the seal of a run that names an entry written since the copy began."""
-        if not SEAL.fullmatch(name):
-            return False
-        try:
-            return name_of_entry(json.loads(data)["entry"]) not in self.entries
-        except (ValueError, TypeError, KeyError):  # 'tumbleline verify' reports it
-            return False
+        with suppress(ValueError, TypeError, KeyError):  # 'tumbleline verify' reports it
+            return bool(SEAL.fullmatch(name)) and name_of_entry(json.loads(data)["entry"]) not in self.entries
+        return False
 
 
 def copy_archive(source: Archive, target: Archive) -> Copied:
     """Copy the files that the target does not have yet.
 
-    Parameters
-    ----------
     target : an empty or new folder, or an earlier copy of this archive
-
-    Raises
-    ------
-    WrongUse
-        The target is the source, or lies in it.
-    ArchiveUnusable
-        The target holds something else, or an archive with another chain; a file was read differently than it was written; or
-        files of the source are damaged that are sound in the target: these are kept, and all others are copied.
+    Raises WrongUse: the target is the source, or lies in it.
+    Raises ArchiveUnusable: the target holds something else, or an archive with another chain; a file was read differently
+        than it was written; or files of the source are damaged that are sound in the target: these are kept, and all others
+        are copied.
     """
     source.refuse_none()
     _refuse_itself(source, target)
@@ -171,10 +158,9 @@ def _names(folder: Place, prefix: str, links: list[str] | None = None) -> set[st
 def _walk(folder: Place, prefix: str, links: list[str]) -> Iterator[str]:
     if not folder.is_dir():
         return
-    try:
-        inside = [path for path in folder.iterdir() if not path.name.startswith(TEMPORARY)]
-    except FileNotFoundError:  # a writer has removed or renamed it meanwhile
-        return
+    inside: list[Place] = []
+    with suppress(FileNotFoundError):  # a writer has removed or renamed it meanwhile
+        inside += [path for path in folder.iterdir() if not path.name.startswith(TEMPORARY)]
     for path in inside:
         name = f"{prefix}/{path.name}" if prefix else path.name
         if prefix and isinstance(path, Path) and path.is_symlink():  # a top folder may lie on another disk

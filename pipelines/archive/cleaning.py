@@ -1,7 +1,5 @@
 """Remove the temporary files of killed writers, and add finished runs to the chain; files in use are never touched."""
 
-from __future__ import annotations
-
 import os
 import shutil
 from collections.abc import Generator, Iterator
@@ -42,8 +40,6 @@ class Cleaned:
 def clean(archive: Archive, *, only_look: bool = False) -> Cleaned:
     """Remove the temporary files of killed writers from an archive.
 
-    Parameters
-    ----------
     only_look : remove nothing and write nothing.
     """
     done = Cleaned()

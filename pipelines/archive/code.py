@@ -3,8 +3,6 @@
 ``tests/contract/test_declared_code.py`` holds every list against the imports of the modules in it.
 """
 
-from __future__ import annotations
-
 _SAMPLES = (
     *("schemas.errors", "schemas.table", "schemas.tables", "schemas.units", "schemas.version"),
     *("inertial.frames", "pipelines.tables"),

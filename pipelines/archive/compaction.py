@@ -5,12 +5,10 @@ folder by folder under the folder's lock, and only those that are still as they 
 time leaves every file at least once; the next compaction removes what lies twice.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import time
-from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Generator, Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -50,16 +48,9 @@ class Compacted:
 def compact(archive: Archive, before: str = "") -> Compacted:
     """Pack what is finished in a local archive.
 
-    Parameters
-    ----------
     before : only runs that began before this day; all where empty
-
-    Raises
-    ------
-    WrongUse
-        The archive is in an object store.
-    OperatorNeeded
-        A run is being measured, or another compaction is active.
+    Raises WrongUse: the archive is in an object store.
+    Raises OperatorNeeded: a run is being measured, or another compaction is active.
     """
     if not isinstance(archive.root, Path):
         raise WrongUse(
@@ -93,13 +84,12 @@ def compact(archive: Archive, before: str = "") -> Compacted:
 @contextmanager
 def _compacting(root: Path) -> Generator[None]:
     """A block in which no other process compacts."""
-    with ExitStack() as held:
-        try:
-            held.enter_context(alone(root / packs.FOLDER))
-        except OperatorNeeded:
-            raise OperatorNeeded(
-                "archive compact: another process is compacting this archive; wait for its end"
-            ) from None
+    held = ExitStack()
+    try:
+        held.enter_context(alone(root / packs.FOLDER))
+    except OperatorNeeded:
+        raise OperatorNeeded("archive compact: another process is compacting this archive; wait for its end") from None
+    with held:
         yield
 
 
@@ -188,22 +178,20 @@ def _has_single(folder: Path) -> bool:
 
 def _pack(root: Path, what: str, folders: Iterable[FolderToPack], done: Compacted) -> None:
     """Write packs of the folders, each up to :data:`LARGEST` bytes."""
+    rest = iter(folders)
+    while portion := _portion(rest):
+        done.packs.append(write_pack(root, what, portion, lambda folder, name: (root / folder / name).read_bytes()))
+        done.packed += sum(len(one.files) for one in portion)
+        done.bytes += sum(one.bytes for one in portion)
+
+
+def _portion(folders: Iterator[FolderToPack]) -> list[FolderToPack]:
+    """The next folders for one pack."""
     portion, size = list[FolderToPack](), 0
-    for one in folders:
+    while size < LARGEST and (one := next(folders, None)) is not None:
         portion.append(one)
         size += one.bytes
-        if size >= LARGEST:
-            _write(root, what, portion, done)
-            portion, size = [], 0
-    if portion:
-        _write(root, what, portion, done)
-
-
-def _write(root: Path, what: str, portion: Sequence[FolderToPack], done: Compacted) -> None:
-    """One pack of single files."""
-    done.packs.append(write_pack(root, what, portion, lambda folder, name: (root / folder / name).read_bytes()))
-    done.packed += sum(len(one.files) for one in portion)
-    done.bytes += sum(one.bytes for one in portion)
+    return portion
 
 
 def _free(root: Path, known: packs.Packs, name: str, done: Compacted) -> None:

@@ -5,8 +5,6 @@ made again from the files of the archive, with a warning. A cache that another k
 to an unsigned archive can also forge a seal: ``tumbleline verify`` makes every cache again and compares.
 """
 
-from __future__ import annotations
-
 import json
 import logging
 from collections.abc import Mapping
@@ -28,8 +26,6 @@ def seal(hashes: Mapping[str, str]) -> dict[str, Any]:
 def standing(seal: object, hashes: Mapping[str, str]) -> str:
     """``sound``, ``edited``, or ``made by others`` (an own key is configured and did not sign it).
 
-    Parameters
-    ----------
     seal : the seal in the file.
     hashes : of the parts of the cache as they are now.
     """
@@ -49,10 +45,7 @@ def framed(data: bytes) -> bytes:
 def unframed(place: Place) -> tuple[bytes, str]:
     """The content of a sealed file and the state of its seal; no content where the seal is not sound.
 
-    Raises
-    ------
-    OSError, ArchiveUnusable
-        The file is not there or cannot be read.
+    Raises OSError, ArchiveUnusable: the file is not there or cannot be read.
     """
     first, _, data = place.read_bytes().partition(b"\n")
     try:

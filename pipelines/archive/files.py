@@ -4,8 +4,6 @@ On a disk a file is written under a temporary name in its folder, synchronised, 
 A reader sees the whole file or none.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os
@@ -33,8 +31,6 @@ ELSEWHERE = "name another place"
 def writing(path: Place, what: str = "archive", remedy: str = IN_ARCHIVE) -> Generator[None, None, None]:
     """A block that writes below ``path``; an error of the system becomes one message.
 
-    Parameters
-    ----------
     what : what is written; the message begins with it.
     remedy : what the user can do; the message ends with it.
     """
@@ -94,8 +90,6 @@ def manifest_bytes(content: Mapping[str, Any]) -> bytes:
 def publish(path: Place, data: bytes, what: str = "archive", remedy: str = IN_ARCHIVE) -> None:
     """Write a file completely or not at all, so that it survives a power failure.
 
-    Parameters
-    ----------
     what, remedy : beginning and end of the error message.
     """
     with writing(path, what, remedy):
@@ -137,13 +131,11 @@ def publish_first(path: Place, data: bytes) -> bool:
     Of several processes exactly one gets true. An object store has no such operation: its callers hold a claim.
     """
     with writing(path.parent):
-        if isinstance(path, ObjectPath):
-            if path.is_file():
-                return False
-            path.write_bytes(data)
-            return True
         if path.is_file():  # also one that is packed
             return False
+        if isinstance(path, ObjectPath):
+            path.write_bytes(data)
+            return True
         with _aside(path.parent) as aside:
             _write_durably(aside, data)
             try:
@@ -225,8 +217,6 @@ def writers_of(folder: Path, mode: int) -> Generator[bool, None, None]:
     The system releases the lock when a process dies. Yields whether the lock was granted; a file system
     without locks grants none.
 
-    Parameters
-    ----------
     mode : ``host.SHARED``, or ``host.EXCLUSIVE | host.AT_ONCE``.
     """
     with host.opened_folder(folder) as handle:

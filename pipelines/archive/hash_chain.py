@@ -4,8 +4,6 @@
 other takes the next number. A copy of the hash of the last entry, kept elsewhere, shows later whether an entry was removed.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from contextlib import nullcontext
 from typing import Any
@@ -21,8 +19,6 @@ SHARD = 1000
 def append(root: Place, kind: str, sealed: Mapping[str, str], about: Mapping[str, Any]) -> int:
     """The number of a new entry.
 
-    Parameters
-    ----------
     kind : ``run``, ``calibrations``, ``programming`` or ``release``.
     sealed : hashes of files by their place below the archive's root.
     about : who wrote it, where and when, and about what.

@@ -1,7 +1,5 @@
 """Keys of stages: a hash of inputs, parameters and code. They do not contain what has no effect on a result."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections.abc import Iterable, Mapping
@@ -24,8 +22,6 @@ def digest(content: object) -> str:
 def stage_key(stage: str, inputs: Mapping[str, str], parameters: Mapping[str, Any], code: str) -> str:
     """The key under which a stage's outputs are stored.
 
-    Parameters
-    ----------
     inputs : hash of the content of every input table, by name.
     parameters : JSON-able values that the stage is called with.
     code : hash of the stage's code, from :func:`code_hash`.
@@ -51,16 +47,13 @@ def libraries() -> dict[str, str]:
     return {name: version(name) for name in LIBRARIES}
 
 
-EXTENDED = {"inertial.effects": "tumbleline.effects"}
-"""Packages to which other packages add modules under an entry point."""
+EXTENDED = {"inertial.effects": "tumbleline.effects"}  # packages to which others add modules under an entry point
 
 
 def sources(modules: Iterable[str]) -> dict[str, Path]:
     """Files of modules, and of everything below those that are packages, by name; nothing is imported for it.
 
-    Raises
-    ------
-    LookupError : there is no such module
+    Raises LookupError: there is no such module
     """
     found: dict[str, Path] = {}
     for module in modules:

@@ -1,7 +1,5 @@
 """The list of the runs of an archive: one line for each run, read from as few files as possible."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Sequence
 from contextlib import suppress

@@ -6,8 +6,6 @@ its own it removes its own and tries again later. Of two simultaneous processes 
 continue. A claim is renewed at intervals; a claim that is too old belongs to a dead process. Only the clock of the store is used.
 """
 
-from __future__ import annotations
-
 import os
 import platform
 import random

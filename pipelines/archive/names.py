@@ -1,17 +1,14 @@
 """Names in manifests: a file of the archive may refer to places inside the archive only."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from typing import Any
 
 from pipelines.archive.store import Place
 from schemas.errors import ArchiveUnusable
 
-ONE = ("capture", "run", "rerun_of", "taken_from")  # entries that name one folder of the archive
-SEVERAL = ("parents",)
+FOLDERS = ("capture", "run", "rerun_of", "taken_from", "parents")  # entries that name folders of the archive
 KEYS = ("content", "inputs", "manifests", "evidence", "events")  # entries whose keys name files of one folder
-PLACES = ("files",)  # entries whose keys are places below the archive's root
+PLACES = "files"  # the entry whose keys are places below the archive's root
 
 
 class NameLeadsOut(ArchiveUnusable):
@@ -35,10 +32,7 @@ def is_below(name: str) -> bool:
 def refuse_leading_out(content: Mapping[str, Any], where: Place) -> None:
     """Refuse a manifest with a name that could lead out of the archive.
 
-    Raises
-    ------
-    NameLeadsOut
-        With the entry and the name.
+    Raises NameLeadsOut: with the entry and the name.
     """
     for entry, name, sound in _named(content):
         if not sound:
@@ -50,13 +44,10 @@ def refuse_leading_out(content: Mapping[str, Any], where: Place) -> None:
 
 def _named(content: Mapping[str, Any]) -> Iterator[tuple[str, str, bool]]:
     """Entries and the names under them, with whether each is sound; values of other types are no names."""
-    for entry in ONE:
-        name = content.get(entry)
-        if isinstance(name, str) and name:
-            yield entry, name, is_plain(name)
-    for entry in SEVERAL:
+    for entry in FOLDERS:
         names = content.get(entry)
-        yield from ((entry, str(name), is_plain(str(name))) for name in (names if isinstance(names, list) else ()))
-    for entry, sound in (*((key, is_plain) for key in KEYS), *((place, is_below) for place in PLACES)):
-        names = content.get(entry)
+        several = names if isinstance(names, list) else [names] if isinstance(names, str) and names else ()
+        yield from ((entry, str(name), is_plain(str(name))) for name in several)
+    for entry in (*KEYS, PLACES):
+        names, sound = content.get(entry), is_below if entry == PLACES else is_plain
         yield from ((entry, name, sound(name)) for name in (names if isinstance(names, dict) else ()))

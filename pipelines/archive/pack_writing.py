@@ -6,8 +6,6 @@ pack grows by half. The merged pack names those that it replaces; when it is pub
 compaction by the next one.
 """
 
-from __future__ import annotations
-
 import hashlib
 import os
 import time
@@ -44,8 +42,6 @@ def write_pack(
 ) -> str:
     """Write and publish one pack; the name of its zip.
 
-    Parameters
-    ----------
     root : folder of the archive
     what : end of its name: a month, or ``calibrations``
     replaced : zips of packs whose files are all in this one; from now on they may be removed

@@ -7,8 +7,6 @@ that has all its files; where two packs have the same file, that of the higher n
 restores the single files.
 """
 
-from __future__ import annotations
-
 import json
 import mmap
 import re
@@ -105,8 +103,6 @@ class Contents:
 class Packs:
     """All packs of a local archive; packs that another process makes are seen at the next question.
 
-    Parameters
-    ----------
     root : folder of the archive
     """
 
@@ -118,8 +114,6 @@ class Packs:
     def contents(self, kind: str = "") -> list[Contents]:
         """The tables of contents, oldest first.
 
-        Parameters
-        ----------
         kind : ``calibrations``, or another first part of a name: those that may have such folders; empty: all
         """
         for _ in range(LISTINGS):
@@ -146,8 +140,6 @@ class Packs:
     def folder(self, name: str) -> PackedFolder | None:
         """The packed files of a folder; None where no pack has it.
 
-        Parameters
-        ----------
         name : below the root, with slashes, such as ``runs/line-six-0123456789``
         """
         tables = self.contents(name.partition("/")[0])
@@ -195,10 +187,7 @@ def identity_of(place: Path) -> tuple[str, int, int]:
 def read(member: Member) -> bytes:
     """The bytes of a packed file.
 
-    Raises
-    ------
-    OSError
-        The zip is not there or ends before the file does.
+    Raises OSError: the zip is not there or ends before the file does.
     """
     with member.pack.open("rb", buffering=0) as file:
         file.seek(member.offset)
@@ -211,8 +200,6 @@ def read(member: Member) -> bytes:
 def read_current(ask: Callable[[], Member | None]) -> bytes | None:
     """The bytes of a packed file, wherever it lies now; None where no pack has it.
 
-    Parameters
-    ----------
     ask : where it lies; asked again where its pack was merged with others since the answer
     """
     for left in reversed(range(LISTINGS)):
@@ -251,7 +238,5 @@ def _is_contents(place: Path) -> bool:
 
 def _together(parts: list[PackedFolder]) -> PackedFolder:
     """A folder of several packs, the newest last."""
-    files: dict[str, Member] = {}
-    for one in parts:
-        files |= one.files
+    files = {name: member for one in parts for name, member in one.files.items()}
     return PackedFolder(max(one.mtime_ns for one in parts), files)

@@ -55,8 +55,6 @@ def decoded(data: bytes, columns: Sequence[str] = ()) -> pa.Table:
 def read_table(path: Place, name: str, expected: str | None = None, columns: Sequence[str] = ()) -> pd.DataFrame:
     """A table of the archive, checked to be complete, written by this archive and unchanged.
 
-    Parameters
-    ----------
     expected : hash that the manifest gives; None where there is no manifest to compare with.
     columns : those that the caller reads; all where none is named. A table of an older version has all its columns.
     """

@@ -1,7 +1,5 @@
 """Provenance: user, host, time and versions; stored in manifests, never in results or keys."""
 
-from __future__ import annotations
-
 import getpass
 import platform
 from datetime import UTC, datetime

@@ -132,8 +132,6 @@ class Records:
     ) -> None:
         """Store one record, durably and all at once, with the station's state after it.
 
-        Parameters
-        ----------
         parts : how many parts of its samples are stored already; ``samples`` are the rest then
         """
         if parts:
@@ -186,8 +184,6 @@ class Records:
     def samples(self, records: Collection[int] | None = None) -> Iterator[pd.DataFrame]:
         """The samples, one table per record in order of record, or several of a long one: they never lie in memory together.
 
-        Parameters
-        ----------
         records : numbers of those that are wanted; all where None
         """
         for folder in self._folders():

@@ -23,10 +23,8 @@ SEALED = "sealed.json"
 def stages_of(folder: Place, names: set[str] | None = None) -> list[str]:
     """The stages that made the run's tables."""
     names = names_in(folder) if names is None else names
-    tables = sorted(name.removesuffix(".parquet") for name in names if name.endswith(".parquet"))
-    made = (
-        str(files.read_json(folder / f"{name}.json").get("stage", "")) for name in tables if f"{name}.json" in names
-    )
+    manifests = sorted(f"{name.removesuffix('.parquet')}.json" for name in names if name.endswith(".parquet"))
+    made = (str(files.read_json(folder / name).get("stage", "")) for name in manifests if name in names)
     return list(dict.fromkeys(made))
 
 
@@ -80,17 +78,9 @@ class Run:
         """Whether all these tables are there, made by the stage with this key."""
         return all(self._is_made_by(name, key) for name in names)
 
-    def save(
-        self,
-        stage: str,
-        key: str,
-        outputs: Mapping[str, pd.DataFrame],
-        about: Mapping[str, Any],
-    ) -> None:
+    def save(self, stage: str, key: str, outputs: Mapping[str, pd.DataFrame], about: Mapping[str, Any]) -> None:
         """Publish the tables of a stage with a manifest beside each.
 
-        Parameters
-        ----------
         about : the stage's inputs, parameters and code, as they went into the key.
         """
         from schemas import table_check, tables  # slow to import, and only writers of tables need it
@@ -150,8 +140,6 @@ class Run:
     def table(self, name: str, columns: Sequence[str] = ()) -> pd.DataFrame:
         """A table of the run, whole and unchanged since it was written.
 
-        Parameters
-        ----------
         columns : those that the caller reads; the table may have more. All where none is named
         """
         path = self.path / f"{name}.parquet"

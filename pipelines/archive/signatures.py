@@ -52,8 +52,6 @@ def signed(content: Mapping[str, Any]) -> dict[str, Any]:
 def check(content: Mapping[str, Any], keys: Mapping[str, Ed25519PublicKey]) -> str:
     """State of the signature of a manifest: ``good``, ``unsigned``, ``unknown key`` or ``bad``.
 
-    Parameters
-    ----------
     keys : public keys that are trusted, by name.
     """
     from cryptography.exceptions import InvalidSignature
@@ -76,8 +74,6 @@ def check(content: Mapping[str, Any], keys: Mapping[str, Ed25519PublicKey]) -> s
 def public_keys(given: Collection[str] = ()) -> dict[str, Ed25519PublicKey]:
     """The public keys that are trusted, by name: the given ones, else the one of the configured private key.
 
-    Parameters
-    ----------
     given : files in PEM, or keys as 64 hexadecimal digits.
     """
     if given:

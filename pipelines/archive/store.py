@@ -30,8 +30,6 @@ class Size:
 class ObjectPath:
     """A place in an object store, with the methods of :class:`pathlib.Path` that the archive uses.
 
-    Parameters
-    ----------
     system : the file system of pyarrow.
     key : bucket and key, with slashes.
     scheme : begins the place's name for people.
@@ -41,7 +39,7 @@ class ObjectPath:
     def __init__(self, system: Any, key: str, scheme: str, address: str) -> None:
         self.system, self.scheme, self.address = system, scheme, address
         self.pure = PurePosixPath(key)
-        self.key = str(self.pure)
+        self.key, self.name, self.stem, self.suffix = str(self.pure), self.pure.name, self.pure.stem, self.pure.suffix
 
     def __truediv__(self, other: str) -> ObjectPath:
         return self._at(self.pure / other)
@@ -60,21 +58,6 @@ class ObjectPath:
 
     def __lt__(self, other: ObjectPath) -> bool:
         return self.key < other.key
-
-    @property
-    def name(self) -> str:
-        """Last part of the name."""
-        return self.pure.name
-
-    @property
-    def stem(self) -> str:
-        """Last part of the name without its ending."""
-        return self.pure.stem
-
-    @property
-    def suffix(self) -> str:
-        """Ending of the name, with its dot."""
-        return self.pure.suffix
 
     @property
     def parent(self) -> ObjectPath:

@@ -73,7 +73,7 @@ def command(
     )
     if check:
         same = sum(result.same for result in done)
-        rows = [{**asdict(result), "same": result.same} for result in done]
+        rows = [asdict(result) for result in done]
         checks = {"archive": str(store.root), "selected": len(done), "same": same, "runs": rows}
         conclude(checks, lambda _: _print_check(done), as_json=as_json, passed=same == len(done))
     add_runs(store, [outcome.new for outcome in done if outcome.new])

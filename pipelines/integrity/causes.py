@@ -4,8 +4,6 @@ One edited manifest fails the check of its signature, of its key, of the chain a
 folder gives one finding for each file.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import PurePosixPath
@@ -25,8 +23,6 @@ def by_cause(
 ) -> list[IntegrityFinding]:
     """The findings by cause; each path occurs once, and consequences are listed in the finding that caused them.
 
-    Parameters
-    ----------
     differing : files that differ from what the chain sealed: of two files that disagree, these were edited
     """
     by_path: dict[str, list[IntegrityFinding]] = {}

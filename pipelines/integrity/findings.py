@@ -26,8 +26,6 @@ CHANGED, MISSING, EDITED, FOREIGN, NEWER, UNREADABLE, SIGNATURE, UNCHAINED = (
 class IntegrityFinding:
     """A difference between the archive and what was written.
 
-    Parameters
-    ----------
     kind : ``changed``, ``missing``, ``edited``, ``foreign``, ``newer``, ``unreadable``, ``signature`` or ``unchained``.
     path : the file, below the archive's root.
     consequences : sentences about further findings with this cause.
@@ -45,8 +43,6 @@ class IntegrityFinding:
 class VerifiedPart:
     """Findings in a part of the archive, and the amount of data read.
 
-    Parameters
-    ----------
     remarks : information that is no finding.
     signatures : number of manifests by state of the signature (good, unknown key, bad, unsigned).
     untrusted : names of the manifests without a signature or with that of an unknown key, by state.
@@ -74,8 +70,13 @@ class VerifiedPart:
         self.signatures += other.signatures
         for state, names in other.untrusted.items():
             self.untrusted[state] += names
-        for name in ("tables", "manifests", "rows", "bytes"):
-            setattr(self, name, getattr(self, name) + getattr(other, name))
+        for name, count in other.counts.items():
+            setattr(self, name, getattr(self, name) + count)
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """The amount of data read, by its name in the document."""
+        return {name: getattr(self, name) for name in ("tables", "manifests", "rows", "bytes")}
 
     def name(self, place: Place) -> str:
         """The name of a place relative to the root of the archive."""
@@ -104,9 +105,8 @@ class VerifiedPart:
         self.bytes += len(data)
         schema = content.get("schema")
         if isinstance(schema, int) and schema > known_schema:
-            self.wrong(
-                NEWER, place, f"has schema {schema}, this version knows up to {known_schema}: use a newer version"
-            )
+            what = f"has schema {schema}, this version knows up to {known_schema}: use a newer version"
+            self.wrong(NEWER, place, what)
             return None
         state = check(content, self.keys)
         self.signatures[state] += 1

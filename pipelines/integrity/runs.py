@@ -1,7 +1,5 @@
 """Checks of one run (its tables, their manifests, the links between these) and of one capture (its records, their chain)."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 
@@ -17,8 +15,7 @@ from pipelines.integrity.findings import CHANGED, EDITED, FOREIGN, MISSING, Veri
 OURS = ("run.json", SEALED, "lock")
 KEYED = ("stage", "inputs", "parameters", "code", "key")
 REMOVE_FOREIGN = "remove it; import foreign files with 'tumbleline import'"
-Record = tuple[dict[str, Any], str, Place]
-"""Manifest of a record, hash of the manifest, and folder."""
+Record = tuple[dict[str, Any], str, Place]  # manifest of a record, hash of the manifest, and folder
 
 
 def check_run(run: Run, checked: VerifiedPart, schema: int) -> VerifiedPart:
@@ -107,9 +104,8 @@ def _check_others(run: Run, names: dict[str, Place], manifests: dict[str, Any], 
     for name, place in sorted(names.items()):
         manifest = run.path / f"{place.stem}.json"
         if name.startswith(files.TEMPORARY):
-            checked.remarks.append(
-                f"{checked.name(place)} is a temporary file of a killed or active writer; see 'archive clean'"
-            )
+            what = "is a temporary file of a killed or active writer; see 'archive clean'"
+            checked.remarks.append(f"{checked.name(place)} {what}")
         elif place.suffix == ".parquet" and place.stem not in manifests and not manifest.is_file():
             mark = table_mark(place)
             if mark != place.stem:

@@ -6,8 +6,6 @@ A run without an entry was copied here, or its entry was removed, or its writer 
 writer may still be active gives a remark and no finding.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -36,8 +34,6 @@ REMEDY = "it was copied here, its entry was removed, or its writer was killed: s
 class Chain:
     """Content of the chain.
 
-    Parameters
-    ----------
     head : hash of its last entry.
     sealed : the files that it names, with the hash that the last entry to name them gives.
     entries : what each entry seals, by its number.
@@ -53,8 +49,6 @@ class Chain:
 def check_chain(root: Place, checked: VerifiedPart, *, only: set[str] | None = None, head: str = "") -> Chain:
     """Read and check the chain; findings go into ``checked``.
 
-    Parameters
-    ----------
     only : runs whose sealed files are checked; all where None.
     head : hash of an entry from a copy kept elsewhere; it must exist.
     """
@@ -63,9 +57,7 @@ def check_chain(root: Place, checked: VerifiedPart, *, only: set[str] | None = N
         part = checked.blank()
         manifest = part.manifest(place, 1)
         if only is not None and (manifest is None or manifest[0].get("run") not in only):
-            part.untrusted = {
-                state: [] for state in part.untrusted
-            }  # signatures of other runs' entries are not checked
+            part.untrusted = {}  # signatures of other runs' entries are not checked
         checked.add(part)
         if manifest is None:
             before = ""
@@ -78,22 +70,19 @@ def check_chain(root: Place, checked: VerifiedPart, *, only: set[str] | None = N
             checked.wrong(EDITED, earlier, f"is not the entry that number {number} refers to")
         named = checked.named(content, "files", place)
         # names that lead out of the archive are ignored
-        chain.entries[number] = {
-            k: v for k, v in named.items() if ".." not in PurePosixPath(k).parts and not k.startswith("/")
-        }
+        inside = {k: v for k, v in named.items() if ".." not in PurePosixPath(k).parts and not k.startswith("/")}
+        chain.entries[number] = inside
         if only is None or content.get("run") in only:
-            chain.sealed |= chain.entries[number]
+            chain.sealed |= inside
         when = str(content.get("when", ""))
         if when < latest:
-            checked.remarks.append(
-                f"entry {number} of the chain says {when}, one before it {latest}: a clock was set back"
-            )
+            what = f"entry {number} of the chain says {when}, one before it {latest}: a clock was set back"
+            checked.remarks.append(what)
         before, latest = own, max(when, latest)
         seen.add(own)
     if head and head not in seen:
-        checked.wrong(
-            MISSING, root / hash_chain.FOLDER, f"has no entry with hash {head}: entries were removed or written again"
-        )
+        what = f"has no entry with hash {head}: entries were removed or written again"
+        checked.wrong(MISSING, root / hash_chain.FOLDER, what)
     chain.differing = {name for name, hashed in chain.sealed.items() if not _is_sealed(root, name, hashed, checked)}
     chain.head = before
     return chain
@@ -194,9 +183,8 @@ def _report(place: Place, content: dict[str, Any], checked: VerifiedPart) -> Non
     """A finding, or a remark where the file was written just now."""
     with suppress(ValueError, TypeError):
         if abs(datetime.now(UTC) - datetime.fromisoformat(str(content.get("when", "")))) < JUST_NOW:
-            checked.remarks.append(
-                f"{checked.name(place)} is not in the chain yet: its writer is still active, or was killed a moment ago"
-            )
+            what = "is not in the chain yet: its writer is still active, or was killed a moment ago"
+            checked.remarks.append(f"{checked.name(place)} {what}")
             return
     checked.wrong(UNCHAINED, place, f"is in no entry of the archive's chain: {REMEDY}")
 

@@ -1,7 +1,5 @@
 """Checks for foreign content in an archive: links, private keys, files that the archive did not write."""
 
-from __future__ import annotations
-
 import os
 import re
 from collections.abc import Iterable, Iterator

@@ -1,7 +1,5 @@
 """Build the lineage graph from the manifests, captures and calibrations of an archive."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from pipelines.archive import Archive, Run, files
@@ -15,6 +13,7 @@ from pipelines.lineage.graph import Graph, Node, ProvActivity
 
 MADE = ("who", "where", "when", "code", "key", "software", "libraries", "schema", "parameters", "taken_from")
 RAW = "records"
+ELSEWHERE = {"recipe", "limits", "station", "signature"}  # parts of ``run.json`` with nodes of their own, or none
 
 
 class Gatherer:
@@ -32,7 +31,8 @@ class Gatherer:
         self._runs.add(run.id)
         about = run.about
         settings = self._settings(about)
-        start = self.graph.add(Node(f"runs/{run.id}", "run", run.id, f"runs/{run.id}/run.json", about=_short(about)))
+        own = {key: value for key, value in about.items() if key not in ELSEWHERE}
+        start = self.graph.add(Node(f"runs/{run.id}", "run", run.id, f"runs/{run.id}/run.json", about=own))
         earlier = [str(one) for one in (about.get("rerun_of"), *about.get("parents", ())) if one]
         earlier = [one for one in dict.fromkeys(earlier) if one != run.id]
         raw = self._capture(str(about.get("capture") or ""), about, settings)
@@ -40,15 +40,10 @@ class Gatherer:
             other = self._other(name)
             if other is not None:
                 self.run(other)
-        self.graph.put(
-            ProvActivity(
-                id=f"start of {run.id}",
-                name="run again" if about.get("rerun_of") else "start",
-                used=(*settings, *(f"runs/{name}" for name in earlier if f"runs/{name}" in self.graph.nodes)),
-                made=(start,),
-                about={key: about[key] for key in (*MADE[:3], "because", "software", "libraries") if key in about},
-            )
-        )
+        used = (*settings, *(f"runs/{name}" for name in earlier if f"runs/{name}" in self.graph.nodes))
+        step = {key: about[key] for key in (*MADE[:3], "because", "software", "libraries") if key in about}
+        what = "run again" if about.get("rerun_of") else "start"
+        self.graph.put(ProvActivity(f"start of {run.id}", what, used, (start,), step))
         self._tables(run, raw, start)
 
     def calibrations(self, serial: str) -> list[str]:
@@ -64,12 +59,8 @@ class Gatherer:
     def certificates_of(self, run: Run) -> list[str]:
         """Add the certificates of the units of a run; return their ids."""
         serials = [unit["serial"] for unit in run.about.get("lot", {}).get("units", [])]
-        return [
-            self._certificate(one)
-            for serial in serials
-            for one in Ledger(self.archive).calibrations(serial)
-            if one.run == run.id
-        ]
+        own = (one for serial in serials for one in Ledger(self.archive).calibrations(serial) if one.run == run.id)
+        return [self._certificate(one) for one in own]
 
     def _other(self, name: str) -> Run | None:
         return self.archive.run(name) if name in self.archive.run_ids() else None
@@ -110,11 +101,8 @@ class Gatherer:
 
     def _tables(self, run: Run, raw: list[str], start: str) -> None:
         """Add the tables of a run, stage by stage."""
-        manifests = {
-            place.stem: files.read_json(place)
-            for place in sorted(run.path.glob("*.json"), key=lambda one: one.name)
-            if place.name not in {"run.json", SEALED}
-        }
+        places = sorted(run.path.glob("*.json"), key=lambda one: one.name)
+        manifests = {one.stem: files.read_json(one) for one in places if one.name not in {"run.json", SEALED}}
         steps: dict[str, list[str]] = {}
         for name, content in manifests.items():
             kind, ending = ("report", "html") if name == "report" else ("table", "parquet")
@@ -154,8 +142,3 @@ class Gatherer:
 
 def _by(event: LedgerEntry) -> dict[str, Any]:
     return {"who": event.who, "where": event.where, "when": event.when, "reason": event.reason}
-
-
-def _short(about: dict[str, Any]) -> dict[str, Any]:
-    """The content of ``run.json`` without the parts that have their own nodes."""
-    return {key: value for key, value in about.items() if key not in {"recipe", "limits", "station", "signature"}}

@@ -6,6 +6,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from typing import Annotated, Any
 
+STATED = ("code", "key", "schema", "reason", "taken_from")  # of a step, in exchange formats
+
 
 @dataclass(frozen=True)
 class Node:

@@ -1,11 +1,9 @@
 """A lineage as W3C PROV-O (Recommendation of 30 April 2013) in JSON-LD; the context is included, so that no network is needed."""
 
-from __future__ import annotations
-
 from typing import Any
 from urllib.parse import quote
 
-from pipelines.lineage.graph import Graph, Node, ProvActivity
+from pipelines.lineage.graph import STATED, Graph, Node, ProvActivity
 from pipelines.lineage.targets import Lineage
 
 BASE = "urn:x-tumbleline:"
@@ -32,10 +30,8 @@ def prov_of(traced: Lineage) -> dict[str, Any]:
     graph = traced.graph
     agents: dict[str, dict[str, Any]] = {}
     activities = [_activity(step, graph, agents) for step in graph.steps.values()]
-    made_by, used_by = graph.made_by(), graph.used_by()
-    entities = [
-        _entity(node, graph, made_by.get(node.id, []), used_by.get(node.id, [])) for node in graph.nodes.values()
-    ]
+    made, used = graph.made_by(), graph.used_by()
+    entities = [_entity(node, graph, made.get(node.id, []), used.get(node.id, [])) for node in graph.nodes.values()]
     return {"@context": CONTEXT, "@graph": [*entities, *activities, *agents.values()]}
 
 
@@ -94,9 +90,7 @@ def _activity(step: ProvActivity, graph: Graph, agents: dict[str, dict[str, Any]
     about = step.about
     if about.get("when"):
         activity["endedAtTime"] = about["when"]
-    activity |= {
-        f"tl:{key}": str(about[key]) for key in ("code", "key", "schema", "reason", "taken_from") if about.get(key)
-    }
+    activity |= {f"tl:{key}": str(about[key]) for key in STATED if about.get(key)}
     activity |= {f"tl:library_{name}": number for name, number in sorted(about.get("libraries", {}).items())}
     plans = [iri("thing", name) for name in step.used if graph.nodes[name].kind in {"recipe", "limits"}]
     who = _agents(step, agents)
@@ -110,15 +104,11 @@ def _activity(step: ProvActivity, graph: Graph, agents: dict[str, dict[str, Any]
 
 def _agents(step: ProvActivity, agents: dict[str, dict[str, Any]]) -> list[str]:
     """The person and the program of a step."""
-    names: list[str] = []
-    if step.about.get("who"):
-        name = iri("agent", step.person)
-        agents[name] = {"@id": name, "@type": ["prov:Agent", "prov:Person"], "label": step.person}
-        names.append(name)
     software = step.about.get("software", {})
+    labels = {"Person": step.person} if step.about.get("who") else {}
     if software:
-        label = " ".join(f"{key} {value}" for key, value in sorted(software.items(), reverse=True))
+        labels["SoftwareAgent"] = " ".join(f"{key} {value}" for key, value in sorted(software.items(), reverse=True))
+    for kind, label in labels.items():
         name = iri("agent", label)
-        agents[name] = {"@id": name, "@type": ["prov:Agent", "prov:SoftwareAgent"], "label": label}
-        names.append(name)
-    return names
+        agents[name] = {"@id": name, "@type": ["prov:Agent", f"prov:{kind}"], "label": label}
+    return [iri("agent", label) for label in labels.values()]

@@ -1,7 +1,5 @@
 """A lineage as an RO-Crate 1.1: a folder with all its files, and a description for other tools."""
 
-from __future__ import annotations
-
 import json
 from hashlib import sha256
 from pathlib import Path
@@ -10,7 +8,7 @@ from urllib.parse import quote
 
 from pipelines.archive import Archive, files
 from pipelines.archive.names import is_below
-from pipelines.lineage.graph import Graph, Node, ProvActivity
+from pipelines.lineage.graph import STATED, Graph, Node, ProvActivity
 from pipelines.lineage.targets import Lineage
 from schemas.errors import ArchiveUnusable, WrongUse
 
@@ -43,8 +41,6 @@ def write_crate(archive: Archive, traced: Lineage, folder: Path) -> int:
 def crate_of(traced: Lineage, contents: dict[str, bytes]) -> dict[str, Any]:
     """The description of the crate.
 
-    Parameters
-    ----------
     contents : the other files of the crate, by name.
     """
     graph = traced.graph
@@ -140,7 +136,7 @@ def _action(step: ProvActivity, graph: Graph) -> dict[str, Any]:
         "object": _one_or_all([{"@id": _id(graph.nodes[name])} for name in step.used]),
         "result": _one_or_all([{"@id": _id(graph.nodes[name])} for name in step.made]),
     }
-    known = [f"{key} {about[key]}" for key in ("code", "key", "schema", "reason", "taken_from") if about.get(key)]
+    known = [f"{key} {about[key]}" for key in STATED if about.get(key)]
     known += [f"{name} {number}" for name, number in sorted(about.get("libraries", {}).items())]
     if known:
         action["description"] = ", ".join(known)
@@ -167,11 +163,10 @@ def _agents(graph: Graph) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
             people[name] = {"@id": name, "@type": "Person", "name": step.person, "affiliation": {"@id": "#owner"}}
         software = step.about.get("software")
         if software:
-            name = _program(software)
-            number = str(software.get("tumbleline", ""))
-            text = f"Run by Python {software.get('python', '')}"
+            name, text = _program(software), f"Run by Python {software.get('python', '')}"
             programs[name] = {
-                "@id": name, "@type": "SoftwareApplication", "name": "Tumbleline", "softwareVersion": number, "description": text,
+                "@id": name, "@type": "SoftwareApplication", "name": "Tumbleline",
+                "softwareVersion": str(software.get("tumbleline", "")), "description": text,
             }  # fmt: skip
     return list(people.values()), list(programs.values())
 

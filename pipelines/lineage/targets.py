@@ -1,7 +1,5 @@
 """The target of a lineage: a unit, a run, a file of the archive, or a copy of such a file."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -18,8 +16,6 @@ from schemas.errors import ArchiveUnusable, WrongUse, did_you_mean
 class Lineage:
     """A lineage graph and its target.
 
-    Parameters
-    ----------
     kind : ``unit``, ``certificate``, ``run`` or ``file``.
     focus : ids of the nodes of the target.
     """
@@ -43,8 +39,6 @@ class Lineage:
 def lineage(archive: Archive, target: str) -> Lineage:
     """Origin of the certificates of a unit, of a run or of a file, and the results made from them.
 
-    Parameters
-    ----------
     target : a serial number, the name of a run or the beginning of it, or a file.
     """
     if Path(target).is_file() or (archive.root / target).is_file():

@@ -1,7 +1,5 @@
 """A lineage as a tree for the terminal: every node with the step that made it, and below the nodes that this step used."""
 
-from __future__ import annotations
-
 from rich.text import Text
 from rich.tree import Tree
 
@@ -75,10 +73,8 @@ class _Drawer:
     def _used(self, branch: Tree, step: ProvActivity) -> None:
         raw = [name for name in step.used if name.startswith("captures/")]
         for name in step.used:
-            known_run = self.graph.nodes[name].kind == "run" and all(
-                one.id in self.shown for one in self.made.get(name, [])
-            )
-            if name not in raw and not known_run:
+            shown = all(one.id in self.shown for one in self.made.get(name, []))
+            if name not in raw and not (shown and self.graph.nodes[name].kind == "run"):
                 self.up(branch, name)
         if raw:
             self._raw(branch, raw)
@@ -119,10 +115,12 @@ def _details(node: Node) -> Text:
 def _step(step: ProvActivity, versions: str) -> Text:
     about = step.about
     text = Text("by ", style="dim").append(step.name, style="italic")
-    parts = [str(about["when"])[:19].replace("T", " ")] if about.get("when") else []
-    parts += [f"{about.get('who', '')} on {about.get('where', '')}"] if about.get("who") else []
-    parts += [f"code {str(about['code'])[:SHORT]}"] if about.get("code") else []
-    parts += [versions]
-    parts += [str(about["reason"])] if about.get("reason") else []
-    parts += [f"taken from run {about['taken_from']}"] if about.get("taken_from") else []
-    return text.append("  " + ", ".join(part for part in parts if part), style="dim")
+    parts = (
+        str(about.get("when") or "")[:19].replace("T", " "),
+        f"{about['who']} on {about.get('where', '')}" if about.get("who") else "",
+        f"code {str(about['code'])[:SHORT]}" if about.get("code") else "",
+        versions,
+        str(about.get("reason") or ""),
+        f"taken from run {about['taken_from']}" if about.get("taken_from") else "",
+    )
+    return text.append("  " + ", ".join(filter(None, parts)), style="dim")

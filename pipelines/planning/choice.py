@@ -5,8 +5,6 @@ frequent; what a calibration takes out is what it determines: zero and gain at o
 nonlinearity in a centrifuge. What it leaves is the change from switch-on to switch-on and a share of each term in temperature.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -22,8 +20,7 @@ COVERAGE = 2.0
 LEFT_OF_TEMPERATURE = 0.05
 """Share of a term in temperature that a calibration over temperature leaves: curvature and hysteresis. An assumption."""
 ASSUMED = "a calibration over temperature leaves {:g} % of the terms in temperature (curvature, hysteresis); a run measures it"
-_POLE = 0.5 * math.pi
-"""Noise bandwidth over −3 dB frequency of one pole."""
+_POLE = 0.5 * math.pi  # noise bandwidth over −3 dB frequency of one pole
 MILLI = 1e3
 
 
@@ -100,10 +97,7 @@ TERMS = (
 def need_of(range_text: str, temperature: str, error: str, bandwidth_hz: float) -> Need:
     """What is asked for, from texts such as ``4g``, ``-40..85`` and ``2mg``.
 
-    Raises
-    ------
-    WrongUse
-        A text is of another form, or a value is not positive.
+    Raises WrongUse: a text is of another form, or a value is not positive.
     """
     size = _quantity(range_text, "--range", {"g": 1.0, "mg": 1e-3})
     allowed = _quantity(error, "--error", {"ug": 1.0, "µg": 1.0, "mg": MILLI, "g": MICRO})
@@ -134,8 +128,6 @@ def _quantity(text: str, option: str, units: dict[str, float]) -> float:
 def choice(need: Need, devices: list[str]) -> ChoiceDocument:
     """The budget of every device with every calibration, those that reach the error first, with the least calibration first.
 
-    Parameters
-    ----------
     devices : presets; empty for all
     """
     known = preset_names()
@@ -170,18 +162,16 @@ def _row(preset: Preset, need: Need, calibration: str) -> ChoiceRow:
     cannot = _cannot(preset, need)
     largest = max(terms, key=lambda name: terms[name])
     reaches = not cannot and error <= need.error_ug
-    why = cannot or ([] if reaches else [f"{largest}: {short(COVERAGE * terms[largest])} µg"])
+    noise = terms["noise in the bandwidth"]
     return {
         "device": preset.name,
         "calibration": calibration,
         "reaches": reaches,
         "error_ug": error,
         "terms_ug": terms,
-        "range_over_noise_dB": 20.0 * math.log10(MICRO * need.range_g / terms["noise in the bandwidth"])
-        if terms["noise in the bandwidth"] > 0.0
-        else None,
+        "range_over_noise_dB": 20.0 * math.log10(MICRO * need.range_g / noise) if noise > 0.0 else None,
         "cannot": cannot,
-        "why": why,
+        "why": cannot or ([] if reaches else [f"{largest}: {short(COVERAGE * terms[largest])} µg"]),
     }
 
 
@@ -192,11 +182,10 @@ def _share(term: Term, level: int) -> float:
 
 def _cannot(preset: Preset, need: Need) -> list[str]:
     """What no calibration mends."""
-    found: list[str] = []
-    if need.range_g > preset.range_g:
-        found.append(f"saturates at {preset.range_g:g} g")
-    if need.bandwidth_hz > preset.passband_hz:
-        found.append(f"passes {preset.passband_hz:.4g} Hz")
-    if need.low_C < preset.temperature_low_C or need.high_C > preset.temperature_high_C:
-        found.append(f"specified from {preset.temperature_low_C:g} to {preset.temperature_high_C:g} °C")
-    return found
+    low, high = preset.temperature_low_C, preset.temperature_high_C
+    beyond = {
+        f"saturates at {preset.range_g:g} g": need.range_g > preset.range_g,
+        f"passes {preset.passband_hz:.4g} Hz": need.bandwidth_hz > preset.passband_hz,
+        f"specified from {low:g} to {high:g} °C": need.low_C < low or need.high_C > high,
+    }
+    return [what for what, holds in beyond.items() if holds]

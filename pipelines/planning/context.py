@@ -1,8 +1,6 @@
 """A recipe on a station before it is measured: activities, dwells and procedures, and what poses of verification show besides."""
 
-from __future__ import annotations
-
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,14 +9,14 @@ from numpy.typing import NDArray
 
 from inertial.noise.dwells import DwellNoise, dwell_covariance
 from inertial.noise.flicker import FLICKER_FLOOR
-from inertial.planning.visibility import SEEN, visibilities
+from inertial.planning.visibility import visibilities
 from inertial.state import State
-from pipelines.procedures import PROCEDURES, FigureSpec, parts_of
+from pipelines.procedures import PROCEDURES, parts_of
 from pipelines.schedule.planned_state import state_of
 from pipelines.schedule.steps import steps
 from pipelines.schedule.timing import Activity, schedule, spent
 from schemas.errors import RecipeInvalid
-from schemas.limits import Limit, Limits
+from schemas.limits import Limits
 from schemas.recipe import Recipe
 from schemas.station import StationConfig
 from stations.plant.preset import load_preset
@@ -45,14 +43,22 @@ class PlanContext:
     state: State
     covariance: NDArray[np.float64]
 
+    @property
+    def minutes(self) -> float:
+        """Station time without the static record, min."""
+        own = spent(self.activities)
+        return own.total - own.static_record
+
+    @property
+    def heat(self) -> NDArray[np.float64]:
+        """The device's temperature at the dwells of the fit (n,), °C."""
+        return np.zeros(0) if self.state.temperature is None else self.state.temperature
+
 
 def plan_context(recipe: Recipe, station: StationConfig, noise: DwellNoise, *, slowest: float = 0.0) -> PlanContext:
     """A recipe on a station with devices of this noise; ``slowest`` as in :func:`inertial.noise.dwells.dwell_covariance`.
 
-    Raises
-    ------
-    RecipeInvalid
-        The recipe has no multi-position test, of whose dwells a plan is made.
+    Raises RecipeInvalid: the recipe has no multi-position test, of whose dwells a plan is made.
     """
     if not recipe.tumbles:
         raise RecipeInvalid(
@@ -71,19 +77,18 @@ def shown_by_verification(
 ) -> set[str]:
     """The effects that are visible with the poses of verification, of those that are not visible without them.
 
-    Parameters
-    ----------
     activities : what the station does in the recipe
     effects : those that are not visible in the dwells of the fit; the recipe's others are the model
     """
     if not effects or not recipe.verification:
         return set()
     every = state_of(activities, station, recipe, history=True, kinds=("dwell", "verification"))
-    shown: set[str] = set()
-    for effect in effects:
-        rest = [other for other in recipe.effects if other != effect]
-        shown |= {s.effect for s in visibilities(every, rest, 1.0, [effect]) if s.remaining_fraction > SEEN}
-    return shown
+    return {
+        s.effect
+        for effect in effects
+        for s in visibilities(every, [other for other in recipe.effects if other != effect], 1.0, [effect])
+        if s.seen
+    }
 
 
 def with_verification_hint(text: str, activities: Sequence[Activity], station: StationConfig, recipe: Recipe) -> str:
@@ -96,8 +101,6 @@ def with_verification_hint(text: str, activities: Sequence[Activity], station: S
 def noise_of(recipe: Recipe, device: str, density: float | None, wander: float | None) -> DwellNoise:
     """Noise of a preset, with given values in place of the preset's.
 
-    Parameters
-    ----------
     device : preset; the recipe's device where it is empty
     density : white noise, µg/√Hz · wander : flicker floor of the Allan deviation, µg
     """
@@ -130,25 +133,23 @@ def procedure_rows(recipe: Recipe, station: StationConfig, limits: Limits | None
     for number, part in enumerate(parts_of(recipe)):
         procedure = PROCEDURES[part.kind]
         own = [activity for activity in activities if activity.step.procedure == number]
-        rows.append(
+        figures = [
             {
-                "procedure": part.kind,
-                "states": procedure.states,
-                "records": len({activity.step.record for activity in own}),
-                "minutes": round(spent(own).total, 2),
-                "temperatures_C": list(dict.fromkeys(activity.step.temperature for activity in own)),
-                "equipment": list(procedure.roles),
-                "figures": [_figure(spec, asked) for spec in procedure.figures],
+                "figure": s.name,
+                "unit": s.unit,
+                "meaning": s.meaning,
+                "limit": asked[s.name].text if s.name in asked else None,
             }
-        )
+            for s in procedure.figures
+        ]
+        row = {
+            "procedure": part.kind,
+            "states": procedure.states,
+            "records": len({activity.step.record for activity in own}),
+            "minutes": round(spent(own).total, 2),
+            "temperatures_C": list(dict.fromkeys(activity.step.temperature for activity in own)),
+            "equipment": list(procedure.roles),
+            "figures": figures,
+        }
+        rows.append(row)
     return rows
-
-
-def _figure(spec: FigureSpec, asked: Mapping[str, Limit]) -> dict[str, Any]:
-    limit = asked.get(spec.name)
-    return {
-        "figure": spec.name,
-        "unit": spec.unit,
-        "meaning": spec.meaning,
-        "limit": None if limit is None else limit.text,
-    }

@@ -1,7 +1,5 @@
 """Discrimination between rival effects as a requirement, and the separation that a recipe reaches."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import permutations
 from typing import Any
@@ -16,12 +14,8 @@ from pipelines.planning.requirement import Requirement, candidates, temperature_
 from schemas.errors import WrongUse
 from schemas.units import MICRO
 
-ENOUGH = 50.0
-"""χ² of the wrong effect over a lot from which two effects count as discriminated."""
-
-SIZE_UG = 100.0
-"""Default size of each rival where it is largest, µg."""
-
+ENOUGH = 50.0  # χ² of the wrong effect over a lot from which two effects count as discriminated
+SIZE_UG = 100.0  # default size of each rival where it is largest, µg
 CANDIDATES = 48
 """Number of candidate directions: rivals differ most between the faces and edges, so more directions are offered."""
 
@@ -38,18 +32,12 @@ def discrimination_requirement(
 ) -> Requirement:
     """The requirement that a recipe discriminates between rivals; the model of ``against`` is fitted beside them.
 
-    Parameters
-    ----------
     against : the textbook plan; its poses scale the columns
     levels : °C, the temperature range
     size_ug : contribution of each rival where it is largest, µg
     enough : χ² of the wrong rival over the recipe's lot, as a diagnosis computes it
     plan : named plan of poses to choose from
-
-    Raises
-    ------
-    WrongUse
-        Fewer than two rivals, or an effect of the station among them.
+    Raises WrongUse: fewer than two rivals, or an effect of the station among them.
     """
     model = [e for e in against.recipe.effects if e not in rivals]
     effects = (*unit_effects(model), *rivals)
@@ -99,13 +87,17 @@ def _columns(effects: Sequence[str], context: PlanContext) -> Array:
     return design.local_columns(sensor, context.state, design.starting_values(sensor, context.state))
 
 
+def matrix_of(requirement: Requirement, context: PlanContext) -> Array:
+    """Normal matrices (axes, p, p) of a recipe, of the columns of a requirement's effects in units of its errors."""
+    columns = _columns(requirement.effects, context) * requirement.errors[:, None, :]
+    return np.swapaxes(columns, -1, -2) @ np.linalg.solve(context.covariance, columns)
+
+
 def rival_separations(requirement: Requirement, context: PlanContext) -> list[dict[str, Any]]:
     """χ² of every wrong rival over a recipe's lot, one row per ordered pair; empty where no rivals are named."""
     if requirement.discrimination is None:
         return []
-    columns = _columns(requirement.effects, context) * requirement.errors[:, None, :]
-    matrix = np.swapaxes(columns, -1, -2) @ np.linalg.solve(context.covariance, columns)
-    separations = requirement.discrimination.separations(matrix)
+    separations = requirement.discrimination.separations(matrix_of(requirement, context))
     rivals = requirement.effects[-len(requirement.discrimination.rivals) :]
     return [
         {"true": true, "wrong": wrong, "chi_square": float(value)}

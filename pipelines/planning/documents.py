@@ -1,7 +1,5 @@
 """The JSON documents of plan and choose: keys that other programs read. A key that is NotRequired may be missing."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any, NotRequired
 
 from typing_extensions import TypedDict

@@ -6,8 +6,6 @@ other coefficients are known. A real recipe also needs moves, settling and the o
 be shorter.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import permutations
@@ -18,28 +16,17 @@ from inertial import design
 from inertial.arrays import Array
 from inertial.noise.dwells import dwell_covariance
 from pipelines.planning.context import PlanContext
-from pipelines.planning.requirement import Requirement
-from pipelines.planning.soak_orders import orders, ramp_orders
-from pipelines.planning.timed_design import followed_along, short_of, soak_waits
+from pipelines.planning.requirement import Requirement, orders
+from pipelines.planning.timed_design import followed_along, normal_matrix, short_of, soak_waits
 from pipelines.schedule.planned_state import settled_state
-from pipelines.schedule.timing import spent
 from schemas.recipe import Recipe
 
 RESTED_S = 1e4  # s at rest before a dwell: nothing of the last move is left
-PIECE_S = 120.0
-"""Length of the dwells that fill the time between soaks, s."""
-
-RAMP_PIECE_S = 30.0
-"""Likewise along a ramp, in which the temperature changes."""
-
-FIRST_LEGS = (0.5, 0.75, 1.0, 1.25)
-"""Times of the first ramp, which begins in the room, over those of the others."""
-
-LOWEST, STEP = 0.05, 0.01
-"""Smallest share of the textbook plan's station time to try, and the step."""
-
-LIKELY = 20
-"""Number of orders of soaks whose division of time is optimised, the best ones under equal division."""
+PIECE_S = 120.0  # length of the dwells that fill the time between soaks, s
+RAMP_PIECE_S = 30.0  # likewise along a ramp, in which the temperature changes
+FIRST_LEGS = (0.5, 0.75, 1.0, 1.25)  # times of the first ramp, which begins in the room, over those of the others
+LOWEST, STEP = 0.05, 0.01  # smallest share of the textbook plan's station time to try, and the step
+LIKELY = 20  # number of orders of soaks whose division of time is optimised, the best ones under equal division
 
 
 @dataclass(frozen=True)
@@ -59,12 +46,7 @@ def lower_bound(
     None where a run as long as the textbook plan is too short, or the model has no pose-independent coefficient.
     """
     search = _BoundSearch(recipe, against, requirement)
-    optional = requirement.optional_levels
-    soak_orders = (
-        ramp_orders(requirement.levels)
-        if ramp
-        else orders(requirement.levels, against.station, recipe.soak_min_s, optional=optional)
-    )
+    soak_orders = orders(requirement, against.station, recipe.soak_min_s, ramp=ramp)
     low, high, best = round(LOWEST / STEP), round(1.0 / STEP), None
     while low <= high and search.columns.size:
         middle = (low + high) // 2
@@ -81,7 +63,7 @@ class _BoundSearch:
 
     def __init__(self, recipe: Recipe, against: PlanContext, requirement: Requirement) -> None:
         self.recipe, self.against, self.requirement = recipe, against, requirement
-        self.total = 60.0 * (spent(against.activities).total - spent(against.activities).static_record)
+        self.total = 60.0 * against.minutes
         self.slowest = float(against.state.time[-1])
         self.sensor, _ = design.split(recipe.effects)
         self.names = [name for name, _ in design.local_names(self.sensor, 0)]
@@ -156,9 +138,7 @@ class _BoundSearch:
         """The worst ratio to the required errors and its effect, of pieces of measurement at times and temperatures (n,)."""
         rows = self._rows(when, heat)[..., self.columns]
         covariance = dwell_covariance(when, piece_s, self.against.noise, slowest=self.slowest)
-        flat = np.moveaxis(rows, 0, 1).reshape(when.size, -1)
-        solved = np.moveaxis(np.linalg.solve(covariance, flat).reshape(when.size, len(rows), -1), 1, 0)
-        errors = self.requirement.ratio_to_required(np.swapaxes(rows, -1, -2) @ solved)
+        errors = self.requirement.ratio_to_required(normal_matrix(rows, covariance))
         return float(errors.max()), self.names[self.columns[int(np.argmax(errors.max(axis=0)))]]
 
     def _rows(self, time: Array, heat: Array) -> Array:

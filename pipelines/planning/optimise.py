@@ -9,20 +9,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial import design
 from inertial.arrays import Array
 from inertial.errors import NotIdentified
 from inertial.planning.expected import Expected
 from inertial.planning.pose_exchange import exchanged
 from inertial.planning.visibility import visibilities
 from pipelines.planning.context import PlanContext, plan_context
+from pipelines.planning.discrimination import matrix_of
 from pipelines.planning.lower_bound import lower_bound
 from pipelines.planning.plan import identified
-from pipelines.planning.requirement import Requirement, apart, numbered, turns
-from pipelines.planning.soak_orders import mirrored, orders, ramp_orders
+from pipelines.planning.requirement import Requirement, apart, mirrored, numbered, orders, turns
 from pipelines.planning.textbook import PART_SEEN
 from pipelines.planning.timed_design import FEWEST, MOST, PlanDesign, TimedDesign, fewest_dwells, short_of, spanned
-from pipelines.schedule.timing import spent
 from schemas.errors import RecipeInvalid
 from schemas.poses import SoakPart
 from schemas.recipe import Recipe
@@ -41,14 +39,9 @@ ROUNDS = 4
 ROUGH = 1.2
 """Ratio to the requirement that a starting arrangement may have, because the first exchange of poses is expected to reduce it."""
 
-NEAR = 0.985
-"""Ratio to the requirement above which no fewer dwells are tried."""
-
-SLOWER = 1.02
-"""Ratio of station time to the best recipe so far above which a design is skipped."""
-
-SPARE = 0.003
-"""Margin below the required errors: counts are whole numbers."""
+NEAR = 0.985  # ratio to the requirement above which no fewer dwells are tried
+SLOWER = 1.02  # ratio of station time to the best recipe so far above which a design is skipped
+SPARE = 0.003  # margin below the required errors: counts are whole numbers
 
 
 @dataclass(frozen=True)
@@ -73,19 +66,7 @@ class Optimum:
     @property
     def share(self) -> float:
         """Station time over that of the textbook plan, both without the static record."""
-        return measuring_minutes(self.planned) / measuring_minutes(self.against)
-
-
-def heat_of(context: PlanContext) -> Array:
-    """The device's temperature at the dwells of the fit (n,), °C."""
-    heat = context.state.temperature
-    return np.zeros(0) if heat is None else heat
-
-
-def measuring_minutes(context: PlanContext) -> float:
-    """Station time without the static record, min."""
-    own = spent(context.activities)
-    return own.total - own.static_record
+        return self.planned.minutes / self.against.minutes
 
 
 def optimise(
@@ -103,16 +84,10 @@ def optimise(
     orders poses are exchanged (:mod:`inertial.planning.pose_exchange`), and dwells are added or removed until the requirement is
     just met.
 
-    Parameters
-    ----------
     tolerance : ratio to the requirement up to which the nearest recipe is returned where none meets it, provided that it is
         quicker than the textbook plan
     ramp : whether the devices are measured while the chamber ramps, in place of soaks
-
-    Raises
-    ------
-    RecipeInvalid
-        No recipe that was tried meets the requirement; the message gives the smallest ratio reached.
+    Raises RecipeInvalid: no recipe that was tried meets the requirement; the message gives the smallest ratio reached.
     """
     search = RecipeSearch(recipe, against, requirement, ramp=ramp)
     best: PlanContext | None = None
@@ -161,22 +136,12 @@ class RecipeSearch:
 
     def ranked(self) -> list[tuple[PlanDesign, float]]:
         """Designs with the fewest dwells in the best orders of soaks, and their station times in s, the quickest first."""
-        requirement, recipe = self.requirement, self.recipe
-        back = requirement.discrimination is None
-        optional, station = requirement.optional_levels, self.against.station
-        soak_orders = (
-            ramp_orders(requirement.levels)
-            if self.ramp
-            else orders(requirement.levels, station, recipe.soak_min_s, optional=optional, back=back)
-        )
+        soak_orders = orders(self.requirement, self.against.station, self.recipe.soak_min_s, ramp=self.ramp)
         dwell_s = self.timed.dwell_lengths()[0]
-        likely = (
-            [
-                (0.0, order) for order in soak_orders
-            ]  # few, and a ramp that does not get far enough says nothing of a longer one
-            if self.ramp
-            else sorted((self.estimated_seconds(order, dwell_s), order) for order in soak_orders)[:LIKELY]
-        )
+        # ramps are few, and one that does not get far enough says nothing of a longer one
+        likely = [(0.0, order) for order in soak_orders]
+        if not self.ramp:
+            likely = sorted((self.estimated_seconds(order, dwell_s), order) for order in soak_orders)[:LIKELY]
         tried: list[tuple[float, PlanDesign]] = []
         for seconds, order in likely:
             if math.isfinite(seconds):
@@ -236,7 +201,7 @@ class RecipeSearch:
             self.nearest = min(self.nearest, worst)
             if self.near is None or worst < self.near[0]:
                 self.near = (worst, designed)
-            if worst <= 1.0 and (best is None or measuring_minutes(designed) < measuring_minutes(best)):
+            if worst <= 1.0 and (best is None or designed.minutes < best.minutes):
                 self.unseen = self.not_visible(designed)
                 best = best if self.unseen else designed
             if NEAR < worst <= 1.0 or self.unseen:
@@ -244,7 +209,7 @@ class RecipeSearch:
             before = now
             now = fewest_dwells(self.timed, plan, (1.0 - SPARE) * self.timed.ratio_and_seconds(now)[0] / reached)
             if self.ramp and worst > 1.0 and (now is None or sum(now.counts) <= sum(before.counts)):
-                # more dwells on ramps are no longer version of fewer: the devices are elsewhere at each of them
+                # more dwells on ramps are no longer a version of fewer: the devices are elsewhere at each of them
                 now = replace(before, counts=tuple(math.ceil(worst * count) for count in before.counts))
         return best
 
@@ -253,12 +218,12 @@ class RecipeSearch:
         if self.near is None or self.near[0] > tolerance:
             return None
         nearest = self.near[1]
-        quicker = measuring_minutes(nearest) < measuring_minutes(self.against)
+        quicker = nearest.minutes < self.against.minutes
         return nearest if quicker and not self.not_visible(nearest) else None
 
     def slower(self, plan: PlanDesign, best: PlanContext | None) -> bool:
         """Whether a design clearly takes longer than the best recipe so far."""
-        return best is not None and self.timed.ratio_and_seconds(plan)[1] / 60.0 > SLOWER * measuring_minutes(best)
+        return best is not None and self.timed.ratio_and_seconds(plan)[1] / 60.0 > SLOWER * best.minutes
 
     def designed(self, plan: PlanDesign) -> PlanContext:
         """The recipe of a design after an exchange of poses, on the station."""
@@ -279,7 +244,7 @@ class RecipeSearch:
         low, high = min(self.requirement.levels), max(self.requirement.levels)
         own = [part.poses or [] for part in context.recipe.soaks]
         for added in range(MOST):
-            heat = heat_of(context)
+            heat = context.heat
             if not short_of(heat, self.requirement.levels):
                 break
             end = low if heat.min() - low >= high - heat.max() else high
@@ -297,11 +262,8 @@ class RecipeSearch:
         expected = identified(context)
         if self.requirement.discrimination is None:
             ratio = expected.errors / self.requirement.errors
-            return self.timed.within(ratio, heat_of(context)) if self.ramp else ratio
-        sensor, _ = design.split(self.requirement.effects)
-        rows = design.local_columns(sensor, context.state, design.starting_values(sensor, context.state))
-        rows = rows * self.requirement.errors[:, None, :]
-        return self.requirement.ratio_to_required(np.swapaxes(rows, -1, -2) @ np.linalg.solve(context.covariance, rows))
+            return self.timed.within(ratio, context.heat) if self.ramp else ratio
+        return self.requirement.ratio_to_required(matrix_of(self.requirement, context))
 
     def _recipe(self, plan: PlanDesign, choice: NDArray[np.intp]) -> Recipe:
         used = np.unique(choice)
@@ -334,8 +296,6 @@ class RecipeSearch:
 
     def not_visible(self, context: PlanContext) -> list[str]:
         """Required effects that are not visible."""
-        seen = {
-            s.effect: s.remaining_fraction
-            for s in visibilities(context.state, self.recipe.effects, 1.0, self.requirement.see)
-        }
-        return [name for name in self.requirement.see if seen.get(name, 1.0) < PART_SEEN]
+        see = self.requirement.see
+        seen = visibilities(context.state, self.recipe.effects, 1.0, see) if see else []
+        return [s.effect for s in seen if s.remaining_fraction < PART_SEEN]

@@ -1,7 +1,5 @@
 """The document of a recipe search: the recipe found beside the one that the search started from and the textbook plan."""
 
-from __future__ import annotations
-
 from collections import Counter
 from typing import Any
 
@@ -21,8 +19,6 @@ from schemas.units import AXES, MICRO
 def optimum_document(best: Optimum, base: Recipe, name: str) -> dict[str, Any]:
     """The result of a search as a document for programs.
 
-    Parameters
-    ----------
     base : the recipe that the search started from; ``name`` : as given on the command line
     """
     document, by_errors = plan(best.planned), best.requirement.discrimination is None

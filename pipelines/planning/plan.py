@@ -1,7 +1,6 @@
 """Visibility of effects, expected errors and station time of a recipe, before it is measured."""
 
-from __future__ import annotations
-
+from collections import Counter
 from collections.abc import Collection, Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -37,15 +36,9 @@ NO_SWITCH_ON = "no repeatability of switching on is stated for this device"
 def plan(context: PlanContext, terms: BudgetTerms | None = None, limits: Limits | None = None) -> dict[str, Any]:
     """Document of a recipe: visibility of every effect of the catalogue, expected errors, station time; keys for other programs.
 
-    Parameters
-    ----------
     terms : what station and device state of their uncertainty; without them the document has no ``uncertainty``
     limits : that the uncertainty must allow
-
-    Raises
-    ------
-    NotIdentified
-        The recipe cannot identify its own model; the message says what is missing.
+    Raises NotIdentified: the recipe cannot identify its own model; the message says what is missing.
     """
     recipe, noise = context.recipe, context.noise
     of_record = _of_record(context)
@@ -91,8 +84,6 @@ def _of_record(context: PlanContext) -> Array:
 def _against_means(context: PlanContext, square: Array, gain: Array) -> tuple[Array, Array]:
     """Variances (k,), g², of biases as the mean of the record and, as far as the walk goes, of the day after it.
 
-    Parameters
-    ----------
     square : (k,), variances of the coefficients; gain : (k, n), what every dwell adds to them
     """
     time, noise, length = context.state.time, context.noise, context.recipe.dwell_s
@@ -116,15 +107,9 @@ def _bias(
 
     See :func:`pipelines.stages.uncertainty.bias_measurands.bias_measurands`.
     """
-    places = [
-        (axis, k)
-        for axis, names in enumerate(expected.names)
-        for k, (effect, _) in enumerate(names)
-        if effect == "bias"
-    ]
-    if not places:
+    axes, columns = np.nonzero(np.array([[effect == "bias" for effect, _ in names] for names in expected.names]))
+    if not axes.size:
         return None
-    axes, columns = np.array(places).T
     gain = expected_gain(context.recipe.effects, context.state, of_record)[axes, columns]
     record, later = _against_means(context, expected.errors[axes, columns] ** 2, gain)
     span = float(np.ptp(context.state.time))
@@ -143,10 +128,7 @@ def _bias(
 def identified(context: PlanContext) -> Expected:
     """The expected standard errors of a recipe's model.
 
-    Raises
-    ------
-    NotIdentified
-        The recipe cannot identify it; the message names the feature of the plan and what to add.
+    Raises NotIdentified: the recipe cannot identify it; the message names the feature of the plan and what to add.
     """
     recipe = context.recipe
     try:
@@ -166,36 +148,25 @@ def missing(state: State, effects: Sequence[str]) -> str:
         if visibility and visibility[0].remaining_fraction <= SEEN:
             reasons[effect] = reason(state, effect, rest)
     # of mutually confounded effects only the last one is reported: without it the others are identified
-    chosen = list(reasons)[-1:] if len(reasons) > 1 and not _alone(state, reasons) else list(reasons)
+    mutual = len(reasons) > 1 and any(visibilities(state, ("bias",), 1.0, [e])[0].seen for e in reasons)
+    chosen = list(reasons)[-1:] if mutual else list(reasons)
     return "; ".join(f"{effect} cannot be identified: {reasons[effect]}" for effect in chosen)
-
-
-def _alone(state: State, reasons: dict[str, str]) -> bool:
-    """Whether each of the effects is invisible by itself, not only beside the others."""
-    return all(not visibilities(state, ("bias",), 1.0, [effect])[0].seen for effect in reasons)
 
 
 def _coefficient_rows(expected: Expected) -> list[dict[str, Any]]:
     """One row per coefficient and axis; parameters of the station have axis ``*``."""
     rows: list[dict[str, Any]] = []
-    for axis, letter in enumerate(AXES[: len(expected.names)]):
-        place: dict[str, int] = {}
-        for column, (effect, name) in enumerate(expected.names[axis]):
-            k = place.setdefault(effect, 0)
+    for letter, names, errors in zip(AXES, expected.names, expected.errors.tolist(), strict=False):
+        place = Counter[str]()
+        for (effect, name), error in zip(names, errors, strict=True):
+            rows.append(_coefficient(effect, name, letter, error, place[effect]))
             place[effect] += 1
-            rows.append(_coefficient(effect, name, letter, float(expected.errors[axis, column]), k))
     shared = zip(expected.shared_names, expected.shared_errors.tolist(), strict=True)
     return [*rows, *(_coefficient(effect, name, "*", error, 0) for (effect, name), error in shared)]
 
 
 def _coefficient(effect: str, name: str, axis: str, error: float, place: int) -> dict[str, Any]:
-    return {
-        "effect": effect,
-        "name": name,
-        "axis": axis,
-        "uncertainty_ug": MICRO * error,
-        "unit": _unit(effect, place),
-    }
+    return {"effect": effect, "name": name, "axis": axis, "uncertainty_ug": MICRO * error, "unit": _unit(effect, place)}
 
 
 def _unit(effect: str, place: int) -> str:
@@ -239,8 +210,6 @@ def _row(visibility: Visibility, context: PlanContext, checked: Collection[str])
 def reach(context: PlanContext, covariance: Array, terms: BudgetTerms, limits: Limits | None) -> dict[str, Any] | None:
     """What a recipe can reach on its station; None where no uncertainty is stated.
 
-    Parameters
-    ----------
     covariance : (n, n), of the dwells of the fit as the fit sees them, g²
     """
     if terms.stated is None:

@@ -1,7 +1,5 @@
 """The textbook plan, 24 orthogonal poses at nine soaks up and down, 15 min each, 10 s dwells: its errors and visible effects."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

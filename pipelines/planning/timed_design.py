@@ -1,7 +1,5 @@
 """Plan designs with times: time and columns of every dwell, covariance of the means, station time, and the fewest dwells."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -27,23 +25,12 @@ from schemas.units import STANDARD_GRAVITY_M_S2
 Choice = NDArray[np.intp]
 
 SHORTEST_DWELL_S = 1.0
-LONGEST_DWELLS = 3.0
-"""Longest dwell to try, as a multiple of the recipe's dwell."""
-
-_GRAIN_S, _LONG_S = 2.0, 600.0
-"""Step of the table of flicker covariance, and the increment of its length, s."""
-
-FEWEST = 4
-"""Minimum number of dwells of a soak: the reference pose at both ends, and two other poses between."""
-
-MOST = 420
-"""Maximum number of dwells of a recipe: above it the search time grows faster than the gain."""
-
-REACHED = 0.04
-"""Distance from the ends of the required temperatures that a ramp may leave, in parts of their range."""
-
-_FIRST = 3
-"""The first reduction removes one part in this many of a soak's dwells."""
+LONGEST_DWELLS = 3.0  # longest dwell to try, as a multiple of the recipe's dwell
+_GRAIN_S, _LONG_S = 2.0, 600.0  # step of the table of flicker covariance, and the increment of its length, s
+FEWEST = 4  # minimum number of dwells of a soak: the reference pose at both ends, and two other poses between
+MOST = 420  # maximum number of dwells of a recipe: above it the search time grows faster than the gain
+REACHED = 0.04  # distance from the ends of the required temperatures that a ramp may leave, in parts of their range
+_FIRST = 3  # the first reduction removes one part in this many of a soak's dwells
 
 
 @dataclass(frozen=True)
@@ -79,20 +66,14 @@ class TimedDesign:
     def __init__(
         self, recipe: Recipe, station: StationConfig, noise: DwellNoise, requirement: Requirement, *, slowest: float
     ) -> None:
-        self.recipe, self.station, self.noise, self.requirement, self.slowest = (
-            recipe,
-            station,
-            noise,
-            requirement,
-            slowest,
-        )
+        self.recipe, self.station, self.noise = recipe, station, noise
+        self.requirement, self.slowest = requirement, slowest
         poses = numbered("p", requirement.candidates)
         starts = [StationPose(outer=p.outer_deg, inner=p.inner_deg) for p in poses]
         self.travel = np.array([[move_seconds(a, b, station) for b in poses] for a in starts])
         self.force = force_from_angles(*np.radians(requirement.candidates).T)
-        self._reference = int(
-            np.argmax(np.min(np.abs(self.force), axis=1))
-        )  # the pose whose smallest component is largest
+        # the pose whose smallest component is largest
+        self._reference = int(np.argmax(np.min(np.abs(self.force), axis=1)))
         self._spread = spread(self.force)
         self._axes = tuple(range(recipe.sensor_axes))
         self._sensor, _ = design.split(requirement.effects or tuple(recipe.effects))
@@ -124,12 +105,8 @@ class TimedDesign:
         """Ratios to the requirement (met at ≤ 1) of a design's starting arrangement, and its station time in s."""
         choice = self.start(plan)
         time, heat, seconds = self._times(plan, choice)
-        rows = self._columns(time, heat, self.force[choice], choice)
-        flat = np.moveaxis(rows, 0, 1).reshape(time.size, -1)
-        solved = np.linalg.solve(self.covariance(time, plan.dwell_s), flat)
-        n, width = time.size, rows.shape[-1]
-        left, right = (np.moveaxis(x.reshape(n, -1, width), 1, 0) for x in (flat, solved))
-        ratio = self.requirement.ratio_to_required(np.swapaxes(left, -1, -2) @ right)
+        rows = self._columns(time, heat, choice)
+        ratio = self.requirement.ratio_to_required(normal_matrix(rows, self.covariance(time, plan.dwell_s)))
         return self.within(ratio, heat) if plan.ramp else ratio, seconds
 
     def within(self, ratio: Array, heat: Array) -> Array:
@@ -140,9 +117,7 @@ class TimedDesign:
     def pose_independent(self) -> Flags:
         """Columns (axes, p) that do not depend on the pose: bias and its dependence on temperature and time."""
         every = np.arange(len(self.force))
-        rows = self._columns(
-            np.full(every.size, 1000.0), np.full(every.size, max(self.requirement.levels)), self.force, every
-        )
+        rows = self._columns(np.full(every.size, 1000.0), np.full(every.size, max(self.requirement.levels)), every)
         return np.ptp(rows, axis=1) <= 1e-9 * np.max(np.abs(rows), axis=1)
 
     def slots(self, plan: PlanDesign) -> tuple[PlanSlots, Choice]:
@@ -151,9 +126,7 @@ class TimedDesign:
         time, heat, seconds = self._times(plan, choice)
         n, c = time.size, len(self.force)
         every = np.tile(np.arange(c), n)
-        rows = self._columns(np.repeat(time, c), np.repeat(heat, c), self.force[every], every).reshape(
-            len(self._axes), n, c, -1
-        )
+        rows = self._columns(np.repeat(time, c), np.repeat(heat, c), every).reshape(len(self._axes), n, c, -1)
         weight = np.asarray(np.linalg.inv(self.covariance(time, plan.dwell_s)), dtype=np.float64)
         without_travel = seconds - float(np.sum(self.travel[choice[:-1], choice[1:]]))
         return PlanSlots(np.moveaxis(rows, 0, 2), weight, self.travel, without_travel, plan.group, plan.fixed), choice
@@ -212,13 +185,21 @@ class TimedDesign:
             return 0.0
         return soaked(StationPose(air=last, device=last), at, self.station, recipe.soak_min_s)[0]
 
-    def _columns(self, time: Array, heat: Array, force: Array, choice: Choice) -> Array:
-        """Design columns (axes, n, p) in units of the required errors."""
+    def _columns(self, time: Array, heat: Array, choice: Choice) -> Array:
+        """Design columns (axes, n, p) of candidates in units of the required errors."""
         angles = np.radians(self.requirement.candidates[choice])
-        gravity = self.recipe.local_gravity_m_s2 / STANDARD_GRAVITY_M_S2
-        state = settled_state(gravity * force, time, heat, angles, self.recipe.settle_s, self._axes)
+        force = self.recipe.local_gravity_m_s2 / STANDARD_GRAVITY_M_S2 * self.force[choice]
+        state = settled_state(force, time, heat, angles, self.recipe.settle_s, self._axes)
         columns = design.local_columns(self._sensor, state, design.starting_values(self._sensor, state))
         return columns * self.requirement.errors[:, None, :]
+
+
+def normal_matrix(rows: Array, covariance: Array) -> Array:
+    """Normal matrices (axes, p, p) of design rows (axes, n, p); one factorisation of the covariance (n, n) serves all axes."""
+    flat = np.moveaxis(rows, 0, 1).reshape(len(covariance), -1)
+    both = (flat, np.linalg.solve(covariance, flat))
+    left, right = (np.moveaxis(x.reshape(len(covariance), len(rows), -1), 1, 0) for x in both)
+    return np.swapaxes(left, -1, -2) @ right
 
 
 def short_of(heat: Array, levels: Sequence[float]) -> float:
@@ -267,8 +248,6 @@ def spread(force: Array) -> Choice:
 def spanned(force: Array, choice: Choice, fixed: Flags, needed_g: float, axes: int) -> Choice:
     """A plan (n,) of candidates with the required span of specific force on the axes, as few poses as possible replaced.
 
-    Parameters
-    ----------
     force : (c, 3), of the candidates
     fixed : (n,), slots that are not changed
     needed_g : g, required difference of the largest and smallest component
@@ -295,8 +274,6 @@ def _flicker(dwell_s: float, longest: float) -> tuple[Array, Array, float]:
 def fewest_dwells(timed: TimedDesign, design: PlanDesign, allowed: Array) -> PlanDesign | None:
     """The design with the fewest dwells whose starting arrangement stays within the allowed ratios; None where there is none.
 
-    Parameters
-    ----------
     design : soaks and dwell length; its counts are replaced
     allowed : (axes, p) or (pairs,), largest ratio to the required errors, as returned by :meth:`TimedDesign.ratio_and_seconds`;
         above 1 where an exchange of poses is expected to improve it

@@ -1,7 +1,5 @@
 """A run whose tables are read once and written together, because the stages of a re-run share tables and make many."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from functools import cached_property
@@ -56,8 +54,6 @@ class BufferedRun(Run):
     def flush(self, *, last: str = "") -> None:
         """Publish all waiting files, tables and manifests in the order in which they were made.
 
-        Parameters
-        ----------
         last : a file that is published after all others; it shows readers that the others exist.
         """
         if self._waiting:

@@ -1,7 +1,5 @@
 """Differences between two runs: grades, coefficients and figures relative to their uncertainty, and the causes."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -24,10 +22,7 @@ def diff(a: Run, b: Run) -> dict[str, Any]:
     the two were independent, √(u_a² + u_b²): two analyses of one measurement are not, so there a change of one standard
     uncertainty is large.
 
-    Raises
-    ------
-    DataRejected
-        The runs have no unit in common, or nothing to compare.
+    Raises DataRejected: the runs have no unit in common, or nothing to compare.
     """
     coefficients = _changed(_table(a, "coefficients"), _table(b, "coefficients"), COEFFICIENT, "standard_error")
     figures = _changed(_standard(a), _standard(b), FIGURE, "standard_error")
@@ -71,9 +66,7 @@ def _standard(run: Run) -> pd.DataFrame:
     figures = _table(run, "figures")
     factor = (run.about.get("limits") or {}).get("coverage_factor", PLAIN_FACTOR)
     limited = figures["limit"].notna() | ("pfa" in figures)
-    return figures.assign(
-        standard_error=figures["uncertainty"].astype(float) / limited.map({True: factor, False: PLAIN_FACTOR})
-    )
+    return figures.assign(standard_error=figures["uncertainty"].astype(float) / np.where(limited, factor, PLAIN_FACTOR))
 
 
 def _changed(a: pd.DataFrame, b: pd.DataFrame, key: list[str], error: str) -> pd.DataFrame:
@@ -134,7 +127,6 @@ def _grades(run: Run) -> dict[str, dict[str, Any]]:
 
 
 ORDER = ("import", "capture", *BY_NAME)
-DATA = ("records", "source")
 MODEL = ("effects", "formulas")
 
 
@@ -189,8 +181,7 @@ def _model_text(own: dict[str, Any], other: dict[str, Any]) -> str:
     """A short text for a model: its effects beyond the other model, or all its effects where neither contains the other."""
     more = [effect for effect in own["effects"] if effect not in other["effects"]]
     if more or len(own["effects"]) < len(other["effects"]):
-        kept = len(own["effects"]) - len(more)
-        return f"{kept} effects" + "".join(f" + {effect}" for effect in more)
+        return " + ".join([f"{len(own['effects']) - len(more)} effects", *more])
     return ", ".join(own["effects"]) or "none"
 
 

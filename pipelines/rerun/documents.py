@@ -1,12 +1,11 @@
 """The JSON documents of rerun, diff, whatif and the fit of an import. A NotRequired key may be missing."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any, Literal, NotRequired
 
 from typing_extensions import TypedDict
 
 from pipelines.diagnosis.documents import LeaveOut, VerdictEvidence
+from pipelines.rerun.reproduce import Reproduction
 from pipelines.rerun.rerun import RerunOutcome
 
 
@@ -150,23 +149,12 @@ class RerunDocument(TypedDict):
     unchanged: NotRequired[int]
 
 
-class ReproducedRun(TypedDict):
-    """Whether the tables of one run are reproduced."""
-
-    run: str
-    same: bool
-    tables: NotRequired[Annotated[dict[str, str], "`same bytes`, `other bytes` or `not checked` by table"]]
-    differences: NotRequired[Annotated[list[str], "what differs and by how much, one sentence per table"]]
-    changed: NotRequired[Annotated[list[str], "code and libraries that changed since the run"]]
-    error: NotRequired[str]
-
-
 class RerunCheckDocument(TypedDict):
     """``rerun --check --json``: whether every table is reproduced byte for byte."""
 
     selected: int
     same: int
-    runs: list[ReproducedRun]
+    runs: list[Reproduction]
     archive: NotRequired[str]
 
 

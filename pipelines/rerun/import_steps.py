@@ -1,7 +1,5 @@
 """The stages of the chain for a run of imported dwells, as far as what was imported with them allows."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -99,8 +97,7 @@ def import_step(data: ImportedData, left_out: Dwells, old: Run) -> StageCall:
     parameters = {"left_out": [list(one) for one in left_out], "dwells": old.manifest("dwells")["sha256"]}
 
     def call(_: Run) -> Tables:
-        kept = {"dwells": leave_out(old.table("dwells"), left_out)}
-        return {**kept, **{name: old.table(name) for name in names[1:]}}
+        return {**{name: old.table(name) for name in names}, "dwells": leave_out(old.table("dwells"), left_out)}
 
     return StageCall("leave_out", (), names, parameters, "", call)
 

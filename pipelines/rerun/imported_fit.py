@@ -1,7 +1,5 @@
 """The result of the fit of an import: verdict, evidence, and decisions if there are limits."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pandas as pd

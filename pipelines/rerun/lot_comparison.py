@@ -1,7 +1,5 @@
 """One archived lot under the model it was run with and under another: outcomes and errors of every unit, nothing is written."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -29,8 +27,7 @@ from pipelines.tables.frames import ByUnit
 from schemas.errors import DataRejected, TumblelineError
 from schemas.units import MICRO
 
-Sums = dict[str, tuple[float, int]]
-"""Sum of squared errors, µg², and their number, by unit."""
+Sums = dict[str, tuple[float, int]]  # sum of squared errors, µg², and their number, by unit
 
 
 OLD_TABLES = {

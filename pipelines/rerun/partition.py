@@ -1,7 +1,5 @@
 """Batches of the runs of an archive for workers; their arguments and results are plain values."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -14,8 +12,7 @@ from pipelines.rerun.reproduce import Reproduction, check
 from pipelines.rerun.rerun import RerunOutcome, again
 from schemas.errors import TumblelineError
 
-MOST = 32
-"""Runs in a batch; the work of one batch is lost when a worker dies."""
+MOST = 32  # runs in a batch; the work of one batch is lost when a worker dies
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,7 @@
 """Reproduction of archived runs: every stage is computed again from its stored inputs and compared byte by byte."""
 
-from __future__ import annotations
-
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Annotated
 
 import numpy as np
 import pandas as pd
@@ -21,23 +20,18 @@ SAME, OTHER, LEFT_OUT = "same bytes", "other bytes", "not checked"
 
 @dataclass(frozen=True)
 class Reproduction:
-    """The result of the check of one run.
-
-    tables : by name, whether the bytes are reproduced
-    differences : what differs and by how much, one sentence for each table
-    changed : changes since the run was made: code of stages, versions of libraries
-    """
+    """Whether the tables of one run are reproduced; ``same`` where every table is that could be checked."""
 
     run: str
-    tables: dict[str, str] = field(default_factory=dict)
-    differences: list[str] = field(default_factory=list)
-    changed: list[str] = field(default_factory=list)
+    tables: Annotated[dict[str, str], "`same bytes`, `other bytes` or `not checked` by table"] = field(
+        default_factory=dict
+    )
+    differences: Annotated[list[str], "what differs and by how much, one sentence per table"] = field(
+        default_factory=list
+    )
+    changed: Annotated[list[str], "code and libraries that changed since the run"] = field(default_factory=list)
     error: str = ""
-
-    @property
-    def same(self) -> bool:
-        """Whether every table that could be checked is reproduced."""
-        return not self.error and not self.differences
+    same: bool = False
 
 
 def check(archive: Archive, run_id: str) -> Reproduction:
@@ -62,7 +56,7 @@ def check(archive: Archive, run_id: str) -> Reproduction:
         raise DataRejected(
             f"run {run_id}: none of its tables can be computed again, at least one is needed; re-run it first"
         )
-    return result
+    return replace(result, same=not result.differences)
 
 
 def _compare(run: Run, step: StageCall, result: Reproduction) -> None:

@@ -1,7 +1,5 @@
 """One run of the archive again: only the stages whose key changed, into a new run; the old one stays as it is."""
 
-from __future__ import annotations
-
 import time
 from dataclasses import dataclass, field
 from functools import cache
@@ -44,10 +42,8 @@ def again(
 ) -> RerunOutcome:
     """Run an archived run again. A new run is published when all of it is there: one that fails or is stopped leaves nothing.
 
-    Raises
-    ------
-    DataRejected
-        The run cannot be run again: its capture is not finished, or samples are needed that are not in the archive.
+    Raises DataRejected: the run cannot be run again: its capture is not finished, or samples are needed that are not in the
+        archive.
     """
     start = time.perf_counter()
     change.use()
@@ -98,10 +94,7 @@ def _libraries() -> ThreadpoolController:
 def raw_samples(run: Run) -> bool:
     """Whether what was captured for a run is in the archive.
 
-    Raises
-    ------
-    DataRejected
-        It is, in part: its capture is not finished.
+    Raises DataRejected: it is, in part: its capture is not finished.
     """
     records = run.records
     if records is None or records.is_complete():
@@ -122,8 +115,6 @@ def has_static_record(run: Run) -> bool:
 def changes(old: Run, plan: Plan, *, raw: bool) -> list[dict[str, str]]:
     """What a re-run would do otherwise than the run did: by stage, ``code``, ``model``, ``limits`` or another parameter.
 
-    Parameters
-    ----------
     raw : whether the raw samples are there; without them the stages that read them are kept as they are
     """
     rows: list[dict[str, str]] = []

@@ -1,7 +1,5 @@
 """Selection of runs of an archive by name or property: ``all``, beginnings of names, ``device:…``, ``since:DATE``."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, date, datetime, time
@@ -67,10 +65,7 @@ def selected(archive: Archive, words: Sequence[str]) -> list[SelectedRun]:
     All conditions with a colon must hold; names and beginnings of names add runs. Conditions do not select re-runs, because
     the original run has the same data.
 
-    Raises
-    ------
-    WrongUse
-        A name or key is unknown, or no run matches.
+    Raises WrongUse: a name or key is unknown, or no run matches.
     """
     known = entries(archive)
     parts = [part.strip() for word in words for part in word.split(",") if part.strip()]

@@ -1,7 +1,5 @@
 """What is to be done to a run of the archive: the stages of the chain for its own job, or those that imported dwells allow."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
@@ -97,8 +95,7 @@ def model_keys(change: ModelChange) -> dict[str, Any]:
 
 
 CAPTURED = ("readings", "history")
-RAW = ("validate", "reduce", "noise")
-"""Stages that read the raw samples."""
+RAW = ("validate", "reduce", "noise")  # stages that read the raw samples
 
 
 @dataclass(frozen=True)
@@ -117,8 +114,6 @@ class Plan:
 def plan_of(run: Run, change: ModelChange, left_out: Dwells = ()) -> Plan:
     """What is to be done to a run, with another model or other limits where they are given.
 
-    Parameters
-    ----------
     left_out : dwells of an import that are left out, as (unit, dwell)
     """
     if run.about.get("capture"):

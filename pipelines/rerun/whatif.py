@@ -1,7 +1,5 @@
 """The effect of a model on the archive: yield and errors of all lots with old and new model, by station and kind of device."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Callable, Sequence
 from itertools import chain
@@ -19,12 +17,10 @@ from pipelines.rerun import lot_comparison
 from pipelines.rerun.lot_comparison import Fresh, FreshTask, LotComparison, Sums
 from pipelines.rerun.partition import parts
 
-FALLS = 0.005
-"""Smallest relative change of an error that counts."""
+FALLS = 0.005  # smallest relative change of an error that counts
 LEVEL = 0.05
 """Two-sided level of the verdict: units scatter as much, or more, in one of twenty archives where the models are equally good."""
-FEWEST = 3
-"""Units that can show a difference: two have one degree of freedom."""
+FEWEST = 3  # units that can show a difference: two have one degree of freedom
 BETTER, WORSE, EQUAL, NOTHING = "better", "worse", "no better", "nothing to judge"
 
 
@@ -38,8 +34,6 @@ def evaluated(
 ) -> dict[str, Any]:
     """The what-if of a model over lots, stored in the archive as evidence; nothing of the lots themselves is changed.
 
-    Parameters
-    ----------
     runs : of the archive, with the present and with the new model
     distribute, workers : where parts are computed, see :func:`pipelines.parallel.map_partitions`
     report_progress : gets what is computed next
@@ -139,11 +133,11 @@ def _flips(lots: Sequence[LotComparison]) -> dict[str, list[dict[str, str]]]:
         old, new = judged.sides
         for unit, before in old.outcome.items():
             after = new.outcome.get(unit, "")
-            if (before == "pass") != (after == "pass"):
-                worse = before == "pass"
-                reasons = (new if worse else old).reasons[unit]
+            passed = before == "pass"
+            if passed != (after == "pass"):
+                reasons = (new if passed else old).reasons[unit]
                 row = {"run": judged.entry.id, "unit": unit, "old": before, "new": after, "reasons": reasons}
-                flips["to_fail" if worse else "to_pass"].append(row)
+                flips["to_fail" if passed else "to_pass"].append(row)
     return flips
 
 
@@ -154,25 +148,25 @@ def _verdict(
     figure = next(iter(_known(total)), "")
     if not figure:
         return NOTHING, "no lot has dwells that were not fitted; the models cannot be compared"
-    where = WHERE[figure]
     before, after = total["yield"]
-    old, new = total[figure]
+    old, new = map(_three, total[figure])
     yields = f"the yield from {100.0 * before:.0f} % to {100.0 * after:.0f} %"
-    sentence = f"the error {where} changes from {_three(old)} to {_three(new)} µg, {yields}"
+    sentence = f"the error {WHERE[figure]} changes from {old} to {new} µg, {yields}"
     ratio = _log_ratios(figure, lots, fresh)
     count = number_of(int(ratio.size), "unit")
-    if lost := _lost(figure, lots, fresh):
+    if lost := sum(len(old.keys() - new.keys()) for old, new in _pairs(figure, lots, fresh)):
         return WORSE, f"{sentence}; {number_of(lost, 'calibration')} of units cannot be judged with the new model"
     if ratio.size < FEWEST:
         return EQUAL, f"{sentence}; {count} cannot show that this is more than scatter, {FEWEST} are needed"
     if not _differs(ratio, LEVEL):
         return EQUAL, f"{sentence}: no more than {count} scatter"
-    groups = [row for row in rows if figure in _known(row) and _share(row[figure]) > FALLS]
-    own = [
-        [one for one in lots if (one.entry.station, one.entry.device) == (r["station"], r["device"])] for r in groups
-    ]
-    rises = [_rises(_log_ratios(figure, one, fresh), LEVEL / len(rows)) for one in own]
-    hurt = [f"{row['device']} on {row['station']}" for row, rise in zip(groups, rises, strict=True) if rise]
+    hurt: list[str] = []
+    for row in rows:
+        own = [one for one in lots if (one.entry.station, one.entry.device) == (row["station"], row["device"])]
+        ratios = _log_ratios(figure, own, fresh)
+        grown = figure in _known(row) and _share(row[figure]) > FALLS and ratios.size >= FEWEST and ratios.mean() > 0.0
+        if grown and _differs(ratios, LEVEL / len(rows)):
+            hurt.append(f"{row['device']} on {row['station']}")
     return _decided(_share(total[figure]), float(ratio.mean()), hurt, sentence)
 
 
@@ -205,11 +199,6 @@ def _log_ratios(figure: str, lots: Sequence[LotComparison], fresh: dict[str, Fre
     return np.array([float(np.mean(own)) for own in by_unit.values()])
 
 
-def _lost(figure: str, lots: Sequence[LotComparison], fresh: dict[str, Fresh]) -> int:
-    """How many calibrations the old model judges and the new one does not."""
-    return sum(len(old.keys() - new.keys()) for old, new in _pairs(figure, lots, fresh))
-
-
 def _differs(ratios: NDArray[np.float64], level: float) -> bool:
     """Whether the mean of the ratios differs from zero by more than they scatter (Student's t, two-sided)."""
     from scipy import stats
@@ -219,10 +208,6 @@ def _differs(ratios: NDArray[np.float64], level: float) -> bool:
         return bool(ratios.mean() != 0.0)
     size = abs(float(ratios.mean())) * ratios.size**0.5 / spread
     return bool(2.0 * stats.t.sf(size, ratios.size - 1) < level)
-
-
-def _rises(ratios: NDArray[np.float64], level: float) -> bool:
-    return bool(ratios.size >= FEWEST and ratios.mean() > 0.0 and _differs(ratios, level))
 
 
 WHERE = {"fresh_rms_ug": "on later runs", "verification_rms_ug": "in poses that were not fitted"}

@@ -20,10 +20,7 @@ def corrected_name(profile: Profile) -> str:
 def corrected_text(profile: Profile, findings: Findings, made: str) -> str:
     """The TOML text of the profile with the changes of a bring-up; empty where nothing is to be changed.
 
-    Raises
-    ------
-    RecipeInvalid
-        The changes contradict each other, such as two registers at one address.
+    Raises RecipeInvalid: the changes contradict each other, such as two registers at one address.
     """
     if not findings.changes:
         return ""

@@ -38,10 +38,7 @@ class Keeper:
     def start(self) -> None:
         """Starts the process and waits until it keeps.
 
-        Raises
-        ------
-        StationTimeout
-            It does not start; nothing has been ordered.
+        Raises StationTimeout: it does not start; nothing has been ordered.
         """
         self._process = start_module(MODULE)
         device = self.target.link.device.model_dump(mode="json")

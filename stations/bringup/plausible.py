@@ -18,8 +18,7 @@ USUAL: dict[str, tuple[float, float]] = {
     "Hz": (0.0, 1e6),
 }
 """What values of a unit can be on equipment of a station at rest."""
-FLOATS = (1e-12, 1e12)
-"""Magnitudes of a float with an unknown unit; words in a wrong order give any exponent."""
+FLOATS = (1e-12, 1e12)  # magnitudes of a float with an unknown unit; words in a wrong order give any exponent
 
 
 Votes = dict[WordOrder, tuple[int, int]]
@@ -66,8 +65,6 @@ def _bits(register: Register, value: int) -> bool | None:
 def votes(profile: Profile, words: Mapping[str, Sequence[int]], order: WordOrder, *, orderly: bool) -> tuple[int, int]:
     """How many registers have a plausible and how many an implausible value in a word order.
 
-    Parameters
-    ----------
     words : by register, as they were read
     orderly : only registers of two words, which alone depend on the order; else all
     """

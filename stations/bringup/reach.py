@@ -9,11 +9,10 @@ from schemas.profile import Profile, Register
 from schemas.station_devices import Device
 from stations.bringup.person import Findings, Person
 from stations.bringup.plausible import best_order, depends_on_order, votes
-from stations.bringup.target import Target
+from stations.bringup.target import Target, moved
 from stations.links.gate import GatedLink
 
-FIRST_IDS = (*range(1, 17), 247, 255)
-"""Where makers put their devices; others are found with ``--device-id``."""
+FIRST_IDS = (*range(1, 17), 247, 255)  # where makers put their devices; others are found with ``--device-id``
 BAUDS = (19200, 9600, 38400, 57600, 115200)
 PROBES = 6
 SHIFTS = (0, -1, 1)
@@ -43,15 +42,9 @@ class Answer:
 def reach(target: Target, findings: Findings, person: Person, *, given_id: int, search_line: bool = False) -> None:
     """Finds the device, and leaves ``target`` with the id, addresses and word order at which it answers plausibly.
 
-    Parameters
-    ----------
     given_id : device id that the person has named; 0 to look for it
     search_line : whether speed and parity of a serial line are to be found as well
-
-    Raises
-    ------
-    StationError
-        Nothing answers, or several devices could be meant.
+    Raises StationError: nothing answers, or several devices could be meant.
     """
     if target.text:
         first = target.profile.commands[0]
@@ -143,11 +136,7 @@ def _at(link: GatedLink, profile: Profile, device_id: int) -> Answer | None:
     for shift, space in others:
         if min(r.address for r in profile.registers) + shift < 0:
             continue
-        moved = [
-            r.model_copy(update={"address": r.address + shift, **({"space": space} if space else {})})
-            for r in probes(profile)
-        ]
-        answer = _read(link, profile, device_id, moved)
+        answer = _read(link, profile, device_id, moved(probes(profile), shift, space))
         if answer is not None:
             answer.shift, answer.space = shift, space
             tried.append(answer)

@@ -37,8 +37,6 @@ LEASED: dict[str, Part] = {"axis": "outer", "chamber": "chamber"}
 class BringUp:
     """A bring-up of one device.
 
-    Attributes
-    ----------
     orders : whether orders are offered at all; readings only otherwise
     timeout_s : longest answer · silence_s : how long the link is cut · watch_s : how long the air of a chamber is watched
     ended : why it ended before its last step; empty at its end
@@ -68,10 +66,7 @@ class BringUp:
     def run(self) -> None:
         """All steps; whatever ends them, the device is as it was found afterwards, or its keeper goes on trying.
 
-        Raises
-        ------
-        StationError
-            Nothing answers, another run drives the device, or it cannot be left as it was found now.
+        Raises StationError: nothing answers, another run drives the device, or it cannot be left as it was found now.
         """
         try:
             reach(self.target, self.findings, self.person, given_id=self.given_id, search_line=self.search_line)
@@ -80,9 +75,8 @@ class BringUp:
             if self.orders and self.profile.kind in {"axis", "chamber"}:
                 self._ordered()
             else:
-                reason = (
-                    f"no orders are known for a {self.profile.kind}" if self.orders else "only readings were asked for"
-                )
+                unknown = f"no orders are known for a {self.profile.kind}"
+                reason = unknown if self.orders else "only readings were asked for"
                 self.findings.add("order", "orders", "not tried", reason)
         except BaseException as problem:
             self.ended = "interrupted" if isinstance(problem, KeyboardInterrupt) else str(problem)

@@ -15,8 +15,7 @@ from stations.devices.commands import Values
 from stations.devices.registers import Registers
 from stations.recordings.decoding import told
 
-PANEL = ("temperature", "set_point", "feedback_position", "humidity")
-"""What panels show, by the names of the profiles."""
+PANEL = ("temperature", "set_point", "feedback_position", "humidity")  # what panels show, by the names of the profiles
 FACTORS = (1000.0, 100.0, 60.0, 57.29577951308232, 10.0, 2.0)
 NEAR = 0.02
 ON_PANEL = " on the panel"

@@ -5,19 +5,21 @@ killed bring-up, send the same absolute orders; a device may get them twice.
 """
 
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from schemas.errors import RecipeInvalid, WrongUse
-from schemas.profile import TEXT_CARRIERS, Profile, WordOrder, limits_of
+from schemas.profile import TEXT_CARRIERS, Profile, Register, WordOrder, limits_of
 from schemas.station import Limits
 from schemas.station_devices import Device
 from stations.codec import Value
-from stations.devices.adapters import axis_adapter, chamber_adapter
+from stations.devices.adapters import adapter_of
 from stations.devices.chamber import ThermalChamber
 from stations.devices.commands import Commands, Values
 from stations.devices.registers import Registers
 from stations.devices.table import TableAxis
 from stations.links.making import SingleLink
+from stations.profile_files import in_order
 from stations.recordings.decoding import told
 
 NAME = "device"
@@ -28,10 +30,7 @@ PORT = 502
 def device_at(link: str, profile: Profile, device_id: int) -> Device:
     """The device that a link names.
 
-    Raises
-    ------
-    WrongUse
-        It is not of one of the forms, or the profile is carried otherwise.
+    Raises WrongUse: it is not of one of the forms, or the profile is carried otherwise.
     """
     kind, _, rest = link.partition(":")
     content: dict[str, object] = {"profile": profile.name, "device_id": device_id}
@@ -87,17 +86,17 @@ class Target:
 
     def ordered(self, order: WordOrder) -> None:
         """Takes another word order for every register."""
-        kept = [register.model_copy(update={"word_order": None}) for register in self.profile.registers]
-        self.profile = self.profile.model_copy(update={"word_order": order, "registers": kept})
+        self.profile = in_order(self.profile, order)
 
     def moved(self, shift: int, space: str) -> None:
         """Takes addresses that are ``shift`` further, in another space where it is given."""
+        self.profile = self.profile.model_copy(update={"registers": moved(self.profile.registers, shift, space)})
 
-        def changed(address: int) -> dict[str, object]:
-            return {"address": address + shift, **({"space": space} if space else {})}
 
-        kept = [r.model_copy(update=changed(r.address)) for r in self.profile.registers]
-        self.profile = self.profile.model_copy(update={"registers": kept})
+def moved(registers: Iterable[Register], shift: int, space: str) -> list[Register]:
+    """Registers at addresses that are ``shift`` further, in another space where it is given."""
+    other = {"space": space} if space else {}
+    return [register.model_copy(update={"address": register.address + shift, **other}) for register in registers]
 
 
 SPEED_DEG_S = 1.0
@@ -144,13 +143,13 @@ def bounds_of(profile: Profile, name: str, wide: tuple[float, float]) -> tuple[f
 def axis_of(target: Target, speed: float = SPEED_DEG_S) -> TableAxis:
     """The adapter of an axis, on a new connection, with the slow limits of a bring-up."""
     limits = limits_of_orders(target.profile, speed)
-    return axis_adapter(target.profile)(target.registers(), limits.outer_deg, limits)
+    return adapter_of(target.profile, "axis", TableAxis)(target.registers(), limits.outer_deg, limits)
 
 
 def chamber_of(target: Target) -> ThermalChamber:
     """The adapter of a chamber, on a new connection."""
     bounds = bounds_of(target.profile, "set_point", (-100.0, 250.0))
-    return chamber_adapter(target.profile)(target.values(), *bounds)
+    return adapter_of(target.profile, "chamber", ThermalChamber)(target.values(), *bounds)
 
 
 def as_found(target: Target) -> AsFound:
@@ -165,10 +164,7 @@ def as_found(target: Target) -> AsFound:
 def leave_as_found(target: Target, found: AsFound) -> list[str]:
     """Stops an axis, writes back what has changed, and tells what was done.
 
-    Raises
-    ------
-    StationError
-        The device did not take an order; it may be given again.
+    Raises StationError: the device did not take an order; it may be given again.
     """
     done: list[str] = []
     if target.profile.kind == "axis" and found.moved:

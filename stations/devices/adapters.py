@@ -1,6 +1,7 @@
 """Adapters by the family that a profile names: each module in ``families`` has the adapter of the family of its name."""
 
 import pkgutil
+from collections.abc import Callable
 from functools import cache
 from importlib import import_module
 from inspect import isabstract
@@ -35,22 +36,8 @@ def adapters() -> dict[str, type[TableAxis | ThermalChamber | Equipment]]:
     return dict(sorted(by_family.items()))
 
 
-def axis_adapter(profile: Profile) -> type[TableAxis]:
-    """The adapter that drives an axis by this profile."""
-    return _adapter(profile, "axis", TableAxis)
-
-
-def chamber_adapter(profile: Profile) -> type[ThermalChamber]:
-    """The adapter that drives a chamber by this profile."""
-    return _adapter(profile, "chamber", ThermalChamber)
-
-
-def equipment_adapter(role: str, profile: Profile) -> type[Equipment]:
-    """The adapter that drives test equipment in a role by this profile."""
-    return _adapter(profile, role, Equipment)
-
-
-def _adapter(profile: Profile, kind: str, base: type[Adapter]) -> type[Adapter]:
+def adapter_of(profile: Profile, kind: str, base: type[Adapter]) -> Callable[..., Adapter]:
+    """The adapter that drives an axis, a chamber, or test equipment in the role ``kind`` by this profile."""
     known = {name: adapter for name, adapter in adapters().items() if issubclass(adapter, base)}
     adapter = known.get(profile.adapter)
     if adapter is None or profile.kind != kind:

@@ -16,7 +16,6 @@ from scipy.io import loadmat
 
 from schemas.errors import OperatorNeeded, StationError, StationRefused, StationTimeout
 from schemas.motion import Motion
-from schemas.profile import Profile
 from schemas.vibration_profile import load_vibration_profile
 from stations.clock import Clock
 from stations.codec import Value
@@ -27,8 +26,7 @@ REFERENCE = "@reference"
 REFERENCE_SLOT = 999
 NEEDED = ("rate_hz", "reference", "reference_rate_hz", "reference_unit")
 STANDARD_GRAVITY = {"g": 1.0, "m/s^2": 9.80665}
-FLAT_SHARE = 5e-4
-"""Of the samples of Gaussian vibration within a thousandth of an extreme: a range of 3.3 σ has so many."""
+FLAT_SHARE = 5e-4  # of the samples of Gaussian vibration within 0.1 % of an extreme: a range of 3.3 σ has so many
 FEWEST_FLAT = 20
 FLAT_SHARE_OF_SINE = 0.1  # of the samples of a sine: it has less
 
@@ -41,8 +39,6 @@ class RecordingSpoilt(StationError):
 class Recording:
     """The outputs of the units by slot, and the reference sensor, each on its own time base.
 
-    Attributes
-    ----------
     outputs : (n, 3) by slot, unit of the output
     rate_hz : nominal rate of the outputs, Hz; a device with a clock of its own departs from it
     reference : (m, 3), g, in the axes of the units
@@ -57,25 +53,19 @@ class Recording:
     def reference_frame(self, record: int, start: float) -> pd.DataFrame:
         """The reference as samples, under a name that no serial can have."""
         n = len(self.reference)
-        return pd.DataFrame(
-            {
-                "unit": pd.Series([REFERENCE] * n, dtype="str"),
-                "slot": np.full(n, REFERENCE_SLOT, dtype=np.int64),
-                "record": np.full(n, record, dtype=np.int64),
-                "kind": pd.Series(["procedure"] * n, dtype="str"),
-                "time_s": start + (np.arange(n) + 1.0) / self.reference_rate_hz,
-                "x": self.reference[:, 0],
-                "y": self.reference[:, 1],
-                "z": self.reference[:, 2],
-            }
-        )
+        columns = {
+            "unit": pd.Series([REFERENCE] * n, dtype="str"),
+            "slot": np.full(n, REFERENCE_SLOT, dtype=np.int64),
+            "record": np.full(n, record, dtype=np.int64),
+            "kind": pd.Series(["procedure"] * n, dtype="str"),
+            "time_s": start + (np.arange(n) + 1.0) / self.reference_rate_hz,
+        }
+        return pd.DataFrame({**columns, **dict(zip("xyz", self.reference[:, :3].T, strict=True))})
 
 
 def read_recording(path: Path, slots: list[int], name: str, units: Mapping[str, float] = STANDARD_GRAVITY) -> Recording:
     """The recording in a result file; a file without rate or unit is refused.
 
-    Parameters
-    ----------
     slots : whose channels are wanted; one that is not there is left out
     name : of the equipment, for messages
     units : allowed units of the reference, with their number in the one that is returned
@@ -92,11 +82,8 @@ def read_recording(path: Path, slots: list[int], name: str, units: Mapping[str, 
     unit = str(content["reference_unit"])
     if unit not in units:
         raise StationRefused(f"{name}: reference in '{unit}', {' or '.join(units)} is needed; correct the set-up")
-    outputs = {
-        slot: np.atleast_2d(np.asarray(content[f"slot_{slot}"], dtype=np.float64))
-        for slot in slots
-        if f"slot_{slot}" in content
-    }
+    found = ((slot, content[f"slot_{slot}"]) for slot in slots if f"slot_{slot}" in content)
+    outputs = {slot: np.atleast_2d(np.asarray(own, dtype=np.float64)) for slot, own in found}
     reference = np.asarray(content["reference"], dtype=np.float64) / units[unit]
     return Recording(outputs, float(content["rate_hz"]), reference, float(content["reference_rate_hz"]))
 
@@ -142,11 +129,7 @@ class RecordingEquipment(Equipment):
         return state
 
     def recorded(
-        self,
-        before: str,
-        slots: Sequence[int],
-        what: str = "recording",
-        units: Mapping[str, float] = STANDARD_GRAVITY,
+        self, before: str, slots: Sequence[int], what: str = "recording", units: Mapping[str, float] = STANDARD_GRAVITY
     ) -> Recording:
         """The recording of the last test; that of ``before`` means that the recorder has missed its trigger."""
         path = self.values.text("file")
@@ -154,30 +137,31 @@ class RecordingEquipment(Equipment):
             raise RecordingSpoilt(f"{self.name}: no {what}, the trigger was missed; check the recorder")
         return read_recording(Path(path), list(slots), self.name, units)
 
+    def refuse_sine(self, frequency: float, level_g: float) -> None:
+        """Refuse a sine that exceeds the exciter's motion; :class:`OperatorNeeded`, since repeating it changes nothing."""
+        motion = self.values.profile.motion or Motion()
+        self._refuse(motion.beyond_sine(frequency, level_g), f"{level_g:g} g at {frequency:g} Hz")
 
-def refuse_motion(profile: Profile, name: str, frequency: float, level_g: float) -> None:
-    """Refuse a sine that exceeds the exciter's motion; :class:`OperatorNeeded`, since repeating it changes nothing."""
-    _refuse((profile.motion or Motion()).beyond_sine(frequency, level_g), f"{name}: {level_g:g} g at {frequency:g} Hz")
+    def refuse_random(self, vibration: str, level_g: float) -> None:
+        """Refuse a random profile whose three-sigma peaks exceed the exciter's motion; :class:`OperatorNeeded`."""
+        motion, points = self.values.profile.motion or Motion(), load_vibration_profile(vibration).breakpoints
+        self._refuse(motion.beyond_random(points, level_g), f"{vibration} at {level_g:g} g rms")
 
+    def _refuse(self, why: str, what: str) -> None:
+        if why:
+            remedy = "lower the level, or correct maximum of the exciter in the station's file"
+            raise OperatorNeeded(f"{self.name}: {what}: {why}; {remedy}")
 
-def refuse_random_motion(profile: Profile, name: str, vibration: str, level_g: float) -> None:
-    """Refuse a random profile whose three-sigma peaks exceed the exciter's motion; :class:`OperatorNeeded`."""
-    points = load_vibration_profile(vibration).breakpoints
-    _refuse((profile.motion or Motion()).beyond_random(points, level_g), f"{name}: {vibration} at {level_g:g} g rms")
+    def refuse_clipped_random(self, driven: Array) -> None:
+        """Refuse Gaussian vibration (n,) whose extremes are flat: the conditioner of the reference clips."""
+        self.refuse_flat(np.abs(driven - driven.mean()), max(FEWEST_FLAT, FLAT_SHARE * driven.size))
 
-
-def refuse_clipped_random(driven: Array, name: str) -> None:
-    """Refuse Gaussian vibration (n,) whose extremes are flat: the conditioner of the reference clips."""
-    refuse_flat(np.abs(driven - driven.mean()), name, max(FEWEST_FLAT, FLAT_SHARE * driven.size))
-
-
-def refuse_flat(size: Array, name: str, most: float, near: float = 0.999) -> None:
-    """Refuse a reference that lies near its largest size (n,) in more than ``most`` samples: its conditioner clips."""
-    top = float(size.max())
-    if int(np.count_nonzero(size > near * top)) > most:
-        raise RecordingSpoilt(
-            f"{name}: the reference is clipped at {top:.4g} g; choose a larger range of its conditioner"
-        )
+    def refuse_flat(self, size: Array, most: float, near: float = 0.999) -> None:
+        """Refuse a reference that lies near its largest size (n,) in more than ``most`` samples: its conditioner clips."""
+        top = float(size.max())
+        if int(np.count_nonzero(size > near * top)) > most:
+            what = f"the reference is clipped at {top:.4g} g; choose a larger range of its conditioner"
+            raise RecordingSpoilt(f"{self.name}: {what}")
 
 
 def tone_level(driven: Array, rate_hz: float, frequency: float) -> tuple[float, float]:
@@ -186,8 +170,3 @@ def tone_level(driven: Array, rate_hz: float, frequency: float) -> tuple[float, 
     rows = np.column_stack([np.cos(phase), np.sin(phase), np.ones_like(phase)])
     c = np.linalg.lstsq(rows, driven, rcond=None)[0]
     return float(np.hypot(c[0], c[1])), float(np.std(driven - rows @ c))
-
-
-def _refuse(why: str, what: str) -> None:
-    if why:
-        raise OperatorNeeded(f"{what}: {why}; lower the level, or correct maximum of the exciter in the station's file")

@@ -70,10 +70,8 @@ class UnitMemory:
     def program(self, copy: Copy, content: bytes) -> None:
         """Programs a copy, once, and waits until it is done; the caller reads it back.
 
-        Raises
-        ------
-        StationRefused : worn out, or the device states a failure
-        StationTimeout, LinkLost : the command was not carried out; it is not sent again
+        Raises StationRefused: worn out, or the device states a failure
+        Raises StationTimeout, LinkLost: the command was not carried out; it is not sent again
         """
         before = self.wait()
         if before.erases[copy] >= before.endurance:

@@ -132,7 +132,7 @@ class Registers:
             self.write(name, value)
         except (StationTimeout, LinkLost) as problem:
             lost = problem
-        if not self._holds(name, value):
+        if self.read(name) != self._as_held(name, value):
             raise lost or StationRefused(
                 f"{self.name}: {name} is {self.read(name)} after {value} was written, {value} is needed; "
                 "check the device's panel and its write protection"
@@ -153,10 +153,6 @@ class Registers:
 
     def _wrong(self, name: str, found: str, needed: str) -> StationRefused:
         return StationRefused(f"{self.name}: {name} is {found}, {needed} is needed; check profile {self.profile.name}")
-
-    def _holds(self, name: str, value: Value) -> bool:
-        """Whether a register holds the encoded value."""
-        return self.read(name) == self._as_held(name, value)
 
     def _as_held(self, name: str, value: Value) -> Value:
         """A value as a register holds it, rounded to its steps."""

@@ -32,6 +32,7 @@ class TableAxis(ABC):
     """One axis behind a servo drive."""
 
     needs: ClassVar[tuple[str, ...]] = ()
+    coils: ClassVar[tuple[str, ...]] = ()  # that are on before commands are accepted: source of commands, servo
 
     def __init__(self, registers: Registers, bounds: tuple[float, float], limits: Limits) -> None:
         self._registers = registers
@@ -46,13 +47,9 @@ class TableAxis(ABC):
     def state(self) -> DriveState:
         """The present state of the drive."""
 
-    @abstractmethod
     def prepare(self) -> None:
         """Enables the drive for commands; nothing moves."""
-
-    def _switch_on(self) -> None:
-        """Selects the serial line as the source of commands and switches the servo on, of drives with coils for both."""
-        for coil in ("serial_mode", "servo_on"):
+        for coil in self.coils:
             if self._registers.text(coil) != "on":
                 self._registers.set(coil, "on")
 

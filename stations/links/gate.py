@@ -32,12 +32,8 @@ class Permit:
     def require(self, order: str, since: float | None) -> None:
         """Refuses a command that must not be sent now, before it is sent.
 
-        Raises
-        ------
-        LeaseLost
-            This process may not drive the station.
-        StationTimeout
-            The reading that the command depends on is too old.
+        Raises LeaseLost: this process may not drive the station.
+        Raises StationTimeout: the reading that the command depends on is too old.
         """
         self.held()
         late = 0.0 if since is None else steady() - since
@@ -62,12 +58,9 @@ class GatedLink:
     def read(self, device_id: int, address: int, count: int, what: str, space: Space = "holding") -> list[int]:
         """Words of registers, or bits; a run that has lost its lease is refused before the read.
 
-        Raises
-        ------
-        LeaseLost
-            The run may not drive the station; nothing was sent.
-        StationTimeout, LinkLost, StationRefused
-            The link's: no answer, no connection or no valid answer after all attempts, or a refusal of the device.
+        Raises LeaseLost: the run may not drive the station; nothing was sent.
+        Raises StationTimeout, LinkLost, StationRefused: from the link: no answer, no connection or no valid answer after all
+            attempts, or a refusal of the device.
         """
         if self._permit is not None:
             self._permit.alive()
@@ -85,20 +78,13 @@ class GatedLink:
     ) -> None:
         """Writes whole writable registers of a known device, once; any other write is refused before it is sent.
 
-        Parameters
-        ----------
         since : time of the reading that the command depends on; a command that is too late is refused
-
-        Raises
-        ------
-        StationRefused
-            There is no such device or no such writable registers, and nothing was sent; or the device refused.
-        LeaseLost
-            The run may not drive the station; nothing was sent.
-        StationTimeout
-            The command is too late, and was not sent; or no answer came, and whether the device acted is unknown.
-        LinkLost
-            The link's: no connection, a lost one, or no valid answer.
+        Raises StationRefused: there is no such device or no such writable registers, and nothing was sent; or the device
+            refused.
+        Raises LeaseLost: the run may not drive the station; nothing was sent.
+        Raises StationTimeout: the command is too late, and was not sent; or no answer came, and whether the device acted is
+            unknown.
+        Raises LinkLost: from the link: no connection, a lost one, or no valid answer.
         """
         profile = self._profiles.get(device_id)
         if profile is None:
@@ -137,14 +123,9 @@ class GatedLines:
     def ask(self, question: str, what: str) -> str:
         """The answer to a query that the profile contains.
 
-        Raises
-        ------
-        StationRefused
-            The profile has no such query, and nothing was sent; or the device refused.
-        LeaseLost
-            The run may not drive the station; nothing was sent.
-        StationTimeout, LinkLost
-            The link's: no answer, or no connection, after all attempts.
+        Raises StationRefused: the profile has no such query, and nothing was sent; or the device refused.
+        Raises LeaseLost: the run may not drive the station; nothing was sent.
+        Raises StationTimeout, LinkLost: from the link: no answer, or no connection, after all attempts.
         """
         if question not in self._queries:
             raise self._refusal(question, what)
@@ -155,14 +136,9 @@ class GatedLines:
     def tell(self, order: str, what: str) -> str:
         """Sends a command that the profile contains, once.
 
-        Raises
-        ------
-        StationRefused
-            The profile has no such command or value, and nothing was sent; or the device refused.
-        LeaseLost
-            The run may not drive the station; nothing was sent.
-        StationTimeout, LinkLost
-            The link's: no answer, or a lost connection; whether the device acted is unknown.
+        Raises StationRefused: the profile has no such command or value, and nothing was sent; or the device refused.
+        Raises LeaseLost: the run may not drive the station; nothing was sent.
+        Raises StationTimeout, LinkLost: from the link: no answer, or a lost connection; whether the device acted is unknown.
         """
         if not any(_fits(command, order) for command in self._commands):
             raise self._refusal(order, what)

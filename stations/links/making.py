@@ -19,8 +19,7 @@ from stations.profile_files import load_profile
 
 Address = tuple[str, int]
 Key = tuple[str, str, int]
-Behind = dict[int, tuple[str, Profile]]
-"""Name and profile of every device behind one address, by device id."""
+Behind = dict[int, tuple[str, Profile]]  # name and profile of every device behind one address, by device id
 
 
 class WireSource(Protocol):
@@ -129,8 +128,7 @@ class Links:
         for place in Devices.model_fields:
             device = getattr(self.config.devices, place)
             if self._key(device) == key:
-                count = getattr(device, "count", 0)
-                names = [f"slot {n}" for n in range(count)] if count else [place]
+                names = [f"slot {n}" for n in range(getattr(device, "count", 0))] or [place]
                 profile = load_profile(device.profile)
                 behind |= {device.device_id + n: (name, profile) for n, name in enumerate(names)}
         for role, equipment in self.config.fitted().items():

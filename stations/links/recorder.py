@@ -25,8 +25,7 @@ from stations.links.frames import READ, WRITE_COIL, WRITE_COILS, WRITE_REGISTERS
 from stations.links.wires import Broken, LineWire, Silence, Wire
 
 FORMAT = "tumbleline frames 1"
-LARGEST = 512_000_000
-"""Bytes of a recording: the exchanges of some days."""
+LARGEST = 512_000_000  # bytes of a recording: the exchanges of some days
 SPACE_OF = {
     **{code: space for space, code in READ.items()},
     WRITE_COIL: "coil",

@@ -46,8 +46,6 @@ class Wire(Protocol):
     def exchange(self, device_id: int, request: bytes, before: Callable[[], None] | None = None) -> bytes:
         """The answer to a request, without its envelope; :class:`Silence`, :class:`Broken` or :class:`Malformed`.
 
-        Parameters
-        ----------
         before : called on the open connection immediately before sending; the request is not sent where it raises
         """
         ...

@@ -85,11 +85,8 @@ class Bank:
     def write(self, address: int, words: list[int], space: Space = "holding") -> None:
         """Writes the registers in an address range; an incomplete or read-only register or a value outside limits is refused."""
         end = address + len(words)
-        values: dict[str, Value] = {}
-        for register in self._registers:
-            if register.space == space and register.address < end and register.end > address:
-                values[register.name] = self._value(register, address, words)
-        self._sink(values)
+        touched = (r for r in self._registers if r.space == space and r.address < end and r.end > address)
+        self._sink({register.name: self._value(register, address, words) for register in touched})
 
     def _value(self, register: Register, address: int, words: list[int]) -> Value:
         first = register.address - address

@@ -22,17 +22,15 @@ PARTS = 3
 
 def build_banks(world: World, devices: Devices, equipment: Mapping[str, Device]) -> dict[int, Bank]:
     """A bank for every device id of the station that holds registers."""
-    banks: dict[int, Bank] = {
+    others = [(device.device_id, profile_of(device)) for device in (devices.chamber, *equipment.values())]
+    first, slots = devices.slots.device_id, profile_of(devices.slots)
+    return {
         devices.outer.device_id: simulated(profile_of(devices.outer), world, world.outer),
         devices.inner.device_id: simulated(profile_of(devices.inner), world, world.inner),
         devices.reader.device_id: _reader(world, profile_of(devices.reader), devices.slots.count),
+        **{first + slot: _slot(world, unit, slots) for unit, slot in enumerate(world.slots)},
+        **{device_id: simulated(profile, world) for device_id, profile in others if profile.registers},
     }
-    for unit, slot in enumerate(world.slots):
-        banks[devices.slots.device_id + slot] = _slot(world, unit, profile_of(devices.slots))
-    for device in (devices.chamber, *equipment.values()):
-        if (profile := profile_of(device)).registers:
-            banks[device.device_id] = simulated(profile, world)
-    return banks
 
 
 def build_line_devices(world: World, devices: Devices, equipment: Mapping[str, Device]) -> "dict[int, LineDevice]":
@@ -158,10 +156,8 @@ class MemoryBank:
         }
         for part in range(PARTS):
             sources[f"buffer_{part}"] = lambda part=part: _part(self.flash.buffer, part)
-            for copy, name in enumerate("ab"):
-                sources[f"copy_{name}_{part}"] = lambda part=part, copy=copy: _part(
-                    self.flash.read(copy, self.world.now_us), part
-                )
+            sources[f"copy_a_{part}"] = lambda part=part: _part(self.flash.read(0, self.world.now_us), part)
+            sources[f"copy_b_{part}"] = lambda part=part: _part(self.flash.read(1, self.world.now_us), part)
         return sources
 
     def write(self, values: dict[str, Value]) -> None:

@@ -160,8 +160,6 @@ class Bench:
     ) -> Waveforms:
         """Response to a force (n,) in g along an axis at a fine rate, which begins and ends at rest.
 
-        Parameters
-        ----------
         fine_hz : of the force
         slow_hz : rate of the recorder for a long recording; its usual one where 0
         """

@@ -14,6 +14,7 @@ from schemas.units import STANDARD_GRAVITY_M_S2
 from stations.plant.bench import Waveforms
 
 STROKE_M, VELOCITY_M_S, ACCELERATION_G = 0.0127, 1.5, 50.0  # of the exciter
+UNKNOWN, WRONG = "NA:CMD ERR", "NA:PARA ERR"  # answers to a line that is no command, and to one with a wrong value
 DONE = "1"
 OUT_OF_RANGE, UNDEFINED = -222, -113  # SCPI-99, 21.8.10 and 21.8.9
 TEXTS = {0: "No error", OUT_OF_RANGE: "Data out of range", UNDEFINED: "Undefined header"}
@@ -23,6 +24,15 @@ def exciter_reach(frequency: float) -> float:
     """Largest peak acceleration of the exciter at a frequency in Hz, g."""
     w = 2.0 * math.pi * frequency
     return min(STROKE_M * w**2 / STANDARD_GRAVITY_M_S2, VELOCITY_M_S * w / STANDARD_GRAVITY_M_S2, ACCELERATION_G)
+
+
+def taken(settings: dict[str, float], name: str, value: str) -> tuple[str, bool]:
+    """The answer to an order of a number, which is taken over, and whether it changed anything."""
+    try:
+        settings[name] = float(value)
+    except ValueError:
+        return WRONG, False
+    return "OK", True
 
 
 class ScpiDevice:
@@ -36,17 +46,17 @@ class ScpiDevice:
         code, self.error = self.error, 0
         return f'{code},"{TEXTS[code]}"', code != 0
 
-    def ordered(self, value: str, low: float, high: float) -> float | None:
-        """The number of an order; None, with an error, for what is no number or outside its range."""
+    def ordered(self, value: str, low: float, high: float, before: float) -> float:
+        """The number of an order; the one before, with an error, for what is no number or outside its range."""
         try:
             number = float(value)
         except ValueError:
             self.error = UNDEFINED
-            return None
-        if not low <= number <= high:
-            self.error = OUT_OF_RANGE
-            return None
-        return number
+            return before
+        if low <= number <= high:
+            return number
+        self.error = OUT_OF_RANGE
+        return before
 
 
 class ResultFiles:
@@ -64,18 +74,11 @@ class ResultFiles:
             self._folder = Path(tempfile.mkdtemp(prefix="tumbleline-results-"))
             weakref.finalize(self, shutil.rmtree, self._folder, ignore_errors=True)
         path = self._folder / f"test{number:06d}.mat"
-        if path == self._last:
-            return str(path)
-        made = recorded()
-        content: dict[str, Any] = {
-            "rate_hz": made.rate_hz,
-            "reference": made.reference,
-            "reference_rate_hz": made.reference_rate_hz,
-            "reference_unit": reference_unit,
-            **{f"slot_{slot}": made.outputs[:, k] for k, slot in enumerate(slots)},
-        }
-        savemat(path, content)
-        if self._last is not None:
-            self._last.unlink(missing_ok=True)
-        self._last = path
+        if path != self._last:
+            content: dict[str, Any] = vars(recorded()) | {"reference_unit": reference_unit}
+            outputs = content.pop("outputs")
+            savemat(path, content | {f"slot_{slot}": outputs[:, k] for k, slot in enumerate(slots)})
+            if self._last is not None:
+                self._last.unlink(missing_ok=True)
+            self._last = path
         return str(path)

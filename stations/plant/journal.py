@@ -107,10 +107,8 @@ class Journal:
     def recorded(self, state: bytes) -> tuple[list[Event], int]:
         """The events in ``state`` and its time, µs; a state of another station or lot is refused.
 
-        Raises
-        ------
-        ArchiveUnusable : the bytes are not a state
-        DataRejected : the state belongs to another station or lot
+        Raises ArchiveUnusable: the bytes are not a state
+        Raises DataRejected: the state belongs to another station or lot
         """
         try:
             content: dict[str, Any] = json.loads(zlib.decompress(state))

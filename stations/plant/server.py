@@ -128,8 +128,7 @@ class _Handler(ServerRequestHandler):
         task.add_done_callback(_TASKS.discard)
 
 
-_TASKS: set[asyncio.Task[None]] = set()
-"""Requests under way: a loop itself keeps its tasks only weakly."""
+_TASKS: set[asyncio.Task[None]] = set()  # requests under way: a loop itself keeps its tasks only weakly
 
 
 class _TcpServer(ModbusTcpServer):

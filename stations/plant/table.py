@@ -154,8 +154,6 @@ class Axis:
 def turn(up: Array, outer: Array, inner: Array, orthogonality: float = 0.0) -> Array:
     """Specific force in the fixture, (n, 3) in g: first the inner axis, then the outer one turned back.
 
-    Parameters
-    ----------
     up : (3,), the direction opposite to gravity in the laboratory, g
     outer, inner : (n,), rad; orthogonality : rad, turn about y between the two axes
     """

@@ -7,6 +7,7 @@ import heapq
 import math
 import threading
 from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -94,15 +95,7 @@ class World:
         )
         self.physics.orthogonality = 0.0 if self.station_errors is None else self.station_errors.orthogonality
         self.flash = [Flash() for _ in self.serials]  # by unit, in any slot
-        self.bench = Bench(
-            self.preset,
-            self._truths,
-            self.physics.devices,
-            gravity,
-            sim.seed,
-            lot.seed,
-            self._key,
-        )
+        self.bench = Bench(self.preset, self._truths, self.physics.devices, gravity, sim.seed, lot.seed, self._key)
         fifo = load_profile(config.devices.slots.profile).fifo
         registers = fifo.registers if fifo is not None else 0
         self.sampler = Sampler(self.physics, len(self.slots), self.preset.packing, registers)
@@ -114,17 +107,9 @@ class World:
 
     def _draw_truths(self, sim: Simulation, lot: Lot) -> list[Truth]:
         seats = 1e-3 * sim.slot_rotation_mrad * stream(sim.seed, "slots").standard_normal((64, 3))
-        return [
-            draw_truth(
-                self.preset,
-                unit.serial,
-                lot.seed,
-                slot_rotation=rotation(seats[unit.slot]),
-                supply_ratio=float(self._supplies.offset[i]),
-                output_scale=self.preset.scale,
-            )
-            for i, unit in enumerate(lot.units)
-        ]
+        own = partial(draw_truth, self.preset, seed=lot.seed, output_scale=self.preset.scale)
+        units = zip(lot.units, self._supplies.offset.tolist(), strict=True)
+        return [own(unit.serial, slot_rotation=rotation(seats[unit.slot]), supply_ratio=ratio) for unit, ratio in units]
 
     @property
     def now(self) -> float:
@@ -227,10 +212,8 @@ class World:
         return keyed_normal(self._key, channel, int(self.now), n)
 
     def _by_slot(self, values: Array, empty: float) -> list[float]:
-        out = [empty] * MOST_SLOTS
-        for slot, value in zip(self.slots, values, strict=True):
-            out[slot] = float(value)
-        return out
+        filled = dict(zip(self.slots, values.tolist(), strict=True))
+        return [filled.get(slot, empty) for slot in range(MOST_SLOTS)]
 
 
 class Supplies:

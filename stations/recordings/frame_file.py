@@ -5,7 +5,8 @@ that is not of the format is refused with its number.
 """
 
 import json
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -34,8 +35,6 @@ class RecordedDevice:
 class Exchange:
     """A request and what came back.
 
-    Attributes
-    ----------
     at_s : seconds since the start of the recording · seconds : until the answer, or until none was waited for any longer
     request : Modbus function and data, without address and checksum; a line of text where ``text``
     reply : likewise; None without an answer · failed : why there is none: ``silence``, ``broken: …``, ``malformed: …``
@@ -109,21 +108,24 @@ class FrameFile:
         return f"device {exchange.device_id}" if device is None else device.place
 
 
-def read_frames(path: Path) -> FrameFile:
-    """The recording in a file.
-
-    Raises
-    ------
-    DataRejected
-        It is no recording, or a line other than the last is damaged.
-    """
+@contextmanager
+def readable(path: Path) -> Generator[None]:
+    """A block that reads a recording; :class:`DataRejected` where the system refuses."""
     try:
-        raw = path.read_bytes()
+        yield
     except OSError as problem:
         raise DataRejected(
             f"recording: {path} cannot be read ({problem.strerror}); name a file that is there"
         ) from None
-    lines = raw.split(b"\n")
+
+
+def read_frames(path: Path) -> FrameFile:
+    """The recording in a file.
+
+    Raises DataRejected: it is no recording, or a line other than the last is damaged.
+    """
+    with readable(path):
+        lines = path.read_bytes().split(b"\n")
     whole, torn = lines[:-1], lines[-1]
     content = FrameFile(
         path.name, remark=f"the last line is incomplete ({len(torn)} bytes) and left out" if torn else ""

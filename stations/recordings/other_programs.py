@@ -16,7 +16,7 @@ from schemas.library import library
 from stations.links.frames import EXCEPTION, READ, WRITES, crc16
 from stations.links.recorder import FORMAT, meaning
 from stations.links.wires import HEADER, LONGEST
-from stations.recordings.frame_file import SILENCE, Exchange, FrameFile, RecordedDevice, read_frames
+from stations.recordings.frame_file import SILENCE, Exchange, FrameFile, RecordedDevice, read_frames, readable
 
 PCAP = (b"\xd4\xc3\xb2\xa1", b"\xa1\xb2\xc3\xd4", b"\x4d\x3c\xb2\xa1", b"\xa1\xb2\x3c\x4d")
 PCAPNG = b"\x0a\x0d\x0d\x0a"
@@ -33,18 +33,10 @@ SECONDS = re.compile(r"^\s*\"?(\d+\.\d+)\"?\s*[,;\t ]")
 def read_recording(path: Path) -> FrameFile:
     """A recording of this program, a pcap or pcapng file, or a log of a Modbus tool, recognised by its content.
 
-    Raises
-    ------
-    DataRejected
-        It is none of these, or it holds no Modbus request.
+    Raises DataRejected: it is none of these, or it holds no Modbus request.
     """
-    try:
-        with path.open("rb") as file:
-            head = file.read(256)
-    except OSError as problem:
-        raise DataRejected(
-            f"recording: {path} cannot be read ({problem.strerror}); name a file that is there"
-        ) from None
+    with readable(path), path.open("rb") as file:
+        head = file.read(256)
     if head.startswith(PCAP) or head.startswith(PCAPNG):
         exchanges, kind = list(_of_packets(path)), "Modbus TCP in a packet capture"
     elif FORMAT.encode() in head:

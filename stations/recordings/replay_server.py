@@ -52,11 +52,6 @@ class Replay:
             if exchange.writes:
                 device.orders.append(number)
 
-    @classmethod
-    def of(cls, recording: FrameFile) -> "Replay":
-        """The devices of a recording."""
-        return cls(recording.exchanges)
-
     @property
     def who(self) -> list[Who]:
         """Link and device id of every device, in order of their first exchange."""
@@ -104,7 +99,7 @@ class ReplayServer:
 
     def __post_init__(self) -> None:
         """Sorts the devices by id and by link."""
-        self.replay = Replay.of(self.recording)
+        self.replay = Replay(self.recording.exchanges)
         self._texts = {e.link for e in self.recording.exchanges if e.text}
         for who in self.replay.who:
             if who[0] not in self._texts:

@@ -33,19 +33,13 @@ KERNEL_NAMES = Path("/sys/dev/char")
 def addresses(config: StationConfig, *, every: bool = False) -> dict[Part, str]:
     """Addresses of table, chamber and reader of a station, in one form however the file writes them.
 
-    Parameters
-    ----------
     every : include parts that share an address with another; a lease is taken once per address
     """
     by_part: dict[Part, str] = {}
-    for part in PARTS:
-        address = address_of(getattr(config.devices, part))
-        if every or address not in by_part.values():
-            by_part[part] = address
-    there = config.equipment.there()
-    for role in ROLES:
-        if role in there and (every or address_of(there[role]) not in by_part.values()):
-            by_part[role] = address_of(there[role])
+    there: dict[str, Device] = {part: getattr(config.devices, part) for part in PARTS} | config.equipment.there()
+    for part in (*PARTS, *ROLES):
+        if part in there and (every or address_of(there[part]) not in by_part.values()):
+            by_part[part] = address_of(there[part])
     return by_part
 
 

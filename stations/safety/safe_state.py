@@ -65,8 +65,6 @@ def equipment_steps(equipment: Mapping[str, Any]) -> list[SafeStep]:
 def reach_safe_state(steps: list[SafeStep], *, patience_s: float = 0.0) -> Reached:
     """Sends every command, also after failures of others, and returns the result.
 
-    Parameters
-    ----------
     steps : the commands, in order
     patience_s : time during which failed commands are repeated, s; 0 sends each once
     """

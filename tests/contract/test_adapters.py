@@ -9,7 +9,9 @@ from other_devices import station_with
 from small_station import lot_of
 
 from schemas.errors import LinkLost, OperatorNeeded, RecipeInvalid, StationRefused, StationTimeout
-from stations.devices.adapters import axis_adapter, chamber_adapter
+from stations.devices.adapters import adapter_of
+from stations.devices.chamber import ThermalChamber
+from stations.devices.table import TableAxis
 from stations.opening import make_plant, serve_plant
 from stations.profile_files import load_profile, profile_names
 
@@ -278,9 +280,9 @@ def test_a_profile_without_what_its_adapter_needs_is_refused_by_name():
     profile = load_profile("oriental_az")
     kept = [register for register in profile.registers if register.name != "alarm"]
     with pytest.raises(RecipeInvalid, match="alarm missing"):
-        axis_adapter(profile.model_copy(update={"registers": kept}))
+        adapter_of(profile.model_copy(update={"registers": kept}), "axis", TableAxis)
     with pytest.raises(RecipeInvalid, match="drives no chamber"):
-        chamber_adapter(profile)
+        adapter_of(profile, "chamber", ThermalChamber)
 
 
 def test_a_device_carried_by_something_it_does_not_have_is_refused():

@@ -13,7 +13,9 @@ from docs.devices_page import PAGE, page
 from schemas.errors import RecipeInvalid
 from stations import profile_files
 from stations.devices import families
-from stations.devices.adapters import adapters, axis_adapter, chamber_adapter
+from stations.devices.adapters import adapter_of, adapters
+from stations.devices.chamber import ThermalChamber
+from stations.devices.table import TableAxis
 from stations.opening import make_plant, open_station
 from stations.plant import families as simulated_families
 from stations.plant.banks import family_names
@@ -127,10 +129,10 @@ def test_every_family_has_an_adapter_a_simulation_and_a_profile():
 def test_every_profile_has_its_adapter_its_simulated_device_and_its_entry_in_the_reference(name):
     profile = load_profile(name)
     if profile.kind == "axis":
-        assert axis_adapter(profile)
+        assert adapter_of(profile, "axis", TableAxis)
         config = station_with(axis=name)
     else:
-        assert chamber_adapter(profile)
+        assert adapter_of(profile, "chamber", ThermalChamber)
         config = station_with(chamber=name)
     plant = make_plant(config, lot_of(1))  # refuses a register without a value of the world behind it
     served = [bank.profile.name for bank in plant.banks.values()]
@@ -182,7 +184,7 @@ def test_a_new_family_is_two_modules_beside_its_profile(product):
 def test_a_profile_of_an_unknown_family_is_refused_by_name(product):
     added(product, "watlow_f4z")
     with pytest.raises(RecipeInvalid, match=r"adapter watlow_f4z of kind chamber drives no chamber.*watlow_f4"):
-        chamber_adapter(load_profile("acme"))
+        adapter_of(load_profile("acme"), "chamber", ThermalChamber)
 
 
 def test_a_family_without_its_simulation_or_its_adapter_is_named_with_the_file_that_is_missing(product):

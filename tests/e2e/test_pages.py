@@ -33,7 +33,8 @@ from schemas.recipe import parse_recipe
 from schemas.safety import Safety, SelfTest, Suspenders
 from schemas.station import load_station
 from schemas.station_devices import Device
-from stations.devices.adapters import adapters, chamber_adapter
+from stations.devices.adapters import adapter_of, adapters
+from stations.devices.chamber import ThermalChamber
 from stations.plant.hidden import HIDDEN
 from stations.plant.physics import Sampler
 from stations.plant.preset import load_preset
@@ -113,7 +114,7 @@ def test_rules_and_views_of_the_guide_to_audits_are_those_of_the_program(tmp_pat
 def test_profile_and_links_of_the_guide_to_devices_are_such() -> None:
     profile = parse_profile(pages.blocks("docs/how-to/add-a-device.md", "toml")[0], "guide")
     assert [register.name for register in profile.registers] == ["temperature", "set_point"]
-    assert chamber_adapter(profile) is adapters()["set_point"]
+    assert adapter_of(profile, "chamber", ThermalChamber) is adapters()["set_point"]
     blocks = re.findall(r"```toml\n(\[devices.*?)```", DEVICES, re.DOTALL)
     links = [Device.model_validate(next(iter(tomllib.loads(text)["devices"].values()))) for text in blocks]
     assert [(device.link, device.missing()) for device in links] == [("rtu", ""), ("tls", "")]

@@ -29,8 +29,7 @@ from pipelines.jobs.recipes import load_recipe
 from pipelines.jobs.releases import release
 from pipelines.planning.context import plan_context
 from pipelines.planning.lower_bound import lower_bound
-from pipelines.planning.requirement import Requirement, apart, candidates
-from pipelines.planning.soak_orders import orders, soak_seconds
+from pipelines.planning.requirement import Requirement, apart, candidates, orders, soak_seconds
 from pipelines.planning.textbook import reference_errors, textbook
 from pipelines.schedule.steps import steps
 from pipelines.schedule.timing import minutes
@@ -256,16 +255,20 @@ def test_verification_poses_are_apart_and_each_is_measured_as_often_as_in_the_re
     assert np.degrees(np.arccos((force @ force.T - 2.0 * np.eye(len(force))).max())) > 40.0
 
 
+def at_levels(*levels: float) -> Requirement:
+    return Requirement(np.ones((3, 1)), (), levels, np.zeros((1, 2)))
+
+
 def test_orders_of_soaks_meet_all_levels_turn_round_and_come_back() -> None:
     station = load_station()
-    for order in orders((-10.0, 25.0, 60.0), station, 900.0):
+    for order in orders(at_levels(-10.0, 25.0, 60.0), station, 900.0):
         turns = np.diff(order)
         assert set(order) == {-10.0, 25.0, 60.0}
         assert len(order) > 3
         assert turns.min() < 0.0 < turns.max()
-    seconds = [soak_seconds(order, station, 900.0) for order in orders((0.0, 50.0), station, 900.0)]
+    seconds = [soak_seconds(order, station, 900.0) for order in orders(at_levels(0.0, 50.0), station, 900.0)]
     assert seconds == sorted(seconds)
-    assert orders((25.0,), station, 900.0) == [(25.0,)]
+    assert orders(at_levels(25.0), station, 900.0) == [(25.0,)]
 
 
 def test_limits_beside_the_first_recipe_are_found_and_missing_ones_are_a_warning(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ from in_process import command
 
 from pipelines.archive import Archive
 from pipelines.jobs.recipes import load_recipe
-from pipelines.planning.soak_orders import ramp_orders
+from pipelines.planning.requirement import ramp_orders
 from pipelines.planning.timed_design import followed_along, short_of
 from pipelines.schedule.planned_state import planned_state
 from schemas.station import load_station

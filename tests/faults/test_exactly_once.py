@@ -7,9 +7,9 @@ from other_devices import station_with
 from small_station import lot_of, plant_of
 
 from schemas.errors import LinkLost, StationTimeout
-from stations.devices.adapters import axis_adapter
+from stations.devices.adapters import adapter_of
 from stations.devices.registers import Registers
-from stations.devices.table import TiltTable
+from stations.devices.table import TableAxis, TiltTable
 from stations.links.making import Links
 from stations.plant.faults.proxy import ChaosProxy, WireAction
 from stations.plant.plant import PlantClock
@@ -37,7 +37,7 @@ DRIVES = ("iai_robo_cylinder", "oriental_az", "smc_lecp6")
 def table_through(proxy, config, plant):
     links = Links(config, {"tcp": (proxy.host, proxy.port)})
     axes = [
-        axis_adapter(load_profile(config.devices.outer.profile))(
+        adapter_of(load_profile(config.devices.outer.profile), "axis", TableAxis)(
             Registers(f"{name} axis", links.registers(name), number, load_profile(config.devices.outer.profile)),
             (-200.0, 200.0),
             config.limits,

@@ -19,10 +19,10 @@ from schemas.errors import STATION, OperatorNeeded, StationRefused
 from schemas.safety import SAFE_WITHIN_S
 from stations import watchdog
 from stations.opening import open_station
+from stations.overview import unsafe_reason
 from stations.plant.faults.proxy import ChaosProxy, WireAction
 from stations.safety import folder, lease_files, leases, watchdog_client
 from stations.safety.leases import Leases, holders, new_holder
-from stations.safety.safety_status import unsafe_reason
 
 
 @pytest.fixture(autouse=True)

@@ -28,13 +28,9 @@ class Acutrol(RecordingEquipment):
         Another mounting is ordered at standstill with the interlock open. ``radius_m`` is the radius of the mounting; a device
         whose profile has no such command is not told.
 
-        Raises
-        ------
-        OperatorNeeded
-            The interlock has opened, by guard door or overspeed; or the rate rises beyond the order; or another mounting was
-            ordered and is not confirmed: the run continues when it is.
-        RecordingSpoilt
-            The recorder has missed its trigger, or the rate has left its band.
+        Raises OperatorNeeded: the interlock has opened, by guard door or overspeed; or the rate rises beyond the order; or
+            another mounting was ordered and is not confirmed: the run continues when it is.
+        Raises RecordingSpoilt: the recorder has missed its trigger, or the rate has left its band.
         """
         self._require_no_fault()
         wanted = {"direction": float(direction)}

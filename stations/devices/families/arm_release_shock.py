@@ -6,7 +6,7 @@ from typing import ClassVar
 import numpy as np
 
 from schemas.errors import OperatorNeeded
-from stations.devices.equipment import FEWEST_FLAT, Recording, RecordingEquipment, RecordingSpoilt, refuse_flat
+from stations.devices.equipment import FEWEST_FLAT, Recording, RecordingEquipment, RecordingSpoilt
 
 POLL_S = 0.2
 PATIENCE_S = 60.0
@@ -26,12 +26,8 @@ class ShockMachine(RecordingEquipment):
     def shock(self, peak: float, seconds: float, axis: int, direction: int, slots: Sequence[int]) -> Recording:
         """A half sine with a peak in g along an axis (0 to 2), up or against it (direction 1 or −1).
 
-        Raises
-        ------
-        OperatorNeeded
-            The guard door is open.
-        RecordingSpoilt
-            Missed trigger, clipped reference, or a peak outside ± 20 %.
+        Raises OperatorNeeded: the guard door is open.
+        Raises RecordingSpoilt: missed trigger, clipped reference, or a peak outside ± 20 %.
         """
         if self.values.text("door") != "CLOSED":
             raise OperatorNeeded(
@@ -52,17 +48,16 @@ class ShockMachine(RecordingEquipment):
                 f"{self.name}: the guard door was opened, the shock was not released; close it, then again"
             )
         recording = self.recorded(before, slots, "recording of the shock")
-        _refuse_wrong_pulse(recording.reference[:, axis] * direction, peak, self.name)
+        self._refuse_wrong_pulse(recording.reference[:, axis] * direction, peak)
         return recording
 
     def make_safe(self) -> None:
-        """Disarms the machine."""
         self.values.write("arm", self.off)
 
-
-def _refuse_wrong_pulse(driven: np.ndarray, peak: float, name: str) -> None:
-    """Refuse a reference that is clipped, or a peak that was not reached."""
-    reached = float(driven.max())
-    refuse_flat(driven, name, max(FEWEST_FLAT, 0.02 * int(np.count_nonzero(driven > 0.1 * reached))), 0.9999)
-    if not abs(reached / peak - 1.0) <= PEAK_SHARE:
-        raise RecordingSpoilt(f"{name}: peak {reached:.4g} g, {peak:g} g ± 20 % was ordered; check height or pressure")
+    def _refuse_wrong_pulse(self, driven: np.ndarray, peak: float) -> None:
+        """Refuse a reference that is clipped, or a peak that was not reached."""
+        reached = float(driven.max())
+        self.refuse_flat(driven, max(FEWEST_FLAT, 0.02 * int(np.count_nonzero(driven > 0.1 * reached))), 0.9999)
+        if not abs(reached / peak - 1.0) <= PEAK_SHARE:
+            what = f"peak {reached:.4g} g, {peak:g} g ± 20 % was ordered; check height or pressure"
+            raise RecordingSpoilt(f"{self.name}: {what}")

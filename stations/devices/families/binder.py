@@ -15,7 +15,6 @@ class BinderChamber(ThermalChamber):
         return AUTOMATIC if mode in {"basic", "manual"} else mode
 
     def require_ready(self) -> None:
-        """Refuses a controller with a running program."""
         if self.mode() == "program":
             refuse_program(self.name, "runs")
 

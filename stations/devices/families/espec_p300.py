@@ -16,7 +16,6 @@ class P300Chamber(ThermalChamber):
         return self._values.text("mode")
 
     def require_ready(self) -> None:
-        """Refuses a controller with an alarm or a running program."""
         count = int(self._values.number("alarms"))
         if count:
             raise OperatorNeeded(f"{self.name}: {count} alarms, none is needed; clear the cause at the panel")

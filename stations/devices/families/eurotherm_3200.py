@@ -14,7 +14,6 @@ class EurothermChamber(ThermalChamber):
         return AUTOMATIC if state == "remote" else state
 
     def require_ready(self) -> None:
-        """Refuses a controller with a running program."""
         refuse_program(self.name, self._values.text("program_status"))
 
     def order(self, temperature: float) -> None:

@@ -10,6 +10,7 @@ class NumericAxis(TableAxis):
         "serial_mode", "servo_on", "pause", "alarm_reset", "state", "motion", "target",
         "feedback_position",
     )  # fmt: skip
+    coils = ("serial_mode", "servo_on")
 
     def state(self) -> DriveState:
         """Both status registers, read in one request, and the alarm code where an alarm is active."""
@@ -20,10 +21,6 @@ class NumericAxis(TableAxis):
             alarm = "emergency stop at the drive"
         ready = flags["ready"] and flags["servo_on"] and not flags["paused"]
         return DriveState(ready, flags["home_end"], more["move"], flags["in_position"] and not more["move"], alarm)
-
-    def prepare(self) -> None:
-        """Selects the serial line as the source of commands and switches the servo on."""
-        self._switch_on()
 
     def order(self, target: float) -> None:
         """Writes band, speed and acceleration and reads them back; then writes the target, whose low word starts the move."""

@@ -4,7 +4,10 @@ from stations.devices.table import DriveState, TableAxis
 
 
 class DirectDataAxis(TableAxis):
-    """An AZ drive. A failed request may have written some of its registers; the trigger comes last, so nothing has moved."""
+    """An AZ drive: it accepts direct data as soon as it is ready.
+
+    A failed request may have written some of its registers; the trigger comes last, so nothing has moved.
+    """
 
     needs = ("direct_data", "command", "status", "alarm", "feedback_position")
 
@@ -13,9 +16,6 @@ class DirectDataAxis(TableAxis):
         flags = self._registers.flags("status")
         alarm = f"drive alarm 0x{int(self._registers.number('alarm')):02X}" if flags["alarm"] else ""
         return DriveState(flags["ready"], flags["home_end"], flags["move"], flags["in_position"], alarm)
-
-    def prepare(self) -> None:
-        """Does nothing: an AZ drive accepts direct data as soon as it is ready."""
 
     def order(self, target: float) -> None:
         """Sends one request with the trigger at its end."""

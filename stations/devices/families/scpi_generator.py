@@ -11,8 +11,6 @@ from stations.devices.equipment import (
     Recording,
     RecordingEquipment,
     RecordingSpoilt,
-    refuse_flat,
-    refuse_motion,
     tone_level,
 )
 
@@ -43,15 +41,11 @@ class ScpiGenerator(RecordingEquipment):
     def sine(self, frequency: float, level: float, axis: int, seconds: float, slots: Sequence[int]) -> Recording:
         """A dwell at one frequency in Hz with a peak level in g, along an axis (0 to 2) of the units.
 
-        Raises
-        ------
-        RecordingSpoilt
-            Missed trigger, clipped reference, or a level that is not reached.
-        OperatorNeeded
-            The amplifier reports a fault, the reference does not follow the drive, or the level is beyond the exciter or the
-            largest amplitude of the generator.
+        Raises RecordingSpoilt: missed trigger, clipped reference, or a level that is not reached.
+        Raises OperatorNeeded: the amplifier reports a fault, the reference does not follow the drive, or the level is beyond
+            the exciter or the largest amplitude of the generator.
         """
-        refuse_motion(self.values.profile, self.name, frequency, level)
+        self.refuse_sine(frequency, level)
         self.write_all(function="SIN", frequency=frequency, axis=float(axis), before=0.0)
         volts = self._drive_volts(frequency, level, axis, slots)
         recording = self._record(volts, frequency, seconds, slots)
@@ -102,10 +96,7 @@ class ScpiGenerator(RecordingEquipment):
     def step(self, volts: float, hold_s: float, before_s: float, slots: Sequence[int]) -> Recording:
         """One step of voltage that is held, recorded from ``before_s`` before its edge; the reference is the drive in V.
 
-        Raises
-        ------
-        RecordingSpoilt
-            Missed trigger, or a drive that did not reach its voltage.
+        Raises RecordingSpoilt: missed trigger, or a drive that did not reach its voltage.
         """
         self.write_all(function="SQU", frequency=0.5 / hold_s, before=before_s)
         recording = self._record(volts, 0.5 / hold_s, before_s + 1.5 * hold_s, slots, cycles=1.0)
@@ -117,7 +108,6 @@ class ScpiGenerator(RecordingEquipment):
         return recording
 
     def make_safe(self) -> None:
-        """Switches the generator's output off."""
         self.values.write("output", "OFF")
 
     def _record(
@@ -146,5 +136,5 @@ class ScpiGenerator(RecordingEquipment):
         level, noise = tone_level(driven, recording.reference_rate_hz, frequency)
         if level <= SEEN * noise * np.sqrt(2.0 / driven.size):
             return 0.0
-        refuse_flat(np.abs(driven), self.name, FLAT_SHARE_OF_SINE * driven.size)
+        self.refuse_flat(np.abs(driven), FLAT_SHARE_OF_SINE * driven.size)
         return level

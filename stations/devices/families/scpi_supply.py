@@ -27,13 +27,9 @@ class ScpiSupply(Equipment):
     def set_voltage(self, volt: float) -> float:
         """Sets the voltage, V, and returns its ratio to the nominal one.
 
-        Raises
-        ------
-        StationRefused
-            The supply reports an error, its memory 1 holds no voltage, or the order is far from that voltage: a recipe that was
-            written for devices with another supply would destroy these.
-        OperatorNeeded
-            The measured voltage is not the one that was set.
+        Raises StationRefused: the supply reports an error, its memory 1 holds no voltage, or the order is far from that
+            voltage: a recipe that was written for devices with another supply would destroy these.
+        Raises OperatorNeeded: the measured voltage is not the one that was set.
         """
         if self._nominal_V <= 0.0:
             self._forget_errors()

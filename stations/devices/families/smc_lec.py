@@ -9,6 +9,7 @@ class StepDataAxis(TableAxis):
     needs = (
         "serial_mode", "servo_on", "reset", "state", "step_data", "start", "feedback_position",
     )  # fmt: skip
+    coils = ("serial_mode", "servo_on")
 
     def state(self) -> DriveState:
         """Discrete inputs, read in one request; a move has ended when BUSY is off and INP is on."""
@@ -18,10 +19,6 @@ class StepDataAxis(TableAxis):
             alarm = "emergency stop at the drive"
         busy, arrived = inputs["busy"] == "on", inputs["in_position"] == "on"
         return DriveState(inputs["servo_ready"] == "on", inputs["homed"] == "on", busy, arrived and not busy, alarm)
-
-    def prepare(self) -> None:
-        """Selects the serial line as the source of commands and switches the servo on."""
-        self._switch_on()
 
     def order(self, target: float) -> None:
         """Writes the step data, which start no move, and reads them back; then writes the start register."""

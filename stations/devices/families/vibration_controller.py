@@ -5,16 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from schemas.errors import OperatorNeeded, StationTimeout
-from stations.devices.equipment import (
-    FLAT_SHARE_OF_SINE,
-    Recording,
-    RecordingEquipment,
-    RecordingSpoilt,
-    refuse_clipped_random,
-    refuse_flat,
-    refuse_motion,
-    refuse_random_motion,
-)
+from stations.devices.equipment import FLAT_SHARE_OF_SINE, Recording, RecordingEquipment, RecordingSpoilt
 
 POLL_S = 0.5
 GRACE_S = 30.0
@@ -31,17 +22,14 @@ class VibrationController(RecordingEquipment):
     def sine(self, frequency: float, level: float, axis: int, seconds: float, slots: Sequence[int]) -> Recording:
         """A dwell at one frequency in Hz with a peak level in g, along an axis (0 to 2) of the units.
 
-        Raises
-        ------
-        RecordingSpoilt
-            Missed trigger, clipped reference, or a level that was not reached.
-        OperatorNeeded
-            The controller has aborted: its interlock or a limit must be looked after first; or the order is beyond the exciter.
+        Raises RecordingSpoilt: missed trigger, clipped reference, or a level that was not reached.
+        Raises OperatorNeeded: the controller has aborted: its interlock or a limit must be looked after first; or the order
+            is beyond the exciter.
         """
-        refuse_motion(self.values.profile, self.name, frequency, level)
+        self.refuse_sine(frequency, level)
         self.write_all(frequency=frequency, level=level, duration=seconds, axis=float(axis))
         recording = self._run("SINE", seconds, slots)
-        refuse_wrong_sine(recording.reference[:, axis], frequency, level, self.name)
+        self._refuse_wrong_sine(recording.reference[:, axis], frequency, level)
         return recording
 
     def sine_across(
@@ -51,35 +39,26 @@ class VibrationController(RecordingEquipment):
 
         At 0° the motion is along the next axis (x after z), at 90° along the one after it.
 
-        Raises
-        ------
-        RecordingSpoilt, OperatorNeeded
-            As for :meth:`sine`.
+        Raises RecordingSpoilt, OperatorNeeded: as for :meth:`sine`.
         """
-        refuse_motion(self.values.profile, self.name, frequency, level)
+        self.refuse_sine(frequency, level)
         self.write_all(frequency=frequency, level=level, duration=seconds, axis=float(axis), turn=angle_deg)
         recording = self._run("ACROSS", seconds, slots)
-        turn = np.radians(angle_deg)
-        moved = recording.reference[:, (axis + 1) % 3] * np.cos(turn) + recording.reference[:, (axis + 2) % 3] * np.sin(
-            turn
-        )
-        refuse_wrong_sine(moved, frequency, level, self.name)
+        turn, (one, two) = np.radians(angle_deg), (recording.reference[:, (axis + k) % 3] for k in (1, 2))
+        self._refuse_wrong_sine(one * np.cos(turn) + two * np.sin(turn), frequency, level)
         return recording
 
     def random(self, profile: str, level: float, axis: int, seconds: float, slots: Sequence[int]) -> Recording:
         """Random vibration by a profile that the controller has, ``level`` in g rms.
 
-        Raises
-        ------
-        RecordingSpoilt, OperatorNeeded
-            As for :meth:`sine`; the exciter must follow peaks of three sigma.
+        Raises RecordingSpoilt, OperatorNeeded: as for :meth:`sine`; the exciter must follow peaks of three sigma.
         """
-        refuse_random_motion(self.values.profile, self.name, profile, level)
+        self.refuse_random(profile, level)
         self.write_all(profile=profile, level=level, duration=seconds, axis=float(axis))
         recording = self._run("RANDOM", seconds, slots)
         driven = recording.reference[:, axis]
         n = len(driven)
-        refuse_clipped_random(driven, self.name)
+        self.refuse_clipped_random(driven)
         reached = float(np.std(driven[n // 4 : 3 * n // 4]))
         if not abs(reached / level - 1.0) <= LEVEL_SHARE:
             raise RecordingSpoilt(
@@ -88,7 +67,6 @@ class VibrationController(RecordingEquipment):
         return recording
 
     def make_safe(self) -> None:
-        """Stops the exciter."""
         self.values.write("stop", "NOW")
 
     def _run(self, kind: str, seconds: float, slots: Sequence[int]) -> Recording:
@@ -107,13 +85,11 @@ class VibrationController(RecordingEquipment):
             )
         return self.recorded(before, slots, "recording of the test")
 
-
-def refuse_wrong_sine(reference: np.ndarray, frequency: float, level: float, name: str) -> None:
-    """Refuse a reference (n,) in g whose extremes are flat, or whose level is not the one that was ordered."""
-    driven = reference - reference.mean()
-    refuse_flat(np.abs(driven), name, FLAT_SHARE_OF_SINE * driven.size)
-    reached = float(np.sqrt(2.0 * np.mean(driven**2)))
-    if not abs(reached / level - 1.0) <= LEVEL_SHARE:
-        raise RecordingSpoilt(
-            f"{name}: {reached:.4g} g at {frequency:g} Hz, {level:g} g was ordered; check amplifier and fixture"
-        )
+    def _refuse_wrong_sine(self, reference: np.ndarray, frequency: float, level: float) -> None:
+        """Refuse a reference (n,) in g whose extremes are flat, or whose level is not the one that was ordered."""
+        driven = reference - reference.mean()
+        self.refuse_flat(np.abs(driven), FLAT_SHARE_OF_SINE * driven.size)
+        reached = float(np.sqrt(2.0 * np.mean(driven**2)))
+        if not abs(reached / level - 1.0) <= LEVEL_SHARE:
+            what = f"{reached:.4g} g at {frequency:g} Hz, {level:g} g was ordered; check amplifier and fixture"
+            raise RecordingSpoilt(f"{self.name}: {what}")

@@ -16,7 +16,6 @@ class F4Chamber(ThermalChamber):
         return AUTOMATIC if state.startswith("static") else state
 
     def require_ready(self) -> None:
-        """Refuses other units than °C and a running program."""
         unit = self._values.text("temperature_unit")
         if unit != CELSIUS:
             self.refuse(f"shows {unit}", CELSIUS, "set the controller's unit")

@@ -13,11 +13,9 @@ class F4TChamber(ThermalChamber):
     )  # fmt: skip
 
     def mode(self) -> str:
-        """The actual mode of the loop."""
         return self._values.text("actual_mode")
 
     def require_ready(self) -> None:
-        """Refuses other units than °C, an alarm and a running program."""
         unit, alarm = self._values.text("temperature_unit"), self._values.text("alarm_1")
         if unit != CELSIUS:
             self.refuse(f"shows {unit}", CELSIUS, "set the controller's unit")
@@ -26,7 +24,6 @@ class F4TChamber(ThermalChamber):
         refuse_program(self.name, self._values.text("program_state"))
 
     def off(self) -> None:
-        """Ends a running program, then switches the loop off."""
         if self._values.text("program_state") in RUNNING:
             self._values.write("program_end", "act")
         super().off()

@@ -1,6 +1,7 @@
 """The simulated centrifuge behind an ACUTROL 3000: mountings at several radii, arm stretch, proof masses, a recorder."""
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
@@ -9,21 +10,15 @@ from schemas.units import AXES, STANDARD_GRAVITY_M_S2
 from stations.codec import OUTPUTS
 from stations.plant.bench import Bench, Waveforms
 from stations.plant.device import stream
-from stations.plant.equipment import ResultFiles
+from stations.plant.equipment import UNKNOWN, WRONG, ResultFiles
 from stations.plant.world import World
 
-UNKNOWN, WRONG = "NA:CMD ERR", "NA:PARA ERR"
 RADIUS_M = 0.5  # of the usual mounting
 HOLE_M = 20e-6  # standard deviation of a mounting's radius about its nominal one
 STANDING_DEG_S = 0.01
 ACCELERATION_DEG_S2 = 100.0
 RECORD_HZ = 200.0
 IDLE_S = 900.0  # without a line for so long the machine stops by itself
-
-
-def simulated(world: World, profile: Profile) -> "Centrifuge":
-    """A centrifuge in front of the world's bench; its input axis is z, or x of a device without z, radial."""
-    return Centrifuge(world)
 
 
 def radius_error(bench: Bench, radius_m: float) -> float:
@@ -36,10 +31,10 @@ def radius_error(bench: Bench, radius_m: float) -> float:
 class Centrifuge:
     """Follows the demanded rate at constant acceleration; an open interlock or a long silence brings it to rest.
 
-    Units are mounted (direction, radius) at rest only, with the interlock open.
+    Units are mounted (direction, radius) at rest only, with the interlock open; radial is their z, or x of a device without z.
     """
 
-    def __init__(self, world: World) -> None:
+    def __init__(self, world: World, profile: Profile) -> None:
         self._world = world
         self._from, self._to, self._since_us = 0.0, 0.0, 0
         self._closed, self._direction, self._asked = False, 1.0, 0.0
@@ -48,19 +43,28 @@ class Centrifuge:
         self._number, self._seconds, self._start_us = 0, 0.0, 0
         self._files = ResultFiles()
 
-    def answer(self, line: str) -> tuple[str, bool]:  # noqa: PLR0911 - one a kind of line
-        """The answer to a line, and whether the line changed anything."""
+    def answer(self, line: str) -> tuple[str, bool]:
         self._watch()
         head, _, value = line.partition(",")
-        if line in {":read:rate? 1", ":interlock? 1", ":rec:file?", ":mode? 1", ":int? 1", ":mount? 1", ":radius? 1"}:
-            return self._report(line), False
+        reports: dict[str, Callable[[], str]] = {
+            ":read:rate? 1": lambda: f"{self.rate():.6f}",
+            ":mount? 1": lambda: f"{self._direction:.0f}",
+            ":radius? 1": lambda: f"{self._radius:.6f}",
+            ":interlock? 1": lambda: (
+                f"Fault {self._tripped}" if self._tripped else "Closed" if self._closed else "Open"
+            ),
+            ":rec:file?": self._file,
+            ":mode? 1": lambda: "rate",
+            ":int? 1": lambda: "close" if self._closed else "open",
+        }
+        if line in reports:
+            return reports[line](), False
         self._heard_us = self._world.now_us
-        if line in {":int:close 1", ":int:open 1"}:
-            self._closed = line.endswith("close 1")
-            if not self._closed:
+        if line in {":int:close 1", ":int:open 1", ":mode:off 1", ":mode:rate 1"}:
+            if line.startswith(":int:"):
+                self._closed = line.endswith("close 1")
+            if line == ":int:open 1":
                 self._go(0.0)
-            return "OK", True
-        if line in {":mode:off 1", ":mode:rate 1"}:
             return "OK", True
         try:
             number = float(value)
@@ -111,19 +115,9 @@ class Centrifuge:
         if self._to > 0.0 and self._world.now_us - self._heard_us > round(1e6 * IDLE_S):
             self._go(0.0)
 
-    def _report(self, line: str) -> str:
-        if line == ":read:rate? 1":
-            return f"{self.rate():.6f}"
-        if line in {":mount? 1", ":radius? 1"}:
-            return f"{self._direction:.0f}" if line == ":mount? 1" else f"{self._radius:.6f}"
-        if line == ":interlock? 1":
-            return f"Fault {self._tripped}" if self._tripped else ("Closed" if self._closed else "Open")
-        if line == ":rec:file?":
-            over = self._world.now_us >= self._start_us + round(1e6 * self._seconds)
-            return (
-                self._files.write(self._number, self._recorded, self._world.slots) if self._number and over else "NONE"
-            )
-        return "rate" if line == ":mode? 1" else ("close" if self._closed else "open")
+    def _file(self) -> str:
+        over = self._world.now_us >= self._start_us + round(1e6 * self._seconds)
+        return self._files.write(self._number, self._recorded, self._world.slots) if self._number and over else "NONE"
 
     def _recorded(self) -> Waveforms:
         bench = self._world.bench
@@ -139,3 +133,6 @@ class Centrifuge:
         reference = np.zeros((round(self._seconds * 10.0), 3))
         reference[:, 0] = self._to * (1.0 + 1e-6 * rng.standard_normal(len(reference)))
         return Waveforms(outputs, RECORD_HZ, reference, 10.0)
+
+
+simulated = Centrifuge

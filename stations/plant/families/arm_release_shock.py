@@ -4,24 +4,19 @@ import numpy as np
 
 from schemas.profile import Profile
 from stations.plant.bench import FINE_HZ, Waveforms
-from stations.plant.equipment import ResultFiles
+from stations.plant.equipment import UNKNOWN, ResultFiles, taken
 from stations.plant.world import World
 
-UNKNOWN, WRONG, REFUSED = "NA:CMD ERR", "NA:PARA ERR", "NA:NOT ARMED"
+REFUSED = "NA:NOT ARMED"
 FALL_S = 2.0
 BEFORE_S, AFTER_S = 0.06, 0.12
 JITTER = 0.03
 
 
-def simulated(world: World, profile: Profile) -> "Machine":
-    """A machine in front of the world's bench."""
-    return Machine(world)
-
-
 class Machine:
     """One shock a release; it disarms itself."""
 
-    def __init__(self, world: World) -> None:
+    def __init__(self, world: World, profile: Profile) -> None:
         self._world = world
         self._set = {"PEAK": 50.0, "DUR": 11.0, "AXIS": 2.0, "DIR": 1.0}
         self._armed, self._number, self._start_us, self._until_us = False, 0, 0, 0
@@ -30,16 +25,11 @@ class Machine:
         self._files = ResultFiles()
 
     def answer(self, line: str) -> tuple[str, bool]:
-        """The answer to a line, and whether the line changed anything."""
         head, _, value = line.partition(" ")
         if line.endswith("?"):
             return self._report(line[:-1]), False
         if head in self._set:
-            try:
-                self._set[head] = float(value)
-            except ValueError:
-                return WRONG, False
-            return "OK", True
+            return taken(self._set, head, value)
         if head == "ARM":
             self._armed = value == "ON"
             return "OK", True
@@ -77,15 +67,16 @@ class Machine:
         self._start_us, self._conditions = world.now_us, frozenset(world.bench.conditions)
         self._until_us = world.now_us + round(1e6 * FALL_S)
         world.bench.hit(self._shape[0])
-        if "missed_trigger" not in world.bench.conditions:
-            self._number += 1
-            self._recorded_one = True
+        self._recorded_one = "missed_trigger" not in world.bench.conditions
+        self._number += self._recorded_one
         return "OK", True
 
     def _waveforms(self) -> Waveforms:
         peak, duration = self._shape
         t = np.arange(round((BEFORE_S + duration + AFTER_S) * FINE_HZ)) / FINE_HZ - BEFORE_S
         pulse = np.where((t >= 0.0) & (t <= duration), peak * np.sin(np.pi * t / duration), 0.0)
-        return self._world.bench.transient(
-            self._set["DIR"] * pulse, int(self._set["AXIS"]), self._start_us, conditions=self._conditions
-        )
+        axis, force = int(self._set["AXIS"]), self._set["DIR"] * pulse
+        return self._world.bench.transient(force, axis, self._start_us, conditions=self._conditions)
+
+
+simulated = Machine

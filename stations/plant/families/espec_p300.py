@@ -3,11 +3,12 @@
 import re
 
 from schemas.profile import Profile
+from stations.plant.equipment import UNKNOWN, WRONG
 from stations.plant.world import World
 
 SET = re.compile(r"TEMP, S(-?\d+(?:\.\d+)?)")
 MODES = {"CONSTANT": True, "STANDBY": False, "OFF": False}
-UNKNOWN, OUTSIDE, WRONG = "NA:CMD ERR", "NA:DATA OUT OF RANGE", "NA:PARA ERR"
+OUTSIDE = "NA:DATA OUT OF RANGE"
 
 
 class P300:
@@ -20,14 +21,11 @@ class P300:
         self._mode = "CONSTANT"
 
     def answer(self, line: str) -> tuple[str, bool]:
-        """The answer to a line, and whether the line changed anything."""
         if line.endswith("?"):
             return self._report(line), False
         if line.startswith("TEMP,"):
             return self._set(line)
-        if line.startswith("MODE,"):
-            return self._switch(line)
-        return UNKNOWN, False
+        return self._switch(line) if line.startswith("MODE,") else (UNKNOWN, False)
 
     def _report(self, query: str) -> str:
         chamber = self._world.fixture.chamber

@@ -14,7 +14,7 @@ HEADS = {"peak": "PEAK", "duration": "DUR", "axis": "AXIS", "direction": "DIR"}
 
 def simulated(world: World, profile: Profile) -> Bank:
     """The registers of a machine in front of the world's bench."""
-    machine = Machine(world)
+    machine = Machine(world, profile)
 
     def report(head: str) -> str:
         return machine.answer(f"{head}?")[0]

@@ -20,11 +20,6 @@ NUMBERS = {
 }
 
 
-def simulated(world: World, profile: Profile) -> "Generator":
-    """A generator in front of the world's bench, in the role of its profile."""
-    return Generator(world, steps=profile.kind == "step_generator")
-
-
 def exciter_gain(frequency: float) -> float:
     """Acceleration over the amplifier's input, g/V: a mass on its suspension above the suspension's resonance."""
     r2 = (frequency / SUSPENSION_HZ) ** 2
@@ -34,9 +29,9 @@ def exciter_gain(frequency: float) -> float:
 class Generator(ScpiDevice):
     """Finite bursts; a burst that is not ended is over after its cycles."""
 
-    def __init__(self, world: World, *, steps: bool) -> None:
+    def __init__(self, world: World, profile: Profile) -> None:
         super().__init__()
-        self._world, self._steps = world, steps
+        self._world, self._steps = world, profile.kind == "step_generator"
         self._set = {
             "SOUR1:FREQ": 160.0, "SOUR1:VOLT": 0.0, "SOUR1:BURS:NCYC": 1.0, "ACQ:LENG": 0.1, "ACQ:BEF": 0.0, "ROUT:AXIS": 2.0,
         }  # fmt: skip
@@ -46,13 +41,11 @@ class Generator(ScpiDevice):
         self._files = ResultFiles()
 
     def answer(self, line: str) -> tuple[str, bool]:
-        """The answer to a line, and whether the line changed anything."""
         if line.endswith("?") and not line.endswith(";*OPC?"):
             return self._report(line[:-1])
         head, _, value = line.removesuffix(";*OPC?").partition(" ")
         if head in NUMBERS:
-            number = self.ordered(value, *NUMBERS[head])
-            self._set[head] = self._set[head] if number is None else number
+            self._set[head] = self.ordered(value, *NUMBERS[head], self._set[head])
         elif head == "SOUR1:FUNC" and value in {"SIN", "SQU"}:
             self._function = value
         elif head == "OUTP1" and value in {"ON", "OFF"}:
@@ -75,12 +68,8 @@ class Generator(ScpiDevice):
             done = self._there and world.now_us >= self._until_us
             unit = "V" if self._steps else "g"
             return (self._files.write(self._number, self._recorded, world.slots, unit) if done else "NONE"), False
-        texts = {
-            "SOUR1:FUNC": self._function,
-            "OUTP1": str(int(self._on)),
-            **{k: f"{v:.7g}" for k, v in self._set.items()},
-        }
-        return texts.get(head, ""), False
+        texts = {"SOUR1:FUNC": self._function, "OUTP1": str(int(self._on))}
+        return (f"{self._set[head]:.7g}" if head in self._set else texts.get(head, "")), False
 
     def _level(self) -> float:
         return exciter_gain(self._set["SOUR1:FREQ"]) * self._set["SOUR1:VOLT"]
@@ -89,21 +78,20 @@ class Generator(ScpiDevice):
         world, conditions = self._world, self._world.bench.conditions
         too_far = not self._steps and self._level() > exciter_reach(self._set["SOUR1:FREQ"])
         self._fault = "controller_abort" in conditions or too_far
-        self._there = False
+        self._there = self._on and not self._fault and "missed_trigger" not in conditions
         if self._fault:
             return
         self._start_us, self._conditions = world.now_us, frozenset(conditions)
         self._until_us = world.now_us + round(1e6 * (self._set["ACQ:LENG"] + SETTLE_S))
-        if self._on and "missed_trigger" not in conditions:
-            self._number += 1
-            self._there = True
+        self._number += self._there
 
     def _recorded(self) -> Waveforms:
         bench, seconds = self._world.bench, self._set["ACQ:LENG"]
         if self._steps:
-            hold = 0.5 / self._set["SOUR1:FREQ"]
-            return bench.self_test(
-                self._set["SOUR1:VOLT"], hold, self._set["ACQ:BEF"], seconds, self._start_us, self._conditions
-            )
+            volts, hold, before = self._set["SOUR1:VOLT"], 0.5 / self._set["SOUR1:FREQ"], self._set["ACQ:BEF"]
+            return bench.self_test(volts, hold, before, seconds, self._start_us, self._conditions)
         axis = int(self._set["ROUT:AXIS"])
         return bench.sine(self._set["SOUR1:FREQ"], self._level(), axis, seconds, self._start_us, self._conditions)
+
+
+simulated = Generator

@@ -20,19 +20,14 @@ class Supply(ScpiDevice):
         self._range = (command.minimum or 0.0, command.maximum or 60.0)
 
     def answer(self, line: str) -> tuple[str, bool]:
-        """The answer to a line, and whether the line changed anything."""
         head, _, value = line.removesuffix(";*OPC?").partition(" ")
-        if line == "VOLT?":
-            return f"{self._set:.6f}", False
-        if line == "MEAS:VOLT?":
-            return f"{self._voltage():.6f}", False
-        if line == "OUTP?":
-            return str(int(self._on)), False
+        reports = {"VOLT?": f"{self._set:.6f}", "MEAS:VOLT?": f"{self._voltage():.6f}", "OUTP?": str(int(self._on))}
+        if line in reports:
+            return reports[line], False
         if line == "SYST:ERR?":
             return self.told_error()
         if head == "VOLT":
-            volt = self.ordered(value, *self._range)
-            self._set = self._set if volt is None else volt
+            self._set = self.ordered(value, *self._range, self._set)
         elif head == "OUTP" and value in {"ON", "OFF"}:
             self._on = value == "ON"
         elif head == "*RCL" and value == "1":

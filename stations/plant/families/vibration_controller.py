@@ -6,17 +6,15 @@ from numpy.typing import NDArray
 from schemas.profile import Profile
 from schemas.vibration_profile import load_vibration_profile
 from stations.plant.bench import Waveforms
-from stations.plant.equipment import ResultFiles, exciter_reach
+from stations.plant.equipment import UNKNOWN, ResultFiles, exciter_reach, taken
 from stations.plant.world import World
 
-UNKNOWN, WRONG, BUSY = "NA:CMD ERR", "NA:PARA ERR", "NA:BUSY"
+BUSY = "NA:BUSY"
 SETTLE_S = 0.5
 RANDOM_FINE_HZ, RANDOM_HZ = 25600.0, 12800.0
-
+REST_S, RAMP_S = 1.0, 0.05
 
 Array = NDArray[np.float64]
-REST_S = 1.0
-RAMP_S = 0.05
 
 
 class Controller:
@@ -31,7 +29,6 @@ class Controller:
         self._files = ResultFiles()
 
     def answer(self, line: str) -> tuple[str, bool]:  # noqa: PLR0911 - one return an order
-        """The answer to a line, and whether the line changed anything."""
         head, _, value = line.partition(" ")
         if line == "STAT?":
             state = "RUN,-" if self._world.now_us < self._until_us else "DONE,-"
@@ -40,7 +37,7 @@ class Controller:
             done = self._kind and self._number and self._world.now_us >= self._until_us
             return (self._files.write(self._number, self._recorded, self._world.slots) if done else "NONE"), False
         if head in self._set:
-            return self._change(head, value)
+            return (BUSY, False) if self._world.now_us < self._until_us else taken(self._set, head, value)
         if head == "PROFILE":
             self._density = value
             return "OK", True
@@ -53,15 +50,6 @@ class Controller:
         if line.endswith("?") and line[:-1] in self._set:
             return f"{self._set[line[:-1]]:.7g}", False
         return UNKNOWN, False
-
-    def _change(self, head: str, value: str) -> tuple[str, bool]:
-        if self._world.now_us < self._until_us:
-            return BUSY, False
-        try:
-            self._set[head] = float(value)
-        except ValueError:
-            return WRONG, False
-        return "OK", True
 
     def _run(self, kind: str) -> tuple[str, bool]:
         world, conditions = self._world, self._world.bench.conditions

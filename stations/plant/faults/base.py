@@ -24,8 +24,6 @@ class Kind:
 
     A resumed plant replays the writes alone.
 
-    Parameters
-    ----------
     meaning : what happens, in one sentence
     targets : what the fault can be given for: ``unit`` (by its serial number) or the station's devices by name; empty for none
     figures : its figures with their defaults
@@ -48,8 +46,7 @@ class Kind:
     action: ActionKind | None = None
 
 
-KINDS: dict[str, Kind] = {}
-"""The kinds by name; each module of this folder adds its own when it is imported."""
+KINDS: dict[str, Kind] = {}  # the kinds by name; each module of this folder adds its own when it is imported
 
 
 def add(*kinds: Kind) -> None:

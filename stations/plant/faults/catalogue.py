@@ -11,8 +11,7 @@ from schemas.fault import FaultOrder
 from stations.plant import faults
 from stations.plant.faults.base import KINDS, UNIT, Fault, Kind
 
-TIMES = ("at_s", "for_s")
-"""Keys of every order: start and duration."""
+TIMES = ("at_s", "for_s")  # keys of every order: start and duration
 
 
 @cache
@@ -39,9 +38,7 @@ def fault_rows() -> list[dict[str, str]]:
 def build_fault(order: FaultOrder, serials: Sequence[str]) -> Fault:
     """The fault that an order describes, for a lot of these serial numbers.
 
-    Raises
-    ------
-    RecipeInvalid : the kind, a figure or the unit does not exist, or the kind needs another target
+    Raises RecipeInvalid: the kind, a figure or the unit does not exist, or the kind needs another target
     """
     known = kinds()
     if order.kind not in known:

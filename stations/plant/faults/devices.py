@@ -1,8 +1,8 @@
-"""Faults of table, chamber and units, of the reader and its sensors, of the emergency stop, and of the computer's clock."""
+"""Faults of table, chamber and units with their memory, reader, sensors, emergency stop, test equipment, computer's clock."""
 
 from typing import Any
 
-from stations.plant.faults.base import AXES, UNIT, Effect, Fault, fault
+from stations.plant.faults.base import AXES, UNIT, Effect, Fault, Kind, add, fault
 from stations.plant.fixture import Chamber
 from stations.plant.world import World
 
@@ -148,3 +148,57 @@ def swapped_slots(fault: Fault, world: World) -> Effect:
     seats[unit], seats[other] = seats[other], seats[unit]
     yield
     seats[unit], seats[other] = seats[other], seats[unit]
+
+
+@fault(UNIT)
+def memory_bad_block(fault: Fault, world: World, copy: float = 0.0, word: float = 40.0) -> Effect:
+    """A word of a unit's memory no longer keeps some bits: word ``word`` of copy A (``copy`` 0) or B (1)."""
+    stuck = world.flash[fault.unit].stuck
+    stuck[int(copy), int(word)] = 0xFF00
+    yield
+    stuck.clear()
+
+
+@fault(UNIT)
+def memory_power_lost(fault: Fault, world: World, after_s: float = 0.45) -> None:
+    """The supply of the devices fails for a second, ``after_s`` after the next command to program the unit's memory."""
+    world.flash[fault.unit].lose_power_s = after_s
+
+
+@fault(UNIT)
+def memory_worn(fault: Fault, world: World, left: float = 0.0) -> None:
+    """The memory of a unit has ``left`` of its specified erasures left."""
+    flash = world.flash[fault.unit]
+    flash.erases = [flash.endurance - int(left)] * 2
+
+
+CONDITIONS = {
+    "missed_trigger": "The recorder misses its trigger: the test leaves no recording.",
+    "clipped_reference": "The conditioner of the reference sensor clips.",
+    "controller_abort": "The controller aborts every test: its interlock is open.",
+    "level_not_reached": "The exciter reaches a third of its level, the shock machine a third of its peak.",
+    "guard_door": "The guard door of shock machine or centrifuge is open: it does not start, and stops.",
+    "overspeed": "The centrifuge's speed monitor trips.",
+    "current_limit": "The current limit of the power supply holds a raised voltage a tenth too low.",
+    "reference_cable_off": "The cable of the reference sensor on the exciter or shock machine is loose: its channel shows "
+    "noise alone.",
+    "drive_runaway": "The drive of the centrifuge turns half as fast again as it is told, and its speed monitor does not trip.",
+}
+"""Conditions of the bench, for which the simulated controllers look."""
+
+
+def _condition(fault: Fault, world: World) -> Effect:
+    world.bench.conditions.add(fault.kind.name)
+    yield
+    world.bench.conditions.discard(fault.kind.name)
+
+
+add(*(Kind(name, meaning, effect=_condition) for name, meaning in CONDITIONS.items()))
+
+
+@fault(UNIT)
+def cable_off(fault: Fault, world: World) -> Effect:
+    """The cable of a unit on the test equipment is off: noise alone is recorded."""
+    world.bench.cable_off.add(fault.unit)
+    yield
+    world.bench.cable_off.discard(fault.unit)

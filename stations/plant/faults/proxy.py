@@ -57,13 +57,12 @@ class ChaosProxy:
     ``frames`` counts the frames by direction, ``applied`` lists the actions on them.
     """
 
-    def __init__(self, host: str, port: int, script: Script = untouched, seed: int = 0) -> None:
+    def __init__(self, host: str, port: int, script: Script = untouched) -> None:
         self._target = (host, port)
         self.script = script
         self.host, self.port = "127.0.0.1", 0
         self.frames: dict[Way, int] = {"request": 0, "reply": 0}
         self.applied: list[WireAction] = []
-        self._seed = seed
         self._once: deque[WireAction] = deque()
         self._late: dict[Way, deque[bytes]] = {"request": deque(), "reply": deque()}
         self._lock = threading.Lock()
@@ -132,10 +131,10 @@ class ChaosProxy:
             self._late[way].append(frame)
 
     def garbled(self, frame: bytes, size: int) -> bytes:
-        """A frame with ``size`` of its bytes changed; seed and frame count decide which."""
+        """A frame with ``size`` of its bytes changed; the frame count decides which."""
         out = bytearray(frame)
         for n in range(size):
-            mix = (self._seed * 2654435761 + sum(self.frames.values()) * 40503 + n * 977) & 0xFFFFFFFF
+            mix = (sum(self.frames.values()) * 40503 + n * 977) & 0xFFFFFFFF
             out[mix % len(out)] ^= 1 + (mix >> 8) % 255
         return bytes(out)
 

@@ -12,8 +12,6 @@ Array = NDArray[np.float64]
 class Block:
     """Quantities during a block of samples: n instants, s units.
 
-    Parameters
-    ----------
     time, since_power, vibration, humidity : (n,), s, s, g rms, % of the air around the devices
     temperature : (n, s), °C of the sensing element
     memory : (n, s, 3), the result of ``slow`` of the effect for these instants
@@ -53,5 +51,5 @@ class HiddenEffect:
         """The supply of the devices is switched at ``now`` s; it is on at the start."""
 
     def output(self, force: Array, block: Block) -> Array | float:
-        """Addition to the outputs, (n, s, 3), g, under ``force`` (n, s, 3)."""
+        """Addition to the outputs, (n, s, 3) or (n, 1, 1), g, under ``force`` (n, s, 3)."""
         return 0.0

@@ -16,11 +16,10 @@ class CubicTransfer(HiddenEffect):
     """A hardening spring: the mass moves by x with f = x + hardening·x³, and the pick-off reads x."""
 
     hardening: float = 100e-6  # per g²
-    spread: float = 0.3
+    spread: float = 0.3  # over the units
     _unit: Array = field(default_factory=lambda: np.zeros(0), init=False)
 
     def begin(self, units: int, stream: np.random.Generator) -> None:
-        """Draws the spring of each unit."""
         self._unit = self.hardening * (1.0 + self.spread * stream.standard_normal((units, 3)))
 
     def output(self, force: Array, block: Block) -> Array:
@@ -36,18 +35,16 @@ class PendulousMass(HiddenEffect):
     """A pendulous mass: load turns the arm by compliance·f, so that the axis becomes slightly sensitive to its neighbour."""
 
     compliance: float = 100e-6  # rad per g
-    spread: float = 0.3
+    spread: float = 0.3  # over the units
     _unit: Array = field(default_factory=lambda: np.zeros(0), init=False)
 
     def begin(self, units: int, stream: np.random.Generator) -> None:
-        """Draws the hinge of each unit."""
         self._unit = self.compliance * (1.0 + self.spread * stream.standard_normal((units, 3)))
 
     def output(self, force: Array, block: Block) -> Array:
         """Force along the turned axis minus that along the axis at rest; the arm of x turns towards y, and so on."""
-        across = np.roll(force, -1, axis=-1)
         angle = self._unit * force
-        return force * (np.cos(angle) - 1.0) + across * np.sin(angle)
+        return force * (np.cos(angle) - 1.0) + np.roll(force, -1, axis=-1) * np.sin(angle)
 
 
 @dataclass
@@ -77,8 +74,7 @@ class VibrationRectification(HiddenEffect):
     coefficient: float = 2e4  # g per g²
 
     def output(self, force: Array, block: Block) -> Array:
-        """The rectified vibration."""
-        return np.broadcast_to((self.coefficient * block.vibration**2)[:, None, None], force.shape)
+        return (self.coefficient * block.vibration**2)[:, None, None]
 
 
 @dataclass
@@ -98,7 +94,6 @@ class HysteresisPlay(HiddenEffect):
         return np.repeat((self._pin - temperature)[:, None], 3, axis=1)
 
     def output(self, force: Array, block: Block) -> Array:
-        """Stress of the backlash state."""
         return self.gain * block.memory
 
 
@@ -118,7 +113,6 @@ class ElementLag(HiddenEffect):
         return np.repeat((self._inside - temperature)[:, None], 3, axis=1)
 
     def output(self, force: Array, block: Block) -> Array:
-        """Bias of the element at its temperature minus that at the temperature of the thermometer."""
         return self.tempco * block.memory
 
 
@@ -132,15 +126,12 @@ class WarmUp(HiddenEffect):
     _switched: float = field(default=0.0, init=False)
 
     def power(self, now: float, *, on: bool) -> None:
-        """Updates the missing fraction of the self-heating."""
         decay = math.exp(-(now - self._switched) / self.tau)
         self._cold = 1.0 - (1.0 - self._cold) * decay if on else self._cold * decay
         self._switched = now
 
     def output(self, force: Array, block: Block) -> Array:
-        """Remaining bias of the warm-up."""
-        remaining = self.size * self._cold * np.exp(-block.since_power / self.tau)
-        return np.broadcast_to(remaining[:, None, None], force.shape)
+        return (self.size * self._cold * np.exp(-block.since_power / self.tau))[:, None, None]
 
 
 @dataclass
@@ -155,11 +146,9 @@ class MoistureSwelling(HiddenEffect):
     _sensitivity: Array = field(default_factory=lambda: np.ones((1, 3)), init=False)
 
     def begin(self, units: int, stream: np.random.Generator) -> None:
-        """Draws the sensitivity of each axis of each device."""
         self._sensitivity = stream.choice([-1.0, 1.0], (units, 3)) * stream.uniform(0.6, 1.4, (units, 3))
 
     def output(self, force: Array, block: Block) -> Array:
-        """Bias relative to that at the usual humidity."""
         swollen = _uptake(block.humidity / 100.0) - _uptake(np.array(MIDDLE_PCT / 100.0))
         return self.swelling * swollen[:, None, None] * self._sensitivity
 
@@ -179,12 +168,10 @@ class StressRelaxation(HiddenEffect):
     longest: float = 3e6
 
     def output(self, force: Array, block: Block) -> Array:
-        """Relaxation since the start of the run."""
         count = 1 + math.ceil(2.0 * math.log(self.longest / self.shortest))
         times = np.geomspace(self.shortest, self.longest, count)
         each = self.size * math.log(times[1] / times[0])
-        relaxed = each * np.sum(1.0 - np.exp(-block.time[:, None] / times), axis=1)
-        return np.broadcast_to(relaxed[:, None, None], force.shape)
+        return (each * np.sum(1.0 - np.exp(-block.time[:, None] / times), axis=1))[:, None, None]
 
 
 @dataclass
@@ -195,6 +182,4 @@ class StepChange(HiddenEffect):
     at: float = 3000.0
 
     def output(self, force: Array, block: Block) -> Array:
-        """The bias step."""
-        jump = np.where(block.time >= self.at, self.size, 0.0)
-        return np.broadcast_to(jump[:, None, None], force.shape)
+        return np.where(block.time >= self.at, self.size, 0.0)[:, None, None]

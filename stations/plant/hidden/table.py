@@ -21,7 +21,6 @@ class LevelError(HiddenEffect):
     about_y: float = -100e-6
 
     def up(self, direction: Array) -> Array:
-        """The vertical in the frame of the base."""
         x, y, z = direction
         y, z = (
             y * math.cos(self.about_x) + z * math.sin(self.about_x),
@@ -43,7 +42,6 @@ class EncoderHarmonic(HiddenEffect):
     phase: float = 0.7
 
     def table(self, outer: Array, inner: Array) -> tuple[Array, Array]:
-        """Angles of the shafts."""
         return outer + self.size * np.sin(self.order * outer + self.phase), inner
 
 
@@ -55,7 +53,6 @@ class SlotRotation(HiddenEffect):
     _vector: Array = field(default_factory=lambda: np.zeros(0), init=False)
 
     def begin(self, units: int, stream: np.random.Generator) -> None:
-        """Draws the rotation of each slot."""
         self._vector = self.size * stream.standard_normal((units, 3))
 
     def force(self, force: Array) -> Array:
