@@ -11,6 +11,9 @@ import pandas as pd
 
 from inertial.quantities import OUTPUT_COLUMNS, SPREAD_COLUMNS
 from pipelines.archive import Archive, Run, code_hash, stage_key
+from pipelines.archive.buffered_run import BufferedRun
+from pipelines.archive.provenance import provenance
+from pipelines.archive.run import START
 from pipelines.importers.files import SourceFile
 from pipelines.importers.judged import FitAnswer
 from pipelines.importers.mapping import OUTPUT_UNITS, Mapping
@@ -20,15 +23,6 @@ from pipelines.tables.dwell_table import output_axes
 from schemas.errors import WrongUse
 from schemas.foreign import shown
 from schemas.import_references import ImportReferences
-
-
-class _ImportedRun(Run):
-    """A run that captured nothing, which need not be begun to be known."""
-
-    @property
-    def records(self) -> None:
-        """None."""
-        return
 
 
 def keep_tables(
@@ -50,12 +44,14 @@ def keep_tables(
     key = stage_key("import", inputs, parameters, code)
     store = Archive(archive)
     store.prepare()
-    run = _ImportedRun(store, store.run_name("import", {"key": key}))
+    run = BufferedRun(store, store.run_name("import", {"key": key}))
+    if not (run.path / START).is_file():
+        run.begin({**provenance(), **about})
     if not run.has(tuple(tables), key):
         run.save("import", key, tables, {"inputs": inputs, "parameters": parameters, "code": code})
-    run = store.open_run("import", about, {"key": key})  # last: a full disk leaves no run without its tables
+    run.flush(last=START)  # together: a full disk leaves no run without its tables
     run.seal()
-    return run
+    return Run(store, run.id)
 
 
 def lot_of_import(units: list[str], dwells: pd.DataFrame | None = None) -> dict[str, Any]:

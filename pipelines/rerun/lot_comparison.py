@@ -11,8 +11,8 @@ from inertial.correction import correct
 from inertial.design import carried_over
 from inertial.errors import InertialError
 from pipelines.archive import Archive, Run
+from pipelines.archive.buffered_run import BufferedRun
 from pipelines.jobs.model_change import ModelChange
-from pipelines.rerun.buffered_run import BufferedRun
 from pipelines.rerun.partition import Batch
 from pipelines.rerun.selection import SelectedRun, entry_of
 from pipelines.rerun.steps import archived_job

@@ -8,12 +8,12 @@ from typing import Annotated, Any
 from threadpoolctl import ThreadpoolController
 
 from pipelines.archive import Archive, Run, files, stage_key
+from pipelines.archive.buffered_run import BufferedRun
 from pipelines.archive.locks import alone
 from pipelines.archive.provenance import provenance
 from pipelines.archive.run import START
 from pipelines.chain.chain import RECORDS
 from pipelines.jobs.model_change import ModelChange
-from pipelines.rerun.buffered_run import BufferedRun
 from pipelines.rerun.steps import RAW, Plan, StageCall, plan_of
 from pipelines.tables.leave_out import Dwells
 from schemas.errors import DataRejected

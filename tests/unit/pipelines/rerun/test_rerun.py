@@ -13,10 +13,10 @@ from capture_double import CaptureDouble, measured_run, small_job, small_run
 from each import each
 
 from pipelines.archive import Archive, Run, code_hash
+from pipelines.archive.buffered_run import BufferedRun
 from pipelines.integrity import verify
 from pipelines.jobs.model_change import ModelChange, change_from_options
 from pipelines.rerun import steps
-from pipelines.rerun.buffered_run import BufferedRun
 from pipelines.rerun.partition import Batch, run_again
 from pipelines.rerun.reproduce import LEFT_OUT, SAME, check
 from pipelines.rerun.rerun import RerunOutcome, again

@@ -1,5 +1,6 @@
 """A table of dwells from elsewhere, as it is: without the scatter of samples, and with a bad dwell of one unit of a lot."""
 
+import errno
 from contextlib import nullcontext
 from pathlib import Path
 
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 
 from inertial.noise.flicker import flicker_kernel
 from inertial.noise.measurands import walk_kernel
-from pipelines.archive import Archive, files
+from pipelines.archive import Archive
 from pipelines.diagnosis.import_document import import_document
 from pipelines.importers.keep import complete_table
 from pipelines.integrity import verify
@@ -134,21 +135,21 @@ def test_an_import_of_a_table_of_dwells_takes_no_mapping(tmp_path: Path) -> None
     assert [unit["slot"] for unit in run.about["lot"]["units"]] == [3, 3, 3]
 
 
-def test_a_full_disk_leaves_no_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("last", ["dwells.parquet", "dwells.json", "run.json"])
+def test_a_full_disk_leaves_no_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, last: str) -> None:
     """A run of an import begins when its tables are there; the same import goes on where it was."""
     path = tmp_path / "lot.csv"
     table(np.random.default_rng(8)).to_csv(path, index=False)
-    publish = files.publish
+    arguments = ([path], {}, "", "", str(tmp_path / "archive"), None, nullcontext)
 
     def full(target: Path, data: bytes) -> None:
-        if target.suffix == ".parquet":
-            raise ArchiveUnusable("archive: no space left on device")
-        publish(target, data)
+        if target.name == last:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        target.write_bytes(data)
 
-    arguments = ([path], {}, "", "", str(tmp_path / "archive"), None, nullcontext)
     with monkeypatch.context() as patched:
-        patched.setattr(files, "publish", full)
-        with pytest.raises(ArchiveUnusable):
+        patched.setattr("pipelines.archive.files._write_durably", full)
+        with pytest.raises(ArchiveUnusable, match="No space left"):
             import_document(*arguments)
     archive = Archive(str(tmp_path / "archive"))
     assert archive.runs() == []

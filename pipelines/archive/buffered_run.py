@@ -8,9 +8,10 @@ from typing import Any
 import pandas as pd
 import pyarrow as pa
 
-from pipelines.archive import Archive, Run, files
+from pipelines.archive import files
+from pipelines.archive.archive import Archive
 from pipelines.archive.parquet import decoded
-from pipelines.archive.run import START
+from pipelines.archive.run import START, Run
 
 
 class BufferedRun(Run):
