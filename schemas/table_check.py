@@ -12,8 +12,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from schemas.errors import DataRejected
-from schemas.table import Column, Table
-from schemas.tables import TABLES
+from schemas.tables import TABLES, Column, Table
 
 if TYPE_CHECKING:
     from pandera.errors import SchemaError

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 _SAMPLES = (
-    *("schemas.errors", "schemas.table", "schemas.tables", "schemas.units", "schemas.version"),
+    *("schemas.errors", "schemas.tables", "schemas.units", "schemas.version"),
     *("inertial.frames", "pipelines.tables"),
 )
 _TABLES = (*_SAMPLES, "inertial.arrays", "inertial.errors", "inertial.quantities", "inertial.state")
