@@ -206,8 +206,8 @@ def _remarks(detected: Layout, lines: Sequence[str], encoding: str) -> tuple[str
 def without_thousands(lines: Sequence[str]) -> tuple[Sequence[str], str]:
     """Lines with their numbers without separators of thousands, and a remark; the lines as they are where there are none.
 
-    16,384 · 16.384,5 · 16'384 · 16 384. A comma or a point may also be the decimal sign, and 16,384 read as 16.384 gives a record that
-    looks sound: a separator is taken only where the text shows that it is one; elsewhere it stays the decimal sign.
+    16,384 · 16.384,5 · 16'384 · 16 384. A comma or a point may also be the decimal sign, and 16,384 read as 16.384 gives a record
+    that looks sound: a separator is taken only where the text shows that it is one; elsewhere it stays the decimal sign.
     """
     later = lines[len(lines) // 3 :]
     sample = [line for line in later[:: max(1, len(later) // _SAMPLED_LINES)] if not is_comment(line)]
