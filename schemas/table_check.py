@@ -22,13 +22,7 @@ _NONE = np.zeros(0, dtype=np.intp)
 
 
 def check(name: str, frame: pd.DataFrame, *, where: str = "") -> pd.DataFrame:
-    """The frame with its columns converted to the right types, or :class:`DataRejected`.
-
-    Parameters
-    ----------
-    name : a key of :data:`TABLES`.
-    where : name of the table's source in a message; the table's name by default.
-    """
+    """The frame of a table of :data:`TABLES` with the right types, or :class:`DataRejected` with its source, ``where``."""
     table = TABLES[name]
     source = where or name
     _refuse_missing_columns(table, frame, source)

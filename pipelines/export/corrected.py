@@ -100,7 +100,6 @@ class Corrected:
     bias: Array | None = None
     bias_covariance: Array | None = None
     updated: Flags | None = None
-    flicker: FlickerTerms | None = None
     at_limits: Track | None = None
     kept: KeptTrack | None = None
     white: Array | None = None
@@ -234,8 +233,8 @@ def _tracked(recording: CorrectableRecording, fit: FitOfUnit, tracking: Tracking
     covariance = plain.covariance + own + np.diag(_within_a_step(terms, per, rate))
     return replace(
         plain, force=plain.force - bias, covariance=covariance, track=bias_track, bias=bias, bias_covariance=own,
-        updated=bias_track.updated[last], flicker=flicker, at_limits=at_limits,
-        kept=KeptTrack(bias_track.end, float(middle[-1]), flicker), white=terms.white,
+        updated=bias_track.updated[last], at_limits=at_limits, white=terms.white,
+        kept=KeptTrack(bias_track.end, float(middle[-1]), flicker),
     )  # fmt: skip
 
 

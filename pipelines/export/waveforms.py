@@ -175,7 +175,6 @@ def _tdms(channels: Sequence[Channel]) -> bytes:
     return sink.getvalue()
 
 
-ACCELERATIONS = ("g", "m/s^2")
 TIME, ACCELERATION, UNKNOWN = 17, 12, 0
 DOUBLE = 4  # ordinate of double precision, real
 
@@ -192,7 +191,7 @@ def _uff58(channels: Sequence[Channel]) -> bytes:
         path = Path(folder) / "waveforms.uff"
         file = pyuff.UFF(str(path))
         for number, one in enumerate(channels, start=1):
-            known = ACCELERATION if one.unit in ACCELERATIONS else UNKNOWN
+            known = ACCELERATION if one.unit in {"g", "m/s^2"} else UNKNOWN
             content = {
                 "type": 58, "binary": 1, "func_type": 1, "rsp_node": number, "rsp_dir": one.axis + 1, "ref_node": 0, "ref_dir": 0,
                 "data": np.asarray(one.samples, dtype=np.float64), "x": one.time, "num_pts": len(one.samples), "id1": one.name,
@@ -201,9 +200,7 @@ def _uff58(channels: Sequence[Channel]) -> bytes:
                 "ordinate_spec_data_type": known, "ordinate_axis_units_lab": one.unit, "orddenom_spec_data_type": UNKNOWN,
                 "ord_data_type": DOUBLE,
             }  # fmt: skip
-            with (
-                warnings.catch_warnings()
-            ):  # pyuff leaves the file to the collector; its "overwrite" loses binary samples
+            with warnings.catch_warnings():  # pyuff leaves the file to the collector; "overwrite" loses binary samples
                 warnings.simplefilter("ignore", ResourceWarning)
                 file.write_sets(content, "add")
         return path.read_bytes()

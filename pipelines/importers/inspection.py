@@ -45,13 +45,7 @@ class Inspection:
 
 
 def inspect(paths: Sequence[Path], *, join: str = "", group: str = "") -> Inspection:
-    """The inspection of a recording of one or several files.
-
-    Parameters
-    ----------
-    join : how several files are joined, ``rows`` or ``columns``.
-    group : the group of channels, if a file has several.
-    """
+    """The inspection of a recording of one or several files, joined as :func:`pipelines.importers.sources.read` does."""
     seen = recognise(paths, join=join, group=group)
     if seen.is_exchange:
         return Inspection(_of_dwells(paths[0], seen), None, None)
@@ -121,7 +115,6 @@ def _content_of_dwells(table: pd.DataFrame) -> str:
 def _intervals(output: Array, time: Array, stops: Stops | None) -> list[IntervalDocument]:
     if stops is None:
         return []
-    pairs = list(zip(stops.found.first, stops.found.last, strict=True))[:_MOST_INTERVALS]
     return [
         {
             "start_s": float(time[a] - time[0]),
@@ -131,7 +124,7 @@ def _intervals(output: Array, time: Array, stops: Stops | None) -> list[Interval
             "sd": output[a:b].std(axis=0, ddof=1).tolist(),
             "positions": change_of_level.several_levels(output[a:b]) if k in stops.several else 1,
         }
-        for k, (a, b) in enumerate(pairs)
+        for k, (a, b) in enumerate(stops.found.spans[:_MOST_INTERVALS])
     ]
 
 
@@ -183,11 +176,8 @@ def _dynamic_guess(path: Path, content: Content, guessed: Guesses, rate_hz: floa
     """What a file with a time and two columns, of which one is named as the reference, may be; None for others."""
     if rate_hz is None or rate_hz < _SLOWEST_HZ:
         return None
-    free = [
-        name
-        for name, one in guessed.columns.items()
-        if one.meaning != "time" and content.table[name].dtype.kind in "fi"
-    ]
+    other = [name for name, one in guessed.columns.items() if one.meaning != "time"]
+    free = [name for name in other if content.table[name].dtype.kind in "fi"]
     driven = [name for name in free if _REFERENCE.search(name)]
     if len(free) != 2 or len(driven) != 1:
         return None

@@ -67,11 +67,9 @@ def imported(
     breaks = sorted({int(np.searchsorted(kept, k)) for k in breaks} | left_out_before)
     raw = np.column_stack([values.finite(columns[axis], where, content) for axis in mapping.axes])
     raw = raw * [1.0 if sign == "+" else -1.0 for sign in mapping.signs[: len(mapping.axes)]]
-    three = len(mapping.axes) == len(AXES)
-    other: tuple[str, ...] = ()
-    if three:  # the norm is that of three
-        other = unit_check.refuse_other_unit(raw, mapping.units.output, where, means=mapping.rows == "dwells")
-    remarks = (*content.remarks, *dropped, *other)
+    remarks = (*content.remarks, *dropped)
+    if len(mapping.axes) == len(AXES):  # the norm is that of three
+        remarks += unit_check.refuse_other_unit(raw, mapping.units.output, where, means=mapping.rows == "dwells")
     out_unit, factor = OUTPUT_UNITS[mapping.units.output]
     serials = _serials(columns, mapping, where)
     extras = _extras(columns, mapping, where, content) | _spreads(columns, mapping, where, content)
@@ -84,15 +82,9 @@ def imported(
             f"{where}: samples of {len(set(serials))} units in one file, one unit is needed; divide the file"
         )
     time = clock.seconds - clock.seconds[0]
-    twice = _twice(time, raw)
     faults = sample_faults.look(raw)
-    remarks = (
-        *remarks,
-        *clock.remarks,
-        *twice,
-        *wide,
-        *sample_faults.refuse_or_remark(faults, raw, time, mapping, where),
-    )
+    faulty = sample_faults.refuse_or_remark(faults, raw, time, mapping, where)
+    remarks = (*remarks, *clock.remarks, *_twice(time, raw), *wide, *faulty)
     bad = faults.bad if mapping.faulty == "leave-out" else np.zeros(len(raw), dtype=bool)
     samples = pd.DataFrame({"unit": serials, "slot": 0, "record": 0, "kind": "dwell", "time_s": time})
     samples[list(AXES)] = np.nan  # of the axes that the device does not have
@@ -101,8 +93,8 @@ def imported(
     labels = columns["dwell"].astype(str).tolist() if "dwell" in columns else None
     intervals = stretches(labels, sample_faults.mended(raw, faults, bad), time, breaks, mapping, where)
     record = np.zeros(len(samples), dtype=np.int64)
-    for number, (a, b) in enumerate(zip(intervals.first, intervals.last, strict=True)):
-        record[a:b] = number + 1
+    for number, (a, b) in enumerate(intervals.spans, start=1):
+        record[a:b] = number
     record[bad] = 0
     intervals, record, short = sample_faults.without_short(intervals, record)
     samples["record"] = record
@@ -112,13 +104,9 @@ def imported(
         dwells = dwells_of_stretches(samples, intervals, numbers, tuple(extras), mapping)
         remarks = (*remarks, *numbered, *pose_check.refuse_or_remark(dwells, mapping, where))
         dwells, held = with_held_out(dwells, mapping.verify, where)
-        remarks = (*remarks, *held)
-    remarks = (
-        *remarks,
-        *intervals.remarks,
-        *short,
-        *time_doubts(time, extras.get("unit_C"), intervals, mapping, searched=labels is None),
-    )
+        remarks += held
+    doubts = time_doubts(time, extras.get("unit_C"), intervals, mapping, searched=labels is None)
+    remarks = (*remarks, *intervals.remarks, *short, *doubts)
     return Imported(samples, dwells, out_unit, remarks, tuple(faults.rows(time)))
 
 
@@ -151,11 +139,8 @@ def _with_numbers(
         return np.arange(count), columns, ()
     whole = np.ones(count, dtype=bool)
     for meaning, column in columns.items():
-        if (
-            meaning in {"unit", "dwell"}
-            or column.dtype.kind in "mM"
-            or (meaning == "time" and clocks.is_stamps(column))
-        ):
+        stamps = column.dtype.kind in "mM" or (meaning == "time" and clocks.is_stamps(column))
+        if meaning in {"unit", "dwell"} or stamps:
             whole &= column.notna().to_numpy()
         else:
             whole &= np.isfinite(values.as_numbers(column, where, flags=meaning not in MEANINGS))
@@ -183,9 +168,8 @@ def _twice(time: Array, raw: Array) -> tuple[str, ...]:
 def _serials(columns: dict[str, pd.Series], mapping: Mapping, where: str) -> list[str]:
     if "unit" in columns:
         serials = ["" if pd.isna(value) else values.text(value) for value in columns["unit"].tolist()]
-        refuse_unusable_serials(
-            dict.fromkeys(serials), f"{where}: column '{columns['unit'].name}'", "correct it in the file"
-        )
+        place = f"{where}: column '{columns['unit'].name}'"
+        refuse_unusable_serials(dict.fromkeys(serials), place, "correct it in the file")
         return serials
     if not mapping.unit:
         raise WrongUse(f"{where}: no unit is mapped, a serial number is needed; give --unit SN")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 
 import numpy as np
 import pandas as pd
@@ -54,10 +55,7 @@ def dwells_of_stretches(
     m = len(letters)
     recorded = samples[[*letters, *extras]].to_numpy(dtype=np.float64)
     time, record = samples["time_s"].to_numpy(dtype=np.float64), samples["record"].to_numpy()
-    inside = [
-        a + np.flatnonzero(record[a:b] == k + 1)
-        for k, (a, b) in enumerate(zip(intervals.first, intervals.last, strict=True))
-    ]
+    inside = [a + np.flatnonzero(record[a:b] == k) for k, (a, b) in enumerate(intervals.spans, start=1)]
     turning = [name == TILT or (name in BY_COLUMN and BY_COLUMN[name].unit == "°") for name in extras]
     angles = m + np.flatnonzero(turning)
     parts = [_of_one_turn(recorded[rows], angles) for rows in inside]
@@ -98,7 +96,7 @@ def finished(frame: pd.DataFrame, mapping: Mapping) -> pd.DataFrame:
     if mapping.norm_g is None:
         raise WrongUse("import: poses are stated, local gravity is needed with them; give --local-g M/S2")
     up = [mapping.poses.get(label, mapping.face) for label in frame["pose"]]
-    frame[["force_x", "force_y", "force_z"]] = np.array([FACES[face] for face in up]) * mapping.norm_g
+    frame[[*FORCE_COLUMNS]] = np.array([FACES[face] for face in up]) * mapping.norm_g
     if mapping.headings:
         frame["heading_deg"] = [mapping.headings[label] for label in frame["pose"]]
     return frame
@@ -126,18 +124,10 @@ def _tilted(frame: pd.DataFrame, mapping: Mapping) -> pd.DataFrame:
 
 
 def _held_out_count(text: str, dwells: int) -> int:
-    """The number of dwells to hold out: a number, or a share such as ``20%``.
-
-    Raises
-    ------
-    WrongUse
-        It is neither.
-    """
-    share = text.endswith("%")
-    try:
+    """The number of dwells to hold out: a number, or a share such as ``20%``."""
+    share, number = text.endswith("%"), float("nan")
+    with suppress(ValueError):
         number = float(text.removesuffix("%"))
-    except ValueError:
-        number = float("nan")
     if not (0.0 < number < (100.0 if share else 1e6)) or (not share and number != int(number)):
         raise WrongUse(
             f"--verify: found '{shown(text)}', a number of dwells or a share such as 20% is needed; correct it"
@@ -155,6 +145,8 @@ def with_held_out(dwells: pd.DataFrame, text: str, where: str) -> tuple[pd.DataF
     ------
     DataRejected
         Too few dwells are left for the fit.
+    WrongUse
+        The text is neither a number nor a share.
     """
     if not text:
         return dwells, ()

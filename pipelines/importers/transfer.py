@@ -29,10 +29,6 @@ FEWEST = 8
 def transfer_points(table: pd.DataFrame, name: str) -> Points:
     """The points of a table with the columns of :data:`NEEDED`, each with its unit in its name.
 
-    Parameters
-    ----------
-    name : of the file, for messages
-
     Raises
     ------
     DataRejected
@@ -45,12 +41,9 @@ def transfer_points(table: pd.DataFrame, name: str) -> Points:
             f"{name}: column {', '.join(missing)} is missing, found {found}; a transfer function needs its units in the "
             "names of its columns; rename them"
         )
-    columns: dict[str, Any] = {}
-    for one in (*NEEDED, *OPTIONAL):
-        there = one in table.columns
-        columns[one] = (
-            finite_column(table, one, name, "correct the row") if there else np.full(len(table), OPTIONAL[one])
-        )
+    columns: dict[str, Any] = {one: np.full(len(table), usual) for one, usual in OPTIONAL.items()}
+    given = [one for one in (*NEEDED, *OPTIONAL) if one in table.columns]
+    columns |= {one: finite_column(table, one, name, "correct the row") for one in given}
     for one in ("frequency_hz", "magnitude", "magnitude_uncertainty_percent", "phase_uncertainty_deg"):
         if not np.all(columns[one] > 0.0):
             row = int(np.flatnonzero(columns[one] <= 0.0)[0]) + 1
@@ -87,16 +80,12 @@ def import_transfer(
     fit = diagnosis.extended
     bandwidth = bandwidth_of(fit, fit.values, float(points.conditions.frequency.max()))
     parameters: dict[str, TransferParameter] = {}
-    for p in fit.parameters:
-        one = diagnosis.parameter(p.name)
-        parameters[p.name] = TransferParameter(
-            value=one.value,
-            uncertainty=one.uncertainty,
-            low=one.low,
-            high=one.high,
-            unit=p.unit,
-            identified=one.identified,
-        )
+    for name, unit_of in ((p.name, p.unit) for p in fit.parameters):
+        p = diagnosis.parameter(name)
+        parameters[name] = {
+            "value": p.value, "uncertainty": p.uncertainty, "low": p.low, "high": p.high, "unit": unit_of,
+            "identified": p.identified,
+        }  # fmt: skip
     text = diagnosis_text(diagnosis)
     stated = {"procedure": "sweep", "effects": list(effects), "unit": unit}
     about = {"name": f"transfer function of {unit}", "source": source.as_dict(), "lot": lot_of_import([unit])}

@@ -64,12 +64,7 @@ def with_effects(text: str, steps: Sequence[ModelStep], file: Path) -> tuple[str
 def errors_by_version(
     versions: Sequence[Version], tables: ImprovedTables, working: Callable[[], AbstractContextManager[Any]]
 ) -> list[dict[str, Any]]:
-    """The errors of each version and the verdict on its change.
-
-    Parameters
-    ----------
-    working : is entered while a version is fitted
-    """
+    """The errors of each version and the verdict on its change; ``working`` is entered while a version is fitted."""
     from pipelines.diagnosis.confirmation import evolution
 
     def compared(effects: list[str], before: list[str] | None) -> dict[str, Any]:

@@ -22,11 +22,6 @@ Working = Callable[[str], AbstractContextManager[Any]]
 def bring_in(paths: list[Path], archive: str | None, working: Working, group: str = "") -> RecordingDocument | None:
     """The import of a recording as it is recognised; None for a table of dwells, which needs none.
 
-    Parameters
-    ----------
-    working : shows what is done, until it is
-    group : the group of channels, if a file has several
-
     Raises
     ------
     WrongUse

@@ -37,10 +37,7 @@ _WHITE_RANGE = 20.0
 def lot_of_norms(readings: Readings, state: State, like: Readings, *, square: bool) -> Lot:
     """The radial lot of dwells whose poses are unknown: y = |C·(a − b)| − 1 in g, with white standard errors by axis.
 
-    Parameters
-    ----------
-    like : the run whose point of expansion is used: coefficients of one run apply to another only so
-    square : whether the model takes the axes as square, so that six parameters, not nine, give the directions
+    ``like`` and ``square`` are those of :func:`pipelines.tables.dwells.lot_of`.
 
     Raises
     ------

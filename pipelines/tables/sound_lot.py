@@ -80,9 +80,7 @@ def _on_purpose(measurement: Measured, fault: Fault, left_out: Collection[str]) 
 def gaps(measurement: Measured, faults: Sequence[Fault], left_out: Collection[str] = ()) -> list[str]:
     """A notice of the dwells that units without a fault lack and others have: they are judged by the dwells they have.
 
-    Parameters
-    ----------
-    left_out : ``UNIT:DWELL``, of which nothing is said: they were removed on purpose
+    Of those that were left out on purpose (``UNIT:DWELL``) nothing is said.
     """
     faulty = {fault.unit for fault in faults}
     parts: list[str] = []
@@ -137,10 +135,6 @@ def told(base: Model, adequate: bool | None, unjudged: str, error: dict[str, Any
     known from hundreds. A residual far beyond it contradicts the model, the stated poses, or dwells without wander; a residual
     within it shows no adequacy, since most missing effects leave nothing on so few poses. Dwells of unknown orientation state
     nothing that their samples could contradict.
-
-    Parameters
-    ----------
-    base : the judged model
     """
     lot = base.problem.lot
     if adequate is not None or lot.radial or not lot.recorded:
