@@ -206,9 +206,7 @@ def _tracked(recording: CorrectableRecording, fit: FitOfUnit, tracking: Tracking
             f"{recording.name}: the force is known nowhere and the unit is never at rest, one of them is needed to track the "
             "bias; give --force, columns force_x, force_y, force_z, or record the unit at rest"
         )
-    if (
-        len(time) % per
-    ):  # the samples after the last whole step are too few for an update; the filter lets the time pass
+    if len(time) % per:  # the samples after the last whole step are too few for an update: time passes in the filter
         middle = np.append(middle, time[-1])
         force, known = (np.vstack([values, np.full((1, 3), np.nan)]) for values in (force, known))
         magnitude = np.append(magnitude, np.nan)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 
 from pipelines.export.firmware import Firmware
@@ -72,11 +73,8 @@ def device_ids(text: str, units: Sequence[str]) -> dict[str, int]:
     WrongUse
         An identification is not a number, a unit is not exported, or two units have the same identification.
     """
-    if not text.strip():
-        return {}
     ids: dict[str, int] = {}
-    parts = [part.strip() for part in text.split(",") if part.strip()]
-    for part in parts:
+    for part in filter(None, map(str.strip, text.split(","))):
         unit, equals, number = part.rpartition("=")
         if not equals and len(units) != 1:
             raise WrongUse(
@@ -96,10 +94,9 @@ def device_ids(text: str, units: Sequence[str]) -> dict[str, int]:
 
 
 def _number(text: str) -> int:
-    try:
+    number = 0
+    with suppress(ValueError):
         number = int(text, 0)
-    except ValueError:
-        number = 0
     if not 0 < number <= HIGHEST_ID:
         raise WrongUse(
             f"--device-id: found '{shown(text)}', a whole number from 1 to {HIGHEST_ID} is needed, as in the "

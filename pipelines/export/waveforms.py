@@ -247,15 +247,12 @@ def files_of_waveforms(form: str, channels: Sequence[Channel], path: Path) -> di
     writer = writer_of(form)
     if not channels:
         raise WrongUse("waveforms: no channel, at least one is needed; name another record")
-    clocks = list(dict.fromkeys((one.interval_s, len(one.samples), one.group) for one in channels))
-    shared = len({(interval, count) for interval, count, _ in clocks}) == 1
-    if shared or not writer.one_clock:
+    clocks: dict[tuple[float, int, str], list[Channel]] = {}
+    for one in channels:
+        clocks.setdefault((one.interval_s, len(one.samples), one.group), []).append(one)
+    if not writer.one_clock or len({clock[:2] for clock in clocks}) == 1:
         return {path: writer.made(channels)}
-    made: dict[Path, bytes] = {}
-    for interval, count, group in clocks:
-        own = [one for one in channels if (one.interval_s, len(one.samples), one.group) == (interval, count, group)]
-        made[path.with_name(f"{path.stem}_{group}{path.suffix}")] = writer.made(own)
-    return made
+    return {path.with_name(f"{path.stem}_{clock[2]}{path.suffix}"): writer.made(own) for clock, own in clocks.items()}
 
 
 def write_waveforms(form: str, channels: Sequence[Channel], path: Path) -> list[Path]:

@@ -131,15 +131,12 @@ def _intervals(output: Array, time: Array, stops: Stops | None) -> list[Interval
 def _columns(content: Content, guessed: Guesses) -> list[ColumnDocument]:
     columns: list[ColumnDocument] = []
     for number, (name, guess) in enumerate(guessed.columns.items(), start=1):
-        column = content.table[name]
-        unit = content.units.get(name, "")
-        if guess.meaning in {"x", "y", "z"}:
-            unit = unit or guessed.output.meaning
-        elif guess.meaning == "time":
-            unit = unit or guessed.time_unit.meaning
+        column, is_axis = content.table[name], guess.meaning in {"x", "y", "z"}
+        taken = guessed.output if is_axis else guessed.time_unit if guess.meaning == "time" else None
+        unit = content.units.get(name, "") or (taken.meaning if taken else "")
         numbers = measurable(column.to_numpy(dtype=np.float64)) if column.dtype.kind in "fiu" else np.zeros(0)
         there = numbers[np.isfinite(numbers)]
-        axis = there if guess.meaning in {"x", "y", "z"} and there.size else None
+        axis = there if is_axis and there.size else None
         columns.append(
             {
                 "name": name,
@@ -188,18 +185,15 @@ def _dynamic_guess(path: Path, content: Content, guessed: Guesses, rate_hz: floa
     names = list(guessed.columns)
     pairs = [("time", guessed.column("time")), ("reference", reference), ("z", output)]
     mapped = ",".join(f"{what}={names.index(name) + 1}" for what, name in pairs if name)
-    missing = {
-        what: f"the unit of column '{name}': --units {what}=…"
-        for what, name in (("output", output), ("reference", reference))
-        if not (content.units.get(name, "") or unit_in(name))
-    }
-    stated = [f"{what}=UNIT" for what in missing]
+    units = {name: content.units.get(name, "") or unit_in(name) for name in (output, reference)}
+    missing = [(what, name) for what, name in (("output", output), ("reference", reference)) if not units[name]]
+    stated = [f"{what}=UNIT" for what, _ in missing]
     if guessed.time_unit.meaning and not content.units.get(guessed.column("time"), ""):
         stated.append(f"time={guessed.time_unit.meaning}")
     words = ["tumbleline", "import", str(path), "--procedure", procedure, "--map", mapped]
     words += ["--units", ",".join(stated)] if stated else []
-    open_ = list(missing.values())
-    if procedure == "shock" and (content.units.get(output, "") or unit_in(output)) in {"V", "mV"}:
+    open_ = [f"the unit of column '{name}': --units {what}=…" for what, name in missing]
+    if procedure == "shock" and units[output] in {"V", "mV"}:
         words += ["--part", "SHOCK.toml"]
         open_.append(f"the scale of column '{output}': a file SHOCK.toml with the line scale = … (output per g)")
     words += ["--unit", serial_of(path)]

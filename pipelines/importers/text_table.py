@@ -9,7 +9,6 @@ from bisect import bisect_left
 from collections import Counter
 from collections.abc import Sequence
 from contextlib import suppress
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -83,12 +82,9 @@ def content(text: str, where: str, encoding: str = "UTF-8") -> Content:
     rows = filled[bisect_left(filled, detected.first) :]
     body = [lines[k] for k in rows]
     table = _parsed(body, detected, labels, where)
-    units = {label: unit for label, unit in zip(labels, detected.units, strict=False) if unit} or {
-        label: unit for label in labels if (unit := unit_in(label))
-    }
-    units = {label: unit.strip("[]() ") for label, unit in units.items()}
-    remarks = _remarks(detected, lines, encoding)
-    remarks = (*remarks, grouped) if grouped else remarks
+    stated = detected.units if any(detected.units) else map(unit_in, labels)
+    units = {label: unit.strip("[]() ") for label, unit in zip(labels, stated, strict=False) if unit}
+    remarks = (*_remarks(detected, lines, encoding), *([grouped] if grouped else []))
     # a line break inside a quoted field, or one that the parser joins, moves all rows behind it
     whole = len(lines) == len(text.splitlines()) and len(rows) == len(table)
     return Content(table, remarks, units, lines=((where, rows),) if whole else ())
@@ -147,24 +143,20 @@ def _parsed(body: Sequence[str], detected: Layout, labels: list[str], where: str
 
 def _read(body: Sequence[str], detected: Layout, names: list[str]) -> pd.DataFrame:
     """The rows by the parser: in blocks, as it takes ten times their size, unless a column is text in some blocks only."""
-    how: dict[str, Any] = {
-        "sep": detected.divider,
-        "decimal": detected.decimal,
-        "header": None,
-        "names": names,
-        "index_col": False,
-        "skipinitialspace": True,
-        "low_memory": False,
-    }
+
+    def parsed(rows: Sequence[str]) -> pd.DataFrame:
+        return pd.read_csv(
+            io.StringIO("\n".join(rows)), sep=detected.divider, decimal=detected.decimal, header=None, names=names,
+            index_col=False, skipinitialspace=True, low_memory=False,
+        )  # fmt: skip
+
     if len(body) > 2 * _BLOCK:
         with suppress(ValueError):  # a broken row: the parser of the whole names it
-            parts = [
-                pd.read_csv(io.StringIO("\n".join(body[k : k + _BLOCK])), **how) for k in range(0, len(body), _BLOCK)
-            ]
+            parts = [parsed(body[k : k + _BLOCK]) for k in range(0, len(body), _BLOCK)]
             kinds_of_columns = [{part.dtypes.iloc[k].kind for part in parts} for k in range(len(names))]
             if all(len(kinds) == 1 or kinds <= {"i", "u", "f"} for kinds in kinds_of_columns):
                 return pd.concat(parts, ignore_index=True)
-    return pd.read_csv(io.StringIO("\n".join(body)), **how)
+    return parsed(body)
 
 
 def _fortran(table: pd.DataFrame) -> pd.DataFrame:
@@ -182,18 +174,12 @@ def _remarks(detected: Layout, lines: Sequence[str], encoding: str) -> tuple[str
     begin = detected.first if detected.header < 0 else detected.header
     passed = [line for line in lines[:begin] if not is_comment(line)]
     if passed:
-        place = (
-            f"the header in line {detected.header + 1}"
-            if detected.header >= 0
-            else f"the first row in line {begin + 1}"
-        )
-        remarks.append(
-            f"{len(passed)} lines before {place} were not read, beginning with '{shown(passed[0].strip(), 60)}'"
-        )
+        place = f"the {'header' if detected.header >= 0 else 'first row'} in line {begin + 1}"
+        start = shown(passed[0].strip(), 60)
+        remarks.append(f"{len(passed)} lines before {place} were not read, beginning with '{start}'")
     if detected.integers:
-        remarks.append(
-            f"line {detected.header + 1} only numbers the columns: {', '.join(filter(None, detected.names[:6]))}, …"
-        )
+        numbers = ", ".join(filter(None, detected.names[:6]))
+        remarks.append(f"line {detected.header + 1} only numbers the columns: {numbers}, …")
     elif detected.names and detected.header < 0:
         remarks.append(f"columns named by a comment: {shown(', '.join(detected.names))}")
     if detected.decimal == ",":

@@ -129,9 +129,8 @@ def _far(readings: Readings, unit: int, fit: EllipsoidFit, kept: NDArray[np.bool
     """The dwell that is farthest off among those kept, if it is far beyond the scatter of the others."""
     heat = _heat(readings, unit, readings.there[unit]) if warm else None
     left = np.zeros(kept.size)
-    left[readings.there[unit]] = np.abs(
-        np.linalg.norm(fit.apply(readings.output[unit, readings.there[unit]], heat), axis=1) - 1.0
-    )
+    there = readings.there[unit]
+    left[there] = np.abs(np.linalg.norm(fit.apply(readings.output[unit, there], heat), axis=1) - 1.0)
     typical = float(np.median(left[kept])) / 0.6745
     worst = int(np.argmax(np.where(kept, left, 0.0)))
     far = np.zeros(kept.size, dtype=bool)

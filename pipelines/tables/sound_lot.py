@@ -55,9 +55,8 @@ def sound_lot(
     measurement = measured(condense(dwells), history)
     faults = find_faults(measurement.readings) if measurement.reference != "norm" else []
     numbers = [int(number) for number in measurement.dwells]
-    faults = [
-        fault.named(measurement.units, numbers) for fault in faults if not _on_purpose(measurement, fault, left_out)
-    ]
+    unmeant = [fault for fault in faults if not _on_purpose(measurement, fault, left_out)]
+    faults = [fault.named(measurement.units, numbers) for fault in unmeant]
     blocked = {f.unit for f in faults}
     sound = [u for u in range(len(measurement.units)) if u not in blocked]
     if not sound:
@@ -85,8 +84,8 @@ def gaps(measurement: Measured, faults: Sequence[Fault], left_out: Collection[st
     faulty = {fault.unit for fault in faults}
     parts: list[str] = []
     for place, unit in enumerate(measurement.units):
-        numbers = [int(measurement.dwells[k]) for k in missing_dwells(measurement.readings, place)]
-        numbers = [n for n in numbers if f"{unit}:{n}" not in left_out]
+        missing = (int(measurement.dwells[k]) for k in missing_dwells(measurement.readings, place))
+        numbers = [n for n in missing if f"{unit}:{n}" not in left_out]
         if numbers and place not in faulty:
             shown = ", ".join(map(str, numbers[:_SHOWN])) + (", …" if len(numbers) > _SHOWN else "")
             parts.append(f"{unit} {len(numbers)} ({shown})")

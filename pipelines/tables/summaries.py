@@ -95,22 +95,12 @@ def _parts(
         bad = np.argwhere(~np.isfinite(own))
         ends = np.argwhere(np.abs(own - zero_output) >= limit) if limit > 0.0 else bad[:0]
         row, axis = bad[0].tolist() if len(bad) else (0, 0)
-        yield (
-            str(unit),
-            {
-                "n": len(own),
-                "mean": mean[k],
-                "sd": sd[k],
-                "low": low[k],
-                "high": high[k],
-                "wild_count": len(bad),
-                "wild_row": row,
-                "wild_axis": axis,
-                "wild_value": float(own[row, axis]) if len(bad) else 0.0,
-                "clipped": len(ends),
-                "clipped_axis": int(ends[0][1]) if len(ends) else 0,
-            },
-        )
+        part = {
+            "n": len(own), "mean": mean[k], "sd": sd[k], "low": low[k], "high": high[k],
+            "wild_count": len(bad), "wild_row": row, "wild_axis": axis, "wild_value": float(own[row, axis]) if len(bad) else 0.0,
+            "clipped": len(ends), "clipped_axis": int(ends[0][1]) if len(ends) else 0,
+        }  # fmt: skip
+        yield str(unit), part
 
 
 def _joined(one: dict[str, Any], more: dict[str, Any]) -> dict[str, Any]:
