@@ -39,11 +39,6 @@ def own_files(kind: Kind) -> dict[str, Path]:
     return dict(sorted(paths.items()))
 
 
-def own_names(kind: Kind) -> list[str]:
-    """The names of the user's files of a kind, sorted."""
-    return list(own_files(kind))
-
-
 def own_file(kind: Kind, name: str, built_in: Iterable[str] = ()) -> Path | None:
     """The file of the user with this name; None where there is none, and refused where it is among the ``built_in`` names."""
     if not name or Path(name).name != name or name.startswith("."):

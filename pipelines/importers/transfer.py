@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from inertial.dynamics.transfer_effects import EFFECTS, Conditions
 from inertial.dynamics.transfer_model import Points
 from inertial.errors import InertialError
 from pipelines.importers import files
-from pipelines.importers.documents import TransferImport, TransferParameter
+from pipelines.importers.documents import TransferFailure, TransferImport, TransferParameter
 from pipelines.importers.keep import keep_tables, lot_of_import
 from pipelines.importers.values import finite_column
 from pipelines.procedures.recorded import finding_table, gathered_points
@@ -102,10 +103,7 @@ def import_transfer(
         "error_percent": diagnosis.error_percent,
         "extended_percent": diagnosis.extended_percent,
         "left_out": list(diagnosis.left_out),
-        "where": [
-            {"low_hz": one.low_hz, "high_hz": one.high_hz, "part": one.part, "share": one.share}
-            for one in diagnosis.where
-        ],
+        "where": [TransferFailure(**asdict(one)) for one in diagnosis.where],
         "classes": [{"effects": list(one.effects), "p_value": one.p_value} for one in diagnosis.classes],
         "recommended": list(diagnosis.recommended),
         "unexplained": diagnosis.unexplained,
