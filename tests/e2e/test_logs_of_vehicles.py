@@ -87,7 +87,7 @@ def test_a_recording_of_a_robot_becomes_a_model(tmp_path, monkeypatch):
     assert "x: bias 0.10" in done.stdout, done.stdout
 
 
-def test_positions_logged_back_to_back_are_faces_by_their_own_files(tmp_path, monkeypatch):
+def test_positions_logged_back_to_back_are_faces_by_their_own_names(tmp_path, monkeypatch):
     """Their labels were those of dwells, which no import of such a record has."""
     monkeypatch.chdir(tmp_path)
     table = np.column_stack([0.01 * np.arange(2400), six_faces()])
