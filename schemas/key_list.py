@@ -13,6 +13,7 @@ from schemas.limits import Limits
 from schemas.recipe import RecipeFile
 from schemas.stated import STATED
 from schemas.station import StationConfig
+from schemas.toml_files import models_in
 
 FILES: dict[str, type[BaseModel]] = {"recipe": RecipeFile, "limits": Limits, "station": StationConfig}
 """The files whose keys are listed, by what a user calls them."""
@@ -56,7 +57,7 @@ def keys_of(model: type[BaseModel]) -> list[Key]:
             continue
         listed.add(one)
         for name, field in one.model_fields.items():
-            below = list(_models(field.annotation))
+            below = models_in(field.annotation)
             default = "needed" if field.is_required() else _text(field.get_default(call_default_factory=True))
             value = _value(field.annotation)
             keys.append(Key(table, name, value, default, meaning(one, name)))
@@ -84,16 +85,10 @@ def _texts() -> dict[str, dict[str, str]]:
     return tomllib.loads(files("schemas").joinpath("key_texts.toml").read_text("utf-8"))
 
 
-def _models(annotation: Any) -> list[type[BaseModel]]:
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return [annotation]
-    return [model for part in get_args(annotation) for model in _models(part)]
-
-
 def _value(annotation: Any) -> str:
     """The kind of a value in words."""
     origin, parts = get_origin(annotation), get_args(annotation)
-    if _models(annotation):
+    if models_in(annotation):
         return TABLES.get(origin, "table")
     if origin is Literal:
         return " or ".join(f"{part}" if isinstance(part, int) else f"'{part}'" for part in parts)

@@ -114,22 +114,12 @@ def _units(info: ValidationInfo) -> Mapping[str, str]:
 
 
 def limits_of(document: Mapping[str, Any], units: Mapping[str, str]) -> Limits:
-    """The limits of a document that was checked when it was archived.
-
-    Parameters
-    ----------
-    units : unit of every known figure, by name.
-    """
+    """The limits of a document that was checked when it was archived; ``units``: of every known figure, by name."""
     return Limits.model_validate(document, context=units)
 
 
 def parse_limits(text: str, source: str, units: Mapping[str, str]) -> Limits:
-    """The limits of a file, or :class:`RecipeInvalid` naming the key and what is needed.
-
-    Parameters
-    ----------
-    units : unit of every known figure, by name.
-    """
+    """The limits of a file, or :class:`RecipeInvalid` naming the key and what is needed; ``units``: of every known figure."""
     return parse_as(Limits, text, source, context=units)
 
 

@@ -1,7 +1,6 @@
 """Model files: a named, versioned list of effects, and the history of who changed it, when and why."""
 
 from datetime import date, datetime
-from pathlib import Path
 from typing import Annotated
 
 from pydantic import Field, model_validator
@@ -9,7 +8,6 @@ from pydantic import Field, model_validator
 from schemas.bounds import Name, Text
 from schemas.recipe import FormulaSpec
 from schemas.strict import Strict, refuse_repeated
-from schemas.toml_files import parse_as, read_text
 
 MOST_VERSIONS = 1_000_000
 
@@ -56,13 +54,3 @@ class ModelFile(Strict):
                 "every version needs its [[change]]"
             )
         return self
-
-
-def parse_model(text: str, source: str) -> ModelFile:
-    """The model of a TOML text, or ``RecipeInvalid`` naming the key and what is needed."""
-    return parse_as(ModelFile, text, source)
-
-
-def load_model(path: Path) -> ModelFile:
-    """The model of a file, or ``RecipeInvalid`` naming the key and what is needed."""
-    return parse_model(read_text(path, "model"), f"model {path.name}")

@@ -39,43 +39,20 @@ def own_files(kind: Kind) -> dict[str, Path]:
     return dict(sorted(paths.items()))
 
 
-def own_names(kind: Kind) -> list[str]:
-    """The names of the user's files of a kind, sorted."""
-    return list(own_files(kind))
-
-
 def own_file(kind: Kind, name: str, built_in: Iterable[str] = ()) -> Path | None:
-    """The file of the user with this name; None where there is none.
-
-    Parameters
-    ----------
-    built_in : names that the product has itself
-
-    Raises
-    ------
-    RecipeInvalid
-        A built-in file has the same name.
-    """
+    """The file of the user with this name; None where there is none, and refused where it is among the ``built_in`` names."""
     if not name or Path(name).name != name or name.startswith("."):
         return None
     there = [path for folder in folders(kind) if is_file(path := folder / f"{name}{SUFFIX}")]
     if not there:
         return None
-    path = there[0]
-    refuse_built_in_name(kind, name, path, built_in)
-    _report(kind, name, path)
-    _report_others(kind, name, there)
-    return path
+    refuse_built_in_name(kind, name, there[0], built_in)
+    _report(kind, name, there)
+    return there[0]
 
 
 def refuse_built_in_name(kind: Kind, name: str, path: Path, built_in: Iterable[str]) -> None:
-    """Refuse a file that would silently stand in the place of a built-in one.
-
-    Raises
-    ------
-    RecipeInvalid
-        A built-in file has the same name.
-    """
+    """Refuse, as :class:`RecipeInvalid`, a file that would silently stand in the place of a built-in one of its name."""
     if name in built_in:
         raise RecipeInvalid(
             f"{kind}: '{name}' is built in, and {path} has the same name, one file per name is needed; rename {path}"
@@ -98,18 +75,13 @@ def report_to(listener: Callable[[str], None]) -> None:
     _reported.clear()
 
 
-def _report_others(kind: Kind, name: str, there: list[Path]) -> None:
-    """Tell about a file of the same name and other content that is not used; each once in a process."""
+def _report(kind: Kind, name: str, there: list[Path]) -> None:
+    """Tell which file is used, and of others of the same name that have other content; each once in a process."""
+    if there[0] not in _reported and _listeners:
+        _reported.add(there[0])
+        _listeners[0](f"{kind.removesuffix('s') if kind != 'limits' else kind} '{name}': {there[0]}")
     used = there[0].resolve()
     for other in there[1:]:
         if (used, other) not in _told and other.read_bytes() != used.read_bytes():
             _told.add((used, other))
             tell(f"{kind}: '{name}' is {used}; {other} has other content and is not used", level="warning")
-
-
-def _report(kind: Kind, name: str, path: Path) -> None:
-    if path in _reported or not _listeners:
-        return
-    _reported.add(path)
-    for listener in _listeners:
-        listener(f"{kind.removesuffix('s') if kind != 'limits' else kind} '{name}': {path}")

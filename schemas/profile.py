@@ -15,7 +15,6 @@ from schemas.bounds import Number
 from schemas.errors import RecipeInvalid, did_you_mean
 from schemas.motion import Motion
 from schemas.strict import Strict
-from schemas.toml_files import parse_as
 
 WordOrder = Literal["high_first", "low_first", "high_first_swapped", "low_first_swapped"]
 RegisterType = Literal["uint16", "int16", "uint32", "int32", "float32", "string", "bit"]
@@ -275,8 +274,3 @@ def _refuse_gaps(group: str, registers: list[Register]) -> None:
         raise ValueError(
             f"group {group}: more than {LONGEST_WRITE} registers cannot be written in one request; split it"
         )
-
-
-def parse_profile(text: str, source: str) -> Profile:
-    """The profile in a TOML text, or :class:`RecipeInvalid` naming the key and what is needed."""
-    return parse_as(Profile, text, source)

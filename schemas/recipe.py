@@ -29,7 +29,6 @@ from schemas.bounds import (
 from schemas.fault import FaultOrder
 from schemas.poses import Pose, SoakPart
 from schemas.strict import Grown, Strict, refuse_repeated
-from schemas.toml_files import parse_as
 from schemas.uncertainty import Uncertainty
 from schemas.validity import CertificateTerms, Stability
 
@@ -264,8 +263,3 @@ class Recipe(_Measurement):
 def _picked(poses: list[Pose], numbers: list[int] | None) -> list[Pose]:
     """The poses of these numbers, from 1; all where none are given."""
     return poses if numbers is None else [poses[k - 1] for k in numbers]
-
-
-def parse_recipe(text: str, source: str) -> RecipeFile:
-    """The recipe file's content, or :class:`RecipeInvalid` naming the key and what is needed."""
-    return parse_as(RecipeFile, text, source)

@@ -38,11 +38,8 @@ class Limits(Strict):
 
     @model_validator(mode="after")
     def _ordered(self) -> "Limits":
-        for name, (low, high) in (
-            ("outer_deg", self.outer_deg),
-            ("inner_deg", self.inner_deg),
-            ("temperature_C", self.temperature_C),
-        ):
+        for name in ("outer_deg", "inner_deg", "temperature_C"):
+            low, high = getattr(self, name)
             if low >= high:
                 raise ValueError(f"limits.{name}: {low} is not below {high}; give the lower bound first")
         return self
@@ -152,13 +149,7 @@ class StationConfig(Grown):
 
 
 def refuse_untraced(stated: Uncertainty, references: Sequence[Reference], *, simulated: bool) -> None:
-    """Refuse a budget that names a reference standard that is not there, claims more than it, or is exact on hardware.
-
-    Raises
-    ------
-    ValueError
-        With the entry.
-    """
+    """Refuse (ValueError) a budget that names a reference that is not there, claims more than it, or is exact on hardware."""
     known = {one.id: one for one in references}
     for name, entry in stated.entries.items():
         if entry.exact and not simulated and name != "reader":  # that of a digital device is in the device

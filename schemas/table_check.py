@@ -12,8 +12,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from schemas.errors import DataRejected
-from schemas.table import Column, Table
-from schemas.tables import TABLES
+from schemas.tables import TABLES, Column, Table
 
 if TYPE_CHECKING:
     from pandera.errors import SchemaError
@@ -23,13 +22,7 @@ _NONE = np.zeros(0, dtype=np.intp)
 
 
 def check(name: str, frame: pd.DataFrame, *, where: str = "") -> pd.DataFrame:
-    """The frame with its columns converted to the right types, or :class:`DataRejected`.
-
-    Parameters
-    ----------
-    name : a key of :data:`TABLES`.
-    where : name of the table's source in a message; the table's name by default.
-    """
+    """The frame of a table of :data:`TABLES` with the right types, or :class:`DataRejected` with its source, ``where``."""
     table = TABLES[name]
     source = where or name
     _refuse_missing_columns(table, frame, source)

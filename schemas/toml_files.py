@@ -111,16 +111,17 @@ def _fields_at(model: type[BaseModel], location: tuple[int | str, ...]) -> list[
         field = model.model_fields.get(str(part))
         if field is None:
             continue
-        inner = _models_in(field.annotation)
+        inner = models_in(field.annotation)
         if inner:
             model = inner[0]
     return list(model.model_fields)
 
 
-def _models_in(annotation: object) -> list[type[BaseModel]]:
+def models_in(annotation: object) -> list[type[BaseModel]]:
+    """The models in an annotation, at any depth."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return [annotation]
-    return [model for inner in getattr(annotation, "__args__", ()) for model in _models_in(inner)]
+    return [model for inner in getattr(annotation, "__args__", ()) for model in models_in(inner)]
 
 
 PATTERNS = {

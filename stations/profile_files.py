@@ -5,10 +5,10 @@ from importlib.resources import files
 from importlib.resources.abc import Traversable
 
 from schemas.errors import RecipeInvalid, did_you_mean
-from schemas.own_files import own_file, own_names
-from schemas.profile import Profile, WordOrder, parse_profile
+from schemas.own_files import own_file, own_files
+from schemas.profile import Profile, WordOrder
 from schemas.station_devices import Carried
-from schemas.toml_files import read_text
+from schemas.toml_files import parse_as, read_text
 
 
 def profile_folder() -> Traversable:
@@ -18,7 +18,7 @@ def profile_folder() -> Traversable:
 
 def profile_names() -> list[str]:
     """Names of the profiles, sorted."""
-    return sorted({*built_in_profiles(), *own_names("profiles")})
+    return sorted({*built_in_profiles(), *own_files("profiles")})
 
 
 def profile_of(device: Carried) -> Profile:
@@ -61,4 +61,4 @@ def built_in_profiles() -> list[str]:
 
 @cache
 def _parsed(text: str, source: str) -> Profile:
-    return parse_profile(text, source)
+    return parse_as(Profile, text, source)

@@ -4,7 +4,7 @@
 """
 
 _SAMPLES = (
-    *("schemas.errors", "schemas.table", "schemas.tables", "schemas.units", "schemas.version"),
+    *("schemas.errors", "schemas.tables", "schemas.units", "schemas.version"),
     *("inertial.frames", "pipelines.tables"),
 )
 _TABLES = (*_SAMPLES, "inertial.arrays", "inertial.errors", "inertial.quantities", "inertial.state")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from pipelines.archive.files import hash_of
 from pipelines.archive.store import Place, first_line
 from schemas.errors import ArchiveUnusable
-from schemas.version import VERSION
+from schemas.version import VERSION, upgraded
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -85,6 +85,4 @@ def read_table(path: Place, name: str, expected: str | None = None, columns: Seq
         raise ArchiveUnusable(
             f"archive: {path} has changed since it was written (its hash is not its manifest's); {remedy}"
         )
-    from schemas.upgrades import upgraded
-
     return upgraded(name, table.to_pandas(use_threads=False), int(marks.get(SCHEMA_MARK, b"1")), str(path))

@@ -22,8 +22,7 @@ from pipelines.audit.run_files import START, RunFiles
 from pipelines.audit.station_effects import station_values
 from schemas.errors import ArchiveUnusable
 from schemas.units import AXES
-from schemas.upgrades import upgraded
-from schemas.version import VERSION
+from schemas.version import VERSION, upgraded
 
 _TEXT, _NUMBER = pa.string(), pa.float64()
 _FEW = pa.dictionary(pa.int32(), _TEXT)  # texts with few different values

@@ -21,8 +21,7 @@ from pipelines.stages.uncertainty.budget_terms import BudgetTables
 from pipelines.stages.validate import validate
 from pipelines.stages.verify import verify_tables
 from pipelines.tables.dwells import LotTables
-from pipelines.tables.samples import PROCEDURE
-from pipelines.tables.summaries import summarised
+from pipelines.tables.summaries import PROCEDURE, summarised
 
 Tables = dict[str, "pd.DataFrame"]
 RECORDS = "records"

@@ -78,10 +78,10 @@ def _recipes(ctx: Context) -> list[str]:
 
 
 def _stations(ctx: Context) -> list[str]:
-    from schemas.own_files import own_names
+    from schemas.own_files import own_files
     from schemas.station import BUILT_IN
 
-    return [BUILT_IN, *own_names("stations"), *_files("*.toml")]
+    return [BUILT_IN, *own_files("stations"), *_files("*.toml")]
 
 
 def _files(pattern: str) -> list[str]:

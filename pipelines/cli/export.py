@@ -33,7 +33,7 @@ EPILOG = ("Formats:", *(f"{name}: {text}" for name, text in _FORMATS.items()))
 
 if TYPE_CHECKING:
     from pipelines.export import UnitCalibration
-    from pipelines.export.firmware import Firmware
+    from pipelines.export.settings import Firmware
 
 
 def command(
@@ -130,7 +130,7 @@ def _firmware(
     low_pass : kind, cut-off and rate, Hz · tracking : whether, step in s, change of the bias from switch-on to switch-on in µg
     """
     from pipelines.export.filtering import chosen_filter
-    from pipelines.export.firmware import Firmware, bias_models
+    from pipelines.export.settings import Firmware, bias_models
 
     kind, cutoff, rate = low_pass
     if form != "c":

@@ -142,7 +142,7 @@ def command(
         )
     stated = None
     if references is not None:
-        from pipelines.importers.stated_references import stated_references
+        from schemas.import_references import stated_references
 
         stated = stated_references(references, keys)
     sets = [files] if keys.get("join") else [[path] for path in files]

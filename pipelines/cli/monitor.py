@@ -76,7 +76,7 @@ def command(
 def _serve(monitor: Monitor, host: str, port: int, poster: Poster | None, audits: Path | None) -> None:
     from pipelines.cli.serving_pages import page_server, run_until_stopped
     from pipelines.monitoring.service import alerting, application
-    from pipelines.serving.listening import listening_socket
+    from pipelines.serving.connections import listening_socket
 
     place = listening_socket(host, port, "monitor")
     say(f"http://{host}:{place.getsockname()[1]}/healthz")

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     import uvicorn
     from starlette.types import ASGIApp
 
-    from pipelines.serving.listening import LimitedSocket
+    from pipelines.serving.connections import LimitedSocket
 
 
 PATIENCE_S = 2  # open streams would hold up the end of a server

@@ -62,8 +62,7 @@ def command(
     import uvicorn
 
     from pipelines.cli.serving_pages import page_server, run_until_stopped
-    from pipelines.serving.connections import MOST, ConnectionLimits
-    from pipelines.serving.listening import listening_socket
+    from pipelines.serving.connections import MOST, ConnectionLimits, listening_socket
     from pipelines.workbench.application import create_app
     from pipelines.workbench.settings import WorkbenchSettings
     from schemas.station import load_station

@@ -33,10 +33,8 @@ from pipelines.diagnosis.result_rows import (
 )
 from pipelines.diagnosis.suggested_formula import as_toml, offer, what_follows
 from pipelines.parallel import keep_memory
-from pipelines.tables.dwells import Measured
-from pipelines.tables.fewer_axes import sentences, shows_misalignment
-from pipelines.tables.sound_lot import error_of, every_unit_faulty, gaps, generator, probability, sound_lot
-from pipelines.tables.stated_poses import told
+from pipelines.tables.dwells import Measured, shows_misalignment, undetermined_responses
+from pipelines.tables.sound_lot import error_of, every_unit_faulty, gaps, generator, probability, sound_lot, told
 from schemas.errors import DataRejected
 
 DEFAULT = ("bias", "scale", "misalignment")
@@ -156,7 +154,7 @@ def document(
     names = Names(units, tuple(int(d) for d in measurement.dwells))
     terms = [*diagnosis.base.terms, *(m.term for n in diagnosis.named for m in n.effects.physics)]
     warnings = [
-        *sentences(measurement.state),
+        *undetermined_responses(measurement.state),
         *gaps(measurement, faults, left_out),
         *without_history(measurement, terms),
     ]

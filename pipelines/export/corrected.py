@@ -100,7 +100,6 @@ class Corrected:
     bias: Array | None = None
     bias_covariance: Array | None = None
     updated: Flags | None = None
-    flicker: FlickerTerms | None = None
     at_limits: Track | None = None
     kept: KeptTrack | None = None
     white: Array | None = None
@@ -207,9 +206,7 @@ def _tracked(recording: CorrectableRecording, fit: FitOfUnit, tracking: Tracking
             f"{recording.name}: the force is known nowhere and the unit is never at rest, one of them is needed to track the "
             "bias; give --force, columns force_x, force_y, force_z, or record the unit at rest"
         )
-    if (
-        len(time) % per
-    ):  # the samples after the last whole step are too few for an update; the filter lets the time pass
+    if len(time) % per:  # the samples after the last whole step are too few for an update: time passes in the filter
         middle = np.append(middle, time[-1])
         force, known = (np.vstack([values, np.full((1, 3), np.nan)]) for values in (force, known))
         magnitude = np.append(magnitude, np.nan)
@@ -234,8 +231,8 @@ def _tracked(recording: CorrectableRecording, fit: FitOfUnit, tracking: Tracking
     covariance = plain.covariance + own + np.diag(_within_a_step(terms, per, rate))
     return replace(
         plain, force=plain.force - bias, covariance=covariance, track=bias_track, bias=bias, bias_covariance=own,
-        updated=bias_track.updated[last], flicker=flicker, at_limits=at_limits,
-        kept=KeptTrack(bias_track.end, float(middle[-1]), flicker), white=terms.white,
+        updated=bias_track.updated[last], at_limits=at_limits, white=terms.white,
+        kept=KeptTrack(bias_track.end, float(middle[-1]), flicker),
     )  # fmt: skip
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from inertial.arrays import Array
 from pipelines.archive import Run
 from pipelines.export.corrected import Corrected, FitOfUnit, Tracking
 from pipelines.export.documents import CorrectDocument
@@ -31,8 +32,7 @@ def tracking_of(
     ----------
     force : true specific force as it was given, X,Y,Z in g; empty: what the recording states
     gravity : m/s²; None: that of the run
-    turn_on : µg, given or stated by the run
-    step : s
+    turn_on : µg, given or stated by the run; step : s
     """
     if not (force or at_rest or bool(np.isfinite(recording.known).all(axis=1).any())):
         return None
@@ -50,11 +50,12 @@ def tracking_of(
             "updates; give it with --turn-on UG (data sheet, or the power cycles of a run)"
         )
     local = gravity if gravity is not None else run.about.get("recipe", {}).get("local_gravity_m_s2")
-    if at_rest and (not isinstance(local, int | float) or not 9.7 < local < 9.9):
-        raise WrongUse(
-            f"correct: local gravity {local}, 9.7 to 9.9 m/s² is needed with --at-rest; give it with --gravity"
-        )
-    magnitude = float(local) / STANDARD_GRAVITY_M_S2 if at_rest and isinstance(local, int | float) else None
+    magnitude = None
+    if at_rest:
+        if not isinstance(local, int | float) or not 9.7 < local < 9.9:
+            found = f"local gravity {local}"
+            raise WrongUse(f"correct: {found}, 9.7 to 9.9 m/s² is needed with --at-rest; give it with --gravity")
+        magnitude = float(local) / STANDARD_GRAVITY_M_S2
     return Tracking(known, magnitude, turn_on, step)
 
 
@@ -62,7 +63,7 @@ def correction_document(
     recording: CorrectableRecording, fit: FitOfUnit, done: Corrected, output: Path | None
 ) -> CorrectDocument:
     """What was corrected, with which calibration, how well, and the bias where it was tracked."""
-    sd = MICRO * np.sqrt(np.diagonal(done.covariance, axis1=1, axis2=2))
+    sd = _deviation_ug(done.covariance)
     certificate = fit.exported.certificate
     document: CorrectDocument = {
         "file": recording.name,
@@ -72,7 +73,7 @@ def correction_document(
         "samples": len(recording.time),
         "outside_temperature": done.outside,
         "temperatures_C": list(fit.exported.temperatures),
-        "u_ug": dict(zip(AXES, np.sqrt(np.mean(sd**2, axis=0)).tolist(), strict=True)),
+        "u_ug": _by_axis(np.sqrt(np.mean(sd**2, axis=0))),
         "u_contains": [
             "references and noise of the calibration" if fit.budget else "noise of the calibration only",
             *(["bias", "white noise of a sample"] if done.track is not None else []),
@@ -82,16 +83,14 @@ def correction_document(
         "state": None,
         "bias": None,
     }
-    if done.track is None or done.flicker is None:
+    if done.track is None or done.kept is None:
         return document
     track, check = done.track, done.track.consistency
-    end = np.sqrt(np.diagonal(track.covariance[-1]))
+    at_limits = None if done.at_limits is None else _by_axis(_deviation_ug(done.at_limits.covariance[-1]))
     document["bias"] = {
-        "last_ug": dict(zip(AXES, (MICRO * track.bias[-1]).tolist(), strict=True)),
-        "u_last_ug": dict(zip(AXES, (MICRO * end).tolist(), strict=True)),
-        "u_last_at_limits_ug": None
-        if done.at_limits is None
-        else dict(zip(AXES, (MICRO * np.sqrt(np.diagonal(done.at_limits.covariance[-1]))).tolist(), strict=True)),
+        "last_ug": _by_axis(MICRO * track.bias[-1]),
+        "u_last_ug": _by_axis(_deviation_ug(track.covariance[-1])),
+        "u_last_at_limits_ug": at_limits,
         "updates": int(track.updated.sum()),
         "steps": len(track.updated),
         "rejected": track.rejected,
@@ -101,7 +100,16 @@ def correction_document(
         "lag_1_bound": check.lag_1_bound,
         # more than 1 % of the updates were rejected, beyond five standard deviations
         "stated_uncertainty": "too small" if track.rejected > 1 + 0.01 * check.count else check.stated,
-        "processes_s": done.flicker.correlation_s.tolist(),
-        "processes_flat": done.flicker.flatness,
+        "processes_s": done.kept.flicker.correlation_s.tolist(),
+        "processes_flat": done.kept.flicker.flatness,
     }
     return document
+
+
+def _deviation_ug(covariance: Array) -> Array:
+    """Standard deviations (…, 3), µg, of covariances (…, 3, 3) in g²."""
+    return MICRO * np.sqrt(np.diagonal(covariance, axis1=-2, axis2=-1))
+
+
+def _by_axis(values: Array) -> dict[str, float]:
+    return dict(zip(AXES, values.tolist(), strict=True))

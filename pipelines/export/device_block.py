@@ -35,6 +35,7 @@ from schemas.errors import WrongUse
 
 Form = Literal["float32", "q24"]
 FORMS: dict[Form, int] = {"float32": 1, "q24": 2}
+STORED: dict[Form, str] = {"float32": "<f4", "q24": "<i4"}
 MAGIC, VERSION = b"TLCB", 1
 HEAD = "<4sHHHHI64sIIffd4h"
 COEFFICIENTS = 48
@@ -105,9 +106,8 @@ def block_of(
     shared = (form, sequence, unit.unit, certificate, date, unit.temperatures)
     if form == "q24":
         whole = fixed_point(moved)
-        return CoefficientBlock(
-            *shared, whole.scale, offsets, whole.bias.astype(np.float64), whole.inverse.astype(np.float64)
-        )
+        exact = [v.astype(np.float64) for v in (whole.bias, whole.inverse)]
+        return CoefficientBlock(*shared, whole.scale, offsets, *exact)
     exact = [v.astype(np.float32).astype(np.float64) for v in (moved.bias, moved.response)]
     return CoefficientBlock(*shared, 0.0, offsets, *exact)
 
@@ -119,9 +119,7 @@ def pack(block: CoefficientBlock) -> bytes:
         block.date, *block.temperatures, block.scale, *block.offsets, 0,
     )  # fmt: skip
     values = np.concatenate([block.bias.ravel(), block.matrix.ravel()])
-    kind = "f" if block.form == "float32" else "i"
-    numbers = values.tolist() if kind == "f" else [int(v) for v in values]
-    body = head + struct.pack(f"<{COEFFICIENTS}{kind}", *numbers)
+    body = head + values.astype(STORED[block.form]).tobytes()
     return body + struct.pack("<I", zlib.crc32(body))
 
 
@@ -136,8 +134,7 @@ def unpack(content: bytes) -> CoefficientBlock | None:
     named: Form | None = next((name for name, number in FORMS.items() if number == form), None)
     if version != VERSION or length != LENGTH or named is None:
         return None
-    kind = "f" if named == "float32" else "i"
-    values = np.array(struct.unpack_from(f"<{COEFFICIENTS}{kind}", data, struct.calcsize(HEAD)), dtype=np.float64)
+    values = np.frombuffer(data, STORED[named], COEFFICIENTS, struct.calcsize(HEAD)).astype(np.float64)
     x, y, z = offsets[:3]
     return CoefficientBlock(
         named, sequence, unit.rstrip(b"\0").decode("utf-8", "replace"), certificate, date, (low, high), scale, (x, y, z),

@@ -33,11 +33,9 @@ def measured_bandwidth(archive: Archive, unit: str) -> tuple[float, str] | None:
             if run is None or name not in run.tables():
                 continue
             table = run.table(name)
-            own = table[
-                (table["unit"] == unit) & table["figure"].isin(FIGURES) & np.isfinite(table["value"].astype(float))
-            ]
-            if len(own):
-                return float(own["value"].astype(float).min()), run.id
+            values = table.loc[(table["unit"] == unit) & table["figure"].isin(FIGURES), "value"].astype(float)
+            if np.isfinite(values).any():
+                return float(values[np.isfinite(values)].min()), run.id
     return None
 
 

@@ -90,7 +90,8 @@ def noise_heading(
     return [f"# {comment(line)}" for line in (head, unit.certified, *before, *left_out, *after)]
 
 
-def comment_lines(parts: Sequence[tuple[str, float]], total_ug: float) -> list[str]:
-    """Lines of a comment: the terms that are not in the file, and the remaining error, µg."""
-    lines = [f"not in this file: {part}, up to {size:.3g} µg" for part, size in parts]
-    return [*lines, f"largest error of this file against the full calibration, at 1 g: {total_ug:.3g} µg"]
+def comment_lines(unit: UnitCalibration, applied: Applied, parts: Sequence[str], nominal: float = 0.0) -> list[str]:
+    """Lines of a comment: the parts of a calibration that a file does not hold, and the remaining error, µg."""
+    lines = [f"not in this file: {part}, up to {size:.3g} µg" for part, size in omitted(unit, parts, nominal)]
+    total = largest_error_ug(unit, applied)
+    return [*lines, f"largest error of this file against the full calibration, at 1 g: {total:.3g} µg"]

@@ -8,17 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from inertial.arrays import Array
-from pipelines.export.omissions import (
-    ACROSS,
-    ACROSS_T,
-    BIAS_T,
-    SCALE_T,
-    Applied,
-    comment,
-    comment_lines,
-    largest_error_ug,
-    omitted,
-)
+from pipelines.export.omissions import ACROSS, ACROSS_T, BIAS_T, SCALE_T, Applied, comment, comment_lines
 from pipelines.export.polynomials import UnitCalibration
 from schemas.units import STANDARD_GRAVITY_M_S2
 
@@ -68,7 +58,7 @@ def heading(
         f"accelerometer calibration of unit {unit.unit}, run {run}, {low:.1f} to {high:.1f} °C",
         unit.certified,
         f"{where}; assumed output of the driver for 1 g: {nominal:g} {unit.out_unit}",
-        *comment_lines(omitted(unit, parts), largest_error_ug(unit, applied)),
+        *comment_lines(unit, applied, parts),
     ]
     return [f"# {comment(line)}" for line in lines]
 

@@ -205,10 +205,8 @@ def _nominal(run: Run, out_unit: str) -> float | None:
 def _temperatures(dwells: pd.DataFrame, unit: str) -> tuple[float, float]:
     """Lowest and highest temperature of a unit's dwells, °C; the reference temperature where none was recorded."""
     column = next((name for name in ("unit_C", "chamber_C") if name in dwells.columns), None)
-    values = (
-        np.array([]) if column is None else dwells.loc[dwells["unit"] == unit, column].dropna().to_numpy(dtype=float)
-    )
-    return (float(values.min()), float(values.max())) if values.size else (T_REFERENCE, T_REFERENCE)
+    values = [] if column is None else dwells.loc[dwells["unit"] == unit, column].dropna().tolist()
+    return (float(min(values)), float(max(values))) if values else (T_REFERENCE, T_REFERENCE)
 
 
 def revoked_units(run: Run) -> dict[str, validity.Calibration]:

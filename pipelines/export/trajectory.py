@@ -48,10 +48,8 @@ def with_temperature(recording: CorrectableRecording) -> tuple[CorrectableRecord
     """The recording with a temperature, that of the calibration's reference where none is recorded; a sentence says so."""
     if recording.state.temperature is not None:
         return recording, ()
-    warm = np.full(len(recording.time), T_REFERENCE)
-    return replace(recording, state=replace(recording.state, temperature=warm)), (
-        f"no unit_C: {T_REFERENCE:g} °C taken",
-    )
+    state = replace(recording.state, temperature=np.full(len(recording.time), T_REFERENCE))
+    return replace(recording, state=state), (f"no unit_C: {T_REFERENCE:g} °C taken",)
 
 
 def simulated(

@@ -175,7 +175,6 @@ def _tdms(channels: Sequence[Channel]) -> bytes:
     return sink.getvalue()
 
 
-ACCELERATIONS = ("g", "m/s^2")
 TIME, ACCELERATION, UNKNOWN = 17, 12, 0
 DOUBLE = 4  # ordinate of double precision, real
 
@@ -192,7 +191,7 @@ def _uff58(channels: Sequence[Channel]) -> bytes:
         path = Path(folder) / "waveforms.uff"
         file = pyuff.UFF(str(path))
         for number, one in enumerate(channels, start=1):
-            known = ACCELERATION if one.unit in ACCELERATIONS else UNKNOWN
+            known = ACCELERATION if one.unit in {"g", "m/s^2"} else UNKNOWN
             content = {
                 "type": 58, "binary": 1, "func_type": 1, "rsp_node": number, "rsp_dir": one.axis + 1, "ref_node": 0, "ref_dir": 0,
                 "data": np.asarray(one.samples, dtype=np.float64), "x": one.time, "num_pts": len(one.samples), "id1": one.name,
@@ -201,9 +200,7 @@ def _uff58(channels: Sequence[Channel]) -> bytes:
                 "ordinate_spec_data_type": known, "ordinate_axis_units_lab": one.unit, "orddenom_spec_data_type": UNKNOWN,
                 "ord_data_type": DOUBLE,
             }  # fmt: skip
-            with (
-                warnings.catch_warnings()
-            ):  # pyuff leaves the file to the collector; its "overwrite" loses binary samples
+            with warnings.catch_warnings():  # pyuff leaves the file to the collector; "overwrite" loses binary samples
                 warnings.simplefilter("ignore", ResourceWarning)
                 file.write_sets(content, "add")
         return path.read_bytes()
@@ -250,15 +247,12 @@ def files_of_waveforms(form: str, channels: Sequence[Channel], path: Path) -> di
     writer = writer_of(form)
     if not channels:
         raise WrongUse("waveforms: no channel, at least one is needed; name another record")
-    clocks = list(dict.fromkeys((one.interval_s, len(one.samples), one.group) for one in channels))
-    shared = len({(interval, count) for interval, count, _ in clocks}) == 1
-    if shared or not writer.one_clock:
+    clocks: dict[tuple[float, int, str], list[Channel]] = {}
+    for one in channels:
+        clocks.setdefault((one.interval_s, len(one.samples), one.group), []).append(one)
+    if not writer.one_clock or len({clock[:2] for clock in clocks}) == 1:
         return {path: writer.made(channels)}
-    made: dict[Path, bytes] = {}
-    for interval, count, group in clocks:
-        own = [one for one in channels if (one.interval_s, len(one.samples), one.group) == (interval, count, group)]
-        made[path.with_name(f"{path.stem}_{group}{path.suffix}")] = writer.made(own)
-    return made
+    return {path.with_name(f"{path.stem}_{clock[2]}{path.suffix}"): writer.made(own) for clock, own in clocks.items()}
 
 
 def write_waveforms(form: str, channels: Sequence[Channel], path: Path) -> list[Path]:

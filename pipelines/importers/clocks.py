@@ -7,6 +7,7 @@ that contradicts the file is refused; one that contradicts the steps gives a rem
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,6 +25,7 @@ USUAL_HZ = (0.5, 5e4)
 """Rates of samples of accelerometers, of recorders and of loggers."""
 _NAMED = re.compile(r"(?:^|[_\s.\-\[(])(s|sec|secs|second|seconds|ms|msec|milli|millis|milliseconds?|us|µs|μs|usec|micros|"
                     r"microseconds?|ns|nsec|nanos|nanoseconds?)[\])]?\s*$", re.IGNORECASE)  # fmt: skip
+_BEGINNINGS = {"ns": ("nsec", "nano"), "us": ("usec", "micro"), "ms": ("msec", "milli")}
 _CLOCK = re.compile(r"^\s*(\d{1,2}:\d{2}:\d{2}(?:[.,:]\d+)?)\s*$")
 _MINUTES = re.compile(r"^\s*(\d{1,3}):([0-5]\d[.,]\d+)\s*$")
 """Minutes and seconds, as a spreadsheet shows a time of day with fractions: without hours, 59:59.9 is followed by 00:00.0."""
@@ -58,14 +60,9 @@ class Recognised:
 def unit_stated(text: str) -> str:
     """The unit of time that a text names, as one of s, ms, us, ns; empty if it names none."""
     word = text.strip().lower().replace("µ", "u").replace("μ", "u")
-    for unit, words in {
-        "ns": ("ns", "nsec", "nano"),
-        "us": ("us", "usec", "micro"),
-        "ms": ("ms", "msec", "milli"),
-    }.items():
-        if word == unit or word.startswith(words[1:]):
-            return unit
-    return "s" if word in {"s", "sec", "secs", "second", "seconds"} else ""
+    if word in {"s", "sec", "secs", "second", "seconds"}:
+        return "s"
+    return next((unit for unit, words in _BEGINNINGS.items() if word == unit or word.startswith(words)), "")
 
 
 def recognised(numbers: Array, name: str, stated: str = "") -> Recognised:
@@ -96,12 +93,9 @@ def _by_steps(numbers: Array) -> Recognised:
         return Recognised("", "time does not increase", ())
     possible = tuple(unit for unit, factor in TIME_UNITS.items() if USUAL_HZ[0] <= 1.0 / (step * factor) <= USUAL_HZ[1])
     fractions = bool(np.any(numbers != np.rint(numbers)))
-    reason = f"steps of {step:.6g}"
     if "s" in possible and step < 1.0 and fractions:
-        return Recognised(
-            "s", reason, ("s",)
-        )  # counters of ms and shorter units in fractions state the unit in their names
-    return Recognised(possible[0] if len(possible) == 1 else "", reason, possible)
+        possible = ("s",)  # counters of ms and shorter units in fractions state the unit in their names
+    return Recognised(possible[0] if len(possible) == 1 else "", f"steps of {step:.6g}", possible)
 
 
 def typical_step(numbers: Array) -> float:
@@ -132,21 +126,16 @@ def stamps(column: pd.Series, where: str) -> Array:
     text = column.astype(str).str.strip().str.replace(_FRACTION, r"\1.\2", regex=True)
     if column.notna().all() and bool(text.str.match(_CLOCK).all()):
         with foreign(f"{where}: column '{name}': times of day that cannot be read", "give seconds, or ISO stamps"):
-            spans = pd.to_timedelta(
-                text.str.replace(r":(\d+)$", r".\1", regex=True) if text.iloc[0].count(":") == 3 else text
-            )
+            pointed = text.str.replace(r":(\d+)$", r".\1", regex=True) if text.iloc[0].count(":") == 3 else text
+            spans = pd.to_timedelta(pointed)
         return _unwrapped(np.asarray(spans.dt.total_seconds(), dtype=np.float64), _DAY_S)
     if column.notna().all() and bool(text.str.match(_MINUTES).all()):
         parts = text.str.replace(",", ".", regex=False).str.split(":", expand=True).astype(float).to_numpy()
         return _unwrapped(60.0 * parts[:, 0] + parts[:, 1], _HOUR_S)
-    for form in _FORMATS:
-        parsed = _parsed(text, form)
-        if parsed is not None:
-            return values.seconds(parsed, where)
-    candidates: list[Array] = []
-    for forms in (_DAY_FIRST, _MONTH_FIRST):
-        read = next((one for one in (_parsed(text, form) for form in forms) if one is not None), None)
-        candidates += [] if read is None else [values.seconds(read, where)]
+    plain = _read(text, _FORMATS, where)
+    if plain is not None:
+        return plain
+    candidates = [one for forms in (_DAY_FIRST, _MONTH_FIRST) if (one := _read(text, forms, where)) is not None]
     if len(candidates) == 2 and not np.allclose(candidates[0], candidates[1]):
         raise DataRejected(
             f"{where}: column '{name}': '{shown(column.iloc[0])}': day and month are ambiguous, and the date changes; "
@@ -167,12 +156,16 @@ def _unwrapped(seconds: Array, period_s: float) -> Array:
     return seconds + period_s * periods - seconds[0]
 
 
-def _parsed(text: pd.Series, form: str) -> pd.Series | None:
-    try:
-        parsed = pd.to_datetime(text, format=form, utc=True, errors="raise")
-    except (ValueError, OverflowError, TypeError):
-        return None
-    return None if parsed.isna().any() else pd.Series(parsed, name=text.name)
+def _read(text: pd.Series, forms: Sequence[str], where: str) -> Array | None:
+    """Seconds by the first form that every row has; None where there is none."""
+    for form in forms:
+        try:
+            parsed = pd.to_datetime(text, format=form, utc=True, errors="raise")
+        except (ValueError, OverflowError, TypeError):
+            continue
+        if not parsed.isna().any():
+            return values.seconds(pd.Series(parsed, name=text.name), where)
+    return None
 
 
 def _first_bad(text: pd.Series) -> int:
@@ -206,13 +199,11 @@ def clock(numbers: Array, name: str, claimed: str, stated: str, where: str) -> R
     """
     recognition = recognised(numbers, name, stated)
     column, step = f"column '{shown(name)}'", typical_step(numbers)
+    possible, found = recognition.possible or tuple(TIME_UNITS), f"steps of {step:.6g}"
     if not claimed and not recognition.unit and step > 0.0:
-        rates = ", ".join(
-            f"{1.0 / (step * TIME_UNITS[u]):.4g} Hz in {u}" for u in recognition.possible or tuple(TIME_UNITS)
-        )
         raise WrongUse(
-            f"{where}: {column}: steps of {step:.6g}: {rates}; the unit is needed; add --units time="
-            f"{'|'.join(recognition.possible or tuple(TIME_UNITS))}"
+            f"{where}: {column}: {found}: {', '.join(rates_in(step, possible))}; the unit is needed; add --units time="
+            f"{'|'.join(possible)}"
         )
     if claimed and recognition.unit and claimed != recognition.unit and not recognition.reason.startswith("steps"):
         raise WrongUse(
@@ -220,20 +211,16 @@ def clock(numbers: Array, name: str, claimed: str, stated: str, where: str) -> R
         )
     unit = claimed or recognition.unit or "s"
     seconds = (numbers - numbers[0]) * TIME_UNITS[unit]  # the difference keeps the digits of Unix time in ns
-    return RecordingClock(
-        seconds,
-        unit,
-        _doubts(step, unit, recognition, column)
-        if claimed
-        else (_reading(column, unit, recognition, step, len(numbers)),),
-    )
+    if claimed:
+        return RecordingClock(seconds, unit, _doubts(step, unit, recognition, column))
+    apart = step * TIME_UNITS[unit]
+    rate = f", {1.0 / apart:.4g} Hz for {apart * (len(numbers) - 1):.5g} s" if apart > 0.0 else ""
+    return RecordingClock(seconds, unit, (f"{column}: time in {unit} ({recognition.reason}){rate}",))
 
 
-def _reading(column: str, unit: str, recognition: Recognised, step: float, count: int) -> str:
-    """The interpretation of time, as text."""
-    seconds = step * TIME_UNITS[unit]
-    rate = f", {1.0 / seconds:.4g} Hz for {seconds * (count - 1):.5g} s" if seconds > 0.0 else ""
-    return f"{column}: time in {unit} ({recognition.reason}){rate}"
+def rates_in(step: float, units: Sequence[str]) -> list[str]:
+    """The rates of samples, Hz, that a step means in some units."""
+    return [f"{1.0 / (step * TIME_UNITS[unit]):.4g} Hz in {unit}" for unit in units]
 
 
 def _doubts(step: float, unit: str, recognition: Recognised, column: str) -> tuple[str, ...]:
@@ -243,5 +230,5 @@ def _doubts(step: float, unit: str, recognition: Recognised, column: str) -> tup
     rate = 1.0 / (step * TIME_UNITS[unit])
     if USUAL_HZ[0] <= rate <= USUAL_HZ[1] or not recognition.possible:
         return ()
-    others = " or ".join(f"{1.0 / (step * TIME_UNITS[u]):.4g} Hz in {u}" for u in recognition.possible)
+    others = " or ".join(rates_in(step, recognition.possible))
     return (f"CHECK THE UNIT OF TIME: {column} in {unit} gives {rate:.4g} Hz; other units give {others}",)

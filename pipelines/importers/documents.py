@@ -22,10 +22,13 @@ class ColumnDocument(TypedDict):
     clipped: Annotated[int, "consecutive samples at an extreme, as at the end of a range"]
 
 
+FaultName = Literal["stuck_output", "torn_words"]
+
+
 class SampleFaultDocument(TypedDict):
     """A fault of samples."""
 
-    fault: Literal["stuck_output", "torn_words"]
+    fault: FaultName
     axis: str
     first_row: int
     samples: int

@@ -9,10 +9,11 @@ import numpy as np
 import pandas as pd
 
 from inertial.arrays import Array
+from inertial.quantities import OUTPUT_COLUMNS, SPREAD_COLUMNS
 from pipelines.importers.judged import FitAnswer
 from pipelines.importers.mapping import Mapping
 from pipelines.importers.record import Imported
-from schemas.units import AXES, MICRO
+from schemas.units import MICRO
 
 
 def dwell_rows(data: Imported, judged: FitAnswer | None, mapping: Mapping) -> list[dict[str, Any]]:
@@ -35,10 +36,8 @@ def dwell_rows(data: Imported, judged: FitAnswer | None, mapping: Mapping) -> li
                 "start_s": start,
                 "end_s": end,
                 "n": int(dwell["n"]) if "n" in dwell else None,
-                "mean": [float(dwell[f"out_{axis}"]) for axis in AXES if f"out_{axis}" in dwell],
-                "sd": [float(dwell[f"sd_{axis}"]) for axis in AXES if f"sd_{axis}" in dwell]
-                if "sd_x" in dwell
-                else None,
+                "mean": [float(dwell[name]) for name in OUTPUT_COLUMNS if name in dwell],
+                "sd": [float(dwell[name]) for name in SPREAD_COLUMNS if name in dwell] if "sd_x" in dwell else None,
                 "residual_ug": None if residual is None else MICRO * float(residual[k]),
                 "influence": None if influence is None else float(influence[k]),
             }
@@ -60,7 +59,7 @@ def _norm_influence(
     if judged is None or judged.method != "norm" or mapping.norm_g is None:
         return None, None
     bias, response = np.array(judged.document["bias"]), np.array(judged.document["response_per_g"])
-    output = dwells[["out_x", "out_y", "out_z"]].to_numpy(dtype=np.float64) - bias
+    output = dwells[[*OUTPUT_COLUMNS]].to_numpy(dtype=np.float64) - bias
     slope = judged.document.get("temperature_offset_per_C")
     if slope is not None and "unit_C" in dwells.columns:
         warm = dwells["unit_C"].to_numpy(dtype=np.float64) - float(judged.document["reference_C"])

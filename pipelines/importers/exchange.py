@@ -54,13 +54,7 @@ def read_dwells(source: str | Path, *, archive: str | Path | None = None) -> pd.
 
 
 def read_history(source: str | Path, *, archive: str | Path | None = None) -> pd.DataFrame:
-    """A run's temperatures against time: `time_s` with `unit_C`, `chamber_C` or both, in order of unit and time.
-
-    Parameters
-    ----------
-    source : a file, or the name of a run in the archive
-    archive : the archive's folder where `source` is a run
-    """
+    """The temperatures against time of a file or run: `time_s` with `unit_C`, `chamber_C` or both, in order of unit and time."""
     if files.is_file(source):
         frame, _ = files.read(Path(source))
         return checked_history(frame, Path(source).name, foreign=True)
@@ -112,7 +106,7 @@ def checked(frame: pd.DataFrame, *, where: str, foreign: bool = False) -> pd.Dat
             continue
         if column in KNOWN_COLUMNS or pd.api.types.is_numeric_dtype(frame[column]):
             frame[column] = _numbers(frame, column, where)
-    frame["dwell"] = _whole(frame, "dwell", where)
+    frame["dwell"] = _dwell_numbers(frame, where)
     if len(output_axes(frame.columns)) < len(OUTPUT_COLUMNS):
         _known_along(frame)
     _all_or_none(frame, FORCE_COLUMNS, where)
@@ -158,8 +152,7 @@ def _require(frame: pd.DataFrame, names: Iterable[str], where: str) -> None:
         columns = list(map(str, frame.columns))
         close = [f"{name}: {did_you_mean(name, columns)}" for name in missing[:3] if close_matches(name, columns)]
         hints = "; ".join(close) or f"known: {', '.join(columns)}"
-        what, it = ("columns", "them") if len(missing) > 1 else ("column", "it")
-        are = "are" if len(missing) > 1 else "is"
+        what, are, it = ("columns", "are", "them") if len(missing) > 1 else ("column", "is", "it")
         raise DataRejected(
             f"{where}: {what} {', '.join(missing)} {are} missing; {hints}; rename {it}, or use 'tumbleline import --map'"
         )
@@ -190,21 +183,19 @@ def _numbers(frame: pd.DataFrame, column: str, where: str) -> Array:
     return numbers
 
 
-def _whole(frame: pd.DataFrame, column: str, where: str) -> Index:
-    numbers = np.asarray(frame[column], dtype=np.float64)
-    bad = np.flatnonzero((numbers != np.rint(numbers)) | (numbers < 0) | (numbers > values.BOUNDS[column][1]))
+def _dwell_numbers(frame: pd.DataFrame, where: str) -> Index:
+    numbers = np.asarray(frame["dwell"], dtype=np.float64)
+    bad = np.flatnonzero((numbers != np.rint(numbers)) | (numbers < 0) | (numbers > values.BOUNDS["dwell"][1]))
     if bad.size:
-        row = int(bad[0])
-        raise DataRejected(
-            f"{where}: row {row}, column {column}: found {numbers[row]}, a whole number from 0 on is needed; correct it"
-        )
+        found = f"row {bad[0]}, column dwell: found {numbers[bad[0]]}"
+        raise DataRejected(f"{where}: {found}, a whole number from 0 on is needed; correct it")
     return numbers.astype(np.int64)
 
 
 def _all_or_none(frame: pd.DataFrame, names: tuple[str, ...], where: str) -> None:
     there = [name for name in names if name in frame.columns]
-    if there and len(there) < len(names):
-        missing = [name for name in names if name not in there]
+    missing = [name for name in names if name not in there]
+    if there and missing:
         raise DataRejected(
             f"{where}: {', '.join(there)} without {', '.join(missing)}; give all of {', '.join(names)} or none"
         )
@@ -235,18 +226,17 @@ def _countable(frame: pd.DataFrame, where: str) -> None:
     """Refuse means of no samples, outputs in an unknown unit, and dwells that all have the same time."""
     if "n" in frame.columns:
         count = np.asarray(frame["n"], dtype=np.float64)
-        row = int(np.argmax((count < 1.0) | (count > values.BOUNDS["n"][1])))
-        if count[row] < 1.0 or count[row] > values.BOUNDS["n"][1]:
-            raise DataRejected(
-                f"{where}: row {row}, column n: found {count[row]:g}, a mean of 1 or more samples is needed; correct it"
-            )
+        bad = np.flatnonzero((count < 1.0) | (count > values.BOUNDS["n"][1]))
+        if bad.size:
+            found = f"row {bad[0]}, column n: found {count[bad[0]]:g}"
+            raise DataRejected(f"{where}: {found}, a mean of 1 or more samples is needed; correct it")
     if "out_unit" in frame.columns:
-        for name in sorted({str(value) for value in frame["out_unit"].dropna()}):
-            if name not in tables.OUTPUT_UNITS:
-                known = ", ".join(tables.OUTPUT_UNITS)
-                raise DataRejected(
-                    f"{where}: column out_unit: found '{shown(name)}', one of {known} is needed; correct it"
-                )
+        unknown = sorted({str(value) for value in frame["out_unit"].dropna()} - {*tables.OUTPUT_UNITS})
+        if unknown:
+            known = ", ".join(tables.OUTPUT_UNITS)
+            raise DataRejected(
+                f"{where}: column out_unit: found '{shown(unknown[0])}', one of {known} is needed; correct it"
+            )
     for unit, rows in frame.groupby("unit", sort=False):
         if len(rows) > 1 and float(np.ptp(rows["time_s"])) == 0.0:
             raise DataRejected(
@@ -269,7 +259,7 @@ def checked_history(frame: pd.DataFrame, where: str, *, foreign: bool) -> pd.Dat
     for column in ("time_s", *heats):
         frame[column] = _numbers(named, column, where)
     _inside(frame, where)
-    order = ["unit", "time_s"] if "unit" in frame.columns else ["time_s"]
+    order = [name for name in ("unit", "time_s") if name in frame.columns]
     frame = frame.sort_values(order, kind="stable").reset_index(drop=True)
     twice = frame.duplicated(order)
     if twice.any():

@@ -57,11 +57,7 @@ def read(path: Path) -> tuple[pd.DataFrame, SourceFile]:
 
 
 def read_content(path: Path, group: str = "") -> tuple[Content, SourceFile]:
-    """The content of a file, and its source; read by the process of the reader.
-
-    Parameters
-    ----------
-    group : the group of channels, if the file has several.
+    """The content of a file, or of a group of channels where it has several, and its source; read by the process of the reader.
 
     Raises
     ------

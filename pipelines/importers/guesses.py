@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from inertial.arrays import Array, Flags
-from inertial.quantities import ANGLE_COLUMNS, FORCE_COLUMNS, KNOWN_COLUMNS, LARGEST, SPREAD_COLUMNS
+from inertial.quantities import ANGLE_COLUMNS, FORCE_COLUMNS, KNOWN_COLUMNS, LARGEST, OUTPUT_COLUMNS, SPREAD_COLUMNS
 from pipelines.importers import clocks, named_columns, triads, unit_check, values
 from pipelines.importers.clocks import typical_step
 from pipelines.importers.content import Content
@@ -33,9 +33,7 @@ _OF_EXCHANGE = {
     "unit": "unit",
     "dwell": "dwell",
     "time_s": "time",
-    "out_x": "x",
-    "out_y": "y",
-    "out_z": "z",
+    **dict(zip(OUTPUT_COLUMNS, "xyz", strict=True)),
     **dict.fromkeys(FORCE_COLUMNS, "reference force"),
     **dict.fromkeys(ANGLE_COLUMNS, "reference angle"),
     **{name: f"sd_{name[-1]}" for name in SPREAD_COLUMNS},
@@ -148,7 +146,7 @@ def measurable(numbers: Array) -> Array:
 
 
 def _numbers(column: pd.Series) -> Array | None:
-    if column.dtype.kind in "mM" or isinstance(column.dtype, pd.DatetimeTZDtype) or column.dtype.kind == "b":
+    if values.is_moment(column) or column.dtype.kind == "b":
         return None
     numbers = measurable(np.asarray(pd.to_numeric(column, errors="coerce"), dtype=np.float64))
     return numbers if np.mean(np.isfinite(numbers)) > 0.5 else None
@@ -171,16 +169,12 @@ def _time(table: pd.DataFrame, numeric: dict[str, Array], guessed: dict[str, Gue
             return
     growing = [name for name in free if name in numeric and (_grows(numeric[name]) or _grows(numeric[name], inside))]
     fine = [name for name in growing if _FINE.search(name)]
-    named = fine or [name for name in growing if _TIME.search(name) and not triads.COUNT.search(name)]
+    uncounted = [name for name in growing if not triads.COUNT.search(name)]
+    named = fine or [name for name in uncounted if _TIME.search(name)]
+    even = [name for name in uncounted if not (_AXIS.search(name) or triads.is_row_number(numeric[name]))]
     if named:
         guessed[named[0]] = Guess("time", "its name, and it only increases")
-        return
-    even = [
-        name
-        for name in growing
-        if not (triads.COUNT.search(name) or _AXIS.search(name) or triads.is_row_number(numeric[name]))
-    ]
-    if even:
+    elif even:
         guessed[even[0]] = Guess("time", "the first column that only increases")
 
 
@@ -218,11 +212,9 @@ def _single_axis(numeric: dict[str, Array], guessed: dict[str, Guess]) -> bool:
         return False
     guessed[output] = Guess("x", "the one output, which follows its reference")
     guessed[reference] = Guess(meaning, "the reference of the one output")
-    spread = [name for name in numeric if re.match(r"^(?:sd|std|noise|sigma)", name, re.IGNORECASE)]
-    count = [name for name in numeric if re.match(r"^(?:n|samples|count)$", name, re.IGNORECASE)]
-    guessed |= {name: Guess("sd_x", "its name") for name in spread[:1]} | {
-        name: Guess("n", "its name") for name in count[:1]
-    }
+    for pattern, further in ((r"^(?:sd|std|noise|sigma)", "sd_x"), (r"^(?:n|samples|count)$", "n")):
+        named = [name for name in numeric if re.match(pattern, name, re.IGNORECASE)]
+        guessed |= {name: Guess(further, "its name") for name in named[:1]}
     return True
 
 
@@ -305,8 +297,7 @@ def _time_unit(content: Content, numeric: dict[str, Array], guessed: dict[str, G
             )
         possible = slow or possible
     near = min(possible, key=lambda unit: abs(np.log(1.0 / (step * clocks.TIME_UNITS[unit]) / _LIKELY_HZ)))
-    rates = ", ".join(f"{1.0 / (step * clocks.TIME_UNITS[unit]):.4g} Hz in {unit}" for unit in possible)
-    return Guess(near, f"{seen.reason} allow {rates}: check")
+    return Guess(near, f"{seen.reason} allow {', '.join(clocks.rates_in(step, possible))}: check")
 
 
 def _output(
@@ -336,12 +327,9 @@ def guesses_of_dwells(table: pd.DataFrame) -> Guesses:
     """The meanings of the columns of the exchange format, by their names; further columns of numbers are covariates."""
     columns: dict[str, Guess] = {}
     for name in map(str, table.columns):
-        if name in _OF_EXCHANGE or name in KNOWN_COLUMNS:
-            columns[name] = Guess(_OF_EXCHANGE.get(name, "recorded quantity"), "its name")
-        elif table[name].dtype.kind in "fiu":
-            columns[name] = Guess("covariate", "further numbers")
-        else:
-            columns[name] = Guess("", "")
+        further = Guess("covariate", "further numbers") if table[name].dtype.kind in "fiu" else Guess("", "")
+        known = name in _OF_EXCHANGE or name in KNOWN_COLUMNS
+        columns[name] = Guess(_OF_EXCHANGE.get(name, "recorded quantity"), "its name") if known else further
     stated = sorted({str(unit) for unit in table["out_unit"].dropna()}) if "out_unit" in table else []
     output = Guess(stated[0], "column out_unit") if len(stated) == 1 else Guess("", "")
     return Guesses(columns, Guess("s", EXCHANGE), output)

@@ -45,13 +45,7 @@ class Inspection:
 
 
 def inspect(paths: Sequence[Path], *, join: str = "", group: str = "") -> Inspection:
-    """The inspection of a recording of one or several files.
-
-    Parameters
-    ----------
-    join : how several files are joined, ``rows`` or ``columns``.
-    group : the group of channels, if a file has several.
-    """
+    """The inspection of a recording of one or several files, joined as :func:`pipelines.importers.sources.read` does."""
     seen = recognise(paths, join=join, group=group)
     if seen.is_exchange:
         return Inspection(_of_dwells(paths[0], seen), None, None)
@@ -121,7 +115,6 @@ def _content_of_dwells(table: pd.DataFrame) -> str:
 def _intervals(output: Array, time: Array, stops: Stops | None) -> list[IntervalDocument]:
     if stops is None:
         return []
-    pairs = list(zip(stops.found.first, stops.found.last, strict=True))[:_MOST_INTERVALS]
     return [
         {
             "start_s": float(time[a] - time[0]),
@@ -131,22 +124,19 @@ def _intervals(output: Array, time: Array, stops: Stops | None) -> list[Interval
             "sd": output[a:b].std(axis=0, ddof=1).tolist(),
             "positions": change_of_level.several_levels(output[a:b]) if k in stops.several else 1,
         }
-        for k, (a, b) in enumerate(pairs)
+        for k, (a, b) in enumerate(stops.found.spans[:_MOST_INTERVALS])
     ]
 
 
 def _columns(content: Content, guessed: Guesses) -> list[ColumnDocument]:
     columns: list[ColumnDocument] = []
     for number, (name, guess) in enumerate(guessed.columns.items(), start=1):
-        column = content.table[name]
-        unit = content.units.get(name, "")
-        if guess.meaning in {"x", "y", "z"}:
-            unit = unit or guessed.output.meaning
-        elif guess.meaning == "time":
-            unit = unit or guessed.time_unit.meaning
+        column, is_axis = content.table[name], guess.meaning in {"x", "y", "z"}
+        taken = guessed.output if is_axis else guessed.time_unit if guess.meaning == "time" else None
+        unit = content.units.get(name, "") or (taken.meaning if taken else "")
         numbers = measurable(column.to_numpy(dtype=np.float64)) if column.dtype.kind in "fiu" else np.zeros(0)
         there = numbers[np.isfinite(numbers)]
-        axis = there if guess.meaning in {"x", "y", "z"} and there.size else None
+        axis = there if is_axis and there.size else None
         columns.append(
             {
                 "name": name,
@@ -183,11 +173,8 @@ def _dynamic_guess(path: Path, content: Content, guessed: Guesses, rate_hz: floa
     """What a file with a time and two columns, of which one is named as the reference, may be; None for others."""
     if rate_hz is None or rate_hz < _SLOWEST_HZ:
         return None
-    free = [
-        name
-        for name, one in guessed.columns.items()
-        if one.meaning != "time" and content.table[name].dtype.kind in "fi"
-    ]
+    other = [name for name, one in guessed.columns.items() if one.meaning != "time"]
+    free = [name for name in other if content.table[name].dtype.kind in "fi"]
     driven = [name for name in free if _REFERENCE.search(name)]
     if len(free) != 2 or len(driven) != 1:
         return None
@@ -198,18 +185,15 @@ def _dynamic_guess(path: Path, content: Content, guessed: Guesses, rate_hz: floa
     names = list(guessed.columns)
     pairs = [("time", guessed.column("time")), ("reference", reference), ("z", output)]
     mapped = ",".join(f"{what}={names.index(name) + 1}" for what, name in pairs if name)
-    missing = {
-        what: f"the unit of column '{name}': --units {what}=…"
-        for what, name in (("output", output), ("reference", reference))
-        if not (content.units.get(name, "") or unit_in(name))
-    }
-    stated = [f"{what}=UNIT" for what in missing]
+    units = {name: content.units.get(name, "") or unit_in(name) for name in (output, reference)}
+    missing = [(what, name) for what, name in (("output", output), ("reference", reference)) if not units[name]]
+    stated = [f"{what}=UNIT" for what, _ in missing]
     if guessed.time_unit.meaning and not content.units.get(guessed.column("time"), ""):
         stated.append(f"time={guessed.time_unit.meaning}")
     words = ["tumbleline", "import", str(path), "--procedure", procedure, "--map", mapped]
     words += ["--units", ",".join(stated)] if stated else []
-    open_ = list(missing.values())
-    if procedure == "shock" and (content.units.get(output, "") or unit_in(output)) in {"V", "mV"}:
+    open_ = [f"the unit of column '{name}': --units {what}=…" for what, name in missing]
+    if procedure == "shock" and units[output] in {"V", "mV"}:
         words += ["--part", "SHOCK.toml"]
         open_.append(f"the scale of column '{output}': a file SHOCK.toml with the line scale = … (output per g)")
     words += ["--unit", serial_of(path)]

@@ -10,7 +10,6 @@ import pandas as pd
 from inertial.quantities import OUTPUT_COLUMNS
 from pipelines.importers.mapping import Mapping
 from schemas.errors import DataRejected, WrongUse
-from schemas.units import AXES
 
 if TYPE_CHECKING:
     from pipelines.importers.record import Imported
@@ -59,19 +58,3 @@ def gravity_of(mapping: Mapping) -> float:
             "import: gravity at the place of measurement is needed for this fit and has no default; give --local-g M/S2"
         )
     return mapping.norm_g
-
-
-def bias_row(unit: str, axis: int, value: float, error: float, out_unit: str) -> dict[str, Any]:
-    """The row of an axis's bias in the archive's table of coefficients."""
-    return _row(unit, axis, "bias", "K0", value, error, out_unit)
-
-
-def response_row(unit: str, axis: int, to: int, value: float, error: float, out_unit: str) -> dict[str, Any]:
-    """The row of an axis's response to the force along an axis: its scale, or a misalignment."""
-    effect, name = ("scale", "K1") if to == axis else ("misalignment", f"K{AXES[axis]}{AXES[to]}")
-    return _row(unit, axis, effect, name, value, error, f"{out_unit}/g")
-
-
-def _row(unit: str, axis: int, effect: str, name: str, value: float, error: float, text: str) -> dict[str, Any]:
-    row = {"unit": unit, "axis": AXES[axis], "effect": effect, "name": name}
-    return {**row, "value": float(value), "standard_error": float(error), "unit_text": text}

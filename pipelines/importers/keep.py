@@ -127,9 +127,10 @@ def keep(
     parameters = {"mapping": how.model_dump(mode="json"), "fit": None if judged is None else judged.method}
     if references is not None:
         parameters["references"] = references.model_dump(mode="json")
-    about: dict[str, Any] = {"name": f"import of {', '.join(data.units[:3])}", "source": source.as_dict()}
-    about |= {"mapping": parameters["mapping"], "remarks": list(data.remarks)}
-    about["lot"] = lot_of_import(data.units, data.dwells)
+    about: dict[str, Any] = {
+        "name": f"import of {', '.join(data.units[:3])}", "source": source.as_dict(), "mapping": parameters["mapping"],
+        "remarks": list(data.remarks), "lot": lot_of_import(data.units, data.dwells),
+    }  # fmt: skip
     if judged is not None and judged.effects:
         model = {"effects": list(judged.effects), "formulas": [], "model_name": "", "model_version": 0}
         about["recipe"] = {"name": "import", **model}

@@ -121,7 +121,6 @@ def in_reader(
 
     Parameters
     ----------
-    where : the file, for messages.
     function : importable by its name; its arguments and result can be pickled.
 
     Raises

@@ -169,21 +169,17 @@ class Mapping(BaseModel):
             raise ValueError(
                 f"axes are {', '.join(self.axes)}, and {', '.join(mapped) or 'no output'} mapped; each needs a column of its own"
             )
-        alone = [
-            name
-            for name, axis in zip(SPREAD_COLUMNS, NEEDED, strict=True)
-            if name in self.columns and axis not in mapped
-        ]
+        alone = [name for name in SPREAD_COLUMNS if name in self.columns and name[-1] not in mapped]
         if alone:
             raise ValueError(
                 f"{alone[0]} without {alone[0][-1]}; a standard deviation belongs to an output: map it too"
             )
         if len(self.signs) not in {len(self.axes), len(NEEDED)}:
             raise ValueError(f"{len(self.signs)} signs for {len(self.axes)} axes; one for each axis is needed")
-        if len(self.axes) < len(NEEDED) and "tilt" in self.columns and (self.poses or self.face or len(self.axes) > 1):
-            raise ValueError("tilt is the reference of a single axis; give it without poses, for one axis")
         if "tilt" in self.columns and len(self.axes) == len(NEEDED):
             raise ValueError("tilt is the reference of a single axis; give the angles of the table as outer and inner")
+        if "tilt" in self.columns and (self.poses or self.face or len(self.axes) > 1):
+            raise ValueError("tilt is the reference of a single axis; give it without poses, for one axis")
         return self
 
     @model_validator(mode="after")

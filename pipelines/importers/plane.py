@@ -14,7 +14,7 @@ from inertial.fits.plane import FEWEST_DOF, PlaneFit, fit_plane, fit_plane_norm,
 from inertial.probability import passes
 from inertial.quantities import OUTPUT_COLUMNS, SPREAD_COLUMNS
 from inertial.uncertainty.rounding import equal
-from pipelines.importers.judged import FitAnswer, bias_row, gravity_of, imported_dwells, response_row
+from pipelines.importers.judged import FitAnswer, gravity_of, imported_dwells
 from pipelines.importers.mapping import Mapping
 from pipelines.tables.dwells import measured
 from schemas.errors import DataRejected
@@ -126,15 +126,10 @@ def _answer(fit: PlaneFit, dwells: pd.DataFrame, out_unit: str) -> FitAnswer:
         "response_per_g": fit.response.tolist(),
         "response_u": fit.response_error.tolist(),
     }
-    unit = str(dwells["unit"].iloc[0])
-    lines = [
-        _head(fit),
-        *(_line(fit, k, out_unit) for k in (*fit.inside, fit.across)),
-        f"open: {'; '.join(opened)}",
-    ]
-    if reason:
-        lines.append(reason)
-    return FitAnswer("plane", adequate, document, tuple(lines), _rows(fit, unit, out_unit, known=known))
+    lines = [_head(fit), *(_line(fit, k, out_unit) for k in (*fit.inside, fit.across)), f"open: {'; '.join(opened)}"]
+    lines += [reason] if reason else []
+    rows = _rows(fit, str(dwells["unit"].iloc[0]), out_unit, known=known)
+    return FitAnswer("plane", adequate, document, tuple(lines), rows)
 
 
 def _errors(dwells: pd.DataFrame, output: Array) -> Array:
@@ -207,11 +202,16 @@ def _line(fit: PlaneFit, axis: int, unit: str) -> str:
 
 def _rows(fit: PlaneFit, unit: str, out_unit: str, *, known: bool) -> list[dict[str, Any]]:
     """Rows of coefficients: only those that the plane determines."""
-    rows: list[dict[str, Any]] = []
-    for axis in range(3):
-        rows.append(bias_row(unit, axis, fit.bias[axis], fit.bias_error[axis], out_unit))
+    rows: list[tuple[str, str, str, float, float, str]] = []
+    for axis, letter in enumerate(AXES):
+        rows.append((letter, "bias", "K0", fit.bias[axis], fit.bias_error[axis], out_unit))
         for column, other in enumerate(inside_of(fit.across)):
+            effect, name = ("scale", "K1") if other == axis else ("misalignment", f"K{letter}{AXES[other]}")
             value, error = fit.response[axis, column], fit.response_error[axis, column]
             if other == axis or known or error > 0.0:
-                rows.append(response_row(unit, axis, other, value, error, out_unit))
-    return rows
+                rows.append((letter, effect, name, value, error, f"{out_unit}/g"))
+    return [
+        {"unit": unit, "axis": axis, "effect": effect, "name": name, "value": float(value), "standard_error": float(error),
+         "unit_text": text}
+        for axis, effect, name, value, error, text in rows
+    ]  # fmt: skip

@@ -7,6 +7,7 @@ import pandas as pd
 from scipy.optimize import linear_sum_assignment
 
 from inertial.fits.plane import quiet_axis
+from inertial.quantities import FORCE_COLUMNS, OUTPUT_COLUMNS
 from pipelines.importers.mapping import Mapping
 from schemas.errors import DataRejected
 from schemas.units import AXES
@@ -20,8 +21,7 @@ ONE_POSE = (
     "one pose whose force is not known: its noise by 'tumbleline allan'; for the bias and what drives it give the face that is "
     "up (--face +x … -z) and --blocks S, with the output in g; scale and misalignment need more poses"
 )
-OUT = ["out_x", "out_y", "out_z"]
-FORCE = ["force_x", "force_y", "force_z"]
+OUT, FORCE = list(OUTPUT_COLUMNS), list(FORCE_COLUMNS)
 
 
 def silent_axis(dwells: pd.DataFrame) -> str:
@@ -75,14 +75,10 @@ def refuse_or_remark(dwells: pd.DataFrame, mapping: Mapping, where: str) -> tupl
     signs = np.sign(shares[rows, columns])
     if np.min(np.abs(shares[rows, columns])) < _CLEAR or (np.array_equal(rows, columns) and np.all(signs > 0)):
         return ()
-    found = ", ".join(
-        f"{AXES[i]} reads {'+' if s > 0 else '-'}{AXES[j]}" for i, j, s in zip(rows, columns, signs, strict=True)
-    )
+    reads = list(zip(rows.tolist(), columns.tolist(), (signs > 0).tolist(), strict=True))
+    found = ", ".join(f"{AXES[i]} reads {'+' if same else '-'}{AXES[j]}" for i, j, same in reads)
     # output i reads axis j: wanted axis j is mapped axis of output i
-    inverse = {
-        int(j): (mapping.axes[int(i)], "+" if (s > 0) == (mapping.signs[int(i)] == "+") else "-")
-        for i, j, s in zip(rows, columns, signs, strict=True)
-    }
+    inverse = {j: (mapping.axes[i], "+" if same == (mapping.signs[i] == "+") else "-") for i, j, same in reads}
     order, turned = (",".join(inverse[k][part] for k in range(3)) for part in (0, 1))
     raise DataRejected(
         f"{where}: by the stated faces, {found}; each output must read its own axis; correct --poses, or add --axes {order} "

@@ -162,11 +162,8 @@ def _six_faces(means: Array, labels: Sequence[str], centre: Array) -> dict[str, 
     axes = np.argmax(np.abs(along), axis=1)
     faces = [f"{'+' if row[k] > 0.0 else '-'}{'xyz'[k]}" for row, k in zip(along, axes.tolist(), strict=True)]
     clear = bool(np.all(np.abs(along).max(axis=1) > _UP)) and not any(re.search(r"[,=]", label) for label in labels)
-    return (
-        dict(zip(labels, faces, strict=True))
-        if clear and len(faces) == len(set(faces)) == len(set(labels)) == 6
-        else {}
-    )
+    six = len(faces) == len(set(faces)) == len(set(labels)) == 6
+    return dict(zip(labels, faces, strict=True)) if clear and six else {}
 
 
 def _still(
@@ -183,9 +180,8 @@ def _still(
     face = f"{'+' if along[axis] > 0.0 else '-'}{'xyz'[axis]}"
     block = max(_SHORTEST_BLOCK_S, float(f"{duration_s / _BLOCKS:.1g}"))
     tilt = f"one pose, {face} taken as vertical: the bias of the other axes holds the tilt of the surface (1° is 17 mg)"
-    keys = {
-        key: value for key, value in keys.items() if key not in {"window_s", "shortest_s", "threshold", "positions"}
-    }
+    searched = {"window_s", "shortest_s", "threshold", "positions"}
+    keys = {key: value for key, value in keys.items() if key not in searched}
     warm = heat is not None and float(np.ptp(heat[np.isfinite(heat)])) > _WARMS_C
     remark = () if warm else ("temperature does not change: only bias, noise and drift can be seen",)
     return Proposal(keys | {"face": face, "block_s": block}, "", (*assumed, tilt), remark)

@@ -40,18 +40,13 @@ def ramp(data: Imported, mapping: Mapping) -> FitAnswer:
     }
     lines = tuple(
         f"{AXES[k]}: the residual of a cubic in temperature is {fit.rms[k]:.3g} {data.out_unit}, {ratio[k]:.1f} times the "
-        "noise of a sample "
-        f"({fit.noise[k]:.3g}, from first differences)"
+        f"noise of a sample ({fit.noise[k]:.3g}, from first differences)"
         for k in range(3)
     )
-    face = (
-        ""
-        if mapping.face
-        else "import it again with --face FACE (the face that is up) --local-g M/S2 --blocks 60, then "
-    )
+    again = "import it again with --face FACE (the face that is up) --local-g M/S2 --blocks 60, then "
     advice = [
         "something other than temperature itself drives this output, such as its rate or a lag",
-        f"to look further: {face}'tumbleline diagnose RUN'",
+        f"to look further: {'' if mapping.face else again}'tumbleline diagnose RUN'",
     ]
     if fit.adequate is None:
         reason = "the noise of a sample or the residual is undefined; check the record for constant channels"

@@ -58,9 +58,8 @@ class Recognition:
             named = self.guessed.column("dwell")
             whole = bool(named) and len(self.content.table) == len(self.output)
             own = [f"dwell {k}" for k in range(len(self.output))]
-            return self._proposal(
-                self.keys, self.output, self.content.table[named].astype(str).tolist() if whole else own
-            )
+            labels = self.content.table[named].astype(str).tolist() if whole else own
+            return self._proposal(self.keys, self.output, labels)
         time = np.arange(len(self.output)) / ASSUMED_HZ if self.time is None else self.time
         stops = self.stops or _stops(self.output, time)
         if self.labels is not None and stops is not None:
@@ -82,8 +81,7 @@ class Recognition:
         duration = float(time[-1] - time[0])
         if found is None or not len(found) or self.output is None:
             return self._proposal(keys, None, [], duration)
-        pairs = zip(found.first, found.last, strict=True)
-        means = np.stack([self.output[first:last].mean(axis=0) for first, last in pairs])
+        means = np.stack([self.output[first:last].mean(axis=0) for first, last in found.spans])
         return self._proposal(keys, means, found.labels, duration)
 
     def _proposal(
@@ -98,13 +96,7 @@ _NO_CLOCK = "the rate of the samples: no column of time was recognised and the f
 
 
 def recognise(paths: Sequence[Path], *, join: str = "", group: str = "") -> Recognition:
-    """The recording of one or several files.
-
-    Parameters
-    ----------
-    join : how several files are joined, ``rows`` or ``columns``.
-    group : the group of channels, if a file has several.
-    """
+    """The recording of one or several files, which are joined as :func:`pipelines.importers.sources.read` does."""
     first, source = files.read_content(paths[0], group)
     content = first
     if len(paths) > 1:
@@ -251,7 +243,7 @@ def _handling(stops: stretches.Stops, time: Array) -> str:
     """A sentence on the motion before the first stop and after the last, longer than a window; empty where there is none."""
     if not len(stops.found):
         return ""
-    first, last = (float(time[k] - time[0]) for k in (stops.found.first[0], stops.found.last[-1] - 1))
+    first, last = (float(time[k] - time[0]) for k in (stops.found.spans[0][0], stops.found.spans[-1][1] - 1))
     ends = first > stops.window_s, float(time[-1] - time[0]) - last > stops.window_s
     return stretches.handling_left_out(stops.found, time, ends)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping as Columns
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -31,12 +32,7 @@ BURST, OFTEN = 3.0, 0.01
 
 
 def seconds(
-    columns: Columns[str, pd.Series],
-    mapping: Mapping,
-    content: Content,
-    where: str,
-    *,
-    dwells: bool = False,
+    columns: Columns[str, pd.Series], mapping: Mapping, content: Content, where: str, *, dwells: bool = False
 ) -> RecordingClock:
     """Seconds of every row from any beginning.
 
@@ -96,11 +92,8 @@ def _clock(
             raise WrongUse(
                 f"{where}: no time in seconds is mapped, a rate is needed then; map time=…, or give --rate HZ"
             )
-        count = (
-            np.arange(len(columns["x"]), dtype=np.float64)
-            if time is None
-            else values.finite(time, where, content, needed="a time")
-        )
+        rows = np.arange(len(columns["x"]), dtype=np.float64)
+        count = rows if time is None else values.finite(time, where, content, needed="a time")
         return RecordingClock(count / mapping.rate_hz, "samples", ())
     numbers = values.finite(time, where, content, needed="a time")
     name = str(time.name)
@@ -176,12 +169,7 @@ def gaps_of(
 
 
 def time_doubts(
-    time: Array,
-    heat: Array | None,
-    intervals: Stretches,
-    mapping: Mapping,
-    *,
-    searched: bool,
+    time: Array, heat: Array | None, intervals: Stretches, mapping: Mapping, *, searched: bool
 ) -> tuple[str, ...]:
     """Remarks if a record in seconds is impossible for a hand, table or chamber: its time may be in another unit.
 
@@ -195,7 +183,7 @@ def time_doubts(
     if heat is not None and span > 0.0 and float(np.ptp(heat)) > FASTEST_K_S * span:
         doubts.append(f"temperature changes by {float(np.ptp(heat)):.3g} K in {span:.3g} s")
     if searched and mapping.positions is None and mapping.block_s is None:
-        moves = [float(time[b] - time[a - 1]) for a, b in zip(intervals.last, intervals.first[1:], strict=False)]
+        moves = [float(time[begin] - time[end - 1]) for (_, end), (begin, _) in pairwise(intervals.spans)]
         if len(moves) >= 2 and float(np.median(moves)) > LONGEST_MOVE_S:
             doubts.append(f"the moves between the dwells take {float(np.median(moves)):.4g} s")
         if not len(intervals) and span < SHORTEST_RECORD_S:

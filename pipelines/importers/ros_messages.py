@@ -63,9 +63,8 @@ def content_of(rows: Sequence[tuple[int, dict[str, float]]], kind: str, name: st
         )
     stamps = [int(own.pop(STAMP, 0)) for _, own in rows]
     stamped = min(stamps) > 0
-    when = np.array(
-        stamps if stamped else [logged for logged, _ in rows], dtype=np.int64
-    )  # ns since 1970: no float holds them
+    # ns since 1970: no float holds them
+    when = np.array(stamps if stamped else [logged for logged, _ in rows], dtype=np.int64)
     order = np.argsort(when, kind="stable")
     table = pd.DataFrame([rows[k][1] for k in order])
     table.insert(0, "time", 1e-9 * (when[order] - when[order][0]))

@@ -8,7 +8,7 @@ import numpy as np
 
 from inertial import record_faults
 from inertial.arrays import Array, Flags, Index
-from pipelines.importers.documents import SampleFaultDocument
+from pipelines.importers.documents import FaultName, SampleFaultDocument
 from pipelines.importers.mapping import Mapping
 from pipelines.importers.stretches import Stretches
 from schemas.errors import DataRejected
@@ -48,17 +48,15 @@ class SampleFaults:
 
     def rows(self, time: Array) -> list[SampleFaultDocument]:
         """The faults for JSON."""
-        still: list[SampleFaultDocument] = [
-            {"fault": "stuck_output", "axis": AXES[one.axis], "first_row": one.start + 1, "samples": one.count,
-             "start_s": float(time[one.start]), "offsets_lsb": []}
-            for one in self.frozen
+        found: list[tuple[FaultName, int, int, int, tuple[int, ...]]] = [
+            *(("stuck_output", one.axis, one.start, one.count, ()) for one in self.frozen),
+            *(("torn_words", one.axis, int(one.rows.min()), one.rows.size, one.offsets) for one in self.torn),
+        ]
+        return [
+            {"fault": fault, "axis": AXES[axis], "first_row": first + 1, "samples": count, "start_s": float(time[first]),
+             "offsets_lsb": list(offsets)}
+            for fault, axis, first, count, offsets in found
         ]  # fmt: skip
-        torn: list[SampleFaultDocument] = [
-            {"fault": "torn_words", "axis": AXES[one.axis], "first_row": int(one.rows.min()) + 1, "samples": one.rows.size,
-             "start_s": float(time[one.rows.min()]), "offsets_lsb": list(one.offsets)}
-            for one in self.torn
-        ]  # fmt: skip
-        return still + torn
 
 
 def look(output: Array) -> SampleFaults:
@@ -84,8 +82,7 @@ def mended(output: Array, faults: SampleFaults, bad: Flags) -> Array:
 
 def without_short(intervals: Stretches, record: Index) -> tuple[Stretches, Index, tuple[str, ...]]:
     """The dwells that keep at least half of their samples, renumbered, and a remark on the others."""
-    left = [int(np.count_nonzero(record[a:b])) for a, b in zip(intervals.first, intervals.last, strict=True)]
-    kept = [k for k, count in enumerate(left) if 2 * count > intervals.last[k] - intervals.first[k]]
+    kept = [k for k, (a, b) in enumerate(intervals.spans) if 2 * np.count_nonzero(record[a:b]) > b - a]
     if len(kept) == len(intervals):
         return intervals, record, ()
     numbers = np.zeros(len(intervals) + 1, dtype=np.int64)

@@ -43,13 +43,7 @@ class EvenSeries:
 
 
 def series_of_file(
-    path: Path,
-    columns: Sequence[str],
-    *,
-    time: str = "",
-    time_unit: str = "s",
-    rate_hz: float | None = None,
-    unit: str = "",
+    path: Path, columns: Sequence[str], *, time: str, time_unit: str, rate_hz: float | None, unit: str
 ) -> EvenSeries:
     """The channels of a file of samples.
 
@@ -80,7 +74,7 @@ def series_of_file(
     return EvenSeries(tuple(chosen), values, float(rate), unit, path.name)
 
 
-def series_of_run(run: Run, record: int | None = None) -> EvenSeries:
+def series_of_run(run: Run, record: int | None) -> EvenSeries:
     """The longest stretch at rest of an import's samples, or the one with the given number.
 
     Raises

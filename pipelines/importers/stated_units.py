@@ -35,11 +35,8 @@ def column_name(columns: list[str], name_or_number: str) -> str:
     """A column by its name, or by its number from 1; empty if there is neither."""
     if name_or_number in columns:
         return name_or_number
-    return (
-        columns[int(name_or_number) - 1]
-        if name_or_number.isdecimal() and 1 <= int(name_or_number[:9]) <= len(columns)
-        else ""
-    )
+    numbered = name_or_number.isdecimal() and 1 <= int(name_or_number[:9]) <= len(columns)
+    return columns[int(name_or_number) - 1] if numbered else ""
 
 
 def completed(given: dict[str, Any], content: Content) -> dict[str, Any]:

@@ -34,19 +34,17 @@ _AT_REST = 0.5
 class Stretches:
     """Static stretches: first and one past the last sample, and label of each; remarks on how they were found."""
 
-    first: tuple[int, ...]
-    last: tuple[int, ...]
+    spans: tuple[tuple[int, int], ...]
     labels: tuple[str, ...]
     remarks: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         """Their number."""
-        return len(self.first)
+        return len(self.spans)
 
     def only(self, numbers: Sequence[int]) -> Stretches:
         """Some of them, by their numbers from 0."""
-        first, last = (tuple(rows[k] for k in numbers) for rows in (self.first, self.last))
-        return Stretches(first, last, tuple(self.labels[k] for k in numbers), self.remarks)
+        return Stretches(tuple(self.spans[k] for k in numbers), tuple(self.labels[k] for k in numbers), self.remarks)
 
 
 @dataclass(frozen=True)
@@ -128,55 +126,48 @@ def found_stops(output: Array, time: Array, edges: Sequence[int]) -> Stops:
     clean = [stops for stops in strict if not stops.several and len(stops.found) >= _ENOUGH]
     if not clean:
         return max(plain, key=lambda stops: len(stops.found) - len(stops.several))
-    most = max(len(stops.found) for stops in clean)
-    return next(
-        stops for stops in clean if len(stops.found) >= _NEARLY * most
-    )  # the longest window that finds nearly all
+    nearly = _NEARLY * max(len(stops.found) for stops in clean)
+    return next(stops for stops in clean if len(stops.found) >= nearly)  # the longest window that finds nearly all
 
 
 def _stops(output: Array, time: Array, edges: Sequence[int], how: _SearchOptions) -> Stops:
     found = _searched(output, time, edges, how)
-    pairs = zip(found.first, found.last, strict=True)
-    several = tuple(k for k, (a, b) in enumerate(pairs) if change_of_level.several_levels(output[a:b]) > 1)
+    several = tuple(k for k, (a, b) in enumerate(found.spans) if change_of_level.several_levels(output[a:b]) > 1)
     return Stops(how.window_s, found, several, how.threshold)
 
 
 def _limits(output: Array, time: Array) -> list[tuple[float, float]]:
     """The windows of the search, s, and the scatter in the quietest stretch of each."""
     rate = (len(time) - 1) / float(time[-1] - time[0])
-    usable = [window for window in WINDOWS_S if len(output) >= 3 * max(3, round(window * rate))]
+    usable = [window for window in WINDOWS_S if _has_windows(len(output), window, rate)]
     return [(window, static_intervals.find(output, rate, window_s=window).quiet_sd) for window in usable]
 
 
 def _by_labels(labels: Sequence[str], edges: list[int]) -> Stretches:
     names = np.asarray(labels, dtype=object)
     first = sorted({*(np.flatnonzero(names[1:] != names[:-1]) + 1).tolist(), *edges[:-1]})
-    last = [*first[1:], names.size]
-    return Stretches(tuple(first), tuple(last), tuple(str(names[k]) for k in first))
+    return Stretches(tuple(pairwise([*first, names.size])), tuple(str(names[k]) for k in first))
 
 
 def labelled(labels: Sequence[str], edges: list[int], found: Stretches) -> tuple[Stretches, bool]:
     """The stretches of a label that lie in found stops for the most part, and whether all do: a label may mark the moves."""
     named = _by_labels(labels, edges)
     still = np.zeros(len(labels), dtype=bool)
-    for first, last in zip(found.first, found.last, strict=True):
+    for first, last in found.spans:
         still[first:last] = True
-    pairs = zip(named.first, named.last, strict=True)
-    resting = [k for k, (first, last) in enumerate(pairs) if np.mean(still[first:last]) >= _AT_REST]
+    resting = [k for k, (first, last) in enumerate(named.spans) if np.mean(still[first:last]) >= _AT_REST]
     return named.only(resting), len(resting) == len(named)
 
 
 def _by_blocks(time: Array, edges: list[int], block_s: float) -> Stretches:
     number = np.floor((time - time[0]) / block_s).astype(np.int64)
     first = sorted({*(np.flatnonzero(np.diff(number)) + 1).tolist(), *edges[:-1]})
-    last = [*first[1:], time.size]
-    return Stretches(tuple(first), tuple(last), tuple(f"block {k}" for k in range(len(first))))
+    return Stretches(tuple(pairwise([*first, time.size])), tuple(f"block {k}" for k in range(len(first))))
 
 
 def _without_handled_ends(intervals: Stretches, output: Array, time: Array) -> Stretches:
     """The blocks of a still record without those at its ends in which a hand still holds the sensor; a remark on these."""
-    pairs = list(zip(intervals.first, intervals.last, strict=True))
-    scatter = np.array([float(np.linalg.norm(output[a:b].std(axis=0))) for a, b in pairs])
+    scatter = np.array([float(np.linalg.norm(output[a:b].std(axis=0))) for a, b in intervals.spans])
     calm = np.flatnonzero(scatter <= HANDLED * np.median(scatter))
     kept = intervals.only(range(int(calm[0]), int(calm[-1]) + 1)) if calm.size else intervals
     if len(kept) == len(intervals):
@@ -192,7 +183,7 @@ def handling_left_out(kept: Stretches, time: Array, ends: tuple[bool, bool]) -> 
     ----------
     ends : whether there is such motion at the beginning, and at the end
     """
-    first, last, end = (float(time[k] - time[0]) for k in (kept.first[0], kept.last[-1] - 1, len(time) - 1))
+    first, last, end = (float(time[k] - time[0]) for k in (kept.spans[0][0], kept.spans[-1][1] - 1, len(time) - 1))
     spans = [f"0 to {first:.1f} s"] if ends[0] else []
     spans += [f"{last:.1f} to {end:.1f} s"] if ends[1] else []
     return f"handling at the ends left out: {' and '.join(spans)}" if spans else ""
@@ -208,28 +199,31 @@ def by_positions(output: Array, count: int, where: str) -> Stretches:
     start, stop = levels.start + (levels.start > 0), levels.stop - (levels.stop < len(output))
     remark = f"{len(levels)} positions logged back to back, {100.0 * levels.explained:.4g} % of the scatter explained by them"
     names = tuple(f"position {k}" for k in range(len(levels)))
-    return Stretches(tuple(start.tolist()), tuple(stop.tolist()), names, (remark,))
+    return Stretches(tuple(zip(start.tolist(), stop.tolist(), strict=True)), names, (remark,))
 
 
 def _searched(output: Array, time: Array, edges: Sequence[int], how: _SearchOptions) -> Stretches:
-    first: list[int] = []
-    last: list[int] = []
+    spans: list[tuple[int, int]] = []
     if len(edges) > 2 and how.threshold is None and time[-1] > time[0]:  # one limit for all parts of a record
         rate = (len(time) - 1) / float(time[-1] - time[0])
-        if len(output) >= 3 * max(3, round(how.window_s * rate)):
+        if _has_windows(len(output), how.window_s, rate):
             how = replace(how, threshold=static_intervals.find(output, rate, window_s=how.window_s).threshold_sd)
     for a, b in pairwise(edges):
         if b - a < 3 or time[b - 1] <= time[a]:
             continue
         rate = (b - a - 1) / float(time[b - 1] - time[a])
-        if b - a < 3 * max(3, round(how.window_s * rate)):
+        if not _has_windows(b - a, how.window_s, rate):
             continue
         piece = static_intervals.find(
             output[a:b], rate, window_s=how.window_s, shortest_s=how.shortest_s, threshold=how.threshold
         )
-        first += (piece.start + a).tolist()
-        last += (piece.stop + a).tolist()
-    return Stretches(tuple(first), tuple(last), tuple(f"dwell {k}" for k in range(len(first))))
+        spans += zip((piece.start + a).tolist(), (piece.stop + a).tolist(), strict=True)
+    return Stretches(tuple(spans), tuple(f"dwell {k}" for k in range(len(spans))))
+
+
+def _has_windows(samples: int, window_s: float, rate: float) -> bool:
+    """Whether there are as many samples as a search with this window needs."""
+    return samples >= 3 * max(3, round(window_s * rate))
 
 
 def _of_one_position(intervals: Stretches, output: Array, time: Array, edges: Sequence[int], where: str) -> Stretches:
@@ -240,19 +234,17 @@ def _of_one_position(intervals: Stretches, output: Array, time: Array, edges: Se
     DataRejected
         Many stretches do: positions were logged one after another.
     """
-    counts = [change_of_level.several_levels(output[a:b]) for a, b in zip(intervals.first, intervals.last, strict=True)]
+    counts = [change_of_level.several_levels(output[a:b]) for a, b in intervals.spans]
     several = [k for k, count in enumerate(counts) if count > 1]
     if not several:
         return intervals
     if len(several) <= _SHIFTED * len(intervals) and len(intervals) - len(several) >= _ENOUGH:
-        spans = ", ".join(
-            f"{time[intervals.first[k]] - time[0]:.1f} to {time[intervals.last[k] - 1] - time[0]:.1f} s"
-            for k in several
-        )
+        ends = (intervals.spans[k] for k in several)
+        spans = ", ".join(f"{time[a] - time[0]:.1f} to {time[b - 1] - time[0]:.1f} s" for a, b in ends)
         left = intervals.only([k for k in range(len(intervals)) if k not in several])
         return replace(left, remarks=(f"left out, since the sensor was shifted during the stop: {spans}",))
     worst = max(several, key=lambda k: counts[k])
-    a, b = intervals.first[worst], intervals.last[worst]
+    a, b = intervals.spans[worst]
     stops = found_stops(output, time, edges)
     if len(stops.found) and not stops.several:
         offer = f"{options_of(stops)} finds {len(stops.found)} stops, one position in each"

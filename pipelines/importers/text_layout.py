@@ -74,9 +74,7 @@ def fields_of(line: str, divider: str) -> list[str]:
     if divider == BLANKS:
         return [word.strip('"') for word in line.split()]
     if '"' in line and line.count('"') % 2 == 0 and len(line) < 100_000:
-        with contextlib.suppress(
-            csv.Error
-        ):  # a quote in the middle of a field opens none, and a line break ends the field
+        with contextlib.suppress(csv.Error):  # a quote inside a field opens none, and a line break ends the field
             return [word.strip() for word in next(csv.reader([line], delimiter=divider, skipinitialspace=True))]
     return [word.strip().strip('"') for word in line.split(divider)]
 
@@ -101,11 +99,8 @@ def layout(lines: Sequence[str], filled: Sequence[int]) -> Layout | None:
     above = [fields_of(lines[k], divider) for k in filled[max(0, place - 2) : place]][::-1]
     if above and _is_header(above[0], width, decimal, trailing=trailing):
         header, names = filled[place - 1], tuple(above[0])
-        if (
-            len(above) > 1
-            and _is_header(above[1], width, decimal, trailing=trailing)
-            and _are_units(above[0], above[1])
-        ):
+        named = [row for row in above[1:] if _is_header(row, width, decimal, trailing=trailing)]
+        if named and _are_units(above[0], named[0]):
             header, names, units = filled[place - 2], tuple(above[1]), tuple(above[0])
     elif _only_numbered([fields_of(lines[k], divider) for k in filled[place : place + 2]]):
         header, names, integers = first, tuple(fields_of(lines[first], divider)), True
@@ -211,12 +206,6 @@ def _counts(row: list[str]) -> bool:
 
 def _commented(lines: Sequence[str], first: int, divider: str, width: int) -> tuple[str, ...]:
     """Names in the last comment above the table, if it has as many words as there are columns; else empty."""
-    for k in range(first - 1, -1, -1):
-        text = lines[k].strip()
-        if not text.startswith(COMMENTS):
-            continue
-        words = fields_of(text.lstrip("#% \t"), divider)
-        if len(words) == width and not any(is_number(w) for w in words) and len(set(words)) == width:
-            return tuple(words)
-        return ()
-    return ()
+    last = next((text for line in lines[:first][::-1] if (text := line.strip()).startswith(COMMENTS)), "")
+    words = fields_of(last.lstrip("#% \t"), divider)
+    return tuple(words) if last and len(words) == len(set(words)) == width and not any(map(is_number, words)) else ()

@@ -6,16 +6,15 @@ import io
 import re
 import warnings
 from bisect import bisect_left
+from collections import Counter
 from collections.abc import Sequence
 from contextlib import suppress
-from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from pipelines.importers.content import Content, unit_in
-from pipelines.importers.text_layout import Layout, filled_lines, is_comment, layout
-from pipelines.importers.thousands import without_thousands
+from pipelines.importers.text_layout import Layout, fields_of, filled_lines, is_comment, is_number, layout
 from schemas.errors import DataRejected
 from schemas.foreign import foreign, shown
 
@@ -28,6 +27,16 @@ _FEW_BYTES, _MOSTLY = 16, 0.9
 _MOST_LINES = 10
 """Line breaks of a quoted field, at most: beyond them the quote is a sign such as that of inches."""
 _FORTRAN = re.compile(r"^\s*[+-]?\d*\.?\d+[dD][+-]?\d+\s*$")
+
+_SURE = ("'", "\N{RIGHT SINGLE QUOTATION MARK}", "\N{NO-BREAK SPACE}", "\N{NARROW NO-BREAK SPACE}", "\N{THIN SPACE}")
+"""Signs that stand in no number for anything else."""
+_NAMES = {",": "a comma", ".": "a point", "'": "an apostrophe", _SURE[1]: "an apostrophe"}
+_DIVIDERS = (";", "\t", "|", ",")
+_SAMPLED_LINES = 400
+_ALIKE = 0.9
+_MANY = 20
+"""Numbers with a sign from which on their form shows that it groups digits: three behind each sign, never a leading zero, and in
+the same column whole numbers without it, all below a thousand."""
 
 
 def decoded(data: bytes, where: str) -> tuple[str, str]:
@@ -73,12 +82,9 @@ def content(text: str, where: str, encoding: str = "UTF-8") -> Content:
     rows = filled[bisect_left(filled, detected.first) :]
     body = [lines[k] for k in rows]
     table = _parsed(body, detected, labels, where)
-    units = {label: unit for label, unit in zip(labels, detected.units, strict=False) if unit} or {
-        label: unit for label in labels if (unit := unit_in(label))
-    }
-    units = {label: unit.strip("[]() ") for label, unit in units.items()}
-    remarks = _remarks(detected, lines, encoding)
-    remarks = (*remarks, grouped) if grouped else remarks
+    stated = detected.units if any(detected.units) else map(unit_in, labels)
+    units = {label: unit.strip("[]() ") for label, unit in zip(labels, stated, strict=False) if unit}
+    remarks = (*_remarks(detected, lines, encoding), *([grouped] if grouped else []))
     # a line break inside a quoted field, or one that the parser joins, moves all rows behind it
     whole = len(lines) == len(text.splitlines()) and len(rows) == len(table)
     return Content(table, remarks, units, lines=((where, rows),) if whole else ())
@@ -137,24 +143,20 @@ def _parsed(body: Sequence[str], detected: Layout, labels: list[str], where: str
 
 def _read(body: Sequence[str], detected: Layout, names: list[str]) -> pd.DataFrame:
     """The rows by the parser: in blocks, as it takes ten times their size, unless a column is text in some blocks only."""
-    how: dict[str, Any] = {
-        "sep": detected.divider,
-        "decimal": detected.decimal,
-        "header": None,
-        "names": names,
-        "index_col": False,
-        "skipinitialspace": True,
-        "low_memory": False,
-    }
+
+    def parsed(rows: Sequence[str]) -> pd.DataFrame:
+        return pd.read_csv(
+            io.StringIO("\n".join(rows)), sep=detected.divider, decimal=detected.decimal, header=None, names=names,
+            index_col=False, skipinitialspace=True, low_memory=False,
+        )  # fmt: skip
+
     if len(body) > 2 * _BLOCK:
         with suppress(ValueError):  # a broken row: the parser of the whole names it
-            parts = [
-                pd.read_csv(io.StringIO("\n".join(body[k : k + _BLOCK])), **how) for k in range(0, len(body), _BLOCK)
-            ]
+            parts = [parsed(body[k : k + _BLOCK]) for k in range(0, len(body), _BLOCK)]
             kinds_of_columns = [{part.dtypes.iloc[k].kind for part in parts} for k in range(len(names))]
             if all(len(kinds) == 1 or kinds <= {"i", "u", "f"} for kinds in kinds_of_columns):
                 return pd.concat(parts, ignore_index=True)
-    return pd.read_csv(io.StringIO("\n".join(body)), **how)
+    return parsed(body)
 
 
 def _fortran(table: pd.DataFrame) -> pd.DataFrame:
@@ -172,18 +174,12 @@ def _remarks(detected: Layout, lines: Sequence[str], encoding: str) -> tuple[str
     begin = detected.first if detected.header < 0 else detected.header
     passed = [line for line in lines[:begin] if not is_comment(line)]
     if passed:
-        place = (
-            f"the header in line {detected.header + 1}"
-            if detected.header >= 0
-            else f"the first row in line {begin + 1}"
-        )
-        remarks.append(
-            f"{len(passed)} lines before {place} were not read, beginning with '{shown(passed[0].strip(), 60)}'"
-        )
+        place = f"the {'header' if detected.header >= 0 else 'first row'} in line {begin + 1}"
+        start = shown(passed[0].strip(), 60)
+        remarks.append(f"{len(passed)} lines before {place} were not read, beginning with '{start}'")
     if detected.integers:
-        remarks.append(
-            f"line {detected.header + 1} only numbers the columns: {', '.join(filter(None, detected.names[:6]))}, …"
-        )
+        numbers = ", ".join(filter(None, detected.names[:6]))
+        remarks.append(f"line {detected.header + 1} only numbers the columns: {numbers}, …")
     elif detected.names and detected.header < 0:
         remarks.append(f"columns named by a comment: {shown(', '.join(detected.names))}")
     if detected.decimal == ",":
@@ -191,3 +187,75 @@ def _remarks(detected: Layout, lines: Sequence[str], encoding: str) -> tuple[str
     if encoding != "UTF-8":
         remarks.append(f"text in {encoding}")
     return tuple(remarks)
+
+
+def without_thousands(lines: Sequence[str]) -> tuple[Sequence[str], str]:
+    """Lines with their numbers without separators of thousands, and a remark; the lines as they are where there are none.
+
+    16,384 · 16.384,5 · 16'384 · 16 384. A comma or a point may also be the decimal sign, and 16,384 read as 16.384 gives a record
+    that looks sound: a separator is taken only where the text shows that it is one; elsewhere it stays the decimal sign.
+    """
+    later = lines[len(lines) // 3 :]
+    sample = [line for line in later[:: max(1, len(later) // _SAMPLED_LINES)] if not is_comment(line)]
+    divider = _divider(sample)
+    if not divider:
+        return lines, ""
+    rows = [fields_of(line, divider) for line in sample]
+    for sign in (*_SURE, " ", ",", "."):
+        if not _is_separator(sign, rows):
+            continue
+        grouped = _grouped(sign)
+        cleaned = [_cleaned(line, divider, sign, grouped) for line in lines]
+        return cleaned, f"numbers with {_NAMES.get(sign, 'a space')} between thousands"
+    return lines, ""
+
+
+def _divider(sample: Sequence[str]) -> str:
+    """The divider of lines that have more than one field; empty if there is none but blanks."""
+    for divider in _DIVIDERS:
+        often = Counter(len(fields_of(line, divider)) for line in sample).most_common(1)
+        if often and often[0][0] > 1 and often[0][1] >= _ALIKE * len(sample):
+            return divider
+    return ""
+
+
+def _grouped(sign: str) -> re.Pattern[str]:
+    """The form of a number with separators, decimals included."""
+    decimal = {",": r"\.", ".": ","}.get(sign, "[.,]")
+    return re.compile(rf"[+-]?[1-9]\d{{0,2}}(?:{re.escape(sign)}\d{{3}})+(?:{decimal}\d+)?")
+
+
+def _is_separator(sign: str, rows: Sequence[Sequence[str]]) -> bool:
+    """Whether a sign groups digits in all words that have it between digits."""
+    words = [word for row in rows for word in row]
+    own = [word for word in words if re.search(rf"\d{re.escape(sign)}\d", word)]
+    grouped = _grouped(sign)
+    if not own or not all(grouped.fullmatch(word) for word in own):
+        return False
+    if sign not in {",", "."}:
+        return True
+    other = "." if sign == "," else ","
+    if any(other in word or word.count(sign) > 1 for word in own):
+        return True
+    if any(other in word and is_number(word, other) for word in words):
+        return True  # the decimal sign of this text is the other one
+    return len(own) >= _MANY and any(
+        _mixed([row[k] for row in rows if k < len(row)], grouped) for k in range(max(map(len, rows)))
+    )
+
+
+def _mixed(column: Sequence[str], grouped: re.Pattern[str]) -> bool:
+    """Whether a column has grouped numbers, and whole numbers, which are all below a thousand."""
+    whole = [abs(int(word)) for word in column if re.fullmatch(r"[+-]?\d{1,12}", word)]
+    return any(whole) and max(whole) < 1000 and any(grouped.fullmatch(word) for word in column)
+
+
+def _cleaned(line: str, divider: str, sign: str, grouped: re.Pattern[str]) -> str:
+    if sign not in line:
+        return line
+    if divider == sign:  # only quoted fields may have it
+        return re.sub(rf'"\s*({grouped.pattern})\s*"', lambda number: number[1].replace(sign, ""), line)
+    fields = line.split(divider)
+    return divider.join(
+        field.replace(sign, "") if grouped.fullmatch(field.strip().strip('"')) else field for field in fields
+    )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from inertial.dynamics.transfer_effects import EFFECTS, Conditions
 from inertial.dynamics.transfer_model import Points
 from inertial.errors import InertialError
 from pipelines.importers import files
-from pipelines.importers.documents import TransferImport, TransferParameter
+from pipelines.importers.documents import TransferFailure, TransferImport, TransferParameter
 from pipelines.importers.keep import keep_tables, lot_of_import
 from pipelines.importers.values import finite_column
 from pipelines.procedures.recorded import finding_table, gathered_points
@@ -29,10 +30,6 @@ FEWEST = 8
 def transfer_points(table: pd.DataFrame, name: str) -> Points:
     """The points of a table with the columns of :data:`NEEDED`, each with its unit in its name.
 
-    Parameters
-    ----------
-    name : of the file, for messages
-
     Raises
     ------
     DataRejected
@@ -45,12 +42,9 @@ def transfer_points(table: pd.DataFrame, name: str) -> Points:
             f"{name}: column {', '.join(missing)} is missing, found {found}; a transfer function needs its units in the "
             "names of its columns; rename them"
         )
-    columns: dict[str, Any] = {}
-    for one in (*NEEDED, *OPTIONAL):
-        there = one in table.columns
-        columns[one] = (
-            finite_column(table, one, name, "correct the row") if there else np.full(len(table), OPTIONAL[one])
-        )
+    columns: dict[str, Any] = {one: np.full(len(table), usual) for one, usual in OPTIONAL.items()}
+    given = [one for one in (*NEEDED, *OPTIONAL) if one in table.columns]
+    columns |= {one: finite_column(table, one, name, "correct the row") for one in given}
     for one in ("frequency_hz", "magnitude", "magnitude_uncertainty_percent", "phase_uncertainty_deg"):
         if not np.all(columns[one] > 0.0):
             row = int(np.flatnonzero(columns[one] <= 0.0)[0]) + 1
@@ -87,16 +81,12 @@ def import_transfer(
     fit = diagnosis.extended
     bandwidth = bandwidth_of(fit, fit.values, float(points.conditions.frequency.max()))
     parameters: dict[str, TransferParameter] = {}
-    for p in fit.parameters:
-        one = diagnosis.parameter(p.name)
-        parameters[p.name] = TransferParameter(
-            value=one.value,
-            uncertainty=one.uncertainty,
-            low=one.low,
-            high=one.high,
-            unit=p.unit,
-            identified=one.identified,
-        )
+    for name, unit_of in ((p.name, p.unit) for p in fit.parameters):
+        p = diagnosis.parameter(name)
+        parameters[name] = {
+            "value": p.value, "uncertainty": p.uncertainty, "low": p.low, "high": p.high, "unit": unit_of,
+            "identified": p.identified,
+        }  # fmt: skip
     text = diagnosis_text(diagnosis)
     stated = {"procedure": "sweep", "effects": list(effects), "unit": unit}
     about = {"name": f"transfer function of {unit}", "source": source.as_dict(), "lot": lot_of_import([unit])}
@@ -113,10 +103,7 @@ def import_transfer(
         "error_percent": diagnosis.error_percent,
         "extended_percent": diagnosis.extended_percent,
         "left_out": list(diagnosis.left_out),
-        "where": [
-            {"low_hz": one.low_hz, "high_hz": one.high_hz, "part": one.part, "share": one.share}
-            for one in diagnosis.where
-        ],
+        "where": [TransferFailure(**asdict(one)) for one in diagnosis.where],
         "classes": [{"effects": list(one.effects), "p_value": one.p_value} for one in diagnosis.classes],
         "recommended": list(diagnosis.recommended),
         "unexplained": diagnosis.unexplained,

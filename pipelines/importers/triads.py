@@ -165,9 +165,9 @@ def sphere_of(columns: Mapping[str, Array], names: Sequence[str]) -> Sphere | No
 
 def _parts(output: Array) -> Array:
     """Means (k, 3) of the parts of a record that are at rest; its rows where they are few."""
-    width = 1 if len(output) <= _FEW_ROWS else int(np.clip(len(output) // _PARTS, 5, _LONGEST_PART))
-    if width == 1:
+    if len(output) <= _FEW_ROWS:
         return output
+    width = int(np.clip(len(output) // _PARTS, 5, _LONGEST_PART))
     scatter = np.sqrt(moving_variance(output, width).sum(axis=-1))[::width]
     means = output[: len(output) // width * width].reshape(-1, width, 3).mean(axis=1)
     scatter = scatter[: len(means)]
@@ -180,9 +180,8 @@ def _fitted(parts: Array, output: Array) -> Sphere:
     size = float(np.median(np.linalg.norm(parts, axis=1)))
     jumps = float(np.median(np.linalg.norm(np.diff(output, axis=0), axis=1)))
     spans = np.ptp(parts, axis=0)
-    one_pose = (
-        np.max(spans) < _STILL * size
-    )  # or far from zero, as the counts of a converter with its zero in the middle
+    # or far from zero, as the counts of a converter with its zero in the middle
+    one_pose = np.max(spans) < _STILL * size
     pose = Sphere(max(size, 1e-300), np.zeros(3), np.inf, np.sort(spans) / max(size, 1e-300), jumps / max(size, 1e-300))
     if not np.max(spans) > 0.0:
         return pose

@@ -77,11 +77,8 @@ def unsigned_bits(output: Array) -> int:
     if min(ends) < _OFTEN or np.mean(np.abs(x - 0.5 * whole) < _END * whole) > _SELDOM:
         return 0
     signed = np.where(x >= 0.5 * whole, x - whole, x)
-    return (
-        bits
-        if _scatter(signed) < _STEADY or _jumps(x, 0.5 * whole) > _OFTEN > 10.0 * _jumps(signed, 0.5 * whole)
-        else 0
-    )
+    parted = _jumps(x, 0.5 * whole) > _OFTEN > 10.0 * _jumps(signed, 0.5 * whole)
+    return bits if parted or _scatter(signed) < _STEADY else 0
 
 
 def _jumps(x: Array, size: float) -> float:
@@ -109,11 +106,9 @@ def refuse_other_unit(output: Array, claimed: str, where: str, *, means: bool = 
     if claimed in GRAVITY:
         if LIKELY[0] < size / GRAVITY[claimed] < LIKELY[1]:
             return ()
-        advice = (
-            f"the unit looks like {other}, give --units output={other}"
-            if other
-            else "numbers of a converter are LSB, of a voltmeter V or mV: --units output=LSB|V|mV"
-        )
+        advice = f"the unit looks like {other}, give --units output={other}"
+        if not other:
+            advice = "numbers of a converter are LSB, of a voltmeter V or mV: --units output=LSB|V|mV"
         raise DataRejected(
             f"{where}: the norm of the output is {size:.5g}, about {GRAVITY[claimed]:.5g} is needed if its unit is {claimed}; "
             f"{advice}"
@@ -150,8 +145,5 @@ def _counts(output: Array, size: float, close: str, where: str, *, may_be_parts:
         )
     if close:
         return (f"CHECK THE UNIT: the norm of the output is {size:.5g}, as gravity in {close}; LSB was given",)
-    if not whole and np.ptp(output[:1000]) < 8.0:
-        return (
-            "CHECK THE UNIT: values within a few units of one another that are not whole numbers, but LSB was given",
-        )
-    return ()
+    doubt = "CHECK THE UNIT: values within a few units of one another that are not whole numbers, but LSB was given"
+    return (doubt,) if not whole and np.ptp(output[:1000]) < 8.0 else ()

@@ -25,13 +25,7 @@ MOST_CELLS, FREE_CELLS, CELLS_PER_BYTE = 2**27, 2**22, 16
 
 
 def refuse_larger(size: int, packed: int, where: str) -> None:
-    """Refuse a file that unpacks to too much.
-
-    Parameters
-    ----------
-    size : bytes unpacked, so far, or as stated by the file.
-    packed : bytes of the file.
-    """
+    """Refuse a file of ``packed`` bytes that unpacks to too much; ``size``: bytes unpacked so far, or as the file states them."""
     if size <= min(MOST_BYTES, max(FREE_BYTES, MOST_TIMES * packed)):
         return
     raise DataRejected(
@@ -76,7 +70,6 @@ def inflated(data: bytes, room: int, packed: int, where: str) -> bytes:
     Parameters
     ----------
     room : bytes of the same file that were unpacked before.
-    packed : bytes of the file.
     """
     stream, pieces, size = zlib.decompressobj(), list[bytes](), 0
     with foreign(f"{where}: a compressed variable that does not unpack", "copy it again"):

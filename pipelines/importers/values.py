@@ -14,13 +14,10 @@ from schemas.errors import DataRejected, did_you_mean
 from schemas.foreign import foreign, shown
 
 _FORCE_G = 1e4
-ANGLES = ("outer", "inner")
+_ANGLES = {name: BY_COLUMN[f"{name}_deg"] for name in ("outer", "inner")}
 BOUNDS: dict[str, tuple[float, float]] = {
     **{row.column: (row.lowest, row.highest) for row in RECORDED},
-    **{
-        f"{angle}_command_deg": (BY_COLUMN[f"{angle}_deg"].lowest, BY_COLUMN[f"{angle}_deg"].highest)
-        for angle in ANGLES
-    },
+    **{f"{name}_command_deg": (row.lowest, row.highest) for name, row in _ANGLES.items()},
     "duration_s": (0.0, LARGEST_TIME_S),
     **dict.fromkeys(FORCE_COLUMNS, (-_FORCE_G, _FORCE_G)),
     **dict.fromkeys((*SPREAD_COLUMNS, "full_scale"), (0.0, LARGEST)),
@@ -46,9 +43,8 @@ def seconds(values: pd.Series, where: str) -> Array:
             f"{where}: row {int(missing[0]) + 1}, column '{shown(str(values.name))}': no time, one is needed in every row "
             f"({missing.size} such rows); repair the file or leave those rows out"
         )
-    with foreign(
-        f"{where}: column '{shown(str(values.name))}': times that cannot be subtracted", "give the time in seconds"
-    ):
+    found = f"{where}: column '{shown(str(values.name))}': times that cannot be subtracted"
+    with foreign(found, "give the time in seconds"):
         steps = (values - values.iloc[0]) / pd.Timedelta(seconds=1)
     return np.asarray(steps, dtype=np.float64)
 
@@ -91,10 +87,7 @@ def finite(
 
 
 def finite_column(
-    table: pd.DataFrame,
-    name: str,
-    where: str,
-    remedy: str = "remove the gap, or cut the recording there",
+    table: pd.DataFrame, name: str, where: str, remedy: str = "remove the gap, or cut the recording there"
 ) -> Array:
     """The numbers of a column of samples or points; a missing column and a value that is no finite number are refused."""
     if name not in table.columns:

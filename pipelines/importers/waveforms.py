@@ -76,34 +76,30 @@ def import_waveforms(
         A file has no sample interval, no unit, or samples that cannot be used.
     """
     one, own, content, full_scale = _part(procedure, part)
-    out_unit = ""
     records: list[ProcedureRecord] = []
-    sources: list[files.SourceFile] = []
     recordings = [_recording(path, layout, own, one) for path in paths]
-    own = _scaled(own, one, recordings[0].unit, part)
+    sources, out_unit = [made.source for made in recordings], recordings[0].unit
+    own = _scaled(own, one, out_unit, part)
     driven = [made.own if made.reference is None else made.reference for made in recordings]
     try:
         own = one.completed(own, driven)
     except InertialError as problem:
         raise DataRejected(f"{paths[0].name}: {problem}") from None
     for number, (path, made, drive) in enumerate(zip(paths, recordings, driven, strict=True)):
-        text = made.unit
-        out_unit = out_unit or text
-        if text != out_unit:
-            raise DataRejected(f"{path.name}: output in {text}, {out_unit} in the files before; import them apart")
-        setting = one.setting_of(own, drive)
+        if made.unit != out_unit:
+            raise DataRejected(f"{path.name}: output in {made.unit}, {out_unit} in the files before; import them apart")
         pose = Pose(name="imported", outer_deg=0.0, inner_deg=0.0)
+        setting = one.setting_of(own, drive)
         step = ProcedureStep(path.name, pose, own.temperature_C, role="imported", setting=setting)
         reading = {
             "unit": unit,
             "unit_C": own.temperature_C,
             "supply_V": np.nan,
             "full_scale": full_scale,
-            "out_unit": text,
+            "out_unit": out_unit,
         }
         samples = {unit: made.own} | ({} if made.reference is None else {REFERENCE: made.reference})
         records.append(ProcedureRecord(number, step, pd.DataFrame([reading]), samples))
-        sources.append(made.source)
     device = Device({}, {}, full_scale, out_unit)
     try:
         points = one.reduce(own, records, device)
@@ -117,15 +113,16 @@ def import_waveforms(
     if not np.isfinite(full_scale):
         texts.append(("not judged", "clipping: full_scale is not given; add it to the file of --part"))
     content |= own.model_dump(include={"duration_ms", "before_ms"} - set(content))
-    stated = {"part": content, "columns": dict(layout.columns), "units": dict(layout.units), "rate_hz": layout.rate_hz}
-    stated |= {"group": layout.group}
     about = {
         "name": f"{one.title} of {unit}, recorded elsewhere",
         "source": sources[0].as_dict(),
         "sources": [source.as_dict() for source in sources],
         "lot": lot_of_import([unit]),
     }
-    parameters = {"procedure": procedure, "unit": unit, **stated}
+    parameters = {
+        "procedure": procedure, "unit": unit, "part": content, "columns": dict(layout.columns), "units": dict(layout.units),
+        "rate_hz": layout.rate_hz, "group": layout.group,
+    }  # fmt: skip
     tables = _tables(procedure, unit, points, values, texts)
     run = keep_tables("import of waveforms", digest_of(sources), parameters, about, tables, archive)
     units = {spec.name: spec.unit for spec in one.figures}
@@ -198,8 +195,8 @@ def _recording(path: Path, layout: RecordingLayout, part: Any, procedure: FromWa
     content, source = files.read_content(path, first)
     other = files.read_content(path, second)[0] if second else content
     outputs = {axis: layout.columns[axis] for axis in AXES if axis in layout.columns}
-    alone = "reference" not in layout.columns and not procedure.needs_reference
-    if not outputs or ("reference" not in layout.columns and not alone):
+    driven = "reference" in layout.columns
+    if not outputs or (procedure.needs_reference and not driven):
         there = ", ".join(shown(str(name)) for name in content.table.columns)
         raise WrongUse(
             f"import: reference and at least one of x, y, z are needed for {path.name} (its columns: {there}); add --map "
@@ -210,7 +207,7 @@ def _recording(path: Path, layout: RecordingLayout, part: Any, procedure: FromWa
     own = UnitRecord(time := _clock(content, layout, path.name), np.zeros((len(time), 3)))
     for axis, column in outputs.items():
         own.output[:, AXES.index(axis)] = finite_column(content.table, column, path.name)
-    if alone:
+    if not driven:
         return _Recording(own, None, text, source)
     reference_unit = _unit(other, layout, "reference", layout.columns["reference"], path.name)
     if reference_unit not in known:

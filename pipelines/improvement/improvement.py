@@ -64,12 +64,7 @@ def with_effects(text: str, steps: Sequence[ModelStep], file: Path) -> tuple[str
 def errors_by_version(
     versions: Sequence[Version], tables: ImprovedTables, working: Callable[[], AbstractContextManager[Any]]
 ) -> list[dict[str, Any]]:
-    """The errors of each version and the verdict on its change.
-
-    Parameters
-    ----------
-    working : is entered while a version is fitted
-    """
+    """The errors of each version and the verdict on its change; ``working`` is entered while a version is fitted."""
     from pipelines.diagnosis.confirmation import evolution
 
     def compared(effects: list[str], before: list[str] | None) -> dict[str, Any]:
@@ -143,9 +138,7 @@ class Improvement:
     def _diagnosis(self, effects: list[str] | None, *, first: bool) -> dict[str, Any]:
         """The diagnosis of a model, as the attendant sees it."""
         with self.attendant.working("looking for missing effects"):
-            from pipelines.diagnosis.diagnose import (
-                examination,  # loads the search for effects: after the first line
-            )
+            from pipelines.diagnosis.diagnose import examination  # loads the search for effects: after the first line
 
             document = examination(self.tables.dwells, self.tables.history, effects).document
         document["history"] = self.used_history or None
@@ -163,12 +156,12 @@ class Improvement:
         classes = [g["effects"] for g in diagnosis["classes"] if set(g["effects"]) & set(diagnosis["recommended"])]
         known = [name for members in classes for name in members]
         for name in named:
+            if not known:
+                raise WrongUse(f"improve: --effect {name}: the diagnosis names no effect; leave --effect out")
             if name not in known:
                 raise WrongUse(
                     f"improve: --effect {name}: the diagnosis does not name it; {did_you_mean(name, known)}; 'tumbleline "
                     "extend' adds any effect"
-                    if known
-                    else f"improve: --effect {name}: the diagnosis names no effect; leave --effect out"
                 )
         answers: list[dict[str, Any]] = []
         for members in classes:
@@ -177,8 +170,7 @@ class Improvement:
                 raise WrongUse(
                     f"improve: --effect {','.join(own)}: these data cannot separate them, one per class is needed; name one"
                 )
-            first = next(name for name in diagnosis["recommended"] if name in members)
-            effect = own[0] if own else first
+            effect = next(name for name in (*own, *diagnosis["recommended"]) if name in members)
             others = [name for name in members if name != effect]
             decided, added = self._answer(effect, others, chosen=bool(own), named=bool(named), yes=yes)
             answers.append({"effect": effect, "not_separated_from": others, "decided_by": decided, "added": added})

@@ -8,12 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pipelines.importers.mapping import build
-from pipelines.importers.proposal import has_reference
+from pipelines.importers.proposal import FEWEST_OF_NORM, Proposal, has_reference
 from pipelines.importers.recognition import Recognition, recognise
 from schemas.errors import DataRejected, WrongUse
 
 if TYPE_CHECKING:
-    from pipelines.importers.proposal import Proposal
     from pipelines.improvement.documents import RecordingDocument
 
 Working = Callable[[str], AbstractContextManager[Any]]
@@ -21,11 +20,6 @@ Working = Callable[[str], AbstractContextManager[Any]]
 
 def bring_in(paths: list[Path], archive: str | None, working: Working, group: str = "") -> RecordingDocument | None:
     """The import of a recording as it is recognised; None for a table of dwells, which needs none.
-
-    Parameters
-    ----------
-    working : shows what is done, until it is
-    group : the group of channels, if a file has several
 
     Raises
     ------
@@ -51,9 +45,8 @@ def bring_in(paths: list[Path], archive: str | None, working: Working, group: st
     build(proposal.keys, name)
     done = import_document(paths, proposal.keys, name, proposal.fit, archive, None, working)
     guessed = seen.guessed
-    files = [str(path) for path in paths]
     return {
-        "files": files,
+        "files": [str(path) for path in paths],
         "form": seen.source.form,
         "rows": len(seen.content.table),
         "columns": {meaning: one for meaning in proposal.keys["columns"] if (one := guessed.column(meaning))},
@@ -74,8 +67,6 @@ def bring_in(paths: list[Path], archive: str | None, working: Working, group: st
 
 def _too_little(seen: Recognition, proposal: Proposal) -> str:
     """Why a recording supports no fit, what is needed, and what can be done with it."""
-    from pipelines.importers.proposal import FEWEST_OF_NORM
-
     sphere = seen.guessed.triad.sphere
     if sphere is not None and sphere.still:
         found, needed = (
@@ -85,6 +76,5 @@ def _too_little(seen: Recognition, proposal: Proposal) -> str:
     else:
         stops = len(seen.output) if seen.guessed.dwells and seen.output is not None else proposal.stops
         found, needed = f"{stops} stops in all", f"{FEWEST_OF_NORM} positions at rest for a fit to the norm of gravity"
-    return (
-        f"{found}, {needed} are needed; record each position for some seconds, or see its noise with 'tumbleline allan'"
-    )
+    remedy = "record each position for some seconds, or see its noise with 'tumbleline allan'"
+    return f"{found}, {needed} are needed; {remedy}"

@@ -17,9 +17,9 @@ from inertial.errors import InertialError, UnknownEffect
 from pipelines.archive import Run, files
 from schemas.errors import RecipeInvalid, WrongUse, close_matches, did_you_mean
 from schemas.foreign import foreign, shown
-from schemas.model import ModelFile, VersionStep, load_model, parse_model
+from schemas.model import ModelFile, VersionStep
 from schemas.recipe import FormulaSpec
-from schemas.toml_files import read_text
+from schemas.toml_files import parse_as, read_text
 
 STARTING_MODEL = ("bias", "scale", "misalignment", "bias_temperature", "scale_temperature")
 """The effects of a new model file: the standard thermal model."""
@@ -49,7 +49,8 @@ class Version:
 
 def read_model(path: Path) -> ModelFile:
     """The model of a file; its formulas become effects, and all its effects are checked against the catalogue."""
-    return _used(load_model(path), f"model {path.name}")
+    source = f"model {path.name}"
+    return _used(parse_as(ModelFile, read_text(path, "model"), source), source)
 
 
 def use_formulas(formulas: Iterable[FormulaSpec], where: str) -> None:
@@ -153,7 +154,7 @@ def extended(text: str, step: ModelStep, source: str) -> tuple[str, ModelFile]:
     RecipeInvalid
         The text is no model, the effect is already in it, or its name is unknown.
     """
-    model = _used(parse_model(text, source), source)
+    model = _used(parse_as(ModelFile, text, source), source)
     if step.effect in model.model.effects:
         raise RecipeInvalid(
             f"{source}: '{step.effect}' is in version {model.model.version} already; "
@@ -172,7 +173,7 @@ def reduced(text: str, step: ModelStep, source: str) -> tuple[str, ModelFile]:
     RecipeInvalid
         The text is no model, the effect is not in it, or it is the only one.
     """
-    model = _used(parse_model(text, source), source)
+    model = _used(parse_as(ModelFile, text, source), source)
     present = model.model.effects
     if step.effect not in present:
         raise RecipeInvalid(
@@ -207,7 +208,7 @@ def _next_version(text: str, model: ModelFile, step: ModelStep, source: str) -> 
     change = {"version": version, "effect": step.effect, "by": step.by, "at": step.at, "why": step.why}
     changes.append(_table(change | ({"run": step.run} if step.run else {})))
     new = tomlkit.dumps(document)
-    return new, parse_model(new, source)
+    return new, parse_as(ModelFile, new, source)
 
 
 def publish_model(path: Path, text: str) -> None:

@@ -21,12 +21,12 @@ from schemas.errors import RecipeInvalid, WrongUse, close_matches, did_you_mean
 from schemas.foreign import is_file, shown
 from schemas.limits import Limits, parse_limits, unknown_limits
 from schemas.lot import Lot, Unit
-from schemas.own_files import own_file, own_names, refuse_built_in_name
+from schemas.own_files import own_file, own_files, refuse_built_in_name
 from schemas.poses import Pose
-from schemas.recipe import Recipe, RecipeFile, parse_recipe
+from schemas.recipe import Recipe, RecipeFile
 from schemas.serials import refuse_unusable_serials
 from schemas.shipped import hint_of_sample
-from schemas.toml_files import explain, read_text
+from schemas.toml_files import explain, parse_as, read_text
 from schemas.units import AXES
 
 MAIN_JOB = "production"
@@ -44,7 +44,7 @@ def load_recipe(name: str = MAIN_JOB, line: LineModel | None = None) -> Recipe:
     line : the keys that say the line's model for a kind of device; refused where a recipe asks for it and it is None
     """
     text, source, folder = _recipe_text(name)
-    return resolved(parse_recipe(text, source), source, folder, line)
+    return resolved(parse_as(RecipeFile, text, source), source, folder, line)
 
 
 def resolved(file: RecipeFile, source: str, folder: Path | None = None, line: LineModel | None = None) -> Recipe:
@@ -99,7 +99,7 @@ def refuse_unusable_poses(recipe: Recipe, source: str) -> None:
 def units_of(name: str = MAIN_JOB) -> list[str]:
     """The units that a recipe names, whatever its model is."""
     text, source, _ = _recipe_text(name)
-    return parse_recipe(text, source).units
+    return parse_as(RecipeFile, text, source).units
 
 
 def folder_of(name: str) -> Path:
@@ -126,7 +126,7 @@ def read_limits(name: str, folder: Path | None = None) -> Limits:
         return _judged_rightly(parse_limits(read_text(path, "limits"), f"limits {path.name}", UNITS), path.name)
     built_in = files("schemas") / "samples" / f"limits-{name}.toml"
     if name not in known:
-        raise unknown_limits(name, [*known, *own_names("limits")])
+        raise unknown_limits(name, [*known, *own_files("limits")])
     return parse_limits(built_in.read_text(encoding="utf-8"), f"limits {name}", UNITS)
 
 
@@ -177,12 +177,12 @@ def sample_names(prefix: str = "") -> list[str]:
 
 def recipe_names() -> list[str]:
     """Names of the built-in recipes and of the user's."""
-    return sorted({*sample_names(), *own_names("recipes")})
+    return sorted({*sample_names(), *own_files("recipes")})
 
 
 def limits_names() -> list[str]:
     """Names of the built-in limits and of the user's."""
-    return sorted({*sample_names("limits-"), *own_names("limits")})
+    return sorted({*sample_names("limits-"), *own_files("limits")})
 
 
 def _recipe_text(name: str) -> tuple[str, str, Path]:

@@ -31,8 +31,7 @@ from pipelines.orchestrator.settings import (
     use_database,
     use_key,
 )
-from pipelines.serving.connections import MOST, ConnectionLimits, TimedRequests
-from pipelines.serving.listening import bound_socket
+from pipelines.serving.connections import MOST, ConnectionLimits, TimedRequests, bound_socket
 from schemas import host
 from schemas.errors import TumblelineError, WrongUse
 from schemas.log_lines import JSON, tell, wants_json

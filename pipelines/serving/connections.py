@@ -1,4 +1,4 @@
-"""The connections of a server: at most so many, in all and of one address, and none that says nothing for long.
+"""The sockets of servers and their connections: at most so many, in all and of one address, and none that says nothing for long.
 
 They are counted where they are accepted, so that those within the handshake of TLS and WebSockets count too. An idle connection
 has no request in progress. Where there are too many, the oldest idle one is closed, so that idle ones shut nobody out; then the
@@ -10,6 +10,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import math
+import os
 import socket
 import time
 from collections.abc import Generator
@@ -17,7 +18,9 @@ from dataclasses import dataclass, field
 from ipaddress import ip_address
 from typing import TYPE_CHECKING, Any
 
-from schemas import host
+from schemas import host as this_machine
+from schemas.errors import WrongUse
+from schemas.foreign import shown
 
 if TYPE_CHECKING:
     from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -61,7 +64,7 @@ class ConnectionLimits:
     @property
     def fitting(self) -> int:
         """The connections that the limit of files permits."""
-        return int(min(self.most, max(host.most_files() // 2, 1)))
+        return int(min(self.most, max(this_machine.most_files() // 2, 1)))
 
 
 @dataclass(eq=False)
@@ -91,7 +94,7 @@ class Connection:
 
     def look(self, now: float, limits: ConnectionLimits) -> None:
         """End it if it has been idle for too long, or takes nothing of an answer that is left to the system to send."""
-        unsent = host.unsent_bytes(self.socket)
+        unsent = this_machine.unsent_bytes(self.socket)
         if unsent != self.unsent:
             self.unsent, self.moved = unsent, now
         patience = limits.answer_s if unsent else limits.idle_s
@@ -213,3 +216,50 @@ def _within(seconds: float, connection: Connection) -> Generator[None]:
         yield
     finally:
         alarm.cancel()
+
+
+class LimitedSocket(socket.socket):
+    """A socket whose connections are counted and limited as they are accepted, before any protocol."""
+
+    connections: Connections
+
+    def accept(self) -> tuple[socket.socket, Any]:
+        """The next connection; the loop of events takes both errors as "none at present"."""
+        if self.connections.crowded:
+            raise BlockingIOError
+        accepted, client = super().accept()
+        if self.connections.admit(accepted, client):
+            return accepted, client
+        with contextlib.suppress(OSError), accepted:
+            if self.connections.limits.plain:
+                accepted.setblocking(False)
+                accepted.send(REFUSAL)
+                accepted.shutdown(socket.SHUT_WR)
+        raise ConnectionAbortedError
+
+
+def bound_socket(host: str, port: int, command: str, limits: ConnectionLimits) -> LimitedSocket:
+    """A socket of a port, not listening yet; a port that another program has, or an address of no interface, is refused."""
+    place = LimitedSocket(socket.AF_INET6 if ":" in host else socket.AF_INET)
+    place.connections = Connections(limits)
+    try:
+        place.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        if ":" in host:
+            place.setsockopt(socket.IPPROTO_IPV6, socket.IPV6_V6ONLY, 1)
+        place.bind((host, port))
+    except (OSError, UnicodeError) as problem:
+        place.close()
+        number = getattr(problem, "errno", None)
+        why = os.strerror(number) if number and number > 0 else str(problem)
+        raise WrongUse(
+            f"{command}: port {port} of {shown(host)} cannot be used ({why}), a free port of this machine is needed; end the "
+            "program that has it, or give another with --port and --host (--port 0: a free one)"
+        ) from None
+    return place
+
+
+def listening_socket(host: str, port: int, command: str, limits: ConnectionLimits | None = None) -> LimitedSocket:
+    """A socket that listens: clients that come before the server is ready wait."""
+    place = bound_socket(host, port, command, limits or ConnectionLimits())
+    place.listen()
+    return place

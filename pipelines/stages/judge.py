@@ -13,8 +13,7 @@ from typing_extensions import TypedDict
 from inertial import effects as catalogue
 from inertial.errors import InertialError
 from pipelines.tables.frames import empty_table, rows_of
-from pipelines.tables.sound_lot import error_of, every_unit_faulty, generator, sound_lot
-from pipelines.tables.stated_poses import told
+from pipelines.tables.sound_lot import error_of, every_unit_faulty, generator, sound_lot, told
 from schemas.errors import DataRejected, RecipeInvalid
 from schemas.tables import ADEQUATE, NOT_ADEQUATE, NOT_JUDGED
 

@@ -16,7 +16,7 @@ from inertial.noise.terms import NoiseTerms, fit_terms, model_deviation
 from pipelines.stages.static_record import Coarse, StaticSeries, Warmed, remark, warmed, without_digits
 from pipelines.tables.calibration import Calibration, read_calibration
 from pipelines.tables.frames import empty_table
-from pipelines.tables.samples import by_record
+from pipelines.tables.summaries import by_record
 from schemas.units import MICRO
 
 Array = NDArray[np.float64]

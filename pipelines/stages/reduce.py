@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from inertial.frames import force_from_angles
 from inertial.quantities import ANGLE_COLUMNS, BY_ATTRIBUTE, READINGS
 from pipelines.tables.dwell_table import covariates
-from pipelines.tables.samples import PROCEDURE, STATIC
-from pipelines.tables.summaries import MEANS, SPREADS, there
+from pipelines.tables.summaries import MEANS, PROCEDURE, SPREADS, STATIC, there
 from schemas.errors import DataRejected
 from schemas.units import AXES, STANDARD_GRAVITY_M_S2
 

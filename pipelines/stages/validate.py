@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 from inertial.frames import force_from_angles
 from inertial.pointing import _force, contradicts, pointing_error
-from pipelines.tables.samples import PROCEDURE, STATIC
-from pipelines.tables.summaries import HIGHS, LOWS, means, there
+from pipelines.tables.summaries import HIGHS, LOWS, PROCEDURE, STATIC, means, there
 from schemas.lot import Unit
 from schemas.units import AXES
 

@@ -15,16 +15,15 @@ _REFERENCE = ("force_x", "force_y", "force_z", "outer_deg", "inner_deg")
 _SUMS = ("n", "duration_s")
 
 
-def condense(dwells: pd.DataFrame, most: int = MOST) -> pd.DataFrame:
-    """Dwells of which no unit has more than about ``most``: neighbours in one pose averaged, else thinned out.
+def condense(dwells: pd.DataFrame) -> pd.DataFrame:
+    """Dwells of which no unit has more than about :data:`MOST`: neighbours in one pose averaged, else thinned out.
 
-    Averages
-    keep the scatter ``sd_*`` and add the samples ``n``; texts are those of the first dwell.
+    Averages keep the scatter ``sd_*`` and add the samples ``n``; texts are those of the first dwell.
     """
     numbers = np.unique(dwells["dwell"].to_numpy())
-    if len(numbers) <= most:
+    if len(numbers) <= MOST:
         return dwells
-    size = int(np.ceil(len(numbers) / most))
+    size = int(np.ceil(len(numbers) / MOST))
     group = _groups(dwells, numbers, size)
     if group is None:
         return dwells[dwells["dwell"].isin(numbers[::size])]

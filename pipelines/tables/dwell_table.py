@@ -83,15 +83,16 @@ class DwellTable:
 
     def _full(self, name: str) -> bool:
         if name not in self._full_columns:
-            values = self.frame[name].to_numpy()
-            values = values if self._order is None else values[self._order]
-            self._full_columns[name] = not pd.isna(values).any()
+            self._full_columns[name] = not pd.isna(self._in_order(self.frame[name].to_numpy())).any()
         return self._full_columns[name]
+
+    def _in_order(self, values: NDArray[Any]) -> NDArray[Any]:
+        return values if self._order is None else values[self._order]
 
     def grid(self, name: str) -> Array:
         """A column of numbers, (units, n); NaN where a unit lacks a dwell."""
-        values = np.array(self.frame[name], dtype=np.float64)  # a copy: sums over it must not depend on the table
-        values = values if self._order is None else values[self._order]
+        # a copy: sums over it must not depend on the table
+        values = self._in_order(np.array(self.frame[name], dtype=np.float64))
         if self.whole:
             return values.reshape(self.shape)
         out = np.full(self.shape, np.nan)
@@ -117,8 +118,7 @@ class DwellTable:
 
     def texts(self, name: str) -> list[str]:
         """A column of texts, one for each row."""
-        values = self.frame[name].to_numpy(dtype=object)
-        return [str(one) for one in (values if self._order is None else values[self._order])]
+        return [str(one) for one in self._in_order(self.frame[name].to_numpy(dtype=object))]
 
     def per_dwell(self, name: str) -> tuple[str, ...]:
         """A text of every dwell, (n,): that of the first unit that has it; empty where the table has no such column."""
@@ -146,14 +146,11 @@ def state_of_table(table: DwellTable, history: pd.DataFrame | None = None) -> tu
         known["temperature"] = known.get("chamber")
     known["power_off"] = _power_off(table)
     reference, force = _force(table, known)
-    columns = {
-        name: values for name in covariates(table.frame) if (values := table.optional(name, filled=True)) is not None
-    }
-    past = (
-        None
-        if history is None or known["temperature"] is None
-        else history_on_grid(history, table.units, known["time"])
-    )
+    full = [name for name in covariates(table.frame) if table.has(name)]
+    columns = {name: table.filled(name) for name in full}
+    past = None
+    if history is not None and known["temperature"] is not None:
+        past = history_on_grid(history, table.units, known["time"])
     return reference, State(force=force, **known, covariates=columns, history=past, axes=table.axes)
 
 

@@ -15,11 +15,12 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from inertial.data_errors.readings import Readings, design, robust_fit
+from inertial.effects.base import others
 from inertial.estimation.problem import Lot
 from inertial.fits.linear import force_along_axes, of_every_axis, own_terms
-from inertial.frames import shown_force
+from inertial.frames import shown_force, unseen_directions
 from inertial.state import State
-from pipelines.tables.dwell_table import DwellTable, state_of_table
+from pipelines.tables.dwell_table import DwellTable, output_axes, state_of_table
 from pipelines.tables.norms import lot_of_norms
 from schemas.errors import DataRejected
 from schemas.units import AXES
@@ -275,3 +276,28 @@ def _white_error(readings: Readings, scale: Array, output: Array) -> Array:
     spread = np.sqrt(np.nanmean(readings.misfit**2, axis=1, keepdims=True))
     pooled = np.sqrt(np.mean(spread**2, axis=0, keepdims=True))
     return np.broadcast_to(np.maximum(pooled, 1e-12), readings.output.shape)
+
+
+def undetermined(state: State) -> list[str]:
+    """Names of the responses across an axis that no pose shows, as Kxy; none for a device with three axes."""
+    if len(state.axes) == len(AXES):
+        return []
+    unseen = unseen_directions(state.force)
+    return [f"K{AXES[axis]}{AXES[k]}" for axis in state.axes for k in others(axis) if k in unseen]
+
+
+def shows_misalignment(dwells: pd.DataFrame) -> bool:
+    """Whether a pose shows the response across an axis; those of a device with three axes are asked to."""
+    if len(output_axes(dwells.columns)) == len(AXES):
+        return True
+    state = state_of_table(DwellTable(dwells))[1]
+    return len(undetermined(state)) < 2 * len(state.axes)
+
+
+def undetermined_responses(state: State) -> list[str]:
+    """What cannot be determined from the poses, and what to measure for it."""
+    names = undetermined(state)
+    if not names:
+        return []
+    text = f"cannot be determined from these poses: {', '.join(names)} (held at zero: the force across does not change in that "
+    return [f"{text}direction); turn the device about its own axis by 90° and tilt it again"]

@@ -37,10 +37,7 @@ _WHITE_RANGE = 20.0
 def lot_of_norms(readings: Readings, state: State, like: Readings, *, square: bool) -> Lot:
     """The radial lot of dwells whose poses are unknown: y = |C·(a − b)| − 1 in g, with white standard errors by axis.
 
-    Parameters
-    ----------
-    like : the run whose point of expansion is used: coefficients of one run apply to another only so
-    square : whether the model takes the axes as square, so that six parameters, not nine, give the directions
+    ``like`` and ``square`` are those of :func:`pipelines.tables.dwells.lot_of`.
 
     Raises
     ------
@@ -132,9 +129,8 @@ def _far(readings: Readings, unit: int, fit: EllipsoidFit, kept: NDArray[np.bool
     """The dwell that is farthest off among those kept, if it is far beyond the scatter of the others."""
     heat = _heat(readings, unit, readings.there[unit]) if warm else None
     left = np.zeros(kept.size)
-    left[readings.there[unit]] = np.abs(
-        np.linalg.norm(fit.apply(readings.output[unit, readings.there[unit]], heat), axis=1) - 1.0
-    )
+    there = readings.there[unit]
+    left[there] = np.abs(np.linalg.norm(fit.apply(readings.output[unit, there], heat), axis=1) - 1.0)
     typical = float(np.median(left[kept])) / 0.6745
     worst = int(np.argmax(np.where(kept, left, 0.0)))
     far = np.zeros(kept.size, dtype=bool)

@@ -1,9 +1,12 @@
-"""Dwells as the lot that a verdict on a model rests on: long runs reduced, units with a data fault left out."""
+"""Dwells as the lot that a verdict on a model rests on: long runs reduced, units with a data fault left out.
+
+Few dwells in stated poses are too few for an estimate of their noise, but enough for their samples to contradict the model.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -11,9 +14,12 @@ from threadpoolctl import threadpool_limits
 
 from inertial.counts import number_of
 from inertial.data_errors.faults import Fault, find_faults, missing_dwells, names_of_missing
-from inertial.decisions import ADEQUATE_ABOVE
-from inertial.errors import InertialError
+from inertial.decisions import ADEQUATE_ABOVE, CERTAIN_BELOW
+from inertial.errors import InertialError, NotIdentified
+from inertial.estimation.model import Model
 from inertial.estimation.problem import Lot
+from inertial.fits.linear import fit_lot
+from inertial.probability import log_chi2_tail
 from pipelines.tables.condense import condense
 from pipelines.tables.dwells import Measured, lot_of, measured
 from schemas.errors import DataRejected
@@ -49,9 +55,8 @@ def sound_lot(
     measurement = measured(condense(dwells), history)
     faults = find_faults(measurement.readings) if measurement.reference != "norm" else []
     numbers = [int(number) for number in measurement.dwells]
-    faults = [
-        fault.named(measurement.units, numbers) for fault in faults if not _on_purpose(measurement, fault, left_out)
-    ]
+    unmeant = [fault for fault in faults if not _on_purpose(measurement, fault, left_out)]
+    faults = [fault.named(measurement.units, numbers) for fault in unmeant]
     blocked = {f.unit for f in faults}
     sound = [u for u in range(len(measurement.units)) if u not in blocked]
     if not sound:
@@ -74,15 +79,13 @@ def _on_purpose(measurement: Measured, fault: Fault, left_out: Collection[str]) 
 def gaps(measurement: Measured, faults: Sequence[Fault], left_out: Collection[str] = ()) -> list[str]:
     """A notice of the dwells that units without a fault lack and others have: they are judged by the dwells they have.
 
-    Parameters
-    ----------
-    left_out : ``UNIT:DWELL``, of which nothing is said: they were removed on purpose
+    Of those that were left out on purpose (``UNIT:DWELL``) nothing is said.
     """
     faulty = {fault.unit for fault in faults}
     parts: list[str] = []
     for place, unit in enumerate(measurement.units):
-        numbers = [int(measurement.dwells[k]) for k in missing_dwells(measurement.readings, place)]
-        numbers = [n for n in numbers if f"{unit}:{n}" not in left_out]
+        missing = (int(measurement.dwells[k]) for k in missing_dwells(measurement.readings, place))
+        numbers = [n for n in missing if f"{unit}:{n}" not in left_out]
         if numbers and place not in faulty:
             shown = ", ".join(map(str, numbers[:_SHOWN])) + (", …" if len(numbers) > _SHOWN else "")
             parts.append(f"{unit} {len(numbers)} ({shown})")
@@ -114,3 +117,40 @@ def is_small(error: Mapping[str, Any]) -> bool:
     A model that is not adequate only because of faults of the data leaves no significant error beside them.
     """
     return bool(error["rms_ug"] < _SMALL * error["floor_ug"] and error["p_value"] <= ADEQUATE_ABOVE)
+
+
+class Told(NamedTuple):
+    """A verdict: whether the model is adequate, why it cannot be judged or is not adequate, and the error behind it, µg."""
+
+    adequate: bool | None
+    reason: str
+    error: dict[str, Any]
+
+
+def told(base: Model, adequate: bool | None, unjudged: str, error: dict[str, Any]) -> Told:  # noqa: FBT001 - a verdict
+    """The verdict of a diagnosis, or that of the samples where there are too few dwells for one.
+
+    Six faces leave six degrees of freedom: no verdict rests on a noise that is estimated from them. The noise of the samples is
+    known from hundreds. A residual far beyond it contradicts the model, the stated poses, or dwells without wander; a residual
+    within it shows no adequacy, since most missing effects leave nothing on so few poses. Dwells of unknown orientation state
+    nothing that their samples could contradict.
+    """
+    lot = base.problem.lot
+    if adequate is not None or lot.radial or not lot.recorded:
+        return Told(adequate, unjudged, error)
+    try:
+        values = {term.effect.id: term.keywords for term in base.terms if term.keywords}
+        fit = fit_lot([term.effect.id for term in base.terms], lot.state, lot.output, lot.error, nonlinear=values)
+    except NotIdentified:
+        return Told(adequate, unjudged, error)
+    dof = int(fit.dof.sum()) - fit.shared.size
+    log_p = float(log_chi2_tail(float(fit.chi2.sum()), dof)) if dof > 0 else 0.0
+    if not log_p < np.log(CERTAIN_BELOW):
+        return Told(adequate, unjudged, error)
+    samples = float(np.sqrt(np.mean(lot.error[np.isfinite(lot.error)] ** 2)))
+    rms = float(np.sqrt(np.mean(fit.residuals[np.isfinite(lot.error)] ** 2)))
+    reason = (
+        "the dwells disagree by more than their samples allow, and are too few to show why: poses that are not as stated (1° is "
+        "17 mg), wander between the dwells, or a missing effect"
+    )
+    return Told(False, reason, {**error, **error_of(rms, samples, log_p)})

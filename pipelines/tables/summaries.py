@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from itertools import groupby
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,17 +11,23 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from pipelines.tables.frames import empty_table
-from pipelines.tables.samples import by_record
 from schemas.units import AXES
 
 Array = NDArray[np.float64]
 
+STATIC, PROCEDURE = "allan", "procedure"
+"""Kinds of records that are no dwells."""
 MEANS, SPREADS, LOWS, HIGHS = (tuple(f"{name}_{axis}" for axis in AXES) for name in ("out", "sd", "low", "high"))
 NUMBERS = " ".join((*MEANS, *SPREADS, *LOWS, *HIGHS, "wild_value"))
 OUTLIER_SIGMA = 20.0
 OUTLIER_PART = 1e-3  # of the full scale: a smaller outlier changes a mean of a hundred samples by at most 1e-5 of it
 FEWEST_FOR_OUTLIERS = 20
 WHOLE = "record n wild_count wild_axis wild_row clipped clipped_axis"
+
+
+def by_record(samples: Iterable[pd.DataFrame]) -> Iterator[tuple[int, Iterator[pd.DataFrame]]]:
+    """Number and tables of every record that has samples, each as long as it takes: not all of them lie in memory."""
+    yield from groupby((table for table in samples if len(table)), key=lambda t: int(t["record"].iloc[0]))
 
 
 def summarised(
@@ -88,22 +95,12 @@ def _parts(
         bad = np.argwhere(~np.isfinite(own))
         ends = np.argwhere(np.abs(own - zero_output) >= limit) if limit > 0.0 else bad[:0]
         row, axis = bad[0].tolist() if len(bad) else (0, 0)
-        yield (
-            str(unit),
-            {
-                "n": len(own),
-                "mean": mean[k],
-                "sd": sd[k],
-                "low": low[k],
-                "high": high[k],
-                "wild_count": len(bad),
-                "wild_row": row,
-                "wild_axis": axis,
-                "wild_value": float(own[row, axis]) if len(bad) else 0.0,
-                "clipped": len(ends),
-                "clipped_axis": int(ends[0][1]) if len(ends) else 0,
-            },
-        )
+        part = {
+            "n": len(own), "mean": mean[k], "sd": sd[k], "low": low[k], "high": high[k],
+            "wild_count": len(bad), "wild_row": row, "wild_axis": axis, "wild_value": float(own[row, axis]) if len(bad) else 0.0,
+            "clipped": len(ends), "clipped_axis": int(ends[0][1]) if len(ends) else 0,
+        }  # fmt: skip
+        yield str(unit), part
 
 
 def _joined(one: dict[str, Any], more: dict[str, Any]) -> dict[str, Any]:

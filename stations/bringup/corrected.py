@@ -5,7 +5,8 @@ from typing import Any
 import tomlkit
 
 from schemas.foreign import shown
-from schemas.profile import Profile, parse_profile
+from schemas.profile import Profile
+from schemas.toml_files import parse_as
 from stations.bringup.person import Findings
 from stations.profile_files import profile_text
 
@@ -38,5 +39,5 @@ def corrected_text(profile: Profile, findings: Findings, made: str) -> str:
             for register in document["registers"]:
                 register.pop("word_order", None)
     text = tomlkit.dumps(document)
-    parse_profile(text, corrected_name(profile))
+    parse_as(Profile, text, corrected_name(profile))
     return text

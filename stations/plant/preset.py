@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 from pydantic import Field, FiniteFloat, ValidationError
 
 from schemas.errors import RecipeInvalid, did_you_mean
-from schemas.own_files import own_file, own_names
+from schemas.own_files import own_file, own_files
 from schemas.strict import Strict
 from schemas.toml_files import explain, parse_toml, read_text
 from schemas.validity import Stability
@@ -112,13 +112,13 @@ class Preset(Strict):
 
 def preset_names() -> list[str]:
     """Names of the presets, as they are written in their files; those of the user by the names of their files."""
-    return sorted({*_texts(), *own_names("presets")})
+    return sorted({*_texts(), *own_files("presets")})
 
 
 def load_preset(name: str, overrides: Mapping[str, float] | None = None) -> Preset:
     """The preset of that name (in any case), with some figures replaced; unknown names and keys are refused."""
     texts = {key.lower(): text for key, text in _texts().items()}
-    own = next((one for one in own_names("presets") if one.lower() == name.lower()), name)
+    own = next((one for one in own_files("presets") if one.lower() == name.lower()), name)
     path = own_file("presets", own, {own} if own.lower() in texts else ())
     if path is None and name.lower() not in texts:
         raise RecipeInvalid(f"device: no preset '{name}'; {did_you_mean(name, preset_names())}", key="device")

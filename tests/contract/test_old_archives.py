@@ -19,7 +19,7 @@ from pipelines.jobs.job import job_of_run
 from pipelines.jobs.model_change import ModelChange
 from pipelines.lineage import lineage
 from pipelines.rerun.rerun import again
-from schemas import upgrades, version
+from schemas import version
 from schemas.errors import WrongUse
 
 KEPT = sorted((ROOT / "tests" / "archives").glob("v*.tar.xz"))
@@ -86,7 +86,7 @@ def test_a_table_is_brought_up_version_by_version(monkeypatch: pytest.MonkeyPatc
         ("dwells", 2): lambda frame: frame.rename(columns={"added": "renamed"}),
         ("grades", 1): lambda frame: frame.iloc[:0],
     }
-    for module, name, value in ((version, "VERSION", 3), (upgrades, "VERSION", 3), (upgrades, "UPGRADES", changes)):
+    for module, name, value in ((version, "VERSION", 3), (version, "UPGRADES", changes)):
         monkeypatch.setattr(module, name, value)
     for written, columns in ((1, ["unit", "value", "renamed"]), (3, ["unit", "value"])):
         path = tmp_path / f"{written}.parquet"

@@ -9,9 +9,10 @@ from plant_wires import tcp_link
 from small_station import lot_of, plant_of
 
 from schemas.errors import RecipeInvalid, StationRefused
-from schemas.profile import parse_profile
+from schemas.profile import Profile
 from schemas.station import load_station
 from schemas.station_devices import Device, Equipment
+from schemas.toml_files import parse_as
 from stations.codec import NotEncodable, encode
 from stations.devices.registers import Registers
 from stations.plant.preset import load_preset, preset_names
@@ -118,7 +119,7 @@ REFUSED = {
 @each(REFUSED)
 def test_refuses_profiles_that_contradict_themselves(registers):
     with pytest.raises(RecipeInvalid, match=REFUSED[registers]):
-        parse_profile(PROFILE.replace("{registers}", registers), "p.toml")
+        parse_as(Profile, PROFILE.replace("{registers}", registers), "p.toml")
 
 
 def test_unknown_profile_is_refused_with_what_looks_like_it():

@@ -20,7 +20,7 @@ from small_station import lot_of
 
 from inertial import effects
 from pipelines.archive import Archive
-from pipelines.serving.listening import listening_socket
+from pipelines.serving.connections import listening_socket
 from schemas.errors import WrongUse
 from stations.clock import WallClock
 from stations.opening import open_station

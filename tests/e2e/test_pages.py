@@ -28,11 +28,12 @@ from pipelines.importers.exchange import read_dwells
 from pipelines.jobs.recipes import load_limits, load_recipe
 from pipelines.jobs.seating import Seating, read_seating
 from pipelines.procedures import PROCEDURES, figures_of_recipe, parts_of, refuse_unusable
-from schemas.profile import parse_profile
-from schemas.recipe import parse_recipe
+from schemas.profile import Profile
+from schemas.recipe import RecipeFile
 from schemas.safety import Safety, SelfTest, Suspenders
 from schemas.station import load_station
 from schemas.station_devices import Device
+from schemas.toml_files import parse_as
 from stations.devices.adapters import adapter_of, adapters
 from stations.devices.chamber import ThermalChamber
 from stations.plant.hidden import HIDDEN
@@ -88,7 +89,7 @@ def test_what_a_page_names_is_there(page: Path) -> None:
 def test_files_of_the_guide_to_running_a_lot_are_files(tmp_path: Path) -> None:
     guide = pages.text("docs/how-to/run-a-lot.md")
     (recipe,) = (block for block in pages.blocks("docs/how-to/run-a-lot.md", "toml") if "poses" in block)
-    assert parse_recipe(recipe, "guide").units == ["SN1", "SN2"]
+    assert parse_as(RecipeFile, recipe, "guide").units == ["SN1", "SN2"]
     (tmp_path / "my.toml").write_text(recipe, encoding="utf-8")
     assert load_limits(load_recipe(str(tmp_path / "my.toml")), tmp_path).name == "consumer"
     assert "a first line slot,serial, then 0,SN1" in guide
@@ -112,7 +113,7 @@ def test_rules_and_views_of_the_guide_to_audits_are_those_of_the_program(tmp_pat
 
 
 def test_profile_and_links_of_the_guide_to_devices_are_such() -> None:
-    profile = parse_profile(pages.blocks("docs/how-to/add-a-device.md", "toml")[0], "guide")
+    profile = parse_as(Profile, pages.blocks("docs/how-to/add-a-device.md", "toml")[0], "guide")
     assert [register.name for register in profile.registers] == ["temperature", "set_point"]
     assert adapter_of(profile, "chamber", ThermalChamber) is adapters()["set_point"]
     blocks = re.findall(r"```toml\n(\[devices.*?)```", DEVICES, re.DOTALL)

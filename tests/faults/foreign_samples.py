@@ -22,10 +22,10 @@ from pipelines.jobs.recipes import load_recipe, read_limits
 from pipelines.jobs.seating import read_seating
 from schemas.bounds import COLDEST_C, HOTTEST_C, LONGEST_WAIT_S
 from schemas.errors import TumblelineError
-from schemas.profile import parse_profile
+from schemas.profile import Profile
 from schemas.serials import is_serial
 from schemas.station import load_station
-from schemas.toml_files import read_text
+from schemas.toml_files import parse_as, read_text
 
 MODEL = """[model]
 name = "line"
@@ -266,7 +266,7 @@ READERS = {
     "station": load_station,
     "model": read_model,
     "slots": read_slots,
-    "profile": lambda path: parse_profile(read_text(path, "profile"), path.name),
+    "profile": lambda path: parse_as(Profile, read_text(path, "profile"), path.name),
     "policy": load_rules,
     "mapping": lambda path: mapping.build(mapping.from_file(path), path.name),
     "manifest": archive_files.read_json,

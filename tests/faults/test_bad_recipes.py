@@ -10,8 +10,8 @@ from pipelines.archive import files as archive_files
 from pipelines.jobs.recipes import load_recipe
 from pipelines.jobs.seating import Seating, read_seating, scan
 from schemas.errors import ArchiveUnusable, RecipeInvalid, WrongUse
-from schemas.model import parse_model
-from schemas.toml_files import parse_toml
+from schemas.model import ModelFile
+from schemas.toml_files import parse_as, parse_toml
 
 RECIPE = ROOT / "schemas" / "samples" / "production.toml"
 
@@ -53,7 +53,7 @@ def test_nesting_and_long_integers_end_in_one_message_everywhere(tmp_path: Path)
         with pytest.raises(RecipeInvalid, match="not valid TOML"):
             parse_toml(text, "f")
         with pytest.raises(RecipeInvalid):
-            parse_model(text, "f")
+            parse_as(ModelFile, text, "f")
     for text in ("[" * 100_000, '{"a": ' * 100_000, f'{{"a": {"1" * 9999}}}'):
         with pytest.raises(ArchiveUnusable, match="not a manifest"):
             archive_files.parsed(text.encode(), tmp_path / "m.json")

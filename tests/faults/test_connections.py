@@ -14,8 +14,7 @@ from typing import Any
 import pytest
 import uvicorn
 
-from pipelines.serving.connections import ConnectionLimits, Connections, TimedRequests
-from pipelines.serving.listening import LimitedSocket, listening_socket
+from pipelines.serving.connections import ConnectionLimits, Connections, LimitedSocket, TimedRequests, listening_socket
 
 QUICK = ConnectionLimits(most=20, idle_s=0.6, body_s=0.6, answer_s=0.6, long_s=0.3)
 GET = b"GET %b HTTP/1.1\r\nhost: x\r\n\r\n"

@@ -6,8 +6,7 @@ import pandas as pd
 from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 
-from schemas.table import Column, Table
-from schemas.tables import TABLES
+from schemas.tables import TABLES, Column, Table
 
 FEW = settings(
     max_examples=8,

@@ -8,7 +8,8 @@ from pipelines.jobs.recipe_text import recipe_text
 from pipelines.jobs.recipes import resolved
 from schemas.fault import FaultOrder
 from schemas.poses import SoakPart
-from schemas.recipe import Recipe, RecipeFile, parse_recipe
+from schemas.recipe import Recipe, RecipeFile
+from schemas.toml_files import parse_as
 from schemas.uncertainty import Uncertainty
 from schemas.validity import Ageing, CertificateTerms, Stability
 
@@ -130,7 +131,7 @@ def recipe_files(draw):
 
 
 def read_again(recipe: Recipe) -> Recipe:
-    return resolved(parse_recipe(recipe_text(recipe, ["a remark"]), "again"), "again")
+    return resolved(parse_as(RecipeFile, recipe_text(recipe, ["a remark"]), "again"), "again")
 
 
 @settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])

@@ -45,11 +45,8 @@ def write(units: Sequence[UnitCalibration], run: str, settings: ExportSettings) 
     n = settings.sensor + 1
     middle = "" if n == 1 else str(n)
     device = settings.device_ids.get(unit.unit)
-    where = f"accelerometer {n} of ArduPilot" + (
-        f", device id {device}"
-        if device is not None
-        else f"; INS_ACC{middle}_ID is not set here: calibrate once by its menu"
-    )
+    unset = f"; INS_ACC{middle}_ID is not set here: calibrate once by its menu"
+    where = f"accelerometer {n} of ArduPilot{unset if device is None else f', device id {device}'}"
     lines = heading(unit, run, nominal, in_g(nominal, offsets), thermal=has_thermal, where=where)
     rows: list[tuple[str, str]] = [] if device is None else [(f"INS_ACC{middle}_ID", str(device))]
     rows += [(f"INS_ACC{middle}OFFS_{axis}", number(offsets.offset[i])) for i, axis in enumerate("XYZ")]
@@ -60,12 +57,8 @@ def write(units: Sequence[UnitCalibration], run: str, settings: ExportSettings) 
             (f"INS_TCAL{n}_ENABLE", "1"),
             (f"INS_TCAL{n}_TMIN", number(low)),
             (f"INS_TCAL{n}_TMAX", number(high)),
-            *(
-                (f"INS_TCAL{n}_ACC{k + 1}_{axis}", number(polynomial[k, i]))
-                for k in range(3)
-                for i, axis in enumerate("XYZ")
-            ),
         ]
+        rows += [(f"INS_TCAL{n}_ACC{k + 1}_{'XYZ'[i]}", number(value)) for (k, i), value in np.ndenumerate(polynomial)]
     return "\n".join([*lines, *(f"{name},{value}" for name, value in rows)]) + "\n"
 
 

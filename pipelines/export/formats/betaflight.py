@@ -15,8 +15,6 @@ from pipelines.export.omissions import (
     SCALE_T,
     comment,
     comment_lines,
-    largest_error_ug,
-    omitted,
 )
 from pipelines.export.polynomials import UnitCalibration
 from pipelines.export.settings import ExportSettings
@@ -47,9 +45,7 @@ def write(units: Sequence[UnitCalibration], run: str, settings: ExportSettings) 
         unit.certified,
         f"assumed: {counts} counts for 1 g (acc_1G), output of the driver for 1 g {nominal:g} {unit.out_unit}",
         f"not in this file: fractions of a count, up to {0.5e6 / counts:.3g} µg",
-        *comment_lines(
-            omitted(unit, (SCALE, SCALE_T, BIAS_T, ACROSS, ACROSS_T), nominal), largest_error_ug(unit, applied)
-        ),
+        *comment_lines(unit, applied, (SCALE, SCALE_T, BIAS_T, ACROSS, ACROSS_T), nominal),
     ]
     values = ",".join(f"{value:.0f}" for value in offsets + 0.0)
     return "\n".join([*(f"# {comment(line)}" for line in lines), f"set acc_calibration = {values},1", "save"]) + "\n"

@@ -30,7 +30,8 @@ def write(units: Sequence[UnitCalibration], run: str, settings: ExportSettings) 
     """The header as text, in double or single precision or in fixed point (``--arithmetic``)."""
     kind = settings.arithmetic
     fixed = kind == "q24"
-    if fixed or settings.firmware.low_pass or settings.firmware.bias:
+    behind = bool(settings.firmware.low_pass or settings.firmware.bias)
+    if fixed or behind:
         refuse_fewer_axes(units, "export: --arithmetic q24, --filter or --track")
     real, suffix = ("float", "f") if kind == "float" else ("double", "")
     head, tail = _template("q24" if fixed else "real").split("@UNITS@\n")
@@ -39,7 +40,7 @@ def write(units: Sequence[UnitCalibration], run: str, settings: ExportSettings) 
     names |= {"RUN": run, "OUT_UNIT": units[0].out_unit, "ORDER": str(ORDER), "REAL": real, "F": suffix}
     names |= {"BYTES": str(struct.calcsize(_PACKED[kind])), "BITS": "uint64_t" if kind == "double" else "uint32_t"}
     names |= {"NUMBER": "int32_t" if fixed else real, "MATRIX": "inverse" if fixed else "response"}
-    if kind == "q24" and (settings.firmware.low_pass or settings.firmware.bias):
+    if fixed and behind:
         raise WrongUse("export: --filter and --track need --arithmetic double or float; choose one of them")
     exact = np.float32 if kind == "float" else np.float64
     own = settings.firmware.names(_literal(exact), _braces)
@@ -78,13 +79,9 @@ def _real_unit(unit: UnitCalibration, kind: str) -> str:
 
 def _of_fewer_axes(unit: UnitCalibration) -> str:
     """What a caller gives for the axes without an output; empty where there are none."""
-    without = [k for k in range(len(AXES)) if k not in unit.axes]
-    places = " and ".join(f"output[{k}]" for k in without)
-    return (
-        f"\n * axes {', '.join(unit.letters)}; {places}: force along that axis in g, 0 where it is not known"
-        if without
-        else ""
-    )
+    places = " and ".join(f"output[{k}]" for k in range(len(AXES)) if k not in unit.axes)
+    text = f"\n * axes {', '.join(unit.letters)}; {places}: force along that axis in g, 0 where it is not known"
+    return text if places else ""
 
 
 def _literal(exact: type[np.float32 | np.float64]) -> Callable[[Any], str]:
@@ -107,9 +104,8 @@ def _fixed_unit(unit: UnitCalibration) -> str:
     factor = round(2.0**_COUNTS_BITS / own.scale) if unit.out_unit == "LSB" else 0
     low, high = own.range_mC
     crc = checksum(unit.unit, "i", [low, high, *own.bias.ravel(), *own.inverse.ravel()])
-    counts = (
-        f"{factor} counts factor" if factor else f"output[] = value in {unit.out_unit} / {own.scale!r} * {ONE}, rounded"
-    )
+    plain = f"output[] = value in {unit.out_unit} / {own.scale!r} * {ONE}, rounded"
+    counts = f"{factor} counts factor" if factor else plain
     return (
         f"/* {comment(unit.unit)}: {comment(unit.certified)}\n"
         f" * largest error against the full calibration from {low / 1000:g} to {high / 1000:g} degrees Celsius, {errors};\n"

@@ -10,13 +10,7 @@ from typing import Any
 import numpy as np
 
 from inertial.arrays import Array
-from pipelines.export.omissions import (
-    ACROSS_T,
-    SCALE,
-    comment_lines,
-    largest_error_ug,
-    omitted,
-)
+from pipelines.export.omissions import ACROSS_T, SCALE, comment_lines
 from pipelines.export.polynomials import UnitCalibration
 from pipelines.export.settings import ExportSettings
 from schemas.errors import WrongUse
@@ -109,7 +103,7 @@ def _remarks(unit: UnitCalibration, settings: ExportSettings) -> list[str]:
         f"{low:.1f} to {high:.1f} °C",
         "MATLAB's output: (AxesMisalignment/100·a + ConstantBias + ΔT·TemperatureBias)·(1 + ΔT/100·TemperatureScaleFactor)",
         f"nominal scale {nominal:g} {unit.out_unit}/g",
-        *comment_lines(omitted(unit, (SCALE, ACROSS_T), nominal), largest_error_ug(unit, applied)),
+        *comment_lines(unit, applied, (SCALE, ACROSS_T), nominal),
     ]
 
 

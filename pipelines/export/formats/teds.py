@@ -9,17 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from inertial.arrays import Array
-from pipelines.export.omissions import (
-    ACROSS,
-    ACROSS_T,
-    BIAS,
-    BIAS_T,
-    SCALE_T,
-    comment,
-    comment_lines,
-    largest_error_ug,
-    omitted,
-)
+from pipelines.export.omissions import ACROSS, ACROSS_T, BIAS, BIAS_T, SCALE_T, comment, comment_lines
 from pipelines.export.polynomials import UnitCalibration
 from pipelines.export.settings import ExportSettings
 from pipelines.export.teds import (
@@ -138,5 +128,4 @@ def _left_out(unit: UnitCalibration, stated: dict[str, Accelerometer]) -> list[s
     def applied(output: Array, temperature: float) -> Array:
         return output / scale
 
-    parts = omitted(whole, (BIAS, BIAS_T, SCALE_T, ACROSS, ACROSS_T))
-    return comment_lines(parts, largest_error_ug(whole, applied))
+    return comment_lines(whole, applied, (BIAS, BIAS_T, SCALE_T, ACROSS, ACROSS_T))

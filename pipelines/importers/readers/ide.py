@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import math
 import re
+from contextlib import suppress
 from functools import partial
 from typing import Any
 
@@ -52,11 +53,10 @@ def read(name: str, data: bytes, group: str) -> Content:
 def _number(text: str | bytes, where: str) -> float:
     """A sample rate or a time scale, as the recorders write it: a number, or number/number such as 1.0/32768."""
     plain = text.decode("utf-8", "replace") if isinstance(text, bytes | bytearray) else str(text)
-    match = _QUOTIENT.fullmatch(plain)
-    try:
-        value = float(match[1]) / float(match[2] or 1.0) if match else float("nan")
-    except (ValueError, ZeroDivisionError):
-        value = float("nan")
+    value = float("nan")
+    with suppress(ValueError, ZeroDivisionError):
+        if match := _QUOTIENT.fullmatch(plain):
+            value = float(match[1]) / float(match[2] or 1.0)
     if not math.isfinite(value):
         raise DataRejected(
             f"{where}: an IDE recording with the rate or time scale '{shown(plain)}', a number or number/number is needed; "

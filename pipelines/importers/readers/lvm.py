@@ -51,14 +51,11 @@ def _settings(text: str, divider: str | None) -> dict[str, list[str]]:
     """Key → words of the lines of a header."""
     settings: dict[str, list[str]] = {}
     for line in text.splitlines():
-        words = [
-            word.strip() for word in (line.replace(",", "\t").split("\t") if divider is None else line.split(divider))
-        ]
-        if words and words[0]:
-            # "Decimal_Separator<TAB>," loses its comma to the guess of the divider
-            settings[words[0]] = (
-                [","] if words[0] == "Decimal_Separator" and divider is None and "," in line else words[1:]
-            )
+        parts = line.replace(",", "\t").split("\t") if divider is None else line.split(divider)
+        key, *words = (part.strip() for part in parts)
+        # "Decimal_Separator<TAB>," loses its comma to the guess of the divider
+        comma = key == "Decimal_Separator" and divider is None and "," in line
+        settings |= {key: [","] if comma else words} if key else {}
     return settings
 
 

@@ -30,7 +30,7 @@ _TAG = 8
 MATRIX, COMPRESSED = 14, 15
 DEEPEST = 16
 """Cells and structures inside one another."""
-_INT8, _INT32, _UINT32 = 1, 5, 6
+_INT8, _INT32, _UINT32, _MATRIX = (frozenset({kind}) for kind in (1, 5, 6, MATRIX))
 _NUMBERS = frozenset({1, 2, 3, 4, 5, 6, 7, 9, 12, 13})
 _LETTERS = frozenset({1, 2, 3, 4, 16, 17, 18})
 _CELL, _STRUCT, _OBJECT, _CHAR, _SPARSE = 1, 2, 3, 4, 5
@@ -39,17 +39,7 @@ _COMPLEX = 0x0800
 
 
 def read(name: str, data: bytes, group: str) -> Content:
-    """Numeric variables as columns."""
-    return Content(table_of(name, data))
-
-
-def table_of(name: str, data: bytes) -> pd.DataFrame:
-    """Numeric variables as columns: a vector under its name, a matrix under name_1, name_2, …, structures with dots.
-
-    Parameters
-    ----------
-    name : of the file, for messages.
-    """
+    """Numeric variables as columns: a vector under its name, a matrix under name_1, name_2, …, structures with dots."""
     from scipy.io import loadmat  # a third of a second
 
     plain = _plain(name, data)
@@ -64,7 +54,7 @@ def table_of(name: str, data: bytes) -> pd.DataFrame:
     longest = max(map(len, columns.values()), default=0)
     columns = {label: column for label, column in columns.items() if len(column) == longest}
     refuse_larger(8 * sum(map(len, columns.values())), len(data), name)
-    return pd.DataFrame(columns)
+    return Content(pd.DataFrame(columns))
 
 
 def _plain(name: str, data: bytes) -> bytes:
@@ -81,7 +71,7 @@ def _plain(name: str, data: bytes) -> bytes:
         whole = inflated(body, size, len(data), name) if kind == COMPRESSED else data[at : at + _TAG + count]
         size += len(whole)
         refuse_larger(size, len(data), name)
-        if _Form(whole, order, name, REMEDY).check():
+        if _Form(whole, order, name).check():
             parts.append(whole)
         at += _TAG + count
     return b"".join(parts)
@@ -107,20 +97,14 @@ class _OtherClass(Exception):
 
 @dataclass
 class _Form:
-    """A walk through the elements of one variable.
+    """A walk through the elements of one variable of the file ``name``.
 
-    Parameters
-    ----------
-    data : the variable, beginning with its tag.
-    order : of bytes, ``<`` or ``>``.
-    name : of the file, for messages.
-    remedy : how messages end.
+    data : the variable, beginning with its tag; order : of bytes, ``<`` or ``>``
     """
 
     data: bytes
     order: str
     name: str
-    remedy: str
     at: int = 0
 
     def check(self) -> bool:
@@ -132,7 +116,7 @@ class _Form:
         return True
 
     def _matrix(self, end: int, depth: int) -> None:
-        start, count, after = self._element(end, frozenset({MATRIX}))
+        start, count, after = self._element(end, _MATRIX)
         if depth > DEEPEST:
             self._refuse(f"more than {DEEPEST} structures in one another", "none needs so many")
         self.at = start
@@ -142,7 +126,7 @@ class _Form:
 
     def _content(self, end: int, depth: int) -> None:
         flags, size = self._flags(end), self._dimensions(end)
-        self._take(end, frozenset({_INT8}))  # the name
+        self._take(end, _INT8)  # the name
         kind, parts = flags & 0xFF, 2 if flags & _COMPLEX else 1
         if kind in _NUMERIC:
             for _ in range(parts):
@@ -150,7 +134,7 @@ class _Form:
         elif kind == _CHAR:
             self._take(end, _LETTERS)
         elif kind == _SPARSE:
-            for allowed in (frozenset({_INT32}), frozenset({_INT32}), *[_NUMBERS] * parts):
+            for allowed in (_INT32, _INT32, *[_NUMBERS] * parts):
                 self._take(end, allowed)
         elif kind in {_CELL, _STRUCT, _OBJECT}:
             for _ in range(size * self._fields(kind, end)):
@@ -159,7 +143,7 @@ class _Form:
             raise _OtherClass
 
     def _flags(self, end: int) -> int:
-        start, count, after = self._element(end, frozenset({_UINT32}))
+        start, count, after = self._element(end, _UINT32)
         if count != 8:
             self._refuse(f"flags of {count} bytes", "8 are needed")
         self.at = after
@@ -167,7 +151,7 @@ class _Form:
 
     def _dimensions(self, end: int) -> int:
         """How many values there are; as many as fit into the file at most."""
-        start, count, after = self._element(end, frozenset({_INT32}))
+        start, count, after = self._element(end, _INT32)
         if count % 4 or not 8 <= count <= 4 * 32:
             self._refuse(f"dimensions of {count} bytes", "4 for each of 2 to 32 are needed")
         size = 1
@@ -183,13 +167,13 @@ class _Form:
         if kind == _CELL:
             return 1
         if kind == _OBJECT:
-            self._take(end, frozenset({_INT8}))
-        start, count, after = self._element(end, frozenset({_INT32}))
+            self._take(end, _INT8)
+        start, count, after = self._element(end, _INT32)
         longest = struct.unpack_from(f"{self.order}i", self.data, start)[0] if count == 4 else 0
         if longest <= 0:
             self._refuse("names of fields without a length", "one is needed")
         self.at = after
-        _, count, after = self._element(end, frozenset({_INT8}))
+        _, count, after = self._element(end, _INT8)
         if count % longest:
             self._refuse(f"{count} bytes of names of {longest} each", "whole names are needed")
         self.at = after
@@ -218,5 +202,5 @@ class _Form:
 
     def _refuse(self, found: str, needed: str) -> None:
         raise DataRejected(
-            f"{self.name}: a MATLAB file with {found}, {needed} (byte {self.at} of a variable); {self.remedy}"
+            f"{self.name}: a MATLAB file with {found}, {needed} (byte {self.at} of a variable); {REMEDY}"
         )

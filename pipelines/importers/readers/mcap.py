@@ -38,10 +38,8 @@ def read(name: str, data: bytes, group: str) -> Content:
             if channel.schema_id in summary.schemas
         }
         topic = chosen([*counts.items()], group, name, "no topic with messages in this MCAP recording")
-        rows = [
-            (int(message.log_time), flattened(decoded))
-            for _, _, message, decoded in source.iter_decoded_messages(topics=[topic])
-        ]
+        messages = source.iter_decoded_messages(topics=[topic])
+        rows = [(int(message.log_time), flattened(decoded)) for _, _, message, decoded in messages]
     return content_of(rows, kinds.get(topic, ""), name, topic)
 
 

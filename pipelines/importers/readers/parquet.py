@@ -23,12 +23,7 @@ _INDEX = re.compile(r"__index_level_\d+__")
 
 
 def read(name: str, data: bytes, group: str) -> Content:
-    """The plain columns of a Parquet file."""
-    return Content(table_of(name, data))
-
-
-def table_of(name: str, data: bytes) -> pd.DataFrame:
-    """The columns of a Parquet file; notes of pandas about indices are not read, and their unnamed columns left out.
+    """The plain columns of a Parquet file; notes of pandas about indices are not read, and their unnamed columns left out.
 
     Raises
     ------
@@ -52,7 +47,7 @@ def table_of(name: str, data: bytes) -> pd.DataFrame:
             refuse_larger(size, len(data), name)
             pieces.append(piece)
         table = pa.Table.from_batches(pieces, reader.schema_arrow.empty_table().select(labels).schema)
-        return pd.DataFrame({label: _plain(table.column(label)) for label in labels})
+        return Content(pd.DataFrame({label: _plain(table.column(label)) for label in labels}))
 
 
 def _claimed(file: pq.ParquetFile) -> int:

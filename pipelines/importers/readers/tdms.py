@@ -60,11 +60,8 @@ class _LibraryLog(logging.Handler):
     @contextmanager
     def collected(self) -> Generator[None]:
         """A block in which the library's log comes here."""
-        loggers = [
-            logging.getLogger(name)
-            for name in ("nptdms", *list(logging.root.manager.loggerDict))
-            if name.startswith("nptdms")
-        ]
+        names = {"nptdms", *(name for name in logging.root.manager.loggerDict if name.startswith("nptdms"))}
+        loggers = [logging.getLogger(name) for name in names]
         before = [(one, list(one.handlers), one.propagate) for one in loggers]
         try:
             for one in loggers:

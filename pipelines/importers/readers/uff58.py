@@ -24,19 +24,9 @@ NAME, TITLE, EXTRA, ORDER = "uff58", "Universal File Format, dataset 58", "uff",
 REMEDY = "export the record again, or as CSV"
 TIME_RECORD, TIME, ACCELERATION = 1, 17, 12
 ORDINATES = {
-    8: "displacement",
-    9: "force",
-    11: "velocity",
-    12: "acceleration",
-    13: "excitation force",
-    5: "temperature",
-    15: "pressure",
-    2: "stress",
-    3: "strain",
-    16: "mass",
-    18: "frequency",
-    19: "revolutions per minute",
-}
+    8: "displacement", 9: "force", 11: "velocity", 12: "acceleration", 13: "excitation force", 5: "temperature", 15: "pressure",
+    2: "stress", 3: "strain", 16: "mass", 18: "frequency", 19: "revolutions per minute",
+}  # fmt: skip
 HANDLES = Path("/proc/self/fd")
 _DIRECTIONS = {1: "+X", -1: "-X", 2: "+Y", -2: "-Y", 3: "+Z", -3: "-Z"}
 
@@ -114,18 +104,11 @@ def _record(one: dict[str, Any]) -> tuple[str, tuple[float, float, int, int], np
     if not one.get("abscissa_spacing") or interval <= 0.0:
         interval = float(np.median(np.diff(x))) if x.size > 1 else 0.0
     direction = _DIRECTIONS.get(int(one.get("rsp_dir") or 0), "")
-    label = " ".join(
-        str(part).strip() for part in (one.get("id1") or "", one.get("rsp_node") or "", direction) if str(part).strip()
-    )
+    parts = [str(part).strip() for part in (one.get("id1") or "", one.get("rsp_node") or "", direction)]
+    label = " ".join(filter(None, parts)) or "record"
     unit = str(one.get("ordinate_axis_units_lab") or "").strip()
     clock = (float(x[0]) if x.size else 0.0, interval, values.size, int(one.get("abscissa_spec_data_type") or 0))
-    return (
-        label or "record",
-        clock,
-        values,
-        "" if unit == "NONE" else unit,
-        int(one.get("ordinate_spec_data_type") or 0),
-    )
+    return label, clock, values, "" if unit == "NONE" else unit, int(one.get("ordinate_spec_data_type") or 0)
 
 
 def _clock_name(clock: tuple[float, float, int, int]) -> str:

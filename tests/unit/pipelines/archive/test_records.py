@@ -17,8 +17,7 @@ from pipelines.capture import capture as capture_stage
 from pipelines.stages import noise as noise_stage
 from pipelines.stages.reduce import reduce
 from pipelines.stages.validate import validate
-from pipelines.tables.samples import by_record
-from pipelines.tables.summaries import summarised
+from pipelines.tables.summaries import by_record, summarised
 from schemas.lot import Unit
 from schemas.station import load_station
 from stations import open_station

@@ -28,7 +28,7 @@ from pipelines.export import (
 )
 from pipelines.export.polynomials import ORDER
 from pipelines.export.unit_noise import UnitNoise
-from pipelines.importers.readers.matlab import table_of
+from pipelines.importers.readers import matlab as matlab_reader
 from schemas.errors import WrongUse
 
 
@@ -217,7 +217,7 @@ def test_matlab_reads_the_properties_of_accelparams() -> None:
     """Read by this project's own reader of the format; the sensor by the documentation of imuSensor (Algorithms)."""
     c = unit(across=3e-3)
     content = export_files("matlab", [c], "run-1", IDS)["calibration.mat"]
-    table = table_of("calibration.mat", content)
+    table = matlab_reader.read("calibration.mat", content, "").table
     from scipy.io import loadmat
 
     p = loadmat(io.BytesIO(content), squeeze_me=True, struct_as_record=False)["SN_1"]

@@ -9,7 +9,8 @@ from inertial import effects
 from pipelines.diagnosis.confirmation import evolution
 from pipelines.jobs.model_files import ModelStep, chosen_effects, extended, new_model, read_model, versions
 from schemas.errors import RecipeInvalid, WrongUse
-from schemas.model import parse_model
+from schemas.model import ModelFile
+from schemas.toml_files import parse_as
 
 NOW = datetime(2026, 5, 4, 12, 0, tzinfo=UTC)
 COMMENTED = """\
@@ -110,7 +111,7 @@ def test_walks_through_the_versions(tmp_path):
     text, _ = extended(COMMENTED, step("third_order"), "model")  # and out again
     gone = text.replace('"third_order"]', "]").replace("version = 2\neffects", "version = 3\neffects")
     gone += '\n[[change]]\nversion = 3\neffect = "third_order"\nby = "B"\nat = 2026-06-01\nwhy = "not confirmed"\n'
-    last = versions(parse_model(gone.replace('scale", ]', 'scale"]'), "model"))[-2:]
+    last = versions(parse_as(ModelFile, gone.replace('scale", ]', 'scale"]'), "model"))[-2:]
     assert ("third_order" in last[0].effects, last[1].removed) == (True, ("third_order",))
 
 
