@@ -1,0 +1,49 @@
+"""Few dwells in stated poses: too few for an estimate of their noise, but enough for their samples to contradict the model."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from inertial.decisions import CERTAIN_BELOW
+from inertial.errors import NotIdentified
+from inertial.estimation.model import Model
+from inertial.fits.linear import fit_lot
+from inertial.probability import log_chi2_tail
+
+REASON = (
+    "the dwells disagree by more than their samples allow, and are too few to show why: poses that are not as stated (1° is "
+    "17 mg), wander between the dwells, or a missing effect"
+)
+
+
+class Contradicted(NamedTuple):
+    """Residual and noise of the samples, g, and the natural logarithm of the probability of such a residual."""
+
+    rms: float
+    samples: float
+    log_p: float
+
+
+def contradicted(base: Model) -> Contradicted | None:
+    """What the noise of the samples says against a model that has too few dwells for a verdict; None where it says nothing.
+
+    Six faces leave six degrees of freedom: no verdict rests on a noise that is estimated from them. The noise of the samples is
+    known from hundreds. A residual far beyond it contradicts the model, the stated poses, or dwells without wander; a residual
+    within it shows no adequacy, since most missing effects leave nothing on so few poses. Dwells of unknown orientation state
+    nothing that their samples could contradict.
+    """
+    lot = base.problem.lot
+    if lot.radial or not lot.recorded:
+        return None
+    try:
+        values = {term.effect.id: term.keywords for term in base.terms if term.keywords}
+        fit = fit_lot([term.effect.id for term in base.terms], lot.state, lot.output, lot.error, nonlinear=values)
+    except NotIdentified:
+        return None
+    dof = int(fit.dof.sum()) - fit.shared.size
+    log_p = float(log_chi2_tail(float(fit.chi2.sum()), dof)) if dof > 0 else 0.0
+    if not log_p < np.log(CERTAIN_BELOW):
+        return None
+    there = np.isfinite(lot.error)
+    rms, samples = (float(np.sqrt(np.mean(one[there] ** 2))) for one in (fit.residuals, lot.error))
+    return Contradicted(rms, samples, log_p)
