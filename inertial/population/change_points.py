@@ -36,6 +36,11 @@ class ChangePoint:
     error: float
     p_value: float
 
+    @property
+    def significance(self) -> float:
+        """|shift| in standard errors."""
+        return abs(self.shift) / self.error
+
 
 def change_points(values: Array, level: float = 1e-3) -> list[ChangePoint]:
     """The changes of level of a series (n,), found by binary segmentation, each then placed between its neighbours.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -17,6 +17,7 @@ WHO = {  # in the order of the report
     "archive": "archive: administration",
 }
 MORE = 20  # units listed in a sentence
+Never = TypeVar("Never", str, None)
 
 
 @dataclass(frozen=True)
@@ -35,9 +36,14 @@ class AuditFinding:
     evidence: dict[str, Any] = field(default_factory=dict[str, Any])
 
 
-def date_or_never(day: float, never: str = "never") -> str:
+def date_or(day: float, never: Never) -> str | Never:
     """A date; ``never`` for infinity."""
     return date_of(day) if np.isfinite(day) else never
+
+
+def date_or_never(day: float) -> str:
+    """A date, or "never"."""
+    return date_or(day, "never")
 
 
 def some(units: tuple[str, ...]) -> str:

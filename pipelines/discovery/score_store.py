@@ -17,15 +17,13 @@ from typing import Any, NamedTuple
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from pipelines.archive import Archive, derived, files
 from pipelines.archive.keys import digest
 from pipelines.archive.store import Place
 from pipelines.discovery.scored_run import ScoredRun, scored_runs
 from pipelines.parallel import Distributor, map_partitions
-
-Array = NDArray[np.float64]
 
 FOLDER = "discovery"
 VERSION = 1
