@@ -25,6 +25,10 @@ class QueryResult:
     columns: tuple[str, ...]
     rows: list[tuple[Any, ...]]
 
+    def documents(self) -> list[dict[str, Any]]:
+        """The rows by column name."""
+        return [dict(zip(self.columns, row, strict=True)) for row in self.rows]
+
 
 class TablesInMemory:
     """Tables for SQL queries in SQLite's dialect, read only. For many threads."""

@@ -124,8 +124,7 @@ def _drawn(bench: Workbench, state: UnitPage, name: str) -> pd.DataFrame:
 
 def _history(bench: Workbench, serial: str) -> list[dict[str, Any]]:
     """The unit's coefficients in all its runs, with the day of each."""
-    answer = bench.index.of_unit(serial, history_question(serial))
-    rows = [dict(zip(answer.columns, row, strict=True)) for row in answer.rows]
+    rows = bench.index.of_unit(serial, history_question(serial)).documents()
     return [{**row, "day": day_of(str(row["measured"]))} for row in rows if row["measured"]]
 
 
