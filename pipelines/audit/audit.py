@@ -1,7 +1,5 @@
 """The audit of an archive, from the index to the results behind the findings."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The audit as one JSON document."""
 
-from __future__ import annotations
-
 from dataclasses import asdict
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Drift since the last calibration: per kind of device and parameter, per unit, and the date when a unit leaves its tolerance."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Units that are due for re-calibration, and when: the state of their certificates in the ledger, and the rules."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Exchanged serials: calibrations that do not fit the history of their unit, and the unit whose history they fit."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A finding: one fact that needs an action."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 

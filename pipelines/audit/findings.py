@@ -1,7 +1,5 @@
 """All findings, sorted by who must act; here those about certificates, due units, the population and the archive."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

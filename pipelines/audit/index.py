@@ -5,8 +5,6 @@ may be deleted at any time, and is updated before every use: a part whose runs h
 runs make new parts.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

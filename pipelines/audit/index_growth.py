@@ -3,8 +3,6 @@
 Each addition is a small part; when there are many they are made anew as one. Whatever is missing is added by the next audit.
 """
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Sequence
 from pathlib import Path

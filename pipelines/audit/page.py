@@ -1,7 +1,5 @@
 """The audit as one page that needs no network."""
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Charts of the audit: yield, calibrations due, control charts, quantities of stations and units over time."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any

@@ -1,7 +1,5 @@
 """The population: yield, capability, differences between stations, slots and lots, and outliers."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Findings about stations: changes of level and slots, check standards out of control, gauge studies above the limit."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

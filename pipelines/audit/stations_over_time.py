@@ -1,7 +1,5 @@
 """The stations over time: their effects run by run, their slots, and their check standards."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Some tables of an index in the memory of this process, for queries that open no file and need no further library."""
 
-from __future__ import annotations
-
 import sqlite3
 import threading
 from collections.abc import Collection, Mapping

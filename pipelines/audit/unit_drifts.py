@@ -1,7 +1,5 @@
 """The last change of each parameter of every unit, and when the unit leaves tolerance and limit."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Findings about units: exchanged serials, out of tolerance, leaving their limits, drift outliers."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from typing import Any
 

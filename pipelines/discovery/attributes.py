@@ -4,8 +4,6 @@ Append-only, one file for each time that something was added, with its source, i
 row, and the newest one counts.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,5 @@
 """One look at an archive: new runs are scored, the night's evidence is kept, and what is beyond chance is named."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import reduce

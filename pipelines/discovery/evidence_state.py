@@ -1,7 +1,5 @@
 """The evidence of a kind of device after some nights, its alarms, and its file."""
 
-from __future__ import annotations
-
 import io
 import math
 from collections import Counter

@@ -1,7 +1,5 @@
 """Figures of a named discovery, and the discovery in sentences: its size, its levels, what carries it, what to do next."""
 
-from __future__ import annotations
-
 import math
 from typing import Any, Literal
 

@@ -1,7 +1,5 @@
 """What the evidence of an archive amounts to: named discoveries with size, scope and what carries them, and what is held back."""
 
-from __future__ import annotations
-
 from collections import Counter
 from dataclasses import dataclass
 from functools import cached_property

@@ -5,8 +5,6 @@ night on, and the entry says so. ``discovery/<device>/state`` is a derived cache
 the scores.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime

@@ -1,7 +1,5 @@
 """Discoveries as one page that needs no network: levels with intervals, evidence over the lots, what could have been seen."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -5,8 +5,6 @@ A derived cache with a seal: where it was edited, or has another layout, it is m
 products of the columns are kept once a file, as means.
 """
 
-from __future__ import annotations
-
 import io
 import json
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """The scores of one run of an archive, as they are kept: a few bytes a unit, so that no dwell is read again."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The marks of a chart as parts of SVG text: points, lines, bands, bars, cells and labels at their places."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from html import escape

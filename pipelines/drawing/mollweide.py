@@ -3,8 +3,6 @@
 Mollweide's projection (Snyder, Map Projections: A Working Manual, USGS 1395, 1987, eqs. 31-1 to 31-3).
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from inertial.arrays import Array

@@ -3,8 +3,6 @@
 Colours are names of roles (``role:before``) that the page replaces by those of its theme. Arrays travel as 32-bit binary.
 """
 
-from __future__ import annotations
-
 import base64
 from typing import Any
 

@@ -3,8 +3,6 @@
 Written directly: a report has dozens of plots, and a drawing library takes a hundred times as long for them.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from html import escape
 

@@ -1,7 +1,5 @@
 """Charts of a diagnosis: model and measurement, residuals on the sphere and against recorded quantities, errors by version."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, Literal, cast
 

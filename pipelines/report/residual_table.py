@@ -1,7 +1,5 @@
 """Residuals of a lot with all quantities recorded with its dwells, as plain arrays for charts and other processes."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any

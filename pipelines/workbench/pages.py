@@ -1,7 +1,5 @@
 """Common parts of pages: the workbench, templates, figures in three formats, and errors as sentences."""
 
-from __future__ import annotations
-
 import hashlib
 import math
 import secrets

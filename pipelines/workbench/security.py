@@ -9,8 +9,6 @@ session that only one origin accepts, and only for reading. The proof for change
 belongs to one origin with its port, and is never sent to another.
 """
 
-from __future__ import annotations
-
 import hashlib
 import hmac
 import secrets

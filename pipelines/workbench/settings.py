@@ -1,7 +1,5 @@
 """Settings of a workbench."""
 
-from __future__ import annotations
-
 import math
 import re
 import secrets

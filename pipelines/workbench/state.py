@@ -3,8 +3,6 @@
 ``parse`` after ``address`` is the identity. Invalid parts of an address are ignored, with a message on the page.
 """
 
-from __future__ import annotations
-
 import shlex
 from collections.abc import Iterable, Mapping
 from typing import Annotated, Any, ClassVar, Literal, Self

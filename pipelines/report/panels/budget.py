@@ -1,7 +1,5 @@
 """The uncertainty budget of the lot: references, shares, coverage by verification, and the risk of decisions."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 

@@ -1,7 +1,5 @@
 """Uncertainty of a unit's bias by measurand."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Figures of merit of a unit against their limits: three digits, as everywhere that a run is shown, and U to two."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

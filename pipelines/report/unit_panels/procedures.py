@@ -1,7 +1,5 @@
 """Figures, findings and pictures of a unit's test procedures."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

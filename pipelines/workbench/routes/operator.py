@@ -1,7 +1,5 @@
 """Lots on the station: slots as tiles, scan of serials, answers to questions, results before unloading."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path

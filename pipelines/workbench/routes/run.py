@@ -1,7 +1,5 @@
 """A run: its units, each with its result and figures."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from fastapi import APIRouter, Request

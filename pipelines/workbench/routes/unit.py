@@ -1,7 +1,5 @@
 """A unit of a run: model and measurement, coefficients, noise, history, certificates."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Search of units and runs."""
 
-from __future__ import annotations
-
 from fastapi import APIRouter, Request
 from starlette.responses import Response
 

@@ -1,7 +1,5 @@
 """The work that a page needs, from its state: a browser sends the address of a page, never a request itself."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from functools import lru_cache
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The work of jobs, in separate processes: each calls the functions of a command. Results can be pickled."""
 
-from __future__ import annotations
-
 import traceback
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
