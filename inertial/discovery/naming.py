@@ -180,8 +180,7 @@ class Pool:
         for number, lot in enumerate(after):
             shown[number] = self._of_effects(self._predicted(lot, driver, sums[driver]))[place]
             expected[number] = self._of_effects(self._expected(lot, driver, sums[driver]))[place]
-        able = int(np.count_nonzero(expected > 0.0))
-        total = float(expected.sum())
+        able, total = int(np.count_nonzero(expected > 0.0)), float(expected.sum())
         if not able or total <= 0.0:
             return float("nan"), float("inf"), 0
         factor = float(shown.sum()) / total

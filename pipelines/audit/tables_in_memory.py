@@ -34,9 +34,8 @@ class TablesInMemory:
     def __init__(self, tables: Mapping[str, pa.Table]) -> None:
         self._asking = threading.Lock()
         self._connection = sqlite3.connect(":memory:", check_same_thread=False)
-        self._connection.create_function(
-            "lower", 1, str.lower, deterministic=True
-        )  # its own leaves letters beyond ASCII
+        # its own leaves letters beyond ASCII
+        self._connection.create_function("lower", 1, str.lower, deterministic=True)
         for name, table in tables.items():
             columns = ", ".join(f'"{column}"' for column in table.column_names)
             places = ", ".join("?" * table.num_columns)
