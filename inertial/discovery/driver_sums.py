@@ -3,12 +3,14 @@
 import warnings
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
 from inertial.arrays import Array
 from inertial.discovery.evidence import DATE, MEAN, SLOT, STATION, UNIT, ScoredLot
+from inertial.discovery.station_wander import over
 
 INSIDE_ONLY = {SLOT, UNIT}
 """Drivers that are judged by differences inside a lot alone."""
@@ -16,54 +18,44 @@ INSIDE_ONLY = {SLOT, UNIT}
 
 @dataclass
 class DriverSums:
-    """Sums of a driver by level: scores (g, h) and information (g, h), in units of the noise of the lots.
+    """Sums of a driver by level, in units of the noise of the lots.
 
-    labels : of the levels; one, "slope" or "all", where the driver has none · weight : (g,), units of each level
+    levels : by label ("slope" or "all" where the driver has none): score and information, (2, h) · units : of each level
     about : what a number is counted from
     inside, between : information of differences inside lots, and of what lots have in common
     """
 
-    labels: list[str] = field(default_factory=list[str])
-    score: Array = field(default_factory=lambda: np.zeros((0, 0)))
-    information: Array = field(default_factory=lambda: np.zeros((0, 0)))
-    weight: Array = field(default_factory=lambda: np.zeros(0))
+    levels: dict[str, Array] = field(default_factory=dict[str, Array])
+    units: Counter[str] = field(default_factory=Counter[str])
     about: float = 0.0
     inside: float = 0.0
     between: float = 0.0
+
+    @property
+    def labels(self) -> list[str]:
+        """Of the g levels."""
+        return list(self.levels)
+
+    @cached_property
+    def score(self) -> Array:
+        """(g, h), once all lots are in."""
+        return np.stack([score for score, _ in self.levels.values()])
+
+    @cached_property
+    def information(self) -> Array:
+        """(g, h), once all lots are in."""
+        return np.stack([information for _, information in self.levels.values()])
 
     @property
     def mixed(self) -> bool:
         """Whether most is known from differences inside lots: then the products of the columns are those inside lots."""
         return self.inside > self.between
 
-    def add(self, label: str, score: Array, information: Array, weight: float) -> None:
+    def add(self, label: str, score: Array, information: Array, units: int) -> None:
         """Add to a level."""
-        if label not in self._place:
-            self._place[label] = len(self.labels)
-            self.labels.append(label)
-            if len(self.labels) > len(self.score):
-                more = np.zeros((max(16, len(self.score)), score.size))
-                self.score = np.vstack([self.score, more]) if self.score.size else more.copy()
-                self.information = np.vstack([self.information, more]) if self.information.size else more.copy()
-                self.weight = np.concatenate([self.weight, np.zeros(len(more))])
-        at = self._place[label]
-        self.score[at] += score
-        self.information[at] += information
-        self.weight[at] += weight
-
-    def __post_init__(self) -> None:
-        self._place: dict[str, int] = {}
-
-    def trimmed(self) -> "DriverSums":
-        """Without room for more levels."""
-        n = len(self.labels)
-        return replace(
-            self,
-            labels=list(self.labels),
-            score=self.score[:n].copy(),
-            information=self.information[:n].copy(),
-            weight=self.weight[:n].copy(),
-        )
+        self.levels.setdefault(label, np.zeros((2, score.size)))
+        self.levels[label] += score, information
+        self.units[label] += units
 
 
 def gathered(lots: Sequence[ScoredLot], drivers: Sequence[str]) -> dict[str, DriverSums]:
@@ -75,7 +67,7 @@ def gathered(lots: Sequence[ScoredLot], drivers: Sequence[str]) -> dict[str, Dri
     seen = Counter(unit for lot in lots for unit in lot.units) if UNIT in out else Counter[str]()
     for lot in lots:
         _gather(lot, out, means[lot.station], (noise, within), about, seen)
-    return {name: sums.trimmed() for name, sums in out.items() if sums.labels}
+    return {name: sums for name, sums in out.items() if sums.levels}
 
 
 def _mean_number(lots: Sequence[ScoredLot], name: str) -> float:
@@ -89,8 +81,7 @@ def _mean_number(lots: Sequence[ScoredLot], name: str) -> float:
 
 def shrinkage(size: Array, information: Array) -> Array:
     """Factors (p,) by which the sizes of levels are drawn to zero: the part of their variance that is not noise."""
-    seen = information > 0.0
-    noise = np.where(seen, 1.0 / np.where(seen, information, 1.0), 0.0).sum(axis=0)
+    noise = over(np.ones_like(information), information).sum(axis=0)
     return np.clip(1.0 - noise / np.maximum((size**2).sum(axis=0), 1e-300), 0.0, 1.0)
 
 
@@ -183,7 +174,7 @@ def _gather(
                     information = information + common
                     of.between += float(common.sum())
                 if label and (name != UNIT or seen[label] > 1):
-                    of.add(label, score, information, float(here.sum()))
+                    of.add(label, score, information, int(here.sum()))
 
 
 def _gather_number(of: DriverSums, numbers: Array, parts: tuple[ScoredLot, Array, Array, float, float]) -> None:
@@ -196,4 +187,4 @@ def _gather_number(of: DriverSums, numbers: Array, parts: tuple[ScoredLot, Array
     score = (about * left).sum(axis=0) / within + centre * (lot.score.sum(axis=0) - lot.information * mean) / noise
     inside, between = (about**2 * own).sum(axis=0) / within, centre**2 * lot.information / noise
     of.inside, of.between = of.inside + float(inside.sum()), of.between + float(between.sum())
-    of.add("slope", score, inside + between, float(len(lot.units)))
+    of.add("slope", score, inside + between, len(lot.units))

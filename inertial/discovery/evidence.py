@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.special import logsumexp
 
 from inertial.arrays import Array, Flags
-from inertial.discovery.station_wander import WALK_FROM, Innovation, Wander
+from inertial.discovery.station_wander import WALK_FROM, Innovation, Wander, over
 
 FIRST = 30
 """Lots that are held back: their medians bound what one of them can do. One lot multiplies evidence by 1.65 at most."""
@@ -125,9 +125,7 @@ class Levels:
             less = -1 if without is None else without.place.get(label, -1)
             if without is not None and less >= 0:
                 score, information = score - without.score[less], information - without.information[less]
-            known = information + prior
-            sizes[unit] = np.where(known > 0.0, score / np.where(known > 0.0, known, 1.0), 0.0)
-            behind[unit] = information
+            sizes[unit], behind[unit] = over(score, information + prior), information
         return sizes, behind
 
     def add(self, labels: tuple[str, ...], score: Array, information: Array) -> None:
@@ -360,41 +358,27 @@ class Evidence:
             if np.isfinite(numbers).all() and float(np.ptp(numbers)) > 0.0:
                 predicted = np.broadcast_to(numbers[:, None], own.shape)
                 self._add_inside(name + INSIDE, lot, predicted, left, two_sided=True)
-        scale.add(np.sqrt(np.mean(np.where(root > 0.0, left / np.where(root > 0.0, root, 1.0), 0.0) ** 2, axis=0)))
+        scale.add(np.sqrt(np.mean(over(left, root) ** 2, axis=0)))
         if self._earlier is None:
-            self._remember(lot, left, information)
+            for unit, *own in zip(lot.units, left, information, strict=True):
+                score, known = self._units.get(unit, (0.0, 0.0))
+                self._units[unit] = score + own[0], known + own[1]
 
-    def _add_inside(
-        self,
-        name: str,
-        lot: ScoredLot,
-        predicted: Array,
-        left: Array,
-        *,
-        two_sided: bool,
-    ) -> None:
+    def _add_inside(self, name: str, lot: ScoredLot, predicted: Array, left: Array, *, two_sided: bool) -> None:
         about = predicted - lot.averaged(predicted)
         size = np.sqrt((lot.own * about**2).sum(axis=0))
-        there = size > 0.0
-        value = np.where(there, (left * about).sum(axis=0) / np.where(there, size, 1.0), 0.0)
         scale = self._scales["inside"]
-        bounded, rms = scale.bounded(value), scale.rms
-        x = bounded / rms if two_sided else bounded / rms * np.minimum(size / rms, BOUND)
-        self._sums(name, two_sided=two_sided).add(np.where(there, x, 0.0))
+        rms = scale.rms
+        x = scale.bounded(over((left * about).sum(axis=0), size)) / rms
+        self._sums(name, two_sided=two_sided).add(x if two_sided else x * np.minimum(size / rms, BOUND))
 
     def _of_units(self, units: tuple[str, ...]) -> Array:
         out = np.zeros((len(units), self.count))
         for place, unit in enumerate(units):
             before = self._units.get(unit) if self._earlier is None else self._earlier(unit, self._taken)
             if before is not None:
-                out[place] = np.where(before[1] > 0.0, before[0] / np.where(before[1] > 0.0, before[1], 1.0), 0.0)
+                out[place] = over(*before)
         return out
-
-    def _remember(self, lot: ScoredLot, left: Array, information: Array) -> None:
-        for place, unit in enumerate(lot.units):
-            before = self._units.get(unit)
-            own = left[place], information[place]
-            self._units[unit] = own if before is None else (before[0] + own[0], before[1] + own[1])
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """The state as named arrays: what :meth:`restored` takes."""

@@ -14,15 +14,9 @@ import numpy as np
 from inertial import effects as effects_catalogue
 from inertial.arrays import Array, Places
 from inertial.decisions import CLASS_WIDTH
-from inertial.discovery.driver_sums import (
-    INSIDE_ONLY,
-    DriverSums,
-    about_common,
-    gathered,
-    shrinkage,
-    weights_of,
-)
+from inertial.discovery.driver_sums import INSIDE_ONLY, DriverSums, about_common, gathered, shrinkage, weights_of
 from inertial.discovery.evidence import INSIDE, MEAN, ScoredLot
+from inertial.discovery.station_wander import over
 
 _MOST = 6
 """Largest number of names of one night."""
@@ -142,7 +136,7 @@ class Pool:
         at, count = self.places(effect), len(self.columns)
         here = np.arange(self.axes)[:, None] * count + at
         info = sums.information[:, here.reshape(-1)]
-        size = about_common(driver, sums)[:, here.reshape(-1)] / np.where(info > 0.0, info, np.inf)
+        size = over(about_common(driver, sums)[:, here.reshape(-1)], info)
         if len(sums.labels) > 1:
             size = size * shrinkage(size, info)
         return np.moveaxis(size.reshape(-1, self.axes, at.size), 1, 0)
@@ -186,8 +180,7 @@ class Pool:
         for number, lot in enumerate(after):
             shown[number] = self._of_effects(self._predicted(lot, driver, sums[driver]))[place]
             expected[number] = self._of_effects(self._expected(lot, driver, sums[driver]))[place]
-        able = int(np.count_nonzero(expected > 0.0))
-        total = float(expected.sum())
+        able, total = int(np.count_nonzero(expected > 0.0)), float(expected.sum())
         if not able or total <= 0.0:
             return float("nan"), float("inf"), 0
         factor = float(shown.sum()) / total
@@ -217,9 +210,7 @@ class Pool:
     def _predicted(self, lot: ScoredLot, driver: str, sums: DriverSums) -> Array:
         """Product (h,) of what a lot shows and what other lots predict of it."""
         of_units = _of_units(lot, driver, sums)
-        if driver in INSIDE_ONLY:
-            return (lot.inside[0] * of_units).sum(axis=0)
-        return (lot.score * of_units).sum(axis=0)
+        return ((lot.inside[0] if driver in INSIDE_ONLY else lot.score) * of_units).sum(axis=0)
 
     def without(self, lot: ScoredLot, driver: str, effect: str, sums: DriverSums, sizes: Array) -> ScoredLot:
         """A lot without sizes (axes, levels, p) of an effect: algebra on its sums, no dwell is read again."""
@@ -249,7 +240,7 @@ class Pool:
             for products, values, info in ((self.inside, left, own), (self.lot, sums[None], information[None])):
                 inner = np.linalg.pinv(products[axis][np.ix_(at, at)], rcond=1e-6, hermitian=True)
                 root = np.sqrt(np.maximum(info[:, every], 0.0))
-                z = np.where(root > 0.0, values[:, every] / np.where(root > 0.0, root, 1.0), 0.0)[:, at]
+                z = over(values[:, every], root)[:, at]
                 values[:, every] -= root * (z @ inner @ products[axis][at])
                 covered = np.einsum("jp,pq,qj->j", products[axis][:, at], inner, products[axis][at])
                 info[:, every] *= np.where(covered > 1.0 - _SEEN, 0.0, np.clip(1.0 - covered, 0.0, 1.0))
@@ -264,7 +255,7 @@ class Pool:
     def scores(self, name: str, sums: DriverSums) -> dict[str, float]:
         """Score of every effect for a driver."""
         out: dict[str, float] = {}
-        for effect in dict.fromkeys(one for one, _ in self.columns):
+        for effect in self.effects:
             at = self.places(effect)
             drop, rank = self._drop(name, sums, at)
             k = float(np.sum(rank) - (np.count_nonzero(rank) if name in INSIDE_ONLY else 0))
@@ -280,9 +271,8 @@ class Pool:
         for axis in range(self.axes):
             here = axis * count + at
             info = sums.information[:, here]
-            seen = info > 0.0
-            rank[axis] = seen.sum(axis=0)
-            z = np.where(seen, centred[:, here] / np.sqrt(np.where(seen, info, 1.0)), 0.0)
+            rank[axis] = (info > 0.0).sum(axis=0)
+            z = over(centred[:, here], np.sqrt(np.maximum(info, 0.0)))
             inner = np.linalg.pinv(products[axis][np.ix_(at, at)], rcond=1e-6, hermitian=True)
             total += float(np.einsum("gp,pq,gq->", z, inner, z))
         return total, rank
@@ -301,21 +291,20 @@ class Pool:
         drivers.sort(key=lambda one: (one != driver, -scores[one][effect]))
         here = np.arange(self.axes) * count + self.places(effects[0])[0]
         info = sums.information[:, here]
-        seen = info > 0.0
-        safe = np.where(seen, info, 1.0)
-        sizes = np.where(seen, about_common(driver, sums)[:, here] / safe, 0.0) * self.size[here]
-        errors = np.where(seen, 1.0 / np.sqrt(safe), np.inf) * self.size[here]
-        return Name(tuple(effects), tuple(drivers), tuple(sums.labels), sums.weight, sizes, errors, top)
+        sizes = over(about_common(driver, sums)[:, here], info) * self.size[here]
+        errors = (
+            np.where(info > 0.0, over(np.ones_like(info), np.sqrt(np.maximum(info, 0.0))), np.inf) * self.size[here]
+        )
+        weights = np.array(list(sums.units.values()), dtype=np.float64)
+        return Name(tuple(effects), tuple(drivers), tuple(sums.levels), weights, sizes, errors, top)
 
 
 def _of_units(lot: ScoredLot, driver: str, sums: DriverSums) -> Array:
     """Sizes (units, h) that the sums of a driver predict for the units of a lot."""
-    size = about_common(driver, sums) / np.where(sums.information > 0.0, sums.information, np.inf)
-    return weights_of(lot, driver, sums) @ size
+    return weights_of(lot, driver, sums) @ over(about_common(driver, sums), sums.information)
 
 
 def _correlation(products: Array) -> Array:
     """Products (m, k, k) over the roots of their diagonals; zero where nothing is seen."""
     root = np.sqrt(np.maximum(np.diagonal(products, axis1=1, axis2=2), 0.0))
-    both = root[:, :, None] * root[:, None, :]
-    return np.where(both > 0.0, products / np.where(both > 0.0, both, 1.0), 0.0)
+    return over(products, root[:, :, None] * root[:, None, :])

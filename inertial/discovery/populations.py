@@ -59,13 +59,12 @@ def two_populations(values: Array, rng: Generator) -> TwoPopulations | None:
     ]
     log_e = float(special.logsumexp(ways) - np.log(2.0))
     weights, means, widths = _fitted(z)
-    small = int(np.argmin(weights))
-    order = (small, 1 - small)
+    first, other = np.argsort(weights, kind="stable")
     return TwoPopulations(
         log_e,
-        (centre + scale * float(means[order[0]]), centre + scale * float(means[order[1]])),
-        (scale * float(widths[order[0]]), scale * float(widths[order[1]])),
-        float(weights[small]),
+        (centre + scale * float(means[first]), centre + scale * float(means[other])),
+        (scale * float(widths[first]), scale * float(widths[other])),
+        float(weights[first]),
     )
 
 
@@ -129,17 +128,9 @@ def _one_peak(z: Array) -> float:
         constant = np.log(0.5 * power) - scale - special.gammaln(1.0 / power)
         return -float(constant * z.size - np.minimum(about**power, 1e6).sum())
 
-    fits = [
-        optimize.minimize(flat, [0.0, 0.5, 1.0], method="Nelder-Mead", options={"xatol": 1e-3, "fatol": 1e-2}),
-        optimize.minimize(student, [0.0, 0.0, 2.0], method="Nelder-Mead", options={"xatol": 1e-3, "fatol": 1e-2}),
-        *(
-            optimize.minimize(
-                sinh_arcsinh,
-                [0.0, 0.0, skew, 0.0],
-                method="Nelder-Mead",
-                options={"xatol": 1e-3, "fatol": 1e-2, "maxiter": 800},
-            )
-            for skew in (-0.5, 0.0, 0.5)
-        ),
-    ]
-    return -min(float(fit.fun) for fit in fits)
+    skewed = [(sinh_arcsinh, [0.0, 0.0, skew, 0.0]) for skew in (-0.5, 0.0, 0.5)]
+    ends = {"xatol": 1e-3, "fatol": 1e-2}
+    return -min(
+        float(optimize.minimize(law, start, method="Nelder-Mead", options=ends).fun)
+        for law, start in [(flat, [0.0, 0.5, 1.0]), (student, [0.0, 0.0, 2.0]), *skewed]
+    )

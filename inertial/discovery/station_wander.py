@@ -169,6 +169,12 @@ class Wander:
                 self.stations[station].predictors[driver] = value.copy()
 
 
+def over(values: Array, weights: Array) -> Array:
+    """Values over weights, zero where a weight is none."""
+    there = weights > 0.0
+    return np.where(there, values / np.where(there, weights, 1.0), 0.0)
+
+
 def _likelihood(every: Array, found: Innovation, rms: Array) -> Array:
     """Log likelihood (q, h) of innovations at each walk, over that without one; they count for five times their rms at most."""
     bounded = np.clip(every, -_LARGEST * rms, _LARGEST * rms) / np.maximum(rms, 1e-300)

@@ -36,6 +36,11 @@ class ChangePoint:
     error: float
     p_value: float
 
+    @property
+    def significance(self) -> float:
+        """|shift| in standard errors."""
+        return abs(self.shift) / self.error
+
 
 def change_points(values: Array, level: float = 1e-3) -> list[ChangePoint]:
     """The changes of level of a series (n,), found by binary segmentation, each then placed between its neighbours.
@@ -56,9 +61,7 @@ def change_points(values: Array, level: float = 1e-3) -> list[ChangePoint]:
         return []
     places = sorted(_segment(left, (0, left.size), noise, level))
     out: list[ChangePoint] = []
-    for number, place in enumerate(places):
-        low = places[number - 1] if number else 0
-        high = places[number + 1] if number + 1 < len(places) else left.size
+    for low, place, high in zip([0, *places], places, [*places[1:], left.size], strict=False):
         offset = _best(left[low:high])
         out.append(_described(left[low:high], low + skipped, place - low if offset is None else offset, noise))
     return out
@@ -100,11 +103,9 @@ def noise_of(values: Array) -> float:
 
 def _segment(values: Array, ends: tuple[int, int], noise: _Noise, level: float) -> list[int]:
     start, stop = ends
-    place = _best(values[start:stop])
-    if place is None:
-        return []
     part = values[start:stop]
-    if not _p_value(_statistic(part)[place - 1] / noise.sigma, part.size, noise) <= level:
+    place = _best(part)
+    if place is None or not _p_value(_statistic(part)[place - 1] / noise.sigma, part.size, noise) <= level:
         return []
     split = start + place
     return [split, *_segment(values, (start, split), noise, level), *_segment(values, (split, stop), noise, level)]

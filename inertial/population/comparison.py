@@ -60,14 +60,12 @@ def _rank_p(values: Array, groups: Index, counts: Index, k: int) -> float:
 
 def holm(p_values: Array) -> Array:
     """p-values adjusted for their number, step by step (Holm 1979); (n,)."""
-    p_values = np.where(
-        np.isfinite(p_values), p_values, 1.0
-    )  # what could not be compared is no evidence, and spoils no other's
+    # what could not be compared is no evidence, and spoils no other's
+    p_values = np.where(np.isfinite(p_values), p_values, 1.0)
     order = np.argsort(p_values)
     n = p_values.size
-    adjusted = np.minimum(1.0, np.maximum.accumulate(p_values[order] * (n - np.arange(n))))
     out = np.empty(n)
-    out[order] = adjusted
+    out[order] = np.minimum(1.0, np.maximum.accumulate(p_values[order] * (n - np.arange(n))))
     return out
 
 
@@ -78,9 +76,8 @@ def sigma_of(values: Array) -> Array:
 
 def robust_z(values: Array) -> Array:
     """Distance of every value from the median, in σ by the median absolute deviation; (n, …) along the first axis."""
-    middle = np.nanmedian(values, axis=0)
     spread = sigma_of(values)
-    return (values - middle) / np.where(spread > 0.0, spread, np.inf)
+    return (values - np.nanmedian(values, axis=0)) / np.where(spread > 0.0, spread, np.inf)
 
 
 def unlike(values: Array, errors: Array) -> Array:
@@ -88,10 +85,8 @@ def unlike(values: Array, errors: Array) -> Array:
 
     Averages of many scatter less than those of few only by their errors: what lots differ by does not shrink with their size.
     """
-    middle = np.nanmedian(values, axis=0)
-    spread2 = sigma_of(values) ** 2
-    sigma2 = np.maximum(spread2 - np.nanmedian(errors**2, axis=0), 0.0) + errors**2
-    return (values - middle) / np.sqrt(np.where(sigma2 > 0.0, sigma2, np.inf))
+    sigma2 = np.maximum(sigma_of(values) ** 2 - np.nanmedian(errors**2, axis=0), 0.0) + errors**2
+    return (values - np.nanmedian(values, axis=0)) / np.sqrt(np.where(sigma2 > 0.0, sigma2, np.inf))
 
 
 def outlier_limit(n: int, known_from: int | None = None, level: float = 0.01) -> float:

@@ -47,6 +47,11 @@ class DeviceDrift:
     mount_sd: float
     pairs: int
 
+    @property
+    def parts(self) -> Array:
+        """Variances of mounting, walk and slope, (3,)."""
+        return np.array([self.mount_sd, self.walk_sd, self.slope_sd]) ** 2
+
 
 def kind_of(change: Array, years: Array, known: Array) -> DeviceDrift:
     """How a kind drifts, from pairs of calibrations of the same units: moments of the changes, weighted, outliers left out.
@@ -63,7 +68,7 @@ def kind_of(change: Array, years: Array, known: Array) -> DeviceDrift:
     if change.size == 0:
         return DeviceDrift(0.0, 0.0, 0.0, 0.0, 0)
     expected = known + np.median((change**2 - known).clip(0.0)) + 1e-12
-    mean, parts, keep = 0.0, np.zeros(3), np.ones(change.size, dtype=bool)
+    mean, parts, keep = 0.0, np.zeros(3), np.ones_like(change, dtype=bool)
     for _ in range(ROUNDS):
         mean, keep, columns, target = _moments(change, years, known, expected, keep)
         parts = _parts(columns, target, (0, 1, 2) if drifts_known(years) else (0,))
@@ -85,9 +90,9 @@ def prudent(kind: DeviceDrift, change: Array, years: Array, known: Array) -> Dev
     """
     if change.size == 0 or not drifts_known(years):
         return kind
-    best = np.array([kind.mount_sd**2, kind.walk_sd**2, kind.slope_sd**2])
+    best = kind.parts
     expected = known + _spread_of(best, years) + 1e-12
-    _, keep, columns, target = _moments(change, years, known, expected, np.ones(change.size, dtype=bool))
+    _, keep, columns, target = _moments(change, years, known, expected)
     alike = 0.5 * (_parts(columns, target, [1]) + _parts(columns, target, [2]))
     bearable = _left(columns, target, best) + SPREAD_OF_SQUARES * LIKELY
     tried = (alike, _parts(columns, target, [1, 2]), best)
@@ -111,22 +116,19 @@ def seating_of(kind: DeviceDrift, change: Array, years: Array, known: Array, pai
     shown = kind.mount_sd, max(kind.pairs / PAIRS_A_DOF, 1.0)
     if change.size == 0 or not drifts_known(years):
         return shown
-    best = np.array([kind.mount_sd**2, kind.walk_sd**2, kind.slope_sd**2])
-    expected = known + _spread_of(best, years) + 1e-12
-    _, _, columns, target = _moments(change, years, known, expected, np.ones(change.size, dtype=bool))
+    best = kind.parts
+    _, _, columns, target = _moments(change, years, known, known + _spread_of(best, years) + 1e-12)
     alone = _parts(columns, target, (0,))
     if _left(columns, target, alone) >= _left(columns, target, best) + SPREAD_OF_SQUARES * SURELY:
         return shown
-    _, _, columns, target = _moments(
-        change, years, known, known + 2.0 * alone[0] + 1e-12, np.ones(change.size, dtype=bool)
-    )
+    _, _, columns, target = _moments(change, years, known, known + 2.0 * alone[0] + 1e-12)
     return float(np.sqrt(_parts(columns, target, (0,))[0])), float(max(pairs - 1, 1))
 
 
 def _moments(
-    change: Array, years: Array, known: Array, expected: Array, keep: Flags
+    change: Array, years: Array, known: Array, expected: Array, keep: Flags | slice = slice(None)
 ) -> tuple[float, Flags, Array, Array]:
-    """Mean slope, pairs that are no outliers, and their weighted squares with the columns that make them."""
+    """Mean slope of the pairs to keep, pairs that are no outliers, and their weighted squares with the columns that make them."""
     weight = np.where(years >= SHORTEST_Y, years, 0.0) / expected
     mean = float(np.sum(weight[keep] * change[keep]) / max(float(np.sum((weight * years)[keep])), 1e-300))
     left = change - mean * years
@@ -180,7 +182,6 @@ def standing(values: Array, errors: Array, years: Array, kind: DeviceDrift) -> L
     ----------
     values, errors, years : (units, most), in order of time and filled up with NaN; errors are standard uncertainties
     """
-    units = values.shape[0]
     span = np.nanmax(years, axis=1) - years[:, 0]
     noise = np.sqrt(np.nanmean(errors**2, axis=1) + kind.mount_sd**2)
     unknown = kind.slope_sd + 10.0 * noise / np.maximum(span, 1e-3)
@@ -188,7 +189,7 @@ def standing(values: Array, errors: Array, years: Array, kind: DeviceDrift) -> L
     expected = np.sqrt(alone.slope_var + kind.slope_sd**2)
     odd = (alone.slope - kind.mean_slope) / np.where(expected > 0.0, expected, np.inf)
     odd = np.where(span >= SHORTEST_Y, odd, np.nan)
-    prior = np.where(np.abs(odd) > ODD, np.abs(alone.slope - kind.mean_slope), np.full(units, kind.slope_sd))
+    prior = np.where(np.abs(odd) > ODD, np.abs(alone.slope - kind.mean_slope), kind.slope_sd)
     return replace(_filtered(values, errors, years, kind, prior), odd=odd)
 
 
@@ -238,13 +239,9 @@ def first_time(condition: Flags, ahead: Array) -> Array:
 
 def leaves(mean: Array, deviation: Array, tolerance: float, ahead: Array) -> tuple[Array, Array, Array]:
     """When values leave ± ``tolerance``: expected time, and the 95 % interval of it, (units,) each, years ahead."""
-    reach = TWO_SIDED_95 * deviation
-    expected = first_time(np.abs(mean) > tolerance, ahead)
-    return (
-        expected,
-        first_time(np.abs(mean) + reach > tolerance, ahead),
-        first_time(np.abs(mean) - reach > tolerance, ahead),
-    )
+    size, reach = np.abs(mean), TWO_SIDED_95 * deviation
+    expected, soonest, latest = (first_time(one > tolerance, ahead) for one in (size, size + reach, size - reach))
+    return expected, soonest, latest
 
 
 def last_reliable(probability: NDArray[np.floating[Any]], target: float, ahead: Array) -> Array:

@@ -12,8 +12,6 @@ FEWEST = 10  # pairs of calibrations that a usual change is known from
 FOREIGN_P = 1e-9  # probability of a distance at which a calibration counts as not of its unit
 ALIKE_P = 1e-3  # … and above which another unit's earlier calibration fits it
 TELLING = 5.0  # spread between units over change of one unit, below which a parameter does not distinguish units
-
-
 _SHORTEST = 1.0 / 365.25  # years; what is closer is one occasion
 
 

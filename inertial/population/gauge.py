@@ -71,7 +71,10 @@ def gauge_study(values: Array) -> Gauge:
     ss_error = np.sum((values - cell[..., None]) ** 2)
     df_cross, df_error = (p - 1) * (o - 1), p * o * (r - 1)
     ms_error = ss_error / df_error
-    p_value = _p_value(ss_cross, df_cross, ms_error, df_error)
+    # of the interaction; there is none on one station
+    p_value = 1.0
+    if df_cross > 0 and ms_error > 0.0:
+        p_value = float(f_distribution.sf(ss_cross / df_cross / ms_error, df_cross, df_error))
     pooled = p_value > POOL_ABOVE
     if pooled:
         ms_error = (ss_error + ss_cross) / (df_error + df_cross)
@@ -121,11 +124,5 @@ def _intervals(
     gauge = station + interaction + drawn[3]
     total = gauge + part
     percent = 100.0 * np.sqrt(np.divide(gauge, total, out=np.zeros_like(total), where=total > 0.0))
-    ends = [np.quantile(one, [0.025, 0.975]) for one in (np.sqrt(gauge), percent)]
-    return (float(ends[0][0]), float(ends[0][1])), (float(ends[1][0]), float(ends[1][1]))
-
-
-def _p_value(ss_cross: float, df_cross: int, ms_error: float, df_error: int) -> float:
-    if df_cross == 0 or ms_error == 0.0:
-        return 1.0
-    return float(f_distribution.sf(ss_cross / df_cross / ms_error, df_cross, df_error))
+    (low, high), (least, most) = (np.quantile(one, [0.025, 0.975]).tolist() for one in (np.sqrt(gauge), percent))
+    return (low, high), (least, most)

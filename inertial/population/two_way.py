@@ -25,10 +25,9 @@ def unit_and_place(values: Array, units: Index, places: Index) -> tuple[Array, A
         unit = _medians(values - place[places], in_units)
         refined = _medians(values - unit[units], in_places)
         refined -= np.median(refined)
-        if np.max(np.abs(refined - place)) < SETTLED * (np.ptp(values) + 1e-300):
-            place = refined
+        moved, place = np.max(np.abs(refined - place)), refined
+        if moved < SETTLED * (np.ptp(values) + 1e-300):
             break
-        place = refined
     return unit, place
 
 

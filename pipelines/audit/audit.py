@@ -1,12 +1,10 @@
 """The audit of an archive, from the index to the results behind the findings."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
 
-from inertial.arrays import Flags
+from inertial.arrays import Flags, Index
 from pipelines.archive import Archive
 from pipelines.audit.calibrations import Calibrations, captures_of, dated_runs, day_of, first_runs, left_out, load
 from pipelines.audit.drifts import KindDrift, kind_drifts
@@ -14,17 +12,7 @@ from pipelines.audit.due import Certificates, Due, certificates_of, due, last_me
 from pipelines.audit.exchanged_serials import Stranger, strangers
 from pipelines.audit.gauge_mounts import Study, studies
 from pipelines.audit.index import up_to_date
-from pipelines.audit.population import (
-    Ability,
-    Difference,
-    Figures,
-    Odd,
-    Share,
-    abilities,
-    figures_of,
-    odd_ones,
-    yields,
-)
+from pipelines.audit.population import Ability, Difference, Figures, Odd, Share, abilities, figures_of, odd_ones, yields
 from pipelines.audit.rules import Rules
 from pipelines.audit.stations_over_time import ControlChart, StationSeries, charts, slot_series, station_series
 from pipelines.audit.unit_drifts import UnitDrift, unit_drifts
@@ -97,6 +85,17 @@ class Audit:
     odd: tuple[Odd, ...]
     studies: tuple[Study, ...]
 
+    @property
+    def overdue(self) -> Index:
+        """Units that are overdue, as indices into ``due``."""
+        return np.flatnonzero(self.due.day < self.scope.until)
+
+    @property
+    def coming_due(self) -> Index:
+        """Units that come due within the days of notice, as indices into ``due``."""
+        until = self.scope.until
+        return np.flatnonzero((self.due.day >= until) & (self.due.day < until + self.rules.notice_days))
+
 
 def audit(
     archive: Archive, rules: Rules, scope: Scope, *, distribute: Distributor | None = None, workers: int = 1
@@ -124,8 +123,7 @@ def audit(
     ledger = certificates_of(archive.root, scope.until, captures_of(every_run))
     kinds = kind_drifts(calibrations, good & inside, rules, scope.since)
     units = unit_drifts(calibrations, good & inside, kinds, rules, _limits(calibrations, figures))
-    station = index.table("station").to_pandas()
-    station["run"] = station["run"].astype(str)
+    station = index.table("station").to_pandas().astype({"run": str})
     if scope.station:
         runs = runs[runs["station"] == scope.station]
     slots, means = slot_series(calibrations, good & product & _at(calibrations, scope))

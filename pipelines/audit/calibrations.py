@@ -113,17 +113,11 @@ def captures_of(runs: pd.DataFrame) -> dict[str, str]:
 
 def load(index: AuditIndex, runs: pd.DataFrame) -> Calibrations:
     """The calibrations of some runs."""
-    units = index.table("units").to_pandas()
-    values = index.table("parameters").to_pandas()
-    for frame in (units, values):
-        frame["run"] = frame["run"].astype(str)
+    units, values = (index.table(name).to_pandas().astype({"run": str}) for name in ("units", "parameters"))
     frame = values.merge(runs, on="run").merge(units.astype({"unit": str}), on=["run", "unit"], how="left")
     frame = frame.sort_values(["unit", "device", "day", "run"], ignore_index=True, kind="stable")
     loaded = Calibrations(
-        run=frame["run"].to_numpy(object),
-        unit=frame["unit"].astype(str).to_numpy(object),
-        device=frame["device"].astype(str).to_numpy(object),
-        station=frame["station"].astype(str).to_numpy(object),
+        **{name: frame[name].astype(str).to_numpy(object) for name in ("run", "unit", "device", "station")},
         slot=frame["slot"].fillna(-1).to_numpy(np.int64),
         outcome=frame["outcome"].astype(object).fillna("").to_numpy(object),
         day=frame["day"].to_numpy(float),

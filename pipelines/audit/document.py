@@ -1,18 +1,17 @@
 """The audit as one JSON document."""
 
-from __future__ import annotations
-
 from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
+from inertial.arrays import Index
 from inertial.population.control_charts import RULES
 from pipelines.audit.audit import Audit
 from pipelines.audit.calibrations import date_of
 from pipelines.audit.documents import AuditDocument, AuditFindingDocument, DueDocument, DueUnit
 from pipelines.audit.due import uncertified
-from pipelines.audit.finding import WHO, AuditFinding
+from pipelines.audit.finding import WHO, AuditFinding, date_or
 from pipelines.audit.parameters import unit_text
 from pipelines.audit.stations_over_time import ControlChart, StationSeries
 from pipelines.audit.unit_drifts import UnitDrift
@@ -50,14 +49,9 @@ def document(audit: Audit, listed: list[AuditFinding], archive: str) -> AuditDoc
 
 def _finding(finding: AuditFinding) -> AuditFindingDocument:
     return {
-        "who": finding.who,
-        "kind": finding.kind,
-        "subject": finding.subject,
-        "message": finding.message,
-        "units": list(finding.units),
-        "evidence": finding.evidence,
-        "whose": WHO[finding.who],
-    }
+        "who": finding.who, "kind": finding.kind, "subject": finding.subject, "message": finding.message,
+        "units": list(finding.units), "evidence": finding.evidence, "whose": WHO[finding.who],
+    }  # fmt: skip
 
 
 def counts(audit: Audit) -> dict[str, int]:
@@ -81,17 +75,10 @@ def furthest(audit: Audit, most: int) -> list[UnitDrift]:
     return sorted(recent, key=lambda d: (-np.nan_to_num(abs(d.e_n)), d.unit))[:most]
 
 
-def date_or_none(day: float) -> str | None:
-    """A date; None for never."""
-    return date_of(day) if np.isfinite(day) else None
-
-
 def _due(audit: Audit) -> DueDocument:
-    own, until = audit.due, audit.scope.until
-    late = np.flatnonzero(own.day < until)
-    soon = np.flatnonzero((own.day >= until) & (own.day < until + audit.rules.notice_days))
+    own = audit.due
 
-    def listed(which: Any) -> list[DueUnit]:
+    def listed(which: Index) -> list[DueUnit]:
         return [
             {
                 "unit": str(audit.all.unit[row]), "device": str(audit.all.device[row]),
@@ -106,8 +93,8 @@ def _due(audit: Audit) -> DueDocument:
         "interval": audit.rules.interval,
         "units": own.row.size,
         "valid": int(own.valid.sum()),
-        "overdue": listed(late),
-        "soon": listed(soon),
+        "overdue": listed(audit.overdue),
+        "soon": listed(audit.coming_due),
         "uncertified": listed(uncertified(audit.all, own, audit.certificates)),
     }
 
@@ -115,44 +102,27 @@ def _due(audit: Audit) -> DueDocument:
 def _kinds(audit: Audit) -> list[dict[str, Any]]:
     return [
         {
-            "device": kind.device,
-            "parameter": kind.parameter,
-            "unit_text": unit_text(kind.parameter),
-            "pairs": kind.kind.pairs,
-            "slope_mean_per_year": kind.kind.mean_slope,
-            "slope_sd_per_year": kind.kind.slope_sd,
-            "walk_sd_per_root_year": kind.kind.walk_sd,
-            "seating_sd": kind.kind.mount_sd,
-            "median_change": kind.median,
-            "share_beyond_uncertainty": kind.beyond,
-            "share_beyond_tolerance": kind.out,
-            "tolerance": kind.tolerance,
-            "reliable_months": kind.reliable_months,
+            "device": one.device, "parameter": one.parameter, "unit_text": unit_text(one.parameter), "pairs": one.kind.pairs,
+            "slope_mean_per_year": one.kind.mean_slope, "slope_sd_per_year": one.kind.slope_sd,
+            "walk_sd_per_root_year": one.kind.walk_sd, "seating_sd": one.kind.mount_sd, "median_change": one.median,
+            "share_beyond_uncertainty": one.beyond, "share_beyond_tolerance": one.out,
+            "tolerance": one.tolerance, "reliable_months": one.reliable_months,
         }
-        for kind in audit.kinds
-    ]
+        for one in audit.kinds
+    ]  # fmt: skip
 
 
 def _unit(drift: UnitDrift) -> dict[str, Any]:
     days = ("leaves", "soonest", "latest", "reliable_day")
     plain = {k: v for k, v in asdict(drift).items() if k not in {*days, "day", "limit_day"}}
-    dates = {name.removesuffix("_day"): date_or_none(getattr(drift, name)) for name in days}
-    leaves_limit = [date_or_none(day) for day in drift.limit_day]
-    return {
-        **plain,
-        "unit_text": unit_text(drift.parameter),
-        "date": date_of(drift.day),
-        **dates,
-        "leaves_limit": leaves_limit,
-    }
+    dates = {name.removesuffix("_day"): date_or(getattr(drift, name), None) for name in days}
+    about = {"unit_text": unit_text(drift.parameter), "date": date_of(drift.day)}
+    return {**plain, **about, **dates, "leaves_limit": [date_or(day, None) for day in drift.limit_day]}
 
 
 def _series(series: StationSeries) -> dict[str, Any]:
     return {
-        "station": series.station,
-        "where": series.where,
-        "parameter": series.parameter,
-        "unit_text": series.unit_text,
+        **{name: getattr(series, name) for name in ("station", "where", "parameter", "unit_text")},
         "n": int(series.value.size),
         "mean": float(np.mean(series.value)),
         "noise": series.noise,
@@ -185,12 +155,8 @@ def weekly(series: StationSeries) -> list[dict[str, Any]]:
 
 
 def _chart(chart: ControlChart) -> dict[str, Any]:
-    hit = np.flatnonzero(chart.rules.any(axis=0) | chart.outside)
     return {
-        "station": chart.station,
-        "standard": chart.standard,
-        "parameter": chart.parameter,
-        "unit_text": chart.unit_text,
+        **{name: getattr(chart, name) for name in ("station", "standard", "parameter", "unit_text")},
         "n": int(chart.value.size),
         "centre": chart.chart.centre,
         "sigma": chart.chart.sigma,
@@ -206,7 +172,7 @@ def _chart(chart: ControlChart) -> dict[str, Any]:
                 "rules": [RULES[r] for r in np.flatnonzero(chart.rules[:, k])],
                 "ewma": bool(chart.outside[k]),
             }
-            for k in hit
+            for k in np.flatnonzero(chart.hit)
         ],
     }
 

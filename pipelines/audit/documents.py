@@ -1,7 +1,5 @@
 """The JSON document of audit: keys that other programs read. Dates are ISO and UTC; null: never, or not known."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any, NotRequired
 
 from typing_extensions import TypedDict

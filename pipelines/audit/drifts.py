@@ -1,7 +1,5 @@
 """Drift since the last calibration: per kind of device and parameter, per unit, and the date when a unit leaves its tolerance."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -91,11 +89,8 @@ def _kind_drift(
     long = (calibrations.device[spans.later] == device) & np.isfinite(longer + longer_known)
     if chosen.sum() < FEWEST_PAIRS:
         return None
-    together = (
-        np.concatenate([change[chosen], longer[long]]),
-        np.concatenate([pairs.years[chosen], spans.years[long]]),
-        np.concatenate([known[chosen], longer_known[long]]),
-    )
+    both = ((change, longer), (pairs.years, spans.years), (known, longer_known))
+    together = tuple(np.concatenate([near[chosen], far[long]]) for near, far in both)
     kind, tolerance = kind_of(*together), rules.tolerance_of(device, FAMILY_OF[name])
     seating = seating_of(kind, *together, pairs=int(chosen.sum()))
     recent = chosen & (calibrations.day[pairs.later] >= since)

@@ -1,7 +1,5 @@
 """Units that are due for re-calibration, and when: the state of their certificates in the ledger, and the rules."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -64,14 +62,11 @@ class Certificates:
             return None
         entered = any(self._measured(one.run) == self._measured(run) for one in known)
         held = next((one for one in known if one.holds(self.day)), None)
-        if held is not None:
-            return CertificateState(held.certificate, "valid", day_of(held.until), entered)
-        last = known[-1]
-        if last.state == "revoked":
+        last = held or known[-1]
+        if held is None and last.state == "revoked":
             return CertificateState(last.certificate, "revoked", _end(last), entered)
-        return CertificateState(
-            last.certificate, "later" if last.start > self.day else "ended", day_of(last.until), entered
-        )
+        state = "valid" if held else "later" if last.start > self.day else "ended"
+        return CertificateState(last.certificate, state, day_of(last.until), entered)
 
     def _measured(self, run: str) -> str:
         """The capture of a run, or the run itself where it has none."""
@@ -90,8 +85,7 @@ def certificates_of(root: Place, until: float, captures: Mapping[str, str]) -> C
     histories = histories_of(root)
     of: dict[tuple[str, str], list[Calibration]] = {}
     for events in histories.units:
-        known = calibrations_of(event for event in events if event.when[:10] <= day)
-        for one in known:
+        for one in calibrations_of(event for event in events if event.when[:10] <= day):
             of.setdefault((one.event.device.upper(), one.serial), []).append(one)
     return Certificates(day, of, captures, histories.problems)
 
@@ -143,16 +137,9 @@ def due(
     months = np.array([fixed[str(device)] for device in calibrations.device[last]])
     because = np.full(last.size, "fixed", dtype=object)
     if rules.interval == "drift":
-        months, because = _by_drift(calibrations, last, months, rules, kinds, units)
-    due_units = Due(
-        last,
-        _months_after(calibrations.day[last], months),
-        months,
-        because,
-        np.full(last.size, "", dtype=object),
-        np.zeros(last.size, dtype=bool),
-        np.zeros(last.size, dtype=bool),
-    )
+        _by_drift(calibrations, last, (months, because), rules, kinds, units)
+    day, no_certificate = _months_after(calibrations.day[last], months), np.full(last.size, "", dtype=object)
+    due_units = Due(last, day, months, because, no_certificate, *np.zeros((2, last.size), dtype=bool))
     if certificates is not None:
         _by_certificate(calibrations, due_units, certificates)
     # imported results have no decision; they count
@@ -196,24 +183,24 @@ def _by_certificate(calibrations: Calibrations, due_units: Due, certificates: Ce
 def _by_drift(
     calibrations: Calibrations,
     last: Index,
-    fixed: Array,
+    interval: tuple[Array, Texts],
     rules: Rules,
     kinds: list[KindDrift],
     units: Mapping[str, list[UnitDrift]],
-) -> tuple[Array, Texts]:
+) -> None:
+    """Replace months and reason of every unit by those of its forecast, where there is one."""
+    months, because = interval
     of_kind: dict[str, float] = {}
     for kind in kinds:
         if np.isfinite(kind.reliable_months):
             of_kind[kind.device] = min(of_kind.get(kind.device, np.inf), kind.reliable_months)
-    months, because = fixed.copy(), np.full(last.size, "fixed", dtype=object)
     for k, row in enumerate(last):
         device = str(calibrations.device[row])
         own = [(d.reliable_day - d.day) / MONTH_D for d in units.get(f"{device} {calibrations.unit[row]}", ())]
-        due_units = min(own) if own else of_kind.get(device, np.nan)
-        if np.isfinite(due_units):
-            months[k] = np.clip(np.floor(due_units), rules.shortest_months, rules.longest_months)
+        reliable = min(own, default=of_kind.get(device, np.nan))
+        if np.isfinite(reliable):
+            months[k] = np.clip(np.floor(reliable), rules.shortest_months, rules.longest_months)
             because[k] = "drift"
-    return months, because
 
 
 def _months_after(day: Array, months: Array) -> Array:

@@ -1,7 +1,5 @@
 """Exchanged serials: calibrations that do not fit the history of their unit, and the unit whose history they fit."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -123,10 +121,9 @@ def _fits(k: int, values: Array, foreign: Flags, histories: Index, days: Array, 
         return -1, -1
     years = (days[k] - days[candidates]) / YEAR_D
     best, least = nearest(values[k], values[candidates], scale, years)
+    place, unit = int(candidates[best]), int(histories[candidates[best]])
     fitting = histories[candidates[distance(values[k], values[candidates], scale, years) <= foreign_above(scale)]]
-    if not least <= alike_below(scale) or np.any(fitting != histories[candidates[best]]):
-        return -1, -1
-    return int(candidates[best]), int(histories[candidates[best]])
+    return (place, unit) if least <= alike_below(scale) and np.all(fitting == unit) else (-1, -1)
 
 
 def _exchanged(
@@ -175,7 +172,6 @@ def exchanged_pairs(
 def _within(calibrations: Calibrations, row: int, past: int, bound: Array) -> bool:
     change = np.abs(calibrations.values[row] - calibrations.values[past])
     expanded = COVERAGE * np.hypot(calibrations.errors[row], calibrations.errors[past])
-    known = np.isfinite(change) & np.isfinite(
-        bound
-    )  # parameters outside the model are NaN and are ignored; without any parameter nothing fits
+    # parameters outside the model are NaN and are ignored; without any parameter nothing fits
+    known = np.isfinite(change) & np.isfinite(bound)
     return bool(known.any() and np.all(change[known] <= (bound + expanded)[known]))

@@ -1,9 +1,7 @@
 """A finding: one fact that needs an action."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -17,6 +15,7 @@ WHO = {  # in the order of the report
     "archive": "archive: administration",
 }
 MORE = 20  # units listed in a sentence
+Never = TypeVar("Never", str, None)
 
 
 @dataclass(frozen=True)
@@ -35,9 +34,14 @@ class AuditFinding:
     evidence: dict[str, Any] = field(default_factory=dict[str, Any])
 
 
-def date_or_never(day: float, never: str = "never") -> str:
+def date_or(day: float, never: Never) -> str | Never:
     """A date; ``never`` for infinity."""
     return date_of(day) if np.isfinite(day) else never
+
+
+def date_or_never(day: float) -> str:
+    """A date, or "never"."""
+    return date_or(day, "never")
 
 
 def some(units: tuple[str, ...]) -> str:

@@ -1,24 +1,44 @@
-"""All findings, sorted by who must act."""
+"""All findings, sorted by who must act; here those about certificates, due units, the population and the archive."""
 
-from __future__ import annotations
+from collections.abc import Iterator
 
+import numpy as np
+
+from inertial.arrays import Index
+from inertial.counts import number_of
+from inertial.uncertainty.rounding import equal
 from pipelines.audit.audit import Audit
 from pipelines.audit.calibrations import date_of
-from pipelines.audit.due_findings import of_certificates, of_what_is_due
-from pipelines.audit.finding import WHO, AuditFinding
-from pipelines.audit.population_findings import of_population
+from pipelines.audit.due import uncertified
+from pipelines.audit.finding import WHO, AuditFinding, some
+from pipelines.audit.parameters import unit_text
 from pipelines.audit.station_findings import of_stations
 from pipelines.audit.unit_findings import of_units
+from pipelines.report.numbers import significant
+
+TELLING_EFFECT = 0.02  # smaller shares of the variance between groups are not relevant
+DIFFERENT_P = 1e-3
+REASONS = {  # reasons in a sentence about overdue units
+    "certificate": "their certificate has ended",
+    "fixed": "their interval is over",
+    "drift": "they drift",
+    "revoked": "their certificate was revoked",
+    "did not pass": "they did not pass",
+}
 
 
 def findings(audit: Audit) -> list[AuditFinding]:
     """All findings: quality first; for each role the most serious kind first."""
     collected = [
         *of_units(audit),
-        *of_certificates(audit),
+        *_held_but_failed(audit),
+        *_uncertified(audit),
         *of_stations(audit),
-        *of_what_is_due(audit),
-        *of_population(audit),
+        *_overdue(audit),
+        *_coming_due(audit),
+        *_odd(audit),
+        *_incapable(audit),
+        *_different(audit),
         *(_unreadable(run, text) for run, text in audit.problems),
         *(_later(run, day) for run, day in audit.later),
         *(_broken(folder, text) for folder, text in audit.certificates.problems.items()),
@@ -42,3 +62,105 @@ def _later(run: str, day: float) -> AuditFinding:
 
 def _broken(folder: str, text: str) -> AuditFinding:
     return AuditFinding("archive", "ledger", folder, f"the certificates of one unit were left out: {folder} {text}")
+
+
+def _held_but_failed(audit: Audit) -> Iterator[AuditFinding]:
+    """Units that failed their last measurement and have a valid certificate, by kind of device."""
+    own = audit.due
+    for device, chosen in _by_device(audit, np.flatnonzero(own.valid & (own.because == "did not pass"))):
+        units, certificates = _units(audit, chosen), tuple(str(one) for one in own.certificate[chosen])
+        message = (
+            f"{device}: {number_of(len(units), 'unit')} with a valid certificate did not pass the last measurement; "
+            "revoke each certificate from the first doubtful day, and measure the unit again "
+            f"({some(certificates)})"
+        )
+        runs = [str(run) for run in audit.all.run[own.row[chosen]]]
+        evidence = {"certificates": list(certificates), "runs": runs}
+        yield AuditFinding("quality", "held_but_failed", device, message, units, evidence)
+
+
+def _uncertified(audit: Audit) -> Iterator[AuditFinding]:
+    """Units that passed without a certificate for it, by kind of device; none in an archive without a ledger."""
+    for device, own in _by_device(audit, uncertified(audit.all, audit.due, audit.certificates)):
+        units = _units(audit, own)
+        without = int(np.count_nonzero(~audit.due.valid[own]))
+        message = (
+            f"{device}: {number_of(len(units), 'unit')} passed the last measurement without a certificate for it, {without} "
+            f"without any valid certificate; certify their runs, or record the reason ({some(units)})"
+        )
+        runs = sorted({str(run) for run in audit.all.run[audit.due.row[own]]})
+        yield AuditFinding("quality", "uncertified", device, message, units, {"without": without, "runs": runs})
+
+
+def _overdue(audit: Audit) -> Iterator[AuditFinding]:
+    for device, own in _by_device(audit, audit.overdue):
+        units, oldest = _units(audit, own), date_of(float(audit.due.day[own].min()))
+        all_counts = {why: int(np.count_nonzero(audit.due.because[own] == why)) for why in REASONS}
+        counts = {why: count for why, count in all_counts.items() if count}
+        because = ", ".join(f"{count} because {REASONS[why]}" for why, count in counts.items())
+        message = (
+            f"{device}: {number_of(len(units), 'unit')} overdue ({because}), the first since {oldest}; "
+            f"recall and calibrate ({some(units)})"
+        )
+        yield AuditFinding("line", "overdue", device, message, units, {"oldest": oldest, "because": counts})
+
+
+def _coming_due(audit: Audit) -> Iterator[AuditFinding]:
+    for device, own in _by_device(audit, audit.coming_due):
+        units = _units(audit, own)
+        message = (
+            f"{device}: {number_of(len(units), 'unit')} due within {audit.rules.notice_days} days; "
+            f"schedule the calibration ({some(units)})"
+        )
+        yield AuditFinding("line", "due", device, message, units)
+
+
+def _by_device(audit: Audit, chosen: Index) -> Iterator[tuple[str, Index]]:
+    """Indices into the due units, by kind of device."""
+    devices = audit.all.device[audit.due.row[chosen]].astype(str)
+    for device in np.unique(devices):
+        yield str(device), chosen[devices == device]
+
+
+def _units(audit: Audit, own: Index) -> tuple[str, ...]:
+    return tuple(str(unit) for unit in audit.all.unit[audit.due.row[own]])
+
+
+def _odd(audit: Audit) -> Iterator[AuditFinding]:
+    for odd in audit.odd:
+        what = f"lot of run {odd.run} ({number_of(odd.units, 'unit')})" if odd.kind == "lot" else f"unit {odd.name}"
+        text = unit_text(odd.parameter)
+        message = (
+            f"{odd.device}: {what} of {date_of(odd.day)} is an outlier in {odd.parameter}: {significant(odd.value, 4)} {text}, "
+            f"{odd.z:+.1f} σ from its kind; look for a change in its production"
+        )
+        evidence = {"run": odd.run, "station": odd.station, "parameter": odd.parameter, "value": odd.value, "z": odd.z}
+        yield AuditFinding(
+            "product", f"odd_{odd.kind}", odd.name, message, (odd.name,) if odd.kind == "unit" else (), evidence
+        )
+
+
+def _incapable(audit: Audit) -> Iterator[AuditFinding]:
+    for able in audit.abilities:
+        if able.ppk.low < audit.rules.ppk_least:
+            limit = f"{able.limit:g}" if able.unit_text == "1" else f"{able.limit:g} {able.unit_text}"
+            message = (
+                f"{able.device}: {able.figure} has Ppk {able.ppk.value:.2f} ({able.ppk.low:.2f} to {able.ppk.high:.2f}) "
+                f"against {limit}, at least {audit.rules.ppk_least:g} is needed; "
+                f"{100 * able.outside.value:.2g} % are outside: reduce the spread, or widen the limit"
+            )
+            interval = {"ppk": able.ppk.value, "low": able.ppk.low, "high": able.ppk.high}
+            evidence = {"figure": able.figure, **interval, "n": able.n}
+            yield AuditFinding("product", "capability", able.device, message, (), evidence)
+
+
+def _different(audit: Audit) -> Iterator[AuditFinding]:
+    for one in audit.differences:
+        if one.by != "lot" and one.p < DIFFERENT_P and one.comparison.effect > TELLING_EFFECT:
+            message = (
+                f"{one.device}: {one.figure} differs between {one.by}s: {100 * one.comparison.effect:.0f} % of its variance, "
+                f"p {equal(one.p)} over {one.comparison.groups} {one.by}s; find out which, and why"
+            )
+            who = "station" if one.by in {"station", "slot"} else "product"
+            evidence = {"figure": one.figure, "by": one.by, "share": one.comparison.effect, "p_value": one.p}
+            yield AuditFinding(who, f"differs_by_{one.by}", one.device, message, (), evidence)

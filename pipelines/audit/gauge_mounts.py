@@ -1,7 +1,5 @@
 """Gauge studies in the archive: the same units seated repeatedly within days, on one or several stations."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

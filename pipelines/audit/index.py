@@ -5,8 +5,6 @@ may be deleted at any time, and is updated before every use: a part whose runs h
 runs make new parts.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os
@@ -141,8 +139,7 @@ def _refreshed(archive: Archive, place: Place, distribute: Distributor | None, w
     stamps, version = stamps_of(archive.root), version_of_rows()
     parts = _believed(part_folders(place), version)
     remove_parts(place, [part for part, runs in parts.items() if not runs])  # a new part may have its name
-    good = {part: runs for part, runs in parts.items() if runs and runs.items() <= stamps.items()}
-    good = _without_doubles(good)
+    good = _without_doubles({part: runs for part, runs in parts.items() if runs and runs.items() <= stamps.items()})
     small = [part for part, runs in good.items() if len(runs) < RUNS_PER_PART // 2]
     if len(small) > MOST_SMALL:
         good = {part: runs for part, runs in good.items() if part not in small}
@@ -152,9 +149,8 @@ def _refreshed(archive: Archive, place: Place, distribute: Distributor | None, w
     root = address_of(archive.root)
     own = "" if place == archive.root / FOLDER else str(place)
     portions = [Portion(root, own, tuple((r, stamps[r]) for r in chunk), version) for chunk in chunks]
-    new = [
-        place / name for name in map_partitions(make_part, portions, distribute, workers=workers, name="audit index")
-    ]
+    names = map_partitions(make_part, portions, distribute, workers=workers, name="audit index")
+    new = [place / name for name in names]
     remove_parts(place, set(parts) - set(good) - set(new))
     return AuditIndex(tuple(sorted([*good, *new], key=str)), len(missing), len(there))
 
@@ -269,9 +265,8 @@ def check_index(archive: Archive, checked: VerifiedPart) -> None:
         if standing_of(part) == derived.EDITED:
             checked.wrong(CHANGED, part, f"was edited since it was made: {REMEDY}")
         elif runs:
-            _check_rows(
-                archive, part, [(run, stamp) for run, stamp in runs.items() if stamps.get(run) == stamp], checked
-            )
+            unchanged = [(run, stamp) for run, stamp in runs.items() if stamps.get(run) == stamp]
+            _check_rows(archive, part, unchanged, checked)
 
 
 def _check_rows(archive: Archive, part: Place, runs: list[tuple[str, str]], checked: VerifiedPart) -> None:

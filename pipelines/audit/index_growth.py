@@ -3,8 +3,6 @@
 Each addition is a small part; when there are many they are made anew as one. Whatever is missing is added by the next audit.
 """
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Sequence
 from pathlib import Path
@@ -14,17 +12,8 @@ import pyarrow.parquet as pq
 from pipelines.archive import Archive
 from pipelines.archive.locks import alone
 from pipelines.archive.store import Place, address_of, first_line
-from pipelines.audit.index import (
-    FOLDER,
-    MOST_SMALL,
-    RUNS_PER_PART,
-    Portion,
-    make_part,
-    part_folders,
-    remove_parts,
-    runs_of,
-    version_of_rows,
-)
+from pipelines.audit import index
+from pipelines.audit.index import FOLDER, MOST_SMALL, RUNS_PER_PART, Portion
 from pipelines.audit.run_files import stamps_among
 from schemas.errors import TumblelineError
 
@@ -46,16 +35,15 @@ def add_runs(archive: Archive, runs: Sequence[str]) -> int:
 
 
 def _added(archive: Archive, root: Path, runs: Sequence[str]) -> int:
-    place, version = root / FOLDER, version_of_rows()
+    place, version = root / FOLDER, index.version_of_rows()
     with alone(place, wait=True):
-        small = [part for part in part_folders(place) if _rows(part) < RUNS_PER_PART // 2]
+        small = [part for part in index.part_folders(place) if _rows(part) < RUNS_PER_PART // 2]
         merged = small if len(small) >= MOST_SMALL else []
-        before = {run for part in merged for run in runs_of(part, version)}
-        portion = Portion(
-            address_of(archive.root), "", tuple(stamps_among(root, sorted({*before, *runs})).items()), version
-        )
-        new = make_part(portion)
-        remove_parts(place, [part for part in merged if part.name != new])
+        before = {run for part in merged for run in index.runs_of(part, version)}
+        stamps = stamps_among(root, sorted({*before, *runs}))
+        portion = Portion(address_of(archive.root), "", tuple(stamps.items()), version)
+        new = index.make_part(portion)
+        index.remove_parts(place, [part for part in merged if part.name != new])
     return len(portion.runs)
 
 

@@ -1,18 +1,14 @@
 """The audit as one page that needs no network."""
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Any
-
-import numpy as np
 
 from inertial.uncertainty.rounding import chance
 from pipelines.audit import pictures as drawn
 from pipelines.audit.audit import Audit
 from pipelines.audit.calibrations import date_of
 from pipelines.audit.document import counts, furthest
-from pipelines.audit.finding import WHO, AuditFinding, date_or_never
+from pipelines.audit.finding import WHO, AuditFinding, date_or
 from pipelines.audit.parameters import unit_text
 from pipelines.audit.stations_over_time import StationSeries
 from pipelines.audit.unit_drifts import UnitDrift
@@ -37,7 +33,7 @@ def render(audit: Audit, listed: list[AuditFinding], archive: str) -> str:
         groups=_groups(listed),
         total=len(listed),
         passed=next((share for share in audit.yields if share.of == "all"), None),
-        overdue=int(np.count_nonzero(audit.due.day < audit.scope.until)),
+        overdue=audit.overdue.size,
         valid=int(audit.due.valid.sum()),
         rules=audit.rules,
         series_svg="".join(svg_text(drawn.series_chart(one)) for one in series),
@@ -59,7 +55,7 @@ def render(audit: Audit, listed: list[AuditFinding], archive: str) -> str:
         number=significant,
         signed=_signed,
         chance=chance,
-        date=partial(date_or_never, never="–"),
+        date=partial(date_or, never="–"),
         percent=lambda share: f"{significant(100.0 * share)} %",
         whole=lambda count: f"{count:,}".replace(",", THIN),
     )
@@ -91,8 +87,8 @@ def _telling_series(audit: Audit) -> list[StationSeries]:
     moved = [one for one in (*audit.stations, *audit.slots) if one.changes]
     events: list[tuple[str, bool, float]] = []
     kept: list[StationSeries] = []
-    for one in sorted(moved, key=lambda s: -max(abs(c.shift) / c.error for c in s.changes)):
-        plainest = max(one.changes, key=lambda c: abs(c.shift) / c.error)
+    for one in sorted(moved, key=lambda s: -max(c.significance for c in s.changes)):
+        plainest = max(one.changes, key=lambda c: c.significance)
         event = (one.station, one.where.startswith("slot"), float(one.day[plainest.first]))
         if not any(event[:2] == known[:2] and abs(event[2] - known[2]) < SAME_EVENT_D for known in events):
             events.append(event)

@@ -23,6 +23,10 @@ class Pairs:
     earlier: Index
     years: Array
 
+    def chosen(self, which: Flags | Index) -> Pairs:
+        """The chosen pairs, in their order."""
+        return Pairs(self.later[which], self.earlier[which], self.years[which])
+
 
 def pairs_of(calibrations: Calibrations, good: Flags) -> Pairs:
     """Every good calibration with the previous good one of the same unit."""

@@ -5,8 +5,6 @@ rotation of the whole sensor to its seat (``rotation``). A new seating changes t
 first (Geist 2017, NIST J. Res. 122.032: intrinsic parameters).
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 

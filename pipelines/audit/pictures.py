@@ -1,7 +1,5 @@
 """Charts of the audit: yield, calibrations due, control charts, quantities of stations and units over time."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
@@ -62,7 +60,6 @@ def due_chart(audit: Audit) -> Chart:
 
 def control_chart(one: ControlChart) -> Chart:
     """A control chart: values within 1, 2 and 3 σ, the moving average, and the signals."""
-    hit = one.rules.any(axis=0) | one.outside
     centre, sigma = one.chart.centre, one.chart.sigma
     traces = [
         between(one.day, centre - width * sigma, centre + width * sigma, f"± {width} σ", legend=False)
@@ -70,7 +67,7 @@ def control_chart(one: ControlChart) -> Chart:
     ]
     traces.append(Trace("moving average", one.day, one.average, "line", "before"))
     texts = np.array([f"{run}: {value:.5g}" for run, value in zip(one.run, one.value, strict=True)], dtype=object)
-    for rows, (name, role, symbol, size) in zip((~hit, hit), SIGNALS, strict=True):
+    for rows, (name, role, symbol, size) in zip((~one.hit, one.hit), SIGNALS, strict=True):
         told = tuple(texts[rows])
         traces.append(Trace(name, one.day[rows], one.value[rows], "points", role, symbol, size, texts=told))
     alarms = f"{number_of(one.alarms, 'alarm')}, {one.expected:.1f} expected by chance"

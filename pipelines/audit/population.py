@@ -1,7 +1,5 @@
 """The population: yield, capability, differences between stations, slots and lots, and outliers."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -119,8 +117,7 @@ def abilities(calibrations: Calibrations, figures: Figures) -> tuple[list[Abilit
     figures = _first_of_each(calibrations, figures)
     device, lot = calibrations.device[figures.row].astype(str), codes(calibrations.run[figures.row])
     groups = {"station": codes(calibrations.station[figures.row]), "slot": calibrations.slot[figures.row], "lot": lot}
-    able: list[Ability] = []
-    differences: list[Difference] = []
+    able, differences = list[Ability](), list[Difference]()
     for kind in np.unique(device):
         for name in np.unique(figures.figure[device == kind].astype(str)):
             own = np.flatnonzero((device == kind) & (figures.figure == name) & np.isfinite(figures.value))
@@ -207,15 +204,12 @@ def odd_ones(calibrations: Calibrations, chosen: Flags) -> list[Odd]:
 
 def _odd_units(calibrations: Calibrations, device: str, rows: Index, values: Array, odd_lots: set[str]) -> list[Odd]:
     z = np.nan_to_num(robust_z(values))
-    outliers: list[Odd] = []
-    for k, column in _outliers(z):
-        row = rows[k]
-        if str(calibrations.run[row]) not in odd_lots:
-            outliers.append(
-                Odd("unit", str(calibrations.unit[row]), device, str(calibrations.station[row]), str(calibrations.run[row]),
-                    float(calibrations.day[row]), OWN[column], float(values[k, column]), float(z[k, column]), 1)
-            )  # fmt: skip
-    return outliers
+    return [
+        Odd("unit", str(calibrations.unit[row]), device, str(calibrations.station[row]), str(calibrations.run[row]),
+            float(calibrations.day[row]), OWN[column], float(values[k, column]), float(z[k, column]), 1)
+        for k, column in _outliers(z)
+        if str(calibrations.run[row := rows[k]]) not in odd_lots
+    ]  # fmt: skip
 
 
 def _outliers(z: Array) -> list[tuple[int, int]]:

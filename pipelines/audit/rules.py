@@ -8,7 +8,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, FiniteFloat, ValidationError, field_validator, model_validator
+from pydantic import AfterValidator, Field, FiniteFloat, ValidationError, model_validator
 
 from pipelines.audit.parameters import FAMILIES
 from schemas.errors import did_you_mean
@@ -26,16 +26,26 @@ class Tolerance(Strict):
     unit: str
 
 
+def _checked(tolerances: dict[str, Tolerance]) -> dict[str, Tolerance]:
+    for name, tolerance in tolerances.items():
+        if name not in FAMILIES or not FAMILIES[name].own:
+            own = [family for family, content in FAMILIES.items() if content.own]
+            raise ValueError(f"unknown parameter '{name}'; {did_you_mean(name, own)}")
+        if tolerance.unit != FAMILIES[name].unit:
+            raise ValueError(
+                f"tolerance.{name}: found {tolerance.unit}, the parameter is in {FAMILIES[name].unit}; give it in that"
+            )
+    return tolerances
+
+
+Tolerances = Annotated[dict[str, Tolerance], AfterValidator(_checked)]
+
+
 class DeviceRules(Strict):
     """Rules for one kind of device."""
 
     interval_months: Months | None = None
-    tolerance: dict[str, Tolerance] = Field(default_factory=dict[str, Tolerance])
-
-    @field_validator("tolerance")
-    @classmethod
-    def _known(cls, value: dict[str, Tolerance]) -> dict[str, Tolerance]:
-        return _checked(value)
+    tolerance: Tolerances = Field(default_factory=dict[str, Tolerance])
 
 
 class Rules(Strict):
@@ -52,13 +62,8 @@ class Rules(Strict):
     gauge_days: Positive
     ppk_least: Positive
     gauge_most_percent: Positive
-    tolerance: dict[str, Tolerance]
+    tolerance: Tolerances
     device: dict[str, DeviceRules] = Field(default_factory=dict[str, DeviceRules])
-
-    @field_validator("tolerance")
-    @classmethod
-    def _known(cls, value: dict[str, Tolerance]) -> dict[str, Tolerance]:
-        return _checked(value)
 
     @model_validator(mode="after")
     def _ordered(self) -> Rules:
@@ -105,15 +110,3 @@ def _over(content: dict[str, Any], own: dict[str, Any]) -> dict[str, Any]:
         both = isinstance(value, dict) and isinstance(out.get(key), dict) and set(value) != {"max", "unit"}
         out[key] = _over(out[key], value) if both else value
     return out
-
-
-def _checked(tolerances: dict[str, Tolerance]) -> dict[str, Tolerance]:
-    for name, tolerance in tolerances.items():
-        if name not in FAMILIES or not FAMILIES[name].own:
-            own = [family for family, content in FAMILIES.items() if content.own]
-            raise ValueError(f"unknown parameter '{name}'; {did_you_mean(name, own)}")
-        if tolerance.unit != FAMILIES[name].unit:
-            raise ValueError(
-                f"tolerance.{name}: found {tolerance.unit}, the parameter is in {FAMILIES[name].unit}; give it in that"
-            )
-    return tolerances

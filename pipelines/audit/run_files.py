@@ -3,8 +3,6 @@
 An uncached disk serves many requests in the time of one, so files are checked and read by several threads.
 """
 
-from __future__ import annotations
-
 import hashlib
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence

@@ -3,8 +3,6 @@
 Files are read run by run, then all runs of a part are processed together, because a call costs more than the rows of a run.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections.abc import Iterable, Mapping, Sequence

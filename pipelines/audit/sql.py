@@ -26,9 +26,8 @@ from schemas.library import library
 if TYPE_CHECKING:
     import duckdb
 
-SHUT_IN: dict[
-    str, str | bool | int | float | list[str]
-] = {  # no access to files, network, extensions or Python variables
+# no access to files, network, extensions or Python variables
+SHUT_IN: dict[str, str | bool | int | float | list[str]] = {
     "enable_external_access": False,
     "autoinstall_known_extensions": False,
     "autoload_known_extensions": False,

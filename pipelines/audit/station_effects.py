@@ -5,8 +5,6 @@ effect of the station is fitted alone to the mean residual, after both are proje
 the weights of the run's own fit have no influence.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple

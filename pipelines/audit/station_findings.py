@@ -1,7 +1,5 @@
 """Findings about stations: changes of level and slots, check standards out of control, gauge studies above the limit."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np
@@ -18,7 +16,10 @@ from pipelines.audit.stations_over_time import StationSeries
 def of_stations(audit: Audit) -> Iterator[AuditFinding]:
     """All findings about stations, the most serious kind first."""
     yield from _moved_stations(audit)
-    yield from _moved_slots(audit)
+    for series in audit.slots:
+        for change in series.changes:
+            if float(series.day[change.first]) >= audit.scope.since:
+                yield _moved(audit, series, change, "slot_moved")
     yield from _standards(audit)
     yield from _gauges(audit)
 
@@ -26,13 +27,13 @@ def of_stations(audit: Audit) -> Iterator[AuditFinding]:
 def _moved_stations(audit: Audit) -> Iterator[AuditFinding]:
     """Changes of a station's level, each reported once, by its most significant effect."""
     reported: list[tuple[str, float]] = []
-    changes = [(abs(c.shift) / c.error, series, c) for series in audit.stations for c in series.changes]
+    changes = [(c.significance, series, c) for series in audit.stations for c in series.changes]
     for _, series, change in sorted(changes, key=lambda item: -item[0]):
         first = float(series.day[change.first])
         near = any(station == series.station and abs(day - first) < _reach(series, change) for station, day in reported)
         reported.append((series.station, first))
         if not near and first >= audit.scope.since:
-            yield _moved(audit, series, change, "station_moved", f"{series.where} ({series.parameter})")
+            yield _moved(audit, series, change, "station_moved")
 
 
 def _reach(series: StationSeries, change: ChangePoint) -> float:
@@ -40,14 +41,7 @@ def _reach(series: StationSeries, change: ChangePoint) -> float:
     return 7.0 + float(series.day[min(change.high, series.day.size - 1)] - series.day[max(change.low - 1, 0)])
 
 
-def _moved_slots(audit: Audit) -> Iterator[AuditFinding]:
-    for series in audit.slots:
-        for change in series.changes:
-            if float(series.day[change.first]) >= audit.scope.since:
-                yield _moved(audit, series, change, "slot_moved", f"{series.where} ({series.parameter})")
-
-
-def _moved(audit: Audit, series: StationSeries, change: ChangePoint, kind: str, what: str) -> AuditFinding:
+def _moved(audit: Audit, series: StationSeries, change: ChangePoint, kind: str) -> AuditFinding:
     first, low = float(series.day[change.first]), float(series.day[max(change.low - 1, 0)])
     high = float(series.day[min(change.high, series.day.size - 1)])
     later = [c.first for c in series.changes if c.first > change.first]
@@ -60,9 +54,9 @@ def _moved(audit: Audit, series: StationSeries, change: ChangePoint, kind: str, 
     )
     until = f" until {date_of(end)}" if np.isfinite(end) else ""
     message = (
-        f"{series.station}: {what} moved by {change.shift:+.0f} ± {2 * change.error:.0f} {series.unit_text} on "
-        f"{date_of(first)} (between {date_of(low)} and {date_of(high)}, 95 %); {number_of(len(units), 'unit')} in "
-        f"{number_of(runs, 'run')} measured there since{until}: {remedy}"
+        f"{series.station}: {series.where} ({series.parameter}) moved by {change.shift:+.0f} ± {2 * change.error:.0f} "
+        f"{series.unit_text} on {date_of(first)} (between {date_of(low)} and {date_of(high)}, 95 %); "
+        f"{number_of(len(units), 'unit')} in {number_of(runs, 'run')} measured there since{until}: {remedy}"
     )
     evidence = {
         "station": series.station, "where": series.where, "parameter": series.parameter, "date": date_of(first),
@@ -74,19 +68,17 @@ def _moved(audit: Audit, series: StationSeries, change: ChangePoint, kind: str, 
 
 def _measured(audit: Audit, series: StationSeries, start: float, end: float) -> tuple[tuple[str, ...], int]:
     """Units measured on a series' station, or in its slot, after the last measurement before the change."""
-    calibrations = audit.all
-    rows = (
-        (calibrations.station == series.station) & (calibrations.day > start) & (calibrations.day < end) & audit.product
-    )
+    own = audit.all
+    rows = (own.station == series.station) & (own.day > start) & (own.day < end) & audit.product
     if series.where.startswith("slot "):
-        rows &= calibrations.slot == int(series.where.removeprefix("slot "))
-    return tuple(sorted({str(u) for u in calibrations.unit[rows]})), len({str(r) for r in calibrations.run[rows]})
+        rows &= own.slot == int(series.where.removeprefix("slot "))
+    return tuple(sorted({str(u) for u in own.unit[rows]})), len({str(r) for r in own.run[rows]})
 
 
 def _standards(audit: Audit) -> Iterator[AuditFinding]:
     for chart in audit.charts:
         if not chart.in_control:
-            first = int(np.argmax(chart.rules.any(axis=0) | chart.outside))
+            first = int(np.argmax(chart.hit))
             message = (
                 f"{chart.station}: check standard {chart.standard}, {chart.parameter}: "
                 f"{number_of(chart.alarms, 'alarm')} on the control chart "

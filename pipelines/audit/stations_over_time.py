@@ -1,7 +1,5 @@
 """The stations over time: their effects run by run, their slots, and their check standards."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -48,11 +46,10 @@ def station_series(station: pd.DataFrame, runs: pd.DataFrame) -> list[StationSer
     station : run, effect, name, value in µrad; runs : run, day, station
     """
     frame = station.merge(runs, on="run").sort_values(["day", "run"], kind="stable")
-    groups = [
-        (key, rows) for key, rows in frame.groupby(["station", "effect", "name"], observed=True) if len(rows) >= FEWEST
-    ]
+    by_effect = frame.groupby(["station", "effect", "name"], observed=True)
+    groups = [(key, rows) for key, rows in by_effect if len(rows) >= FEWEST]
     return [
-        _series((str(where), str(effect), str(name)), "µrad", rows["day"].to_numpy(), rows["value"].to_numpy(),
+        _series((str(where), str(effect), str(name)), rows["day"].to_numpy(), rows["value"].to_numpy(),
                 rows["run"].to_numpy(object), LEVEL / len(groups))
         for (where, effect, name), rows in groups
     ]  # fmt: skip
@@ -69,11 +66,8 @@ def slot_series(calibrations: Calibrations, good: Flags) -> tuple[list[StationSe
     if rows.size < FEWEST:
         return [], []
     units = codes(calibrations.histories[rows].astype(str))
-    seats = np.array(
-        [f"{s} slot {n}" for s, n in zip(calibrations.station[rows], calibrations.slot[rows], strict=True)],
-        dtype=object,
-    )
-    names, place = np.unique(seats.astype(str), return_inverse=True)
+    seats = [f"{s} slot {n}" for s, n in zip(calibrations.station[rows], calibrations.slot[rows], strict=True)]
+    names, place = np.unique(seats, return_inverse=True)
     out: list[StationSeries] = []
     means: dict[str, dict[str, object]] = {str(name): {"where": str(name)} for name in names}
     for turn in TURNS:
@@ -87,18 +81,14 @@ def slot_series(calibrations: Calibrations, good: Flags) -> tuple[list[StationSe
             if own.size >= FEWEST:
                 station, _, slot = str(name).rpartition(" slot ")
                 key = (station, f"slot {slot}", turn)
-                rest = left[place == number][order]
-                level = LEVEL / (names.size * len(TURNS))
-                out.append(
-                    _series(key, "µrad", calibrations.day[own][order], rest, calibrations.run[own][order], level)
-                )
+                rest, level = left[place == number][order], LEVEL / (names.size * len(TURNS))
+                out.append(_series(key, calibrations.day[own][order], rest, calibrations.run[own][order], level))
     return out, list(means.values())
 
 
-def _series(key: tuple[str, str, str], text: str, day: Array, value: Array, run: Texts, level: float) -> StationSeries:
-    station, where, parameter = key
+def _series(key: tuple[str, str, str], day: Array, value: Array, run: Texts, level: float) -> StationSeries:
     changes = change_points(np.asarray(value, dtype=float), level)
-    return StationSeries(station, where, parameter, text, day, value, run, noise_of(value), tuple(changes))
+    return StationSeries(*key, "µrad", day, value, run, noise_of(value), tuple(changes))
 
 
 @dataclass(frozen=True)
@@ -120,21 +110,24 @@ class ControlChart:
     chart: Baseline
     rules: Flags
     average: Array
-    half_width: Array
     outside: Flags
     alarms: int
     expected: float
     p_value: float
     in_control: bool
 
+    @property
+    def hit(self) -> Flags:
+        """Points with a signal of a rule or of the average, (n,)."""
+        return self.rules.any(axis=0) | self.outside
+
 
 def charts(calibrations: Calibrations, rules: Rules, since: float) -> list[ControlChart]:
     """The charts of all check standards; signals count from ``since`` on, and after the points that make the baseline."""
-    standard = np.array([rules.is_standard(unit) for unit in calibrations.unit], dtype=bool)
-    rows = np.flatnonzero(standard)
+    rows = np.flatnonzero([rules.is_standard(unit) for unit in calibrations.unit])
     keys = np.array([f"{calibrations.station[k]}\t{calibrations.unit[k]}" for k in rows], dtype=object)
     out: list[ControlChart] = []
-    for key in np.unique(keys.astype(str)) if rows.size else ():
+    for key in np.unique(keys.astype(str)):
         own = rows[keys == key]
         own = own[np.lexsort((calibrations.run[own].astype(str), calibrations.day[own]))]
         station, unit = str(key).split("\t")
@@ -142,8 +135,7 @@ def charts(calibrations: Calibrations, rules: Rules, since: float) -> list[Contr
             values = calibrations.column(name)[own]
             kept = np.isfinite(values)
             if kept.sum() > rules.baseline_points:
-                chosen = own[kept]
-                out.append(_chart(calibrations, chosen, (station, unit, name), values[kept], rules, since))
+                out.append(_chart(calibrations, own[kept], (station, unit, name), values[kept], rules, since))
     level = CHART_LEVEL / max(len(out), 1)
     return [replace(chart, in_control=chart.p_value >= level) for chart in out]
 
@@ -163,6 +155,6 @@ def _chart(
     number = alarms(by_rule, moving.outside, counted)
     chance = chance_of_alarms(values, rules.baseline_points, int(counted.sum()))
     return ControlChart(
-        *key, unit_text(key[2]), day, values, calibrations.run[own], chart, by_rule & counted, moving.average, moving.half_width,
+        *key, unit_text(key[2]), day, values, calibrations.run[own], chart, by_rule & counted, moving.average,
         moving.outside & counted, number, chance.mean, chance.p_value(number), in_control=True,
     )  # fmt: skip

@@ -1,7 +1,5 @@
 """Some tables of an index in the memory of this process, for queries that open no file and need no further library."""
 
-from __future__ import annotations
-
 import sqlite3
 import threading
 from collections.abc import Collection, Mapping
@@ -25,6 +23,10 @@ class QueryResult:
     columns: tuple[str, ...]
     rows: list[tuple[Any, ...]]
 
+    def documents(self) -> list[dict[str, Any]]:
+        """The rows by column name."""
+        return [dict(zip(self.columns, row, strict=True)) for row in self.rows]
+
 
 class TablesInMemory:
     """Tables for SQL queries in SQLite's dialect, read only. For many threads."""
@@ -32,9 +34,8 @@ class TablesInMemory:
     def __init__(self, tables: Mapping[str, pa.Table]) -> None:
         self._asking = threading.Lock()
         self._connection = sqlite3.connect(":memory:", check_same_thread=False)
-        self._connection.create_function(
-            "lower", 1, str.lower, deterministic=True
-        )  # its own leaves letters beyond ASCII
+        # its own leaves letters beyond ASCII
+        self._connection.create_function("lower", 1, str.lower, deterministic=True)
         for name, table in tables.items():
             columns = ", ".join(f'"{column}"' for column in table.column_names)
             places = ", ".join("?" * table.num_columns)

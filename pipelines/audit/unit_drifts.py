@@ -1,8 +1,6 @@
 """The last change of each parameter of every unit, and when the unit leaves tolerance and limit."""
 
-from __future__ import annotations
-
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -10,14 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial.arrays import Array, Flags, Index
-from inertial.population.drift import (
-    LatestState,
-    forecast,
-    in_tolerance,
-    last_reliable,
-    leaves,
-    standing,
-)
+from inertial.population.drift import LatestState, forecast, in_tolerance, last_reliable, leaves, standing
 from pipelines.audit.calibrations import Calibrations
 from pipelines.audit.drifts import AHEAD, KindDrift
 from pipelines.audit.pairs import YEAR_D, Pairs, changes_of, e_n_of, first_of_each, last_of_each, pairs_of
@@ -70,33 +61,19 @@ def unit_drifts(
     limits : of the product, by device and family, in the parameter's unit
     """
     pairs = pairs_of(calibrations, good)
-    last = last_of_each(calibrations.histories[pairs.later])
-    final = Pairs(pairs.later[last], pairs.earlier[last], pairs.years[last])
+    final = pairs.chosen(last_of_each(calibrations.histories[pairs.later]))
     out: dict[str, list[UnitDrift]] = {}
-    for device in dict.fromkeys(drift_of_kind.device for drift_of_kind in kinds):
-        own = np.flatnonzero(calibrations.device[final.later] == device)
-        rows = Pairs(final.later[own], final.earlier[own], final.years[own])
+    for device in dict.fromkeys(kind.device for kind in kinds):
+        own = [kind for kind in kinds if kind.device == device]
+        rows = final.chosen(np.flatnonzero(calibrations.device[final.later] == device))
         # of all parameters together, assumed independent
-        probability = np.ones((own.size, AHEAD.size), dtype=np.float32)
-        courses = [
-            _course(
-                calibrations,
-                good,
-                rows,
-                drift_of_kind,
-                limits.get((device, FAMILY_OF[drift_of_kind.parameter]), np.inf),
-                probability,
-            )
-            for drift_of_kind in kinds
-            if drift_of_kind.device == device
-        ]
-        bounded = any(np.isfinite(course.drift_of_kind.tolerance) for course in courses) and all(
-            c.drift_of_kind.known for c in courses
-        )
+        probability = np.ones((rows.later.size, AHEAD.size), dtype=np.float32)
+        courses = [_course(calibrations, good, rows, kind, limits, probability) for kind in own]
+        bounded = any(np.isfinite(kind.tolerance) for kind in own) and all(kind.known for kind in own)
         years = last_reliable(probability, rules.reliability_target, AHEAD) if bounded else np.inf
         until = calibrations.day[rows.later] + YEAR_D * years
-        for course in courses:
-            for drift in _unit_drifts(calibrations, rows, course, until):
+        for kind, course in zip(own, courses, strict=True):
+            for drift in _unit_drifts(calibrations, rows, kind, course, until):
                 out.setdefault(f"{drift.device} {drift.unit}", []).append(drift)
     return out
 
@@ -104,74 +81,70 @@ def unit_drifts(
 class _Course(NamedTuple):
     """Present state of the units of a kind in one parameter, (units,), and the days when they leave tolerance and limit."""
 
-    drift_of_kind: KindDrift
     now: LatestState
     counts: Index
-    times: tuple[Array, Array, Array]
+    times: Array
     limit: float
-    beyond: tuple[Array, Array, Array]
+    beyond: Array
 
 
 def _course(
     calibrations: Calibrations,
     good: Flags,
     rows: Pairs,
-    drift_of_kind: KindDrift,
-    limit: float,
+    kind: KindDrift,
+    limits: Mapping[tuple[str, str], float],
     probability: NDArray[np.float32],
 ) -> _Course:
     """The course after the last calibrations; ``probability`` (units, times) is multiplied by that of being in tolerance."""
-    padded = _padded(calibrations, good, rows, drift_of_kind.parameter)
-    now, counts = standing(*padded, drift_of_kind.ahead), np.isfinite(padded[0]).sum(axis=1)
-    mean, deviation = forecast(now, drift_of_kind.ahead, AHEAD, origin=now.last)
-    day = calibrations.day[rows.later]
-    if np.isfinite(drift_of_kind.tolerance):
+    padded = _padded(calibrations, good, rows, kind.parameter)
+    now, counts = standing(*padded, kind.ahead), np.isfinite(padded[0]).sum(axis=1)
+    mean, deviation = forecast(now, kind.ahead, AHEAD, origin=now.last)
+    day, limit = calibrations.day[rows.later], limits.get((kind.device, FAMILY_OF[kind.parameter]), np.inf)
+    if np.isfinite(kind.tolerance):
         known = np.isfinite(now.last)
-        probability[known] *= in_tolerance(mean[known], deviation[known], drift_of_kind.tolerance).astype(np.float32)
-    bounds = (drift_of_kind.tolerance, limit) if drift_of_kind.known else (np.inf, np.inf)
-    times = _leaving(mean, deviation, bounds[0], day)
-    return _Course(
-        drift_of_kind, now, counts, times, limit, _leaving(mean + now.last[:, None], deviation, bounds[1], day)
-    )
+        probability[known] *= in_tolerance(mean[known], deviation[known], kind.tolerance).astype(np.float32)
+    tolerance, most = (kind.tolerance, limit) if kind.known else (np.inf, np.inf)
+    beyond = _leaving(mean + now.last[:, None], deviation, most, day)
+    return _Course(now, counts, _leaving(mean, deviation, tolerance, day), limit, beyond)
 
 
-def _unit_drifts(calibrations: Calibrations, rows: Pairs, course: _Course, until: Array) -> list[UnitDrift]:
-    drift_of_kind, now, times, beyond = course.drift_of_kind, course.now, course.times, course.beyond
-    change, _ = changes_of(calibrations, rows, drift_of_kind.parameter)
-    numbers = e_n_of(calibrations, rows, drift_of_kind.parameter, drift_of_kind.seating)
-    return [
-        UnitDrift(
+def _unit_drifts(
+    calibrations: Calibrations, rows: Pairs, kind: KindDrift, course: _Course, until: Array
+) -> Iterator[UnitDrift]:
+    change, _ = changes_of(calibrations, rows, kind.parameter)
+    numbers = e_n_of(calibrations, rows, kind.parameter, kind.seating)
+    for k in np.flatnonzero(np.isfinite(change)):
+        row, odd = rows.later[k], float(course.now.odd[k])
+        expected, soonest, latest = course.times[:, k].tolist()
+        limit_expected, limit_soonest, limit_latest = course.beyond[:, k].tolist()
+        yield UnitDrift(
             unit=str(calibrations.unit[row]),
-            device=drift_of_kind.device,
-            parameter=drift_of_kind.parameter,
+            device=kind.device,
+            parameter=kind.parameter,
             day=float(calibrations.day[row]),
             run=str(calibrations.run[row]),
             change=float(change[k]),
             years=float(rows.years[k]),
             e_n=float(numbers[k]),
-            slope=float(now.slope[k]) if np.isfinite(now.odd[k]) else float("nan"),
-            tolerance=drift_of_kind.tolerance,
-            leaves=float(times[0][k]),
-            soonest=float(times[1][k]),
-            latest=float(times[2][k]),
+            slope=float(course.now.slope[k]) if np.isfinite(odd) else float("nan"),
+            tolerance=kind.tolerance,
+            leaves=expected,
+            soonest=soonest,
+            latest=latest,
             limit=course.limit,
-            limit_day=(float(beyond[0][k]), float(beyond[1][k]), float(beyond[2][k])),
+            limit_day=(limit_expected, limit_soonest, limit_latest),
             reliable_day=float(until[k]),
-            odd=float(now.odd[k]),
+            odd=odd,
             calibrations=int(course.counts[k]),
         )
-        for k, row in enumerate(rows.later)
-        if np.isfinite(change[k])
-    ]
 
 
-def _leaving(mean: Array, deviation: Array, bound: float, day: Array) -> tuple[Array, Array, Array]:
-    """Days when values leave ± ``bound``: expected, soonest, latest."""
+def _leaving(mean: Array, deviation: Array, bound: float, day: Array) -> Array:
+    """Days when values leave ± ``bound``: expected, soonest, latest, (3, units)."""
     if not np.isfinite(bound):
-        never = np.full(day.size, np.inf)
-        return never, never, never
-    expected, soonest, latest = leaves(mean, deviation, bound, AHEAD)
-    return day + YEAR_D * expected, day + YEAR_D * soonest, day + YEAR_D * latest
+        return np.full((3, day.size), np.inf)
+    return day + YEAR_D * np.stack(leaves(mean, deviation, bound, AHEAD))
 
 
 def _padded(calibrations: Calibrations, good: Flags, rows: Pairs, name: str) -> tuple[Array, Array, Array]:
@@ -185,9 +158,6 @@ def _padded(calibrations: Calibrations, good: Flags, rows: Pairs, name: str) -> 
     starts = first_of_each(unit)
     order = np.arange(use.size) - np.repeat(starts, np.diff(np.append(starts, use.size)))
     shape = (units.size, int(order.max()) + 1 if use.size else 1)
-    filled: list[Array] = []
-    for content in (value, error, calibrations.day / YEAR_D):
-        target = np.full(shape, np.nan)
-        target[unit, order] = content[use]
-        filled.append(target)
+    filled = np.full((3, *shape), np.nan)
+    filled[:, unit, order] = np.stack([value, error, calibrations.day / YEAR_D])[:, use]
     return filled[0], filled[1], filled[2]

@@ -1,7 +1,5 @@
 """Findings about units: exchanged serials, out of tolerance, leaving their limits, drift outliers."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -98,9 +96,8 @@ def _leaving(audit: Audit) -> Iterator[AuditFinding]:
             f"about {date_or_never(days[0])} ({date_or_never(days[1])} to {date_or_never(days[2])})"
             f"{_besides(others)}, before it is due on {date_of(due)}; recall it"
         )
-        yield AuditFinding(
-            "quality", "leaves", drift.unit, message, (drift.unit,), {**_numbers(drift), "parameters": others}
-        )
+        evidence = {**_numbers(drift), "parameters": others}
+        yield AuditFinding("quality", "leaves", drift.unit, message, (drift.unit,), evidence)
 
 
 def _leavings(drift: UnitDrift) -> list[tuple[tuple[float, float, float], str, float, UnitDrift]]:
@@ -137,9 +134,8 @@ def _unlike_their_kind(audit: Audit) -> Iterator[AuditFinding]:
     """Units whose slope is an outlier of their kind: each by its most significant parameter."""
     count = sum(len(drifts) for drifts in audit.units.values())
     for drifts in audit.units.values():
-        stated = [
-            drift for drift in drifts if np.isfinite(drift.odd)
-        ]  # calibrations within a few days have no stated drift
+        # calibrations within a few days have no stated drift
+        stated = [drift for drift in drifts if np.isfinite(drift.odd)]
         worst = max(stated, key=lambda drift: abs(drift.odd), default=None)
         if worst is not None and abs(worst.odd) > outlier_limit(count) and worst.day >= audit.scope.since:
             text = unit_text(worst.parameter)

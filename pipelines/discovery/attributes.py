@@ -4,8 +4,6 @@ Append-only, one file for each time that something was added, with its source, i
 row, and the newest one counts.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Mapping, Sequence
@@ -155,14 +153,13 @@ def _values(table: pd.DataFrame, key: str, names: list[str], source: str) -> dic
         own = out.setdefault(one, {})
         for name in names:
             value = _text(row[name])
-            if not value:
-                continue
-            if own.get(name, value) != value:
+            if value and own.get(name, value) != value:
                 raise WrongUse(
                     f"attributes: {source} has two values of {name} for {one} ({own[name]}, {value}), one is needed; "
                     "add the newer one in a file of its own"
                 )
-            own[name] = value
+            if value:
+                own[name] = value
     return out
 
 
@@ -178,14 +175,11 @@ def _text(value: object) -> str:
 def sentences(added: AddedAttributes) -> list[str]:
     """What was added, for people."""
     what = ", ".join(added["names"])
-    lines = [
-        f"{what}: {number_of(added['added'], 'new value')}, {added['changed']} changed, {added['unchanged']} as before"
-    ]
+    new = number_of(added["added"], "new value")
+    lines = [f"{what}: {new}, {added['changed']} changed, {added['unchanged']} as before"]
     if added["unknown"]:
-        shown = ", ".join(added["unknown"][:_SHOWN]) + (", …" if len(added["unknown"]) > _SHOWN else "")
-        lines.append(
-            f"not in the archive yet: {number_of(len(added['unknown']), str(added['by']))} ({shown}); they are kept"
-        )
+        counted = number_of(len(added["unknown"]), str(added["by"]))
+        lines.append(f"not in the archive yet: {counted} ({_some(added['unknown'], _SHOWN)}); they are kept")
     if added["refused"]:
         lines.append(f"not taken, because they follow from the result: {', '.join(added['refused'])}")
     return lines
@@ -228,6 +222,10 @@ def listed(archive: Archive) -> ListedAttributes:
         for name in names:
             values = [own[name] for own in of.values() if name in own]
             levels = sorted(set(values))
-            some = ", ".join(levels[:_EXAMPLES]) + (", …" if len(levels) > _EXAMPLES else "")
+            some = _some(levels, _EXAMPLES)
             rows.append({"attribute": name, "of": kind, "known": len(values), "levels": len(levels), "such_as": some})
     return {"attributes": rows}
+
+
+def _some(texts: Sequence[str], most: int) -> str:
+    return ", ".join(texts[:most]) + (", …" if len(texts) > most else "")

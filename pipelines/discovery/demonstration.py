@@ -1,7 +1,5 @@
 """The demonstration of discoveries: a simulated line has something hidden in a wafer; it is found, added, confirmed."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """One look at an archive: new runs are scored, the night's evidence is kept, and what is beyond chance is named."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import reduce
@@ -84,8 +82,8 @@ def discovered(archive: Archive, look: Look) -> Looked:
 
 
 def _in_memory(source: DiscoveryArchive, look: Look) -> Findings:
-    runs = [run for run in source.pooled() if run not in source.revoked]
-    runs = [run for run in runs if str(source.store.head(run)["when"])[:10] >= look.since]
+    known = (run for run in source.pooled() if run not in source.revoked)
+    runs = [run for run in known if str(source.store.head(run)["when"])[:10] >= look.since]
     if not runs:
         raise WrongUse(f"discover: no lot of {source.device} was measured since {look.since}; give an earlier --since")
     return Findings(source, grown_by_days(source, fresh(source), runs))
@@ -155,10 +153,8 @@ def explained(document: DiscoverDocument, name: str) -> DiscoveryRow:
     found = next((row for row in document["discoveries"] if row["id"].lower() == name.lower()), None)
     if found is None:
         ids = [row["id"] for row in document["discoveries"]]
-        raise WrongUse(
-            f"discover: no discovery is called '{name}'; "
-            + (did_you_mean(name, ids) if ids else "there is none in this archive")
-        )
+        hint = did_you_mean(name, ids) if ids else "there is none in this archive"
+        raise WrongUse(f"discover: no discovery is called '{name}'; {hint}")
     return found
 
 
@@ -179,18 +175,7 @@ def populations(archive: Archive, device: str, workers: int = 1) -> list[Populat
         found = two_populations(first.column(name), np.random.default_rng(_SEED))
         if found is None or found.log_e < needed:
             continue
-        rows.append(
-            {
-                "figure": name,
-                "kind": "two_populations",
-                "log_e": round(found.log_e, 2),
-                "detail": {
-                    "means": list(found.means),
-                    "widths": list(found.widths),
-                    "share": found.share,
-                    "unit": unit_text(name),
-                    "units": len(first),
-                },
-            }
-        )
+        detail = {"means": list(found.means), "widths": list(found.widths), "share": found.share}
+        detail |= {"unit": unit_text(name), "units": len(first)}
+        rows.append({"figure": name, "kind": "two_populations", "log_e": round(found.log_e, 2), "detail": detail})
     return rows

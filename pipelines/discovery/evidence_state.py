@@ -1,11 +1,9 @@
 """The evidence of a kind of device after some nights, its alarms, and its file."""
 
-from __future__ import annotations
-
 import io
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -54,6 +52,11 @@ class Evidences:
     alarms: list[Alarm] = field(default_factory=list[Alarm])
     night: int = 0
 
+    def unknown(self, alarms: Iterable[Alarm]) -> list[Alarm]:
+        """Alarms for hypotheses that have none yet."""
+        known = {(alarm.driver, alarm.place) for alarm in self.alarms}
+        return [alarm for alarm in alarms if (alarm.driver, alarm.place) not in known]
+
     def needed(self, driver: str) -> float:
         """Logarithm of the evidence from which on a hypothesis of a driver counts; infinite where no lot gives hypotheses."""
         generation = self.generations.get(driver, 0)
@@ -61,6 +64,11 @@ class Evidences:
         of_station = len(STATION_DRIVERS) * len(self.of_station) if generation == 0 else 0
         hypotheses = drivers * AXES * len(self.columns) + of_station
         return math.inf if not hypotheses else float(np.log(hypotheses / (ALPHA * 0.5 ** (generation + 1))))
+
+
+def below(parts: Mapping[str, Any], prefix: str) -> dict[str, Any]:
+    """The parts whose names begin with a prefix, without it."""
+    return {name.removeprefix(prefix): value for name, value in parts.items() if name.startswith(prefix)}
 
 
 def hypothesis(state: Evidences, place: int) -> tuple[str, int, str]:
@@ -83,9 +91,7 @@ def state_bytes(state: Evidences) -> bytes:
         "drivers": np.array(list(state.generations), dtype=np.str_),
         "generations": np.array(list(state.generations.values()), dtype=np.int64),
         "alarm_drivers": np.array([a.driver for a in state.alarms], dtype=np.str_),
-        "alarms": np.array([(a.place, a.night, a.lots, a.log_e) for a in state.alarms], dtype=np.float64).reshape(
-            -1, 4
-        ),
+        "alarms": np.array([(a.place, a.night, a.lots, a.log_e) for a in state.alarms], dtype=float).reshape(-1, 4),
         "night": np.array(state.night),
     }
     parts = {f"about/{name}": value for name, value in about.items()}
@@ -93,9 +99,8 @@ def state_bytes(state: Evidences) -> bytes:
         parts |= {f"{kind}/{name}": value for name, value in evidence.arrays().items()}
     buffer = io.BytesIO()
     # names of drivers and stations are anything: they stand in a list, and the arrays have numbers
-    np.savez(
-        buffer, allow_pickle=False, names=np.array(list(parts)), **{str(n): v for n, v in enumerate(parts.values())}
-    )
+    numbered = {str(number): value for number, value in enumerate(parts.values())}
+    np.savez(buffer, allow_pickle=False, names=np.array(list(parts)), **numbered)
     return buffer.getvalue()
 
 
@@ -111,23 +116,19 @@ def stored_state(source: DiscoveryArchive, folder: Place, nights: Sequence[Mappi
         return None
     with np.load(io.BytesIO(data), allow_pickle=False) as loaded:
         parts = {str(name): loaded[str(n)] for n, name in enumerate(loaded["names"])}
-    about = {name.removeprefix("about/"): value for name, value in parts.items() if name.startswith("about/")}
+    about = below(parts, "about/")
     sensor, station = source.columns
     if [f"{name} {column}" for name, column in (*sensor, *station)] != [*about["columns"], *about["of_station"]]:
         return None
     if any(str(run) not in source.store.place for run in about["order"]):
         return None
     order = [str(run) for run in about["order"]]
-    of = {
-        kind: {n.removeprefix(f"{kind}/"): v for n, v in parts.items() if n.startswith(f"{kind}/")}
-        for kind in ("sensor", "station")
-    }
     return Evidences(
         device=source.device,
         columns=sensor,
         of_station=station,
-        sensor=Evidence.restored(AXES * len(sensor), of["sensor"], source.earlier(order)),
-        station=Evidence.restored(len(station), of["station"], lambda _, __: None),
+        sensor=Evidence.restored(AXES * len(sensor), below(parts, "sensor/"), source.earlier(order)),
+        station=Evidence.restored(len(station), below(parts, "station/"), lambda _, __: None),
         order=order,
         taken_out=[str(run) for run in about["taken_out"]],
         generations={str(name): int(n) for name, n in zip(about["drivers"], about["generations"], strict=True)},

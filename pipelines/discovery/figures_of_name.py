@@ -1,20 +1,17 @@
 """Figures of a named discovery, and the discovery in sentences: its size, its levels, what carries it, what to do next."""
 
-from __future__ import annotations
-
 import math
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.discovery.evidence import INSIDE, SLOT, STATION, Sums
 from inertial.discovery.naming import Name
 from inertial.uncertainty.rounding import short
 from pipelines.discovery.documents import DiscoveredLevel, DiscoveryRow
 from schemas.units import MICRO
 
-Array = NDArray[np.float64]
 Scope = Literal["sensor", "station", "sensor_or_station", "thermometer"]
 
 _SHOWN_LEVELS = 40
@@ -27,19 +24,22 @@ def plain(driver: str) -> str:
 
 def by_axis(name: Name) -> list[float]:
     """Rms of the sizes of each axis over the levels, its noise taken off, g."""
-    weight = name.weights / max(float(name.weights.sum()), 1e-300)
+    weight, _, squares = _squares(name)
+    return np.sqrt(np.maximum((weight * squares).sum(axis=0), 0.0)).tolist()
+
+
+def _squares(name: Name) -> tuple[Array, Array, Array]:
+    """Shares of the levels (g, 1); errors of the sizes, zero where one is not known, and their squares less noise, (g, axes)."""
     there = np.isfinite(name.errors)
-    squares = np.where(there, name.sizes**2 - name.errors**2, 0.0)
-    return [float(value) for value in np.sqrt(np.maximum((weight[:, None] * squares).sum(axis=0), 0.0))]
+    errors = np.where(there, name.errors, 0.0)
+    weight = name.weights / max(float(name.weights.sum()), 1e-300)
+    return weight[:, None], errors, np.where(there, name.sizes**2 - errors**2, 0.0)
 
 
 def size_of(name: Name) -> tuple[float, float, float]:
     """Rms over levels and axes with its 95 % interval, g."""
-    weight = name.weights / max(float(name.weights.sum()), 1e-300)
-    there = np.isfinite(name.errors)
-    errors = np.where(there, name.errors, 0.0)
-    squares = np.where(there, name.sizes**2 - errors**2, 0.0)
-    each = weight[:, None] / 3.0
+    weight, errors, squares = _squares(name)
+    each = weight / 3.0
     mean = float((each * squares).sum())
     spread = 2.0 * float(np.sqrt((each**2 * (4.0 * name.sizes**2 * errors**2 + 2.0 * errors**4)).sum()))
     return tuple(float(np.sqrt(max(value, 0.0))) for value in (mean, mean - spread, mean + spread))  # type: ignore[return-value]

@@ -1,7 +1,5 @@
 """What the evidence of an archive amounts to: named discoveries with size, scope and what carries them, and what is held back."""
 
-from __future__ import annotations
-
 from collections import Counter
 from dataclasses import dataclass
 from functools import cached_property
@@ -10,18 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
+from inertial.arrays import Array
 from inertial.counts import number_of
 from inertial.discovery.evidence import DATE, FIRST, INSIDE, MEAN, SLOT, STATION, UNIT, ScoredLot
 from inertial.discovery.naming import Name, Pool
-from pipelines.discovery.documents import (
-    DiscoverDocument,
-    DiscoveryRow,
-    DriverRow,
-    HeldAlarm,
-    ReachRow,
-    UnexplainedRow,
-    UntoldEffect,
-)
+from pipelines.discovery import documents
+from pipelines.discovery.documents import DiscoveryRow, DriverRow, HeldAlarm, ReachRow, UnexplainedRow
 from pipelines.discovery.evidence_state import ALPHA, Alarm, Evidences, hypothesis
 from pipelines.discovery.figures_of_name import (
     Scope,
@@ -36,8 +28,6 @@ from pipelines.discovery.figures_of_name import (
 from pipelines.discovery.lot_source import AXES, SEASON, DiscoveryArchive
 from pipelines.discovery.nights import held
 from schemas.units import MICRO
-
-Array = NDArray[np.float64]
 
 LATER = 20  # lots after an alarm from which on they confirm or do not
 MOST_NAMED = 3000  # lots that the names are found with: evenly spread ones of a larger archive
@@ -144,7 +134,9 @@ class Findings:
         factor, error, able = self.pool.confirmed(self.lots[:first], self.lots[first:], driver, effect)
         return carried, (factor, error) if able >= LATER else None
 
-    def document(self, *, looking_back: bool = False, rows: list[DiscoveryRow] | None = None) -> DiscoverDocument:
+    def document(
+        self, *, looking_back: bool = False, rows: list[DiscoveryRow] | None = None
+    ) -> documents.DiscoverDocument:
         """The findings as a document.
 
         Parameters
@@ -244,8 +236,10 @@ class Findings:
         if any(a.driver.endswith(INSIDE) for a in self.open_alarms if plain(a.driver) == driver):
             return "sensor", "units of one lot differ by it; whatever the station does to a lot cancels"
         if stations < 2:
-            why = "one station: permanent errors of its references look the same, or its own wander"
-            return "sensor_or_station", why
+            return (
+                "sensor_or_station",
+                "one station: permanent errors of its references look the same, or its own wander",
+            )
         if driver not in {MEAN, DATE, SEASON}:
             return "sensor", "lots of other stations predict it; a station's own wander is no news there"
         if self.state.sensor.shared_by_stations()[self._places(found.name.effects[0])].any():
@@ -259,13 +253,11 @@ class Findings:
         for alarm in self.open_alarms:
             if alarm.place >= self.state.sensor.count:
                 key = self._effect(alarm), alarm.driver
-                if key not in best or alarm.log_e > best[key].log_e:
-                    best[key] = alarm
+                best[key] = max(best.get(key, alarm), alarm, key=lambda one: one.log_e)
         kept: dict[str, Alarm] = {}
-        for (_, driver), alarm in sorted(best.items(), key=lambda item: -self._log_e(item[1])):
-            kept.setdefault(
-                driver, alarm
-            )  # columns of one table are nearly the same: the strongest stands for its driver
+        # columns of one table are nearly the same: the strongest stands for its driver
+        for alarm in sorted(best.values(), key=lambda alarm: -self._log_e(alarm)):
+            kept.setdefault(alarm.driver, alarm)
         return sorted(kept.values(), key=lambda alarm: alarm.lots)
 
     def _log_e(self, alarm: Alarm) -> float:
@@ -278,9 +270,8 @@ class Findings:
         at = alarm.place - self.state.sensor.count
         station = self.state.station
         sizes = station_sizes(station, at)
-        alike = [
-            self._effect(a) for a in self.open_alarms if a.place >= self.state.sensor.count and a.driver == alarm.driver
-        ]
+        of_driver = [a for a in self.open_alarms if a.driver == alarm.driver]
+        alike = [self._effect(a) for a in of_driver if a.place >= self.state.sensor.count]
         scale = float(station.noise[0][at])
         values = np.array([value for value, _ in sizes.values()])
         size, reach = float(np.sqrt(np.mean(values**2))), 2.0 * max(scale * error for _, error in sizes.values())
@@ -353,7 +344,7 @@ class Findings:
                     rows.append({"effect": effect, "driver": driver, "smallest_ug": smallest, "lots_to_1_ug": needed})
         return rows
 
-    def _unseen(self) -> list[UntoldEffect]:
+    def _unseen(self) -> list[documents.UntoldEffect]:
         information = self.state.sensor.information.reshape(AXES, -1)
         own = sum((lot.own.sum(axis=0) for lot in self.some), np.zeros(self.state.sensor.count)).reshape(AXES, -1)
         if len(self.state.order) < FIRST:

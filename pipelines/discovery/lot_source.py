@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from datetime import datetime
 from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.discovery.evidence import MEAN, SLOT, STATION, UNIT, ScoredLot
 from pipelines.archive import Archive
 from pipelines.archive.locks import alone
@@ -23,7 +23,6 @@ from pipelines.discovery.scored_run import ScoredRun
 from pipelines.parallel import Distributor
 from schemas.errors import WrongUse, did_you_mean
 
-Array = NDArray[np.float64]
 Column = tuple[str, int]
 
 AXES = 3
@@ -102,15 +101,16 @@ class DiscoveryArchive:
 
     def pooled(self) -> list[str]:
         """Runs of the device that have scores, in the order of arrival."""
-        heads = ((run, self.store.head(run)) for run in self.store.place)
-        return [run for run, head in heads if head["device"] == self.device and not head["left_out"]]
+        return [run for run, reason in self._reasons() if not reason]
 
     def left_out(self) -> list[tuple[str, str]]:
         """Runs of the device that are not pooled, with the reason."""
+        return [(run, reason) for run, reason in self._reasons() if reason]
+
+    def _reasons(self) -> Iterator[tuple[str, str]]:
+        """Runs of the device with scores, in the order of arrival, with the reason for one that is left out."""
         heads = ((run, self.store.head(run)) for run in self.store.place)
-        return [
-            (run, str(head["left_out"])) for run, head in heads if head["device"] == self.device and head["left_out"]
-        ]
+        return ((run, str(head["left_out"] or "")) for run, head in heads if head["device"] == self.device)
 
     @cached_property
     def columns(self) -> tuple[tuple[Column, ...], tuple[Column, ...]]:
@@ -208,9 +208,8 @@ class DiscoveryArchive:
             before = [run for number, run in index.get(unit, ()) if number < taken]
             if not before:
                 return None
-            lots = [self.lot_of(self.store.run(run)) for run in before]
-            parts = [np.stack(lot.inside)[:, lot.units.index(unit)] for lot in lots]
-            score, information = np.sum(parts, axis=0)
+            lots = (self.lot_of(self.store.run(run)) for run in before)
+            score, information = np.sum([np.stack(lot.inside)[:, lot.units.index(unit)] for lot in lots], axis=0)
             return score, information
 
         return of

@@ -5,8 +5,6 @@ night on, and the entry says so. ``discovery/<device>/state`` is a derived cache
 the scores.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
@@ -46,8 +44,7 @@ def grown_by_days(source: DiscoveryArchive, state: Evidences, runs: Sequence[str
         generation = 1 + max(state.generations.values(), default=-1)
         for driver in state.sensor.drivers:
             state.generations.setdefault(driver, generation)
-        known = {(alarm.driver, alarm.place) for alarm in state.alarms}
-        state.alarms += [one for one in _beyond(state) if (one.driver, one.place) not in known]
+        state.alarms += state.unknown(_beyond(state))
     return state
 
 
@@ -90,13 +87,10 @@ def brought_up(source: DiscoveryArchive) -> Evidences:
         gone = [run for run in state.order if run in source.revoked]
         if gone:
             kept = [run for run in state.order if run not in source.revoked]
-            alarms, out, night = state.alarms, [*state.taken_out, *gone], state.night
-            state = grown_by_days(source, fresh(source), kept)
-            state.taken_out, state.night = out, night
-            state.alarms = [
-                *alarms,
-                *(a for a in state.alarms if (a.driver, a.place) not in {(b.driver, b.place) for b in alarms}),
-            ]
+            grown = grown_by_days(source, fresh(source), kept)
+            grown.taken_out, grown.night = [*state.taken_out, *gone], state.night
+            grown.alarms = [*state.alarms, *state.unknown(grown.alarms)]
+            state = grown
         there = {*state.order, *state.taken_out}
         new = [run for run in source.pooled() if run not in there and run not in source.revoked]
         if new or gone:
@@ -123,12 +117,12 @@ def _replayed(source: DiscoveryArchive, nights: Sequence[Mapping[str, Any]]) -> 
     state.taken_out = [run for night in nights for run in night["taken_out"]]
     # an alarm that was raised stays, also where a run that carried it was taken out since
     place = {_text_of(state, at): at for at in range(state.sensor.count + state.station.count)}
-    known = {(alarm.driver, alarm.place) for alarm in state.alarms}
-    for night in nights:
-        for told in night["alarms"]:
-            at = place.get(told["column"])
-            if at is not None and (told["driver"], at) not in known:
-                state.alarms.append(Alarm(told["driver"], at, night["night"], told["lots"], told["log_e"]))
+    state.alarms += state.unknown(
+        Alarm(told["driver"], place[told["column"]], night["night"], told["lots"], told["log_e"])
+        for night in nights
+        for told in night["alarms"]
+        if told["column"] in place
+    )
     return state
 
 
@@ -177,7 +171,7 @@ def alarm_key(state: Evidences) -> list[str]:
 
 def rows_of_before(source: DiscoveryArchive, state: Evidences) -> list[DiscoveryRow] | None:
     """The discoveries of the last night, where no alarm is new and few lots came in since; None where they are found again."""
-    before = _stored(source)
+    before = _found(source.folder())
     if before is None or before["alarms"] != alarm_key(state) or len(state.order) > _GROWN * before["lots"]:
         return None
     return before["discoveries"]
@@ -186,20 +180,14 @@ def rows_of_before(source: DiscoveryArchive, state: Evidences) -> list[Discovery
 def discovered_before(archive: Archive) -> list[tuple[str, int]]:
     """Kinds of devices with discoveries of an earlier look, and their number; nothing is judged."""
     top = archive.root / FOLDER
-    names = (
-        sorted(place.name for place in top.iterdir() if place.name not in {"scores", "lock"}) if top.is_dir() else []
-    )
-    found = ((name, _read_found(top / name / "found")) for name in names)
-    return [
-        (name, len(stored["discoveries"])) for name, stored in found if stored is not None and stored["discoveries"]
-    ]
+    places = sorted(top.iterdir(), key=lambda one: one.name) if top.is_dir() else []
+    found = {place.name: _found(place) for place in places if place.name not in {"scores", "lock"}}
+    return [(name, len(stored["discoveries"])) for name, stored in found.items() if stored and stored["discoveries"]]
 
 
-def _stored(source: DiscoveryArchive) -> dict[str, Any] | None:
-    return _read_found(source.folder() / "found")
-
-
-def _read_found(place: Place) -> dict[str, Any] | None:
+def _found(folder: Place) -> dict[str, Any] | None:
+    """What was found of a kind of device the last time, and of how many lots."""
+    place = folder / "found"
     if not place.is_file():
         return None
     data, standing = derived.unframed(place)
@@ -208,7 +196,7 @@ def _read_found(place: Place) -> dict[str, Any] | None:
 
 def remembered(source: DiscoveryArchive, state: Evidences, document: DiscoverDocument) -> DiscoverDocument:
     """Keep a document beside the evidence, so that discoveries have the same ids the next time."""
-    stored = _stored(source) or {"discoveries": [], "lots": 0}
+    stored = _found(source.folder()) or {"discoveries": [], "lots": 0}
     before: list[dict[str, Any]] = stored["discoveries"]
     used, free = {row["id"] for row in before}, list(before)
     numbers = (f"D{n}" for n in range(1, 10_000))

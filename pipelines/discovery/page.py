@@ -1,7 +1,5 @@
 """Discoveries as one page that needs no network: levels with intervals, evidence over the lots, what could have been seen."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -122,16 +120,7 @@ def reach_chart(document: DiscoverDocument, lots: int) -> Chart:
     if rows:
         at = np.array([float(row["lots_then"]) for row in rows])
         texts = tuple(f"{row['id']} {row['recommended']}" for row in rows)
-        traces.append(
-            Trace(
-                "discoveries",
-                at,
-                np.array([row["size_ug"] for row in rows]),
-                role="limit",
-                symbol="diamond",
-                size=9.0,
-                texts=texts,
-            )
-        )
+        sizes = np.array([row["size_ug"] for row in rows])
+        traces.append(Trace("discoveries", at, sizes, role="limit", symbol="diamond", size=9.0, texts=texts))
     axes = PlotAxis("lots", log=True), PlotAxis("smallest effect / µg", log=True)
     return Chart("What an archive of so many lots shows", (Plot("", *axes, tuple(traces)),), height=280)

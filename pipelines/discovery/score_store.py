@@ -5,8 +5,6 @@ A derived cache with a seal: where it was edited, or has another layout, it is m
 products of the columns are kept once a file, as means.
 """
 
-from __future__ import annotations
-
 import io
 import json
 from collections.abc import Sequence
@@ -17,15 +15,13 @@ from typing import Any, NamedTuple
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from pipelines.archive import Archive, derived, files
 from pipelines.archive.keys import digest
 from pipelines.archive.store import Place
 from pipelines.discovery.scored_run import ScoredRun, scored_runs
 from pipelines.parallel import Distributor, map_partitions
-
-Array = NDArray[np.float64]
 
 FOLDER = "discovery"
 VERSION = 1
@@ -127,18 +123,14 @@ def written(runs: Sequence[ScoredRun]) -> bytes:
     products = {name: _products_of(own) for name, own in groups.items() if not own[0].left_out}
     columns: dict[str, list[Any]] = {name: [getattr(run, name) for run in runs] for name in TEXTS}
     columns |= {"units": [list(run.units) for run in runs], "slots": [list(run.slots) for run in runs]}
-    columns["columns"] = [_group(run) for run in runs]
-    columns["floor"] = [run.floor for run in runs]
+    columns |= {"columns": [_group(run) for run in runs], "floor": [run.floor for run in runs]}
     for name in ("score", "own", "information", "station_scores"):
         columns[name] = [_packed(name, run) for run in runs]
     buffer = io.BytesIO()
-    np.savez_compressed(
-        buffer, allow_pickle=False, **{f"{name}/{key}": v for name, of in products.items() for key, v in of.items()}
-    )
-    about = {
-        "version": VERSION,
-        "columns": {name: [own[0].columns, own[0].of_station, len(own)] for name, own in groups.items()},
-    }
+    arrays = {f"{name}/{key}": v for name, of in products.items() for key, v in of.items()}
+    np.savez_compressed(buffer, allow_pickle=False, **arrays)
+    named = {name: [own[0].columns, own[0].of_station, len(own)] for name, own in groups.items()}
+    about = {"version": VERSION, "columns": named}
     table = pa.table(columns).replace_schema_metadata({"about": json.dumps(about).encode()})
     sink = pa.BufferOutputStream()
     pq.write_table(table, sink, compression="zstd", compression_level=6, write_statistics=False)

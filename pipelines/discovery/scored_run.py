@@ -1,16 +1,14 @@
 """The scores of one run of an archive, as they are kept: a few bytes a unit, so that no dwell is read again."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
+from inertial.arrays import Array
 from inertial.discovery.scores import LotScores, scores_of
 from inertial.errors import InertialError
 from pipelines.archive import Archive, Run
@@ -18,7 +16,6 @@ from pipelines.stages.judge import verdict_of
 from pipelines.tables.sound_lot import every_unit_faulty, sound_lot
 from schemas.errors import ArchiveUnusable, DataRejected, RecipeInvalid
 
-Array = NDArray[np.float64]
 LOGGER = logging.getLogger("tumbleline.discovery")
 
 

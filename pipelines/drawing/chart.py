@@ -3,8 +3,6 @@
 A page, a file of a report and a CSV file are drawn from the same description, so that they hold the same numbers.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal
 

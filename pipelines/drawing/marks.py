@@ -1,7 +1,5 @@
 """The marks of a chart as parts of SVG text: points, lines, bands, bars, cells and labels at their places."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from html import escape
@@ -125,10 +123,13 @@ def _bars(trace: Trace, place: Place, scale: ColourScale | None) -> str:
     apart = float(np.min(np.diff(np.sort(at)))) if at.size > 1 else 1.0
     left, right = (place.x(at + sign * 0.5 * BAR_SHARE * apart) for sign in (-1.0, 1.0))
     base, top = place.y(np.zeros_like(value)), place.y(value)
-    path = "".join(
-        f"M{a:.1f} {z:.1f}V{t:.1f}H{b:.1f}V{z:.1f}z" for a, b, z, t in zip(left, right, base, top, strict=True)
-    )
-    return f'<path d="{path}" fill="{ROLES[trace.role]}"/>'
+    return f'<path d="{_boxes(left, right, base, top)}" fill="{ROLES[trace.role]}"/>'
+
+
+def _boxes(left: Array, right: Array, low: Array, high: Array) -> str:
+    """Rectangles as one path."""
+    edges = zip(left, right, low, high, strict=True)
+    return "".join(f"M{a:.1f} {z:.1f}V{t:.1f}H{b:.1f}V{z:.1f}z" for a, b, z, t in edges)
 
 
 def _density(trace: Trace, place: Place, scale: ColourScale | None) -> str:
@@ -143,9 +144,7 @@ def _density(trace: Trace, place: Place, scale: ColourScale | None) -> str:
         rows, columns = np.nonzero(level == number)
         left, right = (place.x(trace.x[columns] + sign * 0.5 * wide) for sign in (-1.0, 1.0))
         low, high = (place.y(trace.y[rows] + sign * 0.5 * tall) for sign in (-1.0, 1.0))
-        path = "".join(
-            f"M{a:.1f} {z:.1f}V{t:.1f}H{b:.1f}V{z:.1f}z" for a, b, z, t in zip(left, right, low, high, strict=True)
-        )
+        path = _boxes(left, right, low, high)
         parts.append(f'<path d="{path}" fill="{colour}"/>' if path else "")
     return "".join(parts)
 

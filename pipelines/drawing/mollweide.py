@@ -3,8 +3,6 @@
 Mollweide's projection (Snyder, Map Projections: A Working Manual, USGS 1395, 1987, eqs. 31-1 to 31-3).
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from inertial.arrays import Array
@@ -44,7 +42,13 @@ def direction_at(x: float, y: float) -> Array | None:
     if abs(longitude) > np.pi:
         return None
     latitude = np.arcsin(np.clip((2.0 * angle + np.sin(2.0 * angle)) / np.pi, -1.0, 1.0))
-    return np.array([np.cos(latitude) * np.cos(longitude), np.cos(latitude) * np.sin(longitude), np.sin(latitude)])
+    return _direction(longitude, latitude)
+
+
+def _direction(longitude: float, latitude: Array) -> Array:
+    """Unit vectors (..., 3) at latitudes (...) of a meridian."""
+    east, north = np.cos(longitude), np.sin(longitude)
+    return np.stack([np.cos(latitude) * east, np.cos(latitude) * north, np.sin(latitude)], axis=-1)
 
 
 def sphere(title: str, traces: tuple[Trace, ...]) -> Plot:
@@ -62,11 +66,8 @@ def _graticule() -> tuple[Trace, ...]:
     turn = np.linspace(0.0, 2.0 * np.pi, 121)
     latitude = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 41)
     lines = [Trace("", 2.0 * np.cos(turn), np.sin(turn), "line", "muted", legend=False)]
-    for longitude in np.radians([-90.0, 0.0, 90.0]):
-        around = np.stack(
-            [np.cos(latitude) * np.cos(longitude), np.cos(latitude) * np.sin(longitude), np.sin(latitude)], axis=-1
-        )
-        lines.append(Trace("", *project(around), "line", "muted", legend=False))
+    meridians = (project(_direction(longitude, latitude)) for longitude in np.radians([-90.0, 0.0, 90.0]))
+    lines += [Trace("", *places, "line", "muted", legend=False) for places in meridians]
     lines.append(Trace("", np.array([-2.0, 2.0]), np.zeros(2), "line", "muted", legend=False))
     x, y = project(np.array([direction for direction, _ in LETTERS.values()]))
     anchors: tuple[Anchor, ...] = tuple(anchor for _, anchor in LETTERS.values())

@@ -1,7 +1,5 @@
 """A chart as a file: SVG as in a page, PNG and PDF typeset from it by a library that is optional, CSV of its numbers."""
 
-from __future__ import annotations
-
 import csv
 import io
 from collections.abc import Iterator

@@ -3,8 +3,6 @@
 Colours are names of roles (``role:before``) that the page replaces by those of its theme. Arrays travel as 32-bit binary.
 """
 
-from __future__ import annotations
-
 import base64
 from typing import Any
 
@@ -40,17 +38,12 @@ def plotly_figure(chart: Chart, *, webgl: bool = True) -> dict[str, Any]:
     webgl : whether many points are drawn by WebGL, which the small bundle of reports cannot do
     """
     data: list[dict[str, Any]] = []
+    above = 1.0 + 30.0 / (chart.height * chart.rows)
     layout: dict[str, Any] = {
         "height": chart.height * chart.rows + 40,
         "margin": {"l": 62, "r": 16, "t": 44, "b": 52},
         "showlegend": any(t.legend and t.name for p in chart.plots for t in p.traces),
-        "legend": {
-            "orientation": "h",
-            "itemsizing": "constant",
-            "x": 0,
-            "y": 1.0 + 30.0 / (chart.height * chart.rows),
-            "yanchor": "bottom",
-        },
+        "legend": {"orientation": "h", "itemsizing": "constant", "x": 0, "y": above, "yanchor": "bottom"},
         "hovermode": "closest",
         "annotations": [],
         "barmode": "group",
@@ -179,11 +172,8 @@ def _trace(trace: Trace, names: tuple[str, str], shown: set[str], *, dates: bool
             **({"textposition": [a if a != "center" else "middle center" for a in trace.anchors]} if trace.anchors else {}),
         }  # fmt: skip
     if trace.style == "line":
-        line = {
-            "color": colour,
-            "width": trace.width or (1.0 if not trace.name else 1.8),
-            **({"dash": "dash"} if trace.dashed else {}),
-        }
+        line = {"color": colour, "width": trace.width or (1.8 if trace.name else 1.0)}
+        line |= {"dash": "dash"} if trace.dashed else {}
         return out | {"type": "scatter", "mode": "lines", "line": line, **({} if trace.name else {"hoverinfo": "skip"})}
     return out | _points(trace, colour)
 
@@ -192,11 +182,8 @@ def _points(trace: Trace, colour: str) -> dict[str, Any]:
     marker: dict[str, Any] = {"size": trace.size, "symbol": trace.symbol, "color": colour}
     if trace.colour is not None:
         marker |= {"color": packed(trace.colour), "coloraxis": "coloraxis", "line": {"width": 0.7, "color": "role:ink"}}
-    out: dict[str, Any] = {
-        "type": "scattergl" if trace.x.size > MANY else "scatter",
-        "mode": "markers",
-        "marker": marker,
-    }
+    kind = "scattergl" if trace.x.size > MANY else "scatter"
+    out: dict[str, Any] = {"type": kind, "mode": "markers", "marker": marker}
     if trace.error is not None:
         out["error_y"] = {"type": "data", "array": packed(trace.error), "color": colour, "thickness": 1}
     if trace.texts:

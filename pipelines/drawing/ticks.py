@@ -1,7 +1,5 @@
 """Ticks of an axis at round values, with their labels."""
 
-from __future__ import annotations
-
 import numpy as np
 
 STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)

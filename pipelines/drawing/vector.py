@@ -3,8 +3,6 @@
 Written directly: a report has dozens of plots, and a drawing library takes a hundred times as long for them.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from html import escape
 
@@ -69,13 +67,8 @@ def svg_text(chart: Chart) -> str:
         if plot.sphere:
             place = _sphere_place(plot, x, y, each, tall)
         else:
-            place = Place(
-                x + left[column],
-                y + TOP,
-                each - left[column] - 6.0,
-                tall - TOP - BOTTOM,
-                *(one.at for one in scaled[number]),
-            )
+            wide_each, tall_each = each - left[column] - 6.0, tall - TOP - BOTTOM
+            place = Place(x + left[column], y + TOP, wide_each, tall_each, *(one.at for one in scaled[number]))
             parts.append(_axes(plot, place, scaled[number], labelled=_labelled(chart, number)))
         parts += [DRAW[trace.style](trace, place, chart.scale) for trace in plot.traces]
         parts.append(text_at(place.left, y + TOP - 9.0, plot.title, 'font-weight="600"') if plot.title else "")
@@ -100,15 +93,11 @@ def alone(picture: str) -> str:
 
 
 def _scaled(plot: Plot, wide: float, tall: float) -> tuple[_Scaled, _Scaled]:
-    return (
-        _axis(plot.x, [t.x for t in plot.traces], int(wide // 75)),
-        _axis(
-            plot.y,
-            [edge for t in plot.traces for edge in (t.y, t.high, *(() if t.error is None else (t.y - t.error, t.y + t.error)))
-             if edge is not None],
-            int(tall // 48),
-        ),
-    )  # fmt: skip
+    edges: list[Array] = []
+    for trace in plot.traces:
+        edges += [trace.y] if trace.high is None else [trace.y, trace.high]
+        edges += [] if trace.error is None else [trace.y - trace.error, trace.y + trace.error]
+    return _axis(plot.x, [t.x for t in plot.traces], int(wide // 75)), _axis(plot.y, edges, int(tall // 48))
 
 
 def _axis(axis: PlotAxis, arrays: list[Array], most: int) -> _Scaled:
@@ -163,14 +152,11 @@ def _axes(plot: Plot, place: Place, scaled: tuple[_Scaled, _Scaled], *, labelled
         at = x if turned else min(x, WIDTH - 0.5 * LETTER * len(text))  # the last one ends inside
         parts.append(text_at(at, base + 15.0, _cut(text) if turned else text, f'{turn} fill="{QUIET}"'))
     parts += [text_at(place.left - 6.0, y + 4.0, text, f'text-anchor="end" fill="{QUIET}"') for y, text in y_ticks]
-    parts.append(
-        text_at(place.left + 0.5 * place.width, base + (43.0 if turned else 34.0), plot.x.label, 'text-anchor="middle"')
-    )
+    middle, below = place.left + 0.5 * place.width, base + (43.0 if turned else 34.0)
+    parts.append(text_at(middle, below, plot.x.label, 'text-anchor="middle"'))
     if labelled and plot.y.label:
-        x, y = (
-            place.left - LETTER * max((len(text) for _, text in y_ticks), default=0) - 19.0,
-            place.top + 0.5 * place.height,
-        )
+        x = place.left - LETTER * max((len(text) for _, text in y_ticks), default=0) - 19.0
+        y = place.top + 0.5 * place.height
         parts.append(text_at(x, y, plot.y.label, f'text-anchor="middle" transform="rotate(-90 {x:.1f} {y:.1f})"'))
     return "".join(parts)
 
@@ -238,23 +224,14 @@ def _bar(scale: ColourScale, x: float, y: float, height: float) -> str:
         f'<path d="M{x:.1f} {y + height - each * (k + 1):.2f}h12v{each + 0.4:.2f}h-12z" fill="{colour}"/>'
         for k, colour in enumerate(colours)
     )
-    ticks = [
-        (v, t)
-        for v, t in linear_ticks(scale.low, scale.high, max(2, int(height // 60)))
-        if scale.low <= v <= scale.high
-    ]
     labels = "".join(
         text_at(x + 17.0, y + height * (scale.high - value) / (scale.high - scale.low) + 4.0, text, f'fill="{QUIET}"')
-        for value, text in ticks
+        for value, text in linear_ticks(scale.low, scale.high, max(2, int(height // 60)))
+        if scale.low <= value <= scale.high
     )
     middle = y + 0.5 * height
-    return (
-        cells
-        + labels
-        + text_at(
-            x + 62.0, middle, scale.label, f'text-anchor="middle" transform="rotate(-90 {x + 62.0:.1f} {middle:.1f})"'
-        )
-    )
+    turn = f'text-anchor="middle" transform="rotate(-90 {x + 62.0:.1f} {middle:.1f})"'
+    return cells + labels + text_at(x + 62.0, middle, scale.label, turn)
 
 
 def text_at(x: float, y: float, text: str, more: str = "") -> str:

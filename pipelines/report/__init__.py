@@ -1,7 +1,5 @@
 """The report for people: one HTML file per run that opens without a network."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Shares of the contributions to an uncertainty, as bars."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from html import escape
 

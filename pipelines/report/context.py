@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cached_property
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
@@ -65,13 +65,9 @@ class ReportContext:
         """The units that were not refused, by slot."""
         return [unit for unit in self.units if unit.outcome != "refused"]
 
-    def limit(self, figure: str) -> float:
-        """The limit of a figure, in the figure's unit; nan where it has none."""
-        return float(self.about["limits"]["figures"].get(figure, {}).get("max", np.nan))
-
-    def least(self, figure: str) -> float:
-        """The least value of a figure, in the figure's unit; nan where it has none."""
-        return float(self.about["limits"]["figures"].get(figure, {}).get("min", np.nan))
+    def limit(self, figure: str, end: Literal["max", "min"] = "max") -> float:
+        """The limit of a figure, or its least value, in the figure's unit; nan where it has none."""
+        return float(self.about["limits"]["figures"].get(figure, {}).get(end, np.nan))
 
 
 class UnitContext:

@@ -1,7 +1,5 @@
 """The report of a diagnosis: one HTML file that opens without a network."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Charts of a diagnosis: model and measurement, residuals on the sphere and against recorded quantities, errors by version."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, Literal, cast
 
@@ -10,19 +8,8 @@ from scipy import stats
 
 from inertial.arrays import Array, Flags, Index
 from inertial.state import State
-from pipelines.drawing.chart import (
-    Chart,
-    Plot,
-    PlotAxis,
-    Role,
-    Symbol,
-    Trace,
-    between,
-    density,
-    level,
-    shortened,
-    symmetric,
-)
+from pipelines.drawing import Chart, Plot, PlotAxis, Trace
+from pipelines.drawing.chart import Role, Symbol, between, density, level, shortened, symmetric
 from pipelines.drawing.mollweide import project, sphere
 from pipelines.report.residual_table import ResidualTable
 from pipelines.report.residuals import DriverValues, LotResiduals, direction

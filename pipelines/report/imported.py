@@ -1,7 +1,5 @@
 """The report of an import that was fitted: verdict with pictures, coefficients, figures against limits, certificates, budget."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 from inertial.quantities import ANGLE_COLUMNS, FORCE_COLUMNS

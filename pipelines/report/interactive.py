@@ -4,8 +4,6 @@ The bundle stands compressed in the page, once. The page's policy admits this bu
 hashes, and no other script; nothing is loaded from anywhere.
 """
 
-from __future__ import annotations
-
 import json
 import re
 from base64 import b64encode

@@ -1,7 +1,5 @@
 """Allan deviation, another statistic or spectrum of a record as a picture, and as one HTML page with its tables."""
 
-from __future__ import annotations
-
 from typing import Any, cast
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Numbers for people: as many digits as their uncertainty supports, no more; columns of numbers side by side."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping

@@ -1,7 +1,5 @@
 """The panels of a report: each is one module of a package and is found there."""
 
-from __future__ import annotations
-
 from collections import Counter
 from functools import cache
 from importlib import import_module

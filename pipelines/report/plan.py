@@ -1,7 +1,5 @@
 """The page of a plan: one HTML file that opens without a network."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -153,11 +151,8 @@ def _grouped(cosines: Array) -> list[int]:
     like = np.maximum(cosines, cosines.T)
     left = set(range(len(like)))
     order = [0]
-    left.discard(0)
-    while left:
-        best = max(left, key=lambda k: float(like[order[-1], k]))
-        order.append(best)
-        left.discard(best)
+    while left := left - {order[-1]}:
+        order.append(max(left, key=lambda k: float(like[order[-1], k])))
     return order
 
 
@@ -165,11 +160,10 @@ def sight_chart(effects: list[dict[str, Any]]) -> Chart:
     """Remaining fraction v of every effect by axis."""
     shown = sorted(effects, key=lambda row: row["left"])
     place = np.arange(len(shown), dtype=float)
+    fractions = np.array([row["left_by_axis"] for row in shown]).T
     traces = [
-        Trace(
-            f"sensor axis {axis}", np.array([row["left_by_axis"][k] for row in shown]), place + 0.2 * (1 - k), role=axis
-        )
-        for k, axis in enumerate(AXES[: len(shown[0]["left_by_axis"]) if shown else 0])
+        Trace(f"sensor axis {axis}", left, place + 0.2 * (1 - k), role=axis)
+        for k, (axis, left) in enumerate(zip(AXES, fractions, strict=False))
     ]
     across = PlotAxis("v, fraction of the effect that remains after the model", low=-0.02, high=1.02)
     along = PlotAxis("", names=tuple(str(row["effect"]) for row in shown), low=-0.6, high=len(shown) - 0.4)

@@ -1,7 +1,5 @@
 """The content of a recording as a picture and as a page: its axes, static intervals, and faults of samples."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from inertial.arrays import Array

@@ -1,7 +1,5 @@
 """Residuals of a lot with all quantities recorded with its dwells, as plain arrays for charts and other processes."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -17,15 +15,8 @@ from inertial.estimation.model import Model
 from inertial.estimation.problem import Problem
 from inertial.estimation.refinement import terms_of
 from inertial.quantities import shown_factor
-from pipelines.report.residuals import (
-    FORCE_LABEL,
-    LABELS,
-    axes_of,
-    direction,
-    quantities_of_added,
-    recorded_quantities,
-    residuals_of_model,
-)
+from pipelines.report import residuals
+from pipelines.report.residuals import FORCE_LABEL, LABELS, axes_of, direction, residuals_of_model
 from pipelines.tables.dwells import Measured, lot_of, measured
 from schemas.errors import DataRejected
 
@@ -69,7 +60,7 @@ def residual_table(measurement: Measured, diagnosis: Diagnosis, units: tuple[str
     """
     problem = diagnosis.base.problem
     state = problem.lot.state
-    drivers = {one.name: (one.label, one.values) for one in recorded_quantities(problem)}  # noqa: PD011 - no table of pandas
+    drivers = {one.name: (one.label, one.values) for one in residuals.recorded_quantities(problem)}  # noqa: PD011 - no table of pandas
     shape = (len(units), problem.n)
     drivers["force"] = (FORCE_LABEL, np.asarray(state.force, dtype=float))
     drivers.setdefault("time_s", (LABELS["time_s"], state.time * shown_factor("time_s")))
@@ -77,7 +68,7 @@ def residual_table(measurement: Measured, diagnosis: Diagnosis, units: tuple[str
     if state.slot is not None:
         slot = np.asarray(state.slot, dtype=float)
         drivers["slot"] = ("slot", np.broadcast_to(slot.reshape(len(units), -1)[:, :1], shape).copy())
-    of_effect, named = quantities_of_added(diagnosis)
+    of_effect, named = residuals.quantities_of_added(diagnosis)
     drivers = {one.name: (one.label, one.values) for one in of_effect if one.name != "force"} | drivers  # noqa: PD011
     first = next((name for name in (*(one.name for one in of_effect), *named) if name in drivers), "")
     turning = np.zeros(shape, dtype=np.int64)

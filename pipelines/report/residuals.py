@@ -1,7 +1,5 @@
 """Residuals of a model before and after the missing effects are added, arranged for pictures."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

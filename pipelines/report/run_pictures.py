@@ -1,7 +1,5 @@
 """Charts of a run: model and measurement of a unit, its checks and samples, the verification of the lot, the station."""
 
-from __future__ import annotations
-
 from typing import Any, Literal, cast
 
 import numpy as np

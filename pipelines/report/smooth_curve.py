@@ -1,7 +1,5 @@
 """A smooth curve through residuals with its band, as values and as marks of a chart."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from inertial.arrays import Array

@@ -1,7 +1,5 @@
 """The templates of pages, in this folder and in the modules of panels, with one style; reasons of decisions in words."""
 
-from __future__ import annotations
-
 import re
 from functools import cache
 from hashlib import sha256

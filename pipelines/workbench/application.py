@@ -1,7 +1,5 @@
 """The application: discovered pages, errors as sentences, static files, and access control."""
 
-from __future__ import annotations
-
 import asyncio
 from collections.abc import AsyncGenerator, Callable
 from contextlib import asynccontextmanager

@@ -1,7 +1,5 @@
 """Common parts of pages: the workbench, templates, figures in three formats, and errors as sentences."""
 
-from __future__ import annotations
-
 import hashlib
 import math
 import secrets
@@ -217,7 +215,7 @@ def samples_of(bench: Workbench, run: str, dwell: str) -> tuple[pd.DataFrame, st
     if rows.empty:
         raise WrongUse(f"run {stored.id} has no dwell '{dwell[:80]}'; click a residual")
     row = rows.iloc[0]
-    record = int(row["record"]) if "record" in rows.columns else int(number)
+    record = int(row.get("record", number))
     if stored.records is not None:
         tables = list(stored.records.samples({record}))
     elif "samples" in stored.tables():
@@ -228,10 +226,9 @@ def samples_of(bench: Workbench, run: str, dwell: str) -> tuple[pd.DataFrame, st
     kept = [own for one in tables if len(own := one[one["unit"] == unit])]
     if not kept:
         raise WrongUse(f"run {stored.id}: no samples of dwell {number} of unit {unit} are stored")
-    out_unit = str(row["out_unit"]) if "out_unit" in rows.columns else ""
-    pose = str(row["pose"]) if "pose" in rows.columns else ""
+    pose = str(row.get("pose", ""))
     title = f"Unit {unit}, dwell {number}{', pose ' + pose if pose else ''}"
-    return pd.concat(kept, ignore_index=True), out_unit, title
+    return pd.concat(kept, ignore_index=True), str(row.get("out_unit", "")), title
 
 
 @cache
@@ -254,17 +251,10 @@ def _environment() -> Environment:
     loader = FunctionLoader(
         lambda name: (_TEMPLATES.get(name) or files("pipelines.workbench") / "templates" / name).read_text("utf-8")
     )
-    environment = Environment(
-        loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
-    own: dict[str, Any] = {
-        "short": short,
-        "plain_reason": plain_reason,
-        "tuple_of": tuple,
-        "without_nothing": without_nothing,
-    }
-    environment.filters.update(own)
-    return environment
+    made = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    own: dict[str, Any] = {"short": short, "plain_reason": plain_reason, "tuple_of": tuple}
+    made.filters.update(own, without_nothing=without_nothing)
+    return made
 
 
 def short(text: object, most: int = 28) -> str:

@@ -3,11 +3,16 @@
 Reading needs a known host name, so that no foreign page reaches the service by its own name (DNS rebinding). Without the
 token only this machine reads: a request to a loopback name that shows no sign of a proxy, because a proxy on this machine
 passes on requests of everybody. A change also needs the same origin and the token.
+
+Browsers send a cookie to every port of a host, so the server of another port gets it. It is therefore not the token: it is a
+session that only one origin accepts, and only for reading. The proof for changes is kept in the storage of the page, which
+belongs to one origin with its port, and is never sent to another.
 """
 
-from __future__ import annotations
-
+import hashlib
+import hmac
 import secrets
+import time
 from contextlib import suppress
 from http.cookies import CookieError, SimpleCookie
 from typing import Any
@@ -17,9 +22,9 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.responses import PlainTextResponse, RedirectResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from pipelines.workbench.access import SESSION_S, change_proof, session, session_holds
 from pipelines.workbench.settings import LOOPBACK_HOSTS, WorkbenchSettings
 
+SESSION_S = 7 * 86400
 READING = frozenset({"GET", "HEAD"})
 CHANGING = frozenset({"POST", "PUT", "DELETE"})
 PROOF = "x-change-proof"
@@ -67,11 +72,9 @@ class Guard:
             await PlainTextResponse(text, 400)(scope, receive, _with_headers(send))
             return
         refusal = _refused(scope, self._settings)
-        if refusal is None and (entered := _entering(scope, self._settings)) is not None:
-            await entered(scope, receive, _with_headers(send))
-            return
-        if refusal is not None:
-            await PlainTextResponse(refusal, 403)(scope, receive, _with_headers(send))
+        answer = _entering(scope, self._settings) if refusal is None else PlainTextResponse(refusal, 403)
+        if answer is not None:
+            await answer(scope, receive, _with_headers(send))
             return
         scope["state"] = {**scope.get("state", {}), "may_change": _known(scope, self._settings)}
         await self._app(scope, receive, _with_headers(send))
@@ -204,13 +207,7 @@ def _entering(scope: Scope, settings: WorkbenchSettings) -> RedirectResponse | P
     target = f"{quote(scope['path'])}{'?' + rest if rest else ''}#change={change_proof(settings.token, bound, value)}"
     answer = RedirectResponse(target, 303)
     answer.set_cookie(
-        settings.cookie,
-        value,
-        max_age=SESSION_S,
-        httponly=True,
-        samesite="strict",
-        secure=settings.secure,
-        path="/",
+        settings.cookie, value, max_age=SESSION_S, httponly=True, samesite="strict", secure=settings.secure, path="/"
     )
     return answer
 
@@ -225,3 +222,29 @@ def _with_headers(send: Send) -> Send:
         await send(message)
 
     return sending
+
+
+def session(token: str, origin: str) -> str:
+    """A new session of a browser for one origin: time of its end, a random number, and their code."""
+    content = f"{int(time.time()) + SESSION_S}.{secrets.token_hex(16)}"
+    return f"{content}.{_code(token, 'session', origin, content)}"
+
+
+def session_holds(token: str, origin: str, value: str) -> bool:
+    """Whether this service gave the session, for this origin, and it has not ended."""
+    content, _, code = value.rpartition(".")
+    end = content.partition(".")[0]
+    return (
+        hmac.compare_digest(code.encode(), _code(token, "session", origin, content).encode())
+        and end.isdecimal()
+        and time.time() < int(end)
+    )
+
+
+def change_proof(token: str, origin: str, value: str) -> str:
+    """What the page of a session sends with its changes."""
+    return _code(token, "change", origin, value)
+
+
+def _code(token: str, *parts: str) -> str:
+    return hmac.new(token.encode(), "\0".join(parts).encode(), hashlib.sha256).hexdigest()

@@ -1,18 +1,45 @@
 """Settings of a workbench."""
 
-from __future__ import annotations
-
+import math
+import re
 import secrets
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from pipelines.workbench.access import refuse_weak
 from schemas.errors import WrongUse
 
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
 LOOPBACK_HOSTS = frozenset({*LOOPBACK, "[::1]"})
 """Names of this machine in the header Host."""
 PORT = 8321
+BITS = 128
+FEWEST_DIFFERENT = 6  # a random token of 128 bits has fewer different characters once in 10 000 in digits, never else
+ALPHABETS = ((re.compile(r"[0-9]+"), 10), (re.compile(r"[0-9a-f]+|[0-9A-F]+"), 16), (re.compile(r"[0-9a-z]+"), 36),
+             (re.compile(r"[A-Za-z0-9._~-]+"), 66))  # fmt: skip
+"""Characters that an address can have without quoting, the smallest alphabet first."""
+
+
+def refuse_weak(token: str) -> None:
+    """Refuse a token that can be guessed.
+
+    Raises
+    ------
+    WrongUse
+        It has fewer than 128 bits, repeats few characters, or has characters that an address cannot have.
+    """
+    size = next((size for pattern, size in ALPHABETS if pattern.fullmatch(token)), 0)
+    bits = len(token) * math.log2(size) if size else 0.0
+    if bits >= BITS and len(set(token)) >= FEWEST_DIFFERENT:
+        return
+    found = (
+        "characters other than letters, digits and . _ ~ -" if token and not size
+        else f"a token of {len(token)} characters, {bits:.0f} bits at most" if bits < BITS
+        else f"a token of {len(set(token))} different characters"
+    )  # fmt: skip
+    raise WrongUse(
+        f"workbench: {found} was found, a random token of at least {BITS} bits is needed (32 hexadecimal digits, or 22 letters "
+        "and digits); make one with 'openssl rand -hex 16' and put it into TUMBLELINE_WORKBENCH_TOKEN, or leave it out"
+    )
 
 
 @dataclass(frozen=True)

@@ -3,10 +3,8 @@
 ``parse`` after ``address`` is the identity. Invalid parts of an address are ignored, with a message on the page.
 """
 
-from __future__ import annotations
-
 import shlex
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Annotated, Any, ClassVar, Literal, Self
 from urllib.parse import urlencode
 
@@ -17,6 +15,7 @@ from schemas.toml_files import reason_of
 
 Text = Annotated[str, Field(max_length=200)]
 Texts = Annotated[tuple[Annotated[str, Field(min_length=1, max_length=400)], ...], Field(max_length=60)]
+Day = Annotated[str, Field(pattern=r"^(\d{4}-\d\d-\d\d)?$")]
 Outcome = Literal["", "pass", "fail", "refused"]
 
 ROWS = 50
@@ -40,6 +39,11 @@ def like(text: str) -> str:
     return f"{quoted(f'%{plain}%')} ESCAPE '!'"
 
 
+def options(values: Mapping[str, str]) -> list[str]:
+    """Options of a command line with their values; those without one are omitted."""
+    return [word for name, value in values.items() if value for word in (name, value)]
+
+
 class PageState(BaseModel):
     """Base of the states."""
 
@@ -52,9 +56,7 @@ class PageState(BaseModel):
         values: dict[str, Any] = {}
         for name, value in query:
             if name in cls.model_fields:
-                several = cls.model_fields[name].annotation is not None and "tuple" in str(
-                    cls.model_fields[name].annotation
-                )
+                several = "tuple" in str(cls.model_fields[name].annotation)
                 values[name] = (*values.get(name, ()), value) if several else value
         problems: list[str] = []
         while True:
@@ -108,8 +110,8 @@ class UnitsPage(PageState):
     outcome: Outcome = ""
     station: Text = ""
     device: Text = ""
-    since: Annotated[str, Field(pattern=r"^(\d{4}-\d\d-\d\d)?$")] = ""
-    until: Annotated[str, Field(pattern=r"^(\d{4}-\d\d-\d\d)?$")] = ""
+    since: Day = ""
+    until: Day = ""
     order: Literal["measured", "unit", "outcome", "station"] = "measured"
     page: Annotated[int, Field(ge=1, le=100_000)] = 1
 
@@ -198,20 +200,14 @@ class MissingPage(PageState):
         """The diagnosis."""
         if not self.source:
             return []
-        words = ["diagnose", self.source]
-        words += ["--effects", ",".join(self.judged)] if self.judged else []
-        for text in self.formula:
-            words += ["--formula", text]
-        return words + (["--leave-out", ",".join(self.without)] if self.without else [])
+        formulas = [word for text in self.formula for word in ("--formula", text)]
+        words = ["diagnose", self.source, *options({"--effects": ",".join(self.judged)}), *formulas]
+        return words + options({"--leave-out": ",".join(self.without)})
 
     def ladder_command(self, archive: str) -> str:
         """The command line for the errors of the model in its present state."""
-        arguments = self.arguments()
-        if not arguments:
-            return ""
-        arguments[0] = "compare"
-        arguments += ["--fresh", self.fresh] if self.fresh else []
-        return shlex.join(["tumbleline", *arguments, "--archive", archive])
+        words = self.arguments()[1:] + options({"--fresh": self.fresh})
+        return shlex.join(["tumbleline", "compare", *words, "--archive", archive]) if self.source else ""
 
 
 class UploadPage(PageState):
@@ -235,17 +231,19 @@ class UploadPage(PageState):
         """The import."""
         if not self.file:
             return []
-        words = ["import", self.file, "--map", ",".join(self.columns)] if self.columns else ["import", self.file]
-        units = [f"output={self.output}"] if self.output else []
-        units += [f"time={self.time}"] if self.time != "s" else []
-        units += [f"temperature={self.temperature}"] if self.temperature != "degC" else []
-        words += ["--units", ",".join(units)] if units else []
-        words += ["--unit", self.serial] if self.serial else []
-        words += ["--rows", self.rows] if self.rows != "samples" else []
-        words += ["--rate", repr(self.rate)] if self.rate else []
-        words += ["--local-g", repr(self.gravity)] if self.gravity else []
-        words += ["--poses", self.poses] if self.poses else []
-        return words + (["--fit", self.fit] if self.fit else [])
+        units = {"output": self.output, "time": self.time, "temperature": self.temperature}
+        usual = {("output", ""), ("time", "s"), ("temperature", "degC")}
+        values = {
+            "--map": ",".join(self.columns),
+            "--units": ",".join(f"{name}={unit}" for name, unit in units.items() if (name, unit) not in usual),
+            "--unit": self.serial,
+            "--rows": self.rows if self.rows != "samples" else "",
+            "--rate": repr(self.rate) if self.rate else "",
+            "--local-g": repr(self.gravity) if self.gravity else "",
+            "--poses": self.poses,
+            "--fit": self.fit,
+        }
+        return ["import", self.file, *options(values)]
 
 
 class ModelsPage(PageState):
@@ -277,7 +275,7 @@ class PlanPage(PageState):
 
     def arguments(self) -> list[str]:
         """The plan."""
-        words = ["plan", self.recipe, *(["--effects", ",".join(self.effects)] if self.effects else [])]
+        words = ["plan", self.recipe, *options({"--effects": ",".join(self.effects)})]
         return words + [word for text in self.pose for word in ("--pose", text)]
 
 
@@ -297,18 +295,18 @@ class AuditPage(PageState):
     """Drift and calibrations due."""
 
     PATH: ClassVar[str] = "/audit"
-    since: Annotated[str, Field(pattern=r"^(\d{4}-\d\d-\d\d)?$")] = ""
-    until: Annotated[str, Field(pattern=r"^(\d{4}-\d\d-\d\d)?$")] = ""
+    since: Day = ""
+    until: Day = ""
     device: Text = ""
     station: Text = ""
     finding: Text = ""
 
     def arguments(self) -> list[str]:
         """The audit."""
-        words = ["audit"]
-        for name in ("since", "until", "device", "station"):
-            words += [f"--{name}", getattr(self, name)] if getattr(self, name) else []
-        return words
+        return [
+            "audit",
+            *options({f"--{name}": getattr(self, name) for name in ("since", "until", "device", "station")}),
+        ]
 
 
 class DiscoverPage(PageState):
@@ -323,7 +321,7 @@ class DiscoverPage(PageState):
 
     def arguments(self) -> list[str]:
         """The search."""
-        return ["discover", *(["--device", self.device] if self.device else [])]
+        return ["discover", *options({"--device": self.device})]
 
 
 class OperatorPage(PageState):

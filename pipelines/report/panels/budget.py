@@ -1,15 +1,12 @@
 """The uncertainty budget of the lot: references, shares, coverage by verification, and the risk of decisions."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 
 from pipelines.report.budget_plots import shares_plot
 from pipelines.report.context import ReportContext
 from pipelines.report.numbers import significant
-from pipelines.report.templates import fill
-from pipelines.stages.figures import FIGURES
+from pipelines.report.templates import figure_name, fill
 from pipelines.stages.uncertainty.tables import LABELS
 from pipelines.tables.frames import rows_of
 from schemas.uncertainty import NEEDED
@@ -83,14 +80,10 @@ def _seen(sums: pd.DataFrame) -> list[dict[str, str]]:
     rows = sums[sums["quantity"] == "bias_error"] if len(sums) else sums
     if len(rows):  # the worst axis of each unit
         rows = rows.loc[rows.groupby("unit", sort=False)["u_b"].idxmax()]
+    columns = {"shown": "shown", "met": "u_b", "unseen": "unseen"}
     return [
-        {
-            "unit": str(row["unit"]),
-            "axis": str(row["axis"]),
-            "shown": significant(row["shown"]),
-            "met": significant(row["u_b"]),
-            "unseen": significant(row["unseen"]),
-        }
+        {"unit": str(row["unit"]), "axis": str(row["axis"])}
+        | {name: significant(row[column]) for name, column in columns.items()}
         for row in rows_of(rows)
     ]
 
@@ -100,7 +93,7 @@ def _risks(table: pd.DataFrame | None) -> list[dict[str, str]]:
         return []
     return [
         {
-            "title": FIGURES[row["figure"]].label if row["figure"] in FIGURES else row["figure"],
+            "title": figure_name(row["figure"]) or row["figure"],
             **{name: significant(row[name]) for name in ("limit", "accept", "mean", "process", "u")},
             **{name: _percent(row[name]) for name in ("pfa", "pfr")},
             "largest": _percent(row["largest_pfa"]),

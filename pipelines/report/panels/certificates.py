@@ -1,7 +1,5 @@
 """Certificates of the run's units, as they are in the ledger."""
 
-from __future__ import annotations
-
 from pipelines.report.context import ReportContext
 from pipelines.report.templates import fill
 

@@ -1,7 +1,5 @@
 """Pauses, door openings and repeated dwells of the run."""
 
-from __future__ import annotations
-
 from pipelines.capture.interruptions import interruptions
 from pipelines.report.context import ReportContext
 from pipelines.report.templates import fill

@@ -1,7 +1,5 @@
 """Whether the model of the run is adequate, with residual, noise and probability, and the next step."""
 
-from __future__ import annotations
-
 from inertial.uncertainty.rounding import chance
 from pipelines.jobs.adequacy import adequacy_of
 from pipelines.report.context import ReportContext

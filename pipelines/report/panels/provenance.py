@@ -1,7 +1,5 @@
 """Run, capture, station, libraries and code that the numbers come from."""
 
-from __future__ import annotations
-
 from pipelines.report.context import ReportContext
 from pipelines.report.templates import fill
 

@@ -1,7 +1,5 @@
 """Model, dwell, static record and local gravity of the recipe."""
 
-from __future__ import annotations
-
 from pipelines.report.context import ReportContext
 from pipelines.report.templates import fill
 

@@ -1,7 +1,5 @@
 """Whether the residuals of the run contradict what is stated of the table, with stated and found values."""
 
-from __future__ import annotations
-
 from pipelines.jobs.references import UNITS, contradiction, references_of, unseen
 from pipelines.report.context import ReportContext
 from pipelines.report.numbers import significant

@@ -1,7 +1,5 @@
 """Recipe, device and date of the run, its yield, poses, temperatures and limits."""
 
-from __future__ import annotations
-
 from pipelines.report.context import ReportContext
 from pipelines.report.templates import fill
 

@@ -1,7 +1,5 @@
 """The panels of each unit, in sections that can be opened."""
 
-from __future__ import annotations
-
 from pipelines.report.context import ReportContext
 from pipelines.report.panel import rendered
 from pipelines.report.templates import fill

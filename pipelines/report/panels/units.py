@@ -1,7 +1,5 @@
 """Result, grade and main figures of every unit, with the reasons of each failure."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from pipelines.report.context import ReportContext, UnitContext

@@ -1,7 +1,5 @@
 """Error of every unit on poses that the fit has not used, against the limit."""
 
-from __future__ import annotations
-
 from pipelines.report.context import ReportContext
 from pipelines.report.interactive import figure_of
 from pipelines.report.run_pictures import lot_chart

@@ -1,6 +1,6 @@
 """Uncertainty of a unit's bias by measurand."""
 
-from __future__ import annotations
+from typing import Any
 
 import numpy as np
 
@@ -35,11 +35,8 @@ def render(unit: UnitContext) -> str | None:
     if rows is None or rows.empty or "bias_record_u_ug" not in rows or not np.isfinite(rows["bias_record_u_ug"]).all():
         return None
     by_axis, coverage = {row["axis"]: row for row in rows_of(rows)}, unit.report.coverage
-    lines = [
-        {
-            "name": name,
-            "cells": {axis: significant(coverage * by_axis[axis][column]) or "not stated" for axis in by_axis},
-        }
-        for column, name in MEASURANDS.items()
-    ]
+    lines: list[dict[str, Any]] = []
+    for column, name in MEASURANDS.items():
+        cells = {axis: significant(coverage * row[column]) or "not stated" for axis, row in by_axis.items()}
+        lines.append({"name": name, "cells": cells})
     return fill(TEMPLATE, lines=lines, axes=axes_of(lines), coverage=f"{coverage:g}")

@@ -1,7 +1,5 @@
 """Uncertainty of every quantity of a unit, with its largest contributions."""
 
-from __future__ import annotations
-
 import re
 from typing import Any
 

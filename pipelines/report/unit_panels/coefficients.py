@@ -1,7 +1,5 @@
 """Coefficients of a unit with their expanded uncertainty."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

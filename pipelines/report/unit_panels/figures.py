@@ -1,15 +1,12 @@
 """Figures of merit of a unit against their limits: three digits, as everywhere that a run is shown, and U to two."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
 
 from pipelines.report.context import UnitContext
 from pipelines.report.numbers import significant
-from pipelines.report.templates import fill
-from pipelines.stages.figures import FIGURES
+from pipelines.report.templates import figure_name, fill
 from pipelines.tables.frames import rows_of
 
 ORDER = 20
@@ -39,7 +36,7 @@ def _line(row: dict[str, Any]) -> dict[str, Any]:
     else:  # both are empty without a limit
         limit, margin = significant(most), significant(most - abs(row["value"]))
     return {
-        "title": FIGURES[row["figure"]].label if row["figure"] in FIGURES else row["figure"],
+        "title": figure_name(row["figure"]) or row["figure"],
         "value": significant(row["value"]),
         "uncertainty": significant(row["uncertainty"], 2) if row["uncertainty"] > 0.0 else "",
         "limit": limit,

@@ -1,7 +1,5 @@
 """Measurement and model, residuals, verification and Allan deviation of a unit."""
 
-from __future__ import annotations
-
 from pipelines.report.context import UnitContext
 from pipelines.report.interactive import figure_of
 from pipelines.report.run_pictures import check_chart, model_chart

@@ -1,7 +1,5 @@
 """Noise terms of a unit's static record."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Figures, findings and pictures of a unit's test procedures."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -68,7 +66,7 @@ def picture(procedure: Evaluated, content: dict[str, Any], points: pd.DataFrame)
 
 def _line(unit: UnitContext, row: dict[str, Any], meanings: dict[str, str]) -> dict[str, Any]:
     known = bool(row["identified"])
-    limit, least = unit.report.limit(row["figure"]), unit.report.least(row["figure"])
+    limit, least = unit.report.limit(row["figure"]), unit.report.limit(row["figure"], "min")
     limited = bool(np.isfinite(limit) or np.isfinite(least))
     decided = unit.tables["figures"]
     outcome = decided.loc[decided["figure"] == row["figure"], "outcome"].tolist()

@@ -1,7 +1,5 @@
 """The audit: findings with their evidence, calibrations due, charts of stations and drifts."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What the lots of the archive show together: discoveries with their levels, evidence by effect and driver, reach."""
 
-from __future__ import annotations
-
 from fastapi import APIRouter, Request
 from starlette.responses import Response
 

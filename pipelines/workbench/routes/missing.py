@@ -1,7 +1,5 @@
 """Missing effects: adequacy of the model, drivers of the residual, effects that explain it, the next measurement."""
 
-from __future__ import annotations
-
 from functools import partial
 
 from fastapi import APIRouter, Request

@@ -1,7 +1,5 @@
 """Models: the versions of a model file, its effect on the archive's lots, and its release to the line."""
 
-from __future__ import annotations
-
 from datetime import UTC, datetime
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Lots on the station: slots as tiles, scan of serials, answers to questions, results before unloading."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -125,10 +123,10 @@ def start(request: Request, body: RequestBody) -> JSONResponse:
         raise WrongUse("lot: no serial number was scanned, one at least is needed; scan a unit into its slot")
     faults = str(body.get("fault", "")).split()
     repeat = str(body.get("repeat", "0") or "0")
-    if not repeat.isdecimal() or not repeat.isascii() or len(repeat) > 6:
+    if (repeats := _count(repeat, 6)) < 0:
         raise WrongUse(f"lot: repeat '{repeat[:20]}', a whole number from 0 on is needed; correct it")
     slots, units = zip(*sorted(filled.items()), strict=True)
-    lot_request = LotRequest(recipe, station.file, units, slots, repeat=int(repeat), faults=tuple(faults))
+    lot_request = LotRequest(recipe, station.file, units, slots, repeat=repeats, faults=tuple(faults))
     lot = lots.start(bench.settings, lot_request)
     return JSONResponse({"address": OperatorPage(lot=lot.id).address()})
 
@@ -136,10 +134,10 @@ def start(request: Request, body: RequestBody) -> JSONResponse:
 @router.post("/operator/{name}/answer")
 def answer(request: Request, name: str, body: RequestBody) -> JSONResponse:
     """The answer to the question on the page; refused if the question has changed."""
-    number = str(body.get("number", ""))
-    if not number.isdecimal() or not number.isascii() or len(number) > 6:
+    number = _count(str(body.get("number", "")), 6)
+    if number < 0:
         raise WrongUse("lot: the number of the question is missing; reload the page")
-    lots.answer(workbench_of(request).settings, name, int(number), str(body.get("answer", "")))
+    lots.answer(workbench_of(request).settings, name, number, str(body.get("answer", "")))
     return JSONResponse({"address": OperatorPage(lot=name).address()})
 
 
@@ -153,9 +151,14 @@ def act(request: Request, name: str, action: str) -> JSONResponse:
     return JSONResponse({"address": OperatorPage(lot=lot.id).address()})
 
 
+def _count(text: str, digits: int) -> int:
+    """A whole number of so many decimal digits at most; −1 for any other text."""
+    return int(text) if text.isascii() and text.isdecimal() and len(text) <= digits else -1
+
+
 def _slot(text: str, slots: int) -> int:
     """The number of a slot of the station, counted from 0 as on the page."""
-    number = int(text) if text.isascii() and text.isdecimal() and len(text) <= 4 else -1
+    number = _count(text, 4)
     if not 0 <= number < slots or text != str(number):
         raise WrongUse(
             f"lot: slot '{text[:20]}', a slot from 0 to {slots - 1} of the station is needed; reload the page"

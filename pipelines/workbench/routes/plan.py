@@ -1,7 +1,5 @@
 """The plan of a recipe: poses, temperatures, visible effects, hidden effects, and station time; poses can be moved."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

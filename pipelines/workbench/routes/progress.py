@@ -1,7 +1,5 @@
 """Start and stop of jobs, and the stream of their progress."""
 
-from __future__ import annotations
-
 import asyncio
 import json
 from collections.abc import AsyncIterator, Callable

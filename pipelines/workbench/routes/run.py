@@ -1,7 +1,5 @@
 """A run: its units, each with its result and figures."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from fastapi import APIRouter, Request
@@ -37,9 +35,8 @@ def run(request: Request) -> Response:
     for row in [] if figures is None else rows_of(figures[figures["figure"].isin(SHOWN)]):
         cells.setdefault(str(row["unit"]), {})[str(row["figure"])] = float(row["value"])
     try:
-        certificates = {
-            unit: one.sentence() for unit, one in stated(stored, [str(row["unit"]) for row in grades]).items()
-        }
+        ledger = stated(stored, [str(row["unit"]) for row in grades])
+        certificates = {unit: one.sentence() for unit, one in ledger.items()}
     except TumblelineError as problem:
         certificates = {}
         problems.append(str(problem))

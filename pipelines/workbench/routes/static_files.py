@@ -1,7 +1,5 @@
 """Scripts and styles, by addresses that change with their content; the one of Plotly is compressed already."""
 
-from __future__ import annotations
-
 import gzip
 from functools import cache
 from importlib.resources import files

@@ -1,7 +1,5 @@
 """The station of a run: temperatures and angles over its time, pauses, and duration of soaks."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from fastapi import APIRouter, Request

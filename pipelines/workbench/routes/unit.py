@@ -1,7 +1,5 @@
 """A unit of a run: model and measurement, coefficients, noise, history, certificates."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 
@@ -124,8 +122,7 @@ def _drawn(bench: Workbench, state: UnitPage, name: str) -> pd.DataFrame:
 
 def _history(bench: Workbench, serial: str) -> list[dict[str, Any]]:
     """The unit's coefficients in all its runs, with the day of each."""
-    answer = bench.index.of_unit(serial, history_question(serial))
-    rows = [dict(zip(answer.columns, row, strict=True)) for row in answer.rows]
+    rows = bench.index.of_unit(serial, history_question(serial)).documents()
     return [{**row, "day": day_of(str(row["measured"]))} for row in rows if row["measured"]]
 
 

@@ -1,7 +1,5 @@
 """Search of units and runs."""
 
-from __future__ import annotations
-
 from fastapi import APIRouter, Request
 from starlette.responses import Response
 
@@ -19,8 +17,7 @@ NEWEST = 12
 def units(request: Request) -> Response:
     """A page of units, newest first."""
     bench, state, problems = asked(request, UnitsPage)
-    answer = bench.index.ask(state.question())
-    rows = [dict(zip(answer.columns, row, strict=True)) for row in answer.rows]
+    rows = bench.index.ask(state.question()).documents()
     counts = {str(name): int(count) for name, count in bench.index.ask(yield_question(state)).rows}
     newest = bench.index.ask(newest_question(NEWEST)).rows
     infos = [info_of(bench.archive.run(str(name))) for name, _ in newest]
@@ -34,8 +31,7 @@ def units(request: Request) -> Response:
 def table(request: Request) -> Response:
     """All units of the search."""
     bench, state, _ = asked(request, UnitsPage)
-    answer = bench.index.ask(state.model_copy(update={"page": 1}).question(EVERYTHING))
-    return table_csv([dict(zip(answer.columns, row, strict=True)) for row in answer.rows], "units")
+    return table_csv(bench.index.ask(state.model_copy(update={"page": 1}).question(EVERYTHING)).documents(), "units")
 
 
 def yield_question(page: UnitsPage) -> str:

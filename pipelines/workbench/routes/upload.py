@@ -1,7 +1,5 @@
 """A file of the user: interpretation of its columns, correction, import, and coefficients."""
 
-from __future__ import annotations
-
 from fastapi import APIRouter, Request
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import JSONResponse, Response

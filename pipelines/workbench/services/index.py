@@ -3,8 +3,6 @@
 To check every file of ten thousand runs takes more than half a second, too long for each click on a page.
 """
 
-from __future__ import annotations
-
 import threading
 import time
 from pathlib import Path

@@ -4,8 +4,6 @@ A job is known by the hash of what decides its result, so that two browsers shar
 memory, the newest of them; jobs that ran when the server ended are shown as interrupted.
 """
 
-from __future__ import annotations
-
 import multiprocessing
 import queue
 import threading

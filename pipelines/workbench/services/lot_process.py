@@ -1,7 +1,5 @@
 """The process that measures one lot, with the pages as operator: ``python -m … FOLDER``."""
 
-from __future__ import annotations
-
 import os
 import signal
 import sys

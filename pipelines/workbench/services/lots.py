@@ -4,8 +4,6 @@
 created once: of two answers to one question the second is refused.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import signal

@@ -1,7 +1,5 @@
 """The model of a page, saved as the next version of a model file, with the reason."""
 
-from __future__ import annotations
-
 import getpass
 import re
 import threading

@@ -1,7 +1,5 @@
 """The work that a page needs, from its state: a browser sends the address of a page, never a request itself."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from functools import lru_cache
 from pathlib import Path
@@ -52,11 +50,8 @@ def _judging(settings: WorkbenchSettings, page: MissingPage) -> dict[str, Any]:
 def settled(settings: WorkbenchSettings, page: MissingPage) -> MissingPage:
     """The page with the source's own name, and with the starting model if none is given."""
     name = sources.resolve(settings, page.source, "source")
-    if page.effects:
-        return page.model_copy(update={"source": name})
-    return page.model_copy(
-        update={"source": name, "effects": _starting_model(settings.archive, name, sources.stamp(settings, name))}
-    )
+    effects = page.effects or _starting_model(settings.archive, name, sources.stamp(settings, name))
+    return page.model_copy(update={"source": name, "effects": effects})
 
 
 @lru_cache(maxsize=64)
@@ -81,22 +76,13 @@ def default_model_of(archive: str, name: str) -> tuple[str, ...]:
 
 def plan(settings: WorkbenchSettings, page: PlanPage) -> Request:
     """The plan of a recipe."""
-    if page.recipe not in recipes(settings):
-        raise WrongUse(
-            f"plan: no recipe is called '{page.recipe[:60]}'; {did_you_mean(page.recipe, recipes(settings))}"
-        )
-    place = Path(page.recipe)
-    stamp = place.stat().st_mtime_ns if place.is_file() else 0
-    station = str(settings.station) if settings.station else ""
-    content = {
-        "archive": settings.archive,
-        "recipe": page.recipe,
-        "effects": list(page.effects),
-        "pose": list(page.pose),
-        "station": station,
-        "stamp": stamp,
-    }
-    return f"plan of {page.recipe}", content
+    known, place = recipes(settings), Path(page.recipe)
+    if page.recipe not in known:
+        raise WrongUse(f"plan: no recipe is called '{page.recipe[:60]}'; {did_you_mean(page.recipe, known)}")
+    return f"plan of {page.recipe}", {
+        "archive": settings.archive, "recipe": page.recipe, "effects": list(page.effects), "pose": list(page.pose),
+        "station": str(settings.station or ""), "stamp": place.stat().st_mtime_ns if place.is_file() else 0,
+    }  # fmt: skip
 
 
 def what_if(settings: WorkbenchSettings, page: ModelsPage) -> Request:

@@ -1,7 +1,5 @@
 """Available sources: runs of the archive, and files of dwells in the workbench's folder; no other files."""
 
-from __future__ import annotations
-
 import os
 from dataclasses import dataclass
 from pathlib import Path

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pandas as pd
 
 from pipelines.importers.exchange import is_exchange
@@ -190,36 +191,26 @@ def _read_as(plain: UploadReading, table: pd.DataFrame, page: UploadPage) -> Upl
     from pipelines.importers import record
 
     data = record.imported(table, mapping_of(page.model_dump()), Path(page.file).name)
-    rate = 0.0
-    if data.samples is not None and len(data.samples) > 1:
-        rate = record_rate(data.samples)
-    dwells = [] if data.dwells is None else rows_of(data.dwells)
+    time = np.zeros(0) if data.samples is None else data.samples["time_s"].to_numpy()
+    span = float(np.sum(time[-1:] - time[:1]))
     return replace(
-        plain, units=tuple(data.units), out_unit=data.out_unit, remarks=data.remarks, rate_hz=rate,
-        samples=0 if data.samples is None else len(data.samples), dwells=tuple(dwells),
+        plain, units=tuple(data.units), out_unit=data.out_unit, remarks=data.remarks, samples=len(time),
+        rate_hz=(len(time) - 1) / span if span > 0.0 else 0.0,
+        dwells=() if data.dwells is None else tuple(rows_of(data.dwells)),
     )  # fmt: skip
-
-
-def record_rate(samples: pd.DataFrame) -> float:
-    """Samples in a second, by the whole record."""
-    time = samples["time_s"].to_numpy()
-    span = float(time[-1] - time[0])
-    return (len(time) - 1) / span if span > 0.0 else 0.0
 
 
 def mapping_of(request: Mapped[str, Any]) -> Any:
     """The mapping of an import, from the values of the page."""
     from pipelines.importers import mapping
 
-    units = {"output": request["output"], "time": request["time"], "temperature": request["temperature"]}
     keys: dict[str, Any] = {
         "columns": mapping.pairs(",".join(request["columns"]), "columns"),
-        "units": units,
+        "units": {name: request[name] for name in ("output", "time", "temperature")},
         "rows": request["rows"],
     }
-    keys |= {"unit": request["serial"]} if request["serial"] else {}
-    keys |= {"rate_hz": request["rate"]} if request["rate"] else {}
-    keys |= {"local_gravity_m_s2": request["gravity"]} if request["gravity"] else {}
+    stated = {"unit": "serial", "rate_hz": "rate", "local_gravity_m_s2": "gravity"}
+    keys |= {key: request[name] for key, name in stated.items() if request[name]}
     keys |= {"poses": mapping.pairs(request["poses"], "poses")} if request["poses"] else {}
     return mapping.build(keys, "upload")
 

@@ -1,7 +1,5 @@
 """The work of jobs, in separate processes: each calls the functions of a command. Results can be pickled."""
 
-from __future__ import annotations
-
 import traceback
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -115,10 +113,8 @@ def ladder(request: Mapping[str, Any], report_progress: ReportProgress) -> list[
     if request["fresh"]:
         fresh, fresh_history, _ = dwells_and_history(request["fresh"], "", request["archive"])
     added = list(request["added"])
-    versions = [
-        Version(k + 1, (*start, *added[:k]), tuple(added[k - 1 : k]) if k else (), (), None)
-        for k in range(len(added) + 1)
-    ]
+    last = [(), *((effect,) for effect in added)]
+    versions = [Version(k + 1, (*start, *added[:k]), new, (), None) for k, new in enumerate(last)]
     fitted = count()
 
     def working() -> nullcontext[None]:
@@ -174,13 +170,10 @@ def pose_rows(as_it_stands: Recipe, recipe: Recipe) -> list[dict[str, Any]]:
     rows: dict[str, dict[str, Any]] = {}
     for use in ("poses", "verification"):
         for old, new in zip(getattr(as_it_stands, use), getattr(recipe, use), strict=True):
-            rows[new.name] = {
-                "name": new.name,
-                "use": "fit" if use == "poses" else "verification",
-                "outer_deg": new.outer_deg,
-                "inner_deg": new.inner_deg,
-                "moved": (old.outer_deg, old.inner_deg) != (new.outer_deg, new.inner_deg),
-            }
+            angles = {"outer_deg": new.outer_deg, "inner_deg": new.inner_deg}
+            moved = (old.outer_deg, old.inner_deg) != (new.outer_deg, new.inner_deg)
+            kind = "fit" if use == "poses" else "verification"
+            rows[new.name] = {"name": new.name, "use": kind, **angles, "moved": moved}
     return list(rows.values())
 
 
@@ -222,13 +215,12 @@ def audited(request: Mapping[str, Any], report_progress: ReportProgress) -> dict
         charts["yield"] = pictures.yield_chart(months)
     if archive_audit.due.row.size:
         charts["due"] = pictures.due_chart(archive_audit)
-    for number, one in enumerate(sorted(archive_audit.charts, key=lambda one: one.p_value)[:MOST_CHARTS]):
-        charts[f"control-{number}"] = pictures.control_chart(one)
-    moved = sorted((*archive_audit.stations, *archive_audit.slots), key=lambda one: -len(one.changes))
-    for number, one in enumerate(moved[:MOST_CHARTS]):
-        charts[f"station-{number}"] = pictures.series_chart(one)
-    for number, one in enumerate(furthest(archive_audit, MOST_CHARTS)):
-        charts[f"drift-{number}"] = pictures.drift_chart(archive_audit, one)
+    plainest = sorted(archive_audit.charts, key=lambda one: one.p_value)[:MOST_CHARTS]
+    moved = sorted((*archive_audit.stations, *archive_audit.slots), key=lambda one: -len(one.changes))[:MOST_CHARTS]
+    charts |= {f"control-{number}": pictures.control_chart(one) for number, one in enumerate(plainest)}
+    charts |= {f"station-{number}": pictures.series_chart(one) for number, one in enumerate(moved)}
+    drifts = enumerate(furthest(archive_audit, MOST_CHARTS))
+    charts |= {f"drift-{number}": pictures.drift_chart(archive_audit, one) for number, one in drifts}
     listed = findings(archive_audit)
     evidence = {address_of(one): pictures.evidence_chart(archive_audit, one) for one in listed[:MOST_EVIDENCE]}
     return {

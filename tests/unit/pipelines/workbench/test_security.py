@@ -137,7 +137,7 @@ def test_a_session_is_of_one_origin_and_ends(
     end, rest = cookie.partition(".")[::2]
     forged = f"{int(end) + 1}.{rest}"
     assert change(client, **own | {"cookie": f"{settings.cookie}={forged}"}).status_code == 403
-    monkeypatch.setattr("pipelines.workbench.access.time.time", lambda: float(end))
+    monkeypatch.setattr("pipelines.workbench.security.time.time", lambda: float(end))
     assert told(settings, "127.0.0.1:8321") == 403
 
 
