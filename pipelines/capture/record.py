@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.quantities import ANGLE_COLUMNS, BY_ATTRIBUTE, READINGS
 from pipelines.tables.summaries import first_outlier
 from schemas.lot import Unit
@@ -58,7 +58,7 @@ class Record:
     since_move: float = 0.0
     since_power: float = 0.0
     power_off: float | None = None
-    observations: list[dict[str, NDArray[np.float64]]] = field(default_factory=list)
+    observations: list[dict[str, Array]] = field(default_factory=list)
     recorded: dict[str, list[float]] = field(default_factory=dict)
     parts: dict[str, list[Samples]] = field(default_factory=dict)
     stored: dict[str, int] = field(default_factory=dict)
@@ -158,7 +158,7 @@ class Record:
         )
 
 
-def _joined(parts: Sequence[Samples]) -> NDArray[np.float64]:
+def _joined(parts: Sequence[Samples]) -> Array:
     """Outputs (n, m) of all parts; (0, 3) without any."""
     return np.concatenate([part.outputs for part in parts]) if parts else np.zeros((0, len(AXES)))
 

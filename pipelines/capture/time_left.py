@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from pipelines.schedule.steps import Step
 from pipelines.schedule.timing import schedule
 from schemas.recipe import Recipe
@@ -73,13 +73,13 @@ class Approach:
         lags = [lag for column in devices.T if (lag := _lag(air, column)) is not None]
         return max(lags, default=None)
 
-    def _air(self) -> NDArray[np.float64]:
+    def _air(self) -> Array:
         """Time and temperature of the air, (n, 2)."""
         rows = [(time, air) for time, air, _ in self.rows if math.isfinite(air)]
         return np.array(rows, dtype=np.float64).reshape(-1, 2)
 
 
-def _lag(air: NDArray[np.float64], device: NDArray[np.float64]) -> float | None:
+def _lag(air: Array, device: Array) -> float | None:
     """Lag of one device, s, from air (n, 2) in s and °C and the device (n,) in °C."""
     step = np.diff(air[:, 0])
     distance = air[:, 1] - device

@@ -1,7 +1,5 @@
 """The JSON documents of calibrations: certified, valid, revoked, written as certificates."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any, Literal, NotRequired
 
 from typing_extensions import TypedDict

@@ -1,7 +1,5 @@
 """Comparison of a model with measurements: the error on the run it is fitted to, on poses left out, and on a fresh run."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Diagnosis and comparison of a table of dwells against a model, as documents with the keys that other programs read."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -4,8 +4,6 @@ A required key is never renamed or left out; a key that is NotRequired may be mi
 scale, in µg.
 """
 
-from __future__ import annotations
-
 from typing import Annotated, Any, Literal, NotRequired
 
 from typing_extensions import TypedDict

@@ -1,7 +1,5 @@
 """Inputs of the judgement of a model: dwells with their history, a model, formulas, and dwells left out."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

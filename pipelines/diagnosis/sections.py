@@ -1,7 +1,5 @@
 """The tables of a diagnosis with their sentences, the same at a terminal, in a report and on a page."""
 
-from __future__ import annotations
-
 import re
 from collections import Counter
 from collections.abc import Sequence

@@ -4,8 +4,6 @@ A recipe lists the procedures of a lot in order, as tables ``[[procedures]]`` wi
 procedure: recipes, capture, the stage ``procedures``, limits, the report and the reference read :data:`PROCEDURES`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from importlib import import_module
 from inspect import isabstract

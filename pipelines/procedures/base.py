@@ -1,7 +1,5 @@
 """A test procedure: its part of a recipe, its steps, its reduction to points, its model and figures, its picture."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Annotated, Any, ClassVar

@@ -1,22 +1,19 @@
 """What a procedure plans and gets: steps, the records of units read from tables, the units before it; tables that it writes."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.dynamics.stability import ShortNoise
 from inertial.dynamics.wandering_means import IdentifiedNoise
 from pipelines.tables.frames import empty_table
 from schemas.poses import Pose
 from schemas.units import AXES
 
-Array = NDArray[np.float64]
 REFERENCE = "@reference"
 """The name of the reference sensor in the tables of samples; no serial begins with it."""
 StepKind = Literal["dwell", "verification", "allan", "procedure"]
@@ -175,7 +172,7 @@ POINT_TEXTS, POINT_NUMBERS, POINT_WHOLE = "unit procedure axis series", "setting
 FIGURE_TEXTS, FIGURE_NUMBERS = "unit procedure figure axis unit_text note", "value uncertainty low high dof removed"
 
 
-def numbers(rows: pd.DataFrame, *names: str) -> list[NDArray[np.float64]]:
+def numbers(rows: pd.DataFrame, *names: str) -> list[Array]:
     """Columns of points as arrays: setting, value and uncertainty where none is named."""
     return [rows[name].to_numpy(dtype=float) for name in names or ("setting", "value", "uncertainty")]
 

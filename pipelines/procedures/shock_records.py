@@ -1,7 +1,5 @@
 """Shocks as pulses and as waveforms: peak, duration, velocity change and ratio; spectra, and the diagnosis of the comparison."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from contextlib import suppress
 from typing import Any

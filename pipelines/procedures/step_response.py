@@ -1,7 +1,5 @@
 """Step response by the self-test inputs: settling time into a band, overshoot, rise time."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal
 

@@ -1,7 +1,5 @@
 """Sine comparison: stepped sine on an exciter against a reference sensor; transfer function, its model and its diagnosis."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

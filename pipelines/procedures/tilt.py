@@ -1,9 +1,7 @@
 """Single-axis tilt: the output over the angle in one plane, every 15° to 30°."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
-from typing import Annotated, Any, Literal, cast
+from typing import Annotated, Any, Literal, Self, cast
 
 import numpy as np
 import pandas as pd
@@ -42,7 +40,7 @@ class TiltPart(Part):
     angle_uncertainty_deg: NotNegative = 0.002
 
     @model_validator(mode="after")
-    def _whole_turn(self) -> TiltPart:
+    def _whole_turn(self) -> Self:
         count = 360.0 / self.step_deg
         if abs(count - round(count)) > 1e-9 or round(count) < FEWEST_ANGLES:
             raise ValueError(

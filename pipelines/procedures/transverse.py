@@ -1,9 +1,7 @@
 """Transverse sensitivity on an exciter: the units are turned about their sensitive axis in steps, and a sine is fitted."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 import pandas as pd
@@ -55,7 +53,7 @@ class TransversePart(NominalScale):
     repeatability_ppm: NotNegative = 5.0
 
     @model_validator(mode="after")
-    def _whole_circle(self) -> TransversePart:
+    def _whole_circle(self) -> Self:
         count = 360.0 / self.step_deg
         if abs(count - round(count)) > 1e-9 or count < FEWEST_ANGLES:
             raise ValueError(

@@ -4,8 +4,6 @@ Values and degrees of freedom are those of allantools, except of MTIE. The overl
 docs/decisions/statistics-of-records.md.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
@@ -13,16 +11,14 @@ from functools import lru_cache
 import allantools
 import numpy as np
 from allantools import ci
-from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
+from inertial.arrays import Array, Flags, Index
 from inertial.distributions import chi2_quantile
 from inertial.noise.allan import CONFIDENCE, AllanCurve
 from inertial.noise.flicker import FLICKER_FLOOR
 from inertial.noise.terms import NoiseTerms
 from schemas.units import MICRO, STANDARD_GRAVITY_M_S2
-
-Array = NDArray[np.float64]
 
 POWER = {"Q": 2, "N": 0, "B": -1, "K": -2}
 """Exponent α of the frequency in the density of each noise term, as the degrees of freedom need it; a ramp is no noise."""
@@ -131,7 +127,7 @@ def deviations(
     curve: AllanCurve,
     terms: NoiseTerms,
     *,
-    explained: NDArray[np.bool_],
+    explained: Flags,
 ) -> Deviations:
     """A statistic of records, at the averaging times of their Allan curve that it allows.
 
@@ -176,7 +172,7 @@ def _largest(mixture: Array, tau: Array, statistic: Statistic) -> list[int | Non
     return [powers[place] for place in np.argmax(shares, axis=0)]
 
 
-def _interval(statistic: Statistic, powers: list[int | None], m: NDArray[np.int64], n: int) -> Array:
+def _interval(statistic: Statistic, powers: list[int | None], m: Index, n: int) -> Array:
     """Ends (2, t) of the interval over the deviation."""
     rows = [
         (np.nan, 1.0) if alpha is None else (_freedom(statistic, alpha, int(k), n), statistic.bias(alpha, int(k) / n))

@@ -1,7 +1,5 @@
 """The verdict on the model of a run: whether it is adequate, with residual, noise and probability; one row of the archive."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Annotated, Any
 

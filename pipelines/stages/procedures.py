@@ -1,7 +1,5 @@
 """The procedures of a recipe: points of every unit, the figures that limits may name, and the findings."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """A certificate's XML against the archive: the document is made again from the archive, and the two are compared whole."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import takewhile, zip_longest

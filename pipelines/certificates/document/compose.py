@@ -1,7 +1,5 @@
 """The content of a certificate from the run, its stated budget, the ledger and the laboratory's file."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from math import isfinite, nan
 from typing import Any

@@ -1,7 +1,5 @@
 """The certificate as XML, DCC 3.0.0 of the PTB (Digital Calibration Certificate) with D-SI 2.0.0, and its validation offline."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from functools import cache
 from importlib.resources import files

@@ -1,7 +1,5 @@
 """A certificate's files checked alone, as who receives them does: form, schema, signatures, and the archive where it is given."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Writing certificates: which ones are meant, and their files, all or none of a certificate; the PDF is typeset by typst."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """What stands on the pages of a certificate: the texts and tables of its parts, with the numbers rounded."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Signatures of a certificate's files, checked from the file alone, and the XML that they cover with its statements."""
 
-from __future__ import annotations
-
 import base64
 import re
 from collections.abc import Generator, Iterator

@@ -3,8 +3,6 @@
 Nothing else names a figure: limits files, tables, the report and the reference read :data:`FIGURES`.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from importlib import import_module

@@ -1,13 +1,11 @@
 """The uncertainty budget of every unit: contributions to coefficients, corrected output and verification, and their sum."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from inertial.arrays import Array, Flags
 from inertial.design import of_axes
 from inertial.fits.linear import own_terms
 from inertial.fits.wander import wander_kernels
@@ -23,8 +21,6 @@ from pipelines.tables.calibration import Calibration
 from pipelines.tables.dwells import LotArrays
 from schemas.units import MICRO
 from schemas.validity import Stability
-
-Array = NDArray[np.float64]
 
 
 def budget(tables: BudgetTables, terms: BudgetTerms) -> dict[str, pd.DataFrame]:
@@ -114,7 +110,7 @@ def with_device_temperature(
     return MeasurementModel(effects, coefficients, model.nonlinear)
 
 
-def dwell_noise(lot: LotArrays, wander: pd.DataFrame, used: NDArray[np.bool_]) -> Array:
+def dwell_noise(lot: LotArrays, wander: pd.DataFrame, used: Flags) -> Array:
     """Covariance (n, n) of the noise of the fit's dwells as the fit weighed them; its scale is arbitrary."""
     error = np.broadcast_to(lot.standard_error, lot.output.shape)[:, used]
     profile = np.sqrt(np.mean(error**2 / np.mean(error**2, axis=1, keepdims=True), axis=(0, 2)))

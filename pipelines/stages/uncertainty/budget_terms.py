@@ -1,7 +1,5 @@
 """Inputs of a budget: the tables of a run, and the statements of station, device and certificate."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -1,19 +1,15 @@
 """Entries of ``[uncertainty]`` as influences on the dwells of a lot, by the equations of each contribution."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array, Index
 from inertial.state import State
 from inertial.uncertainty.influences import Errors, InputQuantity, Scattered, harmonic, theta
 from schemas.uncertainty import Entry, StandardUncertainty, Uncertainty
 from schemas.validity import Stability
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -26,7 +22,7 @@ class DwellConditions:
     """
 
     state: State
-    soak: NDArray[np.int64]
+    soak: Index
     target_C: Array
     soak_s: float
     room_C: float

@@ -1,20 +1,16 @@
 """The uncertainty budget of a lot as far as decisions read it, without its tables: quantities are computed when they are read."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from pipelines.stages.figures.base import BudgetRow
 from pipelines.stages.uncertainty.budget import lot_variances
 from pipelines.stages.uncertainty.budget_terms import BudgetTables, BudgetTerms
 from pipelines.stages.uncertainty.measurands import PARTS, part_of
 from pipelines.stages.uncertainty.tables import combined, groups_of
 from pipelines.tables.calibration import symmetric
-
-Array = NDArray[np.float64]
 
 Key = tuple[str, str]
 """Name and axis of a quantity."""

@@ -1,15 +1,13 @@
 """The quantities of a budget: coefficients, angles between axes, corrected output, verification, the error over the period."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inertial import design
+from inertial.arrays import Array, Places
 from inertial.frames import angles_from_force
 from inertial.state import State
 from inertial.uncertainty.propagation import Propagated, norm_errors, rms_over
@@ -21,8 +19,6 @@ from pipelines.tables.dwells import LotArrays
 from pipelines.tables.frames import ByUnit
 from schemas.decisions import BOUND, LARGEST_ERROR, MEDIAN
 from schemas.units import AXES, MICRO
-
-Array = NDArray[np.float64]
 
 EFFECTS = {
     "bias": "µg",
@@ -342,5 +338,5 @@ def _period(
         )
 
 
-def _of_worst(values: list[Array], worst: NDArray[np.intp]) -> Array:
+def _of_worst(values: list[Array], worst: Places) -> Array:
     return np.stack(values)[worst, np.arange(worst.size)]

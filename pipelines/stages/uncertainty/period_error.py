@@ -6,17 +6,15 @@ is a standard deviation each, so the RMS of an axis is a root of a sum of square
 three axes lies well above the RMS that is expected of one.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from functools import lru_cache
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 from scipy.special import ndtri, stdtrit
 from scipy.stats import qmc
 
+from inertial.arrays import Array
 from inertial.uncertainty.period import (
     DAY_S,
     MONTH_S,
@@ -31,8 +29,6 @@ from inertial.uncertainty.period import (
 from pipelines.stages.uncertainty.budget_terms import BudgetTables, BudgetTerms
 from schemas.decisions import BOUND_SHARE
 from schemas.validity import Ageing
-
-Array = NDArray[np.float64]
 
 DRAWS = 2048
 OF_AXIS = 4

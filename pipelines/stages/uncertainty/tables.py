@@ -1,22 +1,18 @@
 """Tables of a budget: one row per contribution, one per quantity, and the covariance of the coefficients."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from inertial.arrays import Array, Places
 from inertial.uncertainty.degrees import coverage_factors, effective_degrees
 from pipelines.stages.uncertainty.budget_terms import BudgetTerms
 from pipelines.stages.uncertainty.contributions import UncertaintySource
 from pipelines.stages.uncertainty.measurands import BudgetQuantity, VarianceParts
 from pipelines.tables.frames import empty_table, picked
-
-Array = NDArray[np.float64]
 
 NOISE = "noise"
 BEYOND = {
@@ -108,13 +104,13 @@ def has_uncertainty(row: Mapping[str, Any]) -> bool:
     return bool(row["expanded"] > 0.0)
 
 
-def groups_of(variances: VarianceParts) -> dict[str, NDArray[np.intp]]:
+def groups_of(variances: VarianceParts) -> dict[str, Places]:
     """The places among the influences of every contribution, in order."""
     names = np.array(variances.fit.source.contributions, dtype=object)
     return {group: np.flatnonzero(names == group) for group in dict.fromkeys(names.tolist())}
 
 
-def combined(one: BudgetQuantity, places: Mapping[str, NDArray[np.intp]]) -> tuple[Array, Array, Array]:
+def combined(one: BudgetQuantity, places: Mapping[str, Places]) -> tuple[Array, Array, Array]:
     """Standard uncertainty of type A, of type B and of both of a quantity, (units,) each."""
     noise = np.asarray(one.noise, dtype=float)
     if one.extra:  # an expected RMS: its contributions make its value, its uncertainty is that of the RMS
@@ -127,7 +123,7 @@ def combined(one: BudgetQuantity, places: Mapping[str, NDArray[np.intp]]) -> tup
 
 def _contributions(
     one: BudgetQuantity,
-    places: Mapping[str, NDArray[np.intp]],
+    places: Mapping[str, Places],
     variances: VarianceParts,
     known: Mapping[str, UncertaintySource],
     terms: BudgetTerms,
@@ -152,7 +148,7 @@ def _contributions(
     return _Contributions(list(own), u, about, stated, dof, sensitivity)
 
 
-def _parts(one: BudgetQuantity, places: Mapping[str, NDArray[np.intp]]) -> dict[str, Array]:
+def _parts(one: BudgetQuantity, places: Mapping[str, Places]) -> dict[str, Array]:
     """Standard uncertainty of every contribution, (units,) each; the noise first."""
     if one.extra:
         return {name: np.asarray(values, dtype=float) for name, values in one.extra.items()}

@@ -1,7 +1,5 @@
 """The uncertainty budget of a fit by the norm of gravity: references that act on the magnitude, through the fit's own design."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

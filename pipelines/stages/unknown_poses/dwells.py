@@ -1,14 +1,12 @@
 """Dwells of unknown orientation under a calibration: the force of each, its noise, and the fit as a linear map, unit by unit."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.correction import correct
 from inertial.fits.linear import force_along_axes, response_matrix
 from inertial.noise.flicker import flicker_kernel
@@ -18,8 +16,6 @@ from inertial.uncertainty.norm_design import NormDesign, norm_design
 from pipelines.tables.calibration import Calibration, read_calibration
 from pipelines.tables.dwells import KINDS, LotArrays, measured
 from schemas.units import MICRO
-
-Array = NDArray[np.float64]
 
 FITTED = "dwell"
 

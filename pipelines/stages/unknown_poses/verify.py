@@ -1,18 +1,13 @@
 """Verification of a fit by the norm of gravity on dwells that were held out, and its uncertainty."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from inertial.fits.wander import student
 from pipelines.stages.rms_error import rms_columns
 from pipelines.stages.unknown_poses.dwells import NormDwells, norm_dwells
 from pipelines.stages.verify import nothing_verified, verification_rows
 from schemas.units import MICRO
-
-Array = NDArray[np.float64]
 
 
 def verify_norms(
