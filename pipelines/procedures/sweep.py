@@ -31,8 +31,8 @@ from pipelines.procedures.sweep_points import (
     response_point,
     transfer_points,
 )
-from pipelines.procedures.transfer_chart import bode_chart
 from pipelines.procedures.transfer_figures import (
+    bode_chart,
     diagnosis_text,
     figures_of_transfer,
     judged_points,

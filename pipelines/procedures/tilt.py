@@ -11,7 +11,7 @@ from scipy.stats import norm
 from inertial.dynamics.tilt import TiltFit, fit_tilt, left_open
 from inertial.errors import NotIdentified
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Role, Trace, level
-from pipelines.procedures.base import Part, RecordByRecord
+from pipelines.procedures.base import Part, RecordByRecord, refuse_broken_turn
 from pipelines.procedures.figures import FigureSpec, FigureValue, Texts, UnitOutcome, worst
 from pipelines.procedures.recorded import Device, ProcedureStep, Taken, numbers, point_rows
 from schemas.bounds import NotNegative, Positive
@@ -41,12 +41,7 @@ class TiltPart(Part):
 
     @model_validator(mode="after")
     def _whole_turn(self) -> Self:
-        count = 360.0 / self.step_deg
-        if abs(count - round(count)) > 1e-9 or round(count) < FEWEST_ANGLES:
-            raise ValueError(
-                f"step_deg: {self.step_deg:g}° gives {count:g} angles in a turn, a whole number of at least {FEWEST_ANGLES} is "
-                "needed; use 15, 20, 24, 30, 36, 45 or 60"
-            )
+        refuse_broken_turn(self.step_deg, FEWEST_ANGLES, "; use 15, 20, 24, 30, 36, 45 or 60")
         return self
 
 

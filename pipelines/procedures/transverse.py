@@ -12,7 +12,7 @@ from inertial.dynamics.sine_fit import HARMONICS, fit_tone, fit_tone_and_frequen
 from inertial.dynamics.transverse import Z95, Transverse, fit_transverse, relative_phase
 from inertial.errors import NotIdentified
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace, level
-from pipelines.procedures.base import Evaluated, InG, NominalScale, OnEquipment, scale_of
+from pipelines.procedures.base import Evaluated, InG, NominalScale, OnEquipment, refuse_broken_turn, scale_of
 from pipelines.procedures.figures import FigureSpec, FigureValue, UnitOutcome, verdict_of
 from pipelines.procedures.recorded import (
     REFERENCE,
@@ -54,12 +54,7 @@ class TransversePart(NominalScale):
 
     @model_validator(mode="after")
     def _whole_circle(self) -> Self:
-        count = 360.0 / self.step_deg
-        if abs(count - round(count)) > 1e-9 or count < FEWEST_ANGLES:
-            raise ValueError(
-                f"step_deg: {self.step_deg:g}° gives {count:g} angles in a turn, a whole number of at least {FEWEST_ANGLES} is "
-                "needed (ISO 16063-31); use 15, 30, 36 or 45"
-            )
+        refuse_broken_turn(self.step_deg, FEWEST_ANGLES, " (ISO 16063-31); use 15, 30, 36 or 45")
         return self
 
 

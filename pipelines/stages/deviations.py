@@ -88,12 +88,8 @@ def _mtie(record: Array, rate_hz: float, m: Array) -> Array:
     return out
 
 
-def _modified_freedom(alpha: int, m: int, n: int) -> float:
-    return ci.edf_greenhall(alpha, 2, m, n + 1, overlapping=True, modified=True)
-
-
-def _hadamard_freedom(alpha: int, m: int, n: int) -> float:
-    return ci.edf_greenhall(alpha, 3, m, n + 1, overlapping=True, modified=False)
+def _greenhall(order: int, *, modified: bool) -> Callable[[int, int, int], float]:
+    return lambda alpha, m, n: ci.edf_greenhall(alpha, order, m, n + 1, overlapping=True, modified=modified)
 
 
 def _total_freedom(alpha: int, m: int, n: int) -> float:
@@ -104,9 +100,9 @@ def _total_freedom(alpha: int, m: int, n: int) -> float:
 
 
 STATISTICS = {
-    "modified": Statistic("modified Allan deviation", _of_allantools("mdev"), 4, _modified_freedom),
+    "modified": Statistic("modified Allan deviation", _of_allantools("mdev"), 4, _greenhall(2, modified=True)),
     "hadamard": Statistic(
-        "overlapping Hadamard deviation", _of_allantools("ohdev"), 4, _hadamard_freedom, sees_ramp=False
+        "overlapping Hadamard deviation", _of_allantools("ohdev"), 4, _greenhall(3, modified=False), sees_ramp=False
     ),
     "total": Statistic(
         "total deviation",
@@ -114,7 +110,7 @@ STATISTICS = {
         freedom=_total_freedom,
         bias=lambda alpha, share: 1.0 - TOTAL_BIAS.get(alpha, 0.0) * share,
     ),
-    "time": Statistic("time deviation", _of_allantools("tdev"), 4, _modified_freedom, integral=True),
+    "time": Statistic("time deviation", _of_allantools("tdev"), 4, _greenhall(2, modified=True), integral=True),
     "tie": Statistic("RMS time interval error", _of_allantools("tierms"), integral=True),
     "mtie": Statistic("maximum time interval error", _mtie, integral=True),
 }

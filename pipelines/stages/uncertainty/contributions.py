@@ -96,7 +96,10 @@ def influences(
         if u > 0.0:
             entry = known[name].entry
             inputs.append(InputQuantity(name, errors, u, entry.scope, entry.dof or float("inf")))
-    return inputs, list(_scattered(stated, at))
+    pose = stated.pose
+    if pose is None or pose.seen_in_residuals or not (u := pose.standard().u) > 0.0:
+        return inputs, []  # the repeatability of the poses is left out where the fit's own scatter shows it already
+    return inputs, [Scattered("pose", u, u, pose.scope, pose.dof or float("inf"))]
 
 
 def _all(stated: Uncertainty, at: DwellConditions, stability: Stability | None) -> Iterator[tuple[str, Errors, float]]:
@@ -182,13 +185,6 @@ def _electrical(
         u = 1e-6 * stated.vibration.coefficient_ug_g2 * stated.vibration.standard("rms").u ** 2
         for axis, scale in own:
             yield "vibration", Errors(offset=_unit_vector(axis, scale)), u
-
-
-def _scattered(stated: Uncertainty, at: DwellConditions) -> Iterator[Scattered]:
-    """Repeatability of the poses; left out where the fit's own scatter shows it already."""
-    if stated.pose is not None and not stated.pose.seen_in_residuals and stated.pose.standard().u > 0.0:
-        u = stated.pose.standard().u
-        yield Scattered("pose", u, u, stated.pose.scope, stated.pose.dof or float("inf"))
 
 
 def _unit_vector(axis: int, size: float = 1.0) -> tuple[float, float, float]:
