@@ -113,14 +113,11 @@ class Tilt(RecordByRecord):
     def of_lot(self, part: TiltPart, points: pd.DataFrame) -> Texts:
         """What the plane leaves open."""
         turned = _turned(part, points)
-        open_in, open_out = "; ".join(left_open(in_plane=True)), "; ".join(left_open(in_plane=False))
-        return [
-            (
-                "not determined by this plane",
-                f"{'axes' if len(turned) > 1 else 'axis'} {' and '.join(turned)}: {open_in}",
-            ),
-            ("not determined by this plane", f"axis {part.about}, about which the unit turns: {open_out}"),
-        ]
+        inside = (
+            f"{'axes' if len(turned) > 1 else 'axis'} {' and '.join(turned)}: {'; '.join(left_open(in_plane=True))}"
+        )
+        about = f"axis {part.about}, about which the unit turns: {'; '.join(left_open(in_plane=False))}"
+        return [("not determined by this plane", text) for text in (inside, about)]
 
     def chart(self, part: TiltPart, points: pd.DataFrame) -> Chart | None:
         """Residual from bias and scale over the angle."""

@@ -222,14 +222,10 @@ def _texts(part: TransversePart, fit: Transverse) -> list[tuple[str, str]]:
     else:
         text = f"{fit.direction_deg:.1f}° ± {2.0 * fit.direction_error_deg:.1g}° (k = 2) from {first} towards {second}"
         out = [("direction of the largest transverse sensitivity", text)]
-    if not np.isfinite(fit.p_value):
-        return [
-            *out,
-            ("model", "a sine over the angle cannot be judged: no degree of freedom is left; measure at more angles"),
-        ]
-    text = f"a sine over the angle {verdict_of(fit)}"
-    if adequate(fit) is False:
-        text += "; check the angles of the fixture and its resonance, repeat at another frequency"
+    text = "a sine over the angle cannot be judged: no degree of freedom is left; measure at more angles"
+    if np.isfinite(fit.p_value):
+        remedy = "; check the angles of the fixture and its resonance, repeat at another frequency"
+        text = f"a sine over the angle {verdict_of(fit)}{remedy if adequate(fit) is False else ''}"
     return [*out, ("model", text)]
 
 

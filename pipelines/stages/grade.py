@@ -8,8 +8,8 @@ import pandas as pd
 
 from inertial.arrays import Array
 from pipelines.procedures import PROCEDURES, figures_of_recipe
-from pipelines.stages.figures import FIGURES, Figure, LotCoefficients, UnitTables, Value, figures_of
-from pipelines.stages.figures.base import BudgetRow
+from pipelines.stages.figures import FIGURES, Figure, figures_of
+from pipelines.stages.figures.base import BudgetRow, LotCoefficients, UnitTables, Value
 from pipelines.stages.uncertainty.decision_budget import DecisionBudget
 from pipelines.stages.uncertainty.lot_risks import lot_risks
 from pipelines.tables.calibration import Calibration, read_calibration

@@ -91,12 +91,6 @@ class StaticSeries:
         """Outputs (n, m) of a unit; none where it was not recorded."""
         return np.concatenate(self._means[unit] or [np.zeros((0, len(self._letters)))])
 
-    def values(self) -> Array:
-        """Outputs (units, m, n), as long as the shortest."""
-        series = [self.of(unit) for unit in self._means]
-        shortest = min(len(one) for one in series)
-        return np.stack([one[:shortest].T for one in series])
-
 
 @dataclass(frozen=True)
 class Warmed:

@@ -10,19 +10,7 @@ from pkgutil import iter_modules
 from typing import NamedTuple
 
 from pipelines.procedures import FIGURES as PROCEDURE_FIGURES
-from pipelines.stages.figures.base import FigureKind, LotCoefficients, UnitTables, Value
-
-__all__ = [
-    "FIGURES",
-    "UNITS",
-    "Figure",
-    "FigureKind",
-    "IncompleteFigure",
-    "LotCoefficients",
-    "UnitTables",
-    "Value",
-    "figures_of",
-]
+from pipelines.stages.figures.base import FigureKind, UnitTables, Value
 
 SHARED = "base"
 

@@ -61,8 +61,7 @@ class LotCoefficients:
         self.stated = stated
         self._calibration = calibration
         self._scale = np.abs(calibration.scale)[..., None]
-        self._values: dict[str, Array] = {}
-        self._errors: dict[str, Array] = {}
+        self._known: dict[str, tuple[Array, Array]] = {}
         self._noise: dict[str, Array] = {}
 
     def of(self, unit: int) -> UnitCoefficients:
@@ -71,10 +70,10 @@ class LotCoefficients:
 
     def effect(self, effect: str, unit: int) -> tuple[Array, Array, Array]:
         """Coefficients (3, columns) and standard errors (3, columns) of an effect, and the scale (3, 1) in output per g."""
-        if effect not in self._values:
-            self._values[effect] = self._calibration.value(effect)
-            self._errors[effect] = self._with_budget().standard_error(effect)
-        return self._values[effect][unit], self._errors[effect][unit], self._scale[unit]
+        if effect not in self._known:
+            self._known[effect] = self._calibration.value(effect), self._with_budget().standard_error(effect)
+        values, errors = self._known[effect]
+        return values[unit], errors[unit], self._scale[unit]
 
     def shared(self, effect: str, unit: int) -> Array:
         """Standard errors (3, columns) of an effect by the references alone, output unit; zero where nothing is stated."""
