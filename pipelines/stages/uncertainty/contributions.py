@@ -70,6 +70,12 @@ _PARTS: dict[str, dict[str, str]] = {
 }
 
 
+def reads_own_temperature(stated: Uncertainty, stability: Stability | None) -> bool:
+    """Whether fit and user read the same thermometer of the device, so that its errors are in the coefficients alike."""
+    entry, user = stated.thermometer, stability is None or stability.temperature_of == "device"
+    return entry is not None and entry.measures == "device" and user
+
+
 def left_out(stated: Uncertainty) -> list[str]:
     """The contributions that a statement has no figure for, and does not call exact, by name."""
     names: list[str] = []
@@ -138,8 +144,7 @@ def _temperature(
 ) -> Iterator[tuple[str, Errors, float]]:
     """Errors of the temperature; none where fit and user read the same thermometer of the device."""
     entry = stated.thermometer
-    own = entry is not None and entry.measures == "device"
-    if own and (stability is None or stability.temperature_of == "device"):
+    if reads_own_temperature(stated, stability):
         return
     if entry is not None:
         yield "thermometer_offset", Errors(temperature=1.0), entry.standard("offset").u
