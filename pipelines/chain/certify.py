@@ -14,7 +14,15 @@ from pipelines.certificates.entries import FOLDER, LedgerEntry
 from pipelines.certificates.ledger import Ledger
 from pipelines.certificates.programmed import refuse_unproved, unproved
 from pipelines.certificates.refusals import allowed_months, refuse_period
-from pipelines.chain import certifiable
+from pipelines.chain.certifiable import (
+    refuse_contradicted,
+    refuse_inadequate,
+    refuse_meanwhile,
+    refuse_overdue,
+    refuse_two_at_once,
+    refuse_unsound,
+    refuse_unstated,
+)
 from pipelines.tables.frames import rows_of
 from schemas.errors import WrongUse, did_you_mean
 
@@ -84,14 +92,14 @@ def certify(  # noqa: PLR0913 - each is an option of the command
         )
     proposals, result = _proposals(run, units, first, last, reason)
     seen = {proposal.serial: len(ledger.events(proposal.serial)) for proposal in proposals}
-    certifiable.refuse_unsound(run, public_keys() if keys is None else keys)
+    refuse_unsound(run, public_keys() if keys is None else keys)
     refuse_period(run, first, last)
     # one at a time from here on: of two who certify one serial at the same moment the second is refused, and learns of the first
     with alone(ledger.root / FOLDER, wait=True):
         for proposal in proposals:
-            certifiable.refuse_two_at_once(ledger, run, proposal.serial)
+            refuse_two_at_once(ledger, run, proposal.serial)
             if not supersede:
-                certifiable.refuse_meanwhile(ledger, proposal, seen[proposal.serial])
+                refuse_meanwhile(ledger, proposal, seen[proposal.serial])
         for proposal in proposals:
             event, was_there = ledger.add(proposal, supersede=supersede)
             (result.there if was_there else result.written).append(event)
@@ -104,10 +112,10 @@ def _proposals(
 ) -> tuple[list[LedgerEntry], Certified]:
     """What is to be certified, and what is not with the reason; a named unit that may not be is refused."""
     grades = {str(row["unit"]): row for row in rows_of(_grades(run))}
-    certifiable.refuse_overdue(run)
-    adequacy = certifiable.refuse_inadequate(run)
-    certifiable.refuse_unstated(run)
-    if told := certifiable.refuse_contradicted(run):
+    refuse_overdue(run)
+    adequacy = refuse_inadequate(run)
+    refuse_unstated(run)
+    if told := refuse_contradicted(run):
         adequacy += f"{'; ' if adequacy else ''}{told}"
     about, result = run.about, Certified()
     evidence = tuple(sorted((name, files.sha256(run.path / f"{name}.json")) for name in EVIDENCE))

@@ -82,7 +82,7 @@ class BudgetTerms:
 
     @property
     def reads_own_temperature(self) -> bool:
-        """As the function of this name says."""
+        """Whether fit and user read the same thermometer of the device, by the function of this name."""
         return self.stated is not None and reads_own_temperature(self.stated, self.stability)
 
     def document(self) -> dict[str, Any]:
