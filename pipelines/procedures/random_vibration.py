@@ -30,7 +30,8 @@ from pipelines.procedures.recorded import (
     taken,
 )
 from pipelines.procedures.sweep_points import FEWEST_POINTS, condition_texts, response_bands, transfer_points
-from pipelines.procedures.transfer_figures import bode_chart, diagnosis_text, figures_of_model, judged_points
+from pipelines.procedures.transfer_chart import bode_chart
+from pipelines.procedures.transfer_figures import diagnosis_text, figures_of_model, judged_points
 from schemas.bounds import NotNegative, Positive
 from schemas.recipe import Recipe
 from schemas.units import AXES, MICRO

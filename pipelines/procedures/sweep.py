@@ -31,13 +31,8 @@ from pipelines.procedures.sweep_points import (
     response_point,
     transfer_points,
 )
-from pipelines.procedures.transfer_figures import (
-    bode_chart,
-    diagnosis_text,
-    figures_of_transfer,
-    judged_points,
-    sampling_text,
-)
+from pipelines.procedures.transfer_chart import bode_chart
+from pipelines.procedures.transfer_figures import diagnosis_text, figures_of_transfer, judged_points, sampling_text
 from schemas.errors import RecipeInvalid
 from schemas.recipe import Recipe
 from schemas.station import StationConfig
