@@ -60,7 +60,7 @@ CODE = {
     "budget": _BUDGET,
     "budget of norms": (
         *(*_BUDGET, "inertial.data_errors", "inertial.decisions", "inertial.estimation"),
-        *("inertial.norm_fit", "pipelines.stages.unknown_poses"),
+        *("inertial.norm_fit", "pipelines.stages.unknown_poses", "pipelines.stages.verify"),
     ),
     "procedures": (*_PROCEDURES, "pipelines.stages.procedures"),
     "grade": (

@@ -7,11 +7,11 @@ from typing import Protocol
 import numpy as np
 import pandas as pd
 
-from pipelines.capture.plausibility import Plausibility
-from pipelines.capture.record import Record, TemperatureLog, readings_row
+from pipelines.capture.record import Plausibility, Record, TemperatureLog, readings_row
 from pipelines.capture.supervision import Power, Supervisor, short_of_samples
 from pipelines.procedures import procedure_of
 from pipelines.procedures.base import OnEquipment, SetsEquipment
+from pipelines.procedures.recorded import ProcedureStep
 from pipelines.schedule.steps import Step
 from schemas.errors import LinkLost, OperatorNeeded, StationError, StationTimeout
 from schemas.event import NO_RECORD
@@ -164,10 +164,9 @@ class Acquisition:
         Suspended : a condition failed before, during or after the record
         """
         station, recipe = self.station, self.recipe
+        self.prepare(step)
         if step.order is not None and step.order.role and not step.order.on_table:
-            self.prepare(None)
-            return self.measure_on_equipment(step)
-        self.prepare(step if step.order is not None and step.order.on_table else None)
+            return self.measure_on_equipment(step, step.order)
         station.table.move(step.pose.outer_deg, step.pose.inner_deg)
         self.rest(recipe.settle_s if step.wait_s is None else step.wait_s)
         self.supervisor.check_before(self.slots)
@@ -194,7 +193,7 @@ class Acquisition:
         for unit, problem in self.plausibility.unreachable_units(self.answering):
             self.give_up(unit.serial, fault_text(unit.slot, problem))
         counts = {unit.slot: record.count(unit.serial) for unit in self.answering}
-        overflow = {unit.slot for unit in self.answering if record.overflow(unit.serial)}
+        overflow = {unit.slot for unit in self.answering if unit.serial in record.lossy}
         if reasons := short_of_samples(counts, overflow, duration, rate):
             raise Suspended(reasons, spoilt=True)
         self.plausibility.refuse_outliers(record, self.answering)
@@ -203,28 +202,26 @@ class Acquisition:
             self.plausibility.refuse_contradiction(record.soak, samples, readings)
         return record, samples, readings
 
-    def prepare(self, step: Step | None) -> None:
+    def prepare(self, step: Step) -> None:
         """Sets the equipment of a step on the table, and brings all other equipment to the state of records without it."""
-        own = step.order if step is not None else None
+        own = step.order if step.order is not None and step.order.on_table else None
         for role, equipment in self.station.equipment.items():
             if own is None or role != own.role:
                 equipment.stand_by()
         ratio = 1.0
-        if step is not None and own is not None:
+        if own is not None:
             procedure = procedure_of(self.recipe, step.procedure, SetsEquipment)
             ratio = procedure.set_equipment(self.station.equipment[own.role], own).get("supply_ratio", 1.0)
         self.supervisor.expect_supply(ratio)
 
-    def measure_on_equipment(self, step: Step) -> tuple[Record, pd.DataFrame, pd.DataFrame]:
+    def measure_on_equipment(self, step: Step, order: ProcedureStep) -> tuple[Record, pd.DataFrame, pd.DataFrame]:
         """One record that other equipment of the station performs, with its samples, those of the reference, and readings.
 
         Raises
         ------
         Suspended : the recording is of no use, and is repeated
         """
-        if step.order is None:
-            raise LookupError(f"record {step.record} has no order for equipment")
-        station, order = self.station, step.order
+        station = self.station
         self.supervisor.check_before(self.slots)
         procedure = procedure_of(self.recipe, step.procedure, OnEquipment)
         powered, start = station.reader.since_power(), station.clock.now()

@@ -1,7 +1,5 @@
 """Capture: drives a station through a recipe and hands every record to a sink; the only place that does."""
 
-from dataclasses import dataclass
-
 from pipelines.capture.acquisition import Acquisition, CaptureSink
 from pipelines.capture.supervision import LINK_ATTEMPTS, LOST_FOR, WARMING, StillSuspended, Supervisor
 from pipelines.capture.time_left import Approach, Remaining
@@ -13,8 +11,6 @@ from schemas.progress import Progress
 from schemas.recipe import Recipe
 from stations.safety.suspenders import Suspended
 from stations.station import Station, Unsettled
-
-__all__ = ["CaptureSink", "Step", "capture", "check", "steps"]
 
 
 def capture(
@@ -55,24 +51,13 @@ def check(station: Station, recipe: Recipe, plan: list[Step]) -> None:
     station.reader.check(recipe.rate_hz)
 
 
-@dataclass
 class CaptureRun:
     """The capture of one lot, record by record, each from its checkpoint; ``approach`` follows the soak under way."""
 
-    acquisition: Acquisition
-    remaining: Remaining
-    progress: Progress
-    approach: Approach | None = None
-
-    @property
-    def station(self) -> Station:
-        """The station that is driven."""
-        return self.acquisition.station
-
-    @property
-    def supervisor(self) -> Supervisor:
-        """The conditions and the journal of this capture."""
-        return self.acquisition.supervisor
+    def __init__(self, acquisition: Acquisition, remaining: Remaining, progress: Progress) -> None:
+        self.acquisition, self.remaining, self.progress = acquisition, remaining, progress
+        self.station, self.supervisor = acquisition.station, acquisition.supervisor
+        self.approach: Approach | None = None
 
     def run(self, plan: list[Step]) -> None:
         """Measures every step that is not stored; an error of the station is journalled and leaves it in its safe state."""

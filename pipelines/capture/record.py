@@ -1,22 +1,31 @@
-"""The data of one record during a capture, and the tables made from them."""
+"""The data of one record during a capture, the tables made from them, and its checks while it can still be measured again.
+
+Means and outliers come from the one module that decodes samples, which validation and reduction use, too.
+"""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
+from inertial.pointing import TURNED_AWAY, Pointing, contradicts
 from inertial.quantities import ANGLE_COLUMNS, BY_ATTRIBUTE, READINGS
-from pipelines.tables.summaries import first_outlier
+from pipelines.tables.summaries import first_outlier, unit_means
+from schemas.errors import OperatorNeeded, StationError
+from schemas.event import Event
 from schemas.lot import Unit
 from schemas.poses import Pose
 from schemas.units import AXES
-from stations.devices.reader import Instruments
+from stations.devices.reader import Instruments, Reader
 from stations.devices.slot import Identity, Samples
+from stations.safety.suspenders import Reason, Suspended
 
+TABLE = "table: "
+TURNED = f"{TABLE}{TURNED_AWAY}"
 POWER_OFF = BY_ATTRIBUTE["power_off"].column
 
 
@@ -58,7 +67,7 @@ class Record:
     since_move: float = 0.0
     since_power: float = 0.0
     power_off: float | None = None
-    observations: list[dict[str, NDArray[np.float64]]] = field(default_factory=list)
+    observations: list[dict[str, Array]] = field(default_factory=list)
     recorded: dict[str, list[float]] = field(default_factory=dict)
     parts: dict[str, list[Samples]] = field(default_factory=dict)
     stored: dict[str, int] = field(default_factory=dict)
@@ -100,10 +109,6 @@ class Record:
     def count(self, serial: str) -> int:
         """Samples of a unit so far."""
         return self.stored.get(serial, 0) + self._held(serial)
-
-    def overflow(self, serial: str) -> bool:
-        """Whether samples of a unit were lost."""
-        return serial in self.lossy
 
     def rows(self) -> int:
         """Number of samples of all units in memory."""
@@ -158,7 +163,7 @@ class Record:
         )
 
 
-def _joined(parts: Sequence[Samples]) -> NDArray[np.float64]:
+def _joined(parts: Sequence[Samples]) -> Array:
     """Outputs (n, m) of all parts; (0, 3) without any."""
     return np.concatenate([part.outputs for part in parts]) if parts else np.zeros((0, len(AXES)))
 
@@ -182,9 +187,71 @@ def readings_row(record: Record, unit: Unit, identity: Identity, status: str) ->
         "duration_s": record.duration,
         "rate_hz": record.rate,
         "n": record.count(unit.serial) if status == "ok" else 0,
-        "overflow": record.overflow(unit.serial),
+        "overflow": unit.serial in record.lossy,
         "status": status,
         "out_unit": identity.out_unit,
         "full_scale": identity.full_scale,
         **{column: observed[column] for column in record.recorded},
     }
+
+
+@dataclass
+class Plausibility:
+    """Checks of a record: the slots' identities, outliers among its samples, and the table's angles against all units."""
+
+    reader: Reader
+    identities: Mapping[str, Identity]
+    pointing: Pointing = field(default_factory=Pointing)
+
+    def unreachable_units(self, units: Sequence[Unit]) -> Iterator[tuple[Unit, StationError]]:
+        """Units whose slots no longer answer, with the error.
+
+        Raises
+        ------
+        OperatorNeeded : another unit sits in a slot than at the start, so its samples have no known unit
+        """
+        for unit in units:
+            try:
+                same = self.reader.slots[unit.slot].holds(unit.serial)
+            except StationError as problem:
+                yield unit, problem
+                continue
+            if not same:
+                raise OperatorNeeded(
+                    f"slot {unit.slot}: '{unit.serial}' is no longer there; seat the units as they were, or measure "
+                    "the lot anew"
+                )
+
+    def refuse_outliers(self, record: Record, units: Sequence[Unit]) -> None:
+        """Suspends a record with an implausible sample."""
+        outliers: dict[int, str] = {}
+        for unit in units:
+            identity = self.identities[unit.serial]
+            if text := record.outlier(unit.serial, identity.lsb, identity.full_scale):
+                outliers[unit.slot] = text
+        if outliers:
+            slot = min(outliers)
+            raise Suspended([Reason("samples", f"slot {slot}: {outliers[slot]}", tuple(outliers))], spoilt=True)
+
+    @staticmethod
+    def refuse_contradicted(past: Sequence[Event]) -> None:
+        """Refuses to resume a run that ended because all units contradicted the table's encoders."""
+        for event in past:
+            if event.kind == "stopped" and event.reason.startswith(TURNED):
+                raise OperatorNeeded(event.reason)
+
+    def refuse_contradiction(self, soak: int, samples: pd.DataFrame, readings: pd.DataFrame) -> None:
+        """Ends the run where all units contradict the encoders of the table.
+
+        Parameters
+        ----------
+        soak : number of the soak; the table's error is judged over the dwells of one
+        samples, readings : the tables of one record
+        """
+        if samples.empty:  # all of a long record's samples are stored already
+            return
+        first = readings.iloc[0]
+        angles = float(first["outer_deg"]), float(first["inner_deg"])
+        text = contradicts(self.pointing.add(soak, angles, unit_means(samples)))
+        if text:
+            raise OperatorNeeded(f"{TABLE}{text}")

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from pipelines.schedule.steps import Step
 from pipelines.schedule.timing import schedule
 from schemas.recipe import Recipe
@@ -32,14 +32,9 @@ class Approach:
 
     def figures(self) -> dict[str, float]:
         """Overshoot of air and devices for the journal, K."""
-        if not self.rows:
-            return {"air_overshoot_K": 0.0, "device_overshoot_K": 0.0}
-        columns = list(zip(*(row[2] for row in self.rows), strict=True))
-        devices = max((self._beyond(column) for column in columns), default=0.0)
-        return {
-            "air_overshoot_K": round(self._beyond([row[1] for row in self.rows]), 4),
-            "device_overshoot_K": round(devices, 4),
-        }
+        columns = zip(*((air, *devices) for _, air, devices in self.rows), strict=True)
+        air, *devices = [round(self._beyond(column), 4) for column in columns] or [0.0]
+        return {"air_overshoot_K": air, "device_overshoot_K": max(devices, default=0.0)}
 
     def _beyond(self, values: Sequence[float]) -> float:
         """Overshoot of values over the target, from their first value on, K; values that are not finite are left out."""
@@ -73,13 +68,13 @@ class Approach:
         lags = [lag for column in devices.T if (lag := _lag(air, column)) is not None]
         return max(lags, default=None)
 
-    def _air(self) -> NDArray[np.float64]:
+    def _air(self) -> Array:
         """Time and temperature of the air, (n, 2)."""
         rows = [(time, air) for time, air, _ in self.rows if math.isfinite(air)]
         return np.array(rows, dtype=np.float64).reshape(-1, 2)
 
 
-def _lag(air: NDArray[np.float64], device: NDArray[np.float64]) -> float | None:
+def _lag(air: Array, device: Array) -> float | None:
     """Lag of one device, s, from air (n, 2) in s and °C and the device (n,) in °C."""
     step = np.diff(air[:, 0])
     distance = air[:, 1] - device
@@ -93,9 +88,7 @@ def _lag(air: NDArray[np.float64], device: NDArray[np.float64]) -> float | None:
     return 1.0 / rate if rate > 0.0 else None
 
 
-MOST = (
-    4.0  # bound of the correction: a soak or record that measured longer was disturbed, which says nothing of the next
-)
+MOST = 4.0  # bound of the correction: a soak or record that took longer was disturbed, which says nothing of the next
 HOUR_S, MINUTE_S = 3600.0, 60.0
 
 
@@ -116,32 +109,24 @@ class _Pace:
         return min(MOST, max(1.0 / MOST, self.measured / self.planned)) if self.planned > 0.0 else 1.0
 
 
-@dataclass
 class Remaining:
     """Seconds of station time that the remaining steps of a capture need."""
 
-    plan: list[Step]
-    config: StationConfig
-    recipe: Recipe
-    _soak: dict[int, float] = field(init=False, default_factory=dict[int, float])
-    _record: dict[int, float] = field(init=False, default_factory=dict[int, float])
-    _after: dict[int, tuple[float, float]] = field(init=False, default_factory=dict[int, "tuple[float, float]"])
-    _done: set[int] = field(init=False, default_factory=set[int])
-    _soaks: _Pace = field(init=False, default_factory=_Pace)
-    _records: _Pace = field(init=False, default_factory=_Pace)
-    _ramp: float | None = field(init=False, default=None)
-    _lag: float | None = field(init=False, default=None)
-    _since: tuple[int, float] | None = field(init=False, default=None)
-    _started: float = field(init=False)
-    _recorded: float = field(init=False, default=0.0)
-
-    def __post_init__(self) -> None:
+    def __init__(self, plan: list[Step], config: StationConfig, recipe: Recipe) -> None:
+        self.plan, self.config, self.recipe = plan, config, recipe
+        self._done: set[int] = set()
+        self._soaks, self._records = _Pace(), _Pace()
+        self._ramp: float | None = None
+        self._lag: float | None = None
+        self._since: tuple[int, float] | None = None
         self._started = time.monotonic()
-        self._planned(self.config)
+        self._planned(config)
 
     def _planned(self, config: StationConfig) -> None:
         """Sums the planned seconds of soaks and records, by record and of all later records."""
-        self._soak, self._record = {}, {}
+        self._soak: dict[int, float] = {}
+        self._record: dict[int, float] = {}
+        self._after: dict[int, tuple[float, float]] = {}
         for activity in schedule(self.plan, config, self.recipe):
             record = activity.step.record
             kind = self._soak if activity.kind == "soak" else self._record
@@ -186,7 +171,6 @@ class Remaining:
     def add_record(self, step: Step, seconds: float) -> None:
         """Adds the measured seconds of a record."""
         self._records.add(self._record[step.record], seconds)
-        self._recorded += self._record[step.record]
         self._done.add(step.record)
         self._since = None
 
@@ -216,10 +200,10 @@ class Remaining:
 
         A simulated station skips the soaks: its time goes by with the samples, which records have in proportion to their length.
         """
-        if self._recorded <= 0.0:
+        if self._records.planned <= 0.0:
             return None
         left = self._after[step.record][1] + (0.0 if step.record in self._done else self._record[step.record])
-        return (time.monotonic() - self._started) * left / self._recorded
+        return (time.monotonic() - self._started) * left / self._records.planned
 
 
 def duration_text(seconds: float) -> str:

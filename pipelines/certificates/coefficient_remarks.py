@@ -1,7 +1,5 @@
 """Certified coefficients, and remarks for their readers: missing or foreign signatures, differing versions of libraries."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Iterable, Mapping
 from typing import Any

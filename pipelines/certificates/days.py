@@ -1,7 +1,5 @@
 """Days of validity: ISO dates in UTC, compared as text. A range includes its first day and not its last."""
 
-from __future__ import annotations
-
 import calendar
 from datetime import UTC, date, datetime
 

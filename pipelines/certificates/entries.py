@@ -1,7 +1,5 @@
 """Entries of the ledger of a unit's calibrations: one event per file, never changed."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields

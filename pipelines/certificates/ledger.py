@@ -5,8 +5,6 @@ and no serial can name a place outside. Each event is a file that is created onc
 a unit one fails, reads the other's event and decides again; so every event was decided with all earlier events known.
 """
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import nullcontext

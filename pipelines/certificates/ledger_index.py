@@ -5,8 +5,6 @@ It is made only from the files of the ledger and can be removed at any time; an 
 time.
 """
 
-from __future__ import annotations
-
 import json
 import os
 from collections.abc import Iterable, Mapping, Sequence

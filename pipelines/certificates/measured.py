@@ -1,7 +1,5 @@
 """Start and end of the measurement of a run."""
 
-from __future__ import annotations
-
 from pipelines.archive import Run, files
 from pipelines.certificates.days import day_of
 

@@ -5,8 +5,6 @@
 its unit is not certified until it is programmed again.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, Literal
 

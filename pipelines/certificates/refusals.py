@@ -1,7 +1,5 @@
 """What the ledger refuses, and why: a strange serial, an overdue standard, dates that are not allowed, and more."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 

@@ -1,7 +1,5 @@
 """What a certificate states of a unit's uncertainty, from the tables of its run: quantities, decisions, references."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -3,19 +3,15 @@
 A new calibration ends those that are valid on its first day, so that a unit never has two valid calibrations on one day.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from datetime import date
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 from pipelines.certificates.days import today
+from pipelines.certificates.documents import CalibrationDocument
 from pipelines.certificates.entries import LedgerEntry
 from schemas.errors import WrongUse
-
-if TYPE_CHECKING:
-    from pipelines.certificates.documents import CalibrationDocument
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,5 @@
 """The stages of the chain, in order: what each reads, what it writes, its parameters; ``archive/code.py`` has their code."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """The JSON documents of noise: Allan deviation and spectrum."""
 
-from __future__ import annotations
-
 from typing import Annotated, Literal
 
 from typing_extensions import TypedDict

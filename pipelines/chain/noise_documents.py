@@ -1,7 +1,5 @@
 """Documents of noise: Allan deviation with its terms, another statistic, the spectrum; of a series or a captured run."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -16,8 +14,6 @@ from pipelines.importers.series import EvenSeries
 from pipelines.stages.noise import FEWEST, UNEXPLAINED_P, alike, limits_where_unexplained, static_record
 from pipelines.tables.frames import rows_of
 from schemas.errors import DataRejected, WrongUse
-
-Array = np.ndarray
 
 SHORTEST_SEGMENT = 64
 SHORTEST_TAU = 8

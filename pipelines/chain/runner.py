@@ -3,8 +3,6 @@
 That is going on after a crash and running an archive again, by one mechanism.
 """
 
-from __future__ import annotations
-
 import shutil
 import time
 from collections.abc import Callable, Iterator

@@ -55,7 +55,7 @@ def command(
     be used.
     """
     from pipelines.cli.inputs import add_effects, dwells_and_history, without_dwells
-    from pipelines.diagnosis.inputs import history_beside, judged_effects
+    from pipelines.diagnosis.inputs import file_beside, judged_effects
     from pipelines.importers.files import is_file
 
     add_effects(effect_file, formula, "diagnose")
@@ -63,7 +63,7 @@ def command(
     judged = judged_effects(dwells, archive, effects, model, "diagnose")
     table, temperatures = dwells_and_history(dwells, history, archive)
     table, left_out = without_dwells(table, leave_out)
-    beside = history or (history_beside(dwells) if is_file(dwells) else "")
+    beside = history or (file_beside(dwells, "history") if is_file(dwells) else "")
     kept_name = dwells if is_file(dwells) else Archive(archive).run(dwells).id  # what 'latest' means changes
     document, report_text = diagnosed(
         table, temperatures, judged, kept_name, with_report=report is not None, left_out=left_out

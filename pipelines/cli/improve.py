@@ -79,7 +79,7 @@ def command(
     from pipelines.cli.next_commands import judged_data
     from pipelines.cli.terminal import attended
     from pipelines.cli.text.improve_text import next_lines, next_of_recording, print_improvement, print_recording
-    from pipelines.diagnosis.inputs import history_beside, judged_effects
+    from pipelines.diagnosis.inputs import file_beside, judged_effects
     from pipelines.importers import limited
     from pipelines.importers.files import is_file
     from pipelines.improvement.recording import bring_in
@@ -96,7 +96,7 @@ def command(
     dwells, temperatures, again, again_temperatures = both_runs(data, history, fresh, fresh_history, archive)
     dwells, _ = without_dwells(dwells, leave_out)
     tables = ImprovedTables(dwells, temperatures, again, again_temperatures)
-    beside = history or (history_beside(data) if is_file(data) else "")
+    beside = history or (file_beside(data, "history") if is_file(data) else "")
     may_measure = True if yes and measure is None else measure
     brief = recording is not None and not show_all
     attendant = _Terminal(data, model, archive, quiet=as_json or brief, measure=may_measure)

@@ -65,12 +65,12 @@ def judged_data(source: str, history: str, archive: str | None) -> JudgedData:
     ----------
     history : the file of temperatures against time that was read; empty where there was none
     """
-    from pipelines.diagnosis.inputs import fresh_beside, history_beside
+    from pipelines.diagnosis.inputs import file_beside
     from pipelines.importers.files import is_file
 
     if is_file(source):
-        fresh = fresh_beside(source)
-        return JudgedData(source, history, fresh, history_beside(fresh) if fresh and history else "", archive)
+        fresh = file_beside(source, "fresh")
+        return JudgedData(source, history, fresh, file_beside(fresh, "history") if fresh and history else "", archive)
     from pipelines.chain.runner import decisive
     from pipelines.jobs.fresh_run import fresh_repeat, fresh_run_of, repeatable
     from pipelines.jobs.job import OF_RUN, job_of_run, measured_again

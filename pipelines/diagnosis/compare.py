@@ -1,7 +1,5 @@
 """Comparison of a model with measurements: the error on the run it is fitted to, on poses left out, and on a fresh run."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 
@@ -73,6 +71,7 @@ def _compared(
     fitted = estimate(model)
     left = fitted_residuals(model)
     out = left_out(model)
+    series = ("norm",) if problem.lot.radial else tuple(AXES[axis] for axis in problem.axes)  # the blocks of one unit
     answer: dict[str, Any] = {
         "effects": [t.effect.id for t in model.terms],
         "rms_ug": MICRO * rms(left),
@@ -84,7 +83,7 @@ def _compared(
             u: {"rms_ug": MICRO * rms(r), "fresh_rms_ug": None}
             for u, r in zip(measurement.units, left.reshape(len(measurement.units), -1), strict=True)
         },
-        "by_axis": {name: MICRO * rms(left[i :: problem.per_unit]) for i, name in enumerate(_series_of_unit(problem))},
+        "by_axis": {name: MICRO * rms(left[i :: problem.per_unit]) for i, name in enumerate(series)},
         "by_pose": _by_pose(measurement, left),
         "nonlinear": {t.effect.id: t.keywords for t in model.terms if t.keywords},
         "nonlinear_interval": intervals(model),
@@ -115,11 +114,6 @@ def _compared(
             for name in _remember(again, model.terms)
         ]
     return answer
-
-
-def _series_of_unit(problem: Problem) -> tuple[str, ...]:
-    """Names of the blocks of one unit: its axes with an output, or the norm."""
-    return ("norm",) if problem.lot.radial else tuple(AXES[axis] for axis in problem.axes)
 
 
 def without_history(measurement: Measured, terms: Sequence[Term]) -> list[str]:

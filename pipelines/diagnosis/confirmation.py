@@ -1,7 +1,5 @@
 """Test of the effects added to a model, by a fresh run or else by dwells left out; the error of all its versions."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Diagnosis and comparison of a table of dwells against a model, as documents with the keys that other programs read."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -16,21 +14,9 @@ from inertial.criticism.diagnosis import diagnose as diagnose_lot
 from inertial.data_errors.faults import Fault
 from inertial.errors import InertialError
 from inertial.planning.reasons import reason
+from pipelines.diagnosis import result_rows
 from pipelines.diagnosis.compare import without_history
 from pipelines.diagnosis.next_measurement import Proposed, proposed
-from pipelines.diagnosis.result_rows import (
-    Names,
-    classes_of,
-    evidence_of,
-    in_part_of,
-    influence_of,
-    leave_out_of,
-    noise_of,
-    removed_of,
-    smallest_of,
-    white_noise_of,
-    without_influence,
-)
 from pipelines.diagnosis.suggested_formula import as_toml, offer, what_follows
 from pipelines.parallel import keep_memory
 from pipelines.tables.dwells import Measured, shows_misalignment, undetermined_responses
@@ -151,7 +137,7 @@ def document(
         }
     faulty = {f.unit for f in faults}
     units = tuple(u for k, u in enumerate(measurement.units) if k not in faulty)
-    names = Names(units, tuple(int(d) for d in measurement.dwells))
+    names = result_rows.Names(units, tuple(int(d) for d in measurement.dwells))
     terms = [*diagnosis.base.terms, *(m.term for n in diagnosis.named for m in n.effects.physics)]
     warnings = [
         *undetermined_responses(measurement.state),
@@ -164,18 +150,22 @@ def document(
         "adequate": adequate,
         "reason": reason or None,
         "blocked_by": blocked,
-        "evidence": evidence_of(diagnosis, names),
-        "error": {**error, "white_noise_ug": white_noise_of(diagnosis.base), **noise_of(diagnosis.final)},
+        "evidence": result_rows.evidence_of(diagnosis, names),
+        "error": {
+            **error,
+            "white_noise_ug": result_rows.white_noise_of(diagnosis.base),
+            **result_rows.noise_of(diagnosis.final),
+        },
         "where": [
             {"driver": p.driver, "axes": list(p.axes), "share": round(p.share, 4), "p_value": probability(p.log_p)}
             for p in diagnosis.where
         ],
-        "classes": classes_of(diagnosis, names),
-        "influence": influence_of(diagnosis, names),
-        "without_influence": without_influence(diagnosis.carried),
-        "removed": removed_of(diagnosis, names),
+        "classes": result_rows.classes_of(diagnosis, names),
+        "influence": result_rows.influence_of(diagnosis, names),
+        "without_influence": result_rows.without_influence(diagnosis.carried),
+        "removed": result_rows.removed_of(diagnosis, names),
         "recommended": [n.effects.proposed.effect.id for n in diagnosis.named if not n.effects.of_data and n.predicts],
-        "leave_out": leave_out_of(diagnosis, names),
+        "leave_out": result_rows.leave_out_of(diagnosis, names),
         "warnings": warnings,
         "unexplained": None
         if diagnosis.unexplained is None
@@ -188,8 +178,8 @@ def document(
             "p_value": probability(diagnosis.unexplained.log_p),
         },
         "unseen": list(diagnosis.unseen),
-        "unseen_in_part": in_part_of(diagnosis),
-        "smallest_named": smallest_of(diagnosis),
+        "unseen_in_part": result_rows.in_part_of(diagnosis),
+        "smallest_named": result_rows.smallest_of(diagnosis),
         "next_measurements": (proposed(diagnosis) if following is None else following).rows(),
     }
 

@@ -4,8 +4,6 @@ A required key is never renamed or left out; a key that is NotRequired may be mi
 scale, in µg.
 """
 
-from __future__ import annotations
-
 from typing import Annotated, Any, Literal, NotRequired
 
 from typing_extensions import TypedDict
@@ -45,11 +43,16 @@ class FailingDriver(TypedDict):
     p_value: float
 
 
-class InfluentialDwell(TypedDict):
-    """A dwell with a large influence on the verdict."""
+class NamedDwell(TypedDict):
+    """A dwell of a unit."""
 
     unit: str
     dwell: int
+
+
+class InfluentialDwell(NamedDwell):
+    """A dwell with a large influence on the verdict."""
+
     share: Annotated[float, "share of the dwell in the evidence"]
 
 
@@ -83,13 +86,6 @@ class EffectClassDocument(TypedDict):
     without_influence: NotRequired[Annotated[WithoutInfluence | None, "the verdict on this class without these dwells"]]
 
 
-class NamedDwell(TypedDict):
-    """A dwell of a unit."""
-
-    unit: str
-    dwell: int
-
-
 class StudentisedDwell(NamedDwell):
     """A dwell and its deviation from the prediction by all other dwells."""
 
@@ -115,11 +111,9 @@ class LeaveOut(TypedDict):
     adequate_without: Annotated[bool | None, "the verdict on the other dwells"]
 
 
-class RemovedDwell(TypedDict):
+class RemovedDwell(NamedDwell):
     """A dwell that was left out before effects were judged."""
 
-    unit: str
-    dwell: int
     off_ug: Annotated[float, "distance from the model, µg"]
     deviations: Annotated[float, "the same in standard deviations"]
     tail: NotRequired[Annotated[bool, "whether it is within the tails of the noise, and so no fault"]]

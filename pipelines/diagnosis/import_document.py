@@ -1,7 +1,5 @@
 """One import as a document: the recording is read, judged and stored."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from pathlib import Path

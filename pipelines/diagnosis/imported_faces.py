@@ -1,7 +1,5 @@
 """Six labelled faces: the fit and the noise of every other model, the published method beside it, and the verdict."""
 
-from __future__ import annotations
-
 from itertools import combinations
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The fits of an import by name, with verdicts: labelled faces, a plane, a temperature ramp, dwells of unknown orientation."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any

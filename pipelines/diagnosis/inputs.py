@@ -1,9 +1,8 @@
 """Inputs of the judgement of a model: dwells with their history, a model, formulas, and dwells left out."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Literal
 
 import pandas as pd
 
@@ -26,7 +25,7 @@ def dwells_and_history(source: str, history: str, archive: str | None) -> tuple[
     history : a file; empty for the run's own, or for the one beside a file of dwells
     """
     dwells = read_dwells(source, archive=archive)
-    beside = history or (history_beside(source) if is_file(source) else "")
+    beside = history or (file_beside(source, "history") if is_file(source) else "")
     if beside:
         return dwells, read_history(beside, archive=archive), beside
     if is_file(source) or "history" not in Archive(archive).run(source).tables():
@@ -34,17 +33,8 @@ def dwells_and_history(source: str, history: str, archive: str | None) -> tuple[
     return dwells, read_history(source, archive=archive), ""
 
 
-def history_beside(source: str) -> str:
-    """The history in the folder of a file of dwells: NAME-history, or history for a file called dwells; else empty."""
-    return _beside(source, "history")
-
-
-def fresh_beside(source: str) -> str:
-    """The fresh run in the folder of a file of dwells: NAME-fresh, or fresh for a file called dwells; else empty."""
-    return _beside(source, "fresh")
-
-
-def _beside(source: str, what: str) -> str:
+def file_beside(source: str, what: Literal["history", "fresh"]) -> str:
+    """The history or fresh run beside a file of dwells: NAME-history, or history for a file called dwells; else empty."""
     dwells = Path(source)
     stems = [f"{dwells.stem}-{what}", f"{dwells.stem}_{what}"]
     if dwells.stem.endswith("dwells"):

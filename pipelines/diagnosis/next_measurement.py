@@ -1,7 +1,5 @@
 """The next measurement: rows of a document with purpose, station time and expected separation, and the recipe of it."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from contextlib import suppress

@@ -1,7 +1,5 @@
 """Results of a diagnosis as rows of its document: classes, dwells of largest influence, dwells left out."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

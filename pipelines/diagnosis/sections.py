@@ -1,7 +1,5 @@
 """The tables of a diagnosis with their sentences, the same at a terminal, in a report and on a page."""
 
-from __future__ import annotations
-
 import re
 from collections import Counter
 from collections.abc import Sequence
@@ -76,10 +74,8 @@ def missing(document: dict[str, Any]) -> Section:
         errors = short(group["rms_after_ug"]), short(group["heldout_after_ug"]) or "–"
         text = group.get("evidence") or parameters_of(group)
         rows.append([names, group["scope"], size, chance(group["p_value"]), *errors, text])
-    columns = (
-        *("effect", "scope", ("size", "µg"), ("p", ""), ("residual", "µg"), ("cross-validated", "µg")),
-        "parameters",
-    )
+    numbers = ("size", "µg"), ("p", ""), ("residual", "µg"), ("cross-validated", "µg")
+    columns = ("effect", "scope", *numbers, "parameters")
     title = "Missing effects; these data cannot separate the effects of one row"
     return Section(title, columns, rows, _legend(document) if rows else [])
 
@@ -189,10 +185,8 @@ def hidden_by_noise(document: dict[str, Any]) -> Section:
         [r["effect"], short(r["size_ug"], 2), short(r["without_slow_noise_ug"], 2), effects.get(r["effect"]).breaker]
         for r in raised
     ]
-    columns = (
-        *("effect", ("smallest size", "µg rms"), ("with white noise only", "µg rms")),
-        "measurement for smaller sizes",
-    )
+    numbers = ("smallest size", "µg rms"), ("with white noise only", "µg rms")
+    columns = ("effect", *numbers, "measurement for smaller sizes")
     return Section("Effects hidden by slow noise (1/f, random walk)", columns, rows, [])
 
 

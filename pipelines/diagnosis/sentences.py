@@ -1,7 +1,5 @@
 """A diagnosis in sentences: the verdict with its numbers, its basis, the dwells that decide it, the next measurement."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

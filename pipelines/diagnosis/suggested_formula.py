@@ -1,7 +1,5 @@
 """The suggestion if a driver explains the excess and no effect of the catalogue does: a formula for a model file."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -18,7 +18,8 @@ from pipelines.importers import files
 from pipelines.importers.documents import TransferFailure, TransferImport, TransferParameter
 from pipelines.importers.keep import keep_tables, lot_of_import
 from pipelines.importers.values import finite_column
-from pipelines.procedures.recorded import finding_table, gathered_points
+from pipelines.procedures import procedure_tables
+from pipelines.procedures.figures import Finding, Outcome
 from pipelines.procedures.transfer_figures import bandwidth_of, diagnosis_text
 from schemas.errors import DataRejected, WrongUse, did_you_mean
 
@@ -126,5 +127,5 @@ def _tables(points: Points, unit: str, text: Sequence[tuple[str, str]]) -> dict[
             "record_s": c.record_s,
         }
     )  # fmt: skip
-    findings = [{"unit": unit, "procedure": "sweep", "number": 0, "subject": a, "text": b} for a, b in text]
-    return {"procedure_points": gathered_points([(0, "sweep", rows)]), "procedure_findings": finding_table(findings)}
+    tables = procedure_tables([(0, "sweep", rows, Outcome({}, [Finding(unit, *one) for one in text]))])
+    return {name: tables[name] for name in ("procedure_points", "procedure_findings")}

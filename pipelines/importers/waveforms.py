@@ -19,17 +19,15 @@ from pipelines.importers.files import digest_of
 from pipelines.importers.keep import keep_tables, lot_of_import
 from pipelines.importers.mapping import TIME_UNITS
 from pipelines.importers.values import finite_column
-from pipelines.procedures import PROCEDURES
+from pipelines.procedures import PROCEDURES, procedure_tables
 from pipelines.procedures.base import FromWaveforms, NominalScale
+from pipelines.procedures.figures import Finding, Outcome
 from pipelines.procedures.recorded import (
     REFERENCE,
     Device,
     ProcedureRecord,
     ProcedureStep,
     UnitRecord,
-    figure_table,
-    finding_table,
-    gathered_points,
 )
 from schemas.errors import DataRejected, WrongUse, did_you_mean
 from schemas.foreign import shown
@@ -123,7 +121,8 @@ def import_waveforms(
         "procedure": procedure, "unit": unit, "part": content, "columns": dict(layout.columns), "units": dict(layout.units),
         "rate_hz": layout.rate_hz, "group": layout.group,
     }  # fmt: skip
-    tables = _tables(procedure, unit, points, values, texts)
+    outcome = Outcome({unit: values}, [Finding(unit, *text) for text in texts])
+    tables = procedure_tables([(0, procedure, points, outcome)])
     run = keep_tables("import of waveforms", digest_of(sources), parameters, about, tables, archive)
     units = {spec.name: spec.unit for spec in one.figures}
     figures: list[WaveformFigure] = [
@@ -270,24 +269,3 @@ def _clock(content: Content, layout: RecordingLayout, where: str) -> np.ndarray:
     if n < 16:
         raise DataRejected(f"{where}: {n} samples, 16 or more are needed; record longer")
     return np.arange(n) * interval
-
-
-def _tables(
-    procedure: str, unit: str, points: pd.DataFrame, values: Sequence[Any], texts: Sequence[tuple[str, str]]
-) -> dict[str, pd.DataFrame]:
-    """Points, figures and findings for the archive."""
-    units = {spec.name: spec.unit for spec in PROCEDURES[procedure].figures}
-    rows = [
-        {
-            "unit": unit, "procedure": procedure, "number": 0, "figure": f.figure, "axis": f.axis, "value": f.value,
-            "uncertainty": f.uncertainty, "low": f.low, "high": f.high, "identified": bool(f.identified and np.isfinite(f.value)),
-            "unit_text": units[f.figure], "note": f.note, "dof": f.dof, "removed": f.removed,
-        }
-        for f in values
-    ]  # fmt: skip
-    findings = [{"unit": unit, "procedure": procedure, "number": 0, "subject": a, "text": b} for a, b in texts]
-    return {
-        "procedure_points": gathered_points([(0, procedure, points)]),
-        "procedure_figures": figure_table(rows),
-        "procedure_findings": finding_table(findings),
-    }

@@ -4,14 +4,14 @@ A recipe lists the procedures of a lot in order, as tables ``[[procedures]]`` wi
 procedure: recipes, capture, the stage ``procedures``, limits, the report and the reference read :data:`PROCEDURES`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from importlib import import_module
 from inspect import isabstract
 from pkgutil import iter_modules
 from typing import Any, TypeVar
 
+import numpy as np
+import pandas as pd
 from pydantic import ValidationError
 
 from pipelines.procedures.base import (
@@ -24,28 +24,14 @@ from pipelines.procedures.base import (
     Procedure,
     SetsEquipment,
 )
+from pipelines.procedures.figures import Outcome
 from pipelines.procedures.recorded import ProcedureStep
+from pipelines.tables.frames import empty_table
 from schemas.errors import RecipeInvalid, close_matches, did_you_mean
 from schemas.recipe import Recipe
 from schemas.station import StationConfig
 from schemas.toml_files import explain
 from schemas.units import AXES
-
-__all__ = [
-    "FIGURES",
-    "PROCEDURES",
-    "FigureSpec",
-    "IncompleteProcedure",
-    "Part",
-    "Procedure",
-    "ProcedureStep",
-    "figures_of_recipe",
-    "parts_of",
-    "procedure_of",
-    "refuse_unusable",
-    "roles_of",
-    "steps_of",
-]
 
 
 class IncompleteProcedure(Exception):
@@ -114,11 +100,8 @@ def parts_of(recipe: Recipe) -> list[Part]:
         where = f"recipe: procedures, number {number}"
         kind = str(content.get("kind", ""))
         if kind not in PROCEDURES:
-            raise RecipeInvalid(
-                f"{where}: kind '{kind}'; {did_you_mean(kind, PROCEDURES)}",
-                key="kind",
-                close=close_matches(kind, PROCEDURES),
-            )
+            text = f"{where}: kind '{kind}'; {did_you_mean(kind, PROCEDURES)}"
+            raise RecipeInvalid(text, key="kind", close=close_matches(kind, PROCEDURES))
         try:
             part = PROCEDURES[kind].part.model_validate(content)
             _refuse_missing_axes(where, part, PROCEDURES[kind], AXES[: recipe.sensor_axes])
@@ -184,22 +167,57 @@ def refuse_unusable(recipe: Recipe, station: StationConfig) -> None:
     RecipeInvalid
         The station lacks a role, a level is beyond it, or the list contradicts the recipe's other keys.
     """
-    kinds = [part.kind for part in parts_of(recipe)]
-    if kinds and recipe.static_record_s > 0.0 and "static_record" not in kinds:
+    parts = parts_of(recipe)
+    if parts and recipe.static_record_s > 0.0 and all(part.kind != "static_record" for part in parts):
         raise RecipeInvalid(
-            f"recipe: static_record_s is {recipe.static_record_s:g} s and 'procedures' lists no "
-            f"static_record, both are needed for "
-            "the record; add the procedure, or set static_record_s = 0",
+            f"recipe: static_record_s is {recipe.static_record_s:g} s and 'procedures' lists no static_record, both are needed "
+            "for the record; add the procedure, or set static_record_s = 0",
             key="procedures",
         )
-    for number, part in enumerate(parts_of(recipe), start=1):
+    for number, part in enumerate(parts, start=1):
         procedure = PROCEDURES[part.kind]
-        for role in procedure.roles:
-            if role not in station.fitted():
-                raise RecipeInvalid(
-                    f"recipe: procedures, number {number} ({part.kind}): station {station.name} has "
-                    f"no {role}, one is needed; add "
-                    f"[equipment.{role}] to the station's file, or measure on another station",
-                    key="procedures",
-                )
+        missing = next((role for role in procedure.roles if role not in station.fitted()), None)
+        if missing is not None:
+            raise RecipeInvalid(
+                f"recipe: procedures, number {number} ({part.kind}): station {station.name} has no {missing}, one is needed; add "
+                f"[equipment.{missing}] to the station's file, or measure on another station",
+                key="procedures",
+            )
         procedure.check(part, recipe, station)
+
+
+EMPTY: dict[str, dict[str, str]] = {
+    "procedure_points": {
+        "texts": "unit procedure axis series", "numbers": "setting value uncertainty", "whole": "number point",
+    },
+    "procedure_figures": {
+        "texts": "unit procedure figure axis unit_text note", "numbers": "value uncertainty low high dof removed",
+        "whole": "number", "flags": "identified",
+    },
+    "procedure_findings": {"texts": "unit procedure subject text", "whole": "number"},
+}  # fmt: skip
+"""Columns of the tables of the stage by their types, for tables without rows."""
+
+
+def procedure_tables(results: Sequence[tuple[int, str, pd.DataFrame, Outcome]]) -> dict[str, pd.DataFrame]:
+    """The tables of the stage ``procedures`` from the number, name, points, figures and findings of each procedure."""
+    points = [own.assign(number=number, procedure=name) for number, name, own, _ in results if len(own)]
+    figures = [
+        {
+            "unit": unit, "procedure": name, "number": number, "figure": one.figure, "axis": one.axis, "value": one.value,
+            "uncertainty": one.uncertainty, "low": one.low, "high": one.high,
+            "identified": bool(one.identified and np.isfinite(one.value)),
+            "unit_text": FIGURES[one.figure].unit, "note": one.note, "dof": one.dof, "removed": one.removed,
+        }
+        for number, name, _, outcome in results for unit, values in outcome.figures.items() for one in values
+    ]  # fmt: skip
+    findings = [
+        {"unit": one.unit, "procedure": name, "number": number, "subject": one.subject, "text": one.text}
+        for number, name, _, outcome in results
+        for one in outcome.findings
+    ]
+    made = (pd.concat(points, ignore_index=True) if points else points, pd.DataFrame(figures), pd.DataFrame(findings))
+    return {
+        name: rows if isinstance(rows, pd.DataFrame) and len(rows) else empty_table(**columns)
+        for (name, columns), rows in zip(EMPTY.items(), made, strict=True)
+    }

@@ -1,7 +1,5 @@
 """A test procedure: its part of a recipe, its steps, its reduction to points, its model and figures, its picture."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Annotated, Any, ClassVar
@@ -164,6 +162,15 @@ class FromWaveforms(Evaluated):
     @abstractmethod
     def setting_of(self, part: Any, reference: UnitRecord) -> dict[str, float]:
         """The setting of a step that was recorded elsewhere, from its reference channel."""
+
+
+def refuse_broken_turn(step_deg: float, fewest: int, advice: str) -> None:
+    """Refuse steps that give no whole number of angles in a turn, or too few; ValueError, for validators of parts."""
+    count = 360.0 / step_deg
+    if abs(count - round(count)) > 1e-9 or round(count) < fewest:
+        raise ValueError(
+            f"step_deg: {step_deg:g}° gives {count:g} angles in a turn, a whole number of at least {fewest} is needed{advice}"
+        )
 
 
 def refuse_unknown_effects(names: Sequence[str], known: Collection[str], test: str) -> None:

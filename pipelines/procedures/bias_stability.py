@@ -1,7 +1,5 @@
 """Bias stability over an hour in one pose, by its several definitions."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Annotated, Any, Literal
 

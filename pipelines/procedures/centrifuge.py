@@ -1,11 +1,9 @@
 """Centrifuge: linearity in % of full scale, K2 and K3 over a = rω²/g, with the input reversed, at one radius or several."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 import pandas as pd
@@ -62,7 +60,7 @@ class CentrifugePart(NominalScale):
     effects: Annotated[list[str], Field(max_length=6)] = Field(default_factory=lambda: list(DEFAULT))
 
     @model_validator(mode="after")
-    def _known(self) -> CentrifugePart:
+    def _known(self) -> Self:
         refuse_unknown_effects(self.effects, EFFECTS, "centrifuges")
         if self.radii_m is None:
             return self

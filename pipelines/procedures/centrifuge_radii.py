@@ -1,7 +1,5 @@
 """Figures, findings and picture of a centrifuge test at one radius or several, and its diagnosis in sentences."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,11 +1,9 @@
 """Figures of procedures and findings in words; the deciding axis of a figure, and the interval of the largest of several axes."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -55,7 +53,7 @@ class FigureValue:
     @classmethod
     def not_determined(
         cls, figure: str, axis: str, note: str, low: float = float("nan"), high: float = float("nan")
-    ) -> FigureValue:
+    ) -> Self:
         """A figure without a value, with the reason."""
         return cls(figure, axis, float("nan"), float("nan"), low, high, identified=False, note=note)
 

@@ -1,7 +1,5 @@
 """The multi-position test: static dwells over poses and temperatures, reduced and fitted by the stages of the chain."""
 
-from __future__ import annotations
-
 from typing import Any, Literal
 
 from pipelines.procedures.base import Part, Procedure

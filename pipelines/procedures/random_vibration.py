@@ -1,9 +1,7 @@
 """Random vibration by a profile: density of the reference, transfer function, and vibration rectification of the units."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 import pandas as pd
@@ -75,7 +73,7 @@ class RandomVibrationPart(NominalScale):
         return name
 
     @model_validator(mode="after")
-    def _effects_known(self) -> RandomVibrationPart:
+    def _effects_known(self) -> Self:
         refuse_unknown_effects(self.effects, EFFECTS, "sweeps")
         return self
 

@@ -1,9 +1,7 @@
 """Zero and sensitivity over the supply voltage: ratiometry of outputs that follow it, rejection of those that do not."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
-from typing import Annotated, Any, Literal, cast
+from typing import Annotated, Any, Literal, Self, cast
 
 import numpy as np
 import pandas as pd
@@ -50,7 +48,7 @@ class RatiometryPart(Part):
     repeatability_ug: NotNegative = 0.0
 
     @model_validator(mode="after")
-    def _different(self) -> RatiometryPart:
+    def _different(self) -> Self:
         if len(set(self.supplies_V)) < len(self.supplies_V):
             raise ValueError("supplies_V: a voltage occurs twice, different ones are needed; remove one")
         for volt in self.supplies_V:

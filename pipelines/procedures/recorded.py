@@ -1,22 +1,19 @@
 """What a procedure plans and gets: steps, the records of units read from tables, the units before it; tables that it writes."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.dynamics.stability import ShortNoise
 from inertial.dynamics.wandering_means import IdentifiedNoise
 from pipelines.tables.frames import empty_table
 from schemas.poses import Pose
 from schemas.units import AXES
 
-Array = NDArray[np.float64]
 REFERENCE = "@reference"
 """The name of the reference sensor in the tables of samples; no serial begins with it."""
 StepKind = Literal["dwell", "verification", "allan", "procedure"]
@@ -171,11 +168,7 @@ def nominal_device(readings: pd.DataFrame) -> Device:
     return Device({}, {}, float(first["full_scale"]), str(first["out_unit"]))
 
 
-POINT_TEXTS, POINT_NUMBERS, POINT_WHOLE = "unit procedure axis series", "setting value uncertainty", "number point"
-FIGURE_TEXTS, FIGURE_NUMBERS = "unit procedure figure axis unit_text note", "value uncertainty low high dof removed"
-
-
-def numbers(rows: pd.DataFrame, *names: str) -> list[NDArray[np.float64]]:
+def numbers(rows: pd.DataFrame, *names: str) -> list[Array]:
     """Columns of points as arrays: setting, value and uncertainty where none is named."""
     return [rows[name].to_numpy(dtype=float) for name in names or ("setting", "value", "uncertainty")]
 
@@ -189,38 +182,10 @@ def point_rows(**columns: Any) -> list[dict[str, Any]]:
 
 def point_table(rows: Iterable[Mapping[str, Any]]) -> pd.DataFrame:
     """Points from rows with unit, axis, series, point, setting, value, uncertainty and further numbers."""
-    listed = list(rows)
-    if not listed:
-        return pd.DataFrame(
-            {
-                **{name: pd.Series([], dtype="str") for name in ("unit", "axis", "series")},
-                "point": pd.Series([], dtype="int64"),
-            }
-            | {name: pd.Series([], dtype="float64") for name in POINT_NUMBERS.split()}
-        )
-    return pd.DataFrame(listed)
-
-
-def gathered_points(parts: Sequence[tuple[int, str, pd.DataFrame]]) -> pd.DataFrame:
-    """The table ``procedure_points`` of all procedures of a recipe."""
-    frames = [frame.assign(number=number, procedure=name) for number, name, frame in parts if len(frame)]
-    if not frames:
-        return empty_table(texts=POINT_TEXTS, numbers=POINT_NUMBERS, whole=POINT_WHOLE)
-    return pd.concat(frames, ignore_index=True)
-
-
-def figure_table(rows: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
-    """The table ``procedure_figures``."""
-    if not rows:
-        return empty_table(texts=FIGURE_TEXTS, numbers=FIGURE_NUMBERS, whole="number", flags="identified")
-    return pd.DataFrame(list(rows))
-
-
-def finding_table(rows: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
-    """The table ``procedure_findings``."""
-    if not rows:
-        return empty_table(texts="unit procedure subject text", whole="number")
-    return pd.DataFrame(list(rows))
+    made = pd.DataFrame(list(rows))
+    return (
+        made if len(made) else empty_table(texts="unit axis series", whole="point", numbers="setting value uncertainty")
+    )
 
 
 EARLIER_SHARE = 0.8  # relative standard deviation of F² from two Allan variances, in points of earlier versions

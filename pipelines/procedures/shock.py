@@ -1,9 +1,7 @@
 """Half-sine shocks against a reference sensor: sensitivity, return, bias shift, shock response spectrum, survival."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
-from typing import Annotated, Any, Literal, cast
+from typing import Annotated, Any, Literal, Self, cast
 
 import numpy as np
 import pandas as pd
@@ -66,7 +64,7 @@ class ShockPart(NominalScale):
     effects: Annotated[list[str], Field(max_length=6)] = Field(default_factory=lambda: list(DEFAULT))
 
     @model_validator(mode="after")
-    def _known(self) -> ShockPart:
+    def _known(self) -> Self:
         refuse_unknown_effects(self.effects, EFFECTS, "shocks")
         return self
 

@@ -1,7 +1,5 @@
 """Shocks as pulses and as waveforms: peak, duration, velocity change and ratio; spectra, and the diagnosis of the comparison."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from contextlib import suppress
 from typing import Any
@@ -10,16 +8,8 @@ import numpy as np
 import pandas as pd
 from scipy.interpolate import CubicSpline
 
-from inertial.dynamics.pulses import (
-    Pulse,
-    low_passed,
-    measured_pulse,
-    octave_frequencies,
-    return_time,
-    shock_spectrum,
-    velocity_change,
-    zero_shift,
-)
+from inertial.dynamics import pulses
+from inertial.dynamics.pulses import Pulse
 from inertial.dynamics.shock_diagnosis import ShockDiagnosis, diagnose_shock
 from inertial.dynamics.shock_effects import EFFECTS
 from inertial.dynamics.shock_fit import ShockRecord, Waves
@@ -41,7 +31,10 @@ def filtered_pair(reference: UnitRecord, own: UnitRecord, axis: int, scale: floa
     """Reference and unit along an axis in g, each through the same phaseless low-pass, with their rates."""
     first, second = reference.output[:, axis], own.output[:, axis] / scale
     rate, unit_rate = reference.rate_hz, own.rate_hz
-    return (low_passed(first, rate, duration_s), rate), (low_passed(second, unit_rate, duration_s), unit_rate)
+    return (pulses.low_passed(first, rate, duration_s), rate), (
+        pulses.low_passed(second, unit_rate, duration_s),
+        unit_rate,
+    )
 
 
 def noise_before(pair: Pair, before_s: float) -> float:
@@ -133,10 +126,10 @@ def curves(pair: Pair, names: Sequence[str], duration: float, before_s: float) -
         inside = slice(max(0, middle - int(2.0 * duration * rate)), middle + int(3.0 * duration * rate))
         t = (np.arange(y.size) / rate)[inside]
         step = max(1, t.size // DRAWN)
-        f = octave_frequencies(0.1 / duration, min(10.0 / duration, 0.08 * rate))
+        f = pulses.octave_frequencies(0.1 / duration, min(10.0 / duration, 0.08 * rate))
         for series, x, value in (
             ("wave", t[::step] - t[0], y[inside][::step]),
-            ("spectrum", f, shock_spectrum(y, rate, f)),
+            ("spectrum", f, pulses.shock_spectrum(y, rate, f)),
         ):
             point = np.arange(x.size)
             rows += point_rows(series=f"{series}_{name}", point=point, setting=x, value=value, uncertainty=np.nan)
@@ -179,7 +172,7 @@ def rows_of(
     (reference, rate), (unit, unit_rate) = pair
     about = {"point": number, "setting": direction}
     rows: list[dict[str, Any]] = []
-    drive = None if alone else measured_pulse(reference, rate, before_s=before_s)
+    drive = None if alone else pulses.measured_pulse(reference, rate, before_s=before_s)
     if drive is not None:
         rows.append(about | {"series": "reference"} | _columns(drive, reference, rate))
     still = np.median(raw[: int(before_s * unit_rate)])
@@ -188,7 +181,7 @@ def rows_of(
     ratio = error = under = noise = np.nan
     with suppress(NotIdentified):
         if not clipped:
-            answer = measured_pulse(unit, unit_rate, before_s=before_s)
+            answer = pulses.measured_pulse(unit, unit_rate, before_s=before_s)
             noise = answer.noise
             rows.append(about | {"series": "pulse"} | _columns(answer, unit, unit_rate))
             if drive is not None:
@@ -200,7 +193,7 @@ def rows_of(
 
 
 def _columns(pulse: Pulse, wave: np.ndarray, rate_hz: float) -> dict[str, float]:
-    shift, error = zero_shift(wave, pulse)
+    shift, error = pulses.zero_shift(wave, pulse)
     between = 1.0 / rate_hz / np.sqrt(12.0)  # rectangular, over the interval of the samples
     share = float(np.hypot(pulse.peak_error / pulse.peak, np.sqrt(2.0) * between / pulse.duration_s))
     return {
@@ -211,7 +204,7 @@ def _columns(pulse: Pulse, wave: np.ndarray, rate_hz: float) -> dict[str, float]
         "uncertainty": pulse.peak_error,
         "duration_s": pulse.duration_s,
         "velocity_m_s": pulse.velocity * STANDARD_GRAVITY_M_S2,
-        "return_s": return_time(wave, pulse, rate_hz),
+        "return_s": pulses.return_time(wave, pulse, rate_hz),
         "zero_shift_percent": 100.0 * shift / pulse.peak,
         "zero_shift_error_percent": 100.0 * error / abs(pulse.peak),
     }
@@ -225,7 +218,7 @@ def texts_of(reference: pd.DataFrame, pulse: pd.DataFrame) -> list[tuple[str, st
     peak, lasting = float(own["value"].abs().mean()), float(own["duration_s"].mean())
     text = (
         f"{name} {peak:.4g} g, {1e3 * lasting:.3g} ms, velocity change {float(own['velocity_m_s'].abs().mean()):.3g} m/s "
-        f"(half sine: {velocity_change(peak, lasting):.3g} m/s; IEC 60068-2-27 allows ± 15 %)"
+        f"(half sine: {pulses.velocity_change(peak, lasting):.3g} m/s; IEC 60068-2-27 allows ± 15 %)"
     )
     return [("pulse", text)]
 

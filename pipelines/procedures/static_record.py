@@ -1,7 +1,5 @@
 """The static record: hours in one pose, whose noise the stage of the chain analyses."""
 
-from __future__ import annotations
-
 from typing import Any, Literal
 
 from pipelines.procedures.base import Part, Procedure

@@ -1,7 +1,5 @@
 """Step response by the self-test inputs: settling time into a band, overshoot, rise time."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal
 
@@ -241,25 +239,19 @@ def _averaged(
 
 
 def _values(part: StepPart, axis: str, one: StepFigures) -> list[FigureValue]:
-    known = one.settling_identified
-    note = (
-        ""
-        if known
-        else (
+    value, spread, low, high = (
+        1e3 * s for s in (one.settling_s, one.settling_error_s, one.settling_low_s, one.settling_high_s)
+    )
+    if one.settling_identified:
+        settling = FigureValue(SETTLING, axis, value, spread, value - 1.96 * spread, value + 1.96 * spread)
+    else:
+        note = (
             f"an extremum of the response lies at the edge of the band of ± {part.band_percent:g} %: the settling time is "
-            f"{1e3 * one.settling_low_s:.3g} or {1e3 * one.settling_high_s:.3g} ms; average more steps, or choose "
-            "another band_percent"
+            f"{low:.3g} or {high:.3g} ms; average more steps, or choose another band_percent"
         )
-    )
-    spread = 1e3 * one.settling_error_s
-    value = 1e3 * one.settling_s
-    low, high = (
-        (value - 1.96 * spread, value + 1.96 * spread)
-        if known
-        else (1e3 * one.settling_low_s, 1e3 * one.settling_high_s)
-    )
+        settling = FigureValue(SETTLING, axis, value, spread, low, high, identified=False, note=note)
     return [
-        FigureValue(SETTLING, axis, value, spread, low, high, identified=known, note=note),
+        settling,
         FigureValue(OVERSHOOT, axis, 100.0 * one.overshoot, 100.0 * one.overshoot_error),
         FigureValue(RISE, axis, 1e3 * one.rise_s, 1e3 * one.rise_error_s),
     ]

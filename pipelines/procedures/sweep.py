@@ -1,7 +1,5 @@
 """Sine comparison: stepped sine on an exciter against a reference sensor; transfer function, its model and its diagnosis."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 
@@ -34,12 +32,7 @@ from pipelines.procedures.sweep_points import (
     transfer_points,
 )
 from pipelines.procedures.transfer_chart import bode_chart
-from pipelines.procedures.transfer_figures import (
-    diagnosis_text,
-    figures_of_transfer,
-    judged_points,
-    sampling_text,
-)
+from pipelines.procedures.transfer_figures import diagnosis_text, figures_of_transfer, judged_points, sampling_text
 from schemas.errors import RecipeInvalid
 from schemas.recipe import Recipe
 from schemas.station import StationConfig

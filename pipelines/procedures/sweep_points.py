@@ -1,9 +1,7 @@
 """Part and reduction of a sweep: its plan, the transfer function at every point, clocks, and conditions of the exciter."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 import pandas as pd
@@ -56,7 +54,7 @@ class SweepPart(Part):
     )
 
     @model_validator(mode="after")
-    def _usable(self) -> SweepPart:
+    def _usable(self) -> Self:
         if self.low_hz >= self.high_hz:
             raise ValueError(f"low_hz: {self.low_hz:g} Hz is not below high_hz, {self.high_hz:g} Hz; correct one")
         refuse_unknown_effects(self.effects, EFFECTS, "sweeps")

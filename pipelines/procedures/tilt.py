@@ -1,9 +1,7 @@
 """Single-axis tilt: the output over the angle in one plane, every 15° to 30°."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
-from typing import Annotated, Any, Literal, cast
+from typing import Annotated, Any, Literal, Self, cast
 
 import numpy as np
 import pandas as pd
@@ -13,7 +11,7 @@ from scipy.stats import norm
 from inertial.dynamics.tilt import TiltFit, fit_tilt, left_open
 from inertial.errors import NotIdentified
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Role, Trace, level
-from pipelines.procedures.base import Part, RecordByRecord
+from pipelines.procedures.base import Part, RecordByRecord, refuse_broken_turn
 from pipelines.procedures.figures import FigureSpec, FigureValue, Texts, UnitOutcome, worst
 from pipelines.procedures.recorded import Device, ProcedureStep, Taken, numbers, point_rows
 from schemas.bounds import NotNegative, Positive
@@ -42,13 +40,8 @@ class TiltPart(Part):
     angle_uncertainty_deg: NotNegative = 0.002
 
     @model_validator(mode="after")
-    def _whole_turn(self) -> TiltPart:
-        count = 360.0 / self.step_deg
-        if abs(count - round(count)) > 1e-9 or round(count) < FEWEST_ANGLES:
-            raise ValueError(
-                f"step_deg: {self.step_deg:g}° gives {count:g} angles in a turn, a whole number of at least {FEWEST_ANGLES} is "
-                "needed; use 15, 20, 24, 30, 36, 45 or 60"
-            )
+    def _whole_turn(self) -> Self:
+        refuse_broken_turn(self.step_deg, FEWEST_ANGLES, "; use 15, 20, 24, 30, 36, 45 or 60")
         return self
 
 
@@ -120,14 +113,11 @@ class Tilt(RecordByRecord):
     def of_lot(self, part: TiltPart, points: pd.DataFrame) -> Texts:
         """What the plane leaves open."""
         turned = _turned(part, points)
-        open_in, open_out = "; ".join(left_open(in_plane=True)), "; ".join(left_open(in_plane=False))
-        return [
-            (
-                "not determined by this plane",
-                f"{'axes' if len(turned) > 1 else 'axis'} {' and '.join(turned)}: {open_in}",
-            ),
-            ("not determined by this plane", f"axis {part.about}, about which the unit turns: {open_out}"),
-        ]
+        inside = (
+            f"{'axes' if len(turned) > 1 else 'axis'} {' and '.join(turned)}: {'; '.join(left_open(in_plane=True))}"
+        )
+        about = f"axis {part.about}, about which the unit turns: {'; '.join(left_open(in_plane=False))}"
+        return [("not determined by this plane", text) for text in (inside, about)]
 
     def chart(self, part: TiltPart, points: pd.DataFrame) -> Chart | None:
         """Residual from bias and scale over the angle."""

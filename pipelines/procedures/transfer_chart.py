@@ -1,7 +1,5 @@
 """The chart of a transfer function: magnitude and phase with their uncertainty, Nyquist plot, residual and coherence."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,23 +1,19 @@
 """Figures and findings that follow from the diagnosis of a transfer function."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from inertial.arrays import Array
 from inertial.counts import degrees_of_freedom
 from inertial.dynamics.spectra import folded_share
 from inertial.dynamics.transfer_diagnosis import TransferDiagnosis, diagnose_transfer
 from inertial.dynamics.transfer_effects import EFFECTS, Conditions
 from inertial.dynamics.transfer_model import IDENTIFIED_SHARE, PLAIN, Points, TransferFit, factor
 from pipelines.procedures.figures import FigureValue, probability
-
-Array = NDArray[np.float64]
 
 MOST_KEPT = 64
 _last_judged: dict[str, TransferDiagnosis] = {}

@@ -1,9 +1,7 @@
 """Transverse sensitivity on an exciter: the units are turned about their sensitive axis in steps, and a sine is fitted."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 import pandas as pd
@@ -14,7 +12,7 @@ from inertial.dynamics.sine_fit import HARMONICS, fit_tone, fit_tone_and_frequen
 from inertial.dynamics.transverse import Z95, Transverse, fit_transverse, relative_phase
 from inertial.errors import NotIdentified
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace, level
-from pipelines.procedures.base import Evaluated, InG, NominalScale, OnEquipment, scale_of
+from pipelines.procedures.base import Evaluated, InG, NominalScale, OnEquipment, refuse_broken_turn, scale_of
 from pipelines.procedures.figures import FigureSpec, FigureValue, UnitOutcome, verdict_of
 from pipelines.procedures.recorded import (
     REFERENCE,
@@ -55,13 +53,8 @@ class TransversePart(NominalScale):
     repeatability_ppm: NotNegative = 5.0
 
     @model_validator(mode="after")
-    def _whole_circle(self) -> TransversePart:
-        count = 360.0 / self.step_deg
-        if abs(count - round(count)) > 1e-9 or count < FEWEST_ANGLES:
-            raise ValueError(
-                f"step_deg: {self.step_deg:g}° gives {count:g} angles in a turn, a whole number of at least {FEWEST_ANGLES} is "
-                "needed (ISO 16063-31); use 15, 30, 36 or 45"
-            )
+    def _whole_circle(self) -> Self:
+        refuse_broken_turn(self.step_deg, FEWEST_ANGLES, " (ISO 16063-31); use 15, 30, 36 or 45")
         return self
 
 
@@ -229,14 +222,10 @@ def _texts(part: TransversePart, fit: Transverse) -> list[tuple[str, str]]:
     else:
         text = f"{fit.direction_deg:.1f}° ± {2.0 * fit.direction_error_deg:.1g}° (k = 2) from {first} towards {second}"
         out = [("direction of the largest transverse sensitivity", text)]
-    if not np.isfinite(fit.p_value):
-        return [
-            *out,
-            ("model", "a sine over the angle cannot be judged: no degree of freedom is left; measure at more angles"),
-        ]
-    text = f"a sine over the angle {verdict_of(fit)}"
-    if adequate(fit) is False:
-        text += "; check the angles of the fixture and its resonance, repeat at another frequency"
+    text = "a sine over the angle cannot be judged: no degree of freedom is left; measure at more angles"
+    if np.isfinite(fit.p_value):
+        remedy = "; check the angles of the fixture and its resonance, repeat at another frequency"
+        text = f"a sine over the angle {verdict_of(fit)}{remedy if adequate(fit) is False else ''}"
     return [*out, ("model", text)]
 
 

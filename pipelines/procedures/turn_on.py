@@ -1,7 +1,5 @@
 """Repeatability of the bias from turn-on to turn-on, by power cycles."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any, Literal
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Warm-up time: from power-on until the output is within its band, and stays there."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Annotated, Any, Literal
 

@@ -4,8 +4,6 @@ Values and degrees of freedom are those of allantools, except of MTIE. The overl
 docs/decisions/statistics-of-records.md.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
@@ -13,16 +11,14 @@ from functools import lru_cache
 import allantools
 import numpy as np
 from allantools import ci
-from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
+from inertial.arrays import Array, Flags, Index
 from inertial.distributions import chi2_quantile
 from inertial.noise.allan import CONFIDENCE, AllanCurve
 from inertial.noise.flicker import FLICKER_FLOOR
 from inertial.noise.terms import NoiseTerms
 from schemas.units import MICRO, STANDARD_GRAVITY_M_S2
-
-Array = NDArray[np.float64]
 
 POWER = {"Q": 2, "N": 0, "B": -1, "K": -2}
 """Exponent α of the frequency in the density of each noise term, as the degrees of freedom need it; a ramp is no noise."""
@@ -92,12 +88,8 @@ def _mtie(record: Array, rate_hz: float, m: Array) -> Array:
     return out
 
 
-def _modified_freedom(alpha: int, m: int, n: int) -> float:
-    return ci.edf_greenhall(alpha, 2, m, n + 1, overlapping=True, modified=True)
-
-
-def _hadamard_freedom(alpha: int, m: int, n: int) -> float:
-    return ci.edf_greenhall(alpha, 3, m, n + 1, overlapping=True, modified=False)
+def _greenhall(order: int, *, modified: bool) -> Callable[[int, int, int], float]:
+    return lambda alpha, m, n: ci.edf_greenhall(alpha, order, m, n + 1, overlapping=True, modified=modified)
 
 
 def _total_freedom(alpha: int, m: int, n: int) -> float:
@@ -108,9 +100,9 @@ def _total_freedom(alpha: int, m: int, n: int) -> float:
 
 
 STATISTICS = {
-    "modified": Statistic("modified Allan deviation", _of_allantools("mdev"), 4, _modified_freedom),
+    "modified": Statistic("modified Allan deviation", _of_allantools("mdev"), 4, _greenhall(2, modified=True)),
     "hadamard": Statistic(
-        "overlapping Hadamard deviation", _of_allantools("ohdev"), 4, _hadamard_freedom, sees_ramp=False
+        "overlapping Hadamard deviation", _of_allantools("ohdev"), 4, _greenhall(3, modified=False), sees_ramp=False
     ),
     "total": Statistic(
         "total deviation",
@@ -118,7 +110,7 @@ STATISTICS = {
         freedom=_total_freedom,
         bias=lambda alpha, share: 1.0 - TOTAL_BIAS.get(alpha, 0.0) * share,
     ),
-    "time": Statistic("time deviation", _of_allantools("tdev"), 4, _modified_freedom, integral=True),
+    "time": Statistic("time deviation", _of_allantools("tdev"), 4, _greenhall(2, modified=True), integral=True),
     "tie": Statistic("RMS time interval error", _of_allantools("tierms"), integral=True),
     "mtie": Statistic("maximum time interval error", _mtie, integral=True),
 }
@@ -131,7 +123,7 @@ def deviations(
     curve: AllanCurve,
     terms: NoiseTerms,
     *,
-    explained: NDArray[np.bool_],
+    explained: Flags,
 ) -> Deviations:
     """A statistic of records, at the averaging times of their Allan curve that it allows.
 
@@ -176,7 +168,7 @@ def _largest(mixture: Array, tau: Array, statistic: Statistic) -> list[int | Non
     return [powers[place] for place in np.argmax(shares, axis=0)]
 
 
-def _interval(statistic: Statistic, powers: list[int | None], m: NDArray[np.int64], n: int) -> Array:
+def _interval(statistic: Statistic, powers: list[int | None], m: Index, n: int) -> Array:
     """Ends (2, t) of the interval over the deviation."""
     rows = [
         (np.nan, 1.0) if alpha is None else (_freedom(statistic, alpha, int(k), n), statistic.bias(alpha, int(k) / n))

@@ -1,14 +1,12 @@
 """Fit of a model to the dwells of a lot: coefficients, covariance, residuals and the noise between dwells."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.errors import InertialError
 from inertial.fits.wander import student
 from pipelines.stages.noisy_fit import NoisyFit, fitted_with_noise
@@ -18,9 +16,6 @@ from pipelines.tables.dwells import LotArrays, LotTables
 from pipelines.tables.frames import empty_table, picked
 from schemas.errors import DataRejected
 from schemas.units import MICRO
-
-Array = NDArray[np.float64]
-
 
 LONG_S = 3600.0  # shortest record whose walk is extrapolated over a day: it then grows by a factor of three at most
 

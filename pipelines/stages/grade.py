@@ -1,17 +1,15 @@
 """Decisions: every figure of every unit against its limit under the agreed rule, the grade, and the reasons."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from pipelines.procedures import PROCEDURES, figures_of_recipe
-from pipelines.stages.figures import FIGURES, Figure, LotCoefficients, UnitTables, Value, figures_of
-from pipelines.stages.figures.base import BudgetRow
+from pipelines.stages.figures import FIGURES, Figure, figures_of
+from pipelines.stages.figures.base import BudgetRow, LotCoefficients, UnitTables, Value
 from pipelines.stages.uncertainty.decision_budget import DecisionBudget
 from pipelines.stages.uncertainty.lot_risks import lot_risks
 from pipelines.tables.calibration import Calibration, read_calibration
@@ -167,7 +165,7 @@ def _budget(evidence: GradeEvidence) -> Callable[[str], Mapping[tuple[str, str],
     return lambda unit: by_unit.get(unit, {})
 
 
-def _stated(table: pd.DataFrame | None, units: int) -> NDArray[np.float64] | None:
+def _stated(table: pd.DataFrame | None, units: int) -> Array | None:
     """Covariance of the coefficients by the budget, (units, 3p, 3p)."""
     if table is None or table.empty:
         return None

@@ -1,7 +1,5 @@
 """The verdict on the model of a run: whether it is adequate, with residual, noise and probability; one row of the archive."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Annotated, Any
 
@@ -40,37 +38,24 @@ def judge(dwells: pd.DataFrame, history: pd.DataFrame | None, effects: Sequence[
 
 
 def verdict_on(dwells: pd.DataFrame, history: pd.DataFrame | None, effects: Sequence[str]) -> AdequacyDocument:
-    """The verdict; where the data or an effect are not usable, the reason."""
+    """What a diagnosis says of a model, without classes and proposals; where the data or an effect are not usable, the reason."""
     if dwells.empty:
         return _not_judged("every unit was refused, so that no dwell is left; see the reasons of each unit")
-    try:
-        return adequacy(dwells, history, effects)
-    except (DataRejected, RecipeInvalid, InertialError) as problem:
-        return _not_judged(str(problem).rstrip("."))
-
-
-def adequacy(dwells: pd.DataFrame, history: pd.DataFrame | None, effects: Sequence[str]) -> AdequacyDocument:
-    """The verdict of dwells on a model: what a diagnosis says of it, without classes, drivers and proposals.
-
-    Raises
-    ------
-    DataRejected
-        There are no dwells, or too few to judge anything.
-    InertialError
-        An effect is unknown, or the dwells lack a quantity of the model.
-    """
     from inertial.criticism.verdict import judged  # loads the search for effects: a run without dwells does not need it
 
-    catalogue.get_all(list(effects))
-    measurement, faults, lot = sound_lot(dwells, history, effects)
-    faulty = sorted({measurement.units[fault.unit] for fault in faults})
-    if lot is None:
-        return _not_judged(every_unit_faulty(faults), faulty)
-    with threadpool_limits(1):
-        verdict = judged(lot, effects, generator())
+    try:
+        catalogue.get_all(list(effects))
+        measurement, faults, lot = sound_lot(dwells, history, effects)
+        faulty = sorted({measurement.units[fault.unit] for fault in faults})
+        if lot is None:
+            return _not_judged(every_unit_faulty(faults), faulty)
+        with threadpool_limits(1):
+            verdict = judged(lot, effects, generator())
+        error = error_of(verdict.rms, verdict.floor, verdict.log_p)
+        adequate, reason, error = told(verdict.search.base, verdict.adequate, verdict.unjudged, error)
+    except (DataRejected, RecipeInvalid, InertialError) as problem:
+        return _not_judged(str(problem).rstrip("."))
     units = len(measurement.units) - len(faulty)
-    error = error_of(verdict.rms, verdict.floor, verdict.log_p)
-    adequate, reason, error = told(verdict.search.base, verdict.adequate, verdict.unjudged, error)
     return _document(adequate, reason or None, error, verdict.named, units, faulty)
 
 

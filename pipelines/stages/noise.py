@@ -1,14 +1,12 @@
 """Noise of the static record: Allan deviation with its intervals, and the noise terms that explain it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.distributions import chi2_upper
 from inertial.noise.allan import AllanCurve, overlapping
 from inertial.noise.flicker import FLICKER_FLOOR
@@ -18,8 +16,6 @@ from pipelines.tables.calibration import Calibration, read_calibration
 from pipelines.tables.frames import empty_table
 from pipelines.tables.summaries import by_record
 from schemas.units import MICRO
-
-Array = NDArray[np.float64]
 
 TERM = "stability_1h"
 HOUR_S = 3600.0
@@ -65,6 +61,27 @@ UNITS = {"Q": "µg·s", "N": "µg/√Hz", N_ONE_SIDED: "µg/√Hz", "B": "µg", 
 TERM_COLUMNS = ["unit", "axis", "term", "value", "low", "high", "identified", "unit_text", "note"]
 
 
+@dataclass(frozen=True)
+class StaticChannel:
+    """One axis of one unit: its record (n,) in µg without the response to its temperature, or the reason why there is none."""
+
+    unit: str
+    axis: str
+    record: np.ndarray
+    digits: Coarse
+    warmth: str
+    silent: str
+
+
+@dataclass(frozen=True)
+class StaticRecord:
+    """The static record of a run; ``size`` : samples, at ``rate_hz``, of which each value of the channels is the mean."""
+
+    channels: list[StaticChannel]
+    rate_hz: float
+    size: int
+
+
 def noise(record: StaticRecord | None) -> dict[str, pd.DataFrame]:
     """Allan curves (table ``allan``) and noise terms (table ``noise``) of every calibrated unit, in µg; empty without a record.
 
@@ -102,15 +119,6 @@ def noise(record: StaticRecord | None) -> dict[str, pd.DataFrame]:
     }
 
 
-@dataclass(frozen=True)
-class StaticRecord:
-    """The static record of a run; ``size`` : samples, at ``rate_hz``, of which each value of the channels is the mean."""
-
-    channels: list[StaticChannel]
-    rate_hz: float
-    size: int
-
-
 def static_record(
     samples: Iterable[pd.DataFrame],
     readings: pd.DataFrame,
@@ -142,18 +150,6 @@ def static_record(
         for channel in _channels(series, calibration, unit, static[static["unit"] == unit], rate, history)
     ]
     return StaticRecord(channels, rate, series.size)
-
-
-@dataclass(frozen=True)
-class StaticChannel:
-    """One axis of one unit: its record (n,) in µg without the response to its temperature, or the reason why there is none."""
-
-    unit: str
-    axis: str
-    record: np.ndarray
-    digits: Coarse
-    warmth: str
-    silent: str
 
 
 def _channels(

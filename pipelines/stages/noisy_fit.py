@@ -1,16 +1,14 @@
 """The fit of a lot, and the noise of its dwells by the residuals."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inertial import design
 from inertial import effects as catalogue
+from inertial.arrays import Array, Flags
 from inertial.estimation.problem import Lot, Problem
 from inertial.estimation.refinement import terms_of
 from inertial.fits.linear import LotFit, felt_force, fit_lot, of_every_axis, own_axes, pseudo_inverses
@@ -19,7 +17,6 @@ from pipelines.tables.dwells import LotArrays
 from schemas.errors import DataRejected
 from schemas.units import STANDARD_GRAVITY_M_S2
 
-Array = NDArray[np.float64]
 FEWEST_TO_SPARE = 4  # degrees of freedom of the lot, below which the kind of its noise cannot be estimated
 _PER_G = {"g": 1.0, "m/s^2": STANDARD_GRAVITY_M_S2}
 """Output per g by the name of the output's unit, for models without a scale."""
@@ -79,7 +76,7 @@ def fitted_with_noise(lot: LotArrays, effects: Sequence[str]) -> NoisyFit:
     return _by_wander(lot, fitted, used)
 
 
-def _felt(lot: LotArrays, used: NDArray[np.bool_]) -> Array:
+def _felt(lot: LotArrays, used: Flags) -> Array:
     """Force along the sensors' own axes at every dwell, (units, n, 3), g; misalignment from the dwells of the fit alone."""
     force, own = lot.state.force, lot.state.force[:, used]
     theta = None if lot.state.theta is None else np.broadcast_to(lot.state.theta, lot.output.shape[:2])[:, used]
@@ -87,7 +84,7 @@ def _felt(lot: LotArrays, used: NDArray[np.bool_]) -> Array:
     return force @ turn
 
 
-def _by_wander(lot: LotArrays, fitted: WanderFit, used: NDArray[np.bool_]) -> NoisyFit:
+def _by_wander(lot: LotArrays, fitted: WanderFit, used: Flags) -> NoisyFit:
     level = np.sqrt(np.mean(lot.standard_error[:, used] ** 2, axis=1)) * np.sqrt(fitted.lack_of_fit)
     return NoisyFit(
         method="wander",
@@ -107,7 +104,7 @@ def _by_wander(lot: LotArrays, fitted: WanderFit, used: NDArray[np.bool_]) -> No
     )
 
 
-def _by_birge(lot: LotArrays, plain: LotFit, used: NDArray[np.bool_]) -> NoisyFit:
+def _by_birge(lot: LotArrays, plain: LotFit, used: Flags) -> NoisyFit:
     """The plain fit with its covariance scaled, by Student's factor too; all its noise is taken to be white."""
     stretch = np.maximum(1.0, plain.chi2 / np.maximum(plain.dof, 1))  # χ²/ν, never below one
     noise = lot.standard_error * np.sqrt(stretch)[:, None, :]
@@ -155,7 +152,7 @@ def _per_g(lot: LotArrays, lot_fit: LotFit) -> Array:
     return np.full_like(scale, _PER_G[lot.out_unit])
 
 
-def profiled(lot: LotArrays, effects: Sequence[str], used: NDArray[np.bool_]) -> dict[str, dict[str, Any]]:
+def profiled(lot: LotArrays, effects: Sequence[str], used: Flags) -> dict[str, dict[str, Any]]:
     """Values of nonlinear parameters and constants by effect id, one or one per axis; none for a linear model.
 
     Parameters
@@ -168,7 +165,7 @@ def profiled(lot: LotArrays, effects: Sequence[str], used: NDArray[np.bool_]) ->
     return {term.effect.id: term.keywords for term in terms_of(model, Problem(_in_g(lot, used))) if term.keywords}
 
 
-def _in_g(lot: LotArrays, used: NDArray[np.bool_]) -> Lot:
+def _in_g(lot: LotArrays, used: Flags) -> Lot:
     """The lot in g, over the nominal scale of each unit and axis; dwells that are not fitted count as missing."""
     plain = fit_lot(PLAIN, lot.state, lot.output, np.where(used[:, None], lot.standard_error, np.inf))
     scale = np.abs(plain.scale())

@@ -1,29 +1,17 @@
 """The procedures of a recipe: points of every unit, the figures that limits may name, and the findings."""
 
-from __future__ import annotations
-
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from inertial.dynamics.wandering_means import IdentifiedNoise
 from inertial.errors import InertialError
-from pipelines.procedures import PROCEDURES, parts_of, steps_of
+from pipelines.procedures import PROCEDURES, parts_of, procedure_tables, steps_of
 from pipelines.procedures.base import Evaluated, Part
 from pipelines.procedures.figures import FigureValue, Outcome
-from pipelines.procedures.recorded import (
-    Device,
-    ProcedureRecord,
-    figure_table,
-    finding_table,
-    gathered_points,
-    nominal_device,
-    point_table,
-    procedure_record,
-)
+from pipelines.procedures.recorded import Device, ProcedureRecord, nominal_device, point_table, procedure_record
 from pipelines.tables.calibration import read_calibration
 from schemas.recipe import Recipe
 
@@ -45,16 +33,10 @@ def procedures(
     noise : terms of the static record of the run
     """
     if not recipe.procedures:
-        return {
-            "procedure_points": gathered_points([]),
-            "procedure_figures": figure_table([]),
-            "procedure_findings": finding_table([]),
-        }
+        return procedure_tables([])
     device = replace(_device(readings, coefficients, covariance), noise=identified_noise(noise))
     accepted = verdicts.loc[~verdicts["refused"], "unit"].tolist()
-    points: list[tuple[int, str, pd.DataFrame]] = []
-    figures: list[dict[str, Any]] = []
-    findings: list[dict[str, Any]] = []
+    results: list[tuple[int, str, pd.DataFrame, Outcome]] = []
     steps = steps_of(recipe)
     for number, part in enumerate(parts_of(recipe)):
         procedure = PROCEDURES[part.kind]
@@ -67,24 +49,12 @@ def procedures(
             procedure_record(record, step, samples({record}), _answered(readings, record, accepted), recipe.sensor_axes)
             for record, step in own
         )
-        table, outcome = analysed(procedure, part, records, device, accepted)
-        points.append((number, part.kind, table))
-        units = {spec.name: spec.unit for spec in procedure.figures}
-        for unit, values in outcome.figures.items():
-            figures += [_figure_row(number, part.kind, unit, one, units[one.figure]) for one in values]
-        findings += [
-            {"unit": one.unit, "procedure": part.kind, "number": number, "subject": one.subject, "text": one.text}
-            for one in outcome.findings
-        ]
-    return {
-        "procedure_points": gathered_points(points),
-        "procedure_figures": figure_table(figures),
-        "procedure_findings": finding_table(findings),
-    }
+        results.append((number, part.kind, *_analysed(procedure, part, records, device, accepted)))
+    return procedure_tables(results)
 
 
-def analysed(
-    procedure: Evaluated, part: Part, records: Any, device: Device, units: list[str]
+def _analysed(
+    procedure: Evaluated, part: Part, records: Iterable[ProcedureRecord], device: Device, units: list[str]
 ) -> tuple[pd.DataFrame, Outcome]:
     """Points, figures and findings; a unit for which a declared figure is missing gets it as not determined, with the reason.
 
@@ -93,8 +63,7 @@ def analysed(
     records : of the procedure, in order; each is read once
     """
     try:
-        kept: list[ProcedureRecord] = list(records)
-        table = procedure.reduce(part, kept, device)
+        table = procedure.reduce(part, list(records), device)
         outcome = procedure.evaluate(part, table, device)
         why = "its records give no value"
     except InertialError as problem:
@@ -104,8 +73,7 @@ def analysed(
         values = list(outcome.figures.get(unit, []))
         there = {one.figure for one in values}
         missing = [spec for spec in procedure.figures if spec.name not in there]
-        values += [FigureValue.not_determined(spec.name, "*", why) for spec in missing]
-        whole[unit] = [one if np.isfinite(one.value) else replace(one, identified=False) for one in values]
+        whole[unit] = values + [FigureValue.not_determined(spec.name, "*", why) for spec in missing]
     return table, Outcome(whole, outcome.findings)
 
 
@@ -142,22 +110,3 @@ def identified_noise(terms: pd.DataFrame | None) -> dict[tuple[str, str], Identi
         ends = float(row["value"]), float(row["low"]), float(row["high"])
         of.setdefault((str(row["unit"]), str(row["axis"])), {})[str(row["term"])] = ends
     return {key: IdentifiedNoise(one["B"], one["K"]) for key, one in of.items()}
-
-
-def _figure_row(number: int, procedure: str, unit: str, one: FigureValue, unit_text: str) -> dict[str, Any]:
-    return {
-        "unit": unit,
-        "procedure": procedure,
-        "number": number,
-        "figure": one.figure,
-        "axis": one.axis,
-        "value": one.value,
-        "uncertainty": one.uncertainty,
-        "low": one.low,
-        "high": one.high,
-        "identified": one.identified,
-        "unit_text": unit_text,
-        "note": one.note,
-        "dof": one.dof,
-        "removed": one.removed,
-    }

@@ -1,13 +1,11 @@
 """Samples to dwells: one row per accepted unit and static dwell, in the exchange format, with all recorded covariates."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.frames import force_from_angles
 from inertial.quantities import ANGLE_COLUMNS, BY_ATTRIBUTE, READINGS
 from pipelines.tables.dwell_table import covariates
@@ -31,7 +29,7 @@ class FollowedSupply(NamedTuple):
     nominal_V: float
     share: float
 
-    def ratio(self, supply: NDArray[np.float64]) -> NDArray[np.float64]:
+    def ratio(self, supply: Array) -> Array:
         """Output over that at the nominal supply, of measured supplies in V."""
         return 1.0 + self.share * (supply / self.nominal_V - 1.0)
 

@@ -1,16 +1,11 @@
 """Standard uncertainty of the RMS error over dwells with correlated errors."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from schemas.units import AXES
-
-Array = NDArray[np.float64]
-
 
 OF_UNITS = ("rms_uncertainty_{}_ug", "rms_expected_{}_ug", "rms_dof_{}")
 """Columns that are the same in all rows of a unit, for each axis."""

@@ -1,15 +1,14 @@
 """The static record of a lot, collected table by table: samples, coarse digits with their noise, known share of temperature."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import Self
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from inertial import design
+from inertial.arrays import Array
 from inertial.fits.linear import force_along_axes
 from inertial.frames import force_from_angles
 from inertial.noise.resolution import FINE, most, ripple, step_of, without_rounding
@@ -17,8 +16,6 @@ from inertial.noise.terms import NoiseTerms
 from inertial.state import State
 from pipelines.tables.calibration import Calibration
 from schemas.units import AXES
-
-Array = NDArray[np.float64]
 
 COUNTED = 1000
 """Different values of a channel that are counted: an output with more values has no coarse digits."""
@@ -93,12 +90,6 @@ class StaticSeries:
     def of(self, unit: str) -> Array:
         """Outputs (n, m) of a unit; none where it was not recorded."""
         return np.concatenate(self._means[unit] or [np.zeros((0, len(self._letters)))])
-
-    def values(self) -> Array:
-        """Outputs (units, m, n), as long as the shortest."""
-        series = [self.of(unit) for unit in self._means]
-        shortest = min(len(one) for one in series)
-        return np.stack([one[:shortest].T for one in series])
 
 
 @dataclass(frozen=True)
@@ -182,7 +173,7 @@ class Coarse:
     most: float
 
     @classmethod
-    def of(cls, digits: Digits, scale: float) -> Coarse:
+    def of(cls, digits: Digits, scale: float) -> Self:
         """Digits of a channel whose output is ``scale`` times µg."""
         step = digits.step / abs(scale)
         largest = most(step, digits.outside, digits.n) if step > 0.0 else np.inf

@@ -3,15 +3,13 @@
 A unit with a fault is refused completely: it gets a verdict, but no coefficient, grade or certificate; the other units continue.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from inertial.arrays import Array, Flags
 from inertial.frames import force_from_angles
 from inertial.pointing import _force, contradicts, pointing_error
 from pipelines.tables.summaries import HIGHS, LOWS, PROCEDURE, STATIC, means, there
@@ -24,9 +22,6 @@ FOLLOWED_SHARE = 0.2  # a sensor that follows less than a fifth of the chamber's
 FORCE_EXPLAINS = 0.5  # of an axis' variance over the poses; a live channel has more than 0.99
 TURNED_G = 0.5  # a follow-up may stay in a few poses: an axis that they hardly turn shows no response
 SAMPLES_KEPT = 0.99
-
-
-Array = NDArray[np.float64]
 
 
 class DataFault(NamedTuple):
@@ -190,13 +185,13 @@ def _dead_channels(means: pd.DataFrame, readings: pd.DataFrame) -> list[DataFaul
     return faults
 
 
-def _turned(rows: pd.DataFrame) -> NDArray[np.bool_]:
+def _turned(rows: pd.DataFrame) -> Flags:
     """Axes that the poses turn far enough to expect a response, (3,)."""
     force = force_from_angles(*np.radians(rows[["outer_deg", "inner_deg"]].to_numpy()).T)
     return np.asarray(np.ptp(force, axis=0) >= TURNED_G)
 
 
-def _explained_by_force(rows: pd.DataFrame) -> NDArray[np.float64]:
+def _explained_by_force(rows: pd.DataFrame) -> Array:
     """Share of each output's variance inside the soaks that a linear function of the force explains, (m,)."""
     force = force_from_angles(*np.radians(rows[["outer_deg", "inner_deg"]].to_numpy()).T)
     soaks = (rows["soak"].to_numpy()[:, None] == np.unique(rows["soak"].to_numpy())).astype(float)
@@ -265,7 +260,7 @@ def frozen(readings: pd.DataFrame) -> Iterator[tuple[str, int, float]]:
             yield str(unit), still + 1, float(values[-1, column])
 
 
-def _by_chance(changed: NDArray[np.bool_], counted: NDArray[np.bool_], column: int, still: int) -> float:
+def _by_chance(changed: Flags, counted: Flags, column: int, still: int) -> float:
     """Probability that the reading of a sound thermometer stays equal for so long; 1 if unknown.
 
     Parameters

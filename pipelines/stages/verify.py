@@ -1,11 +1,9 @@
 """Verification on poses that the fit has not seen: | |a_corr| − g | of every unit, by dwell and by pose, and its uncertainty."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from inertial.arrays import Array, Flags
 from inertial.correction import correct, station_change
 from inertial.design import of_axes
 from pipelines.stages.rms_error import OF_UNITS, rms_columns
@@ -13,8 +11,6 @@ from pipelines.tables.calibration import Calibration, read_calibration
 from pipelines.tables.dwells import LotArrays, LotTables
 from pipelines.tables.frames import empty_table, picked
 from schemas.units import AXES, MICRO
-
-Array = NDArray[np.float64]
 
 
 def verify(
@@ -85,7 +81,7 @@ def sizes(force: Array) -> Array:
 
 
 def verification_rows(
-    lot: LotArrays, unseen: NDArray[np.bool_], columns: dict[str, Array], by_axis: Array, expected: Array
+    lot: LotArrays, unseen: Flags, columns: dict[str, Array], by_axis: Array, expected: Array
 ) -> dict[str, pd.DataFrame]:
     """The tables of a verification.
 
@@ -115,7 +111,7 @@ def _expected(predictions: pd.DataFrame, units: tuple[str, ...]) -> Array:
     return out
 
 
-def _pose_rows(lot: LotArrays, unseen: NDArray[np.bool_], error: Array, expected: Array) -> pd.DataFrame:
+def _pose_rows(lot: LotArrays, unseen: Flags, error: Array, expected: Array) -> pd.DataFrame:
     poses = np.asarray(lot.poses, dtype=object)[unseen]
     names = list(dict.fromkeys(poses.tolist()))
     own = [np.flatnonzero(poses == pose) for pose in names]
@@ -131,7 +127,7 @@ def _pose_rows(lot: LotArrays, unseen: NDArray[np.bool_], error: Array, expected
     )
 
 
-def _rows(lot: LotArrays, unseen: NDArray[np.bool_], columns: dict[str, Array], by_axis: Array) -> pd.DataFrame:
+def _rows(lot: LotArrays, unseen: Flags, columns: dict[str, Array], by_axis: Array) -> pd.DataFrame:
     u, n = np.indices(by_axis.shape[:2]).reshape(2, -1)
     temperature = lot.state.temperature
     return pd.DataFrame(

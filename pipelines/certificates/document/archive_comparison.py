@@ -1,7 +1,5 @@
 """A certificate's XML against the archive: the document is made again from the archive, and the two are compared whole."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import takewhile, zip_longest
@@ -168,11 +166,30 @@ def _ended(one: Calibration) -> tuple[str, str]:
     return ("", text) if today() < one.until else (text, "")
 
 
-CORE = "/*/dcc:administrativeData/dcc:coreData"
-ITEM = "/*/dcc:administrativeData/dcc:items/dcc:item"
-METHOD = "/*/dcc:measurementResults/dcc:measurementResult/dcc:usedMethods/dcc:usedMethod"
-PERSON = "/*/dcc:administrativeData/dcc:respPersons/dcc:respPerson"
-NAME = "dcc:name/dcc:content/text()"
+CORE, ITEM = "dcc:coreData", "dcc:items/dcc:item"
+LABORATORY, PERSON = "dcc:calibrationLaboratory", "dcc:respPersons/dcc:respPerson"
+NAME = "dcc:name/dcc:content"
+CONTACT = {"name": NAME, "email": "dcc:eMail", "address": "dcc:location/dcc:further/dcc:content"}
+STATED = {
+    "laboratory": {
+        **{key: f"{LABORATORY}/dcc:contact/{path}" for key, path in CONTACT.items()},
+        "country": f"{CORE}/dcc:countryCodeISO3166_1",
+        "place": f"{CORE}/dcc:performanceLocation",
+    },
+    "customer": {
+        **{key: f"dcc:customer/{path}" for key, path in CONTACT.items()},
+        "order": f"{CORE}/dcc:identifications/dcc:identification[dcc:name/dcc:content='order']/dcc:value",
+    },
+    "signatory": {"name": f"{PERSON}/dcc:person/{NAME}", "role": f"{PERSON}/dcc:role"},
+    "item": {
+        "manufacturer": f"{ITEM}/dcc:manufacturer/{NAME}",
+        "description": f"{ITEM}/{NAME}",
+        "model": f"{ITEM}/dcc:model",
+        "received": f"{CORE}/dcc:receiptDate",
+        "condition": f"{ITEM}/dcc:description/dcc:content",
+    },
+}
+"""Where the administrative data of a document have the keys of the laboratory's file."""
 ACCREDITED, DEVIATIONS = "Accreditation: ", "Deviations from the method: "
 
 NOBODY = LaboratoryFile.model_validate(
@@ -200,52 +217,31 @@ def laboratory_in(root: Any, archived: CertificateContent) -> LaboratoryFile:
     pydantic.ValidationError
         A text is not allowed in a laboratory's file, such as a claim of accreditation without its body and number.
     """
+
+    def administrative(path: str) -> str:
+        return first(root, f"/*/dcc:administrativeData/{path}/text()")
+
+    said: dict[str, dict[str, Any]] = {
+        table: {key: administrative(path) for key, path in own.items()} for table, own in STATED.items()
+    }
+    said["item"]["received"] = said["item"]["received"] or None
     known = set(statements_of(archived))
     other = [text for text in statements(root) if text not in known]
-    claim = next((text for text in other if text.startswith(ACCREDITED)), "").removeprefix(ACCREDITED)
-    deviations = next((text for text in other if text.startswith(DEVIATIONS)), "").removeprefix(DEVIATIONS)
-    remarks = [text for text in other if not text.startswith((ACCREDITED, DEVIATIONS))]
-    method = first(root, f"{METHOD}/dcc:description/dcc:content/text()")
-    laboratory, customer = (_contact(root, place) for place in ("calibrationLaboratory/dcc:contact", "customer"))
-    number = first(root, "/*/dcc:administrativeData/dcc:calibrationLaboratory/dcc:calibrationLaboratoryCode/text()")
-    if claim or number:
-        laboratory["accreditation"] = {"body": claim.removesuffix(f", {number}"), "number": number}
-    order = f"{CORE}/dcc:identifications/dcc:identification[dcc:name/dcc:content='order']/dcc:value/text()"
-    return LaboratoryFile.model_validate(
-        {
-            "laboratory": {
-                **laboratory,
-                "country": first(root, f"{CORE}/dcc:countryCodeISO3166_1/text()"),
-                "place": first(root, f"{CORE}/dcc:performanceLocation/text()"),
-            },
-            "customer": {**customer, "order": first(root, order)},
-            "signatory": {
-                "name": first(root, f"{PERSON}/dcc:person/{NAME}"),
-                "role": first(root, f"{PERSON}/dcc:role/text()"),
-            },
-            "item": {
-                "manufacturer": first(root, f"{ITEM}/dcc:manufacturer/{NAME}"),
-                "description": first(root, f"{ITEM}/{NAME}"),
-                "model": first(root, f"{ITEM}/dcc:model/text()"),
-                "received": first(root, f"{CORE}/dcc:receiptDate/text()") or None,
-                "condition": first(root, f"{ITEM}/dcc:description/dcc:content/text()"),
-            },
-            "method": {
-                "procedure": method.removesuffix(archived.method).removesuffix(". "),
-                "deviations": deviations,
-                "remarks": remarks[0] if remarks else "",
-            },
-        }
+    claim, deviations = (
+        next((text for text in other if text.startswith(head)), "").removeprefix(head)
+        for head in (ACCREDITED, DEVIATIONS)
     )
-
-
-def _contact(root: Any, place: str) -> dict[str, Any]:
-    head = f"/*/dcc:administrativeData/dcc:{place}"
-    return {
-        "name": first(root, f"{head}/{NAME}"),
-        "email": first(root, f"{head}/dcc:eMail/text()"),
-        "address": first(root, f"{head}/dcc:location/dcc:further/dcc:content/text()"),
+    number = administrative(f"{LABORATORY}/dcc:calibrationLaboratoryCode")
+    if claim or number:
+        said["laboratory"]["accreditation"] = {"body": claim.removesuffix(f", {number}"), "number": number}
+    used = "/*/dcc:measurementResults/dcc:measurementResult/dcc:usedMethods/dcc:usedMethod"
+    method = first(root, f"{used}/dcc:description/dcc:content/text()")
+    said["method"] = {
+        "procedure": method.removesuffix(archived.method).removesuffix(". "),
+        "deviations": deviations,
+        "remarks": next((text for text in other if not text.startswith((ACCREDITED, DEVIATIONS))), ""),
     }
+    return LaboratoryFile.model_validate(said)
 
 
 def said_by(who: LaboratoryFile) -> str:

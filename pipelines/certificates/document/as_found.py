@@ -1,7 +1,5 @@
 """As found and as left: the readings of today corrected with the earlier coefficients and with the new ones."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

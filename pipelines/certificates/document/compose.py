@@ -1,7 +1,5 @@
 """The content of a certificate from the run, its stated budget, the ledger and the laboratory's file."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from math import isfinite, nan
 from typing import Any
@@ -9,19 +7,9 @@ from typing import Any
 from inertial.counts import number_of
 from pipelines.archive import Run
 from pipelines.certificates import Calibration
+from pipelines.certificates.document import content
 from pipelines.certificates.document.as_found import adjustment
-from pipelines.certificates.document.content import (
-    Amendment,
-    BudgetTable,
-    CertificateContent,
-    Coefficient,
-    Condition,
-    Conformity,
-    Contribution,
-    ReferenceStandard,
-    Result,
-    letters_of,
-)
+from pipelines.certificates.document.content import CertificateContent, letters_of
 from pipelines.certificates.document.laboratory import LaboratoryFile
 from pipelines.certificates.document.numbers import probability, significant
 from pipelines.certificates.ledger import stated
@@ -154,9 +142,9 @@ def _refuse(run: Run, one: Calibration) -> None:
         )
 
 
-def _coefficient(row: Row) -> Coefficient:
+def _coefficient(row: Row) -> content.Coefficient:
     own = {name: row[name] for name in ("effect", "name", "axis", "value", "standard_error")}
-    return Coefficient(**own, unit=row["unit_text"])
+    return content.Coefficient(**own, unit=row["unit_text"])
 
 
 def _quantity(row: Row) -> str:
@@ -170,7 +158,7 @@ def _of_axes(text: str, letters: str) -> str:
     return text
 
 
-def _result(row: Row, coefficients: list[Coefficient]) -> Result:
+def _result(row: Row, coefficients: list[content.Coefficient]) -> content.Result:
     """A quantity of the budget; the scale, which the budget has relative to itself, as a sensitivity in units of the output."""
     value, unit, expanded = row["value"], row["unit_text"], row["expanded"]
     scale = [c for c in coefficients if c.effect == row["quantity"] == "scale" and c.axis == row["axis"]]
@@ -178,7 +166,7 @@ def _result(row: Row, coefficients: list[Coefficient]) -> Result:
         value, unit, expanded = scale[0].value, scale[0].unit, abs(scale[0].value) * 1e-6 * expanded
     bare = row["quantity"] in {"output", "scale"} and not scale
     letters = letters_of(coefficients)
-    return Result(
+    return content.Result(
         quantity=_of_axes(_quantity(row), letters),
         axis=letters if row["axis"] == "norm" and len(letters) < len(AXES) else row["axis"],
         unit=unit,
@@ -189,17 +177,17 @@ def _result(row: Row, coefficients: list[Coefficient]) -> Result:
     )
 
 
-def _budget(row: Row, parts: list[Row]) -> BudgetTable:
+def _budget(row: Row, parts: list[Row]) -> content.BudgetTable:
     # contributions to the error over the period add up to the result, not to the result's own u
     deviation = not has_uncertainty(row)
-    return BudgetTable(
+    return content.BudgetTable(
         quantity=f"{_quantity(row)}, {row['axis']}",
         unit=row["unit_text"],
         u=row["value"] if deviation else row["u"],
         k=None if deviation else row["k"],
         expanded=None if deviation else row["expanded"],
         rows=tuple(
-            Contribution(
+            content.Contribution(
                 name=LABELS.get(one["contribution"], str(one["contribution"])),
                 unit=row["unit_text"],
                 source=_source(one["source"]),
@@ -217,11 +205,11 @@ def _source(text: str) -> str:
     return text
 
 
-def _conformity(row: Row, letters: str) -> Conformity:
+def _conformity(row: Row, letters: str) -> content.Conformity:
     label = FIGURES[row["figure"]].label if row["figure"] in FIGURES else row["figure"]
     label = _of_axes(label, letters)
     least = isfinite(row.get("least", nan))
-    return Conformity(
+    return content.Conformity(
         figure=f"{label} (least value, accepted from)" if least else label,
         expanded=row["uncertainty"],
         limit=edge(row),
@@ -243,9 +231,9 @@ def _grade_statement(budget: StatedBudget, grade: str) -> str:
     )
 
 
-def _reference(one: Reference) -> ReferenceStandard:
+def _reference(one: Reference) -> content.ReferenceStandard:
     accreditation = f" ({one.accreditation})" if one.accreditation else ""
-    return ReferenceStandard(
+    return content.ReferenceStandard(
         laboratory=one.laboratory + accreditation,
         date="" if one.date is None else one.date.isoformat(),
         due=one.due.isoformat(),
@@ -304,7 +292,7 @@ def _method(run: Run, recipe: dict[str, Any], who: LaboratoryFile) -> str:
     )
 
 
-def _conditions(run: Run, serial: str, recipe: dict[str, Any]) -> list[Condition]:
+def _conditions(run: Run, serial: str, recipe: dict[str, Any]) -> list[content.Condition]:
     dwells = run.table("dwells")
     own, conditions = dwells[dwells["unit"] == serial], []
     for column, name, unit in (
@@ -314,15 +302,15 @@ def _conditions(run: Run, serial: str, recipe: dict[str, Any]) -> list[Condition
     ):
         values = own[column].dropna() if column in own else []
         if len(values):
-            conditions.append(Condition(name=name, low=float(min(values)), high=float(max(values)), unit=unit))
+            conditions.append(content.Condition(name=name, low=float(min(values)), high=float(max(values)), unit=unit))
     gravity = recipe.get("local_gravity_m_s2") or (run.about.get("mapping") or {}).get("local_gravity_m_s2")
     if gravity:
-        conditions.append(Condition(name="local gravity", low=float(gravity), high=float(gravity), unit="m/s²"))
+        conditions.append(content.Condition(name="local gravity", low=float(gravity), high=float(gravity), unit="m/s²"))
     return conditions
 
 
-def _amendment(one: Calibration, known: list[Calibration]) -> Amendment:
+def _amendment(one: Calibration, known: list[Calibration]) -> content.Amendment:
     """A certificate of the same run that this one ended: its amendment; one that ended this one: where to look now."""
     ended = [old.certificate for old in known if old.event.sequence in one.event.ends and old.run == one.run]
     after = one.ended_by.certificate if one.ended_by is not None and one.ended_by.action != "revoke" else ""
-    return Amendment(replaces=tuple(ended), reason=one.event.reason if ended else "", replaced_by=after)
+    return content.Amendment(replaces=tuple(ended), reason=one.event.reason if ended else "", replaced_by=after)

@@ -1,7 +1,5 @@
 """What a certificate says, as one document: paper and XML are written from it, and nothing is added there."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from pipelines.certificates.document.laboratory import LaboratoryFile

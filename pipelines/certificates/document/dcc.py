@@ -1,7 +1,5 @@
 """The certificate as XML, DCC 3.0.0 of the PTB (Digital Calibration Certificate) with D-SI 2.0.0, and its validation offline."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from functools import cache
 from importlib.resources import files
@@ -272,13 +270,8 @@ def _conditions(w: _Writer, parent: Any, c: CertificateContent) -> None:
 
 
 def _conformity(w: _Writer, parent: Any, one: Conformity, c: CertificateContent) -> None:
-    w.add(parent, "norm", one_line(c.decision_rule))
+    w.add(parent, "norm", " ".join(c.decision_rule.split()))
     limit = f"limit {one.limit:g} {one.unit} of '{c.limits}'"
     text = f"{one.figure}: {limit}, specific probability of false acceptance {least_of(one.pfa)}"
     w.text(parent, "declaration", f"{text}. {c.grade_statement}".removesuffix(". "))
     w.add(parent, "conformity", OUTCOMES.get(one.outcome, "noPass"))
-
-
-def one_line(text: str) -> str:
-    """Without line ends."""
-    return " ".join(text.split())

@@ -1,7 +1,5 @@
 """A certificate's files checked alone, as who receives them does: form, schema, signatures, and the archive where it is given."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -10,20 +8,11 @@ from typing import Any, Literal
 from cryptography.x509 import Certificate
 
 from pipelines.archive import Archive
+from pipelines.certificates.document import signature_check
 from pipelines.certificates.document.archive_comparison import compare
 from pipelines.certificates.document.dcc import DocumentInvalid, validate
 from pipelines.certificates.document.laboratory import LaboratoryFile
-from pipelines.certificates.document.signature_check import (
-    ATTACHMENT,
-    CertificateFacts,
-    SignatureBroken,
-    attachments,
-    canonical,
-    facts_of,
-    parsed,
-    pdf_signers,
-    xml_signature,
-)
+from pipelines.certificates.document.signature_check import SignatureBroken, canonical, parsed
 from pipelines.certificates.document.signers import WHERE, Signer, not_trusted, time_of
 from schemas.errors import WrongUse
 
@@ -51,7 +40,7 @@ class CheckedFile:
     """
 
     path: Path
-    facts: CertificateFacts | None = None
+    facts: signature_check.CertificateFacts | None = None
     signers: list[str] = field(default_factory=list[str])
     checks: list[Check] = field(default_factory=list[Check])
     proven_by: tuple[str, ...] = ()
@@ -94,7 +83,7 @@ def check_file(path: Path, against: Against) -> CheckedFile:
         root = _document(data, done, against)
         if root is None:
             return done
-        done.facts = facts_of(root)
+        done.facts = signature_check.facts_of(root)
     except SignatureBroken as problem:
         done.add("file", "bad", str(problem))
         return done
@@ -135,7 +124,7 @@ def _document(data: bytes, done: CheckedFile, against: Against) -> Any | None:
 
 def _signature(data: bytes, done: CheckedFile, against: Against) -> Any | None:
     try:
-        signer, root = xml_signature(data)
+        signer, root = signature_check.xml_signature(data)
     except SignatureBroken as problem:
         done.add("signature", "bad", str(problem))
         return None
@@ -145,13 +134,15 @@ def _signature(data: bytes, done: CheckedFile, against: Against) -> Any | None:
 
 
 def _pdf(data: bytes, done: CheckedFile, against: Against) -> Any | None:
-    attached = attachments(data)
+    attached = signature_check.attachments(data)
     if len(attached) != 1:
-        done.add("attachment", "bad", f"the PDF has {len(attached)} attachments {ATTACHMENT}, one is needed")
+        done.add(
+            "attachment", "bad", f"the PDF has {len(attached)} attachments {signature_check.ATTACHMENT}, one is needed"
+        )
         return None
     root = parsed(attached[0])
     try:
-        signers = pdf_signers(data)
+        signers = signature_check.pdf_signers(data)
     except SignatureBroken as problem:
         done.add("signature", "bad", str(problem))
         signers = []

@@ -1,7 +1,5 @@
 """Writing certificates: which ones are meant, and their files, all or none of a certificate; the PDF is typeset by typst."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -176,10 +174,8 @@ def _why(archive: Archive, serial: str) -> str:
     for info in reversed([one for one in archive.runs() if serial in one.units]):
         run = Run(archive, info.id)
         reason = _reasons(run).get(serial)
+        if reason:
+            return f"run {run.id}: {reason}"
         if reason is not None:
-            return (
-                f"run {run.id}: {reason}"
-                if reason
-                else f"it passed: certify it with 'tumbleline certify {run.id}' first"
-            )
+            return f"it passed: certify it with 'tumbleline certify {run.id}' first"
     return "see 'tumbleline list'"

@@ -1,11 +1,9 @@
 """The laboratory's file: who calibrates, for whom, who signs; what the archive cannot know and a certificate must say."""
 
-from __future__ import annotations
-
 import re
 from datetime import date as Day  # noqa: N812 - a field has its name
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, ValidationError, model_validator
 
@@ -85,7 +83,7 @@ class LaboratoryFile(Strict):
     method: Method = Method()
 
     @model_validator(mode="after")
-    def _no_claim(self) -> LaboratoryFile:
+    def _no_claim(self) -> Self:
         if self.laboratory.accreditation is None:
             claims = [name for name, text in _texts(self.model_dump(mode="json")) if ACCREDITED.search(text)]
             if claims:

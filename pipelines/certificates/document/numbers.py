@@ -1,7 +1,5 @@
 """Numbers of a certificate: rounded for people, in SI units for XML."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

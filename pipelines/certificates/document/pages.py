@@ -1,7 +1,5 @@
 """What stands on the pages of a certificate: the texts and tables of its parts, with the numbers rounded."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
@@ -154,21 +152,10 @@ def _conformity(c: CertificateContent) -> dict[str, Any]:
         return {"title": "Conformity", "before": ["No statement of conformity is made."]}
     rows = []
     for one in c.conformity:
-        value, expanded = (
-            (significant(abs(one.value)), "") if one.expanded <= 0.0 else with_uncertainty(abs(one.value), one.expanded)
-        )
-        rows.append(
-            [
-                one.figure,
-                value,
-                expanded,
-                significant(one.limit),
-                significant(one.accept, 4),
-                one.unit,
-                one.outcome,
-                probability(one.pfa),
-            ]
-        )
+        size = abs(one.value)
+        printed = (significant(size), "") if one.expanded <= 0.0 else with_uncertainty(size, one.expanded)
+        edges = significant(one.limit), significant(one.accept, 4)
+        rows.append([one.figure, *printed, *edges, one.unit, one.outcome, probability(one.pfa)])
     heads = ["figure", "magnitude", "U", "limit", "accepted up to", "unit", "decision", "PFA"]
     table = _table("", heads, rows, [1, *["auto"] * 7], [1, 2, 3, 4, 7])
     passed = all(one.outcome == "pass" for one in c.conformity)

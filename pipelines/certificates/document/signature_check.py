@@ -1,7 +1,5 @@
 """Signatures of a certificate's files, checked from the file alone, and the XML that they cover with its statements."""
 
-from __future__ import annotations
-
 import base64
 import re
 from collections.abc import Generator, Iterator
@@ -195,7 +193,6 @@ class CertificateFacts:
     coefficients : SHA-256 of the certified table
     """
 
-    version: str
     number: str
     serial: str
     run: str
@@ -222,7 +219,6 @@ def facts_of(root: Any) -> CertificateFacts:
         "[dcc:name/dcc:content='serial number']/dcc:value/text()"
     )
     return CertificateFacts(
-        version=root.get("schemaVersion", ""),
         number=first(root, f"{core}/dcc:uniqueIdentifier/text()"),
         serial=first(root, serial),
         run=first(root, run),

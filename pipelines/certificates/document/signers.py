@@ -1,7 +1,5 @@
 """Who signed a certificate, and whether a certificate of the reader's own vouches for it."""
 
-from __future__ import annotations
-
 import asyncio
 from collections.abc import Sequence
 from dataclasses import dataclass

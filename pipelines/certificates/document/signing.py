@@ -1,7 +1,5 @@
 """Signatures that others can check: PAdES in the PDF, a detached XML signature beside the XML; the key is the laboratory's."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from io import BytesIO

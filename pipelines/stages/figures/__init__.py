@@ -3,8 +3,6 @@
 Nothing else names a figure: limits files, tables, the report and the reference read :data:`FIGURES`.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from importlib import import_module
@@ -12,19 +10,7 @@ from pkgutil import iter_modules
 from typing import NamedTuple
 
 from pipelines.procedures import FIGURES as PROCEDURE_FIGURES
-from pipelines.stages.figures.base import FigureKind, LotCoefficients, UnitTables, Value
-
-__all__ = [
-    "FIGURES",
-    "UNITS",
-    "Figure",
-    "FigureKind",
-    "IncompleteFigure",
-    "LotCoefficients",
-    "UnitTables",
-    "Value",
-    "figures_of",
-]
+from pipelines.stages.figures.base import FigureKind, UnitTables, Value
 
 SHARED = "base"
 

@@ -8,8 +8,8 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.distributions import normal_tail
 from inertial.state import ALL_AXES
 from inertial.uncertainty.deviation_law import DeviationLaw
@@ -56,27 +56,26 @@ class LotCoefficients:
     stated : covariance of the coefficients by the uncertainty budget, (units, 3p, 3p); None: noise only.
     """
 
-    def __init__(self, calibration: Calibration, zero_g: float, stated: NDArray[np.float64] | None = None) -> None:
+    def __init__(self, calibration: Calibration, zero_g: float, stated: Array | None = None) -> None:
         self.zero_g = zero_g
         self.stated = stated
         self._calibration = calibration
         self._scale = np.abs(calibration.scale)[..., None]
-        self._values: dict[str, NDArray[np.float64]] = {}
-        self._errors: dict[str, NDArray[np.float64]] = {}
-        self._noise: dict[str, NDArray[np.float64]] = {}
+        self._known: dict[str, tuple[Array, Array]] = {}
+        self._noise: dict[str, Array] = {}
 
     def of(self, unit: int) -> UnitCoefficients:
         """The coefficients of the unit at a place of the lot."""
         return UnitCoefficients(self, unit)
 
-    def effect(self, effect: str, unit: int) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    def effect(self, effect: str, unit: int) -> tuple[Array, Array, Array]:
         """Coefficients (3, columns) and standard errors (3, columns) of an effect, and the scale (3, 1) in output per g."""
-        if effect not in self._values:
-            self._values[effect] = self._calibration.value(effect)
-            self._errors[effect] = self._with_budget().standard_error(effect)
-        return self._values[effect][unit], self._errors[effect][unit], self._scale[unit]
+        if effect not in self._known:
+            self._known[effect] = self._calibration.value(effect), self._with_budget().standard_error(effect)
+        values, errors = self._known[effect]
+        return values[unit], errors[unit], self._scale[unit]
 
-    def shared(self, effect: str, unit: int) -> NDArray[np.float64]:
+    def shared(self, effect: str, unit: int) -> Array:
         """Standard errors (3, columns) of an effect by the references alone, output unit; zero where nothing is stated."""
         if self.stated is None:
             return np.zeros_like(self.effect(effect, unit)[1])

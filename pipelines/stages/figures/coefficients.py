@@ -1,7 +1,5 @@
 """Figures of the coefficients of a calibrated unit: offset, misalignment, temperature, and deviations over a range."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from pipelines.stages.figures.base import FigureKind, UnitTables, Value, effect_in_model

@@ -1,7 +1,5 @@
 """Figures of what a calibration leaves: residual of the fit, errors of verification, error over the period of validity."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.special import ndtri
 

@@ -1,7 +1,5 @@
 """Figures of the static record: noise terms of the worst axis (IEEE Std 952), and the stability of the bias over an hour."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,16 +1,12 @@
 """The bias as three measurands, each with its standard uncertainty: mean of the record, mean of a day, next switch-on."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from inertial.noise.flicker import SLOWEST_FITTED, constants_of
 from inertial.noise.measurands import DAY_S, against_mean, flicker_mean, instability, of_a_day, walk_mean
-
-Array = NDArray[np.float64]
 
 COLUMNS = (
     *("bias_instability_ug", "bias_record_u_ug", "bias_long_u_ug", "bias_long_s", "bias_switch_on_u_ug"),

@@ -1,13 +1,11 @@
 """The uncertainty budget of every unit: contributions to coefficients, corrected output and verification, and their sum."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from inertial.arrays import Array, Flags
 from inertial.design import of_axes
 from inertial.fits.linear import own_terms
 from inertial.fits.wander import wander_kernels
@@ -17,14 +15,12 @@ from inertial.uncertainty.influences import MeasurementModel, sensitivity
 from inertial.uncertainty.propagation import fit_design, propagated
 from pipelines.stages.uncertainty.budget_terms import BudgetTables, BudgetTerms
 from pipelines.stages.uncertainty.contributions import DwellConditions, influences, sources
-from pipelines.stages.uncertainty.measurands import VarianceParts, quantities_of
-from pipelines.stages.uncertainty.tables import covariance_rows, empty, rows_of_quantities
+from pipelines.stages.uncertainty.measurands import LotBudget, VarianceParts
+from pipelines.stages.uncertainty.tables import empty, tables_of
 from pipelines.tables.calibration import Calibration
 from pipelines.tables.dwells import LotArrays
 from schemas.units import MICRO
 from schemas.validity import Stability
-
-Array = NDArray[np.float64]
 
 
 def budget(tables: BudgetTables, terms: BudgetTerms) -> dict[str, pd.DataFrame]:
@@ -35,16 +31,10 @@ def budget(tables: BudgetTables, terms: BudgetTerms) -> dict[str, pd.DataFrame]:
     """
     if terms.stated is None or tables.coefficients.empty:
         return empty()
-    lot, calibration, variances = lot_variances(tables, terms)
-    quantities = list(quantities_of(lot, calibration, tables, terms, variances))
-    known = sources(terms.stated)
-    return {
-        **rows_of_quantities(calibration.units, quantities, variances, terms, known),
-        "budget_covariance": covariance_rows(calibration.units, variances.fit.covariance()),
-    }
+    return tables_of(lot_budget(tables, terms), sources(terms.stated))
 
 
-def lot_variances(tables: BudgetTables, terms: BudgetTerms) -> tuple[LotArrays, Calibration, VarianceParts]:
+def lot_budget(tables: BudgetTables, terms: BudgetTerms) -> LotBudget:
     """The dwells of a lot with the angles of the table, its calibration, and the influences through its fit."""
     lot = tables.arrays()
     if lot.state.outer is None:  # faces or forces that are known otherwise: as a table would have turned to them
@@ -52,7 +42,7 @@ def lot_variances(tables: BudgetTables, terms: BudgetTerms) -> tuple[LotArrays, 
         lot = replace(lot, state=replace(lot.state, outer=outer, inner=inner, memory={}))
     calibration = tables.calibrated()
     at = conditions(lot, tables.dwells, calibration.response, terms)
-    return lot, calibration, propagate(lot, calibration, tables.wander, terms, at)
+    return LotBudget(lot, calibration, tables, terms, propagate(lot, calibration, tables.wander, terms, at))
 
 
 def conditions(lot: LotArrays, dwells: pd.DataFrame, response: Array, terms: BudgetTerms) -> DwellConditions:
@@ -114,7 +104,7 @@ def with_device_temperature(
     return MeasurementModel(effects, coefficients, model.nonlinear)
 
 
-def dwell_noise(lot: LotArrays, wander: pd.DataFrame, used: NDArray[np.bool_]) -> Array:
+def dwell_noise(lot: LotArrays, wander: pd.DataFrame, used: Flags) -> Array:
     """Covariance (n, n) of the noise of the fit's dwells as the fit weighed them; its scale is arbitrary."""
     error = np.broadcast_to(lot.standard_error, lot.output.shape)[:, used]
     profile = np.sqrt(np.mean(error**2 / np.mean(error**2, axis=1, keepdims=True), axis=(0, 2)))

@@ -1,7 +1,5 @@
 """Inputs of a budget: the tables of a run, and the statements of station, device and certificate."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -9,7 +7,7 @@ from typing import Any
 import pandas as pd
 
 from pipelines.stages.reduce import FollowedSupply
-from pipelines.stages.uncertainty.contributions import merged
+from pipelines.stages.uncertainty.contributions import merged, reads_own_temperature
 from pipelines.tables.calibration import Calibration, read_calibration
 from pipelines.tables.dwells import LotArrays, LotTables
 from schemas.limits import VALIDITY_MONTHS
@@ -84,10 +82,8 @@ class BudgetTerms:
 
     @property
     def reads_own_temperature(self) -> bool:
-        """Whether fit and user read the same thermometer of the device, so that its errors are in the coefficients alike."""
-        entry = None if self.stated is None else self.stated.thermometer
-        user = self.stability is None or self.stability.temperature_of == "device"
-        return entry is not None and entry.measures == "device" and user
+        """Whether fit and user read the same thermometer of the device, by the function of this name."""
+        return self.stated is not None and reads_own_temperature(self.stated, self.stability)
 
     def document(self) -> dict[str, Any]:
         """As JSON values."""

@@ -1,14 +1,12 @@
 """What a lot shows of its references: the common residual of its units against the stated errors of the table."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inertial import design
+from inertial.arrays import Array, Places
 from inertial.correction import predict
 from inertial.fits.wander import wander_kernels
 from inertial.uncertainty.contradiction import (
@@ -28,8 +26,6 @@ from pipelines.stages.uncertainty.budget_terms import BudgetTables, BudgetTerms
 from pipelines.stages.uncertainty.contributions import influences
 from pipelines.tables.dwells import LotArrays
 from schemas.uncertainty import Uncertainty
-
-Array = NDArray[np.float64]
 
 JUDGED = ("level", "orthogonality", "outer_offset", "inner_offset", "harmonics", "pose")
 """Contributions of the table that all units of a lot share."""
@@ -71,7 +67,7 @@ def lot_references(tables: BudgetTables, terms: BudgetTerms) -> LotReferences | 
 
 def _evidence(
     lot: LotArrays, tables: BudgetTables, terms: BudgetTerms, stated: Uncertainty
-) -> tuple[CommonEvidence, dict[str, NDArray[np.intp]], NDArray[np.intp]]:
+) -> tuple[CommonEvidence, dict[str, Places], Places]:
     """The evidence on the common influences, the places of those that are judged, and those along the force (the last ones)."""
     calibration, state = tables.calibrated(), lot.state
     model = MeasurementModel(calibration.effects, calibration.coefficients, calibration.nonlinear)

@@ -1,19 +1,15 @@
 """Entries of ``[uncertainty]`` as influences on the dwells of a lot, by the equations of each contribution."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array, Index
 from inertial.state import State
 from inertial.uncertainty.influences import Errors, InputQuantity, Scattered, harmonic, theta
 from schemas.uncertainty import Entry, StandardUncertainty, Uncertainty
 from schemas.validity import Stability
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -26,7 +22,7 @@ class DwellConditions:
     """
 
     state: State
-    soak: NDArray[np.int64]
+    soak: Index
     target_C: Array
     soak_s: float
     room_C: float
@@ -74,6 +70,12 @@ _PARTS: dict[str, dict[str, str]] = {
 }
 
 
+def reads_own_temperature(stated: Uncertainty, stability: Stability | None) -> bool:
+    """Whether fit and user read the same thermometer of the device, so that its errors are in the coefficients alike."""
+    entry, user = stated.thermometer, stability is None or stability.temperature_of == "device"
+    return entry is not None and entry.measures == "device" and user
+
+
 def left_out(stated: Uncertainty) -> list[str]:
     """The contributions that a statement has no figure for, and does not call exact, by name."""
     names: list[str] = []
@@ -100,7 +102,10 @@ def influences(
         if u > 0.0:
             entry = known[name].entry
             inputs.append(InputQuantity(name, errors, u, entry.scope, entry.dof or float("inf")))
-    return inputs, list(_scattered(stated, at))
+    pose = stated.pose
+    if pose is None or pose.seen_in_residuals or not (u := pose.standard().u) > 0.0:
+        return inputs, []  # the repeatability of the poses is left out where the fit's own scatter shows it already
+    return inputs, [Scattered("pose", u, u, pose.scope, pose.dof or float("inf"))]
 
 
 def _all(stated: Uncertainty, at: DwellConditions, stability: Stability | None) -> Iterator[tuple[str, Errors, float]]:
@@ -139,8 +144,7 @@ def _temperature(
 ) -> Iterator[tuple[str, Errors, float]]:
     """Errors of the temperature; none where fit and user read the same thermometer of the device."""
     entry = stated.thermometer
-    own = entry is not None and entry.measures == "device"
-    if own and (stability is None or stability.temperature_of == "device"):
+    if reads_own_temperature(stated, stability):
         return
     if entry is not None:
         yield "thermometer_offset", Errors(temperature=1.0), entry.standard("offset").u
@@ -186,13 +190,6 @@ def _electrical(
         u = 1e-6 * stated.vibration.coefficient_ug_g2 * stated.vibration.standard("rms").u ** 2
         for axis, scale in own:
             yield "vibration", Errors(offset=_unit_vector(axis, scale)), u
-
-
-def _scattered(stated: Uncertainty, at: DwellConditions) -> Iterator[Scattered]:
-    """Repeatability of the poses; left out where the fit's own scatter shows it already."""
-    if stated.pose is not None and not stated.pose.seen_in_residuals and stated.pose.standard().u > 0.0:
-        u = stated.pose.standard().u
-        yield Scattered("pose", u, u, stated.pose.scope, stated.pose.dof or float("inf"))
 
 
 def _unit_vector(axis: int, size: float = 1.0) -> tuple[float, float, float]:

@@ -1,20 +1,16 @@
 """The uncertainty budget of a lot as far as decisions read it, without its tables: quantities are computed when they are read."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
 from pipelines.stages.figures.base import BudgetRow
-from pipelines.stages.uncertainty.budget import lot_variances
+from pipelines.stages.uncertainty.budget import lot_budget
 from pipelines.stages.uncertainty.budget_terms import BudgetTables, BudgetTerms
 from pipelines.stages.uncertainty.measurands import PARTS, part_of
 from pipelines.stages.uncertainty.tables import combined, groups_of
 from pipelines.tables.calibration import symmetric
-
-Array = NDArray[np.float64]
 
 Key = tuple[str, str]
 """Name and axis of a quantity."""
@@ -31,12 +27,11 @@ class DecisionBudget:
     """
 
     def __init__(self, tables: BudgetTables, terms: BudgetTerms) -> None:
-        self._tables, self._terms = tables, terms
-        self._lot, self._calibration, self._variances = lot_variances(tables, terms)
-        self._places = {unit: place for place, unit in enumerate(self._calibration.units)}
-        self._groups = groups_of(self._variances)
+        self._lot = lot_budget(tables, terms)
+        self._places = {unit: place for place, unit in enumerate(self._lot.calibration.units)}
+        self._groups = groups_of(self._lot.variances)
         self._known: dict[str, dict[Key, list[BudgetRow]]] = {}
-        whole = symmetric(self._variances.fit.covariance())
+        whole = symmetric(self._lot.variances.fit.covariance())
         self.covariance: Array = np.broadcast_to(whole, (len(self._places), *whole.shape[-2:]))
 
     def of(self, unit: str) -> Mapping[Key, BudgetRow]:
@@ -48,13 +43,10 @@ class DecisionBudget:
         """The quantities of the part of the budget with a name, for every unit in order; none for an unknown name."""
         part = PARTS.get(name, "")
         if part and part not in self._known:
-            own = part_of(
-                part, self._lot, self._calibration, self._tables, self._terms, self._variances, decisions=True
-            )
             self._known[part] = {}
-            for one in own:
-                noise, stated, whole = combined(one, self._groups)
-                columns = (np.asarray(values, dtype=float).tolist() for values in (one.value, noise, stated, whole))
+            for one in part_of(part, self._lot, decisions=True):
+                parts = one.value, *combined(one, self._groups)
+                columns = (np.asarray(values, dtype=float).tolist() for values in parts)
                 self._known[part][one.name, one.axis] = [BudgetRow(*row) for row in zip(*columns, strict=True)]
         return self._known.get(part, {})
 

@@ -1,7 +1,5 @@
 """Risk of the decisions on a lot: false acceptance and false rejection over the production that it represents (JCGM 106, 9)."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,15 +1,13 @@
 """The quantities of a budget: coefficients, angles between axes, corrected output, verification, the error over the period."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inertial import design
+from inertial.arrays import Array
 from inertial.frames import angles_from_force
 from inertial.state import State
 from inertial.uncertainty.propagation import Propagated, norm_errors, rms_over
@@ -21,8 +19,6 @@ from pipelines.tables.dwells import LotArrays
 from pipelines.tables.frames import ByUnit
 from schemas.decisions import BOUND, LARGEST_ERROR, MEDIAN
 from schemas.units import AXES, MICRO
-
-Array = NDArray[np.float64]
 
 EFFECTS = {
     "bias": "µg",
@@ -61,6 +57,27 @@ class VarianceParts:
 
 
 @dataclass(frozen=True)
+class LotBudget:
+    """What a budget is computed from: dwells, calibration, tables, statements, and the influences through the fit."""
+
+    lot: LotArrays
+    calibration: Calibration
+    tables: BudgetTables
+    terms: BudgetTerms
+    variances: VarianceParts
+
+    @cached_property
+    def dof(self) -> Array:
+        """Degrees of freedom of the noise, those of the whole lot, (units,)."""
+        return np.full(len(self.lot.units), float(np.sum(np.asarray(self.tables.wander["dof"], dtype=float))))
+
+    @cached_property
+    def scale(self) -> Array:
+        """Output per g of every unit and axis, (units, m)."""
+        return np.abs(self.calibration.scale)
+
+
+@dataclass(frozen=True)
 class BudgetQuantity:
     """A quantity of every unit of a lot with the error that each influence makes of it.
 
@@ -86,48 +103,34 @@ class BudgetQuantity:
     axis_errors: AxisErrors | None = None
 
 
-def quantities_of(
-    lot: LotArrays, calibration: Calibration, tables: BudgetTables, terms: BudgetTerms, variances: VarianceParts
-) -> Iterator[BudgetQuantity]:
+def quantities_of(own: LotBudget) -> Iterator[BudgetQuantity]:
     """Every quantity of a budget."""
     for part in dict.fromkeys(PARTS.values()):
-        yield from part_of(part, lot, calibration, tables, terms, variances)
+        yield from part_of(part, own)
 
 
-def part_of(
-    part: str,
-    lot: LotArrays,
-    calibration: Calibration,
-    tables: BudgetTables,
-    terms: BudgetTerms,
-    variances: VarianceParts,
-    *,
-    decisions: bool = False,
-) -> Iterator[BudgetQuantity]:
+def part_of(part: str, own: LotBudget, *, decisions: bool = False) -> Iterator[BudgetQuantity]:
     """The quantities of one part of a budget, a value of :data:`PARTS`.
 
     Parameters
     ----------
     decisions : whether the parts that a verification shows are left out where no decision depends on them
     """
-    dof = np.full(len(lot.units), float(np.sum(np.asarray(tables.wander["dof"], dtype=float))))
-    scale = np.abs(calibration.scale)
     if part == "coefficients":
-        yield from _coefficients(calibration, variances, scale, dof)
+        yield from _coefficients(own)
     elif part == "angles":
-        yield from _angles(calibration, variances, scale, dof)
+        yield from _angles(own)
     elif part == "outputs":
-        yield from _outputs(lot, calibration, terms, variances, dof)
-    elif part == "verification" and len(tables.verification):
-        split = terms.stability is not None or not decisions  # the error over the period is made of the two parts
-        errors = list(_verification(lot, calibration, tables, terms, variances, dof, split=split))
+        yield from _outputs(own)
+    elif part == "verification" and len(own.tables.verification):
+        split = own.terms.stability is not None or not decisions  # the error over the period is made of the two parts
+        errors = list(_verification(own, split=split))
         yield from errors
-        yield from _period(errors, lot, tables, terms, dof)
+        yield from _period(errors, own)
 
 
-def _coefficients(
-    calibration: Calibration, variances: VarianceParts, scale: Array, dof: Array
-) -> Iterator[BudgetQuantity]:
+def _coefficients(own: LotBudget) -> Iterator[BudgetQuantity]:
+    calibration, scale = own.calibration, own.scale
     spread = np.sqrt(np.diagonal(calibration.covariance, axis1=-2, axis2=-1))
     for effect, unit in EFFECTS.items():
         for axis, letter in enumerate(calibration.letters):
@@ -135,13 +138,14 @@ def _coefficients(
                 along = letter + calibration.names[axis][column][1][-1] if effect == "misalignment" else letter
                 factor = MICRO / scale[:, axis]
                 value = factor * calibration.coefficients[:, axis, column]
-                parts = factor[:, None] * variances.fit.coefficients[:, axis, column, :]
-                nominal = MICRO if effect == "scale" else 0.0
-                yield BudgetQuantity(effect, along, unit, value - nominal, factor * spread[:, axis, column], parts, dof)
+                parts = factor[:, None] * own.variances.fit.coefficients[:, axis, column, :]
+                noise, nominal = factor * spread[:, axis, column], MICRO if effect == "scale" else 0.0
+                yield BudgetQuantity(effect, along, unit, value - nominal, noise, parts, own.dof)
 
 
-def _angles(calibration: Calibration, variances: VarianceParts, scale: Array, dof: Array) -> Iterator[BudgetQuantity]:
+def _angles(own: LotBudget) -> Iterator[BudgetQuantity]:
     """Deviation from 90° of the angle between two axes, (m_ij + m_ji): independent of the seat."""
+    calibration, scale, changes = own.calibration, own.scale, own.variances.fit.coefficients
     if "misalignment" not in calibration.effects or len(calibration.axes) < len(AXES):
         return
     noise = calibration.covariance
@@ -152,20 +156,19 @@ def _angles(calibration: Calibration, variances: VarianceParts, scale: Array, do
         b = others[(i - j - 1) % 3]
         fi, fj = MICRO / scale[:, i], MICRO / scale[:, j]
         value = fi * calibration.coefficients[:, i, a] + fj * calibration.coefficients[:, j, b]
-        parts = fi[:, None] * variances.fit.coefficients[:, i, a] + fj[:, None] * variances.fit.coefficients[:, j, b]
+        parts = fi[:, None] * changes[:, i, a] + fj[:, None] * changes[:, j, b]
         u = np.sqrt((fi**2) * noise[:, i, a, a] + (fj**2) * noise[:, j, b, b])
-        yield BudgetQuantity("orthogonality", AXES[i] + AXES[j], "µrad", value, u, parts, dof)
+        yield BudgetQuantity("orthogonality", AXES[i] + AXES[j], "µrad", value, u, parts, own.dof)
 
 
-def _outputs(
-    lot: LotArrays, calibration: Calibration, terms: BudgetTerms, variances: VarianceParts, dof: Array
-) -> Iterator[BudgetQuantity]:
+def _outputs(own: LotBudget) -> Iterator[BudgetQuantity]:
     """Corrected output, worst force and temperature of the certified range."""
-    state = certified_range(lot, terms)
+    calibration, dof = own.calibration, own.dof
+    state = certified_range(own.lot, own.terms)
     columns = design.local_columns(design.split(calibration.effects)[0], state, calibration.nonlinear)
-    errors = variances.fit.user_errors(columns, state.force, intrinsic=terms.certificate.frame == "intrinsic")
+    errors = own.variances.fit.user_errors(columns, state.force, intrinsic=own.terms.certificate.frame == "intrinsic")
     noise = output_noise(calibration, columns)
-    zero = np.zeros(len(lot.units))
+    zero = np.zeros_like(dof)
     for axis, letter in enumerate(calibration.letters):
         yield _worst("output", letter, errors[..., axis, :], noise[..., axis, axis], zero, dof)
     if len(calibration.axes) < len(AXES):
@@ -225,46 +228,32 @@ def certified_range(lot: LotArrays, terms: BudgetTerms) -> State:
     )
 
 
-def _verification(
-    lot: LotArrays,
-    calibration: Calibration,
-    tables: BudgetTables,
-    terms: BudgetTerms,
-    variances: VarianceParts,
-    dof: Array,
-    *,
-    split: bool,
-) -> Iterator[BudgetQuantity]:
+def _verification(whole: LotBudget, *, split: bool) -> Iterator[BudgetQuantity]:
     """RMS error of each axis for the user, and the magnitude at its worst pose.
 
     Parameters
     ----------
     split : whether the part that the station's own verification shows, and that which it cannot, are computed
     """
+    lot, calibration, variances = whole.lot, whole.calibration, whole.variances
     unseen = lot.of_kind("verification")
     columns = design.local_columns(design.split(calibration.effects)[0], lot.state, calibration.nonlinear)
     columns = columns[..., unseen, :]
     force = np.broadcast_to(lot.state.force, (*lot.output.shape[:1], *lot.state.force.shape[-2:]))[:, unseen]
-    intrinsic = terms.certificate.frame == "intrinsic"
+    intrinsic = whole.terms.certificate.frame == "intrinsic"
     true = MICRO * variances.fit.user_errors(columns, force, intrinsic=intrinsic)
     shown = MICRO * variances.fit.shown_errors(columns, variances.verification) if split else None
     hidden = variances.visible < UNSEEN if split else None
-    rows = tables.verification
+    rows = whole.tables.verification
     for axis, letter in enumerate(calibration.letters):
         own = rows[f"error_{letter}_ug"].to_numpy().reshape(len(lot.units), -1)
         noise, expected, freedom = (
             rows[name.format(letter)].to_numpy().reshape(len(lot.units), -1)[:, 0] for name in OF_UNITS
         )
         parts = np.sqrt(np.mean(true[..., axis, :] ** 2, axis=-2))
-        one = BudgetQuantity(
-            "bias_error",
-            letter,
-            "µg",
-            np.sqrt(np.mean(own**2, axis=1)),
-            noise,
-            np.broadcast_to(parts, (len(lot.units), parts.shape[-1])),
-            dof,
-        )
+        parts = np.broadcast_to(parts, (len(lot.units), parts.shape[-1]))
+        value = np.sqrt(np.mean(own**2, axis=1))
+        one = BudgetQuantity("bias_error", letter, "µg", value, noise, parts, whole.dof)
         if shown is not None and hidden is not None:
             seen, unshown = (
                 _all(rms_over(part), lot) for part in (shown[..., axis, :], true[..., axis, :][..., hidden])
@@ -277,8 +266,9 @@ def _verification(
         yield one
     seen_force = design.of_axes(force, calibration.axes, -1)
     along = norm_errors(true / MICRO, seen_force)
-    value, noise = _worst_pose(lot, tables)
-    worst = _worst("verification_norm", "norm", along, np.zeros(along.shape[:-1]) + noise[:, None] ** 2, value, dof)
+    value, noise = _worst_pose(lot, whole.tables)
+    variance = np.zeros(along.shape[:-1]) + noise[:, None] ** 2
+    worst = _worst("verification_norm", "norm", along, variance, value, whole.dof)
     if shown is None or hidden is None:
         yield worst
         return
@@ -306,41 +296,30 @@ def _all(values: Array, lot: LotArrays) -> Array:
     return np.broadcast_to(values, (len(lot.units),)).copy()
 
 
-def _period(
-    errors: list[BudgetQuantity], lot: LotArrays, tables: BudgetTables, terms: BudgetTerms, dof: Array
-) -> Iterator[BudgetQuantity]:
+def _period(errors: list[BudgetQuantity], own: LotBudget) -> Iterator[BudgetQuantity]:
     """RMS error over the period of validity of each axis, and the largest; none if nothing is stated for the time after."""
+    lot, tables, terms = own.lot, own.tables, own.terms
     used = lot.of_kind("dwell")
     time = np.broadcast_to(lot.state.time, (len(lot.units), used.size))[:, used]
     span = float(np.ptp(time[0])) + terms.dwell_s
     axes: list[AxisErrors] = []
     for letter in lot.letters:
-        own = next(q for q in errors if q.name == "bias_error" and q.axis == letter)
+        of_run = next(q for q in errors if q.name == "bias_error" and q.axis == letter).axis_errors
         whole = [one for unit in lot.units if (one := period_of(tables, terms, unit, letter, span)) is not None]
-        if len(whole) != len(lot.units) or own.axis_errors is None:
+        if len(whole) != len(lot.units) or of_run is None:
             return
         names = dict.fromkeys(name for one in whole for name in one)
         later = {name: np.array([one.get(name, 0.0) for one in whole]) for name in names}
-        axes.append(replace(own.axis_errors, later=later))
-    for letter, axis in zip(lot.letters, axes, strict=True):
-        parts = {"run": axis.run, "budget": axis.fixed, **axis.later}
-        none = np.zeros((len(lot.units), 0))
-        yield BudgetQuantity(
-            "bias_error_period", letter, "µg", axis.value, np.zeros_like(axis.run), none, dof, extra=parts
-        )
-    largest = largest_error(axes, terms.switch_on_dof)
+        axes.append(replace(of_run, later=later))
+    zero, none = np.zeros(len(lot.units)), np.zeros((len(lot.units), 0))
+    by_axis = [{"run": axis.run, "budget": axis.fixed, **axis.later} for axis in axes]
+    for letter, axis, parts in zip(lot.letters, axes, by_axis, strict=True):
+        yield BudgetQuantity("bias_error_period", letter, "µg", axis.value, zero, none, own.dof, extra=parts)
+    # of the largest error the parts are those of the axis that is expected to be the worst
     worst = np.argmax([axis.value for axis in axes], axis=0)
-    names = dict.fromkeys(name for axis in axes for name in axis.later)
-    parts = {
-        "run": _of_worst([axis.run for axis in axes], worst),
-        "budget": _of_worst([axis.fixed for axis in axes], worst),
+    names = dict.fromkeys(name for parts in by_axis for name in parts)
+    extra = {
+        name: np.stack([parts.get(name, zero) for parts in by_axis])[worst, np.arange(zero.size)] for name in names
     }
-    parts |= {name: _of_worst([axis.later.get(name, axis.run * 0.0) for axis in axes], worst) for name in names}
-    for name, value in zip((MEDIAN, BOUND), largest, strict=True):
-        yield BudgetQuantity(
-            LARGEST_ERROR, name, "µg", value, np.zeros_like(value), np.zeros((value.size, 0)), dof, extra=parts
-        )
-
-
-def _of_worst(values: list[Array], worst: NDArray[np.intp]) -> Array:
-    return np.stack(values)[worst, np.arange(worst.size)]
+    for name, value in zip((MEDIAN, BOUND), largest_error(axes, terms.switch_on_dof), strict=True):
+        yield BudgetQuantity(LARGEST_ERROR, name, "µg", value, zero, none, own.dof, extra=extra)

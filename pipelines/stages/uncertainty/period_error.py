@@ -6,33 +6,20 @@ is a standard deviation each, so the RMS of an axis is a root of a sum of square
 three axes lies well above the RMS that is expected of one.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from functools import lru_cache
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 from scipy.special import ndtri, stdtrit
 from scipy.stats import qmc
 
-from inertial.uncertainty.period import (
-    DAY_S,
-    MONTH_S,
-    YEAR_S,
-    Windows,
-    bounded_walk,
-    flicker_later,
-    flicker_within,
-    logarithmic,
-    walk_later,
-)
+from inertial.arrays import Array
+from inertial.uncertainty import period
+from inertial.uncertainty.period import Windows
 from pipelines.stages.uncertainty.budget_terms import BudgetTables, BudgetTerms
 from schemas.decisions import BOUND_SHARE
 from schemas.validity import Ageing
-
-Array = NDArray[np.float64]
 
 DRAWS = 2048
 OF_AXIS = 4
@@ -140,11 +127,11 @@ def after_run(terms: BudgetTerms, span_s: float, instability: float, walk: float
     ----------
     span_s : of the dwells of the fit; instability : B, µg; walk : K, µg/√s
     """
-    stability, gap = terms.stability, terms.certificate.validity_months * MONTH_S
-    if stability is None or gap > stability.horizon_days * DAY_S * 1.001:
+    stability, gap = terms.stability, terms.certificate.validity_months * period.MONTH_S
+    if stability is None or gap > stability.horizon_days * period.DAY_S * 1.001:
         return None
     windows = Windows(span_s, terms.certificate.use_window_s or terms.dwell_s, gap)
-    later, within = (f(windows, stability.flicker_slowest_s) for f in (flicker_later, flicker_within))
+    later, within = (f(windows, stability.flicker_slowest_s) for f in (period.flicker_later, period.flicker_within))
     parts = {
         "flicker": instability * float(np.sqrt(max(later**2 - within**2, 0.0))),
         "switch_on": stability.switch_on_ug,
@@ -165,7 +152,7 @@ def walk_carried(windows: Windows, slowest: float | None) -> float:
     K of an hour would grow by a factor of a hundred, to more than devices do; slower changes are ageing.
     """
     bound = max(slowest or 0.0, 2.0 * windows.calibration / 3.0)
-    return min(walk_later(windows), float(np.sqrt(bound)))
+    return min(period.walk_later(windows), float(np.sqrt(bound)))
 
 
 def walk_of(tables: BudgetTables, unit: str, axis: str) -> float:
@@ -179,12 +166,12 @@ def ageing_u(ageing: Ageing, windows: Windows) -> float:
     """Standard uncertainty by ageing, µg: a bound of a drift is rectangular (JCGM 100, 4.3.7)."""
     gap = windows.gap
     if ageing.form == "log":
-        return logarithmic(ageing.per_decade_ug or 0.0, gap) / RECTANGULAR
+        return period.logarithmic(ageing.per_decade_ug or 0.0, gap) / RECTANGULAR
     if ageing.form == "linear":
-        return (ageing.per_year_ug or 0.0) * gap / YEAR_S / RECTANGULAR
+        return (ageing.per_year_ug or 0.0) * gap / period.YEAR_S / RECTANGULAR
     if ageing.form == "walk":
-        return (ageing.walk_ug_rtday or 0.0) / float(np.sqrt(DAY_S)) * walk_later(windows)
-    return bounded_walk(ageing.deviation_ug or 0.0, (ageing.correlation_days or 1.0) * DAY_S, gap)
+        return (ageing.walk_ug_rtday or 0.0) / float(np.sqrt(period.DAY_S)) * period.walk_later(windows)
+    return period.bounded_walk(ageing.deviation_ug or 0.0, (ageing.correlation_days or 1.0) * period.DAY_S, gap)
 
 
 def instability_of(tables: BudgetTables, unit: str, axis: str) -> float:

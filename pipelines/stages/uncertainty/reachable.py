@@ -1,14 +1,12 @@
 """Uncertainty that a recipe can reach on its station, before it is measured, and its largest contributions."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inertial import design
+from inertial.arrays import Array, Index
 from inertial.state import State
 from inertial.uncertainty.influences import MeasurementModel, sensitivity
 from inertial.uncertainty.propagation import Propagated, fit_design, norm_errors, propagated, rms_over
@@ -20,8 +18,6 @@ from pipelines.stages.uncertainty.period_error import AxisErrors, after_run, lar
 from schemas.decisions import BOUND, GRADES, LARGEST_ERROR
 from schemas.limits import Limits
 from schemas.units import AXES, MICRO
-
-Array = NDArray[np.float64]
 
 LEAST_SHARE = 0.01
 """Smallest share of a contribution that a reason names."""
@@ -48,7 +44,7 @@ class PlannedDwells:
 
     fit: State
     verification: State | None
-    soak: NDArray[np.int64]
+    soak: Index
     target_C: Array
     covariance: Array
     run_ug: float

@@ -1,22 +1,18 @@
 """Tables of a budget: one row per contribution, one per quantity, and the covariance of the coefficients."""
 
-from __future__ import annotations
-
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from inertial.arrays import Array, Places
 from inertial.uncertainty.degrees import coverage_factors, effective_degrees
 from pipelines.stages.uncertainty.budget_terms import BudgetTerms
 from pipelines.stages.uncertainty.contributions import UncertaintySource
-from pipelines.stages.uncertainty.measurands import BudgetQuantity, VarianceParts
+from pipelines.stages.uncertainty.measurands import BudgetQuantity, LotBudget, VarianceParts, quantities_of
 from pipelines.tables.frames import empty_table, picked
-
-Array = NDArray[np.float64]
 
 NOISE = "noise"
 BEYOND = {
@@ -84,19 +80,22 @@ class _Contributions:
     sensitivity: Array
 
 
-def rows_of_quantities(
-    units: Sequence[str],
-    quantities: Sequence[BudgetQuantity],
-    variances: VarianceParts,
-    terms: BudgetTerms,
-    known: Mapping[str, UncertaintySource],
+def tables_of(
+    lot: LotBudget, known: Mapping[str, UncertaintySource], left_out: Collection[tuple[str, str]] = ()
 ) -> dict[str, pd.DataFrame]:
-    """Tables ``budget`` and ``uncertainties``; every quantity for all units at once."""
-    places = groups_of(variances)
-    parts = [_contributions(one, places, variances, known, terms) for one in quantities]
+    """The tables of a budget; every quantity for all units at once.
+
+    Parameters
+    ----------
+    left_out : quantities by name and axis that are none of this lot
+    """
+    units, places = lot.calibration.units, groups_of(lot.variances)
+    quantities = [one for one in quantities_of(lot) if (one.name, one.axis) not in left_out]
+    parts = [_contributions(one, places, lot.variances, known, lot.terms) for one in quantities]
     return {
         "budget": _budget_rows(units, quantities, parts),
-        "uncertainties": _sum_rows(units, quantities, parts, terms),
+        "uncertainties": _sum_rows(units, quantities, parts, places, lot.terms),
+        "budget_covariance": _covariance_rows(units, lot.variances.fit.covariance()),
     }
 
 
@@ -108,13 +107,13 @@ def has_uncertainty(row: Mapping[str, Any]) -> bool:
     return bool(row["expanded"] > 0.0)
 
 
-def groups_of(variances: VarianceParts) -> dict[str, NDArray[np.intp]]:
+def groups_of(variances: VarianceParts) -> dict[str, Places]:
     """The places among the influences of every contribution, in order."""
     names = np.array(variances.fit.source.contributions, dtype=object)
     return {group: np.flatnonzero(names == group) for group in dict.fromkeys(names.tolist())}
 
 
-def combined(one: BudgetQuantity, places: Mapping[str, NDArray[np.intp]]) -> tuple[Array, Array, Array]:
+def combined(one: BudgetQuantity, places: Mapping[str, Places]) -> tuple[Array, Array, Array]:
     """Standard uncertainty of type A, of type B and of both of a quantity, (units,) each."""
     noise = np.asarray(one.noise, dtype=float)
     if one.extra:  # an expected RMS: its contributions make its value, its uncertainty is that of the RMS
@@ -127,7 +126,7 @@ def combined(one: BudgetQuantity, places: Mapping[str, NDArray[np.intp]]) -> tup
 
 def _contributions(
     one: BudgetQuantity,
-    places: Mapping[str, NDArray[np.intp]],
+    places: Mapping[str, Places],
     variances: VarianceParts,
     known: Mapping[str, UncertaintySource],
     terms: BudgetTerms,
@@ -152,7 +151,7 @@ def _contributions(
     return _Contributions(list(own), u, about, stated, dof, sensitivity)
 
 
-def _parts(one: BudgetQuantity, places: Mapping[str, NDArray[np.intp]]) -> dict[str, Array]:
+def _parts(one: BudgetQuantity, places: Mapping[str, Places]) -> dict[str, Array]:
     """Standard uncertainty of every contribution, (units,) each; the noise first."""
     if one.extra:
         return {name: np.asarray(values, dtype=float) for name, values in one.extra.items()}
@@ -205,54 +204,46 @@ def _summed(values: Array) -> Array:
 def _budget_rows(
     units: Sequence[str], quantities: Sequence[BudgetQuantity], parts: Sequence[_Contributions]
 ) -> pd.DataFrame:
-    many = len(units)
-    counts = [len(own.names) for own in parts]
-
-    def each(of: Callable[[BudgetQuantity], str]) -> list[str]:
-        """A text of the quantities in every row of theirs."""
-        return [text for one, count in zip(quantities, counts, strict=True) for text in [of(one)] * count] * many
-
-    def same(of: Callable[[_Contributions], list[Any]]) -> list[Any]:
-        return [value for own in parts for value in of(own)] * many
+    rows = [(one, name) for one, own in zip(quantities, parts, strict=True) for name in own.names]
+    about = {name: [value for own in parts for value in own.about[name]] for name in SAME}
 
     def together(of: Callable[[_Contributions], Array]) -> Array:
         return np.concatenate([of(own) for own in parts], axis=1).ravel() if parts else np.empty(0)
 
     return pd.DataFrame(
         {
-            "unit": [unit for unit in units for _ in range(sum(counts))],
-            "quantity": each(lambda one: one.name),
-            "axis": each(lambda one: one.axis),
-            "unit_text": each(lambda one: one.unit),
-            "contribution": same(lambda own: own.names),
+            "unit": [unit for unit in units for _ in rows],
+            "quantity": [one.name for one, _ in rows] * len(units),
+            "axis": [one.axis for one, _ in rows] * len(units),
+            "unit_text": [one.unit for one, _ in rows] * len(units),
+            "contribution": [name for _, name in rows] * len(units),
             "u": together(lambda own: own.u),
-            "visible": same(lambda own: own.about["visible"]),
+            "visible": about["visible"] * len(units),
             "sensitivity": together(lambda own: own.sensitivity),
-            **{name: same(lambda own, name=name: own.about[name]) for name in SAME[1:-2]},
-            "divisor": same(lambda own: own.about["divisor"]),
+            **{name: about[name] * len(units) for name in (*SAME[1:-2], "divisor")},
             "stated": together(lambda own: own.stated),
             "dof": together(lambda own: own.dof),
-            "source": same(lambda own: own.about["source"]),
+            "source": about["source"] * len(units),
             "share": together(lambda own: _share(own.u)),
         }
     )
 
 
 def _sum_rows(
-    units: Sequence[str], quantities: Sequence[BudgetQuantity], parts: Sequence[_Contributions], terms: BudgetTerms
+    units: Sequence[str],
+    quantities: Sequence[BudgetQuantity],
+    parts: Sequence[_Contributions],
+    places: Mapping[str, Places],
+    terms: BudgetTerms,
 ) -> pd.DataFrame:
     """Every quantity with its combined and expanded uncertainty."""
     columns: dict[str, list[Array]] = {name: [] for name in SUM_NUMBERS.split()}
     largest: list[list[str]] = []
     for one, own in zip(quantities, parts, strict=True):
-        a = np.asarray(one.noise, dtype=float)
+        a, b, u = combined(one, places)
         none = np.full_like(a, np.nan)
-        if one.extra:  # an expected RMS: its contributions make its value, and it has no uncertainty of its own
-            b, dof = np.zeros_like(a), none
-        else:
-            stated = [k for k, kind in enumerate(own.about["type"]) if kind == "B"]
-            b, dof = np.sqrt(_summed(own.u[:, stated] ** 2)), effective_degrees(own.u, own.dof)
-        u, k = np.hypot(a, b), none if one.extra else coverage_factors(dof)
+        dof = none if one.extra else effective_degrees(own.u, own.dof)
+        k = none if one.extra else coverage_factors(dof)
         row = {"value": one.value, "u_a": a, "u_b": b, "u": u, "dof": dof, "k": k, "expanded": k * u,
                "shown": none if one.shown is None else one.shown,
                "unseen": none if one.unseen is None else one.unseen}  # fmt: skip
@@ -260,13 +251,13 @@ def _sum_rows(
             columns[name].append(np.asarray(values, dtype=float))
         largest.append(_largest(own))
     many, count = len(units), len(quantities)
-    texts = {"quantity": [one.name for one in quantities] * many, "axis": [one.axis for one in quantities] * many,
-             "unit_text": [one.unit for one in quantities] * many}  # fmt: skip
     numbers = {name: np.stack(values, axis=1).ravel() if values else np.empty(0) for name, values in columns.items()}
     return pd.DataFrame(
         {
             "unit": [unit for unit in units for _ in range(count)],
-            **texts,
+            "quantity": [one.name for one in quantities] * many,
+            "axis": [one.axis for one in quantities] * many,
+            "unit_text": [one.unit for one in quantities] * many,
             **numbers,
             "largest": [own[unit] for unit in range(many) for own in largest],
             "frame": [terms.certificate.frame] * (many * count),
@@ -284,7 +275,7 @@ def _largest(own: _Contributions) -> list[str]:
     ]
 
 
-def covariance_rows(units: Sequence[str], covariance: Array) -> pd.DataFrame:
+def _covariance_rows(units: Sequence[str], covariance: Array) -> pd.DataFrame:
     """Covariance (units, 3p, 3p) of the coefficients by the budget, x before y before z, as its lower triangles; output unit²."""
     many = np.broadcast_to(covariance, (len(units), *covariance.shape[-2:]))
     row, column = np.tril_indices(many.shape[-1])

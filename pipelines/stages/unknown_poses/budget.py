@@ -1,7 +1,5 @@
 """The uncertainty budget of a fit by the norm of gravity: references that act on the magnitude, through the fit's own design."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -13,13 +11,15 @@ from inertial.uncertainty.norm_design import propagated_by_norm
 from pipelines.stages.uncertainty.budget import conditions, with_device_temperature
 from pipelines.stages.uncertainty.budget_terms import BudgetTables, BudgetTerms
 from pipelines.stages.uncertainty.contributions import influences, sources
-from pipelines.stages.uncertainty.measurands import VarianceParts, quantities_of
-from pipelines.stages.uncertainty.tables import covariance_rows, empty, rows_of_quantities
-from pipelines.stages.unknown_poses.dwells import NormDwells, norm_dwells
+from pipelines.stages.uncertainty.measurands import LotBudget, VarianceParts
+from pipelines.stages.uncertainty.tables import empty, tables_of
+from pipelines.stages.unknown_poses.verify import NormDwells, norm_dwells
 from schemas.uncertainty import Uncertainty
 
 OF_POSES = ("level", "orthogonality", "outer_offset", "inner_offset", "harmonics", "pose", "seat")
 """Entries that change the direction of the force only: the norm does not depend on them."""
+ROTATIONS = {("misalignment", axis) for axis in ("yx", "zx", "zy")}
+"""A coefficient of K below the diagonal is a rotation of the whole unit, zero by definition."""
 
 
 def norm_budget(tables: BudgetTables, terms: BudgetTerms) -> dict[str, pd.DataFrame]:
@@ -28,13 +28,13 @@ def norm_budget(tables: BudgetTables, terms: BudgetTerms) -> dict[str, pd.DataFr
         return empty()
     stated = terms.stated.model_copy(update=dict.fromkeys(OF_POSES))
     own = [
-        _of_unit(one, tables, replace(terms, stated=stated), stated)
+        tables_of(_of_unit(one, tables, replace(terms, stated=stated), stated), sources(stated), ROTATIONS)
         for one in norm_dwells(tables.dwells, tables.history, tables.coefficients, tables.covariance, tables.wander)
     ]
     return {name: pd.concat([part[name] for part in own], ignore_index=True) for name in own[0]}
 
 
-def _of_unit(one: NormDwells, tables: BudgetTables, terms: BudgetTerms, stated: Uncertainty) -> dict[str, pd.DataFrame]:
+def _of_unit(one: NormDwells, tables: BudgetTables, terms: BudgetTerms, stated: Uncertainty) -> LotBudget:
     unit = one.lot.units[0]
     state = one.lot.state
     outer, inner = angles_from_force(state.force)
@@ -59,13 +59,7 @@ def _of_unit(one: NormDwells, tables: BudgetTables, terms: BudgetTerms, stated: 
         verification_poses=_of(tables.verification_poses, unit),
         noise=_of(tables.noise, unit),
     )
-    # a coefficient of K below the diagonal is a rotation of the whole unit, zero by definition
-    every = quantities_of(lot, one.calibration, part, terms, variances)
-    quantities = [q for q in every if not (q.name == "misalignment" and q.axis in {"yx", "zx", "zy"})]
-    return {
-        **rows_of_quantities((unit,), quantities, variances, terms, sources(stated)),
-        "budget_covariance": covariance_rows((unit,), variances.fit.covariance()),
-    }
+    return LotBudget(lot, one.calibration, part, terms, variances)
 
 
 def _of(table: pd.DataFrame, unit: str) -> pd.DataFrame:

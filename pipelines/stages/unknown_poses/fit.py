@@ -1,16 +1,14 @@
 """Fit of a model to dwells of unknown orientation: coefficients, covariance, residuals of the norm and its noise, as tables."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from inertial import effects as catalogue
+from inertial.arrays import Array
 from inertial.errors import InertialError
 from inertial.estimation.model import Model
 from inertial.estimation.noise_shares import LONGEST
@@ -27,8 +25,6 @@ from pipelines.tables.frames import empty_table, picked
 from pipelines.tables.norms import expansion
 from schemas.errors import DataRejected
 from schemas.units import AXES, MICRO
-
-Array = NDArray[np.float64]
 
 FEW_DWELLS = 300
 """Dwells up to which standard errors are averaged over the plausible shares of wander."""

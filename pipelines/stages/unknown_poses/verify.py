@@ -1,18 +1,108 @@
-"""Verification of a fit by the norm of gravity on dwells that were held out, and its uncertainty."""
+"""Dwells of unknown orientation under a calibration: the force of each, its noise, the fit as a linear map, and verification."""
 
-from __future__ import annotations
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from inertial.arrays import Array
+from inertial.correction import correct
+from inertial.fits.linear import force_along_axes, response_matrix
 from inertial.fits.wander import student
+from inertial.noise.flicker import flicker_kernel
+from inertial.noise.measurands import walk_kernel
+from inertial.uncertainty.influences import MeasurementModel
+from inertial.uncertainty.norm_design import NormDesign, norm_design
 from pipelines.stages.rms_error import rms_columns
-from pipelines.stages.unknown_poses.dwells import NormDwells, norm_dwells
 from pipelines.stages.verify import nothing_verified, verification_rows
+from pipelines.tables.calibration import Calibration, read_calibration
+from pipelines.tables.dwells import KINDS, LotArrays, measured
 from schemas.units import MICRO
 
-Array = NDArray[np.float64]
+FITTED = "dwell"
+
+
+@dataclass(frozen=True)
+class NormDwells:
+    """The dwells of one unit under its calibration.
+
+    lot : with the force that explains the outputs; calibration : of this unit
+    reading : (n,), white noise of each dwell's norm, g; noise : (n, n), covariance of the norms, white and wander, g²
+    """
+
+    lot: LotArrays
+    calibration: Calibration
+    design: NormDesign
+    reading: Array
+    noise: Array
+
+    @property
+    def model(self) -> MeasurementModel:
+        """The calibrated model."""
+        return MeasurementModel(self.calibration.effects, self.calibration.coefficients, self.calibration.nonlinear)
+
+
+def norm_dwells(
+    dwells: pd.DataFrame,
+    history: pd.DataFrame | None,
+    coefficients: pd.DataFrame,
+    covariance: pd.DataFrame,
+    wander: pd.DataFrame,
+) -> Iterator[NormDwells]:
+    """Every unit of a lot that has coefficients; the dwells of the fit and those that are held out together."""
+    calibration = read_calibration(coefficients, covariance)
+    for place, unit in enumerate(calibration.units):
+        own = dwells[(dwells["unit"].astype(str) == unit) & dwells["kind"].isin(list(KINDS))]
+        past = history if history is None or "unit" not in history.columns else history[history["unit"] == unit]
+        one = replace(
+            calibration,
+            units=(unit,),
+            coefficients=calibration.coefficients[[place]],
+            covariance=calibration.covariance[[place]],
+        )
+        yield _one(own.sort_values("dwell"), past, one, wander[wander["unit"].astype(str) == unit])
+
+
+def _one(
+    dwells: pd.DataFrame, history: pd.DataFrame | None, calibration: Calibration, wander: pd.DataFrame
+) -> NormDwells:
+    measurement = measured(dwells, history)
+    readings, state = measurement.readings, measurement.state
+    force = correct(calibration.effects, state, readings.output, calibration.coefficients, calibration.nonlinear)
+    response = response_matrix(calibration.coefficients, calibration.names)
+    scale = np.abs(np.diagonal(response, axis1=-2, axis2=-1))
+    felt = force_along_axes(response, force)
+    state = replace(state, force=force, felt=felt, memory={})
+    white, flicker, walk = (float(wander[name].iloc[0]) / MICRO for name in ("white_ug", "flicker_ug", "walk_ug"))
+    direction = force[0] / np.linalg.norm(force[0], axis=-1, keepdims=True)
+    n = len(direction)
+    reading = np.full(n, white)
+    error = np.full((n, 3), white) * scale[0]
+    if readings.spread is not None and readings.count is not None:
+        error = readings.spread[0] / np.sqrt(np.maximum(readings.count[0], 1.0))[:, None]
+        reading = np.sqrt(np.sum((direction * error / scale[0]) ** 2, axis=1))
+    kinds = dwells["kind"].to_numpy().astype(np.str_)
+    used = np.asarray(kinds == FITTED)
+    profile = np.where(reading > 0.0, reading, np.median(reading))
+    profile = profile / np.sqrt(np.mean(profile[used] ** 2))
+    time = readings.time[0]
+    kernel = flicker**2 * flicker_kernel(time) + walk**2 * walk_kernel(time)
+    noise = np.diag((white * profile) ** 2) + kernel * (direction @ direction.T)
+    model = MeasurementModel(calibration.effects, calibration.coefficients, calibration.nonlinear)
+    lot = LotArrays(
+        units=calibration.units,
+        dwells=measurement.dwells,
+        poses=tuple(dwells["pose"].astype(str))
+        if "pose" in dwells.columns
+        else tuple(f"dwell {k}" for k in measurement.dwells),
+        kinds=kinds,
+        state=state,
+        output=readings.output,
+        standard_error=error[None],
+        out_unit=str(dwells["out_unit"].iloc[0]),
+    )
+    return NormDwells(lot, calibration, norm_design(model, state, noise, used), reading, noise)
 
 
 def verify_norms(

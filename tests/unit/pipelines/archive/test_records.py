@@ -122,8 +122,8 @@ def test_a_long_series_is_averaged_and_keeps_its_allan_deviation(rng: np.random.
     series = noise_stage.StaticSeries(["U"], size)
     for table in tables:
         series.add(table)
-    assert series.values().shape == (1, 3, n // size)
-    whole, means = overlapping(values.T, 100.0), overlapping(series.values()[0], 100.0 / size)
+    assert series.of("U").shape == (n // size, 3)
+    whole, means = overlapping(values.T, 100.0), overlapping(series.of("U").T, 100.0 / size)
     shared = np.isin(np.round(whole.tau, 9), np.round(means.tau, 9))
     ratio = means.deviation[:, : shared.sum()] / whole.deviation[:, shared]
     assert means.tau[0] == pytest.approx(size / 100.0)
@@ -131,4 +131,4 @@ def test_a_long_series_is_averaged_and_keeps_its_allan_deviation(rng: np.random.
     kept = noise_stage.StaticSeries(["U"], 1)
     for table in tables:
         kept.add(table)
-    assert np.array_equal(kept.values()[0], values.T)
+    assert np.array_equal(kept.of("U"), values)

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 from inertial.pointing import force_from_angles
-from pipelines.capture.plausibility import TURNED, Plausibility
+from pipelines.capture.record import TURNED, Plausibility
 from pipelines.tables.summaries import MEANS, first_outlier, summarised, unit_means
 from schemas.errors import OperatorNeeded
 

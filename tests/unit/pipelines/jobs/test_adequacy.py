@@ -27,7 +27,7 @@ from pipelines.report.context import ReportContext
 from pipelines.report.numbers import significant
 from pipelines.report.panels import model_adequacy
 from pipelines.rerun.rerun import again
-from pipelines.stages.judge import adequacy, judge, told_by, verdict_of
+from pipelines.stages.judge import judge, told_by, verdict_of, verdict_on
 
 MODEL = ["bias", "scale", "misalignment", "bias_temperature", "scale_temperature"]
 FIGURES = ("rms_ug", "floor_ug", "p_value")
@@ -77,7 +77,7 @@ CASES = [(_plain, True), (_hidden, False), (_knocked, False), (_few, None), (_sw
 def test_it_is_the_verdict_of_diagnose_in_every_figure(made, adequate) -> None:
     table = made()
     effects = MODEL if made is not _few else MODEL[:3]
-    short, whole = adequacy(table, None, effects), diagnose(table, None, effects)
+    short, whole = verdict_on(table, None, effects), diagnose(table, None, effects)
     assert short["adequate"] is adequate
     assert (short["adequate"], short["reason"]) == (whole["adequate"], whole["reason"])
     assert {name: short[name] for name in FIGURES} == {name: whole["error"][name] for name in FIGURES}

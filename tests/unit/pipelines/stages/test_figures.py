@@ -6,7 +6,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from pipelines.stages.figures import UNITS, Figure, LotCoefficients, UnitTables, figures_of
+from pipelines.stages.figures import UNITS, Figure, UnitTables, figures_of
+from pipelines.stages.figures.base import LotCoefficients
 from pipelines.stages.grade import GradeEvidence, grade
 from pipelines.tables.frames import ByUnit
 from schemas.limits import parse_limits

@@ -27,13 +27,12 @@ from pipelines.certificates import Calibration, Ledger
 from pipelines.certificates.document import archive_comparison
 from pipelines.certificates.document.compose import compose
 from pipelines.certificates.document.content import CertificateContent
-from pipelines.certificates.document.documents import CertificateCheckDocument
 from pipelines.certificates.document.file_check import Against, check_file
 from pipelines.certificates.document.issue import issue
 from pipelines.certificates.document.laboratory import LaboratoryFile, read_laboratory
 from pipelines.certificates.document.signature_check import canonical, parsed, xml_signature
 from pipelines.certificates.document.signing import SigningKey, sign_pdf, sign_xml
-from pipelines.certificates.documents import CertifyDocument
+from pipelines.certificates.documents import CertificateCheckDocument, CertifyDocument
 from pipelines.chain.certify import certify
 from pipelines.cli import app
 from schemas.errors import WrongUse
