@@ -78,7 +78,8 @@ def _component(pin: Pin) -> dict[str, Any]:
 
     What the lock installs on some Pythons or systems only is optional, with the marker that says where.
     """
-    licence = _licence(pin.name, pin.version)
+    held = _metadata_of(pin)
+    licence = {} if held is None else licence_of(held)
     where = [{"name": "tumbleline:lock:marker", "value": str(pin.marker)}] if pin.marker else []
     return {
         "type": "library",
@@ -90,12 +91,6 @@ def _component(pin: Pin) -> dict[str, Any]:
         "purl": _reference(pin.name, pin.version),
         "properties": [*where, *({"name": "tumbleline:lock:sha256", "value": one} for one in pin.hashes)],
     }
-
-
-def _licence(name: str, version: str) -> dict[str, Any]:
-    """The licence of a library, where it is installed in that version."""
-    installed = _installed(name, version)
-    return {} if installed is None else licence_of(installed)
 
 
 def licence_of(installed: Any) -> dict[str, Any]:
@@ -112,7 +107,7 @@ def licence_of(installed: Any) -> dict[str, Any]:
 
 def _below(pin: Pin, locked: dict[str, list[Pin]]) -> list[str]:
     """References of the libraries of the lock that an installed library needs, without its extras."""
-    held = _installed(pin.name, pin.version)
+    held = _metadata_of(pin)
     return _references(held.get_all("Requires-Dist") or (), locked) if held is not None else []
 
 
@@ -126,12 +121,18 @@ def _references(requirements: Iterable[str], locked: dict[str, list[Pin]]) -> li
     return [_reference(pin.name, pin.version) for lib in sorted(needed) for pin in locked.get(lib, ())]
 
 
-def _installed(name: str, version: str) -> Any:
+def installed(name: str) -> metadata.Distribution | None:
+    """A package that is installed."""
     try:
-        held = metadata.distribution(name)
+        return metadata.distribution(name)
     except metadata.PackageNotFoundError:
         return None
-    return held.metadata if held.version == version else None
+
+
+def _metadata_of(pin: Pin) -> Any:
+    """The metadata of a library, where it is installed in that version."""
+    held = installed(pin.name)
+    return held.metadata if held is not None and held.version == pin.version else None
 
 
 def _reference(name: str, version: str) -> str:

@@ -45,21 +45,15 @@ def _show(document: DoctorDocument) -> None:
 
     checks = document["checks"]
     lines = [
-        [
-            c["part"],
-            c["check"],
-            Text(c["state"], COLOURS[c["state"]]),
-            c["found"] if c["state"] == "good" else "see below",
-        ]
+        [c.part, c.check, Text(c.state, COLOURS[c.state]), c.found if c.state == "good" else "see below"]
         for c in checks
     ]
     print_table(["part", "check", "state", "found"], lines, whole=3)
     if document["samples"]:
         say(f"sample recipes and stations: {document['samples']}")
     for state in ("not configured", "warning", "fault"):
-        for c in (c for c in checks if c["state"] == state):
-            needed = f", needed: {c['needed']}" if c["needed"] else ""
-            remedy = f"; {c['remedy']}" if c["remedy"] else ""
-            text = f"{state}: {c['part']}, {c['check']}: {c['found']}{needed}{remedy}"
-            say(text, style=COLOURS[state])
+        for c in (c for c in checks if c.state == state):
+            needed = f", needed: {c.needed}" if c.needed else ""
+            remedy = f"; {c.remedy}" if c.remedy else ""
+            say(f"{state}: {c.part}, {c.check}: {c.found}{needed}{remedy}", style=COLOURS[state])
     say(f"{document['faults']} faults, {document['warnings']} warnings")

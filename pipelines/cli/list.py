@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
-
 from inertial.counts import number_of
 from pipelines.archive import Archive, RunInfo
 from pipelines.cli.options import ArchiveOption, JsonOption
@@ -23,8 +21,7 @@ def command(archive: ArchiveOption = None, *, as_json: JsonOption = False) -> No
     """List the runs of the archive in the order of their start."""
     store = Archive(archive)
     infos = store.runs()
-    document = {"archive": str(store.root), "runs": [asdict(info) for info in infos]}
-    give(document, lambda _: _print(infos, store), as_json=as_json)
+    give({"archive": str(store.root), "runs": infos}, lambda _: _print(infos, store), as_json=as_json)
 
 
 def _print(infos: list[RunInfo], store: Archive) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -39,8 +39,6 @@ def check(
 
     It leases the station as a run does and leaves it in the safe state. Exit status 3: a test failed.
     """
-    from dataclasses import asdict
-
     from schemas.station import load_station
     from stations.links.recorder import recorded
     from stations.serving import look
@@ -52,8 +50,8 @@ def check(
         findings = [] if registers or silent else _tested(config, device, units)
     failed = [*silent, *(finding.message for finding in findings if not finding.ok)]
     if as_json:
-        document: dict[str, Any] = {"ok": not failed, "failed": failed, "registers": [asdict(r) for r in readings]}
-        print_json(document | ({} if registers else {"checks": [asdict(finding) for finding in findings]}))
+        document = {"ok": not failed, "failed": failed, "registers": readings}
+        print_json(document if registers else {**document, "checks": findings})
     else:
         _print(readings, findings, registers=registers)
         for message in failed:

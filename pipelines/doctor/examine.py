@@ -6,12 +6,11 @@ import sys
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
-from typing import cast
 from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 
 from pipelines.doctor.archive import archive_checks, key_checks
-from pipelines.doctor.check import Check, of_error, unwritable, write_probe
-from pipelines.doctor.documents import CheckDocument, DoctorDocument
+from pipelines.doctor.check import of_error, unwritable, write_probe
+from pipelines.doctor.documents import Check, DoctorDocument
 from pipelines.doctor.orchestrator import orchestrator_checks
 from pipelines.doctor.software import software_checks
 from schemas.errors import TumblelineError
@@ -51,7 +50,7 @@ def examine(archive: str | None = None, station: Path | None = None, free_gb: fl
         "version": metadata.version(PRODUCT),
         "python": platform.python_version(),
         "samples": None if samples is None else str(samples),
-        "checks": [cast("CheckDocument", check._asdict()) for check in checks],
+        "checks": checks,
     }
 
 

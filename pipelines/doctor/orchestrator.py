@@ -13,7 +13,8 @@ from importlib import metadata
 from typing import NamedTuple
 from urllib.parse import urlsplit
 
-from pipelines.doctor.check import Check, clock_check, judged, of_error, offset
+from pipelines.doctor.check import clock_check, judged, of_error, offset
+from pipelines.doctor.documents import Check
 from pipelines.orchestrator.archive_address import without_credentials
 from pipelines.orchestrator.settings import CLIENT_KEY, KEY_FILE, LOOPBACK, use_key
 from schemas.errors import TumblelineError
