@@ -4,8 +4,6 @@ The makefile calls it with the Python that a person has, before any library is t
 ``FOLDER/.made`` says who finished it last; a folder without it was stopped in the middle and is not trusted.
 """
 
-from __future__ import annotations
-
 import fcntl
 import hashlib
 import json

@@ -4,8 +4,6 @@ PYTHONS names interpreters in place of those that are found, TESTS folders or fi
 cloned. The output of each interpreter is kept in ``build/pythons/``. Needs the standard library alone.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import shutil

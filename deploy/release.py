@@ -4,8 +4,6 @@ The wheel is built from the source distribution, in a folder of its own: a file 
 is missing in the wheel, and files of an earlier build in ``build/`` do not get in. Nothing is fetched.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import shutil

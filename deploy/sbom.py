@@ -4,8 +4,6 @@
 are those of the installed distributions of the same version; a library that is not installed in that version has neither.
 """
 
-from __future__ import annotations
-
 import json
 import sys
 import tomllib

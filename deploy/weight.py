@@ -4,8 +4,6 @@ What is measured is what is installed in the present environment: the files that
 compiled modules among them. Extras that are not installed whole are left out.
 """
 
-from __future__ import annotations
-
 import re
 import sys
 from collections.abc import Iterable

@@ -1,7 +1,5 @@
 """Coefficients of units with their uncertainty, and what can be done with them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path

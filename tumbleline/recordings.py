@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import tempfile
 from collections.abc import Mapping, Sequence
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
@@ -31,11 +31,6 @@ def _session() -> tempfile.TemporaryDirectory[str]:
 def session_folder() -> Path:
     """The folder of this process for what nobody asked to keep; it is removed when the process ends."""
     return Path(_session().name)
-
-
-def silent(_: str = "") -> AbstractContextManager[Any]:
-    """Shows nothing while something is computed."""
-    return nullcontext()
 
 
 @dataclass(frozen=True)
@@ -213,7 +208,7 @@ def _imported(
             f"rate_hz=…; recognised: {seen.import_command}"
         )
     build(keys, path.name)
-    done = import_document([path], keys, path.name, "", _place(archive), None, silent)
+    done = import_document([path], keys, path.name, "", _place(archive), None, nullcontext)
     run = Archive(_place(archive)).run(done["run"])
     return Recording(run, _told(seen, proposal, done["remarks"]), Proposal(keys).command([path]))
 

@@ -229,7 +229,7 @@ def _product(
 def main() -> None:
     """Run the command line; an error that the user can correct is one message on standard error and an exit status."""
     _one_thread()
-    report_to(_remark)
+    report_to(lambda line: typer.echo(line, err=True))
     try:
         app()
     except TumblelineError as problem:
@@ -282,10 +282,6 @@ def _one_thread() -> None:
     """
     for name in THREADS:
         os.environ.setdefault(name, os.environ.get("OMP_NUM_THREADS", "1"))
-
-
-def _remark(line: str) -> None:
-    sys.stderr.write(f"{line}\n")
 
 
 def _leave(message: str, status: int) -> None:

@@ -1,7 +1,5 @@
 """``tumbleline archive``: the signing key, the temporary files of killed writers, compaction, backup and restore."""
 
-from __future__ import annotations
-
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated

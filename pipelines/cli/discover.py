@@ -1,7 +1,5 @@
 """``tumbleline discover``: what the lots of an archive show together that one lot cannot."""
 
-from __future__ import annotations
-
 from datetime import date
 from functools import partial
 from pathlib import Path

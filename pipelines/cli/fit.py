@@ -1,7 +1,5 @@
 """``tumbleline fit``: archived data again, with another model or other limits."""
 
-from __future__ import annotations
-
 import shlex
 from pathlib import Path
 from typing import Any, NoReturn

@@ -96,7 +96,6 @@ def _write(inspection: Inspection, picture: Path | None, page: Path | None) -> N
 
 
 def _print(one: InspectDocument) -> None:
-    """Print the content of a recording."""
     names = " + ".join(Path(name).name for name in one["files"])
     rate = "" if one["rate_hz"] is None else f", {one['rate_hz']:.5g} Hz"
     long = "" if one["duration_s"] is None else f", {one['duration_s']:.5g} s"
@@ -150,10 +149,9 @@ def _print_intervals(one: InspectDocument) -> None:
     intervals = one["intervals"]
     if not intervals:
         return
-    several = [k for k, interval in enumerate(intervals) if interval["positions"] > 1]
     total = sum(interval["end_s"] - interval["start_s"] for interval in intervals)
     say(f"  {number_of(len(intervals), 'static interval')}, {total:.4g} s")
-    for k in several[:MOST_FAULTS]:
+    for k in [k for k, interval in enumerate(intervals) if interval["positions"] > 1][:MOST_FAULTS]:
         say(f"  interval {k} holds about {intervals[k]['positions']} positions logged back to back")
     rows = [
         [

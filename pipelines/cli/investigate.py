@@ -112,7 +112,6 @@ def _answer(inquiry: Inquiry, follow_up: FollowUp) -> Consent:
 
 
 def _print_diagnosis(joint: JointDiagnosis) -> None:
-    """Print one line about a joint diagnosis."""
     from pipelines.diagnosis.sentences import verdict
 
     runs = len(joint.lineage.runs)

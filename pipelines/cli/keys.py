@@ -1,7 +1,5 @@
 """``tumbleline keys``: the keys and names that recipes, limits, stations, --fault and demo accept."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Annotated
 

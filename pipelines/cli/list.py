@@ -1,7 +1,5 @@
 """``tumbleline list``: the runs of the archive."""
 
-from __future__ import annotations
-
 from inertial.counts import number_of
 from pipelines.archive import Archive, RunInfo
 from pipelines.cli.options import ArchiveOption, JsonOption

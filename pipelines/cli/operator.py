@@ -1,7 +1,5 @@
 """``tumbleline operator``: answers the questions of waiting runs, at any terminal that reaches their orchestrator."""
 
-from __future__ import annotations
-
 import os
 from typing import TYPE_CHECKING, Annotated, Any
 

@@ -30,18 +30,16 @@ NARROW = 28
 STYLES = {"pass": "bold green", "fail": "bold red", "refused": "bold magenta"}
 
 
-def console() -> Console:
+def console(*, stderr: bool = False) -> Console:
     """The console for results; brackets and colons in it are text, never markup."""
     from pipelines.cli.console import WordConsole
 
-    return WordConsole(highlight=False, markup=False, emoji=False)
+    return WordConsole(stderr=stderr, highlight=False, markup=False, emoji=False)
 
 
 def error_console() -> Console:
     """The console for progress and remarks: standard output has results only."""
-    from pipelines.cli.console import WordConsole
-
-    return WordConsole(stderr=True, highlight=False, markup=False, emoji=False)
+    return console(stderr=True)
 
 
 def say(what: object = "", style: str = "") -> None:
@@ -137,9 +135,9 @@ def _least(kept: bool, column: str, cells: Sequence[str | Text], width: int | No
 
 def _parts(least: Sequence[int], whole: int, width: int | None, gap: int) -> list[list[int]]:
     """The columns in portions that fit a width, each with the first ``whole`` ones."""
-    head = list(range(min(whole, len(least))))
     if width is None:
         return [list(range(len(least)))]
+    head = list(range(min(whole, len(least))))
     parts, own = list[list[int]](), list(head)
     for k in range(len(head), len(least)):
         if len(own) > len(head) and sum(least[m] + gap for m in [*own, k]) + 1 > width:
@@ -181,19 +179,13 @@ def _print_part(
 def _widths(least: Sequence[int], most: Sequence[int], room: int) -> list[int]:
     """Widths between what columns need at least and at most; room is given to the narrowest of those that want more."""
     widths = list(least)
-    spare = room - sum(widths)
-    while spare > 0:
-        wanting = [k for k in range(len(widths)) if widths[k] < most[k]]
-        if not wanting:
-            break
-        narrowest = min(wanting, key=lambda k: widths[k])
-        widths[narrowest] += 1
-        spare -= 1
+    while sum(widths) < room and (wanting := [k for k in range(len(widths)) if widths[k] < most[k]]):
+        widths[min(wanting, key=lambda k: widths[k])] += 1
     return widths
 
 
 def _numeric(cells: Sequence[str]) -> bool:
-    return bool(cells) and all(_is_number(cell) for cell in cells)
+    return bool(cells) and all(map(_is_number, cells))
 
 
 def _longest(texts: Sequence[str], between: str | None) -> int:

@@ -1,7 +1,5 @@
 """``tumbleline psd``: power spectral density of a file or a run, and the Allan deviation that follows from it."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any
 
 from pipelines.cli import options

@@ -1,7 +1,5 @@
 """``tumbleline report``: the path of a run's report."""
 
-from __future__ import annotations
-
 import typer
 
 from pipelines.archive import Archive

@@ -1,7 +1,5 @@
 """``tumbleline show``: a run, one of its tables, or the calibration of a unit on a date, from a few small files without numpy."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Sequence
 from importlib import import_module

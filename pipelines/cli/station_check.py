@@ -7,15 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from inertial.counts import number_of
+from pipelines.cli import options
 from pipelines.cli.inputs import made_up
-from pipelines.cli.options import (
-    JsonOption,
-    RecordOption,
-    SimulatedDeviceOption,
-    SimulatedUnitsOption,
-    StationOption,
-    option,
-)
+from pipelines.cli.options import option
 from pipelines.cli.printing import print_json, print_table, remark
 from schemas.errors import STATION
 
@@ -27,13 +21,13 @@ if TYPE_CHECKING:
 
 
 def check(
-    station: StationOption = None,
-    device: SimulatedDeviceOption = "ADXL355",
-    units: SimulatedUnitsOption = 8,
+    station: options.StationOption = None,
+    device: options.SimulatedDeviceOption = "ADXL355",
+    units: options.SimulatedUnitsOption = 8,
     *,
     registers: Annotated[bool, option("--registers", "Only read every register once; no motion.")] = False,
-    record: RecordOption = None,
-    as_json: JsonOption = False,
+    record: options.RecordOption = None,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Test a station before a shift: registers, instruments, moves, noise of every slot, a check standard.
 

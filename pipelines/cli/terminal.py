@@ -64,8 +64,7 @@ def agreed(question: str, choices: str = MEASURES, unattended: str = UNATTENDED)
             return True
         if answer in STOP:
             return False
-        message = f"'{answer}' is neither yes nor no: {choices}"
-        remark(message, style="yellow")
+        remark(f"'{answer}' is neither yes nor no: {choices}", style="yellow")
 
 
 def attended() -> bool:

@@ -1,7 +1,5 @@
 """Unexpected exceptions: one line for the user, and a file with the details for the developers."""
 
-from __future__ import annotations
-
 import os
 import platform
 import re

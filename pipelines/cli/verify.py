@@ -166,17 +166,11 @@ def check_certificates(
 
 
 def _document(one: CheckedFile) -> dict[str, Any]:
-    facts = one.facts
     return {
-        "file": str(one.path),
-        "certificate": "" if facts is None else facts.number,
-        "serial": "" if facts is None else facts.serial,
-        "run": "" if facts is None else facts.run,
-        "issued": "" if facts is None else facts.issued,
-        "signers": one.signers,
-        "checks": [{"check": c.check, "state": c.state, "message": c.message} for c in one.checks],
-        "proven_by": list(one.proven_by),
-        "accepted": one.accepted,
+        "file": one.path,
+        "certificate": getattr(one.facts, "number", ""),
+        **{key: getattr(one.facts, key, "") for key in ("serial", "run", "issued")},
+        **{key: getattr(one, key) for key in ("signers", "checks", "proven_by", "accepted")},
     }
 
 

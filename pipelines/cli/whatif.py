@@ -1,7 +1,5 @@
 """``tumbleline whatif``: the effect of a model on the lots of the archive, before its release to the line."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated, Any
 

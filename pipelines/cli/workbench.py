@@ -1,7 +1,5 @@
 """``tumbleline workbench``: archive, models and missing effects in a browser."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 from typing import Annotated

@@ -4,8 +4,6 @@ The physics is written here and knows no column of a fit: a proof mass on a spri
 its targets, wander from an Ornstein-Uhlenbeck cascade. What is hidden is a harder spring in the devices of one wafer.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field

@@ -3,9 +3,6 @@
 Drivers and registers are those of a production station; only the physics is simulated. The diagnosis gets only the dwells.
 """
 
-from __future__ import annotations
-
-import io
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -51,9 +48,8 @@ class DemoLot:
     def write(self, folder: Path) -> None:
         """The four tables as Parquet files."""
         for name in ("dwells", "history", "fresh", "fresh_history"):
-            sink = io.BytesIO()
-            getattr(self, name).to_parquet(sink, index=False)
-            files.publish(folder / f"{name.replace('_', '-')}.parquet", sink.getvalue(), "demo", files.ELSEWHERE)
+            content = getattr(self, name).to_parquet(index=False)
+            files.publish(folder / f"{name.replace('_', '-')}.parquet", content, "demo", files.ELSEWHERE)
 
 
 def measure(chosen: Scene, seed: int, progress: Progress = silent) -> DemoLot:

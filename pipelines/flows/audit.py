@@ -1,7 +1,5 @@
 """The flow ``audit_archive``: the audit on a schedule, its findings as artifacts that the orchestrator shows."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from typing import Any

@@ -8,8 +8,6 @@ The command of Prefect 3.8 ends with error 422 with FastAPI 0.151 and later: aft
 the pool with null for two numbers, and FastAPI now reads null as a value and not as a missing one.
 """
 
-from __future__ import annotations
-
 import sys
 from importlib import import_module
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The flow ``discover_in_archive``: every night what the lots of an archive show together, with its discoveries as artifacts."""
 
-from __future__ import annotations
-
 from datetime import UTC, datetime
 from pathlib import Path
 

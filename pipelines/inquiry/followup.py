@@ -1,7 +1,5 @@
 """A follow-up: proposed steps as a recipe for the station, and their station time."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

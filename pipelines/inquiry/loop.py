@@ -3,8 +3,6 @@
 The stages run as plain calls or as tasks of the orchestrator; approval of extra station time is supplied by the caller.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal

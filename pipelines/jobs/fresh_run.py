@@ -1,7 +1,5 @@
 """A second measurement of a run's units by the same recipe on the same station, which no fit has seen."""
 
-from __future__ import annotations
-
 from contextlib import suppress
 from typing import Any
 

@@ -1,12 +1,11 @@
 """Model files: formulas as effects, versions as a history, and the next version with one more effect."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 import tomlkit
 from tomlkit.items import Table
@@ -50,6 +49,17 @@ class Version:
 def read_model(path: Path) -> ModelFile:
     """The model of a file; its formulas become effects, and all its effects are checked against the catalogue."""
     return _used(load_model(path), f"model {path.name}")
+
+
+def model_keys(file: ModelFile) -> dict[str, Any]:
+    """The keys of a recipe that state the model of a file."""
+    model = file.model
+    return {
+        "effects": model.effects,
+        "formulas": file.formula,
+        "model_name": model.name,
+        "model_version": model.version,
+    }
 
 
 def use_formulas(formulas: Iterable[FormulaSpec], where: str) -> None:

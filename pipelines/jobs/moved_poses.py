@@ -1,7 +1,5 @@
 """A recipe with some of its poses turned elsewhere: ``NAME=OUTER,INNER`` in degrees."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 
@@ -77,5 +75,5 @@ def with_moved_poses(recipe: Recipe, moves: dict[str, Angles], where: str) -> Re
         moved_recipe = Recipe.model_validate({**recipe.model_dump(), **changed})
     except ValidationError as problem:
         raise explain(problem, source, Recipe) from None
-    refuse_unusable_poses(moved_recipe, source)
+    refuse_unusable_poses(moved_recipe, moved_recipe.poses, moved_recipe.verification, source)
     return moved_recipe

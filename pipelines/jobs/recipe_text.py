@@ -1,7 +1,5 @@
 """A resolved recipe as the text of a recipe file: the fields of the file's own model, written by a TOML library."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterable
 from pathlib import Path

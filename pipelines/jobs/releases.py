@@ -5,8 +5,6 @@ one for the device only, and this over one for all; among records of equal scope
 future applies, and of two with the same date the one that was written last.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -42,15 +40,6 @@ class Release:
     forced: bool
     who: str
     when: str
-
-    def holds_for(self, device: str, station: str) -> bool:
-        """Whether the record applies to this device and station."""
-        return _matches(self.device, device) and _matches(self.station, station)
-
-    @property
-    def rank(self) -> tuple[bool, bool, datetime, int]:
-        """The order of priority of the records."""
-        return bool(self.station), bool(self.device), self.since, self.number
 
     def document(self) -> ReleaseRecord:
         """The record for JSON."""
@@ -172,8 +161,9 @@ def releases(archive: Archive) -> list[Release]:
 
 def released(archive: Archive, device: str, station: str, when: datetime) -> Release | None:
     """The record of the line's model for a device and station at a time; None without one."""
-    holding = [one for one in releases(archive) if one.holds_for(device, station) and one.since <= when]
-    return max(holding, key=lambda one: one.rank, default=None)
+    own = [one for one in releases(archive) if _matches(one.device, device) and _matches(one.station, station)]
+    holding = [one for one in own if one.since <= when]
+    return max(holding, key=lambda one: (bool(one.station), bool(one.device), one.since, one.number), default=None)
 
 
 def line_model(archive: Archive, device: str, station: str, when: datetime | None = None) -> dict[str, Any]:

@@ -1,7 +1,5 @@
 """Seating of the units in the slots: a list, a slot map in a file, or a scan, slot by slot."""
 
-from __future__ import annotations
-
 import csv
 import io
 from collections.abc import Callable, Sequence

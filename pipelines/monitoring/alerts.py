@@ -4,8 +4,6 @@ Each alert is posted until the receiver accepts it, and not after that: its id i
 synchronised to the disk. A process that is killed between these two steps posts the alert twice, with the same id.
 """
 
-from __future__ import annotations
-
 import json
 import time
 import urllib.error

@@ -1,7 +1,5 @@
 """Numbers of the orchestrator, read over its HTTP interface: runs in the queues, late and recently crashed runs, workers."""
 
-from __future__ import annotations
-
 import json
 import os
 import urllib.error

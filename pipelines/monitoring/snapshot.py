@@ -1,7 +1,5 @@
 """All numbers at one time, and the verdict on them for health checks."""
 
-from __future__ import annotations
-
 import threading
 import time
 from collections import Counter

@@ -4,8 +4,6 @@ Prefect checks the key. It has no setting for trusted host names (DNS rebinding 
 of other origins, and its WebSockets check neither.
 """
 
-from __future__ import annotations
-
 import base64
 import secrets
 from collections.abc import Sequence

@@ -4,8 +4,6 @@ A flow takes the credentials from its environment (``TUMBLELINE_ARCHIVE``, or th
 from a Secret block of the orchestrator, which is encrypted. Credentials in an address are detected, removed, or refused.
 """
 
-from __future__ import annotations
-
 import os
 import re
 from collections.abc import Generator

@@ -1,7 +1,5 @@
 """Copy and restoration of the orchestrator's database: SQLite while its server runs, or PostgreSQL with its own programs."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import sqlite3

@@ -5,8 +5,6 @@ shortest period that Prefect allows). An automation of the server marks a run as
 has no final state: its computer has no power, or its network is down.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
 from datetime import timedelta
@@ -15,16 +13,7 @@ from time import monotonic, sleep
 from uuid import UUID
 
 from prefect.client.orchestration import SyncPrefectClient, get_client
-from prefect.client.schemas.filters import (
-    FlowRunFilter,
-    FlowRunFilterName,
-    FlowRunFilterState,
-    FlowRunFilterStateType,
-    WorkPoolFilter,
-    WorkPoolFilterName,
-    WorkQueueFilter,
-    WorkQueueFilterName,
-)
+from prefect.client.schemas import filters
 from prefect.client.schemas.objects import FlowRun, StateType
 from prefect.client.schemas.sorting import FlowRunSort
 from prefect.events.actions import ActionTypes, ChangeFlowRunState
@@ -62,7 +51,7 @@ def close_dead_runs(name: str) -> None:
 
 def runs_of_name(client: SyncPrefectClient, name: str) -> list[FlowRun]:
     """Flow runs of a name, the newest first."""
-    flow_filter = FlowRunFilter(name=FlowRunFilterName(any_=[name]))
+    flow_filter = filters.FlowRunFilter(name=filters.FlowRunFilterName(any_=[name]))
     return client.read_flow_runs(flow_run_filter=flow_filter, sort=FlowRunSort.START_TIME_DESC, limit=MANY)
 
 
@@ -129,9 +118,11 @@ def runs_of_queue(
 ) -> list[FlowRun]:
     """Flow runs of a work queue in one of the states, in the order of their start."""
     return client.read_flow_runs(
-        flow_run_filter=FlowRunFilter(state=FlowRunFilterState(type=FlowRunFilterStateType(any_=list(states)))),
-        work_pool_filter=WorkPoolFilter(name=WorkPoolFilterName(any_=[pool])),
-        work_queue_filter=WorkQueueFilter(name=WorkQueueFilterName(any_=[queue])),
+        flow_run_filter=filters.FlowRunFilter(
+            state=filters.FlowRunFilterState(type=filters.FlowRunFilterStateType(any_=list(states)))
+        ),
+        work_pool_filter=filters.WorkPoolFilter(name=filters.WorkPoolFilterName(any_=[pool])),
+        work_queue_filter=filters.WorkQueueFilter(name=filters.WorkQueueFilterName(any_=[queue])),
         sort=sort,
         limit=MANY,
     )

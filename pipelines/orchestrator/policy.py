@@ -9,8 +9,6 @@
       crashed: close         # or continue: a run whose process died continues from its checkpoint
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass, fields

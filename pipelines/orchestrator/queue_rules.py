@@ -6,8 +6,6 @@ also while its worker is busy or dead. It also closes runs whose process ended w
 place in the queue for ever.
 """
 
-from __future__ import annotations
-
 import threading
 from collections import defaultdict
 from collections.abc import Generator, Mapping, Sequence
@@ -19,12 +17,7 @@ from typing import Any, cast
 from uuid import UUID
 
 from prefect.client.orchestration import SyncPrefectClient, get_client
-from prefect.client.schemas.filters import (
-    DeploymentFilter,
-    DeploymentFilterId,
-    FlowRunFilter,
-    FlowRunFilterExpectedStartTime,
-)
+from prefect.client.schemas import filters
 from prefect.client.schemas.objects import FlowRun, StateType
 from prefect.client.schemas.sorting import FlowRunSort
 from prefect.states import Cancelled, Scheduled
@@ -125,10 +118,10 @@ def newer_run(deployment: str, start: datetime, now: datetime | None = None) -> 
     after, before = cast("Any", start + timedelta(milliseconds=1)), cast("Any", now or datetime.now(UTC))
     with get_client(sync_client=True) as client:
         runs = client.read_flow_runs(
-            flow_run_filter=FlowRunFilter(
-                expected_start_time=FlowRunFilterExpectedStartTime(after_=after, before_=before)
+            flow_run_filter=filters.FlowRunFilter(
+                expected_start_time=filters.FlowRunFilterExpectedStartTime(after_=after, before_=before)
             ),
-            deployment_filter=DeploymentFilter(id=DeploymentFilterId(any_=[UUID(deployment)])),
+            deployment_filter=filters.DeploymentFilter(id=filters.DeploymentFilterId(any_=[UUID(deployment)])),
             sort=FlowRunSort.EXPECTED_START_TIME_DESC,
         )
     return next((run.name for run in runs if run.auto_scheduled and run.state_type != StateType.CANCELLED), "")

@@ -3,8 +3,6 @@
 :func:`check_server` finds out before Prefect, whose errors are tracebacks, whether a server answers and accepts the key.
 """
 
-from __future__ import annotations
-
 import base64
 import os
 import secrets

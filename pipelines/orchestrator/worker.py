@@ -10,8 +10,6 @@ progress, the watchdog of the station) have ended.
 ``stop`` pauses the station's queue and waits for the run in progress; the next ``start`` resumes the queue.
 """
 
-from __future__ import annotations
-
 import argparse
 import ctypes
 import os

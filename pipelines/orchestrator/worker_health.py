@@ -5,8 +5,6 @@ takes no run, and no service manager sees it. What counts is the worker's heartb
 monotonic clock of this computer; the heartbeat's time is compared for equality only, so that no clock needs to be right.
 """
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

@@ -1,7 +1,5 @@
 """The programming of the units of a run: choice of units and station, and their certificates."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace

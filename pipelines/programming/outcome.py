@@ -1,7 +1,5 @@
 """Options of the programming, the outcome of each unit, and checks of its output: offset registers, coefficients in a pose."""
 
-from __future__ import annotations
-
 import zlib
 from dataclasses import dataclass, field
 from typing import Any

@@ -4,8 +4,6 @@ A unit that fails a step is not certified, and its previously valid copy is unch
 a device uses it only when it is complete.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -29,7 +27,7 @@ from pipelines.programming.outcome import (
 from schemas.errors import OperatorNeeded, StationError, StationRefused, TumblelineError, WrongUse
 from schemas.recipe import Recipe
 from schemas.units import STANDARD_GRAVITY_M_S2
-from stations.devices.memory import COPIES, UnitMemory
+from stations.devices.memory import COPIES
 from stations.safety.suspenders import require_released
 from stations.station import Station
 
@@ -67,7 +65,8 @@ class Programmer:
         StationError, LeaseLost, EmergencyStop
             The station fails for all units; every unit whose programming has begun is recorded as failed.
         """
-        outcomes = [ProgrammingOutcome(unit.unit, slot, unit, self._memory(slot)) for slot, unit in units]
+        slots, clock = self.station.reader.slots, self.station.clock
+        outcomes = [ProgrammingOutcome(unit.unit, slot, unit, slots[slot].memory(clock)) for slot, unit in units]
         self._check(outcomes)
         step = "archive the memory"
         try:
@@ -102,9 +101,6 @@ class Programmer:
                     self._failed(one, step, str(problem) or type(problem).__name__)
                 except (TumblelineError, OSError) as second:
                     problem.add_note(f"the failure of unit {one.serial} could not be recorded either: {second}")
-
-    def _memory(self, slot: int) -> UnitMemory:
-        return self.station.reader.slots[slot].memory(self.station.clock)
 
     def _require(self) -> None:
         """Ends the programming where the lease is lost, the emergency stop is pressed or the door is open.

@@ -1,7 +1,5 @@
 """What a recipe will make a lot go through, as states of the science: for checks and budgets before any chamber time is spent."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterable, Sequence
 from typing import Any, NamedTuple
 
@@ -167,9 +165,6 @@ def planned_dwells(recipe: Recipe, station: StationConfig, activities: list[Acti
     whole = schedule(steps(recipe), station, recipe) if activities is None else activities
     own = [one for one in whole if one.kind == "dwell"]
     checks = [one for one in whole if one.kind == "verification"]
-    return Planned(
-        fit=state_of(whole, station, recipe),
-        verification=state_of(whole, station, recipe, kinds=("verification",)) if checks else None,
-        soak=np.array([one.step.soak for one in own]),
-        target_C=np.array([one.step.temperature for one in own]),
-    )
+    verification = state_of(whole, station, recipe, kinds=("verification",)) if checks else None
+    soak, target = (np.array([getattr(one.step, name) for one in own]) for name in ("soak", "temperature"))
+    return Planned(state_of(whole, station, recipe), verification, soak, target)

@@ -1,7 +1,5 @@
 """Station time of a recipe, or of any steps: moves, soaks, dwells and the static record, before any of it is spent."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """The JSON documents of runs, of the maintenance of the archive, of versions of a model and of the demonstration."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any, Literal, NotRequired
 
 from typing_extensions import TypedDict

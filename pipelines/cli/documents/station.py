@@ -1,7 +1,5 @@
 """The JSON documents of stations: state, self-test, log, charts, server; and the keys of the files that describe them."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any, Literal, NotRequired
 
 from typing_extensions import TypedDict

@@ -1,7 +1,5 @@
 """An improvement of a model for people: choices, error of each version, and the next command."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any

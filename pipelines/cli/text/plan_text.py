@@ -1,7 +1,5 @@
 """A plan as text: station time, expected errors, reachable uncertainty, visible and hidden effects."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from typing import Any
