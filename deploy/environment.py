@@ -34,11 +34,7 @@ FAILURES = (
         "the file that was delivered is not that of {lock}: its hash is another one",
         "empty pip's cache with '{python} -m pip cache purge' and try again; if it stays, ask who runs your package index",
     ),
-    (
-        re.compile(r"No space left on device"),
-        "no space is left on the disk of {folder}",
-        "free 2 GB and try again",
-    ),
+    (re.compile(r"No space left on device"), "no space is left on the disk of {folder}", "free 2 GB and try again"),
     (
         re.compile(r"Failed building wheel for (?P<name>\S+)|Failed to build|to build wheel did not run"),
         "there is no wheel for {system}, and it cannot be built here",

@@ -262,8 +262,7 @@ def _unexpected(problem: Exception) -> None:
         )
     if isinstance(problem, OSError) and problem.errno == errno.ENAMETOOLONG:
         _leave(
-            f"'{shown(str(problem.filename))}': the file name is too long for this system; give a shorter one",
-            UNUSABLE,
+            f"'{shown(str(problem.filename))}': the file name is too long for this system; give a shorter one", UNUSABLE
         )
     from schemas.installed import not_installed
 

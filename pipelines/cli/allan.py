@@ -18,10 +18,7 @@ if TYPE_CHECKING:
 PART = "Results"
 ORDER = 370
 SUMMARY = "Compute the Allan deviation of a record and its noise terms, with intervals."
-EXAMPLES = (
-    "tumbleline allan rest.csv --rate 100 --plot allan.png",
-    "tumbleline allan latest --statistic hadamard",
-)
+EXAMPLES = ("tumbleline allan rest.csv --rate 100 --plot allan.png", "tumbleline allan latest --statistic hadamard")
 
 SPACINGS = ("octave", "decade")
 STATISTICS = ("allan", "modified", "hadamard", "total", "time", "tie", "mtie")
@@ -140,12 +137,7 @@ def _print_curves(document: dict[str, Any]) -> None:
 
 
 def even_series(
-    source: str,
-    columns: str,
-    clock: tuple[str, str, float | None],
-    unit: str,
-    archive: str | None,
-    stretch: int | None,
+    source: str, columns: str, clock: tuple[str, str, float | None], unit: str, archive: str | None, stretch: int | None
 ) -> EvenSeries | None:
     """The samples of a file or an import; None for a captured run, which has figures of its own.
 

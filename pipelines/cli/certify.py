@@ -11,10 +11,7 @@ from schemas.errors import ArchiveUnusable
 PART = "Certificates, trace, audit"
 ORDER = 410
 SUMMARY = "Certify the units of a run that passed, for a period of validity."
-EXAMPLES = (
-    "tumbleline certify latest --months 12",
-    "tumbleline certify latest --units SN1",
-)
+EXAMPLES = ("tumbleline certify latest --months 12", "tumbleline certify latest --units SN1")
 
 
 def command(

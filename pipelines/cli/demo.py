@@ -23,10 +23,7 @@ if TYPE_CHECKING:
 PART = "Start here"
 ORDER = 50
 SUMMARY = "Hide an effect in the simulated station, find it, add it and see the error fall."
-EXAMPLES = (
-    "tumbleline demo",
-    "tumbleline demo --effect pendulous_mass --seed 11 --by-hand",
-)
+EXAMPLES = ("tumbleline demo", "tumbleline demo --effect pendulous_mass --seed 11 --by-hand")
 
 
 def command(

@@ -13,10 +13,7 @@ if TYPE_CHECKING:
 PART = "Measure"
 ORDER = 165
 SUMMARY = "Check installation, archive, orchestrator, station and clock; a remedy for each fault."
-EXAMPLES = (
-    "tumbleline doctor",
-    "tumbleline doctor --station line-1.toml --json",
-)
+EXAMPLES = ("tumbleline doctor", "tumbleline doctor --station line-1.toml --json")
 
 COLOURS = {"good": "green", "warning": "yellow", "fault": "bold red", "not configured": "dim"}
 

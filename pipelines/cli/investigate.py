@@ -22,10 +22,7 @@ if TYPE_CHECKING:
 PART = "Measure"
 ORDER = 130
 SUMMARY = "Measure a lot, then measure only what separates the effects that may be missing."
-EXAMPLES = (
-    "tumbleline investigate my.toml --yes",
-    "tumbleline investigate my.toml --station line-1.toml --budget 60",
-)
+EXAMPLES = ("tumbleline investigate my.toml --yes", "tumbleline investigate my.toml --station line-1.toml --budget 60")
 
 SETTLED = frozenset({"adequate", "told_apart"})
 

@@ -9,10 +9,7 @@ from schemas.tables import ADEQUATE
 PART = "Results"
 ORDER = 310
 SUMMARY = "List the runs of the archive."
-EXAMPLES = (
-    "tumbleline list",
-    "tumbleline list --json",
-)
+EXAMPLES = ("tumbleline list", "tumbleline list --json")
 
 
 def command(archive: ArchiveOption = None, *, as_json: JsonOption = False) -> None:

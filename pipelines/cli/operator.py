@@ -14,10 +14,7 @@ if TYPE_CHECKING:
 PART = "Measure"
 ORDER = 140
 SUMMARY = "Answer the questions of runs that wait for an operator."
-EXAMPLES = (
-    "tumbleline operator",
-    "tumbleline operator line-six --go",
-)
+EXAMPLES = ("tumbleline operator", "tumbleline operator line-six --go")
 
 
 def command(

@@ -22,10 +22,7 @@ if TYPE_CHECKING:
 PART = "Old data, new models"
 ORDER = 520
 SUMMARY = "Re-analyse archived runs with the present code, another model or other limits."
-EXAMPLES = (
-    "tumbleline rerun all --check",
-    "tumbleline rerun device:adxl355 since:2026-01-01 --model model.toml",
-)
+EXAMPLES = ("tumbleline rerun all --check", "tumbleline rerun device:adxl355 since:2026-01-01 --model model.toml")
 
 SHOWN = 40
 DIFFERENCES = 3  # re-runs that are proposed for a comparison

@@ -22,10 +22,7 @@ if TYPE_CHECKING:
 PART = "Measure"
 ORDER = 150
 SUMMARY = "Connect, show, check, serve and describe stations."
-EXAMPLES = (
-    "tumbleline station status --station line-1.toml",
-    "tumbleline station check --station line-1.toml",
-)
+EXAMPLES = ("tumbleline station status --station line-1.toml", "tumbleline station check --station line-1.toml")
 EXAMPLES_OF = {
     "bring-up": (
         "tumbleline station bring-up watlow_f4t --link tcp://192.168.0.20 --readings",
@@ -47,22 +44,10 @@ EXAMPLES_OF = {
         "tumbleline station check --station line-1.toml",
         "tumbleline station check --station line-1.toml --registers",
     ),
-    "log": (
-        "tumbleline station log",
-        "tumbleline station log latest --all",
-    ),
-    "watch": (
-        "tumbleline station watch",
-        "tumbleline station watch --station line-1.toml --minutes 30",
-    ),
-    "serve": (
-        "tumbleline station serve --port 5020",
-        "tumbleline station serve --units 4 --speed 60",
-    ),
-    "profiles": (
-        "tumbleline station profiles",
-        "tumbleline station profiles watlow_f4t",
-    ),
+    "log": ("tumbleline station log", "tumbleline station log latest --all"),
+    "watch": ("tumbleline station watch", "tumbleline station watch --station line-1.toml --minutes 30"),
+    "serve": ("tumbleline station serve --port 5020", "tumbleline station serve --units 4 --speed 60"),
+    "profiles": ("tumbleline station profiles", "tumbleline station profiles watlow_f4t"),
 }
 """Of the subcommands."""
 
@@ -154,12 +139,7 @@ SHORT = {"read": "r", "write": "w", "read_write": "rw"}
 SETTINGS = re.compile(r"[,:;(]| with | behind ")
 """What stands between the name of a model and the required settings of the device."""
 
-app = typer.Typer(
-    help=SUMMARY,
-    no_args_is_help=True,
-    add_completion=False,
-    pretty_exceptions_enable=False,
-)
+app = typer.Typer(help=SUMMARY, no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
 
 app.command("bring-up")(bring_up)
 app.command()(frames)

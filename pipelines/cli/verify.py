@@ -23,10 +23,7 @@ SHOWN = 8  # consequences of one finding
 PART = "Certificates, trace, audit"
 ORDER = 440
 SUMMARY = "Check every hash of the archive, or the files of a certificate."
-EXAMPLES = (
-    "tumbleline verify latest",
-    "tumbleline verify certificates/SN1_1.pdf --trust laboratory.pem",
-)
+EXAMPLES = ("tumbleline verify latest", "tumbleline verify certificates/SN1_1.pdf --trust laboratory.pem")
 
 
 def command(
@@ -110,7 +107,7 @@ def _print(report: Report) -> None:
     rate = f"{checked.bytes / report.seconds / 1e6:.3g} MB/s"
     out.print(
         f"{number_of(report.runs, 'run')}, {number_of(report.captures, 'capture')}: {number_of(checked.tables, 'table')}, "
-        f"{number_of(checked.manifests, 'manifest')}, {number_of(checked.rows, 'row')} in {report.seconds:.2f} s ({rate})",
+        f"{number_of(checked.manifests, 'manifest')}, {number_of(checked.rows, 'row')} in {report.seconds:.2f} s ({rate})"
     )
     out.print(f"signatures  {report.trust}")
     if report.head:

@@ -12,10 +12,7 @@ from schemas.errors import WrongUse
 PART = "Start here"
 ORDER = 40
 SUMMARY = "Show archive, models and missing effects in a browser."
-EXAMPLES = (
-    "tumbleline workbench",
-    "tumbleline workbench archive --port 8765",
-)
+EXAMPLES = ("tumbleline workbench", "tumbleline workbench archive --port 8765")
 
 
 def command(

@@ -27,12 +27,7 @@ from schemas.station import Soak, StationConfig, load_station
 from stations import open_station
 
 UNITS = 4
-QUIET = {
-    "noise_density_ug": 8.0,
-    "bias_instability_ug": 1.5,
-    "rate_random_walk_ug": 0.003,
-    "linearity_pct_fs": 0.0,
-}
+QUIET = {"noise_density_ug": 8.0, "bias_instability_ug": 1.5, "rate_random_walk_ug": 0.003, "linearity_pct_fs": 0.0}
 """A unit with low noise: with the noise of the data sheet most effects would need days of measurement."""
 
 

@@ -188,11 +188,7 @@ def _start(home: Path, meanwhile: Callable[[], None]) -> tuple[int, str]:
         process = subprocess.Popen(  # noqa: S603 - our own module, by our own interpreter
             [sys.executable, "-m", "pipelines.orchestrator.server", "--port", str(port), "--until-unused", str(home)],
             # the key in the environment: the arguments of a process are there for everybody to read
-            env={
-                **os.environ,
-                **settings(home, port, key),
-                "PYTHONPATH": os.pathsep.join(filter(None, sys.path)),
-            },
+            env={**os.environ, **settings(home, port, key), "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
             stdin=subprocess.DEVNULL,
             stdout=log,
             stderr=log,

@@ -165,7 +165,4 @@ def _station(run: Run, config: StationConfig) -> Generator[tuple[Any, Callable[[
 
 def document(run: Run, outcomes: Sequence[ProgrammingOutcome], given: Mapping[str, str]) -> dict[str, Any]:
     """The result for JSON."""
-    return {
-        "run": run.id,
-        "units": [{**one.document(), "certificate": given.get(one.serial)} for one in outcomes],
-    }
+    return {"run": run.id, "units": [{**one.document(), "certificate": given.get(one.serial)} for one in outcomes]}
