@@ -52,7 +52,7 @@ def bill(lock: str, project: dict[str, Any], when: datetime, hashes: dict[str, s
         ],
     }
     listed = [pin for _, same in sorted(locked.items()) for pin in same]
-    content = {
+    return {
         "bomFormat": "CycloneDX",
         "specVersion": "1.6",
         "serialNumber": f"urn:uuid:{uuid.uuid5(SPACE, lock + version)}",
@@ -67,8 +67,6 @@ def bill(lock: str, project: dict[str, Any], when: datetime, hashes: dict[str, s
             *({"ref": _reference(pin.name, pin.version), "dependsOn": _below(pin, locked)} for pin in listed),
         ],
     }
-    json.dumps(content, allow_nan=False)
-    return content
 
 
 def _component(pin: Pin) -> dict[str, Any]:

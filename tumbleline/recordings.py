@@ -131,12 +131,12 @@ def read(
             past = history if isinstance(history, pd.DataFrame) else None if history is None else read_history(history)
             return _kept(checked(source, where="DataFrame", foreign=True), past, "DataFrame", archive)
         return replace(_imported(_as_file(source), columns, units, serial or "A", archive, stated), command="")
-    from pipelines.importers.files import is_file
+    from pipelines.importers import files
 
-    if not is_file(str(source)):
+    if not files.is_file(str(source)):
         return Recording(Archive(None if archive is None else str(archive)).run(str(source)))
     path = Path(source)
-    if columns is None and _is_table_of_dwells(path):
+    if columns is None and is_exchange(files.read(path)[0].columns):
         from pipelines.diagnosis.inputs import dwells_and_history
 
         beside = history if isinstance(history, str | Path) else ""
@@ -144,13 +144,6 @@ def read(
         past = checked_history(history, "history", foreign=True) if isinstance(history, pd.DataFrame) else past
         return _kept(dwells, past, path.name, archive)
     return _imported(path, columns, units, serial, archive, stated)
-
-
-def _is_table_of_dwells(path: Path) -> bool:
-    from pipelines.importers import files
-    from pipelines.importers.exchange import is_exchange
-
-    return is_exchange(files.read(path)[0].columns)
 
 
 def _kept(dwells: pd.DataFrame, history: pd.DataFrame | None, name: str, archive: str | Path | None) -> Recording:

@@ -1,14 +1,10 @@
 """``tumbleline doctor``: what is configured, reachable, authenticated, writable and in time, with which versions."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from pipelines.cli.options import ArchiveOption, JsonOption, StationOption, option
 from pipelines.cli.printing import conclude, print_table, say
-
-if TYPE_CHECKING:
-    from pipelines.doctor.documents import DoctorDocument
+from pipelines.doctor.documents import DoctorDocument
 
 PART = "Measure"
 ORDER = 165

@@ -15,7 +15,7 @@ from pipelines.cli.printing import give, print_json, print_table, publish, remar
 from schemas.errors import STATION, StationError, WrongUse
 
 if TYPE_CHECKING:
-    from pipelines.commissioning.documents import ConformanceDocument, FramesDocument, Platform, RecordedDeviceRow
+    from pipelines.commissioning.documents import ConformanceDocument, FramesDocument, RecordedDeviceRow
     from stations.bringup.session import BringUp
 
 ON = "What is at the other end: hardware, simulator or replay? (Enter: not stated)"
@@ -95,11 +95,13 @@ def _written(session: BringUp, folder: Path, person: _Typed, by: str, *, as_json
     import json
 
     from pipelines.commissioning.conformance import conformance_page, document_of
+    from pipelines.commissioning.documents import Platform
     from stations.bringup.corrected import corrected_name, corrected_text
 
     corrected = corrected_text(session.profile, session.findings, session.made)
     name = f"{corrected_name(session.profile)}.toml" if corrected else ""
-    platform = _platform(person) if not session.ended else "not stated"
+    typed = "" if session.ended else person.ask(ON).strip().lower()
+    platform = next((known for known in get_args(Platform) if known == typed), "not stated")
     document = document_of(session, verified_on=platform, by=by, recording="frames.jsonl", corrected=name)
     if corrected:
         publish(folder / name, corrected, "corrected profile")
@@ -110,13 +112,6 @@ def _written(session: BringUp, folder: Path, person: _Typed, by: str, *, as_json
     else:
         _print(document)
     return document
-
-
-def _platform(person: _Typed) -> Platform:
-    from pipelines.commissioning.documents import Platform as Known
-
-    typed = person.ask(ON).strip().lower()
-    return next((known for known in get_args(Known) if known == typed), "not stated")
 
 
 def _print(document: ConformanceDocument) -> None:

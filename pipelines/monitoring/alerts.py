@@ -45,18 +45,11 @@ def alerts_of(snapshot: Snapshot, audits: Path | None = None) -> list[Alert]:
     return [*alerts, *_of_audit(audits, snapshot.when), *_of_discoveries(audits, snapshot.when)]
 
 
-def _opener() -> urllib.request.OpenerDirector:
-    """Follows no redirection, which is an error here: a POST would become a GET, whose answer accepts nothing."""
-    opener = urllib.request.OpenerDirector()
-    for handler in (
-        urllib.request.ProxyHandler,
-        urllib.request.HTTPHandler,
-        urllib.request.HTTPSHandler,
-        urllib.request.HTTPDefaultErrorHandler,
-        urllib.request.HTTPErrorProcessor,
-    ):
-        opener.add_handler(handler())
-    return opener
+class _NoRedirection(urllib.request.HTTPRedirectHandler):
+    """A redirection is an error here: a POST would become a GET, whose answer accepts nothing."""
+
+    def redirect_request(self, *_: Any) -> None:
+        return None
 
 
 class Poster:
@@ -104,7 +97,7 @@ class Poster:
     def _send(self, alert: Alert) -> None:
         headers = {"Content-Type": "application/json", "User-Agent": "tumbleline"}
         request = urllib.request.Request(self._address, json.dumps(alert).encode(), headers)  # noqa: S310 - checked above
-        with _opener().open(request, timeout=TIMEOUT_S):
+        with urllib.request.build_opener(_NoRedirection).open(request, timeout=TIMEOUT_S):
             return
 
     def _accepted(self) -> dict[str, float]:

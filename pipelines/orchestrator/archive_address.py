@@ -12,6 +12,7 @@ from typing import Any
 from urllib.parse import parse_qsl, quote, urlencode
 
 from pipelines.archive import Archive
+from pipelines.parallel import with_environment
 from schemas.errors import WrongUse
 
 VARIABLE = "TUMBLELINE_ARCHIVE"
@@ -53,20 +54,9 @@ def archive_of(parameter: str | None) -> Archive:
 @contextmanager
 def named(archive: Archive) -> Generator[str]:
     """A context in which flows of this process find an archive by its address without credentials; it gives this address."""
-    whole = archive.address
-    shown = without_credentials(whole)
-    if shown == whole:
+    shown = without_credentials(archive.address)
+    with with_environment({} if shown == archive.address else {VARIABLE: archive.address}):
         yield shown
-        return
-    before = os.environ.get(VARIABLE)
-    os.environ[VARIABLE] = whole
-    try:
-        yield shown
-    finally:
-        if before is None:
-            del os.environ[VARIABLE]
-        else:
-            os.environ[VARIABLE] = before
 
 
 def _of_block(name: str) -> str:

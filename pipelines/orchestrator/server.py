@@ -66,7 +66,11 @@ def serve(
         for name, value in settings.kept().items():
             os.environ.setdefault(name, value)
     if PAGES not in os.environ:
-        os.environ[PAGES] = str(_pages_folder())
+        pages = (
+            state_folder() / "orchestrator-pages"
+        )  # once for a user and a version of Prefect, outside the installed packages
+        pages.mkdir(exist_ok=True)  # Prefect locks a file in it before it makes it
+        os.environ[PAGES] = str(pages)
     folder = os.environ.get("PREFECT_HOME")
     if folder:
         private_folder(Path(folder))
@@ -96,13 +100,6 @@ def serve(
         threading.Thread(target=_leave_when_alone, args=(home, server), daemon=True).start()
     with place:
         server.run(sockets=[place])
-
-
-def _pages_folder() -> Path:
-    """Where Prefect copies the files of its pages: once for a user and a version of Prefect, outside the installed packages."""
-    folder = state_folder() / "orchestrator-pages"
-    folder.mkdir(exist_ok=True)  # Prefect locks a file in it before it makes it
-    return folder
 
 
 def private_folder(path: Path) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pipelines.cli.next_commands import FindData, JudgedData, command_line, print_extension, print_next
+from pipelines.cli.next_commands import FindData, command_line, print_extension, print_next
 from pipelines.cli.printing import console, print_table, say, warn
 from pipelines.cli.text.verdict_text import print_verdict
 from pipelines.diagnosis import sections, sentences
@@ -74,20 +74,15 @@ def _dim(text: str) -> None:
         say(text, style="dim")
 
 
-def _with_formula(document: dict[str, Any], data: JudgedData) -> str:
-    """The command that judges the model with the suggested formula, without a model file."""
-    offer = document["offer"]
-    formula = f"{offer['id']}={'; '.join(offer['columns'])}"
-    effects = ",".join([*document["effects"], offer["id"]])
-    return command_line("diagnose", data.source, "--effects", effects, "--formula", formula, *data.options)
-
-
 def _unexplained(document: dict[str, Any], data: FindData | None, model: Path | None) -> None:
     if not document["unexplained"]:
         return
     say(f"\n{sentences.UNEXPLAINED}: {sentences.unexplained_text(document)}")
-    if document["offer"]:
+    if offer := document["offer"]:
         say(f"Formula for {model or 'a model file'}, to be refined:\n")
-        say(document["offer"]["toml"])
-        if data is not None:
-            print_next([_with_formula(document, data())])
+        say(offer["toml"])
+        if data is not None:  # the command that judges the model with it, without a model file
+            found, effects = data(), ",".join([*document["effects"], offer["id"]])
+            formula = f"{offer['id']}={'; '.join(offer['columns'])}"
+            words = ("--effects", effects, "--formula", formula)
+            print_next([command_line("diagnose", found.source, *words, *found.options)])
