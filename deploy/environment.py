@@ -60,8 +60,6 @@ class NotSetUp(Exception):
 def set_up(name: str, folder: Path, *, asked: bool = False) -> None:
     """Make or complete the environment; says so where packages are installed.
 
-    Parameters
-    ----------
     name : of the lock, ``requirements-NAME.lock``
     asked : whether this version of Python was asked for, so that an environment of another one is made anew
     """

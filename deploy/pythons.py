@@ -92,8 +92,6 @@ def _probe(place: Path) -> Interpreter | None:
 def tried(interpreter: Interpreter, tests: str, folder: Path) -> Outcome:
     """Set-up, main job and tests in a clone; the clone is removed, the output kept.
 
-    Parameters
-    ----------
     tests : folders or files; empty for all
     folder : of the clone, and of a link to the data that lie beside a checkout
     """

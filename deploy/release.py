@@ -22,8 +22,6 @@ SUMS = "SHA256SUMS"
 def build(folder: Path, root: Path = ROOT) -> tuple[Path, Path]:
     """Wheel and source distribution of a tree, written into a folder.
 
-    Parameters
-    ----------
     root : the tree; it is copied, and stays as it is
     """
     folder.mkdir(parents=True, exist_ok=True)

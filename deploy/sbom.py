@@ -28,8 +28,6 @@ SPACE = uuid.UUID("6f1c1d5e-0f0c-5d4e-9b65-0d6f1f3b7a10")
 def bill(lock: str, project: dict[str, Any], when: datetime, hashes: dict[str, str] | None = None) -> dict[str, Any]:
     """The bill of materials.
 
-    Parameters
-    ----------
     lock : text of the lock
     project : the table ``project`` of pyproject.toml
     when : time of the release

@@ -61,10 +61,8 @@ def find_commands(folder: Path) -> dict[str, CommandModule]:
 
     The name is the name of the module; a module with a reserved name of Python ends in an underscore (``import_``).
 
-    Raises
-    ------
-    IncompleteCommand
-        A module has the function or application of a command without its constants, or the reverse, or an ORDER twice.
+    Raises IncompleteCommand: a module has the function or application of a command without its constants, or the reverse, or an
+    ORDER twice.
     """
     commands: dict[str, CommandModule] = {}
     for path in sorted(folder.glob("*.py")):

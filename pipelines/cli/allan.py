@@ -141,14 +141,9 @@ def even_series(
 ) -> EvenSeries | None:
     """The samples of a file or an import; None for a captured run, which has figures of its own.
 
-    Parameters
-    ----------
     clock : column and unit of the time, and rate in Hz, as they were given
 
-    Raises
-    ------
-    WrongUse
-        An option of files was given for a run.
+    Raises WrongUse: an option of files was given for a run.
     """
     from pipelines.importers.files import is_file
     from pipelines.importers.series import series_of_file, series_of_run

@@ -68,8 +68,6 @@ def command(
 def _fit_import(run: Run, change: tuple[str, Path | None, str], leave_out: str, *, as_json: bool) -> NoReturn:
     """Fit a model to an import, keep it as a run of its own and print it.
 
-    Parameters
-    ----------
     change : effects, model file and limits; empty or None if not given
     leave_out : dwells as UNIT:DWELL,…
     """

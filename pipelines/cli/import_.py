@@ -181,8 +181,6 @@ def _waveforms(
 ) -> NoReturn:
     """Reduce, keep and print the recordings of one unit; a part failed where a figure is not determined.
 
-    Parameters
-    ----------
     stated : columns and units as the options have them, rate in Hz, group
     """
     from pipelines.importers.mapping import pairs

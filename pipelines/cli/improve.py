@@ -175,8 +175,6 @@ def _target(model: Path | None, output: Path | None) -> Path:
 def fresh_run(source: str, archive: str | None, *, measure: bool | None) -> str:
     """The fresh run of a run; empty where there is none and none is measured.
 
-    Parameters
-    ----------
     source : a file or a run, as it was named
     measure : whether the station measures one where the archive has none; None: ask at the terminal, else not
     """

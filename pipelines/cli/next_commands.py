@@ -59,8 +59,6 @@ def archive_words(archive: str | None) -> list[str]:
 def judged_data(source: str, history: str, archive: str | None) -> JudgedData:
     """The data of a command, with a fresh run: the one beside a file, or the one that an archive holds or will hold.
 
-    Parameters
-    ----------
     history : the file of temperatures against time that was read; empty where there was none
     """
     from pipelines.diagnosis.inputs import fresh_beside, history_beside
@@ -93,8 +91,6 @@ def extension(
 ) -> list[str]:
     """The commands that add effects to a model file, and the one that shows the errors of its versions.
 
-    Parameters
-    ----------
     judged : the model that was judged; a new file begins with it
     new : whether the file does not exist yet
     """
@@ -130,8 +126,6 @@ def print_next(lines: Sequence[str]) -> None:
 def print_extension(document: dict[str, Any], find: FindData, model: Path | None) -> None:
     """Print the commands that add the recommended effects of a diagnosis and judge them.
 
-    Parameters
-    ----------
     find : gives the data; called only where there is something to add: to look for a fresh run takes a second
     model : the model file that was judged; None for a list of effects
     """

@@ -156,8 +156,6 @@ def cheapest_recipe(
 ) -> tuple[Optimum, dict[str, Any]]:
     """The recipe with the least station time for the required errors, and the document about it.
 
-    Parameters
-    ----------
     base : the recipe to start from; ``name`` : its name on the command line
     """
     from pipelines.planning.context import plan_context
@@ -191,8 +189,6 @@ def cheapest_recipe(
 def written(best: Optimum, target: Path, home: Path, own: dict[str, Any]) -> str:
     """The text of the recipe file at ``target``.
 
-    Parameters
-    ----------
     home : folder of the recipe that the search started from
     own : the document of the search
     """

@@ -9,8 +9,6 @@ import typer
 def option(notation: str, text: str, **checks: Any) -> Any:
     """An option of a command.
 
-    Parameters
-    ----------
     notation : its names, then what stands for its value, as the help shows them: ``--output -o FILE``
     text : what it does
     checks : ``min``, ``max``, ``callback`` and others of :class:`typer.Option`

@@ -53,8 +53,6 @@ UNATTENDED = (
 def agreed(question: str, choices: str = MEASURES, unattended: str = UNATTENDED) -> bool:
     """The answer at the terminal to a question: Enter alone is yes; an answer that is neither yes nor no repeats the question.
 
-    Parameters
-    ----------
     choices : what the answers do
     unattended : the error where standard input ends before an answer
     """

@@ -123,10 +123,7 @@ STYLES = {"good": "", "bad": "bold red", "not checked": "yellow"}
 def certificate_files(names: Sequence[str]) -> list[Path]:
     """The names as files of certificates; empty where none is one.
 
-    Raises
-    ------
-    WrongUse
-        Files and runs are mixed, or a file is not there.
+    Raises WrongUse: files and runs are mixed, or a file is not there.
     """
     files = [Path(name) for name in names if Path(name).suffix.lower() in ENDINGS]
     if not files:

@@ -53,10 +53,7 @@ def document_of(
 def read_conformance(path: Path) -> ConformanceDocument:
     """A conformance document from its file.
 
-    Raises
-    ------
-    DataRejected
-        The file is not of the format.
+    Raises DataRejected: the file is not of the format.
     """
     with foreign(f"conformance: {path}", "a file that 'tumbleline station bring-up' wrote is needed"):
         document = TypeAdapter(ConformanceDocument).validate_json(path.read_bytes())

@@ -161,8 +161,6 @@ class DemoArchive:
 def write_lots(folder: Path, line: Line, lots: int, progress: Callable[[int], None] = lambda _: None) -> DemoArchive:
     """Write lots of a line as runs of an archive, and ``units.csv`` with the wafer of each unit beside it.
 
-    Parameters
-    ----------
     progress : is told the number of lots that are written
     """
     archive = Archive(str(folder / "archive"))

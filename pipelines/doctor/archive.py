@@ -24,8 +24,6 @@ OTHERS = 0o077
 def archive_checks(address: str | None, free_gb: float) -> list[Check]:
     """The checks of the archive of an address, or of the default one.
 
-    Parameters
-    ----------
     free_gb : needed free space, GB; not known of an object store
     """
     named = address or os.environ.get(VARIABLE)

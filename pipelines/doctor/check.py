@@ -31,10 +31,7 @@ def write_probe(folder: Place) -> float:
 
     A file of 1 MiB is written, synchronised, read back, and removed in any case.
 
-    Raises
-    ------
-    OSError
-        It cannot be written, or other bytes were read than were written.
+    Raises OSError: it cannot be written, or other bytes were read than were written.
     """
     probe = folder / f"{TEMPORARY}doctor-{os.getpid()}"
     data = os.urandom(PROBE_BYTES)
@@ -56,8 +53,6 @@ def write_probe(folder: Place) -> float:
 def offset(stamp: float, begun: float, ended: float, resolution_s: float) -> float:
     """Smallest difference, s, of a clock that read ``stamp`` between two readings of the host's; 0 if they may be equal.
 
-    Parameters
-    ----------
     resolution_s : by so much may a stamp be early because its clock has coarse steps
     """
     if stamp > ended:

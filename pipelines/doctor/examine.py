@@ -25,8 +25,6 @@ LEAST_FREE_GB = 1.0
 def examine(archive: str | None = None, station: Path | None = None, free_gb: float = LEAST_FREE_GB) -> DoctorDocument:
     """The state of the installation and of what it is connected to.
 
-    Parameters
-    ----------
     archive : its address; the default one where None
     station : file of a station; none is checked where None
     free_gb : free space that the archive needs, GB

@@ -64,10 +64,7 @@ def orchestrator_checks() -> list[Check]:
 def ask(address: str, *, keyed: bool = False) -> ServerAnswer:
     """The answer to a GET, with the key of this process where it is asked for, whatever its status.
 
-    Raises
-    ------
-    OSError, http.client.HTTPException
-        There is no answer within 5 s.
+    Raises OSError, http.client.HTTPException: there is no answer within 5 s.
     """
     request = urllib.request.Request(address)  # noqa: S310 - http or https, looked at above
     begun = time.time()

@@ -58,8 +58,6 @@ def audit_archive(
 ) -> int:
     """Audit an archive; return the number of findings.
 
-    Parameters
-    ----------
     archive : without credentials, see :func:`pipelines.orchestrator.archive_address.archive_of`
     pages : folder for the page and the document of every audit
     since, until : dates; everything up to today where empty

@@ -21,16 +21,11 @@ CONNECT_S = 10
 def on_dask(address: str, workers: int = 1, home: Path | None = None) -> Distributor | None:
     """The distribution over the workers of a Dask cluster; None without an address.
 
-    Parameters
-    ----------
     address : of a Dask scheduler, or ``local`` for a cluster of processes on this machine
     workers : processes of the local cluster
     home : folder of the orchestrator that is started without PREFECT_API_URL; None: a temporary folder
 
-    Raises
-    ------
-    WrongUse
-        The address is not the address of a scheduler, or the libraries of Dask are not installed.
+    Raises WrongUse: the address is not the address of a scheduler, or the libraries of Dask are not installed.
     """
     if not address:
         return None

@@ -29,10 +29,7 @@ PATIENCE_S = 60.0
 def register(path: Path) -> list[str]:
     """Register the deployments of a file with the server of PREFECT_API_URL; return their names.
 
-    Raises
-    ------
-    WrongUse
-        The key is missing or wrong, a parameter has credentials, or a policy has an unknown key or value.
+    Raises WrongUse: the key is missing or wrong, a parameter has credentials, or a policy has an unknown key or value.
     """
     use_key(CLIENT_KEY)
     check_server(PATIENCE_S)

@@ -34,8 +34,6 @@ VARIED: dict[Kind, tuple[Driver, ...]] = {
 def why(state: State, base: Sequence[str], proposal: Proposal) -> str:
     """Why a measurement is proposed, in one sentence: the confounded rivals, the cause, the measurement, and the gain.
 
-    Parameters
-    ----------
     state : the dwells so far
     base : ids of the model beside the rivals
     """

@@ -48,8 +48,6 @@ def state_after(job: Job) -> StationState:
 def circumstances(base: Job, last: Job, budget: float) -> Circumstances:
     """Limits of a follow-up: reach and pace of the station, station time of steps, and the remaining budget.
 
-    Parameters
-    ----------
     base : the first job of the lineage, for the calibration temperatures
     last : the newest job; the station continues from its end
     budget : min

@@ -32,10 +32,7 @@ def repeatable(run: Run) -> bool:
 def fresh_repeat(archive: Archive, run: Run) -> int:
     """The first count of repeats after the run's whose capture is not finished: one that was begun and stopped goes on.
 
-    Raises
-    ------
-    WrongUse
-        The run was imported, or measured only what another run lacked.
+    Raises WrongUse: the run was imported, or measured only what another run lacked.
     """
     job = job_of_run(run)
     repeat = job.lot.repeat + 1

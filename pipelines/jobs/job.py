@@ -158,8 +158,6 @@ class Request:
     def job(self, archive: Archive | None = None) -> Job:
         """The job that is asked for, with everything refused that cannot work, before anything moves.
 
-        Parameters
-        ----------
         archive : where the line's model is released, for recipes that ask for it; the default one where None
         """
         if self.recipe.startswith(OF_RUN):

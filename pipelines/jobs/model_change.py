@@ -57,10 +57,7 @@ def change_from_options(
 ) -> ModelChange:
     """The change from the options of a command: effects, model file, limits and effect files.
 
-    Raises
-    ------
-    WrongUse, RecipeInvalid
-        Effects and a model are both given; an effect, the file or the limits are unknown.
+    Raises WrongUse, RecipeInvalid: effects and a model are both given; an effect, the file or the limits are unknown.
     """
     outside = tuple(str(path.resolve()) for path in effect_files or ())
     ModelChange(effect_files=outside).use()

@@ -65,10 +65,7 @@ def model_keys(file: ModelFile) -> dict[str, Any]:
 def use_formulas(formulas: Iterable[FormulaSpec], where: str) -> None:
     """Add the formulas of a file to the catalogue of effects.
 
-    Raises
-    ------
-    RecipeInvalid
-        A formula is invalid, or its id belongs to an effect of the catalogue.
+    Raises RecipeInvalid: a formula is invalid, or its id belongs to an effect of the catalogue.
     """
     for spec in formulas:
         if spec.id in effects.built_in():
@@ -158,10 +155,7 @@ def new_model(path: Path, names: Sequence[str], by: str, at: datetime) -> str:
 def extended(text: str, step: ModelStep, source: str) -> tuple[str, ModelFile]:
     """The text of the next version of a model, with its comments, and the model of this version.
 
-    Raises
-    ------
-    RecipeInvalid
-        The text is no model, the effect is already in it, or its name is unknown.
+    Raises RecipeInvalid: the text is no model, the effect is already in it, or its name is unknown.
     """
     model = _used(parse_model(text, source), source)
     if step.effect in model.model.effects:
@@ -177,10 +171,7 @@ def extended(text: str, step: ModelStep, source: str) -> tuple[str, ModelFile]:
 def reduced(text: str, step: ModelStep, source: str) -> tuple[str, ModelFile]:
     """The text of the next version of a model without an effect, its comments kept, and the model as it then is.
 
-    Raises
-    ------
-    RecipeInvalid
-        The text is no model, the effect is not in it, or it is the only one.
+    Raises RecipeInvalid: the text is no model, the effect is not in it, or it is the only one.
     """
     model = _used(parse_model(text, source), source)
     present = model.model.effects

@@ -37,8 +37,6 @@ LineModel = Callable[[str], dict[str, Any]]
 def load_recipe(name: str = MAIN_JOB, line: LineModel | None = None) -> Recipe:
     """The recipe of a file, or the built-in one of this name, resolved and checked.
 
-    Parameters
-    ----------
     line : the keys that say the line's model for a kind of device; refused where a recipe asks for it and it is None
     """
     text, source, folder = _recipe_text(name)
@@ -48,16 +46,11 @@ def load_recipe(name: str = MAIN_JOB, line: LineModel | None = None) -> Recipe:
 def resolved(file: RecipeFile, source: str, folder: Path | None = None, line: LineModel | None = None) -> Recipe:
     """The content of a recipe file with every name in it resolved, and its poses checked.
 
-    Parameters
-    ----------
     source : what messages call the file
     folder : that names of model files are relative to; the working folder where None
     line : see :func:`load_recipe`
 
-    Raises
-    ------
-    RecipeInvalid
-        A name is not known, or the poses cannot work.
+    Raises RecipeInvalid: a name is not known, or the poses cannot work.
     """
     model = _model(file, folder or Path(), source, line)
     fit_poses = _resolve(file.poses, "p", "poses", source)
@@ -84,10 +77,7 @@ def refuse_unusable_poses(
 ) -> None:
     """Refuse poses that span too little for a fit, and verification in a direction of the fit.
 
-    Raises
-    ------
-    RecipeInvalid
-        The axis or the poses, and what is needed.
+    Raises RecipeInvalid: the axis or the poses, and what is needed.
     """
     if recipe.tumbles:
         _refuse_flat_plan(fit, recipe.span_min_g, recipe.sensor_axes)

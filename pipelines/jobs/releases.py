@@ -107,11 +107,8 @@ def release(
 ) -> Release:
     """Write a new release of a model to the line; return the record.
 
-    Raises
-    ------
-    WrongUse
-        The release is not forced and there is no what-if of the model for this device and station, or its verdict is not
-        'better'; or no reason is given.
+    Raises WrongUse: the release is not forced and there is no what-if of the model for this device and station, or its verdict
+    is not 'better'; or no reason is given.
     """
     if not reason.strip():
         raise WrongUse("release: no reason is given, one is needed; give --reason TEXT")
@@ -169,10 +166,7 @@ def released(archive: Archive, device: str, station: str, when: datetime) -> Rel
 def line_model(archive: Archive, device: str, station: str, when: datetime | None = None) -> dict[str, Any]:
     """The keys of a recipe for the line's model, now or at a time.
 
-    Raises
-    ------
-    RecipeInvalid
-        No model is released for the device and station.
+    Raises RecipeInvalid: no model is released for the device and station.
     """
     at = when or datetime.now(UTC)
     in_force = released(archive, device, station, at)
@@ -190,8 +184,6 @@ def line_model(archive: Archive, device: str, station: str, when: datetime | Non
 def planned_recipe(name: str, effects: str, model: Path | None, archive: str | None, station: str) -> Recipe:
     """The recipe to be planned, with another model where one is given; the archive is read only for the line's model.
 
-    Parameters
-    ----------
     effects, model : a list of effects, or a model file; empty or None if not given
     """
     chosen = chosen_effects(effects, model, "plan")

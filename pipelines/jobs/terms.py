@@ -88,10 +88,7 @@ def with_stability(recipe: Recipe, station: StationConfig) -> Recipe:
 def refuse_contradictions(recipe: Recipe, station: StationConfig) -> None:
     """Refuse a recipe whose entries are not traced, whose local gravity is not the station's, or that lacks its nominal supply.
 
-    Raises
-    ------
-    RecipeInvalid
-        With the key.
+    Raises RecipeInvalid: with the key.
     """
     if recipe.uncertainty is not None:
         try:
@@ -121,9 +118,7 @@ def refuse_contradictions(recipe: Recipe, station: StationConfig) -> None:
 def refuse_beyond_station(recipe: Recipe, station: StationConfig) -> None:
     """Refuse temperatures, °C, angles, degrees, and rates, Hz, outside of the limits of the station.
 
-    Raises
-    ------
-    RecipeInvalid : names the key, the first value outside, and the range
+    Raises RecipeInvalid: names the key, the first value outside, and the range
     """
     limits = station.limits
     temperatures = [*recipe.temperatures_C, *([recipe.static_temperature_C] if recipe.static_record_s > 0.0 else [])]
@@ -146,8 +141,6 @@ def refuse_beyond_station(recipe: Recipe, station: StationConfig) -> None:
 def refused_by_run(recipe: Recipe, station: StationConfig, folder: Path) -> list[str]:
     """What 'tumbleline run' refuses in a recipe that can be planned: limits, serial numbers, ranges of the station.
 
-    Parameters
-    ----------
     folder : where a limits file that the recipe names is looked for
     """
     messages: list[str] = []

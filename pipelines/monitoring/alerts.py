@@ -35,8 +35,6 @@ KINDS = {"CRASHED": "crashed", "FAILED": "failed", "CANCELLED": "missed"}
 def alerts_of(snapshot: Snapshot, audits: Path | None = None) -> list[Alert]:
     """All alerts from the numbers and the newest audit, including those that were posted before.
 
-    Parameters
-    ----------
     audits : folder of the documents of the audits (``pages`` of the deployment weekly-audit); none where None
     """
     alerts = [*_of_runs(snapshot), *_of_stations(snapshot)]
@@ -55,15 +53,10 @@ class _NoRedirection(urllib.request.HTTPRedirectHandler):
 class Poster:
     """Posts the alerts that the receiver has not accepted yet.
 
-    Parameters
-    ----------
     address : of the web hook, http or https
     folder : state folder, which holds the ids of accepted alerts
 
-    Raises
-    ------
-    WrongUse
-        The address begins with neither ``http://`` nor ``https://``.
+    Raises WrongUse: the address begins with neither ``http://`` nor ``https://``.
     """
 
     def __init__(self, address: str, folder: Path) -> None:

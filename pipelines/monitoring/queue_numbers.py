@@ -65,10 +65,7 @@ def configured() -> bool:
 def read_queues(now: datetime | None = None) -> QueueNumbers:
     """The numbers of the orchestrator that PREFECT_API_URL names.
 
-    Raises
-    ------
-    LinkLost
-        It does not answer, or refuses the key.
+    Raises LinkLost: it does not answer, or refuses the key.
     """
     at = now or datetime.now(UTC)
     if os.environ.get(KEY_FILE) or os.environ.get("CREDENTIALS_DIRECTORY"):

@@ -124,8 +124,6 @@ def _reason(problem: Exception, prefix: str) -> str:
 class Monitor:
     """Takes snapshots of an archive, the orchestrator of the environment and the stations of this computer.
 
-    Parameters
-    ----------
     window_d : number of days whose runs are counted
     free_gb : free space that the archive needs, GB
     expected : queues that must have a worker online

@@ -32,15 +32,10 @@ ADDRESS = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*://[^\s\"'<>\\]+")
 def archive_of(parameter: str | None) -> Archive:
     """The archive of a flow's parameter, with the credentials of this process.
 
-    Parameters
-    ----------
     parameter : an address without credentials; ``block:NAME`` for the address in a Secret block; None: TUMBLELINE_ARCHIVE of
         the environment. The address of the environment is used where it differs only by its credentials.
 
-    Raises
-    ------
-    WrongUse
-        The parameter has credentials, or the block does not exist.
+    Raises WrongUse: the parameter has credentials, or the block does not exist.
     """
     refuse_credentials(parameter)
     if parameter is None:

@@ -94,8 +94,6 @@ class LostRuns:
     def close(self, client: SyncPrefectClient, now: float) -> list[str]:
         """Mark the lost runs as crashed; return their names.
 
-        Parameters
-        ----------
         now : s, of a clock that only counts on
         """
         lost = {(run.id, run.state_id): run for run in _without_process(client, *self._where)}

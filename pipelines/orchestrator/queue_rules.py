@@ -47,8 +47,6 @@ SETTLED = timedelta(seconds=30)
 def apply_rules(pool: str, queue: str, now: datetime | None = None, settled: timedelta = SETTLED) -> list[str]:
     """Apply the policies to the runs of a queue; one sentence for each run that changed.
 
-    Parameters
-    ----------
     settled : age of a crash from which its run may continue; zero where the worker has not started yet
     """
     at = now or datetime.now(UTC)
@@ -64,8 +62,6 @@ def apply_rules(pool: str, queue: str, now: datetime | None = None, settled: tim
 def applied(pool: str, queues: Sequence[str], worker: str) -> Generator[None]:
     """A context in which the rules are applied to the queues every ``EVERY_S`` seconds, in a thread of this process.
 
-    Parameters
-    ----------
     worker : name of the worker of Prefect that takes the runs
     """
     lost = {queue: LostRuns(pool, queue, worker) for queue in queues}

@@ -40,16 +40,10 @@ def start(
 ) -> int:
     """Run a worker for a station's queue and further queues, one run at a time; its exit status when all its processes ended.
 
-    Parameters
-    ----------
     host : name of this computer, by which a worker knows the runs of its predecessor; that of the system where empty
 
-    Raises
-    ------
-    OperatorNeeded
-        Another worker of this computer works for the station.
-    WrongUse, LinkLost
-        The orchestrator does not accept the key, or does not answer.
+    Raises OperatorNeeded: another worker of this computer works for the station.
+    Raises WrongUse, LinkLost: the orchestrator does not accept the key, or does not answer.
     """
     from pipelines.orchestrator.dead_runs import FREQUENCY, HEARTBEAT_S, close_dead_runs_of_queue
     from pipelines.orchestrator.queue_rules import applied, apply_rules
@@ -193,12 +187,8 @@ def run_until_orphans_end(
     A service manager that stops a unit, and a container whose first process ends, kill the remaining processes. The main process
     must therefore end after the watchdog: it adopts the orphans of its descendants (Linux, ``PR_SET_CHILD_SUBREAPER``).
 
-    Parameters
-    ----------
     begun : called with the child; only this function waits for it.
 
-    Notes
-    -----
     A SIGTERM to this process is passed to the command, not to its orphans. The exit status of a child that a
     signal ended is 128 plus the signal's number, as in shells.
     """

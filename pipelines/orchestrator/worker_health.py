@@ -29,8 +29,6 @@ STARTUP_S = 180.0
 class Silence:
     """Whether heartbeats have stopped, from what the server says at each question.
 
-    Parameters
-    ----------
     longest_s : time without a new heartbeat that is silence.
     startup_s : the same before the first heartbeat.
     gap_s : two questions further apart than this are no observation: this computer was suspended.
@@ -49,8 +47,6 @@ class Silence:
     def heard(self, heartbeat: str, now: float) -> bool:
         """Note the time of the last heartbeat that the server has (empty without one); whether the worker is silent.
 
-        Parameters
-        ----------
         now : time of the monotonic clock, s.
         """
         new, gap = heartbeat != self._last, not now - self._asked <= self.gap_s
@@ -79,8 +75,6 @@ def watched(
 ) -> Generator[None]:
     """A context in which a child that is silent is killed, by a thread of this process; its own children go on.
 
-    Parameters
-    ----------
     ask : time of the child's last heartbeat, empty without one; raises where the server does not answer.
     child : the process; None before it has started.
     every_s : period of the heartbeats.
@@ -113,8 +107,6 @@ def watched(
 def in_thread(name: str, repeat: Callable[[threading.Event], None], patience_s: float = 0.0) -> Generator[None]:
     """A context in which a function runs in a thread of this process; its event is set at the end.
 
-    Parameters
-    ----------
     patience_s : time to wait for the end of the thread, s
     """
     ended = threading.Event()

@@ -60,10 +60,8 @@ class Programmer:
     def program(self, units: Sequence[tuple[int, UnitCalibration]]) -> list[ProgrammingOutcome]:
         """Writes units (slot, calibration); the outcome of each.
 
-        Raises
-        ------
-        StationError, LeaseLost, EmergencyStop
-            The station fails for all units; every unit whose programming has begun is recorded as failed.
+        Raises StationError, LeaseLost, EmergencyStop: the station fails for all units; every unit whose programming has begun
+        is recorded as failed.
         """
         slots, clock = self.station.reader.slots, self.station.clock
         outcomes = [ProgrammingOutcome(unit.unit, slot, unit, slots[slot].memory(clock)) for slot, unit in units]

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
 def print_diagnosis(document: dict[str, Any], *, data: FindData | None, model: Path | None, brief: bool = True) -> None:
     """Print a diagnosis.
 
-    Parameters
-    ----------
     data : gives the data as they were named on the command line, where commands to give next are printed; None: none are printed
     model : the model file as it was given there
     brief : one sentence counts the effects of quantities that were not recorded
