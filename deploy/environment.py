@@ -19,9 +19,7 @@ ROOT = Path(__file__).resolve().parents[1]
 HELD_BY = {"run": ("all", "dev", "bench"), "all": ("dev", "bench"), "dev": ("bench",)}
 """Locks that hold all libraries of another one, in the same versions."""
 
-OF_ANOTHER = {"crate"}
-"""Locks of programs of other makers, whose environments do not hold the product."""
-
+OF_ANOTHER = {"crate"}  # locks of programs of other makers, whose environments do not hold the product
 PROBE = "import importlib.util as u, sys; print(*sys.version_info[:2], sep='.') if u.find_spec('pip') else sys.exit(1)"
 UNREACHED = (
     r"(?:Retrying \(|Max retries exceeded|name resolution|[Cc]onnection ?(?:Error|refused|reset)|timed out"

@@ -13,8 +13,7 @@ from pipelines.archive import Archive, Run
 from tumbleline.pictures import Picture, as_html, as_text, rounded_table
 from tumbleline.recordings import Recording
 
-K = 2.0
-"""Coverage factor of U."""
+K = 2.0  # coverage factor of U
 
 
 @dataclass(frozen=True)

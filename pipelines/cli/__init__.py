@@ -29,9 +29,7 @@ if TYPE_CHECKING:
 INTERRUPTED = 130  # the exit status that shells use for Ctrl-C
 PIPE_CLOSED = 141  # the exit status that shells use for a reader that closed the pipe
 
-COMPLETES = "_TUMBLELINE_COMPLETE"
-"""Variable by which a shell asks for candidates; typer defines its name."""
-
+COMPLETES = "_TUMBLELINE_COMPLETE"  # variable by which a shell asks for candidates; typer defines its name
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 """Variables that BLAS libraries read when they are loaded."""
 
@@ -94,8 +92,7 @@ def _read(path: Path) -> CommandModule | None:
     return CommandModule(path.stem, values["PART"], int(values["ORDER"]), values["SUMMARY"])
 
 
-COMMANDS = find_commands(Path(__file__).parent)
-"""The commands by name, in the order of the help."""
+COMMANDS = find_commands(Path(__file__).parent)  # the commands by name, in the order of the help
 
 
 class _OnDemand(TyperCommand):

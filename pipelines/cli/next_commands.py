@@ -42,8 +42,7 @@ class JudgedData:
         return [*(["--history", self.history] if self.history else []), *archive_words(self.archive)]
 
 
-FindData = Callable[[], JudgedData]
-"""Gives the data of a command; see :func:`judged_data`."""
+FindData = Callable[[], JudgedData]  # gives the data of a command; see :func:`judged_data`
 
 
 def command_line(*words: str) -> str:

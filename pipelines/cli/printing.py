@@ -18,15 +18,10 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.text import Text
 
-STANDARD_OUTPUT = Path("-")
-"""The name of standard output in place of a file, as the programs of a system understand it."""
+STANDARD_OUTPUT = Path("-")  # the name of standard output in place of a file, as the programs of a system understand it
 
-short, short_values = rounding.short, rounding.short_values
-"""Numbers as commands print them."""
-
-NARROW = 28
-"""Characters of a word that a narrow terminal shows unbroken: the longest name of an effect has 27."""
-
+short, short_values = rounding.short, rounding.short_values  # numbers as commands print them
+NARROW = 28  # characters of a word that a narrow terminal shows unbroken: the longest name of an effect has 27
 STYLES = {"pass": "bold green", "fail": "bold red", "refused": "bold magenta"}
 
 
@@ -117,8 +112,7 @@ def print_table(
         title = ""
 
 
-GAPS = (3, 2)
-"""Characters between two columns; the second where it saves a continuation of the table."""
+GAPS = (3, 2)  # characters between two columns; the second where it saves a continuation of the table
 
 
 def _least(kept: bool, column: str, cells: Sequence[str | Text], width: int | None) -> int:

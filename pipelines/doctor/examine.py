@@ -18,8 +18,7 @@ from schemas.shipped import PRODUCT, shipped
 from stations.overview import Overview
 from stations.safety.folder import VARIABLE, state_folder
 
-LEAST_FREE_GB = 1.0
-"""Free space that an archive needs, GB, by default."""
+LEAST_FREE_GB = 1.0  # free space that an archive needs, GB, by default
 
 
 def examine(archive: str | None = None, station: Path | None = None, free_gb: float = LEAST_FREE_GB) -> DoctorDocument:
@@ -55,8 +54,7 @@ def examine(archive: str | None = None, station: Path | None = None, free_gb: fl
 STATE, CLOCK = "state folder", "clock"
 A_ZONE = "Europe/Berlin"
 TIMEX_BYTES = 1024  # struct timex has 208 on 64-bit Linux
-TIME_ERROR = 5
-"""What adjtimex(2) returns while no time server disciplines the clock."""
+TIME_ERROR = 5  # what adjtimex(2) returns while no time server disciplines the clock
 
 
 def host_checks() -> list[Check]:

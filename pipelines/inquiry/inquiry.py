@@ -78,9 +78,7 @@ def ambiguous_classes(joint: JointDiagnosis) -> str:
     return ", and ".join(" | ".join(group) for group in joint.ambiguous)
 
 
-EXTRA = 0.3
-"""Default budget of follow-ups, as a share of the first run's station time."""
-
+EXTRA = 0.3  # default budget of follow-ups, as a share of the first run's station time
 MOST_ROUNDS = 6
 
 

@@ -51,9 +51,7 @@ ANALYSIS_KEYS = {
 }
 
 
-OF_RUN = "run:"
-"""What a recipe's name begins with where it is the run whose units are measured again."""
-
+OF_RUN = "run:"  # what a recipe's name begins with where it is the run whose units are measured again
 GUARDS = {"suspenders", "safety", "self_test"}
 """Parts of a station that say when a capture pauses and how it ends: one that an operator has eased goes on where it was."""
 

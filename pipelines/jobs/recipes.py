@@ -29,8 +29,7 @@ from schemas.units import AXES
 
 MAIN_JOB = "production"
 SAME_POSE_DEG = 1.0
-LINE = "line"
-"""What a recipe says in place of a model file for the model that is released to the line."""
+LINE = "line"  # what a recipe says in place of a model file for the model that is released to the line
 LineModel = Callable[[str], dict[str, Any]]
 
 

@@ -23,12 +23,8 @@ from schemas.errors import WrongUse
 TIMEOUT_S = 10.0
 ACCEPTED_FILE = "alerts.json"
 MOST_IDS = 5000
-AUDIT_AGE = timedelta(days=10)
-"""Findings of an older audit are not posted."""
-
-CONTENT_REFUSED = {400, 413, 422}
-"""Answers that refuse one alert for its content; the alerts after it are posted."""
-
+AUDIT_AGE = timedelta(days=10)  # findings of an older audit are not posted
+CONTENT_REFUSED = {400, 413, 422}  # answers that refuse one alert for its content; the alerts after it are posted
 KINDS = {"CRASHED": "crashed", "FAILED": "failed", "CANCELLED": "missed"}
 
 

@@ -16,9 +16,7 @@ from pipelines.certificates.days import today
 from pipelines.certificates.ledger import Ledger
 from schemas.errors import ArchiveUnusable, TumblelineError
 
-DUE_DAYS = (0, 30)
-"""Periods, days: a certificate is due where it ends within the period."""
-
+DUE_DAYS = (0, 30)  # periods, days: a certificate is due where it ends within the period
 IMPORTED = "(import)"  # station label of an imported run
 
 

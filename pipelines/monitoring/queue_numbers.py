@@ -18,9 +18,7 @@ PAGE_SIZE = 200  # largest that the server allows
 OPEN = ("SCHEDULED", "PENDING", "RUNNING", "PAUSED", "CANCELLING")
 FAILED = ("CRASHED", "FAILED")
 MISSED = ("missed:", "skipped:")  # beginnings of the messages of pipelines.orchestrator.queue_rules
-LATE = timedelta(minutes=5)
-"""A run that has been due for longer is late; a worker requests work every ten seconds."""
-
+LATE = timedelta(minutes=5)  # a run that has been due for longer is late; a worker requests work every ten seconds
 RECENT = timedelta(days=1)
 
 

@@ -17,9 +17,7 @@ from schemas.errors import TumblelineError
 from stations.safety.folder import read_log, state_folder
 from stations.safety.lease_files import read_holder
 
-KEEP_S = 10.0
-"""Time for which a snapshot is reused, s: several scrapers cause one reading."""
-
+KEEP_S = 10.0  # time for which a snapshot is reused, s: several scrapers cause one reading
 LAG_S = 3600.0
 """Longest time, s, between the start of a finished run and its entry in the hash chain; a killed writer leaves it out."""
 

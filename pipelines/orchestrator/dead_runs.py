@@ -22,9 +22,7 @@ from prefect.events.schemas.events import ResourceSpecification
 from prefect.states import Crashed
 
 PROCESSES = Path("/proc")
-OF_KERNEL = 0x00200000
-"""Flag of a thread of the kernel (PF_KTHREAD of Linux), which never has an environment."""
-
+OF_KERNEL = 0x00200000  # flag of a thread of the kernel (PF_KTHREAD of Linux), which never has an environment
 STARTED_WITHIN = timedelta(seconds=1)
 """Longest time for which a process that is being started may have no environment yet."""
 
@@ -34,9 +32,7 @@ LOST_S = 60.0
 """Longest time from the moment at which a worker takes a run to the start of its process, s, with a large margin."""
 
 SUSPENDED = "Suspended"  # such a run has no process and gets a new one when it is resumed
-WORKER = "prefect.worker.name"
-"""Label that the worker of Prefect gives to the runs that it takes."""
-
+WORKER = "prefect.worker.name"  # label that the worker of Prefect gives to the runs that it takes
 GONE = "its process has ended: it was killed, or its worker ended; give the same order again to continue"
 
 

@@ -16,9 +16,7 @@ from pathlib import Path
 
 from schemas.errors import LinkLost, WrongUse
 
-LOCAL = "local"
-"""In place of the address of a Dask scheduler: a cluster of processes on this computer."""
-
+LOCAL = "local"  # in place of the address of a Dask scheduler: a cluster of processes on this computer
 STARTUP_S = 120
 SERVER_KEY, CLIENT_KEY = "PREFECT_SERVER_API_AUTH_STRING", "PREFECT_API_AUTH_STRING"
 CREDENTIAL = "prefect-auth"  # name in the systemd units (LoadCredential)
@@ -35,8 +33,7 @@ RETENTION_D = 90
 
 EVENTS_D = 7
 LOOPBACK = ("127.0.0.1", "localhost")
-POLL_S, TIMEOUT_S = 1.0, 5.0
-"""Time between two questions to a server that does not answer yet, and for its answer, s."""
+POLL_S, TIMEOUT_S = 1.0, 5.0  # time between two questions to a server that does not answer yet, and for its answer, s
 
 
 def cache_folder() -> Path:

@@ -16,14 +16,9 @@ from contextlib import contextmanager
 from schemas.log_lines import tell
 
 VARIABLE = "PREFECT_WORKER_HEARTBEAT_SECONDS"
-PERIOD_S = 30.0
-"""Prefect's period between two heartbeats of a worker."""
-
-MISSED = 4
-"""Heartbeats in succession that a worker may owe."""
-
-STARTUP_S = 180.0
-"""Time that a worker may need on a busy computer until its first heartbeat."""
+PERIOD_S = 30.0  # Prefect's period between two heartbeats of a worker
+MISSED = 4  # heartbeats in succession that a worker may owe
+STARTUP_S = 180.0  # time that a worker may need on a busy computer until its first heartbeat
 
 
 class Silence:

@@ -10,8 +10,7 @@ from pipelines.cli.printing import print_table, remark, say, short
 from pipelines.planning.documents import worst_axes
 from schemas.decisions import LARGEST_ERROR
 
-RAISED = 3.0
-"""Factor by which 1/f and random walk must raise a floor to be listed."""
+RAISED = 3.0  # factor by which 1/f and random walk must raise a floor to be listed
 
 
 def print_plan(document: dict[str, Any]) -> None:
@@ -156,8 +155,7 @@ TITLES = {
     "bias_error_period": "error over the period, RMS",
     LARGEST_ERROR: "largest error of an axis over the period, 95 % bound",
 }
-LEAST = 0.01
-"""Smallest share of a contribution that is printed."""
+LEAST = 0.01  # smallest share of a contribution that is printed
 
 
 def print_reach(reach: dict[str, Any] | None) -> None:
