@@ -26,13 +26,7 @@ SPACE = uuid.UUID("6f1c1d5e-0f0c-5d4e-9b65-0d6f1f3b7a10")
 
 
 def bill(lock: str, project: dict[str, Any], when: datetime, hashes: dict[str, str] | None = None) -> dict[str, Any]:
-    """The bill of materials.
-
-    lock : text of the lock
-    project : the table ``project`` of pyproject.toml
-    when : time of the release
-    hashes : SHA-256 of the files of the release, by name
-    """
+    """The bill of materials; ``hashes`` has the SHA-256 of the files of the release by name."""
     locked: dict[str, list[Pin]] = {}
     for pin in pins(lock):
         locked.setdefault(pin.name, []).append(pin)

@@ -127,7 +127,6 @@ def measured_recipe(dwells: str, recipe: str, archive: str | None) -> Recipe:
 def write_next(path: Path, document: dict[str, Any], base: Recipe, home: Path, source: str) -> None:
     """Write the proposed measurement as a recipe and print its path; without proposed steps nothing is written.
 
-    document : the diagnosis
     base : the recipe that the dwells were measured with; home : its folder
     source : the dwells as they were named
     """

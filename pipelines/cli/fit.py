@@ -69,7 +69,6 @@ def _fit_import(run: Run, change: tuple[str, Path | None, str], leave_out: str, 
     """Fit a model to an import, keep it as a run of its own and print it.
 
     change : effects, model file and limits; empty or None if not given
-    leave_out : dwells as UNIT:DWELL,…
     """
     from pipelines.jobs.model_change import change_from_options
     from pipelines.rerun.imported_fit import fit_document

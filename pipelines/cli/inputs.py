@@ -38,10 +38,7 @@ def without_dwells(dwells: pd.DataFrame, listed: str) -> tuple[pd.DataFrame, lis
 
 
 def add_effects(files: Sequence[Path] | None, formulas: Sequence[str] | None = None, where: str = "") -> None:
-    """Effects from files outside the tree, and formulas of the command line, in the catalogue from now on.
-
-    where : the command, for messages about formulas
-    """
+    """Effects from files outside the tree, and formulas of the command line, in the catalogue from now on."""
     from inertial import effects
 
     for path in files or ():
@@ -53,10 +50,7 @@ def add_effects(files: Sequence[Path] | None, formulas: Sequence[str] | None = N
 
 
 def distribution(store: Archive, runs: Sequence[str], dask: str, workers: int | None) -> tuple[Distributor | None, int]:
-    """How the work on runs is distributed over Dask, None for processes of this machine; and the number of processes.
-
-    dask, workers : as they were given
-    """
+    """How the work on runs is distributed over Dask, None for processes of this machine; and the number of processes."""
     from pipelines.flows.dask_cluster import on_dask
     from pipelines.parallel import processors
 

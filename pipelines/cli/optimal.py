@@ -156,7 +156,7 @@ def cheapest_recipe(
 ) -> tuple[Optimum, dict[str, Any]]:
     """The recipe with the least station time for the required errors, and the document about it.
 
-    base : the recipe to start from; ``name`` : its name on the command line
+    name : of the recipe to start from on the command line
     """
     from pipelines.planning.context import plan_context
     from pipelines.planning.optimise import optimise
@@ -190,7 +190,6 @@ def written(best: Optimum, target: Path, home: Path, own: dict[str, Any]) -> str
     """The text of the recipe file at ``target``.
 
     home : folder of the recipe that the search started from
-    own : the document of the search
     """
     from pipelines.jobs.recipe_text import limits_from, recipe_text
 

@@ -22,12 +22,7 @@ LEAST_FREE_GB = 1.0  # free space that an archive needs, GB, by default
 
 
 def examine(archive: str | None = None, station: Path | None = None, free_gb: float = LEAST_FREE_GB) -> DoctorDocument:
-    """The state of the installation and of what it is connected to.
-
-    archive : its address; the default one where None
-    station : file of a station; none is checked where None
-    free_gb : free space that the archive needs, GB
-    """
+    """The state of the installation and of what it is connected to; without a file of a station none is checked."""
     checks = [
         *software_checks(),
         *archive_checks(archive, free_gb),

@@ -181,7 +181,9 @@ def _running(home: Path) -> tuple[int, str] | None:
 
 
 def _start(home: Path, meanwhile: Callable[[], None]) -> tuple[int, str]:
-    port, key = _free_port(), new_key()
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port, key = int(probe.getsockname()[1]), new_key()
     log_path = home / "server.log"
     before = log_path.stat().st_size if log_path.exists() else 0
     with os.fdopen(_private_file(log_path, os.O_APPEND), "ab") as log:
@@ -220,12 +222,6 @@ def _private_file(path: Path, how: int) -> int:
     handle = os.open(path, os.O_WRONLY | os.O_CREAT | how, PRIVATE)
     os.fchmod(handle, PRIVATE)  # one of an older version is there with another mode
     return handle
-
-
-def _free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 def _answers(port: int) -> bool:

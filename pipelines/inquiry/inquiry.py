@@ -107,7 +107,6 @@ class FollowUp:
 class Inquiry:
     """An inquiry between two steps.
 
-    effects : ids of the model to diagnose; the recipe's where empty
     budget : min, station time for follow-ups
     unseen : whether to measure follow-ups for effects that are not visible, too, once no class is ambiguous
     """

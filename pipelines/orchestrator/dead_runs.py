@@ -88,10 +88,7 @@ class LostRuns:
         self._since: dict[tuple[UUID, UUID | None], float] = {}
 
     def close(self, client: SyncPrefectClient, now: float) -> list[str]:
-        """Mark the lost runs as crashed; return their names.
-
-        now : s, of a clock that only counts on
-        """
+        """Mark the lost runs as crashed; return their names. ``now``, s, is of a clock that only counts on."""
         lost = {(run.id, run.state_id): run for run in _without_process(client, *self._where)}
         self._since = {key: self._since.get(key, now) for key in lost}
         closed: list[str] = []

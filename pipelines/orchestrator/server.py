@@ -46,7 +46,6 @@ def serve(
 ) -> None:
     """Serve until the process is stopped, or, with a ``home``, until no client is left there.
 
-    host, port : where to listen
     names : further names of this host; requests with other names are refused
     home : folder of the locks of the clients
     tls : files of the certificate and of its key, for https; clients name the authority in PREFECT_API_SSL_CERT_FILE

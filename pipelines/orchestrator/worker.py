@@ -192,7 +192,9 @@ def run_until_orphans_end(
     A SIGTERM to this process is passed to the command, not to its orphans. The exit status of a child that a
     signal ended is 128 plus the signal's number, as in shells.
     """
-    _adopt_orphans()
+    library = ctypes.CDLL(None, use_errno=True)
+    if library.prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0):
+        raise OSError(ctypes.get_errno(), "prctl(PR_SET_CHILD_SUBREAPER)")
     stopped = False
 
     def pass_on(_number: int, _frame: FrameType | None) -> None:
@@ -217,12 +219,6 @@ def run_until_orphans_end(
         if pid == child.pid:
             child.returncode = code = os.waitstatus_to_exitcode(how)
             status = code if code >= 0 else 128 - code
-
-
-def _adopt_orphans() -> None:
-    library = ctypes.CDLL(None, use_errno=True)
-    if library.prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0):
-        raise OSError(ctypes.get_errno(), "prctl(PR_SET_CHILD_SUBREAPER)")
 
 
 if __name__ == "__main__":

@@ -40,10 +40,7 @@ class Silence:
         self._since = float("nan")
 
     def heard(self, heartbeat: str, now: float) -> bool:
-        """Note the time of the last heartbeat that the server has (empty without one); whether the worker is silent.
-
-        now : time of the monotonic clock, s.
-        """
+        """Note the time of the last heartbeat that the server has (empty without one); whether the worker is silent."""
         new, gap = heartbeat != self._last, not now - self._asked <= self.gap_s
         if self._last is not None and new:
             self._begun = True

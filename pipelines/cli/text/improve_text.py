@@ -56,8 +56,6 @@ def _ladder(rows: list[dict[str, Any]]) -> None:
 def next_lines(document: dict[str, Any], target: Path, find: FindData, *, after: dict[str, Any]) -> list[str]:
     """The commands to give next; empty where the model is adequate and a fresh run has judged it.
 
-    target : the model file
-    find : gives the data
     after : the diagnosis of the resulting model
     """
     from pipelines.cli.history import removal
