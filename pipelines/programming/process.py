@@ -18,7 +18,6 @@ from pipelines.export.device_block import block_of, pack, unpack
 from pipelines.export.polynomials import UnitCalibration
 from pipelines.programming.outcome import (
     Choice,
-    InPose,
     ProgrammingOutcome,
     require_in_pose,
     require_moved,
@@ -270,7 +269,7 @@ class Programmer:
                 outcomes,
                 "verify",
                 lambda one, f=force, m=plain, t=temperatures, p=pose.name: require_in_pose(
-                    one, InPose(p, f, one.unit.with_forces(m[one.slot], f), t[one.slot]), self.choice.tolerance_ug
+                    one, p, f, one.unit.with_forces(m[one.slot], f), t[one.slot], self.choice.tolerance_ug
                 ),
             )
 
