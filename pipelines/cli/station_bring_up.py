@@ -96,6 +96,7 @@ def _written(session: BringUp, folder: Path, person: _Typed, by: str, *, as_json
 
     from pipelines.commissioning.conformance import conformance_page, document_of
     from pipelines.commissioning.documents import Platform
+    from pipelines.tables.json_values import json_value
     from stations.bringup.corrected import corrected_name, corrected_text
 
     corrected = corrected_text(session.profile, session.findings, session.made)
@@ -105,7 +106,8 @@ def _written(session: BringUp, folder: Path, person: _Typed, by: str, *, as_json
     document = document_of(session, verified_on=platform, by=by, recording="frames.jsonl", corrected=name)
     if corrected:
         publish(folder / name, corrected, "corrected profile")
-    publish(folder / "conformance.json", json.dumps(document, ensure_ascii=False, indent=2) + "\n", "conformance")
+    text = json.dumps(json_value(document), ensure_ascii=False, indent=2)
+    publish(folder / "conformance.json", f"{text}\n", "conformance")
     publish(folder / "conformance.html", conformance_page(document, folder / "frames.jsonl"), "page")
     if as_json:
         print_json(document)
@@ -115,13 +117,10 @@ def _written(session: BringUp, folder: Path, person: _Typed, by: str, *, as_json
 
 
 def _print(document: ConformanceDocument) -> None:
-    told = [point for point in document["points"] if point["verdict"] == "differs"]
-    if told:
-        lines = [[p["what"], p["found"], p["expected"], p["remedy"]] for p in told]
+    points = document["points"]
+    if lines := [[p.what, p.found, p.expected, p.remedy] for p in points if p.verdict == "differs"]:
         print_table(["differs", "found", "expected", "what to do"], lines)
-    untried = [
-        point["what"] for point in document["points"] if point["verdict"] == "not tried" and point["part"] != "register"
-    ]
+    untried = [p.what for p in points if p.verdict == "not tried" and p.part != "register"]
     if untried:
         say(f"not tried: {', '.join(untried)}")
     state = "" if document["complete"] else "; it ended before its last step"
