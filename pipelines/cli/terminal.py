@@ -1,18 +1,13 @@
 """The operator at a terminal: questions on standard error, answers from standard input, one line each, typed or scanned."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable
 from contextlib import AbstractContextManager
-from typing import TYPE_CHECKING
 
+from pipelines.chain.attendance import Answer, Prompt
 from pipelines.cli.printing import remark
 from pipelines.jobs.seating import Seating, scan
 from schemas.errors import WrongUse
-
-if TYPE_CHECKING:
-    from pipelines.chain.attendance import Answer, Prompt
 
 YES = frozenset({"", "y", "yes", "go", "ok"})
 STOP = frozenset({"stop", "s", "q", "quit", "no", "n"})

@@ -1,18 +1,15 @@
 """A diagnosis for people: the verdict in a sentence, then data faults, drivers, classes, the next command, hidden effects."""
 
-from __future__ import annotations
-
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+from rich.console import Console
 
 from pipelines.cli.next_commands import FindData, command_line, print_extension, print_next
 from pipelines.cli.printing import console, print_table, say, warn
 from pipelines.cli.text.verdict_text import print_verdict
 from pipelines.diagnosis import sections, sentences
 from pipelines.diagnosis.sections import Section
-
-if TYPE_CHECKING:
-    from rich.console import Console
 
 
 def print_diagnosis(document: dict[str, Any], *, data: FindData | None, model: Path | None, brief: bool = True) -> None:
