@@ -102,7 +102,7 @@ def _written(session: BringUp, folder: Path, person: _Typed, by: str, *, as_json
     corrected = corrected_text(session.profile, session.findings, session.made)
     name = f"{corrected_name(session.profile)}.toml" if corrected else ""
     typed = "" if session.ended else person.ask(ON).strip().lower()
-    platform = next((known for known in get_args(Platform) if known == typed), "not stated")
+    platform: Platform = next((known for known in get_args(Platform) if known == typed), "not stated")
     document = document_of(session, verified_on=platform, by=by, recording="frames.jsonl", corrected=name)
     if corrected:
         publish(folder / name, corrected, "corrected profile")

@@ -42,7 +42,7 @@ def alerts_of(snapshot: Snapshot, audits: Path | None = None) -> list[Alert]:
 class _NoRedirection(urllib.request.HTTPRedirectHandler):
     """A redirection is an error here: a POST would become a GET, whose answer accepts nothing."""
 
-    def redirect_request(self, *_: Any) -> None:
+    def redirect_request(self, *_: Any, **_named: Any) -> None:
         return None
 
 
