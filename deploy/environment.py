@@ -4,8 +4,6 @@ The makefile calls it with the Python that a person has, before any library is t
 ``FOLDER/.made`` says who finished it last; a folder without it was stopped in the middle and is not trusted.
 """
 
-from __future__ import annotations
-
 import fcntl
 import hashlib
 import json
@@ -21,9 +19,7 @@ ROOT = Path(__file__).resolve().parents[1]
 HELD_BY = {"run": ("all", "dev", "bench"), "all": ("dev", "bench"), "dev": ("bench",)}
 """Locks that hold all libraries of another one, in the same versions."""
 
-OF_ANOTHER = {"crate"}
-"""Locks of programs of other makers, whose environments do not hold the product."""
-
+OF_ANOTHER = {"crate"}  # locks of programs of other makers, whose environments do not hold the product
 PROBE = "import importlib.util as u, sys; print(*sys.version_info[:2], sep='.') if u.find_spec('pip') else sys.exit(1)"
 UNREACHED = (
     r"(?:Retrying \(|Max retries exceeded|name resolution|[Cc]onnection ?(?:Error|refused|reset)|timed out"
@@ -36,11 +32,7 @@ FAILURES = (
         "the file that was delivered is not that of {lock}: its hash is another one",
         "empty pip's cache with '{python} -m pip cache purge' and try again; if it stays, ask who runs your package index",
     ),
-    (
-        re.compile(r"No space left on device"),
-        "no space is left on the disk of {folder}",
-        "free 2 GB and try again",
-    ),
+    (re.compile(r"No space left on device"), "no space is left on the disk of {folder}", "free 2 GB and try again"),
     (
         re.compile(r"Failed building wheel for (?P<name>\S+)|Failed to build|to build wheel did not run"),
         "there is no wheel for {system}, and it cannot be built here",
@@ -66,8 +58,6 @@ class NotSetUp(Exception):
 def set_up(name: str, folder: Path, *, asked: bool = False) -> None:
     """Make or complete the environment; says so where packages are installed.
 
-    Parameters
-    ----------
     name : of the lock, ``requirements-NAME.lock``
     asked : whether this version of Python was asked for, so that an environment of another one is made anew
     """

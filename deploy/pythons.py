@@ -4,8 +4,6 @@ PYTHONS names interpreters in place of those that are found, TESTS folders or fi
 cloned. The output of each interpreter is kept in ``build/pythons/``. Needs the standard library alone.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import shutil
@@ -19,9 +17,7 @@ from typing import NamedTuple
 ROOT = Path(__file__).resolve().parents[1]
 LOGS = ROOT / "build" / "pythons"
 MINORS = range(11, 15)
-PROBE = (
-    "import os, sys, platform as p; print(p.python_version(), os.path.realpath(sys.executable), *sys.version_info[:2])"
-)
+PROBE = "import os, sys, platform as p; print(p.python_version(), os.path.realpath(sys.executable))"
 CLOSING = re.compile(r"^(?:\d+ (?:passed|failed|errors?|skipped|deselected|warnings?)|no tests ran).*$", re.MULTILINE)
 HEAD = ("interpreter", "version", "set-up s", "run exit", "run s", "tests")
 
@@ -31,6 +27,11 @@ class Interpreter(NamedTuple):
 
     program: Path
     version: str
+
+    @property
+    def minor(self) -> int:
+        """The second number of a version of Python 3; -1 for another one."""
+        return int(self.version.split(".")[1]) if self.version.startswith("3.") else -1
 
 
 class Outcome(NamedTuple):
@@ -72,27 +73,25 @@ def interpreters(named: str = "") -> list[Interpreter]:
         held = _probe(place) if place.is_file() else None
         if held is None and named:
             raise SystemExit(f"test-pythons: '{place}' is no Python that starts; correct PYTHONS")
-        if held is not None and held[1][:1] == (3,) and held[1][1] in MINORS:
-            found.setdefault(held[0].program, held[0])
+        if held is not None and held.minor in MINORS:
+            found.setdefault(held.program, held)
     return sorted(found.values(), key=lambda one: [int(n) for n in re.findall(r"\d+", one.version)])
 
 
-def _probe(place: Path) -> tuple[Interpreter, tuple[int, ...]] | None:
+def _probe(place: Path) -> Interpreter | None:
     try:
         done = subprocess.run([place, "-c", PROBE], capture_output=True, text=True, check=False, timeout=60)  # noqa: S603
     except (OSError, subprocess.TimeoutExpired):
         return None
     if done.returncode:
         return None
-    version, program, major, minor = done.stdout.split()
-    return Interpreter(Path(program), version), (int(major), int(minor))
+    version, program = done.stdout.split()
+    return Interpreter(Path(program), version)
 
 
 def tried(interpreter: Interpreter, tests: str, folder: Path) -> Outcome:
     """Set-up, main job and tests in a clone; the clone is removed, the output kept.
 
-    Parameters
-    ----------
     tests : folders or files; empty for all
     folder : of the clone, and of a link to the data that lie beside a checkout
     """

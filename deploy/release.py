@@ -4,8 +4,6 @@ The wheel is built from the source distribution, in a folder of its own: a file 
 is missing in the wheel, and files of an earlier build in ``build/`` do not get in. Nothing is fetched.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import shutil
@@ -24,8 +22,6 @@ SUMS = "SHA256SUMS"
 def build(folder: Path, root: Path = ROOT) -> tuple[Path, Path]:
     """Wheel and source distribution of a tree, written into a folder.
 
-    Parameters
-    ----------
     root : the tree; it is copied, and stays as it is
     """
     folder.mkdir(parents=True, exist_ok=True)

@@ -4,8 +4,6 @@
 are those of the installed distributions of the same version; a library that is not installed in that version has neither.
 """
 
-from __future__ import annotations
-
 import json
 import sys
 import tomllib
@@ -28,15 +26,7 @@ SPACE = uuid.UUID("6f1c1d5e-0f0c-5d4e-9b65-0d6f1f3b7a10")
 
 
 def bill(lock: str, project: dict[str, Any], when: datetime, hashes: dict[str, str] | None = None) -> dict[str, Any]:
-    """The bill of materials.
-
-    Parameters
-    ----------
-    lock : text of the lock
-    project : the table ``project`` of pyproject.toml
-    when : time of the release
-    hashes : SHA-256 of the files of the release, by name
-    """
+    """The bill of materials; ``hashes`` has the SHA-256 of the files of the release by name."""
     locked: dict[str, list[Pin]] = {}
     for pin in pins(lock):
         locked.setdefault(pin.name, []).append(pin)
@@ -54,7 +44,7 @@ def bill(lock: str, project: dict[str, Any], when: datetime, hashes: dict[str, s
         ],
     }
     listed = [pin for _, same in sorted(locked.items()) for pin in same]
-    content = {
+    return {
         "bomFormat": "CycloneDX",
         "specVersion": "1.6",
         "serialNumber": f"urn:uuid:{uuid.uuid5(SPACE, lock + version)}",
@@ -69,8 +59,6 @@ def bill(lock: str, project: dict[str, Any], when: datetime, hashes: dict[str, s
             *({"ref": _reference(pin.name, pin.version), "dependsOn": _below(pin, locked)} for pin in listed),
         ],
     }
-    json.dumps(content, allow_nan=False)
-    return content
 
 
 def _component(pin: Pin) -> dict[str, Any]:
@@ -78,7 +66,8 @@ def _component(pin: Pin) -> dict[str, Any]:
 
     What the lock installs on some Pythons or systems only is optional, with the marker that says where.
     """
-    licence = _licence(pin.name, pin.version)
+    held = _metadata_of(pin)
+    licence = {} if held is None else licence_of(held)
     where = [{"name": "tumbleline:lock:marker", "value": str(pin.marker)}] if pin.marker else []
     return {
         "type": "library",
@@ -90,12 +79,6 @@ def _component(pin: Pin) -> dict[str, Any]:
         "purl": _reference(pin.name, pin.version),
         "properties": [*where, *({"name": "tumbleline:lock:sha256", "value": one} for one in pin.hashes)],
     }
-
-
-def _licence(name: str, version: str) -> dict[str, Any]:
-    """The licence of a library, where it is installed in that version."""
-    installed = _installed(name, version)
-    return {} if installed is None else licence_of(installed)
 
 
 def licence_of(installed: Any) -> dict[str, Any]:
@@ -112,7 +95,7 @@ def licence_of(installed: Any) -> dict[str, Any]:
 
 def _below(pin: Pin, locked: dict[str, list[Pin]]) -> list[str]:
     """References of the libraries of the lock that an installed library needs, without its extras."""
-    held = _installed(pin.name, pin.version)
+    held = _metadata_of(pin)
     return _references(held.get_all("Requires-Dist") or (), locked) if held is not None else []
 
 
@@ -126,12 +109,18 @@ def _references(requirements: Iterable[str], locked: dict[str, list[Pin]]) -> li
     return [_reference(pin.name, pin.version) for lib in sorted(needed) for pin in locked.get(lib, ())]
 
 
-def _installed(name: str, version: str) -> Any:
+def installed(name: str) -> metadata.Distribution | None:
+    """A package that is installed."""
     try:
-        held = metadata.distribution(name)
+        return metadata.distribution(name)
     except metadata.PackageNotFoundError:
         return None
-    return held.metadata if held.version == version else None
+
+
+def _metadata_of(pin: Pin) -> Any:
+    """The metadata of a library, where it is installed in that version."""
+    held = installed(pin.name)
+    return held.metadata if held is not None and held.version == pin.version else None
 
 
 def _reference(name: str, version: str) -> str:

@@ -4,13 +4,10 @@ What is measured is what is installed in the present environment: the files that
 compiled modules among them. Extras that are not installed whole are left out.
 """
 
-from __future__ import annotations
-
 import re
 import sys
 from collections.abc import Iterable
 from functools import cache
-from importlib import metadata
 from importlib.util import cache_from_source
 from pathlib import Path
 from typing import NamedTuple
@@ -18,8 +15,8 @@ from typing import NamedTuple
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
-from deploy.sbom import ROOT, licence_of, project_of
-from schemas.locks import UNUSED
+from deploy.sbom import ROOT, installed, licence_of, project_of
+from pipelines.doctor.software import needed_below
 
 NOT_OF_USERS = {"build", "dev", "bench", "docs"}
 TESTS = frozenset({"test", "tests"})
@@ -51,29 +48,16 @@ def weights() -> list[Weight]:
         if extra in NOT_OF_USERS:
             continue
         added = closure(_flat(requirements, project["optional-dependencies"])) - base
-        if all(_held(name) is not None for name in added):
+        if all(installed(name) is not None for name in added):
             parts.append(_weight(extra, added))
     return parts
 
 
 def closure(requirements: Iterable[str]) -> set[str]:
     """Normalised names of all packages that some requirements bring, on this Python; those that are missing are among them."""
-    left = [Requirement(one) for one in requirements]
-    seen: set[tuple[str, frozenset[str]]] = set()
-    while left:
-        one = left.pop()
-        key = (canonicalize_name(one.name), frozenset(one.extras))
-        held = _held(key[0])
-        if key in seen:
-            continue
-        seen.add(key)
-        for needed in map(Requirement, held.requires or () if held is not None else ()):
-            extras = one.extras or {""}
-            if canonicalize_name(needed.name) in UNUSED.get(key[0], ()):
-                continue
-            if needed.marker is None or any(needed.marker.evaluate({"extra": extra}) for extra in extras):
-                left.append(needed)
-    return {name for name, _ in seen}
+    parsed = [Requirement(one) for one in requirements]
+    below = needed_below((canonicalize_name(one.name), frozenset(one.extras)) for one in parsed)
+    return {canonicalize_name(one.name) for one in (*parsed, *(requirement for _, requirement in below))}
 
 
 def kind_of(licence: str) -> str:
@@ -95,7 +79,7 @@ def _weight(part: str, packages: set[str]) -> Weight:
 @cache
 def megabytes(name: str) -> float:
     """Size of the installed files of a package and of its compiled modules, those of its own tests left out, 10⁶ bytes."""
-    held = _held(name)
+    held = installed(name)
     total = 0
     for file in (held.files or ()) if held is not None else ():
         path = Path(str(file.locate()))
@@ -108,16 +92,9 @@ def megabytes(name: str) -> float:
 
 
 def _licence(name: str) -> str:
-    held = _held(name)
+    held = installed(name)
     found = licence_of(held.metadata) if held is not None else {}
     return str(found.get("expression") or found.get("license", {}).get("name", ""))
-
-
-def _held(name: str) -> metadata.Distribution | None:
-    try:
-        return metadata.distribution(name)
-    except metadata.PackageNotFoundError:
-        return None
 
 
 def _flat(requirements: Iterable[str], extras: dict[str, list[str]]) -> list[str]:

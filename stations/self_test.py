@@ -7,6 +7,7 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,9 +36,9 @@ class CheckResult:
     ok: bool
     value: float | str = ""
     unit: str = ""
-    low: float | None = None
-    high: float | None = None
-    message: str = ""
+    low: Annotated[float | None, "smallest value allowed"] = None
+    high: Annotated[float | None, "largest value allowed"] = None
+    message: Annotated[str, "empty if it is good"] = ""
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from contextlib import ExitStack, closing, suppress
 from dataclasses import dataclass
 from functools import partial
 from threading import Event
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 from schemas.errors import StationError, StationRefused, WrongUse
 from schemas.lot import Lot
@@ -46,7 +46,7 @@ class Served:
 
 @dataclass(frozen=True)
 class RegisterReading:
-    """Present value of one register; ``fault`` is the error where it cannot be read."""
+    """Present value of one register."""
 
     device: str
     device_id: int
@@ -54,7 +54,7 @@ class RegisterReading:
     address: int
     value: str
     unit: str
-    fault: str = ""
+    fault: Annotated[str, "reason why it cannot be read; empty otherwise"] = ""
 
 
 def served(config: StationConfig, slots: list[int]) -> list[Served]:

@@ -13,8 +13,6 @@ Everything is what the commands of the same names do, by the same code, with the
 A name is imported when it is used first: ``import tumbleline`` loads neither pandas nor a station.
 """
 
-from __future__ import annotations
-
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 

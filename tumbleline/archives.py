@@ -1,7 +1,5 @@
 """An archive as tables: its runs, their tables, SQL over all of them, and the calibration of a unit on a date."""
 
-from __future__ import annotations
-
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Coefficients of units with their uncertainty, and what can be done with them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -15,8 +13,7 @@ from pipelines.archive import Archive, Run
 from tumbleline.pictures import Picture, as_html, as_text, rounded_table
 from tumbleline.recordings import Recording
 
-K = 2.0
-"""Coverage factor of U."""
+K = 2.0  # coverage factor of U
 
 
 @dataclass(frozen=True)

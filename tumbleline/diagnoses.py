@@ -20,25 +20,31 @@ _FIGURES = ("size_ug", "p_value", "rms_after_ug", "heldout_after_ug")
 
 
 @dataclass(frozen=True)
-class ModelDiagnosis:
-    """The diagnosis of a model.
+class JudgedModel:
+    """A model that was judged.
 
-    document : with the keys of ``tumbleline diagnose --json``
+    document : with the keys of ``--json`` of the command of the same name
     """
 
     document: dict[str, Any] = field(repr=False)
-    source: str = ""
-    _made: Examination | None = field(default=None, repr=False)
 
     @property
     def adequate(self) -> bool | None:
-        """Whether nothing but noise is left; None where these data cannot tell."""
+        """Whether nothing but noise is left by the model; None where these data cannot tell."""
         return self.document["adequate"]
 
     @property
     def effects(self) -> list[str]:
-        """The model that was judged."""
+        """The effects of the model."""
         return list(self.document["effects"])
+
+
+@dataclass(frozen=True)
+class ModelDiagnosis(JudgedModel):
+    """The diagnosis of a model."""
+
+    source: str = ""
+    _made: Examination | None = field(default=None, repr=False)
 
     @property
     def verdict(self) -> str:

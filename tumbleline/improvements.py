@@ -1,7 +1,5 @@
 """The loop: diagnose a model, add what is missing, and judge the change on what was left out or on a fresh run."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from getpass import getuser
@@ -14,35 +12,24 @@ from numpy.typing import NDArray
 
 from pipelines.improvement.improvement import Attendant, ImprovedTables, Improvement
 from tumbleline.calibrations import Calibration, fit
-from tumbleline.diagnoses import ModelDiagnosis
+from tumbleline.diagnoses import JudgedModel, ModelDiagnosis
 from tumbleline.pictures import as_html, as_text
 from tumbleline.recordings import Recording, read, session_folder
 
 
 @dataclass(frozen=True)
-class ImprovedModel:
+class ImprovedModel(JudgedModel):
     """A model with what was missing in it.
 
-    document : with the keys of ``tumbleline improve --json`` · calibration : the fit of the resulting model
+    calibration : the fit of the resulting model
     """
 
-    document: dict[str, Any] = field(repr=False)
     calibration: Calibration = field(repr=False)
-
-    @property
-    def adequate(self) -> bool | None:
-        """Whether the resulting model is adequate; None where these data cannot tell."""
-        return self.document["adequate"]
 
     @property
     def added(self) -> list[str]:
         """Effects that were added."""
         return list(self.document["added"])
-
-    @property
-    def effects(self) -> list[str]:
-        """The resulting model."""
-        return list(self.document["effects"])
 
     @property
     def undecided(self) -> list[list[str]]:

@@ -13,8 +13,7 @@ if TYPE_CHECKING:
     from pipelines.drawing.chart import Chart
 
 
-MOST_ROWS = 40
-"""Rows of a table that is shown; the table itself has all."""
+MOST_ROWS = 40  # rows of a table that is shown; the table itself has all
 
 
 @dataclass(frozen=True)

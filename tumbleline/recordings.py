@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import tempfile
 from collections.abc import Mapping, Sequence
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
@@ -31,11 +31,6 @@ def _session() -> tempfile.TemporaryDirectory[str]:
 def session_folder() -> Path:
     """The folder of this process for what nobody asked to keep; it is removed when the process ends."""
     return Path(_session().name)
-
-
-def silent(_: str = "") -> AbstractContextManager[Any]:
-    """Shows nothing while something is computed."""
-    return nullcontext()
 
 
 @dataclass(frozen=True)
@@ -136,12 +131,12 @@ def read(
             past = history if isinstance(history, pd.DataFrame) else None if history is None else read_history(history)
             return _kept(checked(source, where="DataFrame", foreign=True), past, "DataFrame", archive, units)
         return replace(_imported(_as_file(source), columns, units, serial or "A", archive, stated), command="")
-    from pipelines.importers.files import is_file
+    from pipelines.importers import files
 
-    if not is_file(str(source)):
+    if not files.is_file(str(source)):
         return Recording(Archive(None if archive is None else str(archive)).run(str(source)))
     path = Path(source)
-    if columns is None and _is_table_of_dwells(path):
+    if columns is None and is_exchange(files.read(path)[0].columns):
         from pipelines.diagnosis.inputs import dwells_and_history
 
         beside = history if isinstance(history, str | Path) else ""
@@ -149,13 +144,6 @@ def read(
         past = checked_history(history, "history", foreign=True) if isinstance(history, pd.DataFrame) else past
         return _kept(dwells, past, path.name, archive, units)
     return _imported(path, columns, units, serial, archive, stated)
-
-
-def _is_table_of_dwells(path: Path) -> bool:
-    from pipelines.importers import files
-    from pipelines.importers.exchange import is_exchange
-
-    return is_exchange(files.read(path)[0].columns)
 
 
 def _kept(
@@ -213,7 +201,7 @@ def _imported(
             f"rate_hz=…; recognised: {seen.import_command}"
         )
     build(keys, path.name)
-    done = import_document([path], keys, path.name, "", _place(archive), None, silent)
+    done = import_document([path], keys, path.name, "", _place(archive), None, nullcontext)
     run = Archive(_place(archive)).run(done["run"])
     return Recording(run, _told(seen, proposal, done["remarks"]), Proposal(keys).command([path]))
 

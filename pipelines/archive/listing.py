@@ -4,7 +4,7 @@ import time
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import astuple, dataclass, fields
-from typing import Any
+from typing import Annotated, Any
 
 from pipelines.archive import derived, files
 from pipelines.archive.keys import digest
@@ -15,25 +15,20 @@ from schemas.errors import ArchiveUnusable
 
 @dataclass(frozen=True)
 class RunInfo:
-    """One line of the archive's list.
-
-    station : its name; empty for an import · rerun_of : the run that it computes again; empty for others
-    passed, graded : units; None before the grades are there
-    verdict : on the model, as the table ``verdict`` has it; None without one
-    """
+    """One line of the archive's list."""
 
     id: str
     recipe: str
     device: str
     units: tuple[str, ...]
-    started: str
+    started: Annotated[str, "ISO date and time, UTC"]
     finished: bool
     stages: tuple[str, ...]
-    station: str = ""
-    rerun_of: str = ""
-    passed: int | None = None
-    graded: int | None = None
-    verdict: str | None = None
+    station: Annotated[str, "its name; empty for an import"] = ""
+    rerun_of: Annotated[str, "the run that it computes again; empty for others"] = ""
+    passed: Annotated[int | None, "units that passed; null before the grades are there"] = None
+    graded: Annotated[int | None, "units with a decision; null before the grades are there"] = None
+    verdict: Annotated[str | None, "adequate, not adequate, not judged; null without a model to judge"] = None
 
 
 def info_of(run: Run) -> RunInfo | None:

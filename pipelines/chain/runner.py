@@ -33,15 +33,16 @@ class Done:
 Measure = Callable[["Job", "Records", "Progress"], None]
 
 
-def from_station(job: Job, records: Records, progress: Progress) -> None:
-    """Measure a job's lot on its station, going on behind the last record that is stored."""
+def from_station(job: Job, records: Records, progress: Progress, before: Records | None = None) -> None:
+    """Measure a job's lot on its station, going on behind the last record that is stored, or from the end of another capture."""
     from pipelines.capture.capture import capture  # a re-run of archived data opens no station
     from pipelines.procedures import roles_of
     from stations import open_station
 
     run = f"{job.recipe.name} {job.capture_id}"
     roles = roles_of(job.recipe)
-    with open_station(job.station, job.lot, resume=records.last_state(), run=run, roles=roles) as station:
+    state = records.last_state() or (None if before is None else before.last_state())
+    with open_station(job.station, job.lot, resume=state, run=run, roles=roles) as station:
         capture(station, job.recipe, job.lot, records, progress=progress, events=records.events)
 
 

@@ -29,9 +29,7 @@ if TYPE_CHECKING:
 INTERRUPTED = 130  # the exit status that shells use for Ctrl-C
 PIPE_CLOSED = 141  # the exit status that shells use for a reader that closed the pipe
 
-COMPLETES = "_TUMBLELINE_COMPLETE"
-"""Variable by which a shell asks for candidates; typer defines its name."""
-
+COMPLETES = "_TUMBLELINE_COMPLETE"  # variable by which a shell asks for candidates; typer defines its name
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 """Variables that BLAS libraries read when they are loaded."""
 
@@ -61,10 +59,8 @@ def find_commands(folder: Path) -> dict[str, CommandModule]:
 
     The name is the name of the module; a module with a reserved name of Python ends in an underscore (``import_``).
 
-    Raises
-    ------
-    IncompleteCommand
-        A module has the function or application of a command without its constants, or the reverse, or an ORDER twice.
+    Raises IncompleteCommand: a module has the function or application of a command without its constants, or the reverse, or an
+    ORDER twice.
     """
     commands: dict[str, CommandModule] = {}
     for path in sorted(folder.glob("*.py")):
@@ -96,8 +92,7 @@ def _read(path: Path) -> CommandModule | None:
     return CommandModule(path.stem, values["PART"], int(values["ORDER"]), values["SUMMARY"])
 
 
-COMMANDS = find_commands(Path(__file__).parent)
-"""The commands by name, in the order of the help."""
+COMMANDS = find_commands(Path(__file__).parent)  # the commands by name, in the order of the help
 
 
 class _OnDemand(TyperCommand):
@@ -229,7 +224,7 @@ def _product(
 def main() -> None:
     """Run the command line; an error that the user can correct is one message on standard error and an exit status."""
     _one_thread()
-    report_to(_remark)
+    report_to(lambda line: typer.echo(line, err=True))
     try:
         app()
     except TumblelineError as problem:
@@ -262,8 +257,7 @@ def _unexpected(problem: Exception) -> None:
         )
     if isinstance(problem, OSError) and problem.errno == errno.ENAMETOOLONG:
         _leave(
-            f"'{shown(str(problem.filename))}': the file name is too long for this system; give a shorter one",
-            UNUSABLE,
+            f"'{shown(str(problem.filename))}': the file name is too long for this system; give a shorter one", UNUSABLE
         )
     from schemas.installed import not_installed
 
@@ -282,10 +276,6 @@ def _one_thread() -> None:
     """
     for name in THREADS:
         os.environ.setdefault(name, os.environ.get("OMP_NUM_THREADS", "1"))
-
-
-def _remark(line: str) -> None:
-    sys.stderr.write(f"{line}\n")
 
 
 def _leave(message: str, status: int) -> None:

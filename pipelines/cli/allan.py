@@ -18,10 +18,7 @@ if TYPE_CHECKING:
 PART = "Results"
 ORDER = 370
 SUMMARY = "Compute the Allan deviation of a record and its noise terms, with intervals."
-EXAMPLES = (
-    "tumbleline allan rest.csv --rate 100 --plot allan.png",
-    "tumbleline allan latest --statistic hadamard",
-)
+EXAMPLES = ("tumbleline allan rest.csv --rate 100 --plot allan.png", "tumbleline allan latest --statistic hadamard")
 
 SPACINGS = ("octave", "decade")
 STATISTICS = ("allan", "modified", "hadamard", "total", "time", "tie", "mtie")
@@ -140,23 +137,13 @@ def _print_curves(document: dict[str, Any]) -> None:
 
 
 def even_series(
-    source: str,
-    columns: str,
-    clock: tuple[str, str, float | None],
-    unit: str,
-    archive: str | None,
-    stretch: int | None,
+    source: str, columns: str, clock: tuple[str, str, float | None], unit: str, archive: str | None, stretch: int | None
 ) -> EvenSeries | None:
     """The samples of a file or an import; None for a captured run, which has figures of its own.
 
-    Parameters
-    ----------
     clock : column and unit of the time, and rate in Hz, as they were given
 
-    Raises
-    ------
-    WrongUse
-        An option of files was given for a run.
+    Raises WrongUse: an option of files was given for a run.
     """
     from pipelines.importers.files import is_file
     from pipelines.importers.series import series_of_file, series_of_run

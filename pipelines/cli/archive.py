@@ -1,7 +1,5 @@
 """``tumbleline archive``: the signing key, the temporary files of killed writers, compaction, backup and restore."""
 
-from __future__ import annotations
-
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
@@ -22,18 +20,9 @@ EXAMPLES = (
     "tumbleline archive backup /mnt/copy --database /mnt/copies",
 )
 EXAMPLES_OF = {
-    "compact": (
-        "tumbleline archive compact",
-        "tumbleline archive compact --before 2026-05-01",
-    ),
-    "clean": (
-        "tumbleline archive clean --dry-run",
-        "tumbleline archive clean --archive /srv/archive",
-    ),
-    "key": (
-        "tumbleline archive key",
-        "tumbleline archive key --public",
-    ),
+    "compact": ("tumbleline archive compact", "tumbleline archive compact --before 2026-05-01"),
+    "clean": ("tumbleline archive clean --dry-run", "tumbleline archive clean --archive /srv/archive"),
+    "key": ("tumbleline archive key", "tumbleline archive key --public"),
     "backup": (
         "tumbleline archive backup /mnt/copy",
         "tumbleline archive backup /mnt/copy --database /mnt/copies --keep 30",

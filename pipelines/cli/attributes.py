@@ -1,18 +1,14 @@
 """``tumbleline attributes``: what is known of units and runs beside the measurement: wafer, supplier, batch, firmware."""
 
-from __future__ import annotations
-
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from pipelines.archive import Archive
 from pipelines.cli.options import ArchiveOption, JsonOption, argument, option
 from pipelines.cli.printing import give, print_table, say
-
-if TYPE_CHECKING:
-    from pipelines.discovery.documents import ListedAttributes
+from pipelines.discovery.documents import ListedAttributes
 
 PART = "Certificates, trace, audit"
 ORDER = 454

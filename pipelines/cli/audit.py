@@ -18,10 +18,7 @@ if TYPE_CHECKING:
 PART = "Certificates, trace, audit"
 ORDER = 450
 SUMMARY = "Audit the archive: drift, calibrations due, stations that changed, the population."
-EXAMPLES = (
-    "tumbleline audit --page audit.html",
-    "tumbleline audit --since 2026-01-01 --device ADXL355",
-)
+EXAMPLES = ("tumbleline audit --page audit.html", "tumbleline audit --since 2026-01-01 --device ADXL355")
 
 SHOWN = 12  # findings of one kind
 BEGINNING = -700000.0  # days before any calibration

@@ -1,9 +1,7 @@
 """``tumbleline certificate``: the calibration certificate of a certified unit, as PDF for people and as XML for programs."""
 
-from __future__ import annotations
-
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -11,9 +9,6 @@ from pipelines.archive import Archive
 from pipelines.cli.options import ArchiveOption, JsonOption, argument, option
 from pipelines.cli.printing import give, refuse_standard_output, remark
 from schemas.errors import DONE, PART_FAILED
-
-if TYPE_CHECKING:
-    from pipelines.certificates.document.issue import Issued
 
 PART = "Certificates, trace, audit"
 ORDER = 415
@@ -55,24 +50,9 @@ def command(
     key = None if sign_with is None else read_key(sign_with, password_file)
     done = issue(Archive(archive), names, who, output, key=key, address=address)
     lines = [f"certificate {one.number}: {one.pdf}, {one.xml}" for one in done.written]
-    give(_document(done), lines, as_json=as_json)
+    kept = ("serial", "run", "pdf", "xml", "signature")
+    written = [{"certificate": one.number, **{key: getattr(one, key) for key in kept}} for one in done.written]
+    give({"certificates": written, "left_out": done.left_out}, lines, as_json=as_json)
     for serial, why in done.left_out.items():
         remark(f"certificate: {serial}: {why}")
     raise typer.Exit(PART_FAILED if done.left_out else DONE)
-
-
-def _document(done: Issued) -> dict[str, Any]:
-    return {
-        "certificates": [
-            {
-                "certificate": one.number,
-                "serial": one.serial,
-                "run": one.run,
-                "pdf": str(one.pdf),
-                "xml": str(one.xml),
-                "signature": None if one.signature is None else str(one.signature),
-            }
-            for one in done.written
-        ],
-        "left_out": done.left_out,
-    }

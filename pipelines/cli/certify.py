@@ -1,7 +1,5 @@
 """``tumbleline certify``: certificates with a period of validity for the units of a run that passed."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any
 
 from inertial.counts import number_of
@@ -13,10 +11,7 @@ from schemas.errors import ArchiveUnusable
 PART = "Certificates, trace, audit"
 ORDER = 410
 SUMMARY = "Certify the units of a run that passed, for a period of validity."
-EXAMPLES = (
-    "tumbleline certify latest --months 12",
-    "tumbleline certify latest --units SN1",
-)
+EXAMPLES = ("tumbleline certify latest --months 12", "tumbleline certify latest --units SN1")
 
 
 def command(
@@ -59,26 +54,19 @@ def command(
             renew_report(source)
     except ArchiveUnusable as problem:  # the certificates are written; the old report may show other coefficients
         remark(f"certify: the report was not made again: {problem}")
-    there = {event.certificate for event in done.there}
-    certified = [
-        {"certificate": e.certificate, **e.document(), "was_there": e.certificate in there} for e in done.events
-    ]
+    certified = [{"certificate": e.certificate, **e.document(), "was_there": e in done.there} for e in done.events]
     document = {"run": source.id, "certified": certified, "left_out": done.left_out}
     conclude(document, _print, as_json=as_json, passed=not done.left_out)
 
 
 def _print_run(run: Run) -> None:
-    """Print on standard error which run will be certified."""
     from pipelines.certificates.coefficient_remarks import library_remarks
     from pipelines.certificates.measured import measured_on
 
     units = [str(unit["serial"]) for unit in run.about.get("lot", {}).get("units", [])]
     named = ", ".join(units) if len(units) <= 6 else f"{units[0]} … {units[-1]}"
-    lines = [
-        f"run {run.id}, measured on {measured_on(run)}, {number_of(len(units), 'unit')}: {named}",
-        *library_remarks(run),
-    ]
-    for line in lines:
+    counted = number_of(len(units), "unit")
+    for line in (f"run {run.id}, measured on {measured_on(run)}, {counted}: {named}", *library_remarks(run)):
         remark(f"certify: {line}")
 
 

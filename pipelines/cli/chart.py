@@ -28,8 +28,6 @@ class Line:
 def chart(title: str, lines: Sequence[Line], width: int, height: int, span: tuple[float, float]) -> Text:
     """The chart as text of ``height`` rows and about ``width`` columns, with values on the left and times below.
 
-    Parameters
-    ----------
     span : first and last time of the chart, s
     """
     from rich.text import Text

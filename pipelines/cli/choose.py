@@ -1,14 +1,10 @@
 """``tumbleline choose``: which kind of device, with which calibration, reaches an error that an application asks for."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from pipelines.cli.options import JsonOption, option
 from pipelines.cli.printing import conclude, print_table, say, short
-
-if TYPE_CHECKING:
-    from pipelines.planning.documents import ChoiceDocument, ChoiceRow
+from pipelines.planning.documents import ChoiceDocument, ChoiceRow
 
 PART = "Measure"
 ORDER = 115

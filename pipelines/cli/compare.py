@@ -1,7 +1,5 @@
 """``tumbleline compare``: a model against the dwells it is fitted to, dwells left out, and a fresh run."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from pipelines.cli import options

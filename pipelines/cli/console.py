@@ -1,7 +1,5 @@
 """A console whose long lines are wrapped between words at a terminal, and left whole in a pipe."""
 
-from __future__ import annotations
-
 import os
 from typing import Any
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -10,7 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from pipelines.archive import Archive
-from pipelines.cli.options import ArchiveOption, JsonOption, RateOption, TimeColumnOption, argument, option
+from pipelines.cli import options
+from pipelines.cli.options import argument, option
 from pipelines.cli.printing import (
     STANDARD_OUTPUT,
     conclude,
@@ -39,15 +39,13 @@ EXAMPLES = (
 
 def command(
     file: Annotated[Path, argument("FILE", "Raw output over time, with a column of temperature.")],
-    calibration: Annotated[
-        str, option("--calibration RUN:UNIT", "The calibration: a run and one of its units.")
-    ] = "latest",
+    calibration: options.CalibrationOption = "latest",
     output: Annotated[
         Path | None, option("--output -o FILE", "Corrected samples, as .csv or .parquet; -: as CSV on standard output.")
     ] = None,
     columns: Annotated[str, option("--columns x,y,z", "Columns of the output; x,y,z or out_x,… by default.")] = "",
-    time: TimeColumnOption = "",
-    rate: RateOption = None,
+    time: options.TimeColumnOption = "",
+    rate: options.RateOption = None,
     force: Annotated[str, option("--force X,Y,Z", "True specific force, g, the same for all samples.")] = "",
     gravity: Annotated[
         float | None, option("--gravity M_S2", "Local gravity with --at-rest, m/s²; that of the run by default.")
@@ -65,14 +63,14 @@ def command(
     state: Annotated[
         Path | None, option("--state FILE", "Go on with filter and bias as kept in this file, and keep them in it.")
     ] = None,
-    archive: ArchiveOption = None,
+    archive: options.ArchiveOption = None,
     *,
     at_rest: Annotated[
         bool, option("--at-rest", "Find where the unit is at rest and use the magnitude of gravity there.")
     ] = False,
     failed: Annotated[bool, option("--failed", "Also use a unit that failed its limits.")] = False,
     revoked: Annotated[bool, option("--revoked", "Also use a revoked calibration.")] = False,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Correct a recording: a = K⁻¹(ã − b) with all effects of the model, and the covariance of each sample.
 
@@ -81,17 +79,9 @@ def command(
     force and delays it, as stated. Exit status 1: the updates
     contradict the stated noise.
     """
+    from pipelines.export import filtering
     from pipelines.export.corrected import corrected, fit_of_unit
     from pipelines.export.correction import correction_document, tracking_of
-    from pipelines.export.filtering import (
-        Kept,
-        chosen_filter,
-        filter_document,
-        filter_rate,
-        filtered,
-        read_state,
-        write_state,
-    )
     from pipelines.export.recording import at_nominal_supply, read_recording
     from pipelines.jobs.model_files import use_formulas_of
     from pipelines.stages.uncertainty.budget_terms import archived_terms
@@ -113,21 +103,23 @@ def command(
         turn_on = terms.stability.switch_on_ug
     tracking = tracking_of(run, recording, force, gravity, turn_on, step, at_rest=at_rest)
     serial = fit.exported.unit
-    begin = None if state is None else read_state(state, serial)
+    begin = None if state is None else filtering.read_state(state, serial)
     if tracking is not None and begin is not None:
         tracking = replace(tracking, begin=begin.track)
     done = corrected(recording, fit, tracking)
     chosen, end, source = None, None, ""
     if low_pass:
-        chosen, source = chosen_filter(low_pass, cutoff, filter_rate(recording, begin), store, serial)
-        done, end = filtered(recording, done, chosen, begin)
+        chosen, source = filtering.chosen_filter(
+            low_pass, cutoff, filtering.filter_rate(recording, begin), store, serial
+        )
+        done, end = filtering.filtered(recording, done, chosen, begin)
     if output is not None:
         _write(recording, done, output)
     document = correction_document(recording, fit, done, None if printed else output)
-    document["filter"] = None if chosen is None else filter_document(chosen, source)
+    document["filter"] = None if chosen is None else filtering.filter_document(chosen, source)
     if state is not None:
         passed = None if chosen is None or end is None else (chosen, end)
-        write_state(state, Kept(serial, float(recording.time[-1]), passed, done.kept))
+        filtering.write_state(state, filtering.Kept(serial, float(recording.time[-1]), passed, done.kept))
         document["state"] = str(state)
     consistent = document["bias"] is None or document["bias"]["stated_uncertainty"] != "too small"
     conclude(document, partial(_print, remark if printed else say), as_json=as_json, passed=consistent)
@@ -139,9 +131,7 @@ def _write(recording: CorrectableRecording, done: Corrected, output: Path) -> No
 
     table = table_of(recording, done)
     if output.suffix == ".parquet":
-        sink = io.BytesIO()
-        table.to_parquet(sink, index=False)
-        data = sink.getvalue()
+        data = table.to_parquet(index=False)
     elif output.suffix == ".csv" or output == STANDARD_OUTPUT:
         data = table.to_csv(index=False, lineterminator="\n", float_format="%.10g").encode()
     else:

@@ -23,10 +23,7 @@ if TYPE_CHECKING:
 PART = "Start here"
 ORDER = 50
 SUMMARY = "Hide an effect in the simulated station, find it, add it and see the error fall."
-EXAMPLES = (
-    "tumbleline demo",
-    "tumbleline demo --effect pendulous_mass --seed 11 --by-hand",
-)
+EXAMPLES = ("tumbleline demo", "tumbleline demo --effect pendulous_mass --seed 11 --by-hand")
 
 
 def command(
@@ -52,14 +49,14 @@ def command(
 
     The same lot is measured twice; the second run is fresh data that no fit sees.
     """
+    drawn = secrets.randbelow(100000) if seed is None else seed
     if archive:
-        _archive(folder, secrets.randbelow(100000) if seed is None else seed, lots, as_json=as_json)
+        _archive(folder, drawn, lots, as_json=as_json)
         return
     from pipelines.archive.files import ELSEWHERE, writing
     from pipelines.demo.measure import measure
     from pipelines.demo.scenes import scene
 
-    drawn = secrets.randbelow(100000) if seed is None else seed
     hidden = scene(effect, drawn)
     with writing(folder, "demo", ELSEWHERE):
         folder.mkdir(parents=True, exist_ok=True)
@@ -103,7 +100,6 @@ def _put_aside(model: Path) -> Path | None:
 
 @contextmanager
 def _bar(what: str = "measuring the lot twice") -> Generator[Progress]:
-    """A bar on standard error."""
     from rich.progress import Progress as Bars
 
     with Bars(console=error_console(), transient=True) as bars:

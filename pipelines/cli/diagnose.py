@@ -108,10 +108,7 @@ def diagnosed(
 def measured_recipe(dwells: str, recipe: str, archive: str | None) -> Recipe:
     """The recipe that dwells were measured with: the one given, else the one of the run.
 
-    Raises
-    ------
-    WrongUse
-        Neither a file of dwells nor an import states its recipe, and none is named.
+    Raises WrongUse: neither a file of dwells nor an import states its recipe, and none is named.
     """
     from pipelines.importers.files import is_file
     from pipelines.jobs.job import job_of_run
@@ -130,9 +127,6 @@ def measured_recipe(dwells: str, recipe: str, archive: str | None) -> Recipe:
 def write_next(path: Path, document: dict[str, Any], base: Recipe, home: Path, source: str) -> None:
     """Write the proposed measurement as a recipe and print its path; without proposed steps nothing is written.
 
-    Parameters
-    ----------
-    document : the diagnosis
     base : the recipe that the dwells were measured with; home : its folder
     source : the dwells as they were named
     """

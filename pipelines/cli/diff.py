@@ -17,10 +17,7 @@ if TYPE_CHECKING:
 PART = "Old data, new models"
 ORDER = 530
 SUMMARY = "Show the differences between two runs, their size and their causes."
-EXAMPLES = (
-    "tumbleline diff latest RE-RUN",
-    "tumbleline diff RUN-A RUN-B --all",
-)
+EXAMPLES = ("tumbleline diff latest RE-RUN", "tumbleline diff RUN-A RUN-B --all")
 
 SHOWN = 12
 

@@ -1,7 +1,5 @@
 """``tumbleline discover``: what the lots of an archive show together that one lot cannot."""
 
-from __future__ import annotations
-
 from datetime import date
 from functools import partial
 from pathlib import Path
@@ -15,10 +13,7 @@ from schemas.errors import WrongUse
 PART = "Certificates, trace, audit"
 ORDER = 452
 SUMMARY = "Find effects, far smaller than the noise of a lot, that an archive of many lots shows."
-EXAMPLES = (
-    "tumbleline discover --html discoveries.html",
-    "tumbleline discover --driver station,slot --reach --json",
-)
+EXAMPLES = ("tumbleline discover --html discoveries.html", "tumbleline discover --driver station,slot --reach --json")
 
 
 def command(

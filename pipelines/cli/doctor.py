@@ -1,22 +1,15 @@
 """``tumbleline doctor``: what is configured, reachable, authenticated, writable and in time, with which versions."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from pipelines.cli.options import ArchiveOption, JsonOption, StationOption, option
 from pipelines.cli.printing import conclude, print_table, say
-
-if TYPE_CHECKING:
-    from pipelines.doctor.documents import DoctorDocument
+from pipelines.doctor.documents import DoctorDocument
 
 PART = "Measure"
 ORDER = 165
 SUMMARY = "Check installation, archive, orchestrator, station and clock; a remedy for each fault."
-EXAMPLES = (
-    "tumbleline doctor",
-    "tumbleline doctor --station line-1.toml --json",
-)
+EXAMPLES = ("tumbleline doctor", "tumbleline doctor --station line-1.toml --json")
 
 COLOURS = {"good": "green", "warning": "yellow", "fault": "bold red", "not configured": "dim"}
 
@@ -45,21 +38,15 @@ def _show(document: DoctorDocument) -> None:
 
     checks = document["checks"]
     lines = [
-        [
-            c["part"],
-            c["check"],
-            Text(c["state"], COLOURS[c["state"]]),
-            c["found"] if c["state"] == "good" else "see below",
-        ]
+        [c.part, c.check, Text(c.state, COLOURS[c.state]), c.found if c.state == "good" else "see below"]
         for c in checks
     ]
     print_table(["part", "check", "state", "found"], lines, whole=3)
     if document["samples"]:
         say(f"sample recipes and stations: {document['samples']}")
     for state in ("not configured", "warning", "fault"):
-        for c in (c for c in checks if c["state"] == state):
-            needed = f", needed: {c['needed']}" if c["needed"] else ""
-            remedy = f"; {c['remedy']}" if c["remedy"] else ""
-            text = f"{state}: {c['part']}, {c['check']}: {c['found']}{needed}{remedy}"
-            say(text, style=COLOURS[state])
+        for c in (c for c in checks if c.state == state):
+            needed = f", needed: {c.needed}" if c.needed else ""
+            remedy = f"; {c.remedy}" if c.remedy else ""
+            say(f"{state}: {c.part}, {c.check}: {c.found}{needed}{remedy}", style=COLOURS[state])
     say(f"{document['faults']} faults, {document['warnings']} warnings")

@@ -125,8 +125,6 @@ def _firmware(
 ) -> Firmware:
     """The low-pass and the models of the bias that C code gets.
 
-    Parameters
-    ----------
     low_pass : kind, cut-off and rate, Hz · tracking : whether, step in s, change of the bias from switch-on to switch-on in µg
     """
     from pipelines.export.filtering import chosen_filter

@@ -1,7 +1,5 @@
 """``tumbleline fit``: archived data again, with another model or other limits."""
 
-from __future__ import annotations
-
 import shlex
 from pathlib import Path
 from typing import Any, NoReturn
@@ -70,10 +68,7 @@ def command(
 def _fit_import(run: Run, change: tuple[str, Path | None, str], leave_out: str, *, as_json: bool) -> NoReturn:
     """Fit a model to an import, keep it as a run of its own and print it.
 
-    Parameters
-    ----------
     change : effects, model file and limits; empty or None if not given
-    leave_out : dwells as UNIT:DWELL,…
     """
     from pipelines.jobs.model_change import change_from_options
     from pipelines.rerun.imported_fit import fit_document

@@ -1,7 +1,5 @@
 """``tumbleline history``: the error of a model, version by version, beside the noise that its fit assumes."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated, Any
 

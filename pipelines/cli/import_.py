@@ -1,14 +1,15 @@
 """``tumbleline import``: recordings of other systems into the archive, with an optional fit."""
 
-from __future__ import annotations
-
+from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, NoReturn
 
+from inertial.counts import number_of
+from pipelines.cli.next_commands import archive_words, command_line, print_next
 from pipelines.cli.options import ArchiveOption, GroupOption, JoinOption, JsonOption, argument, option
-from pipelines.cli.printing import conclude, error_console
-from pipelines.cli.text.import_text import print_imports, print_transfers, print_waveforms
+from pipelines.cli.printing import conclude, error_console, print_table, say, short, short_values
+from pipelines.cli.text.verdict_text import print_verdict_of_fit
 from schemas.errors import WrongUse, did_you_mean
 from schemas.foreign import shown
 
@@ -151,7 +152,7 @@ def command(
     verdicts = [one["adequate"] for one in imports if one["fit"]]
     adequate = False if False in verdicts else None if None in verdicts else True
     document = imports[0] if len(imports) == 1 else {"imports": imports, "adequate": adequate}
-    show = partial(print_imports, imports, archive, list_dwells=list_dwells)
+    show = partial(_print_imports, imports, archive, list_dwells=list_dwells)
     conclude(document, show, as_json=as_json, passed=adequate is True)
 
 
@@ -165,7 +166,7 @@ def _transfer(files: list[Path], unit: str, effects: str, archive: str | None, *
     imported = [import_transfer(path, unit, model, archive) for path in files]
     document = dict(imported[0]) if len(imported) == 1 else {"imports": imported}
     passed = all(one["adequate"] is True for one in imported)
-    conclude(document, lambda _: print_transfers(imported), as_json=as_json, passed=passed)
+    conclude(document, lambda _: _print_transfers(imported), as_json=as_json, passed=passed)
 
 
 def _waveforms(
@@ -180,8 +181,6 @@ def _waveforms(
 ) -> NoReturn:
     """Reduce, keep and print the recordings of one unit; a part failed where a figure is not determined.
 
-    Parameters
-    ----------
     stated : columns and units as the options have them, rate in Hz, group
     """
     from pipelines.importers.mapping import pairs
@@ -193,4 +192,61 @@ def _waveforms(
     layout = RecordingLayout(pairs(columns, "--map"), pairs(units, "--units"), rate, group)
     imported = import_waveforms(paths, procedure, part, unit, layout, archive)
     passed = all(one["identified"] for one in imported["figures"])
-    conclude(dict(imported), print_waveforms, as_json=as_json, passed=passed)
+    conclude(dict(imported), _print_waveforms, as_json=as_json, passed=passed)
+
+
+def _print_transfers(imports: Sequence[Mapping[str, Any]]) -> None:
+    for one in imports:
+        say(f"{one['unit']}: {one['points']} points, kept as run {one['run']}")
+        for line in one["text"]:
+            say(f"  {line}")
+        print_verdict_of_fit(one["adequate"], "the model does not describe these points")
+
+
+def _print_waveforms(imported: Mapping[str, Any]) -> None:
+    say(f"{imported['unit']}: {imported['records']} recordings, kept as run {imported['run']}")
+    rows = [
+        [one["figure"], one["axis"], short(one["value"]), short(one["uncertainty"]), one["unit"], one["note"]]
+        for one in imported["figures"]
+    ]
+    print_table(["figure", "axis", "value", "standard uncertainty", "unit", "remark"], rows, whole=2)
+    for line in imported["text"]:
+        say(f"  {line}")
+
+
+def _print_imports(imports: Sequence[dict[str, Any]], archive: str | None, _: object, *, list_dwells: bool) -> None:
+    for one in imports:
+        dwells = number_of(one["dwells"], "dwell")
+        rows = f"{number_of(one['samples'], 'sample')}, {dwells}" if one["samples"] else dwells
+        say(f"{', '.join(one['units'])}: {rows} in {one['out_unit']}, kept as run {one['run']}")
+        for remark in [*one["remarks"], *one["lines"]]:
+            say(f"  {remark}")
+        if list_dwells:
+            _print_dwells(one["dwell_list"], one["out_unit"])
+        if one["fit"]:
+            print_verdict_of_fit(one["adequate"], "this fit does not describe these data")
+            if one["fit"] == "norm" and one["adequate"] is False:
+                print_next([command_line("diagnose", one["run"], *archive_words(archive))])
+
+
+def _print_dwells(dwells: list[dict[str, Any]], unit: str) -> None:
+    heads = ["dwell", "label", "start, s", "end, s", "samples", f"mean x / y / z, {unit}", f"sd x / y / z, {unit}",
+             "residual, µg", "influence"]  # fmt: skip
+    print_table(
+        heads,
+        [
+            [
+                str(one["dwell"]),
+                one["label"],
+                f"{one['start_s']:.2f}",
+                f"{one['end_s']:.2f}",
+                "" if one["n"] is None else str(one["n"]),
+                " / ".join(f"{value:.6g}" for value in one["mean"]),
+                "" if one["sd"] is None else short_values(one["sd"]),
+                "" if one["residual_ug"] is None else f"{one['residual_ug']:.1f}",
+                short(one["influence"]),
+            ]
+            for one in dwells
+        ],
+        whole=2,
+    )

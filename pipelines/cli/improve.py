@@ -21,10 +21,7 @@ if TYPE_CHECKING:
 PART = "Start here"
 ORDER = 20
 SUMMARY = "Diagnose a model, add what is missing, and judge it by a fresh run, in one command."
-EXAMPLES = (
-    "tumbleline improve latest",
-    "tumbleline improve dwells.csv --model model.toml --fresh fresh.csv --yes",
-)
+EXAMPLES = ("tumbleline improve latest", "tumbleline improve dwells.csv --model model.toml --fresh fresh.csv --yes")
 CHOICES = "y or Enter adds it, n leaves it out; Ctrl-C stops, and nothing is written"
 UNATTENDED = "improve: standard input ended before an answer, a line is needed; give --yes to run without an operator"
 
@@ -178,8 +175,6 @@ def _target(model: Path | None, output: Path | None) -> Path:
 def fresh_run(source: str, archive: str | None, *, measure: bool | None) -> str:
     """The fresh run of a run; empty where there is none and none is measured.
 
-    Parameters
-    ----------
     source : a file or a run, as it was named
     measure : whether the station measures one where the archive has none; None: ask at the terminal, else not
     """

@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 def dwells_and_history(source: str, history: str, archive: str | None) -> tuple[pd.DataFrame, pd.DataFrame | None]:
     """The dwells of a file or run, and their temperatures against time where there are any.
 
-    Parameters
-    ----------
     history : a file; empty for the run's own, or for the one beside a file of dwells
     """
     from pipelines.diagnosis import inputs
@@ -40,12 +38,7 @@ def without_dwells(dwells: pd.DataFrame, listed: str) -> tuple[pd.DataFrame, lis
 
 
 def add_effects(files: Sequence[Path] | None, formulas: Sequence[str] | None = None, where: str = "") -> None:
-    """Effects from files outside the tree, and formulas of the command line, in the catalogue from now on.
-
-    Parameters
-    ----------
-    where : the command, for messages about formulas
-    """
+    """Effects from files outside the tree, and formulas of the command line, in the catalogue from now on."""
     from inertial import effects
 
     for path in files or ():
@@ -57,12 +50,7 @@ def add_effects(files: Sequence[Path] | None, formulas: Sequence[str] | None = N
 
 
 def distribution(store: Archive, runs: Sequence[str], dask: str, workers: int | None) -> tuple[Distributor | None, int]:
-    """How the work on runs is distributed over Dask, None for processes of this machine; and the number of processes.
-
-    Parameters
-    ----------
-    dask, workers : as they were given
-    """
+    """How the work on runs is distributed over Dask, None for processes of this machine; and the number of processes."""
     from pipelines.flows.dask_cluster import on_dask
     from pipelines.parallel import processors
 

@@ -17,10 +17,7 @@ if TYPE_CHECKING:
 PART = "Start here"
 ORDER = 30
 SUMMARY = "Look at recordings of other systems and propose how to import them."
-EXAMPLES = (
-    "tumbleline inspect recording.csv",
-    "tumbleline inspect part-1.csv part-2.csv --join rows",
-)
+EXAMPLES = ("tumbleline inspect recording.csv", "tumbleline inspect part-1.csv part-2.csv --join rows")
 
 MOST_INTERVALS, MOST_FAULTS = 12, 6
 NUMBERS: tuple[tuple[Literal["low", "high", "resolution"], int], ...] = (("low", 6), ("high", 6), ("resolution", 4))
@@ -71,7 +68,7 @@ def _print_all(documents: list[InspectDocument]) -> None:
     if len(documents) > 1:
         say(
             f"{len(documents)} recordings; if they are parts of one, add --join rows (one after the other) or --join "
-            "columns (side by side)",
+            "columns (side by side)"
         )
     for document in documents:
         _print(document)
@@ -96,7 +93,6 @@ def _write(inspection: Inspection, picture: Path | None, page: Path | None) -> N
 
 
 def _print(one: InspectDocument) -> None:
-    """Print the content of a recording."""
     names = " + ".join(Path(name).name for name in one["files"])
     rate = "" if one["rate_hz"] is None else f", {one['rate_hz']:.5g} Hz"
     long = "" if one["duration_s"] is None else f", {one['duration_s']:.5g} s"
@@ -114,7 +110,7 @@ def _print(one: InspectDocument) -> None:
         if column["clipped"] and column["low"] is not None and column["high"] is not None:
             say(
                 f"  axis {column['meaning']} is clipped: {number_of(column['clipped'], 'sample')} in runs at the end of its "
-                f"range ({column['low']:g} to {column['high']:g}); the true output is beyond",
+                f"range ({column['low']:g} to {column['high']:g}); the true output is beyond"
             )
     for fault in one["faults"][:MOST_FAULTS]:
         what = "is constant" if fault["fault"] == "stuck_output" else "has torn words"
@@ -150,10 +146,9 @@ def _print_intervals(one: InspectDocument) -> None:
     intervals = one["intervals"]
     if not intervals:
         return
-    several = [k for k, interval in enumerate(intervals) if interval["positions"] > 1]
     total = sum(interval["end_s"] - interval["start_s"] for interval in intervals)
     say(f"  {number_of(len(intervals), 'static interval')}, {total:.4g} s")
-    for k in several[:MOST_FAULTS]:
+    for k in [k for k, interval in enumerate(intervals) if interval["positions"] > 1][:MOST_FAULTS]:
         say(f"  interval {k} holds about {intervals[k]['positions']} positions logged back to back")
     rows = [
         [

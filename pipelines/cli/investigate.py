@@ -22,10 +22,7 @@ if TYPE_CHECKING:
 PART = "Measure"
 ORDER = 130
 SUMMARY = "Measure a lot, then measure only what separates the effects that may be missing."
-EXAMPLES = (
-    "tumbleline investigate my.toml --yes",
-    "tumbleline investigate my.toml --station line-1.toml --budget 60",
-)
+EXAMPLES = ("tumbleline investigate my.toml --yes", "tumbleline investigate my.toml --station line-1.toml --budget 60")
 
 SETTLED = frozenset({"adequate", "told_apart"})
 
@@ -65,6 +62,7 @@ def command(
     effects are identified; 1: neither.
     """
     from pipelines.cli.terminal import attended
+    from pipelines.diagnosis.sentences import verdict
     from pipelines.inquiry.loop import InquirySettings, Participants, always, directly, run_inquiry
     from pipelines.jobs.job import Request
     from pipelines.jobs.model_files import chosen_effects
@@ -81,8 +79,9 @@ def command(
                 return _answer(inquiry, follow_up) if at_terminal else "nobody"
 
         def diagnosed(joint: JointDiagnosis) -> None:
+            runs = len(joint.lineage.runs)
             with quiet():
-                _print_diagnosis(joint)
+                remark(f"diagnosis of {runs} run{'s' if runs > 1 else ''}: {verdict(joint.document)}")
 
         participants = Participants(directly, always if yes else ask, progress, stage_done, diagnosed)
         if direct:
@@ -109,14 +108,6 @@ def _answer(inquiry: Inquiry, follow_up: FollowUp) -> Consent:
     left = inquiry.budget - inquiry.spent
     text = f"Measure this follow-up ({follow_up.minutes:.1f} min; {left:.1f} of {inquiry.budget:.1f} min budget left)?"
     return "go" if agreed(text) else "stop"
-
-
-def _print_diagnosis(joint: JointDiagnosis) -> None:
-    """Print one line about a joint diagnosis."""
-    from pipelines.diagnosis.sentences import verdict
-
-    runs = len(joint.lineage.runs)
-    remark(f"diagnosis of {runs} run{'s' if runs > 1 else ''}: {verdict(joint.document)}")
 
 
 def print_inquiry(document: dict[str, Any], archive: str | None = None) -> None:

@@ -1,7 +1,5 @@
 """``tumbleline keys``: the keys and names that recipes, limits, stations, --fault and demo accept."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Annotated
 
@@ -12,10 +10,7 @@ from schemas.errors import WrongUse, did_you_mean
 PART = "Measure"
 ORDER = 190
 SUMMARY = "List keys of recipes, limits and stations, faults, hidden effects and names of files."
-EXAMPLES = (
-    "tumbleline keys recipe",
-    "tumbleline keys fault --json",
-)
+EXAMPLES = ("tumbleline keys recipe", "tumbleline keys fault --json")
 
 
 def command(

@@ -15,12 +15,8 @@ if TYPE_CHECKING:
 PART = "Certificates, trace, audit"
 ORDER = 430
 SUMMARY = "Show the origin of certificates, tables and samples, and the results made from them."
-LONGEST = 10_000
-"""Characters of a line in a pipe, which has no width."""
-EXAMPLES = (
-    "tumbleline lineage latest",
-    "tumbleline lineage SN1 --prov sn1.jsonld",
-)
+LONGEST = 10_000  # characters of a line in a pipe, which has no width
+EXAMPLES = ("tumbleline lineage latest", "tumbleline lineage SN1 --prov sn1.jsonld")
 
 
 def command(

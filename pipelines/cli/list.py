@@ -1,9 +1,5 @@
 """``tumbleline list``: the runs of the archive."""
 
-from __future__ import annotations
-
-from dataclasses import asdict
-
 from inertial.counts import number_of
 from pipelines.archive import Archive, RunInfo
 from pipelines.cli.options import ArchiveOption, JsonOption
@@ -13,18 +9,14 @@ from schemas.tables import ADEQUATE
 PART = "Results"
 ORDER = 310
 SUMMARY = "List the runs of the archive."
-EXAMPLES = (
-    "tumbleline list",
-    "tumbleline list --json",
-)
+EXAMPLES = ("tumbleline list", "tumbleline list --json")
 
 
 def command(archive: ArchiveOption = None, *, as_json: JsonOption = False) -> None:
     """List the runs of the archive in the order of their start."""
     store = Archive(archive)
     infos = store.runs()
-    document = {"archive": str(store.root), "runs": [asdict(info) for info in infos]}
-    give(document, lambda _: _print(infos, store), as_json=as_json)
+    give({"archive": str(store.root), "runs": infos}, lambda _: _print(infos, store), as_json=as_json)
 
 
 def _print(infos: list[RunInfo], store: Archive) -> None:

@@ -1,7 +1,5 @@
 """Commands to give next, as lines that can be pasted: every file, run and archive in them exists, and every word is quoted."""
 
-from __future__ import annotations
-
 import shlex
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -44,8 +42,7 @@ class JudgedData:
         return [*(["--history", self.history] if self.history else []), *archive_words(self.archive)]
 
 
-FindData = Callable[[], JudgedData]
-"""Gives the data of a command; see :func:`judged_data`."""
+FindData = Callable[[], JudgedData]  # gives the data of a command; see :func:`judged_data`
 
 
 def command_line(*words: str) -> str:
@@ -61,8 +58,6 @@ def archive_words(archive: str | None) -> list[str]:
 def judged_data(source: str, history: str, archive: str | None) -> JudgedData:
     """The data of a command, with a fresh run: the one beside a file, or the one that an archive holds or will hold.
 
-    Parameters
-    ----------
     history : the file of temperatures against time that was read; empty where there was none
     """
     from pipelines.diagnosis.inputs import file_beside
@@ -95,8 +90,6 @@ def extension(
 ) -> list[str]:
     """The commands that add effects to a model file, and the one that shows the errors of its versions.
 
-    Parameters
-    ----------
     judged : the model that was judged; a new file begins with it
     new : whether the file does not exist yet
     """
@@ -132,8 +125,6 @@ def print_next(lines: Sequence[str]) -> None:
 def print_extension(document: dict[str, Any], find: FindData, model: Path | None) -> None:
     """Print the commands that add the recommended effects of a diagnosis and judge them.
 
-    Parameters
-    ----------
     find : gives the data; called only where there is something to add: to look for a fresh run takes a second
     model : the model file that was judged; None for a list of effects
     """

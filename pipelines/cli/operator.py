@@ -1,7 +1,5 @@
 """``tumbleline operator``: answers the questions of waiting runs, at any terminal that reaches their orchestrator."""
 
-from __future__ import annotations
-
 import os
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -16,10 +14,7 @@ if TYPE_CHECKING:
 PART = "Measure"
 ORDER = 140
 SUMMARY = "Answer the questions of runs that wait for an operator."
-EXAMPLES = (
-    "tumbleline operator",
-    "tumbleline operator line-six --go",
-)
+EXAMPLES = ("tumbleline operator", "tumbleline operator line-six --go")
 
 
 def command(

@@ -1,26 +1,31 @@
 """``tumbleline plan optimise``: the search, the recipe file, and the printed result."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, get_args
+from typing import Any, get_args
 
+from inertial.design import local_names, split
+from inertial.noise.dwells import DwellNoise
+from inertial.planning.pose_exchange import Criterion
+from inertial.poses import NAMED
 from pipelines.cli.options import names_in
 from pipelines.cli.printing import error_console
+from pipelines.jobs.model_files import refuse_unknown_effects
+from pipelines.jobs.recipe_text import limits_from, recipe_text
+from pipelines.jobs.recipes import load_limits
+from pipelines.planning.context import PlanContext, plan_context
+from pipelines.planning.discrimination import ENOUGH, SIZE_UG, discrimination_requirement
+from pipelines.planning.optimise import Optimum, optimise
+from pipelines.planning.optimum_document import optimum_document
+from pipelines.planning.requirement import Requirement, candidates, temperature_choices, verified_in
+from pipelines.planning.textbook import reference_errors, seen_by, textbook
 from schemas.bounds import COLDEST_C, HOTTEST_C
 from schemas.errors import TumblelineError, WrongUse, did_you_mean
 from schemas.foreign import shown
 from schemas.recipe import Recipe
 from schemas.station import StationConfig
 from schemas.units import MICRO
-
-if TYPE_CHECKING:
-    from inertial.noise.dwells import DwellNoise
-    from pipelines.planning.context import PlanContext
-    from pipelines.planning.optimise import Optimum
-    from pipelines.planning.requirement import Requirement
 
 
 @dataclass(frozen=True)
@@ -77,9 +82,6 @@ def _discriminates(options: OptimiseOptions) -> bool:
 
 
 def _discrimination(options: OptimiseOptions, against: PlanContext, levels: tuple[float, ...]) -> Requirement:
-    from pipelines.jobs.model_files import refuse_unknown_effects
-    from pipelines.planning.discrimination import ENOUGH, SIZE_UG, discrimination_requirement
-
     rivals, see = names_in(options.part), names_in(options.see)
     if not rivals:
         raise WrongUse(
@@ -93,8 +95,6 @@ def _discrimination(options: OptimiseOptions, against: PlanContext, levels: tupl
 
 
 def _refuse_unknown_plan(name: str) -> None:
-    from inertial.poses import NAMED
-
     if name and name not in NAMED:
         raise WrongUse(f"plan: no plan of poses is called '{shown(name)}'; {did_you_mean(name, list(NAMED))}")
 
@@ -102,11 +102,7 @@ def _refuse_unknown_plan(name: str) -> None:
 def _required_errors(
     options: OptimiseOptions, base: Recipe, against: PlanContext, levels: tuple[float, ...]
 ) -> Requirement:
-    from inertial.design import local_names, split
-    from inertial.planning.pose_exchange import Criterion
     from pipelines.jobs.model_files import refuse_unknown_effects
-    from pipelines.planning.requirement import Requirement, candidates, temperature_choices
-    from pipelines.planning.textbook import reference_errors, seen_by
 
     criteria = {name.lower(): name for name in get_args(Criterion)}
     if options.criterion.lower() not in criteria:
@@ -156,16 +152,8 @@ def cheapest_recipe(
 ) -> tuple[Optimum, dict[str, Any]]:
     """The recipe with the least station time for the required errors, and the document about it.
 
-    Parameters
-    ----------
-    base : the recipe to start from; ``name`` : its name on the command line
+    name : of the recipe to start from on the command line
     """
-    from pipelines.planning.context import plan_context
-    from pipelines.planning.optimise import optimise
-    from pipelines.planning.optimum_document import optimum_document
-    from pipelines.planning.requirement import verified_in
-    from pipelines.planning.textbook import textbook
-
     levels = levels_of(base, options.temperatures)
     against = plan_context(textbook(base, levels), station, noise)
     requirement = (
@@ -191,13 +179,8 @@ def cheapest_recipe(
 def written(best: Optimum, target: Path, home: Path, own: dict[str, Any]) -> str:
     """The text of the recipe file at ``target``.
 
-    Parameters
-    ----------
     home : folder of the recipe that the search started from
-    own : the document of the search
     """
-    from pipelines.jobs.recipe_text import limits_from, recipe_text
-
     recipe = best.planned.recipe
     limits = limits_from(recipe.limits, home, target.parent)
     remarks = [
@@ -213,8 +196,6 @@ def written(best: Optimum, target: Path, home: Path, own: dict[str, Any]) -> str
 
 def missing_limits(recipe: Recipe, home: Path) -> str:
     """What is missing where the limits of a recipe cannot be read from its folder; empty where they can."""
-    from pipelines.jobs.recipes import load_limits
-
     try:
         load_limits(recipe, home)
     except TumblelineError as problem:

@@ -1,7 +1,5 @@
 """Options and arguments that several commands share."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -11,8 +9,6 @@ import typer
 def option(notation: str, text: str, **checks: Any) -> Any:
     """An option of a command.
 
-    Parameters
-    ----------
     notation : its names, then what stands for its value, as the help shows them: ``--output -o FILE``
     text : what it does
     checks : ``min``, ``max``, ``callback`` and others of :class:`typer.Option`
@@ -94,6 +90,7 @@ SelectionArgument = Annotated[
         "Names of runs or their beginnings, 'latest', 'all', device:…, station:…, unit:…, recipe:…, since:DATE, until:DATE.",
     ),
 ]
+CalibrationOption = Annotated[str, option("--calibration RUN:UNIT", "The calibration: a run and one of its units.")]
 DaskOption = Annotated[
     str, option("--dask ADDRESS|local", "Work on Dask workers: of the scheduler at an address, or started here.")
 ]

@@ -23,15 +23,9 @@ if TYPE_CHECKING:
 PART = "Measure"
 ORDER = 120
 SUMMARY = "Show what a recipe can and cannot determine, before anything is measured."
-EXAMPLES = (
-    "tumbleline plan my.toml",
-    "tumbleline plan optimise my.toml",
-)
+EXAMPLES = ("tumbleline plan my.toml", "tumbleline plan optimise my.toml")
 EXAMPLES_OF = {
-    "recipe": (
-        "tumbleline plan my.toml",
-        "tumbleline plan my.toml --station line-1.toml --page plan.html",
-    ),
+    "recipe": ("tumbleline plan my.toml", "tumbleline plan my.toml --station line-1.toml --page plan.html"),
     "optimise": (
         "tumbleline plan optimise my.toml",
         "tumbleline plan optimise my.toml --criterion T --part third_order,odd_quadratic --size 10000",

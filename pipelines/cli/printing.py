@@ -18,30 +18,23 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.text import Text
 
-STANDARD_OUTPUT = Path("-")
-"""The name of standard output in place of a file, as the programs of a system understand it."""
+STANDARD_OUTPUT = Path("-")  # the name of standard output in place of a file, as the programs of a system understand it
 
-short, short_values = rounding.short, rounding.short_values
-"""Numbers as commands print them."""
-
-NARROW = 28
-"""Characters of a word that a narrow terminal shows unbroken: the longest name of an effect has 27."""
-
+short, short_values = rounding.short, rounding.short_values  # numbers as commands print them
+NARROW = 28  # characters of a word that a narrow terminal shows unbroken: the longest name of an effect has 27
 STYLES = {"pass": "bold green", "fail": "bold red", "refused": "bold magenta"}
 
 
-def console() -> Console:
+def console(*, stderr: bool = False) -> Console:
     """The console for results; brackets and colons in it are text, never markup."""
     from pipelines.cli.console import WordConsole
 
-    return WordConsole(highlight=False, markup=False, emoji=False)
+    return WordConsole(stderr=stderr, highlight=False, markup=False, emoji=False)
 
 
 def error_console() -> Console:
     """The console for progress and remarks: standard output has results only."""
-    from pipelines.cli.console import WordConsole
-
-    return WordConsole(stderr=True, highlight=False, markup=False, emoji=False)
+    return console(stderr=True)
 
 
 def say(what: object = "", style: str = "") -> None:
@@ -108,69 +101,64 @@ def print_table(
     from pipelines.cli.console import limited
 
     shown = out or console()
-    used = [k for k in range(len(columns)) if k < whole or not lines or any(str(line[k]).strip() for line in lines)]
-    columns, lines = [columns[k] for k in used], [[line[k] for k in used] for line in lines]
     width = shown.width if limited(shown) else None
-    least = [_least(k < whole, column, [line[k] for line in lines], width) for k, column in enumerate(columns)]
-    gap = min(GAPS, key=lambda one: (len(_parts(least, whole, width, one)), -one))
-    for part in _parts(least, whole, width, gap):
-        kept = [[line[k] for k in part] for line in lines]
-        _print_part(shown, [columns[k] for k in part], kept, title, [least[k] for k in part], whole, gap)
+    cells = ([line[k] for line in lines] for k in range(len(columns)))
+    made = [
+        _Column(head, own, kept=k < whole, in_pipe=width is None)
+        for k, (head, own) in enumerate(zip(columns, cells, strict=True))
+    ]
+    used = [one for k, one in enumerate(made) if k < whole or not lines or one.filled]
+    gap = min(GAPS, key=lambda one: (len(_parts(used, whole, width, one)), -one))
+    for part in _parts(used, whole, width, gap):
+        _print_part(shown, part, title, gap)
         title = ""
 
 
-GAPS = (3, 2)
-"""Characters between two columns; the second where it saves a continuation of the table."""
+GAPS = (3, 2)  # characters between two columns; the second where it saves a continuation of the table
 
 
-def _least(kept: bool, column: str, cells: Sequence[str | Text], width: int | None) -> int:
-    """Characters that a column needs at least: its longest line where it is kept whole, else its longest word.
+class _Column:
+    """A column of a table, with the characters that it needs at least and at most.
 
-    Words longer than any name are broken, but not in a pipe, which has no ``width``.
+    Numbers, and a column that is ``kept``, need their longest line, others their longest word. Words longer than any name are
+    broken, but not in a pipe, which has no width.
     """
-    texts = [str(cell) for cell in cells]
-    if kept or _numeric(texts):
-        return _longest([column, *texts], None)
-    longest = _longest([column, *texts], " ")
-    return longest if width is None else min(longest, NARROW)
+
+    def __init__(self, head: str, cells: Sequence[str | Text], *, kept: bool, in_pipe: bool) -> None:
+        texts = [str(cell) for cell in cells]
+        lines = [line for text in (head, *texts) for line in text.splitlines()]
+        longest_word = max((len(word) for line in lines for word in line.split(" ")), default=0)
+        self.head, self.cells, self.filled = head, cells, any(text.strip() for text in texts)
+        self.numeric = bool(texts) and all(map(_is_number, texts))
+        self.kept = kept or self.numeric
+        self.most = max(map(len, lines), default=0)
+        self.least = self.most if self.kept else longest_word if in_pipe else min(longest_word, NARROW)
 
 
-def _parts(least: Sequence[int], whole: int, width: int | None, gap: int) -> list[list[int]]:
+def _parts(columns: Sequence[_Column], whole: int, width: int | None, gap: int) -> list[list[_Column]]:
     """The columns in portions that fit a width, each with the first ``whole`` ones."""
-    head = list(range(min(whole, len(least))))
     if width is None:
-        return [list(range(len(least)))]
-    parts, own = list[list[int]](), list(head)
-    for k in range(len(head), len(least)):
-        if len(own) > len(head) and sum(least[m] + gap for m in [*own, k]) + 1 > width:
+        return [list(columns)]
+    head = list(columns[:whole])
+    parts, own = list[list[_Column]](), list(head)
+    for one in columns[whole:]:
+        if len(own) > len(head) and sum(column.least + gap for column in [*own, one]) + 1 > width:
             parts.append(own)
             own = list(head)
-        own.append(k)
+        own.append(one)
     return [*parts, own]
 
 
-def _print_part(
-    shown: Console,
-    columns: Sequence[str],
-    lines: Sequence[Sequence[str | Text]],
-    title: str,
-    least: Sequence[int],
-    whole: int,
-    gap: int,
-) -> None:
+def _print_part(shown: Console, columns: Sequence[_Column], title: str, gap: int) -> None:
     from rich import box
     from rich.table import Table
 
     table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, gap - 2))
-    texts = [[str(line[number]) for line in lines] for number in range(len(columns))]
-    most = [_longest([column, *own], None) for column, own in zip(columns, texts, strict=True)]
-    widths = _widths(least, most, shown.width - 1 - gap * len(columns))
-    for number, column in enumerate(columns):
-        numeric = _numeric(texts[number])
-        justify = "right" if numeric else "left"
-        kept = numeric or number < whole
-        table.add_column(column, justify=justify, overflow="fold", no_wrap=kept, width=widths[number])
-    for line in lines:
+    widths = _widths(columns, shown.width - 1 - gap * len(columns))
+    for one, width in zip(columns, widths, strict=True):
+        justify = "right" if one.numeric else "left"
+        table.add_column(one.head, justify=justify, overflow="fold", no_wrap=one.kept, width=width)
+    for line in zip(*(one.cells for one in columns), strict=True):
         table.add_row(*line)
     table.width = sum(widths) + gap * len(widths) + 1
     if title:
@@ -178,28 +166,12 @@ def _print_part(
     shown.print(table, crop=False)
 
 
-def _widths(least: Sequence[int], most: Sequence[int], room: int) -> list[int]:
+def _widths(columns: Sequence[_Column], room: int) -> list[int]:
     """Widths between what columns need at least and at most; room is given to the narrowest of those that want more."""
-    widths = list(least)
-    spare = room - sum(widths)
-    while spare > 0:
-        wanting = [k for k in range(len(widths)) if widths[k] < most[k]]
-        if not wanting:
-            break
-        narrowest = min(wanting, key=lambda k: widths[k])
-        widths[narrowest] += 1
-        spare -= 1
+    widths = [one.least for one in columns]
+    while sum(widths) < room and (wanting := [k for k, one in enumerate(columns) if widths[k] < one.most]):
+        widths[min(wanting, key=lambda k: widths[k])] += 1
     return widths
-
-
-def _numeric(cells: Sequence[str]) -> bool:
-    return bool(cells) and all(_is_number(cell) for cell in cells)
-
-
-def _longest(texts: Sequence[str], between: str | None) -> int:
-    """The longest line of texts, or the longest word with line breaks ``between`` words."""
-    pieces = (piece for text in texts for line in text.splitlines() for piece in line.split(between or "\n"))
-    return max(map(len, pieces), default=0)
 
 
 def _is_number(text: str) -> bool:

@@ -61,11 +61,7 @@ def command(
         say("nothing was written")
         raise typer.Exit(DONE)
     outcomes, given = program_run(
-        source,
-        chosen,
-        config,
-        Choice(form, offset_registers, tolerance),
-        lambda text: remark(f"program: {text}"),
+        source, chosen, config, Choice(form, offset_registers, tolerance), lambda text: remark(f"program: {text}")
     )
     result = document(source, outcomes, given)
     give(result, _print, as_json=as_json)

@@ -1,7 +1,5 @@
 """``tumbleline psd``: power spectral density of a file or a run, and the Allan deviation that follows from it."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any
 
 from pipelines.cli import options
@@ -12,10 +10,7 @@ from schemas.errors import WrongUse
 PART = "Results"
 ORDER = 375
 SUMMARY = "Compute the power spectral density of a record, and the Allan deviation from it."
-EXAMPLES = (
-    "tumbleline psd rest.csv --rate 100",
-    "tumbleline psd rest.csv --rate 100 --plot psd.png",
-)
+EXAMPLES = ("tumbleline psd rest.csv --rate 100", "tumbleline psd rest.csv --rate 100 --plot psd.png")
 
 
 def command(
@@ -56,7 +51,7 @@ def command(
 def _print(document: dict[str, Any]) -> None:
     say(
         f"{document['source']}: {document['samples']} samples at {short(document['rate_hz'], 5)} Hz, segments of "
-        f"{document['segment']} samples, resolution {short(document['rate_hz'] / document['segment'])} Hz",
+        f"{document['segment']} samples, resolution {short(document['rate_hz'] / document['segment'])} Hz"
     )
     unit = document["unit"] or "unit"
     lines = [[row["channel"], short(row["median_amplitude"], 4)] for row in document["spectra"]]

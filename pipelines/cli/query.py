@@ -1,7 +1,5 @@
 """``tumbleline query``: SQL queries on the archive."""
 
-from __future__ import annotations
-
 import csv
 import sys
 from typing import Annotated

@@ -1,7 +1,5 @@
 """``tumbleline report``: the path of a run's report."""
 
-from __future__ import annotations
-
 import typer
 
 from pipelines.archive import Archive
@@ -11,10 +9,7 @@ from pipelines.cli.printing import error_console, give
 PART = "Results"
 ORDER = 330
 SUMMARY = "Print the path of a run's report; write the report if it is missing."
-EXAMPLES = (
-    "tumbleline report latest",
-    "tumbleline report line-six --archive archive",
-)
+EXAMPLES = ("tumbleline report latest", "tumbleline report line-six --archive archive")
 
 
 def command(run: RunArgument = "latest", archive: ArchiveOption = None, *, as_json: JsonOption = False) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import asdict
 from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any
@@ -17,18 +16,13 @@ from pipelines.cli.printing import conclude, error_console, print_table, say
 from schemas.errors import WrongUse
 
 if TYPE_CHECKING:
-    from pipelines.jobs.model_change import ModelChange
-    from pipelines.parallel import Distributor
     from pipelines.rerun.reproduce import Reproduction
     from pipelines.rerun.rerun import RerunOutcome
 
 PART = "Old data, new models"
 ORDER = 520
 SUMMARY = "Re-analyse archived runs with the present code, another model or other limits."
-EXAMPLES = (
-    "tumbleline rerun all --check",
-    "tumbleline rerun device:adxl355 since:2026-01-01 --model model.toml",
-)
+EXAMPLES = ("tumbleline rerun all --check", "tumbleline rerun device:adxl355 since:2026-01-01 --model model.toml")
 
 SHOWN = 40
 DIFFERENCES = 3  # re-runs that are proposed for a comparison
@@ -57,7 +51,8 @@ def command(
     """
     from pipelines.audit.index_growth import add_runs
     from pipelines.jobs.model_change import change_from_options
-    from pipelines.rerun.partition import checked, run_again
+    from pipelines.parallel import map_partitions
+    from pipelines.rerun.partition import checked, parts, run_again
     from pipelines.rerun.selection import selected
 
     change = change_from_options(effects, model, limits, effect_file)
@@ -68,37 +63,19 @@ def command(
         )
     store = Archive(archive)
     runs = [entry.id for entry in selected(store, selection)]
-    done = _mapped(
-        checked if check else run_again, store, runs, change, distribution(store, runs, dask, workers), report=report
-    )
+    (distribute, count), counted = distribution(store, runs, dask, workers), number_of(len(runs), "run")
+    with error_console().status(f"re-analysing {counted}, {count} at a time"):
+        function, portions = checked if check else run_again, parts(store, runs, change, count, report=report)
+        found = map_partitions(function, portions, distribute, workers=count, name=f"rerun of {counted}")
+    done: list[Any] = [outcome for portion in found for outcome in portion]
     if check:
         same = sum(result.same for result in done)
         rows = [asdict(result) for result in done]
         checks = {"archive": str(store.root), "selected": len(done), "same": same, "runs": rows}
         conclude(checks, lambda _: _print_check(done), as_json=as_json, passed=same == len(done))
     add_runs(store, [outcome.new for outcome in done if outcome.new])
-    document = {"archive": str(store.root), "runs": [asdict(outcome) for outcome in done], **_counts(done)}
+    document = {"archive": str(store.root), "runs": done, **_counts(done)}
     conclude(document, partial(_print, done, archive), as_json=as_json, passed=not document["failed"])
-
-
-def _mapped(
-    function: Callable[[Any], list[Any]],
-    store: Archive,
-    runs: list[str],
-    change: ModelChange,
-    spread: tuple[Distributor | None, int],
-    *,
-    report: bool,
-) -> list[Any]:
-    """Results of a function for the runs, in their order, computed here or on a cluster."""
-    from pipelines.parallel import map_partitions
-    from pipelines.rerun.partition import parts
-
-    (distribute, count), counted = spread, number_of(len(runs), "run")
-    with error_console().status(f"re-analysing {counted}, {count} at a time"):
-        portions = parts(store, runs, change, count, report=report)
-        done = map_partitions(function, portions, distribute, workers=count, name=f"rerun of {counted}")
-    return [outcome for portion in done for outcome in portion]
 
 
 def _counts(outcomes: list[RerunOutcome]) -> dict[str, int]:
@@ -125,7 +102,7 @@ def _print(outcomes: list[RerunOutcome], archive: str | None, document: dict[str
 
 
 def _line(one: RerunOutcome) -> list[str]:
-    whats = dict.fromkeys("code" if change["what"] == "code" else change["what"] for change in one.because)
+    whats = dict.fromkeys(change["what"] for change in one.because)
     worked = [name for name, how in one.stages.items() if how == "computed"]
     return [one.run, one.new if one.new != one.run else "—", ", ".join(whats) or "nothing", ", ".join(worked) or "none"]
 

@@ -1,7 +1,5 @@
 """``tumbleline revoke``: end the validity of a unit's calibration, with the reason."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from pipelines.archive import Archive, Run

@@ -108,10 +108,7 @@ def command(
 def refuse_recorded(jobs: list[Job], store: Archive, *, replays: bool) -> None:
     """Refuse to record or replay a lot that the archive has already: nothing would be measured.
 
-    Raises
-    ------
-    WrongUse
-        Its capture is there, whole or in part.
+    Raises WrongUse: its capture is there, whole or in part.
     """
     for job in jobs:
         capture = store.capture(job.capture_id)

@@ -1,21 +1,15 @@
 """Commands that serve pages: Ctrl-C ends without a traceback."""
 
-from __future__ import annotations
-
 import asyncio
 import logging
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+import uvicorn
+from starlette.types import ASGIApp
 
 from pipelines.cli.printing import remark
-
-if TYPE_CHECKING:
-    import uvicorn
-    from starlette.types import ASGIApp
-
-    from pipelines.serving.connections import LimitedSocket
-
+from pipelines.serving.connections import LimitedSocket, TimedRequests
 
 PATIENCE_S = 2  # open streams would hold up the end of a server
 
@@ -24,10 +18,6 @@ def page_server(
     app: ASGIApp, place: LimitedSocket, certificate: Path | None = None, key: Path | None = None
 ) -> uvicorn.Server:
     """The server of an application on a socket that is open already; with HTTPS where a certificate and its key are given."""
-    import uvicorn
-
-    from pipelines.serving.connections import TimedRequests
-
     config = uvicorn.Config(
         TimedRequests(app, place.connections), log_level="warning", access_log=False, server_header=False, ws="none",
         timeout_graceful_shutdown=PATIENCE_S, ssl_certfile=certificate, ssl_keyfile=key, proxy_headers=False,

@@ -1,7 +1,5 @@
 """``tumbleline show``: a run, one of its tables, or the calibration of a unit on a date, from a few small files without numpy."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Sequence
 from importlib import import_module
@@ -19,17 +17,14 @@ from schemas.errors import DONE, PART_FAILED, WrongUse
 PART = "Results"
 ORDER = 320
 SUMMARY = "Show a run, one of its tables, or the calibration of a unit that is valid on a date."
-EXAMPLES = (
-    "tumbleline show latest coefficients",
-    "tumbleline show SN1 --at 2026-03-01",
-)
+EXAMPLES = ("tumbleline show latest coefficients", "tumbleline show SN1 --at 2026-03-01")
 
 MANY = 40
 NOTES = {
     "coefficients": (
         "standard_error: k = 1, of the value that wander moves about; of the bias as the mean of this record: bias_record_u_ug "
         "of the table wander"
-    ),
+    )
 }
 """What the columns of a table mean where their names alone mislead."""
 

@@ -6,7 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from pipelines.archive import Archive
-from pipelines.cli.options import ArchiveOption, JsonOption, RateOption, TimeColumnOption, argument, option
+from pipelines.cli import options
+from pipelines.cli.options import argument, option
 from pipelines.cli.printing import error_console, give, say, short
 
 if TYPE_CHECKING:
@@ -27,21 +28,19 @@ def command(
         Path, argument("FILE", "True specific force over time: time_s, force_x, force_y, force_z, unit_C.")
     ],
     output: Annotated[Path, option("--output -o FILE", "Raw samples, as .csv, .parquet, .mat or .npy.")],
-    calibration: Annotated[
-        str, option("--calibration RUN:UNIT", "The calibration: a run and one of its units.")
-    ] = "latest",
+    calibration: options.CalibrationOption = "latest",
     units: Annotated[str, option("--units g|m/s^2", "Unit of the force.")] = "g",
-    time: TimeColumnOption = "",
-    rate: RateOption = None,
+    time: options.TimeColumnOption = "",
+    rate: options.RateOption = None,
     bandwidth: Annotated[
         float | None, option("--bandwidth HZ", "Of the sensor, two poles; by default none is applied.", min=1e-9)
     ] = None,
     seed: Annotated[int, option("--seed", "Of the noise; the same seed gives the same samples.", min=0)] = 0,
-    archive: ArchiveOption = None,
+    archive: options.ArchiveOption = None,
     *,
     noise: Annotated[bool, option("--noise/--no-noise", "Add the noise of the unit's static record.")] = True,
     failed: Annotated[bool, option("--failed", "Also use a unit that failed its limits.")] = False,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Pass a trajectory through a calibrated unit: bias, scale, misalignment, temperature, all effects of the model, and noise.
 

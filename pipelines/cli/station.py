@@ -8,16 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from pipelines.archive import Archive
+from pipelines.cli import options
 from pipelines.cli.inputs import made_up
-from pipelines.cli.options import (
-    ArchiveOption,
-    JsonOption,
-    SimulatedDeviceOption,
-    SimulatedUnitsOption,
-    StationOption,
-    argument,
-    option,
-)
+from pipelines.cli.options import argument, option
 from pipelines.cli.printing import give, print_json, print_table, say
 from pipelines.cli.station_bring_up import bring_up, frames, replay
 from pipelines.cli.station_check import check
@@ -29,10 +22,7 @@ if TYPE_CHECKING:
 PART = "Measure"
 ORDER = 150
 SUMMARY = "Connect, show, check, serve and describe stations."
-EXAMPLES = (
-    "tumbleline station status --station line-1.toml",
-    "tumbleline station check --station line-1.toml",
-)
+EXAMPLES = ("tumbleline station status --station line-1.toml", "tumbleline station check --station line-1.toml")
 EXAMPLES_OF = {
     "bring-up": (
         "tumbleline station bring-up watlow_f4t --link tcp://192.168.0.20 --readings",
@@ -54,22 +44,10 @@ EXAMPLES_OF = {
         "tumbleline station check --station line-1.toml",
         "tumbleline station check --station line-1.toml --registers",
     ),
-    "log": (
-        "tumbleline station log",
-        "tumbleline station log latest --all",
-    ),
-    "watch": (
-        "tumbleline station watch",
-        "tumbleline station watch --station line-1.toml --minutes 30",
-    ),
-    "serve": (
-        "tumbleline station serve --port 5020",
-        "tumbleline station serve --units 4 --speed 60",
-    ),
-    "profiles": (
-        "tumbleline station profiles",
-        "tumbleline station profiles watlow_f4t",
-    ),
+    "log": ("tumbleline station log", "tumbleline station log latest --all"),
+    "watch": ("tumbleline station watch", "tumbleline station watch --station line-1.toml --minutes 30"),
+    "serve": ("tumbleline station serve --port 5020", "tumbleline station serve --units 4 --speed 60"),
+    "profiles": ("tumbleline station profiles", "tumbleline station profiles watlow_f4t"),
 }
 """Of the subcommands."""
 
@@ -92,11 +70,11 @@ QUIET = {"reference", "soak"}  # shown only with --all, because they occur in ev
 
 def log(
     run: Annotated[str, argument("[RUN]", "Show only this run of the archive.")] = "",
-    archive: ArchiveOption = None,
+    archive: options.ArchiveOption = None,
     limit: Annotated[int, option("--limit", "Number of events, newest last.", min=1)] = 50,
     *,
     everything: Annotated[bool, option("--all", "Also show soaks and reference readings.")] = False,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Show events that paused or ended runs (from the archive) and events of stations (from the log of this computer)."""
     recorded = [*_of_runs(Archive(archive), run), *([] if run else _of_machine())]
@@ -161,12 +139,7 @@ SHORT = {"read": "r", "write": "w", "read_write": "rw"}
 SETTINGS = re.compile(r"[,:;(]| with | behind ")
 """What stands between the name of a model and the required settings of the device."""
 
-app = typer.Typer(
-    help=SUMMARY,
-    no_args_is_help=True,
-    add_completion=False,
-    pretty_exceptions_enable=False,
-)
+app = typer.Typer(help=SUMMARY, no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
 
 app.command("bring-up")(bring_up)
 app.command()(frames)
@@ -179,20 +152,20 @@ app.command()(watch)
 
 @app.command()
 def serve(
-    station: StationOption = None,
+    station: options.StationOption = None,
     host: Annotated[str, option("--host", "Interface to listen on.")] = "127.0.0.1",
     port: Annotated[int, option("--port", "TCP port; 0: any free port.", min=0, max=65535)] = 5020,
     speed: Annotated[
         float, option("--speed", "Simulated seconds per second of real time.", min=0.001, max=1000.0)
     ] = 1.0,
-    device: SimulatedDeviceOption = "ADXL355",
-    units: SimulatedUnitsOption = 8,
+    device: options.SimulatedDeviceOption = "ADXL355",
+    units: options.SimulatedUnitsOption = 8,
     seed: Annotated[int, option("--seed", "Random seed of the simulated units.", min=0)] = 1,
     silence: Annotated[
         float, option("--silence", "Seconds without a request after which drives and reader stop; 0: never.", min=0.0)
     ] = 30.0,
     *,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Serve the simulated station over Modbus TCP until interrupted, for any Modbus client."""
     import signal
@@ -224,7 +197,7 @@ def serve(
 def profiles(
     name: Annotated[str, argument("[PROFILE]", "Show the registers of this profile.")] = "",
     *,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """List the register-map profiles, or the registers of one profile."""
     from stations.profile_files import load_profile, profile_names

@@ -15,7 +15,7 @@ from pipelines.cli.printing import give, print_json, print_table, publish, remar
 from schemas.errors import STATION, StationError, WrongUse
 
 if TYPE_CHECKING:
-    from pipelines.commissioning.documents import ConformanceDocument, FramesDocument, Platform, RecordedDeviceRow
+    from pipelines.commissioning.documents import ConformanceDocument, FramesDocument, RecordedDeviceRow
     from stations.bringup.session import BringUp
 
 ON = "What is at the other end: hardware, simulator or replay? (Enter: not stated)"
@@ -95,15 +95,19 @@ def _written(session: BringUp, folder: Path, person: _Typed, by: str, *, as_json
     import json
 
     from pipelines.commissioning.conformance import conformance_page, document_of
+    from pipelines.commissioning.documents import Platform
+    from pipelines.tables.json_values import json_value
     from stations.bringup.corrected import corrected_name, corrected_text
 
     corrected = corrected_text(session.profile, session.findings, session.made)
     name = f"{corrected_name(session.profile)}.toml" if corrected else ""
-    platform = _platform(person) if not session.ended else "not stated"
+    typed = "" if session.ended else person.ask(ON).strip().lower()
+    platform: Platform = next((known for known in get_args(Platform) if known == typed), "not stated")
     document = document_of(session, verified_on=platform, by=by, recording="frames.jsonl", corrected=name)
     if corrected:
         publish(folder / name, corrected, "corrected profile")
-    publish(folder / "conformance.json", json.dumps(document, ensure_ascii=False, indent=2) + "\n", "conformance")
+    text = json.dumps(json_value(document), ensure_ascii=False, indent=2)
+    publish(folder / "conformance.json", f"{text}\n", "conformance")
     publish(folder / "conformance.html", conformance_page(document, folder / "frames.jsonl"), "page")
     if as_json:
         print_json(document)
@@ -112,21 +116,11 @@ def _written(session: BringUp, folder: Path, person: _Typed, by: str, *, as_json
     return document
 
 
-def _platform(person: _Typed) -> Platform:
-    from pipelines.commissioning.documents import Platform as Known
-
-    typed = person.ask(ON).strip().lower()
-    return next((known for known in get_args(Known) if known == typed), "not stated")
-
-
 def _print(document: ConformanceDocument) -> None:
-    told = [point for point in document["points"] if point["verdict"] == "differs"]
-    if told:
-        lines = [[p["what"], p["found"], p["expected"], p["remedy"]] for p in told]
+    points = document["points"]
+    if lines := [[p.what, p.found, p.expected, p.remedy] for p in points if p.verdict == "differs"]:
         print_table(["differs", "found", "expected", "what to do"], lines)
-    untried = [
-        point["what"] for point in document["points"] if point["verdict"] == "not tried" and point["part"] != "register"
-    ]
+    untried = [p.what for p in points if p.verdict == "not tried" and p.part != "register"]
     if untried:
         say(f"not tried: {', '.join(untried)}")
     state = "" if document["complete"] else "; it ended before its last step"

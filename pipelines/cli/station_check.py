@@ -2,20 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from inertial.counts import number_of
+from pipelines.cli import options
 from pipelines.cli.inputs import made_up
-from pipelines.cli.options import (
-    JsonOption,
-    RecordOption,
-    SimulatedDeviceOption,
-    SimulatedUnitsOption,
-    StationOption,
-    option,
-)
+from pipelines.cli.options import option
 from pipelines.cli.printing import print_json, print_table, remark
 from schemas.errors import STATION
 
@@ -27,20 +21,18 @@ if TYPE_CHECKING:
 
 
 def check(
-    station: StationOption = None,
-    device: SimulatedDeviceOption = "ADXL355",
-    units: SimulatedUnitsOption = 8,
+    station: options.StationOption = None,
+    device: options.SimulatedDeviceOption = "ADXL355",
+    units: options.SimulatedUnitsOption = 8,
     *,
     registers: Annotated[bool, option("--registers", "Only read every register once; no motion.")] = False,
-    record: RecordOption = None,
-    as_json: JsonOption = False,
+    record: options.RecordOption = None,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Test a station before a shift: registers, instruments, moves, noise of every slot, a check standard.
 
     It leases the station as a run does and leaves it in the safe state. Exit status 3: a test failed.
     """
-    from dataclasses import asdict
-
     from schemas.station import load_station
     from stations.links.recorder import recorded
     from stations.serving import look
@@ -52,8 +44,8 @@ def check(
         findings = [] if registers or silent else _tested(config, device, units)
     failed = [*silent, *(finding.message for finding in findings if not finding.ok)]
     if as_json:
-        document: dict[str, Any] = {"ok": not failed, "failed": failed, "registers": [asdict(r) for r in readings]}
-        print_json(document | ({} if registers else {"checks": [asdict(finding) for finding in findings]}))
+        document = {"ok": not failed, "failed": failed, "registers": readings}
+        print_json(document if registers else {**document, "checks": findings})
     else:
         _print(readings, findings, registers=registers)
         for message in failed:

@@ -13,17 +13,10 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 import typer
 
 from pipelines.archive import Archive, Records
+from pipelines.cli import options
 from pipelines.cli.chart import Line, chart, clock
 from pipelines.cli.inputs import made_up
-from pipelines.cli.options import (
-    ArchiveOption,
-    JsonOption,
-    SimulatedDeviceOption,
-    SimulatedUnitsOption,
-    StationOption,
-    argument,
-    option,
-)
+from pipelines.cli.options import argument, option
 from pipelines.cli.printing import console, print_json, remark, say
 from schemas.errors import STATION, WrongUse
 
@@ -38,13 +31,13 @@ GOOD, BAD = "green", "bold red"
 
 
 def status(
-    station: StationOption = None,
-    device: SimulatedDeviceOption = "ADXL355",
-    units: SimulatedUnitsOption = 8,
+    station: options.StationOption = None,
+    device: options.SimulatedDeviceOption = "ADXL355",
+    units: options.SimulatedUnitsOption = 8,
     every: Annotated[float, option("--every", "Seconds between two readings with --watch.", min=0.1)] = 1.0,
     *,
     watch: Annotated[bool, option("--watch", "Repeat until Ctrl-C.")] = False,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Show angles, temperatures, states, slots and the run that drives the station.
 
@@ -143,15 +136,15 @@ class ChartData:
 
 def watch(
     run: Annotated[str, argument("[RUN]", "A run of the archive; default: the newest.")] = "latest",
-    station: StationOption = None,
-    archive: ArchiveOption = None,
+    station: options.StationOption = None,
+    archive: options.ArchiveOption = None,
     minutes: Annotated[
         float, option("--minutes", "Time span, minutes before now; default: the whole run.", min=0.1)
     ] = math.inf,
     every: Annotated[float, option("--every", "Seconds between two readings.", min=0.1)] = 1.0,
     *,
     once: Annotated[bool, option("--once", "Draw once and exit.")] = False,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Draw temperatures and angles over time, live: of a run in the archive, or with --station of a station."""
     with _source(run, station, archive) as look:

@@ -1,8 +1,6 @@
 """The result of a run in short: one line per slot, for people and as JSON."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from inertial.counts import number_of
 from pipelines.archive import Run
@@ -10,9 +8,6 @@ from pipelines.capture.interruptions import Interruptions, interruptions
 from pipelines.cli.printing import STYLES, print_table, say, short
 from pipelines.tables.frames import rows_of
 from pipelines.tables.json_values import json_value
-
-if TYPE_CHECKING:
-    from rich.text import Text
 
 SHOWN = (
     ("residual_rms_ug", "fit\nµg"),
@@ -47,17 +42,17 @@ def summary(run: Run) -> dict[str, Any]:
         of_unit = rows_of(figures[figures["unit"] == row["unit"]])
         cells = {f["figure"]: {k: f[k] for k in (*FIXED, *RISKS) if k in f} for f in of_unit}
         units.append(json_value({**row, "figures": cells}))
-    passed = sum(unit["outcome"] == "pass" for unit in units)
+    outcomes = [unit["outcome"] for unit in units]
     return {
         "run": run.id,
         "recipe": run.about["recipe"]["name"],
         "effects": run.about["recipe"]["effects"],
         "rule": str(grades["rule"].iloc[0]),
         "units": units,
-        "passed": passed,
-        "failed": sum(unit["outcome"] == "fail" for unit in units),
-        "refused": sum(unit["outcome"] == "refused" for unit in units),
-        "yield": passed / len(units),
+        "passed": outcomes.count("pass"),
+        "failed": outcomes.count("fail"),
+        "refused": outcomes.count("refused"),
+        "yield": outcomes.count("pass") / len(units),
         "interruptions": interruptions(run),
         "report": str(run.report),
         "archive": str(run.archive.root),
@@ -128,9 +123,8 @@ def _interrupted(interrupted: Interruptions | None) -> list[str]:
     """The interruptions of a run as lines; empty if there were none."""
     if not interrupted or not interrupted["events"]:
         return []
-    door = (
-        f", the door was opened {number_of(interrupted['door_opened'], 'time')}" if interrupted["door_opened"] else ""
-    )
+    opened = interrupted["door_opened"]
+    door = f", the door was opened {number_of(opened, 'time')}" if opened else ""
     head = f"  station: {number_of(interrupted['pauses'], 'pause')} ({interrupted['paused_s'] / 60.0:.1f} min waited){door}"
     dwells = [
         f"  dwell {one['record']} (pose {one['pose']}) measured again {number_of(one['times'], 'time')}: "

@@ -1,18 +1,13 @@
 """The operator at a terminal: questions on standard error, answers from standard input, one line each, typed or scanned."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable
 from contextlib import AbstractContextManager
-from typing import TYPE_CHECKING
 
+from pipelines.chain.attendance import Answer, Prompt
 from pipelines.cli.printing import remark
 from pipelines.jobs.seating import Seating, scan
 from schemas.errors import WrongUse
-
-if TYPE_CHECKING:
-    from pipelines.chain.attendance import Answer, Prompt
 
 YES = frozenset({"", "y", "yes", "go", "ok"})
 STOP = frozenset({"stop", "s", "q", "quit", "no", "n"})
@@ -53,8 +48,6 @@ UNATTENDED = (
 def agreed(question: str, choices: str = MEASURES, unattended: str = UNATTENDED) -> bool:
     """The answer at the terminal to a question: Enter alone is yes; an answer that is neither yes nor no repeats the question.
 
-    Parameters
-    ----------
     choices : what the answers do
     unattended : the error where standard input ends before an answer
     """
@@ -64,8 +57,7 @@ def agreed(question: str, choices: str = MEASURES, unattended: str = UNATTENDED)
             return True
         if answer in STOP:
             return False
-        message = f"'{answer}' is neither yes nor no: {choices}"
-        remark(message, style="yellow")
+        remark(f"'{answer}' is neither yes nor no: {choices}", style="yellow")
 
 
 def attended() -> bool:

@@ -1,13 +1,12 @@
 """Unexpected exceptions: one line for the user, and a file with the details for the developers."""
 
-from __future__ import annotations
-
 import os
 import platform
 import re
 import sys
 import tempfile
 import traceback
+from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -74,15 +73,8 @@ def _written(text: str) -> Path | None:
                 file.write(text)
         except (OSError, RuntimeError, TumblelineError):  # RuntimeError: no home folder
             continue
-        _forget_old(path.parent)
+        with suppress(OSError):
+            for old in sorted(path.parent.glob(f"{PREFIX}*.txt"))[:-KEPT]:  # their names sort by time
+                old.unlink(missing_ok=True)
         return path
     return None
-
-
-def _forget_old(folder: Path) -> None:
-    """Delete old reports; their names sort by time."""
-    for old in sorted(folder.glob(f"{PREFIX}*.txt"))[:-KEPT]:
-        try:
-            old.unlink(missing_ok=True)
-        except OSError:
-            return

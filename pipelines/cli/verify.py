@@ -23,10 +23,7 @@ SHOWN = 8  # consequences of one finding
 PART = "Certificates, trace, audit"
 ORDER = 440
 SUMMARY = "Check every hash of the archive, or the files of a certificate."
-EXAMPLES = (
-    "tumbleline verify latest",
-    "tumbleline verify certificates/SN1_1.pdf --trust laboratory.pem",
-)
+EXAMPLES = ("tumbleline verify latest", "tumbleline verify certificates/SN1_1.pdf --trust laboratory.pem")
 
 
 def command(
@@ -110,7 +107,7 @@ def _print(report: Report) -> None:
     rate = f"{checked.bytes / report.seconds / 1e6:.3g} MB/s"
     out.print(
         f"{number_of(report.runs, 'run')}, {number_of(report.captures, 'capture')}: {number_of(checked.tables, 'table')}, "
-        f"{number_of(checked.manifests, 'manifest')}, {number_of(checked.rows, 'row')} in {report.seconds:.2f} s ({rate})",
+        f"{number_of(checked.manifests, 'manifest')}, {number_of(checked.rows, 'row')} in {report.seconds:.2f} s ({rate})"
     )
     out.print(f"signatures  {report.trust}")
     if report.head:
@@ -126,10 +123,7 @@ STYLES = {"good": "", "bad": "bold red", "not checked": "yellow"}
 def certificate_files(names: Sequence[str]) -> list[Path]:
     """The names as files of certificates; empty where none is one.
 
-    Raises
-    ------
-    WrongUse
-        Files and runs are mixed, or a file is not there.
+    Raises WrongUse: files and runs are mixed, or a file is not there.
     """
     files = [Path(name) for name in names if Path(name).suffix.lower() in ENDINGS]
     if not files:
@@ -166,17 +160,11 @@ def check_certificates(
 
 
 def _document(one: CheckedFile) -> dict[str, Any]:
-    facts = one.facts
     return {
-        "file": str(one.path),
-        "certificate": "" if facts is None else facts.number,
-        "serial": "" if facts is None else facts.serial,
-        "run": "" if facts is None else facts.run,
-        "issued": "" if facts is None else facts.issued,
-        "signers": one.signers,
-        "checks": [{"check": c.check, "state": c.state, "message": c.message} for c in one.checks],
-        "proven_by": list(one.proven_by),
-        "accepted": one.accepted,
+        "file": one.path,
+        "certificate": getattr(one.facts, "number", ""),
+        **{key: getattr(one.facts, key, "") for key in ("serial", "run", "issued")},
+        **{key: getattr(one, key) for key in ("signers", "checks", "proven_by", "accepted")},
     }
 
 

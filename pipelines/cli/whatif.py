@@ -1,7 +1,5 @@
 """``tumbleline whatif``: the effect of a model on the lots of the archive, before its release to the line."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -15,10 +13,7 @@ from pipelines.cli.printing import conclude, error_console, print_table, say, sh
 PART = "Old data, new models"
 ORDER = 540
 SUMMARY = "Show the effect of a model on the archive's lots before it is released."
-EXAMPLES = (
-    "tumbleline whatif model.toml",
-    "tumbleline whatif model.toml device:adxl355",
-)
+EXAMPLES = ("tumbleline whatif model.toml", "tumbleline whatif model.toml device:adxl355")
 
 SHOWN = 12
 

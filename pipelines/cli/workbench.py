@@ -1,7 +1,5 @@
 """``tumbleline workbench``: archive, models and missing effects in a browser."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -14,10 +12,7 @@ from schemas.errors import WrongUse
 PART = "Start here"
 ORDER = 40
 SUMMARY = "Show archive, models and missing effects in a browser."
-EXAMPLES = (
-    "tumbleline workbench",
-    "tumbleline workbench archive --port 8765",
-)
+EXAMPLES = ("tumbleline workbench", "tumbleline workbench archive --port 8765")
 
 
 def command(

@@ -1,12 +1,10 @@
 """The conformance of a bring-up as document and page: per register and per promise of the family held, differs or not tried."""
 
-from dataclasses import asdict
 from pathlib import Path
-from typing import cast
 
 from pydantic import TypeAdapter
 
-from pipelines.commissioning.documents import ConformanceDocument, ConformancePoint, Platform
+from pipelines.commissioning.documents import ConformanceDocument, Platform
 from pipelines.commissioning.frames import timeline
 from pipelines.drawing import svg_text
 from pipelines.report.templates import template
@@ -38,7 +36,7 @@ def document_of(
         "held": findings.count("held"),
         "differs": findings.count("differs"),
         "not_tried": findings.count("not tried"),
-        "points": [cast("ConformancePoint", asdict(point)) for point in findings.points],
+        "points": findings.points,
         "answers": {
             "usual_ms": round(1e3 * bring_up.read.usual, 3),
             "slowest_ms": round(1e3 * bring_up.read.slowest, 3),
@@ -53,10 +51,7 @@ def document_of(
 def read_conformance(path: Path) -> ConformanceDocument:
     """A conformance document from its file.
 
-    Raises
-    ------
-    DataRejected
-        The file is not of the format.
+    Raises DataRejected: the file is not of the format.
     """
     with foreign(f"conformance: {path}", "a file that 'tumbleline station bring-up' wrote is needed"):
         document = TypeAdapter(ConformanceDocument).validate_json(path.read_bytes())
@@ -76,7 +71,7 @@ def conformance_page(document: ConformanceDocument, recording: Path | None) -> s
     if recording is not None and recording.is_file():
         content = read_frames(recording)
         chart = svg_text(timeline(content)) if content.exchanges else ""
-    sections = [("What differs", [point for point in document["points"] if point["verdict"] == "differs"])]
+    sections = [("What differs", [point for point in document["points"] if point.verdict == "differs"])]
     for title, part in SECTIONS.items():
-        sections.append((title, [point for point in document["points"] if point["part"] == part]))
+        sections.append((title, [point for point in document["points"] if point.part == part]))
     return template("conformance.html").render(d=document, sections=sections, chart=chart)

@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from typing_extensions import TypedDict
 
-from stations.bringup.person import Verdict
+from stations.bringup.person import Point
 
 Platform = Literal["hardware", "simulator", "replay", "not stated"]
 
@@ -53,17 +53,6 @@ class ReplayDocument(TypedDict):
     devices: list[RecordedDeviceRow]
 
 
-class ConformancePoint(TypedDict):
-    """One register, or one promise."""
-
-    part: Annotated[str, "reach, register, panel, order or link"]
-    what: str
-    verdict: Verdict
-    found: str
-    expected: str
-    remedy: str
-
-
 class AnswerTimes(TypedDict):
     """How long answers took."""
 
@@ -89,7 +78,7 @@ class ConformanceDocument(TypedDict):
     held: int
     differs: int
     not_tried: int
-    points: list[ConformancePoint]
+    points: list[Point]
     answers: AnswerTimes
     left: Annotated[list[str], "what was done to leave the device as it was found"]
     recording: Annotated[str, "name of the file with every frame"]

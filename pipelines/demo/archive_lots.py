@@ -4,8 +4,6 @@ The physics is written here and knows no column of a fit: a proof mass on a spri
 its targets, wander from an Ornstein-Uhlenbeck cascade. What is hidden is a harder spring in the devices of one wafer.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -163,8 +161,6 @@ class DemoArchive:
 def write_lots(folder: Path, line: Line, lots: int, progress: Callable[[int], None] = lambda _: None) -> DemoArchive:
     """Write lots of a line as runs of an archive, and ``units.csv`` with the wafer of each unit beside it.
 
-    Parameters
-    ----------
     progress : is told the number of lots that are written
     """
     archive = Archive(str(folder / "archive"))

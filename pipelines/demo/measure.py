@@ -3,9 +3,6 @@
 Drivers and registers are those of a production station; only the physics is simulated. The diagnosis gets only the dwells.
 """
 
-from __future__ import annotations
-
-import io
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -30,12 +27,7 @@ from schemas.station import Soak, StationConfig, load_station
 from stations import open_station
 
 UNITS = 4
-QUIET = {
-    "noise_density_ug": 8.0,
-    "bias_instability_ug": 1.5,
-    "rate_random_walk_ug": 0.003,
-    "linearity_pct_fs": 0.0,
-}
+QUIET = {"noise_density_ug": 8.0, "bias_instability_ug": 1.5, "rate_random_walk_ug": 0.003, "linearity_pct_fs": 0.0}
 """A unit with low noise: with the noise of the data sheet most effects would need days of measurement."""
 
 
@@ -51,9 +43,8 @@ class DemoLot:
     def write(self, folder: Path) -> None:
         """The four tables as Parquet files."""
         for name in ("dwells", "history", "fresh", "fresh_history"):
-            sink = io.BytesIO()
-            getattr(self, name).to_parquet(sink, index=False)
-            files.publish(folder / f"{name.replace('_', '-')}.parquet", sink.getvalue(), "demo", files.ELSEWHERE)
+            content = getattr(self, name).to_parquet(index=False)
+            files.publish(folder / f"{name.replace('_', '-')}.parquet", content, "demo", files.ELSEWHERE)
 
 
 def measure(chosen: Scene, seed: int, progress: Progress = silent) -> DemoLot:

@@ -1,7 +1,5 @@
 """Hidden effects of the demonstration, each with a measurement plan that can detect it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

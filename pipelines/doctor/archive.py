@@ -11,7 +11,8 @@ from pipelines.archive.archive import FORMAT
 from pipelines.archive.signatures import VARIABLE as KEY_VARIABLE
 from pipelines.archive.signatures import key_place, name_of, private_key
 from pipelines.archive.store import first_line
-from pipelines.doctor.check import LARGEST_OFFSET_S, Check, clock_check, judged, of_error, unwritable, write_probe
+from pipelines.doctor.check import LARGEST_OFFSET_S, clock_check, judged, of_error, unwritable, write_probe
+from pipelines.doctor.documents import Check
 from schemas.errors import TumblelineError
 
 PART, KEY = "archive", "signing key"
@@ -23,8 +24,6 @@ OTHERS = 0o077
 def archive_checks(address: str | None, free_gb: float) -> list[Check]:
     """The checks of the archive of an address, or of the default one.
 
-    Parameters
-    ----------
     free_gb : needed free space, GB; not known of an object store
     """
     named = address or os.environ.get(VARIABLE)

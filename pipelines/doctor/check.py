@@ -1,29 +1,17 @@
-"""One result of a check, and the checks that several parts share: a file that is written, read and removed; a clock."""
+"""Results, and the checks that several parts share: a file that is written, read and removed; a clock."""
 
 import os
 import time
 from contextlib import suppress
-from typing import NamedTuple
 
 from pipelines.archive.files import TEMPORARY
 from pipelines.archive.store import Place, first_line
-from pipelines.doctor.documents import State
+from pipelines.doctor.documents import Check
 
 LARGEST_OFFSET_S = 5.0
 """Largest difference of two clocks, s: the order of runs and the days of certificates follow the clock of the host."""
 
 PROBE_BYTES = 2**20  # more than one block or one quota's grain: a full disk refuses it
-
-
-class Check(NamedTuple):
-    """Result of a check; ``needed`` and ``remedy`` are empty where nothing has to be done."""
-
-    part: str
-    check: str
-    state: State
-    found: str
-    needed: str = ""
-    remedy: str = ""
 
 
 def judged(part: str, check: str, found: str, needed: str, remedy: str, *, good: bool) -> Check:
@@ -43,10 +31,7 @@ def write_probe(folder: Place) -> float:
 
     A file of 1 MiB is written, synchronised, read back, and removed in any case.
 
-    Raises
-    ------
-    OSError
-        It cannot be written, or other bytes were read than were written.
+    Raises OSError: it cannot be written, or other bytes were read than were written.
     """
     probe = folder / f"{TEMPORARY}doctor-{os.getpid()}"
     data = os.urandom(PROBE_BYTES)
@@ -68,8 +53,6 @@ def write_probe(folder: Place) -> float:
 def offset(stamp: float, begun: float, ended: float, resolution_s: float) -> float:
     """Smallest difference, s, of a clock that read ``stamp`` between two readings of the host's; 0 if they may be equal.
 
-    Parameters
-    ----------
     resolution_s : by so much may a stamp be early because its clock has coarse steps
     """
     if stamp > ended:

@@ -1,5 +1,6 @@
 """The JSON document of ``doctor``: keys that other programs read."""
 
+from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from typing_extensions import TypedDict
@@ -7,15 +8,16 @@ from typing_extensions import TypedDict
 State = Literal["good", "warning", "fault", "not configured"]
 
 
-class CheckDocument(TypedDict):
+@dataclass(frozen=True)
+class Check:
     """One thing that was checked."""
 
     part: Annotated[str, "software, archive, signing key, orchestrator, station, state folder or clock"]
     check: str
     state: State
     found: Annotated[str, "value, with its unit"]
-    needed: Annotated[str, "empty: nothing else than what was found"]
-    remedy: Annotated[str, "empty: nothing has to be done"]
+    needed: Annotated[str, "empty: nothing else than what was found"] = ""
+    remedy: Annotated[str, "empty: nothing has to be done"] = ""
 
 
 class DoctorDocument(TypedDict):
@@ -29,4 +31,4 @@ class DoctorDocument(TypedDict):
     version: str
     python: str
     samples: Annotated[str | None, "folder of the sample recipes and stations; null: they are not there"]
-    checks: list[CheckDocument]
+    checks: list[Check]

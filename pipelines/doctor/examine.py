@@ -6,12 +6,11 @@ import sys
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
-from typing import cast
 from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 
 from pipelines.doctor.archive import archive_checks, key_checks
-from pipelines.doctor.check import Check, of_error, unwritable, write_probe
-from pipelines.doctor.documents import CheckDocument, DoctorDocument
+from pipelines.doctor.check import of_error, unwritable, write_probe
+from pipelines.doctor.documents import Check, DoctorDocument
 from pipelines.doctor.orchestrator import orchestrator_checks
 from pipelines.doctor.software import software_checks
 from schemas.errors import TumblelineError
@@ -19,19 +18,11 @@ from schemas.shipped import PRODUCT, shipped
 from stations.overview import Overview
 from stations.safety.folder import VARIABLE, state_folder
 
-LEAST_FREE_GB = 1.0
-"""Free space that an archive needs, GB, by default."""
+LEAST_FREE_GB = 1.0  # free space that an archive needs, GB, by default
 
 
 def examine(archive: str | None = None, station: Path | None = None, free_gb: float = LEAST_FREE_GB) -> DoctorDocument:
-    """The state of the installation and of what it is connected to.
-
-    Parameters
-    ----------
-    archive : its address; the default one where None
-    station : file of a station; none is checked where None
-    free_gb : free space that the archive needs, GB
-    """
+    """The state of the installation and of what it is connected to; without a file of a station none is checked."""
     checks = [
         *software_checks(),
         *archive_checks(archive, free_gb),
@@ -51,15 +42,14 @@ def examine(archive: str | None = None, station: Path | None = None, free_gb: fl
         "version": metadata.version(PRODUCT),
         "python": platform.python_version(),
         "samples": None if samples is None else str(samples),
-        "checks": [cast("CheckDocument", check._asdict()) for check in checks],
+        "checks": checks,
     }
 
 
 STATE, CLOCK = "state folder", "clock"
 A_ZONE = "Europe/Berlin"
 TIMEX_BYTES = 1024  # struct timex has 208 on 64-bit Linux
-TIME_ERROR = 5
-"""What adjtimex(2) returns while no time server disciplines the clock."""
+TIME_ERROR = 5  # what adjtimex(2) returns while no time server disciplines the clock
 
 
 def host_checks() -> list[Check]:

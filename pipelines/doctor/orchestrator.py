@@ -1,6 +1,5 @@
 """The orchestrator: it answers, its database is ready, it takes the key, it has the version of the client, it is in time."""
 
-import base64
 import http.client
 import json
 import os
@@ -13,9 +12,10 @@ from importlib import metadata
 from typing import NamedTuple
 from urllib.parse import urlsplit
 
-from pipelines.doctor.check import Check, clock_check, judged, of_error, offset
+from pipelines.doctor.check import clock_check, judged, of_error, offset
+from pipelines.doctor.documents import Check
 from pipelines.orchestrator.archive_address import without_credentials
-from pipelines.orchestrator.settings import CLIENT_KEY, KEY_FILE, LOOPBACK, use_key
+from pipelines.orchestrator.settings import CLIENT_KEY, KEY_FILE, LOOPBACK, use_key, with_key
 from schemas.errors import TumblelineError
 
 PART = "orchestrator"
@@ -61,19 +61,15 @@ def orchestrator_checks() -> list[Check]:
     ]
 
 
-def ask(address: str, key: str = "") -> ServerAnswer:
-    """The answer to a GET, whatever its status.
+def ask(address: str, *, keyed: bool = False) -> ServerAnswer:
+    """The answer to a GET, with the key of this process where it is asked for, whatever its status.
 
-    Raises
-    ------
-    OSError, http.client.HTTPException
-        There is no answer within 5 s.
+    Raises OSError, http.client.HTTPException: there is no answer within 5 s.
     """
-    head = {"Authorization": "Basic " + base64.b64encode(key.encode()).decode()} if key else {}
-    request = urllib.request.Request(address, headers=head)  # noqa: S310 - http or https, looked at above
+    request = urllib.request.Request(address)  # noqa: S310 - http or https, looked at above
     begun = time.time()
     try:
-        with urllib.request.urlopen(request, timeout=TIMEOUT_S) as reply:  # noqa: S310
+        with urllib.request.urlopen(with_key(request) if keyed else request, timeout=TIMEOUT_S) as reply:  # noqa: S310
             status, head, body = reply.status, reply.headers, reply.read(LARGEST_BODY)
     except urllib.error.HTTPError as problem:
         with problem:
@@ -93,8 +89,8 @@ def _ahead(stated: str | None, begun: float, ended: float) -> float | None:
 def _authenticated(address: str) -> list[Check]:
     """Whether the server takes the key of this process, and has its version."""
     try:
-        key = use_key(CLIENT_KEY)
-        answer = ask(f"{address}/admin/version", key)
+        use_key(CLIENT_KEY)
+        answer = ask(f"{address}/admin/version", keyed=True)
     except TumblelineError as problem:
         return [of_error(PART, "authenticated", problem)]
     except (OSError, http.client.HTTPException) as problem:

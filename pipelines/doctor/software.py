@@ -1,7 +1,7 @@
 """Versions: of Python and of the libraries, against the ranges that the product declares and against its lock."""
 
 import platform
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from importlib import metadata
 from pathlib import Path
 
@@ -9,7 +9,7 @@ from packaging.requirements import Requirement
 from packaging.specifiers import SpecifierSet
 from packaging.utils import canonicalize_name
 
-from pipelines.doctor.check import Check
+from pipelines.doctor.documents import Check
 from schemas.locks import UNUSED, pins
 from schemas.shipped import PRODUCT, shipped
 
@@ -42,7 +42,7 @@ def _python() -> Check:
 def _libraries() -> list[Check]:
     """Libraries that are missing or outside the ranges of the product or of one another: a check each, the product's first."""
     checks: dict[str, Check] = {}
-    needed = list(_closure())
+    needed = list(needed_below([(PRODUCT, frozenset())]))
     for by, requirement in needed:
         name, specifier = requirement.name, requirement.specifier
         remedy, version = f"run: pip install '{name}{specifier}'", _installed(name)
@@ -54,9 +54,9 @@ def _libraries() -> list[Check]:
     return list(checks.values()) or [Check(PART, "libraries", "good", f"{len(needed)} requirements are met")]
 
 
-def _closure() -> Iterator[tuple[str, Requirement]]:
-    """The requirements of the product and, of what is installed, theirs, each with the distribution that declares it."""
-    left: list[tuple[str, frozenset[str]]] = [(PRODUCT, frozenset())]
+def needed_below(begin: Iterable[tuple[str, frozenset[str]]]) -> Iterator[tuple[str, Requirement]]:
+    """Requirements of distributions with some extras and, of what is installed, theirs; each with the one that declares it."""
+    left = list(begin)
     seen: set[tuple[str, frozenset[str]]] = set()
     while left:
         name, extras = left.pop()

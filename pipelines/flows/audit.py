@@ -1,7 +1,5 @@
 """The flow ``audit_archive``: the audit on a schedule, its findings as artifacts that the orchestrator shows."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from typing import Any
@@ -60,8 +58,6 @@ def audit_archive(
 ) -> int:
     """Audit an archive; return the number of findings.
 
-    Parameters
-    ----------
     archive : without credentials, see :func:`pipelines.orchestrator.archive_address.archive_of`
     pages : folder for the page and the document of every audit
     since, until : dates; everything up to today where empty

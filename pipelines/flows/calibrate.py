@@ -1,14 +1,12 @@
 """The flow ``calibrate_lot``: the stages of the chain in order, a task per stage of a lot."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from prefect import flow, task
 from prefect.cache_policies import NO_CACHE
@@ -34,23 +32,21 @@ from schemas.progress import Progress, silent
 
 HISTORY_S = 20.0
 AUTO = "auto-scheduled"  # tag of Prefect on the runs of a schedule
+T = TypeVar("T")
 FINAL = {StateType.COMPLETED, StateType.FAILED, StateType.CRASHED, StateType.CANCELLED}
 
-Listener = tuple["Progress", "Callable[[Done], None]", "Operator | None"]
-
-_listeners: list[Listener] = []
+listeners: list[tuple[Progress, Callable[[Done], None], Operator | None]] = []
+"""To whom flows of this process report progress and stages, and whom they ask: the last one counts."""
 
 
 @contextmanager
-def listening(
-    progress: Progress, report_stage: Callable[[Done], None], operator: Operator | None = None
-) -> Generator[None, None, None]:
-    """A context in which flows of this process report their progress, and ask ``operator`` where one is given."""
-    _listeners.append((progress, report_stage, operator))
+def with_last(listed: list[T], one: T) -> Generator[None]:
+    """A context in which one more stands at the end of a list."""
+    listed.append(one)
     try:
         yield
     finally:
-        _listeners.pop()
+        listed.pop()
 
 
 def _worth_repeating(task_: Any, task_run: Any, state: Any) -> bool:
@@ -97,7 +93,7 @@ def calibrate_lot(  # noqa: PLR0913 - the parameters of a flow are the form on t
     """
     if too_late := late_start():
         return Cancelled(message=too_late)
-    progress, report_stage, operator = _listeners[-1] if _listeners else (silent, lambda _done: None, None)
+    progress, report_stage, operator = listeners[-1] if listeners else (silent, lambda _done: None, None)
     store = archive_of(archive)
     job = requested(recipe, station, units, slots, seed, repeat, faults).job(store)
     runner = Runner(job, store, progress)

@@ -3,16 +3,12 @@
 Prefect is imported for work only.
 """
 
-from __future__ import annotations
-
-import os
-from collections.abc import Callable, Generator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from pipelines.flows.local import own_server, reach_named
+from pipelines.flows.local import reached
 from pipelines.orchestrator.settings import LOCAL
 from pipelines.parallel import Distributor, in_one_thread, one_thread_each
 from schemas.errors import LinkLost, WrongUse
@@ -25,16 +21,11 @@ CONNECT_S = 10
 def on_dask(address: str, workers: int = 1, home: Path | None = None) -> Distributor | None:
     """The distribution over the workers of a Dask cluster; None without an address.
 
-    Parameters
-    ----------
     address : of a Dask scheduler, or ``local`` for a cluster of processes on this machine
     workers : processes of the local cluster
     home : folder of the orchestrator that is started without PREFECT_API_URL; None: a temporary folder
 
-    Raises
-    ------
-    WrongUse
-        The address is not the address of a scheduler, or the libraries of Dask are not installed.
+    Raises WrongUse: the address is not the address of a scheduler, or the libraries of Dask are not installed.
     """
     if not address:
         return None
@@ -46,21 +37,13 @@ def on_dask(address: str, workers: int = 1, home: Path | None = None) -> Distrib
     require("prefect_dask", "dask", "--dask: work on Dask workers")
 
     def distribute(function: Callable[[Any], Any], partitions: Sequence[Any], name: str) -> list[Any]:
-        with _orchestrator(home):
+        with (
+            TemporaryDirectory(prefix="tumbleline-", ignore_cleanup_errors=True) as spare,
+            reached(home or Path(spare)),
+        ):
             return _run_on_dask(function, partitions, address, workers, name)
 
     return distribute
-
-
-@contextmanager
-def _orchestrator(home: Path | None) -> Generator[None, None, None]:
-    """A context with an orchestrator: the one of PREFECT_API_URL, or a temporary one."""
-    if os.environ.get("PREFECT_API_URL"):
-        reach_named()
-        yield
-        return
-    with TemporaryDirectory(prefix="tumbleline-", ignore_cleanup_errors=True) as spare, own_server(home or Path(spare)):
-        yield
 
 
 def _run_on_dask(
@@ -93,13 +76,7 @@ def _run(function: Callable[[Any], Any], partitions: Sequence[Any], name: str, *
     def partition(label: str, part: Any) -> Any:
         return in_one_thread(function, part)
 
-    @flow(
-        name="map_partitions",
-        flow_run_name=name,
-        task_runner=runner,
-        persist_result=False,
-        log_prints=False,
-    )
+    @flow(name="map_partitions", flow_run_name=name, task_runner=runner, persist_result=False, log_prints=False)
     def mapped() -> list[Any]:
         width, count = len(str(len(partitions))), len(partitions)
         futures = [partition.submit(f"{k:0{width}d} of {count}", part) for k, part in enumerate(partitions, start=1)]

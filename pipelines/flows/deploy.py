@@ -8,8 +8,6 @@ The command of Prefect 3.8 ends with error 422 with FastAPI 0.151 and later: aft
 the pool with null for two numbers, and FastAPI now reads null as a value and not as a missing one.
 """
 
-from __future__ import annotations
-
 import sys
 from importlib import import_module
 from pathlib import Path
@@ -31,10 +29,7 @@ PATIENCE_S = 60.0
 def register(path: Path) -> list[str]:
     """Register the deployments of a file with the server of PREFECT_API_URL; return their names.
 
-    Raises
-    ------
-    WrongUse
-        The key is missing or wrong, a parameter has credentials, or a policy has an unknown key or value.
+    Raises WrongUse: the key is missing or wrong, a parameter has credentials, or a policy has an unknown key or value.
     """
     use_key(CLIENT_KEY)
     check_server(PATIENCE_S)

@@ -1,7 +1,5 @@
 """The flow ``discover_in_archive``: every night what the lots of an archive show together, with its discoveries as artifacts."""
 
-from __future__ import annotations
-
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -37,8 +35,6 @@ def look(archive: str | None, device: str, pages: Path, workers: int) -> Discove
 def discover_in_archive(archive: str | None = None, device: str = "", pages: str = "audits", workers: int = 1) -> int:
     """Look for what many lots show together; return the number of new discoveries.
 
-    Parameters
-    ----------
     archive : without credentials, see :func:`pipelines.orchestrator.archive_address.archive_of`
     pages : folder for the page and the document of every night
     """

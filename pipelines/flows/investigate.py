@@ -4,10 +4,6 @@ Where a person must approve extra station time the flow run pauses with the ques
 operator: from the server's page, from ``tumbleline operator``, or from any client of the server.
 """
 
-from __future__ import annotations
-
-from collections.abc import Generator
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -16,7 +12,7 @@ from prefect import flow
 from pipelines.archive import Archive
 from pipelines.chain.attendance import Prompt
 from pipelines.chain.runner import Done, Runner
-from pipelines.flows.calibrate import requested, stage
+from pipelines.flows.calibrate import requested, stage, with_last
 from pipelines.flows.local import flow_run
 from pipelines.flows.operator import Paused
 from pipelines.inquiry.inquiry import FollowUp, Inquiry
@@ -25,7 +21,7 @@ from pipelines.inquiry.loop import Consent, InquirySettings, Participants, run_i
 from pipelines.jobs.job import Request
 from pipelines.orchestrator.archive_address import archive_of
 
-_participants: list[Participants] = []
+_participants: list[Participants] = []  # whom inquiries of this process report to and ask: the last one counts
 
 
 @dataclass(frozen=True)
@@ -39,16 +35,6 @@ class PausedApproval:
         why = "; ".join(follow_up.why)
         text = f"measure {follow_up.minutes:.1f} min more ({inquiry.budget - inquiry.spent:.1f} min are left): {why}"
         return self.paused.ask(Prompt("approve", inquiry.lineage.ids[0], text))
-
-
-@contextmanager
-def seated(participants: Participants) -> Generator[None]:
-    """A context in which inquiries of this process report to, and ask, the participants."""
-    _participants.append(participants)
-    try:
-        yield
-    finally:
-        _participants.pop()
 
 
 @flow(name="investigate", persist_result=False, log_prints=False)
@@ -91,7 +77,7 @@ def investigate_locally(
     archive.prepare()
     job = request.job(archive)
     name = f"investigate {job.recipe.name} {job.capture_id}"
-    with flow_run(archive, name) as address, seated(participants):
+    with flow_run(archive, name) as address, with_last(_participants, participants):
         flow = investigate.with_options(flow_run_name=name)
         document: Any = flow(
             **request.parameters(),

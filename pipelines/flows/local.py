@@ -1,7 +1,5 @@
 """A run through an orchestrator that needs no set-up: its server is started beside the archive and shared."""
 
-from __future__ import annotations
-
 import json
 import os
 import socket
@@ -67,16 +65,16 @@ def run_locally(
     archive: Archive,
     progress: Progress,
     report: Callable[[Done], None],
-    operator: Operator | None = None,
+    operator: Operator | None,
 ) -> Run:
     """The run that the flow ``calibrate_lot`` made, on the server named by PREFECT_API_URL or on one of our own."""
     archive.prepare()
     progress(0, len(steps(job.recipe)), "starting the orchestrator")
     name = f"{job.recipe.name} {job.capture_id}"
     with flow_run(archive, name, lambda: _prepare(job)) as address:
-        from pipelines.flows.calibrate import calibrate_lot, listening
+        from pipelines.flows.calibrate import calibrate_lot, listeners, with_last
 
-        with listening(progress, report, operator):
+        with with_last(listeners, (progress, report, operator)):
             flow = calibrate_lot.with_options(flow_run_name=name)
             run_id = str(flow(**request.parameters(), archive=address))
     return archive.run(run_id)
@@ -85,7 +83,7 @@ def run_locally(
 @contextmanager
 def flow_run(archive: Archive, name: str, meanwhile: Callable[[], None] = lambda: None) -> Generator[str]:
     """A block for one flow run of a name, with the address by which it finds an archive; its history is complete at the end."""
-    with reached(archive, meanwhile):
+    with reached(_home(archive), meanwhile):
         from pipelines.flows.calibrate import settle_history
         from pipelines.orchestrator.dead_runs import close_dead_runs
 
@@ -105,22 +103,15 @@ def _prepare(job: Job) -> None:
 
 
 @contextmanager
-def reached(archive: Archive, meanwhile: Callable[[], None] = lambda: None) -> Generator[None]:
-    """A block in which an orchestrator answers: the one named by PREFECT_API_URL, or one of our own beside the archive.
+def reached(home: Path, meanwhile: Callable[[], None] = lambda: None) -> Generator[None]:
+    """A block in which an orchestrator answers: the one named by PREFECT_API_URL, or one of our own in the folder ``home``.
 
-    ``meanwhile`` is called while a server of our own starts.
+    ``meanwhile`` is called while a server of our own starts. This process is its client; the environment is restored afterwards.
     """
     if os.environ.get("PREFECT_API_URL"):
         reach_named()
         yield
         return
-    with own_server(_home(archive), meanwhile):
-        yield
-
-
-@contextmanager
-def own_server(home: Path, meanwhile: Callable[[], None] = lambda: None) -> Generator[None]:
-    """A block in which this process is a client of a server of our own; the environment is restored afterwards."""
     with local_server(home, meanwhile) as environment, with_environment(environment):
         from prefect.settings import temporary_settings
 
@@ -190,18 +181,16 @@ def _running(home: Path) -> tuple[int, str] | None:
 
 
 def _start(home: Path, meanwhile: Callable[[], None]) -> tuple[int, str]:
-    port, key = _free_port(), new_key()
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port, key = int(probe.getsockname()[1]), new_key()
     log_path = home / "server.log"
     before = log_path.stat().st_size if log_path.exists() else 0
     with os.fdopen(_private_file(log_path, os.O_APPEND), "ab") as log:
         process = subprocess.Popen(  # noqa: S603 - our own module, by our own interpreter
             [sys.executable, "-m", "pipelines.orchestrator.server", "--port", str(port), "--until-unused", str(home)],
             # the key in the environment: the arguments of a process are there for everybody to read
-            env={
-                **os.environ,
-                **settings(home, port, key),
-                "PYTHONPATH": os.pathsep.join(filter(None, sys.path)),
-            },
+            env={**os.environ, **settings(home, port, key), "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
             stdin=subprocess.DEVNULL,
             stdout=log,
             stderr=log,
@@ -233,12 +222,6 @@ def _private_file(path: Path, how: int) -> int:
     handle = os.open(path, os.O_WRONLY | os.O_CREAT | how, PRIVATE)
     os.fchmod(handle, PRIVATE)  # one of an older version is there with another mode
     return handle
-
-
-def _free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 def _answers(port: int) -> bool:

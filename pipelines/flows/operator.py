@@ -3,8 +3,6 @@
 The answer comes from the server's page, from ``tumbleline operator`` at any terminal, or from any client of the server.
 """
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass
 from typing import Literal

@@ -1,21 +1,16 @@
 """Sentences that explain a proposed measurement."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from inertial import frames
 from inertial.next_measurement.menus import Kind
+from inertial.next_measurement.proposals import Proposal
 from inertial.planning.reasons import begins_again, confounding_feature, constant_feature, reason
 from inertial.planning.remedies import Driver
 from inertial.planning.sequences import SequenceStep
 from inertial.state import State
-
-if TYPE_CHECKING:
-    from inertial.next_measurement.proposals import Proposal
 
 DRAWN_OUT_S = 5.0
 VARIED: dict[Kind, tuple[Driver, ...]] = {
@@ -34,8 +29,6 @@ VARIED: dict[Kind, tuple[Driver, ...]] = {
 def why(state: State, base: Sequence[str], proposal: Proposal) -> str:
     """Why a measurement is proposed, in one sentence: the confounded rivals, the cause, the measurement, and the gain.
 
-    Parameters
-    ----------
     state : the dwells so far
     base : ids of the model beside the rivals
     """

@@ -1,9 +1,6 @@
 """A follow-up: proposed steps as a recipe for the station, and their station time."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -20,43 +17,23 @@ from stations.profile_files import profile_of
 VARIED_K = 5.0
 
 
-@dataclass(frozen=True)
-class StationState:
-    """State of a station after a run.
-
-    pose, temperature : of the last record, °C
-    at_once : whether the station is still there; hardware returns to its safe state
-    """
-
-    pose: Pose
-    temperature: float
-    at_once: bool
-
-    def step(self) -> SequenceStep:
-        """The state as a step of a sequence."""
-        outer, inner = np.radians([self.pose.outer_deg, self.pose.inner_deg])
-        return SequenceStep(float(outer), float(inner), self.temperature)
-
-
-def state_after(job: Job) -> StationState:
-    """State of the station after the last record of a job."""
+def state_after(job: Job) -> StationPose:
+    """Where the station stands after the last record of a job; hardware has returned to its safe state."""
     last = steps(job.recipe)[-1]
     safe = job.station.safety
-    simulated = job.station.kind == "simulated"
-    temperature = last.temperature if simulated or safe.chamber == "hold" else safe.temperature_C
-    return StationState(last.pose, temperature, simulated)
+    stays = job.station.kind == "simulated" or safe.chamber == "hold"
+    temperature = last.temperature if stays else safe.temperature_C
+    return StationPose(last.pose.outer_deg, last.pose.inner_deg, temperature, temperature)
 
 
 def circumstances(base: Job, last: Job, budget: float) -> Circumstances:
     """Limits of a follow-up: reach and pace of the station, station time of steps, and the remaining budget.
 
-    Parameters
-    ----------
     base : the first job of the lineage, for the calibration temperatures
     last : the newest job; the station continues from its end
     budget : min
     """
-    station, recipe, station_state = base.station, base.recipe, state_after(last)
+    station, recipe, now = base.station, base.recipe, state_after(last)
     limits = station.limits
     low, high = min(recipe.temperatures_C), max(recipe.temperatures_C)
     reach = TableReach(
@@ -74,32 +51,29 @@ def circumstances(base: Job, last: Job, budget: float) -> Circumstances:
         soak_s=recipe.soak_min_s,
         rule=rule_of(station),
         drive=drive_of(station),
-        start=station_state.step(),
+        start=SequenceStep(*_radians((now.outer, now.inner)), now.air),
     )
-    return Circumstances(reach, pace, lambda sequence: station_minutes(sequence, base, station_state), budget)
+    return Circumstances(reach, pace, lambda sequence: station_minutes(sequence, base, now), budget)
 
 
-def station_minutes(sequence: Sequence[SequenceStep], base: Job, station_state: StationState) -> float:
-    """Station time of steps from a state of the station, min."""
+def station_minutes(sequence: Sequence[SequenceStep], base: Job, now: StationPose) -> float:
+    """Station time of steps from where the station stands, min."""
     if not sequence:
         return 0.0
     parts = _parts(sequence)
     plan: list[Step] = []
     for soak, part in enumerate(parts):
-        settled = _settled(soak, part, station_state)
+        settled = _settled(soak, part, base, now)
         plan += [
             Step(len(plan) + k, "dwell", soak, s.temperature, pose_of(s), s.wait, settled, s.off)
             for k, s in enumerate(part)
         ]
-    start = StationPose(
-        station_state.pose.outer_deg, station_state.pose.inner_deg, station_state.temperature, station_state.temperature
-    )
-    return minutes(plan, base.station, base.recipe, start).total
+    return minutes(plan, base.station, base.recipe, now).total
 
 
 def follow_up(sequence: Sequence[SequenceStep], base: Job, last: Job, parents: Sequence[str], why: str) -> Job:
     """The job that measures only these steps, on the same station and lot, from the end of the newest run."""
-    station_state = state_after(last)
+    now = state_after(last)
     poses: dict[tuple[float, float], Pose] = {}
     for step in sequence:
         pose = pose_of(step)
@@ -113,7 +87,7 @@ def follow_up(sequence: Sequence[SequenceStep], base: Job, last: Job, parents: S
             verification=[],
             waits_s=[round(s.wait, 1) for s in part],
             off_s=[round(s.off, 1) for s in part] if any(s.off > 0.0 for s in part) else None,
-            settled=_settled(k, part, station_state),
+            settled=_settled(k, part, base, now),
         )
         for k, part in enumerate(_parts(sequence))
     ]
@@ -142,12 +116,10 @@ def _parts(sequence: Sequence[SequenceStep]) -> list[list[SequenceStep]]:
     return parts
 
 
-def _settled(number: int, part: Sequence[SequenceStep], station_state: StationState) -> bool:
+def _settled(number: int, part: Sequence[SequenceStep], base: Job, now: StationPose) -> bool:
     """Whether the devices must settle first: not where they are already settled, nor for dwells during a temperature change."""
-    already_settled = (
-        number == 0 and station_state.at_once and abs(part[0].temperature - station_state.temperature) < 0.5
-    )
-    return part[0].soaked and not already_settled
+    stayed = number == 0 and base.station.kind == "simulated"
+    return part[0].soaked and not (stayed and abs(part[0].temperature - now.device) < 0.5)
 
 
 def pose_of(step: SequenceStep) -> Pose:

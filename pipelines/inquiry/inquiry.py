@@ -1,17 +1,16 @@
 """The inquiry of one lot: joint diagnosis of all runs so far, and the next follow-up or the reason for the end."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any, Literal
 
 from threadpoolctl import threadpool_limits
 
 from inertial.next_measurement.proposals import Proposal
 from inertial.planning.sequences import SequenceStep
-from pipelines.archive import Archive, Records, Run, code_hash, files, stage_key
-from pipelines.chain.runner import Runner
+from pipelines.archive import Archive, Run, code_hash, files, stage_key
+from pipelines.chain.runner import Runner, from_station
 from pipelines.diagnosis.diagnose import document, examined, report_fields
 from pipelines.diagnosis.next_measurement import Proposed, proposed, rows_of
 from pipelines.inquiry.explanation import shows, why
@@ -79,9 +78,7 @@ def ambiguous_classes(joint: JointDiagnosis) -> str:
     return ", and ".join(" | ".join(group) for group in joint.ambiguous)
 
 
-EXTRA = 0.3
-"""Default budget of follow-ups, as a share of the first run's station time."""
-
+EXTRA = 0.3  # default budget of follow-ups, as a share of the first run's station time
 MOST_ROUNDS = 6
 
 
@@ -110,7 +107,6 @@ class FollowUp:
 class Inquiry:
     """An inquiry between two steps.
 
-    effects : ids of the model to diagnose; the recipe's where empty
     budget : min, station time for follow-ups
     unseen : whether to measure follow-ups for effects that are not visible, too, once no class is ambiguous
     """
@@ -206,12 +202,12 @@ class Inquiry:
     def runner(self, follow_up: FollowUp, progress: Progress) -> Runner:
         """The runner of a follow-up: the station continues from the state at the end of the newest run."""
         before = self.archive.capture(self.jobs[-1].capture_id)
-        return Runner(follow_up.job, self.archive, progress, measure=_continued(before))
+        return Runner(follow_up.job, self.archive, progress, measure=partial(from_station, before=before))
 
     def add_run(self, follow_up: FollowUp, run: Run) -> None:
         """Adds the run of a measured follow-up to the lineage."""
         self.jobs.append(follow_up.job)
-        self.lineage = self.lineage.with_run(run)
+        self.lineage = RunSequence((*self.lineage.runs, run))
         minutes = self.lineage.minutes()[-1]
         self.rounds.append(
             {
@@ -271,18 +267,3 @@ def begin(
     lineage = RunSequence((run,))
     allowed = EXTRA * lineage.minutes()[0] if budget is None else budget
     return Inquiry(archive, [job], lineage, tuple(effects or job.recipe.effects), allowed, unseen)
-
-
-def _continued(before: Records) -> Any:
-    """The capture of a station that continues from the state at the end of another capture."""
-
-    def measure(job: Job, records: Records, progress: Progress) -> None:
-        from pipelines.capture.capture import capture
-        from stations import open_station
-
-        state = records.last_state() or before.last_state()
-        run = f"{job.recipe.name} {job.capture_id}"
-        with open_station(job.station, job.lot, resume=state, run=run) as station:
-            capture(station, job.recipe, job.lot, records, progress=progress, events=records.events)
-
-    return measure

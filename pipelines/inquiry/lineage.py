@@ -1,7 +1,5 @@
 """A run and its follow-ups as one set of dwells, and their diagnosis together: one station, one lot, one clock."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -56,10 +54,6 @@ class RunSequence:
         readings = [run.table("readings") for run in self.runs]
         ends = [float((one["start_s"] + one["duration_s"]).max()) for one in readings]  # on the station's clock
         return [(end - begin) / 60.0 for begin, end in zip([0.0, *ends], ends, strict=False)]
-
-    def with_run(self, run: Run) -> RunSequence:
-        """The sequence with one more run."""
-        return RunSequence((*self.runs, run))
 
 
 @dataclass(frozen=True)

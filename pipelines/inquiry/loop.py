@@ -3,8 +3,6 @@
 The stages run as plain calls or as tasks of the orchestrator; approval of extra station time is supplied by the caller.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -50,14 +48,7 @@ class InquirySettings:
 
 @dataclass(frozen=True)
 class Participants:
-    """Callbacks of an inquiry.
-
-    stage : runs a stage
-    approve : approves extra station time
-    progress : progress of the stages
-    stage_done : called after every stage
-    diagnosed : called after every joint diagnosis
-    """
+    """Who runs the stages of an inquiry, approves extra station time, and is told of stages and joint diagnoses."""
 
     stage: Callable[[str, Runner], Done] = directly
     approve: Approval = always

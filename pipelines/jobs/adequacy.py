@@ -1,7 +1,5 @@
 """Whether the model of a run is adequate: the verdict of its archive."""
 
-from __future__ import annotations
-
 from pipelines.archive import Run
 from pipelines.importers.exchange import dwells_of_run, history_of_run
 from pipelines.jobs.model_files import use_formulas_of

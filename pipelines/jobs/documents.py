@@ -1,7 +1,5 @@
 """The JSON documents of release: keys that other programs read."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from typing_extensions import TypedDict

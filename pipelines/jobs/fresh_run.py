@@ -1,7 +1,5 @@
 """A second measurement of a run's units by the same recipe on the same station, which no fit has seen."""
 
-from __future__ import annotations
-
 from contextlib import suppress
 from typing import Any
 
@@ -34,10 +32,7 @@ def repeatable(run: Run) -> bool:
 def fresh_repeat(archive: Archive, run: Run) -> int:
     """The first count of repeats after the run's whose capture is not finished: one that was begun and stopped goes on.
 
-    Raises
-    ------
-    WrongUse
-        The run was imported, or measured only what another run lacked.
+    Raises WrongUse: the run was imported, or measured only what another run lacked.
     """
     job = job_of_run(run)
     repeat = job.lot.repeat + 1

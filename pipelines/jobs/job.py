@@ -1,17 +1,15 @@
 """A job: recipe, limits, lot and station together, and the names that follow from them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 from inertial.errors import InertialError
 from pipelines.archive import Archive, Run
 from pipelines.archive.keys import digest
-from pipelines.jobs.model_files import read_model, refuse_unknown_effects, use_formulas
+from pipelines.jobs.model_files import model_keys, read_model, refuse_unknown_effects, use_formulas
 from pipelines.jobs.recipes import MAIN_JOB, folder_of, load_limits, load_recipe, lot_of, units_of
 from pipelines.jobs.terms import (
     budget_terms,
@@ -53,9 +51,7 @@ ANALYSIS_KEYS = {
 }
 
 
-OF_RUN = "run:"
-"""What a recipe's name begins with where it is the run whose units are measured again."""
-
+OF_RUN = "run:"  # what a recipe's name begins with where it is the run whose units are measured again
 GUARDS = {"suspenders", "safety", "self_test"}
 """Parts of a station that say when a capture pauses and how it ends: one that an operator has eased goes on where it was."""
 
@@ -148,7 +144,7 @@ class Request:
         lists = {name: list(getattr(self, name)) for name in ("units", "slots", "faults")}
         return {**asdict(self), "station": str(self.station) if self.station else None, **lists}
 
-    def fillings(self, slots: int) -> list[Request]:
+    def fillings(self, slots: int) -> list[Self]:
         """The request in portions that fit a fixture of so many slots; a slot map is one filling as it is."""
         if self.recipe.startswith(OF_RUN):
             return [self]
@@ -160,8 +156,6 @@ class Request:
     def job(self, archive: Archive | None = None) -> Job:
         """The job that is asked for, with everything refused that cannot work, before anything moves.
 
-        Parameters
-        ----------
         archive : where the line's model is released, for recipes that ask for it; the default one where None
         """
         if self.recipe.startswith(OF_RUN):
@@ -213,13 +207,11 @@ def job_of_run(run: Run, *, effects: Sequence[str] = (), model: Path | None = No
     if effects and model is not None:
         raise WrongUse("fit: --effects and --model are both given, one is needed; leave one out")
     if model is not None:
-        file = read_model(model)
-        effects, names = file.model.effects, {"model_name": file.model.name, "model_version": file.model.version}
-        recipe = recipe.model_copy(update={**names, "formulas": file.formula})
-    if effects:
+        recipe = recipe.model_copy(update=model_keys(read_model(model)))
+    if effects or model is not None:
         use_formulas(recipe.formulas, f"run {run.id}")
-        refuse_unknown_effects(effects, "fit")
-        recipe = recipe.model_copy(update={"effects": list(effects)})
+        recipe = recipe.model_copy(update={"effects": list(effects or recipe.effects)})
+        refuse_unknown_effects(recipe.effects, "fit")
     chosen = limits_of(about["limits"], UNITS)
     if limits:
         recipe = recipe.model_copy(update={"limits": limits})

@@ -1,14 +1,12 @@
 """The change for a re-run: model, limits or nothing. Plain values, so that they can be sent to workers."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from inertial.effects import add_file
-from pipelines.jobs.model_files import chosen_effects, read_model, use_formulas
+from pipelines.jobs.model_files import chosen_effects, model_keys, read_model, use_formulas
 from pipelines.jobs.recipes import read_limits
 from schemas.limits import Limits
 from schemas.recipe import FormulaSpec
@@ -59,22 +57,12 @@ def change_from_options(
 ) -> ModelChange:
     """The change from the options of a command: effects, model file, limits and effect files.
 
-    Raises
-    ------
-    WrongUse, RecipeInvalid
-        Effects and a model are both given; an effect, the file or the limits are unknown.
+    Raises WrongUse, RecipeInvalid: effects and a model are both given; an effect, the file or the limits are unknown.
     """
     outside = tuple(str(path.resolve()) for path in effect_files or ())
     ModelChange(effect_files=outside).use()
     names = chosen_effects(effects, model, where)
-    head: dict[str, Any] = {}
-    if model is not None:
-        file = read_model(model)
-        head = {
-            "formulas": tuple(file.formula),
-            "model_name": file.model.name,
-            "model_version": file.model.version,
-        }
+    keys: dict[str, Any] = {"effects": names} if model is None else model_keys(read_model(model))
+    stated: dict[str, Any] = {key: tuple(value) if isinstance(value, list) else value for key, value in keys.items()}
     chosen = read_limits(limits) if limits else None
-    own = None if names is None else tuple(names)
-    return ModelChange(own, **head, limits=chosen, limits_name=limits, effect_files=outside)
+    return ModelChange(**stated, limits=chosen, limits_name=limits, effect_files=outside)

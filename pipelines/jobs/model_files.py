@@ -1,12 +1,11 @@
 """Model files: formulas as effects, versions as a history, and the next version with one more effect."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 import tomlkit
 from tomlkit.items import Table
@@ -53,13 +52,21 @@ def read_model(path: Path) -> ModelFile:
     return _used(parse_as(ModelFile, read_text(path, "model"), source), source)
 
 
+def model_keys(file: ModelFile) -> dict[str, Any]:
+    """The keys of a recipe that state the model of a file."""
+    model = file.model
+    return {
+        "effects": model.effects,
+        "formulas": file.formula,
+        "model_name": model.name,
+        "model_version": model.version,
+    }
+
+
 def use_formulas(formulas: Iterable[FormulaSpec], where: str) -> None:
     """Add the formulas of a file to the catalogue of effects.
 
-    Raises
-    ------
-    RecipeInvalid
-        A formula is invalid, or its id belongs to an effect of the catalogue.
+    Raises RecipeInvalid: a formula is invalid, or its id belongs to an effect of the catalogue.
     """
     for spec in formulas:
         if spec.id in effects.built_in():
@@ -149,10 +156,7 @@ def new_model(path: Path, names: Sequence[str], by: str, at: datetime) -> str:
 def extended(text: str, step: ModelStep, source: str) -> tuple[str, ModelFile]:
     """The text of the next version of a model, with its comments, and the model of this version.
 
-    Raises
-    ------
-    RecipeInvalid
-        The text is no model, the effect is already in it, or its name is unknown.
+    Raises RecipeInvalid: the text is no model, the effect is already in it, or its name is unknown.
     """
     model = _used(parse_as(ModelFile, text, source), source)
     if step.effect in model.model.effects:
@@ -168,10 +172,7 @@ def extended(text: str, step: ModelStep, source: str) -> tuple[str, ModelFile]:
 def reduced(text: str, step: ModelStep, source: str) -> tuple[str, ModelFile]:
     """The text of the next version of a model without an effect, its comments kept, and the model as it then is.
 
-    Raises
-    ------
-    RecipeInvalid
-        The text is no model, the effect is not in it, or it is the only one.
+    Raises RecipeInvalid: the text is no model, the effect is not in it, or it is the only one.
     """
     model = _used(parse_as(ModelFile, text, source), source)
     present = model.model.effects

@@ -1,7 +1,5 @@
 """A recipe with some of its poses turned elsewhere: ``NAME=OUTER,INNER`` in degrees."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 
@@ -21,14 +19,9 @@ FULL_TURN = 360.0
 def moves_of(texts: Iterable[str], where: str) -> dict[str, Angles]:
     """Outer and inner angle in degrees by the name of the pose; of two for one pose the last counts.
 
-    Parameters
-    ----------
     texts : each ``NAME=OUTER,INNER``, such as ``p05=45,-90`` · where : first words of the message
 
-    Raises
-    ------
-    WrongUse
-        A text is not of this form, or an angle is beyond a turn.
+    Raises WrongUse: a text is not of this form, or an angle is beyond a turn.
     """
     moves: dict[str, Angles] = {}
     for text in texts:
@@ -51,12 +44,8 @@ def moves_of(texts: Iterable[str], where: str) -> dict[str, Angles]:
 def with_moved_poses(recipe: Recipe, moves: dict[str, Angles], where: str) -> Recipe:
     """The recipe with the poses of these names at other angles; checked as a recipe file is.
 
-    Raises
-    ------
-    WrongUse
-        The recipe has no pose of a name.
-    RecipeInvalid
-        The poses are useless for a fit, or a pose for verification coincides with one of the fit.
+    Raises WrongUse: the recipe has no pose of a name.
+    Raises RecipeInvalid: the poses are useless for a fit, or a pose for verification coincides with one of the fit.
     """
     if not moves:
         return recipe
@@ -77,5 +66,5 @@ def with_moved_poses(recipe: Recipe, moves: dict[str, Angles], where: str) -> Re
         moved_recipe = Recipe.model_validate({**recipe.model_dump(), **changed})
     except ValidationError as problem:
         raise explain(problem, source, Recipe) from None
-    refuse_unusable_poses(moved_recipe, source)
+    refuse_unusable_poses(moved_recipe, moved_recipe.poses, moved_recipe.verification, source)
     return moved_recipe

@@ -1,7 +1,5 @@
 """A resolved recipe as the text of a recipe file: the fields of the file's own model, written by a TOML library."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterable
 from pathlib import Path
@@ -22,14 +20,9 @@ RESOLVED = {"poses", "verification", "static_pose", "model_name", "model_version
 def recipe_text(recipe: Recipe, remarks: Iterable[str] = ()) -> str:
     """The text of a recipe file that reads as this recipe; keys that stand at their defaults are left out.
 
-    Parameters
-    ----------
     remarks : lines for the head of the file, without the sign of a remark
 
-    Raises
-    ------
-    WrongUse
-        The model has formulas of its own, which only a model file can hold.
+    Raises WrongUse: the model has formulas of its own, which only a model file can hold.
     """
     if recipe.formulas:
         raise WrongUse(

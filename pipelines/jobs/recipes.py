@@ -3,8 +3,6 @@
 Nothing here touches a station: what cannot work is refused before anything moves.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from importlib.resources import files
 from pathlib import Path
@@ -16,7 +14,7 @@ from pydantic import ValidationError
 
 from inertial import poses
 from inertial.frames import force_from_angles
-from pipelines.jobs.model_files import read_model, refuse_unknown_effects
+from pipelines.jobs.model_files import model_keys, read_model, refuse_unknown_effects
 from schemas.errors import RecipeInvalid, WrongUse, close_matches, did_you_mean
 from schemas.foreign import is_file, shown
 from schemas.limits import Limits, parse_limits, unknown_limits
@@ -31,16 +29,13 @@ from schemas.units import AXES
 
 MAIN_JOB = "production"
 SAME_POSE_DEG = 1.0
-LINE = "line"
-"""What a recipe says in place of a model file for the model that is released to the line."""
+LINE = "line"  # what a recipe says in place of a model file for the model that is released to the line
 LineModel = Callable[[str], dict[str, Any]]
 
 
 def load_recipe(name: str = MAIN_JOB, line: LineModel | None = None) -> Recipe:
     """The recipe of a file, or the built-in one of this name, resolved and checked.
 
-    Parameters
-    ----------
     line : the keys that say the line's model for a kind of device; refused where a recipe asks for it and it is None
     """
     text, source, folder = _recipe_text(name)
@@ -50,23 +45,16 @@ def load_recipe(name: str = MAIN_JOB, line: LineModel | None = None) -> Recipe:
 def resolved(file: RecipeFile, source: str, folder: Path | None = None, line: LineModel | None = None) -> Recipe:
     """The content of a recipe file with every name in it resolved, and its poses checked.
 
-    Parameters
-    ----------
     source : what messages call the file
     folder : that names of model files are relative to; the working folder where None
     line : see :func:`load_recipe`
 
-    Raises
-    ------
-    RecipeInvalid
-        A name is not known, or the poses cannot work.
+    Raises RecipeInvalid: a name is not known, or the poses cannot work.
     """
     model = _model(file, folder or Path(), source, line)
     fit_poses = _resolve(file.poses, "p", "poses", source)
     verification = _resolve(file.verification, "v", "verification", source)
-    if file.tumbles:
-        _refuse_flat_plan(fit_poses, file.span_min_g, file.sensor_axes)
-        _refuse_coincidence(fit_poses, verification, source)
+    refuse_unusable_poses(file, fit_poses, verification, source)
     shared = file.model_dump(
         exclude={"poses", "verification", "verification_repeats", "static_pose", "model", "effects"}
     )
@@ -83,17 +71,16 @@ def resolved(file: RecipeFile, source: str, folder: Path | None = None, line: Li
         raise explain(problem, source, RecipeFile) from None
 
 
-def refuse_unusable_poses(recipe: Recipe, source: str) -> None:
+def refuse_unusable_poses(
+    recipe: Recipe | RecipeFile, fit: Sequence[Pose], verification: Sequence[Pose], source: str
+) -> None:
     """Refuse poses that span too little for a fit, and verification in a direction of the fit.
 
-    Raises
-    ------
-    RecipeInvalid
-        The axis or the poses, and what is needed.
+    Raises RecipeInvalid: the axis or the poses, and what is needed.
     """
     if recipe.tumbles:
-        _refuse_flat_plan(recipe.poses, recipe.span_min_g, recipe.sensor_axes)
-        _refuse_coincidence(recipe.poses, recipe.verification, source)
+        _refuse_flat_plan(fit, recipe.span_min_g, recipe.sensor_axes)
+        _refuse_coincidence(fit, verification, source)
 
 
 def units_of(name: str = MAIN_JOB) -> list[str]:
@@ -215,13 +202,7 @@ def _model(file: RecipeFile, folder: Path, source: str, line: LineModel | None) 
     if not file.model:
         refuse_unknown_effects(file.effects, f"{source}: key 'effects'")
         return {"effects": file.effects}
-    model = read_model(folder / file.model)
-    return {
-        "effects": model.model.effects,
-        "formulas": model.formula,
-        "model_name": model.model.name,
-        "model_version": model.model.version,
-    }
+    return model_keys(read_model(folder / file.model))
 
 
 def _resolve(given: str | Sequence[Sequence[float]], letter: str, key: str, source: str) -> list[Pose]:

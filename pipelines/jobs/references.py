@@ -1,7 +1,5 @@
 """Whether a run's own residuals contradict what its station states of the table, and what they cannot show of it."""
 
-from __future__ import annotations
-
 import math
 from typing import Annotated
 

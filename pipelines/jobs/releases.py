@@ -5,8 +5,6 @@ one for the device only, and this over one for all; among records of equal scope
 future applies, and of two with the same date the one that was written last.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -42,15 +40,6 @@ class Release:
     forced: bool
     who: str
     when: str
-
-    def holds_for(self, device: str, station: str) -> bool:
-        """Whether the record applies to this device and station."""
-        return _matches(self.device, device) and _matches(self.station, station)
-
-    @property
-    def rank(self) -> tuple[bool, bool, datetime, int]:
-        """The order of priority of the records."""
-        return bool(self.station), bool(self.device), self.since, self.number
 
     def document(self) -> ReleaseRecord:
         """The record for JSON."""
@@ -118,11 +107,8 @@ def release(
 ) -> Release:
     """Write a new release of a model to the line; return the record.
 
-    Raises
-    ------
-    WrongUse
-        The release is not forced and there is no what-if of the model for this device and station, or its verdict is not
-        'better'; or no reason is given.
+    Raises WrongUse: the release is not forced and there is no what-if of the model for this device and station, or its verdict
+    is not 'better'; or no reason is given.
     """
     if not reason.strip():
         raise WrongUse("release: no reason is given, one is needed; give --reason TEXT")
@@ -172,17 +158,15 @@ def releases(archive: Archive) -> list[Release]:
 
 def released(archive: Archive, device: str, station: str, when: datetime) -> Release | None:
     """The record of the line's model for a device and station at a time; None without one."""
-    holding = [one for one in releases(archive) if one.holds_for(device, station) and one.since <= when]
-    return max(holding, key=lambda one: one.rank, default=None)
+    own = [one for one in releases(archive) if _matches(one.device, device) and _matches(one.station, station)]
+    holding = [one for one in own if one.since <= when]
+    return max(holding, key=lambda one: (bool(one.station), bool(one.device), one.since, one.number), default=None)
 
 
 def line_model(archive: Archive, device: str, station: str, when: datetime | None = None) -> dict[str, Any]:
     """The keys of a recipe for the line's model, now or at a time.
 
-    Raises
-    ------
-    RecipeInvalid
-        No model is released for the device and station.
+    Raises RecipeInvalid: no model is released for the device and station.
     """
     at = when or datetime.now(UTC)
     in_force = released(archive, device, station, at)
@@ -200,8 +184,6 @@ def line_model(archive: Archive, device: str, station: str, when: datetime | Non
 def planned_recipe(name: str, effects: str, model: Path | None, archive: str | None, station: str) -> Recipe:
     """The recipe to be planned, with another model where one is given; the archive is read only for the line's model.
 
-    Parameters
-    ----------
     effects, model : a list of effects, or a model file; empty or None if not given
     """
     chosen = chosen_effects(effects, model, "plan")

@@ -1,7 +1,5 @@
 """Seating of the units in the slots: a list, a slot map in a file, or a scan, slot by slot."""
 
-from __future__ import annotations
-
 import csv
 import io
 from collections.abc import Callable, Sequence
@@ -43,8 +41,6 @@ def read_seating(text: str) -> Seating:
 def scan(slots: int, read: Callable[[int], str], refuse: Callable[[str], None]) -> Seating:
     """The seating, scanned at the station slot by slot; an empty line leaves a slot empty.
 
-    Parameters
-    ----------
     slots : number of slots.
     read : returns the line for a slot.
     refuse : called with the fault of a line, before the slot is scanned again.

@@ -1,7 +1,5 @@
 """What a job states of its uncertainty, and what is refused before anything moves, such as poses out of the station's range."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
@@ -23,21 +21,19 @@ from schemas.uncertainty import Uncertainty
 GRAVITY_SIGMAS = 3.0
 
 
-def budget_terms(recipe: Recipe, station: Any, limits: Limits) -> BudgetTerms:
+def budget_terms(recipe: Recipe, station: Any, limits: Limits | None) -> BudgetTerms:
     """The terms of a job's budget; the station of an archived job may be its document, as it was written."""
     stated, pace, given = (getattr(station, name, None) for name in ("uncertainty", "pace", "reference"))
     stated = None if stated is None else Uncertainty.model_validate(stated)
     references = [Reference.model_validate(one) for one in given or []]
     room = Pace.model_validate(pace or {}).room_C
-    return terms_of(recipe, stated, references, room, limits.longest_validity_months)
+    months = VALIDITY_MONTHS if limits is None else limits.longest_validity_months
+    return terms_of(recipe, stated, references, room, months)
 
 
 def planned_terms(recipe: Recipe, station: StationConfig, limits: Limits | None) -> BudgetTerms:
     """The terms of a recipe that is planned on a station."""
-    months = VALIDITY_MONTHS if limits is None else limits.longest_validity_months
-    return terms_of(
-        with_stability(recipe, station), station.uncertainty, station.reference, station.pace.room_C, months
-    )
+    return budget_terms(with_stability(recipe, station), station, limits)
 
 
 def refuse_unreachable(recipe: Recipe, station: StationConfig, limits: Limits) -> None:
@@ -92,10 +88,7 @@ def with_stability(recipe: Recipe, station: StationConfig) -> Recipe:
 def refuse_contradictions(recipe: Recipe, station: StationConfig) -> None:
     """Refuse a recipe whose entries are not traced, whose local gravity is not the station's, or that lacks its nominal supply.
 
-    Raises
-    ------
-    RecipeInvalid
-        With the key.
+    Raises RecipeInvalid: with the key.
     """
     if recipe.uncertainty is not None:
         try:
@@ -125,9 +118,7 @@ def refuse_contradictions(recipe: Recipe, station: StationConfig) -> None:
 def refuse_beyond_station(recipe: Recipe, station: StationConfig) -> None:
     """Refuse temperatures, °C, angles, degrees, and rates, Hz, outside of the limits of the station.
 
-    Raises
-    ------
-    RecipeInvalid : names the key, the first value outside, and the range
+    Raises RecipeInvalid: names the key, the first value outside, and the range
     """
     limits = station.limits
     temperatures = [*recipe.temperatures_C, *([recipe.static_temperature_C] if recipe.static_record_s > 0.0 else [])]
@@ -150,8 +141,6 @@ def refuse_beyond_station(recipe: Recipe, station: StationConfig) -> None:
 def refused_by_run(recipe: Recipe, station: StationConfig, folder: Path) -> list[str]:
     """What 'tumbleline run' refuses in a recipe that can be planned: limits, serial numbers, ranges of the station.
 
-    Parameters
-    ----------
     folder : where a limits file that the recipe names is looked for
     """
     messages: list[str] = []

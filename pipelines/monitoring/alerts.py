@@ -4,8 +4,6 @@ Each alert is posted until the receiver accepts it, and not after that: its id i
 synchronised to the disk. A process that is killed between these two steps posts the alert twice, with the same id.
 """
 
-from __future__ import annotations
-
 import json
 import time
 import urllib.error
@@ -25,20 +23,14 @@ from schemas.errors import WrongUse
 TIMEOUT_S = 10.0
 ACCEPTED_FILE = "alerts.json"
 MOST_IDS = 5000
-AUDIT_AGE = timedelta(days=10)
-"""Findings of an older audit are not posted."""
-
-CONTENT_REFUSED = {400, 413, 422}
-"""Answers that refuse one alert for its content; the alerts after it are posted."""
-
+AUDIT_AGE = timedelta(days=10)  # findings of an older audit are not posted
+CONTENT_REFUSED = {400, 413, 422}  # answers that refuse one alert for its content; the alerts after it are posted
 KINDS = {"CRASHED": "crashed", "FAILED": "failed", "CANCELLED": "missed"}
 
 
 def alerts_of(snapshot: Snapshot, audits: Path | None = None) -> list[Alert]:
     """All alerts from the numbers and the newest audit, including those that were posted before.
 
-    Parameters
-    ----------
     audits : folder of the documents of the audits (``pages`` of the deployment weekly-audit); none where None
     """
     alerts = [*_of_runs(snapshot), *_of_stations(snapshot)]
@@ -47,32 +39,20 @@ def alerts_of(snapshot: Snapshot, audits: Path | None = None) -> list[Alert]:
     return [*alerts, *_of_audit(audits, snapshot.when), *_of_discoveries(audits, snapshot.when)]
 
 
-def _opener() -> urllib.request.OpenerDirector:
-    """Follows no redirection, which is an error here: a POST would become a GET, whose answer accepts nothing."""
-    opener = urllib.request.OpenerDirector()
-    for handler in (
-        urllib.request.ProxyHandler,
-        urllib.request.HTTPHandler,
-        urllib.request.HTTPSHandler,
-        urllib.request.HTTPDefaultErrorHandler,
-        urllib.request.HTTPErrorProcessor,
-    ):
-        opener.add_handler(handler())
-    return opener
+class _NoRedirection(urllib.request.HTTPRedirectHandler):
+    """A redirection is an error here: a POST would become a GET, whose answer accepts nothing."""
+
+    def redirect_request(self, *_: Any, **_named: Any) -> None:
+        return None
 
 
 class Poster:
     """Posts the alerts that the receiver has not accepted yet.
 
-    Parameters
-    ----------
     address : of the web hook, http or https
     folder : state folder, which holds the ids of accepted alerts
 
-    Raises
-    ------
-    WrongUse
-        The address begins with neither ``http://`` nor ``https://``.
+    Raises WrongUse: the address begins with neither ``http://`` nor ``https://``.
     """
 
     def __init__(self, address: str, folder: Path) -> None:
@@ -106,7 +86,7 @@ class Poster:
     def _send(self, alert: Alert) -> None:
         headers = {"Content-Type": "application/json", "User-Agent": "tumbleline"}
         request = urllib.request.Request(self._address, json.dumps(alert).encode(), headers)  # noqa: S310 - checked above
-        with _opener().open(request, timeout=TIMEOUT_S):
+        with urllib.request.build_opener(_NoRedirection).open(request, timeout=TIMEOUT_S):
             return
 
     def _accepted(self) -> dict[str, float]:

@@ -1,12 +1,11 @@
 """Numbers of an archive: runs, yield, interruptions, station time, lag of the chain, and units that are due."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Iterable
 from dataclasses import dataclass, field, fields
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from typing import Self
 
 from pipelines.archive import Archive, files
 from pipelines.archive.listing import RunInfo
@@ -17,9 +16,7 @@ from pipelines.certificates.days import today
 from pipelines.certificates.ledger import Ledger
 from schemas.errors import ArchiveUnusable, TumblelineError
 
-DUE_DAYS = (0, 30)
-"""Periods, days: a certificate is due where it ends within the period."""
-
+DUE_DAYS = (0, 30)  # periods, days: a certificate is due where it ends within the period
 IMPORTED = "(import)"  # station label of an imported run
 
 
@@ -33,9 +30,9 @@ class RunTime:
     repeated: int = 0
     door: int = 0
 
-    def __add__(self, other: RunTime) -> RunTime:
+    def __add__(self, other: Self) -> Self:
         """The sum of two runs, field by field."""
-        return RunTime(**{one.name: getattr(self, one.name) + getattr(other, one.name) for one in fields(self)})
+        return type(self)(**{one.name: getattr(self, one.name) + getattr(other, one.name) for one in fields(self)})
 
 
 @dataclass

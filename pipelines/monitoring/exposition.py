@@ -1,7 +1,5 @@
 """The numbers in the text format of Prometheus."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from datetime import datetime

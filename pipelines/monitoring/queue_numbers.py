@@ -1,7 +1,5 @@
 """Numbers of the orchestrator, read over its HTTP interface: runs in the queues, late and recently crashed runs, workers."""
 
-from __future__ import annotations
-
 import json
 import os
 import urllib.error
@@ -20,9 +18,7 @@ PAGE_SIZE = 200  # largest that the server allows
 OPEN = ("SCHEDULED", "PENDING", "RUNNING", "PAUSED", "CANCELLING")
 FAILED = ("CRASHED", "FAILED")
 MISSED = ("missed:", "skipped:")  # beginnings of the messages of pipelines.orchestrator.queue_rules
-LATE = timedelta(minutes=5)
-"""A run that has been due for longer is late; a worker requests work every ten seconds."""
-
+LATE = timedelta(minutes=5)  # a run that has been due for longer is late; a worker requests work every ten seconds
 RECENT = timedelta(days=1)
 
 
@@ -67,10 +63,7 @@ def configured() -> bool:
 def read_queues(now: datetime | None = None) -> QueueNumbers:
     """The numbers of the orchestrator that PREFECT_API_URL names.
 
-    Raises
-    ------
-    LinkLost
-        It does not answer, or refuses the key.
+    Raises LinkLost: it does not answer, or refuses the key.
     """
     at = now or datetime.now(UTC)
     if os.environ.get(KEY_FILE) or os.environ.get("CREDENTIALS_DIRECTORY"):

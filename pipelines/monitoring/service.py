@@ -1,7 +1,5 @@
 """The service: ``/metrics`` for Prometheus, ``/healthz`` for health checks, and alerts to a web hook."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Generator
 from contextlib import contextmanager

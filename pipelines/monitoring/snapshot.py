@@ -1,7 +1,5 @@
 """All numbers at one time, and the verdict on them for health checks."""
 
-from __future__ import annotations
-
 import threading
 import time
 from collections import Counter
@@ -19,9 +17,7 @@ from schemas.errors import TumblelineError
 from stations.safety.folder import read_log, state_folder
 from stations.safety.lease_files import read_holder
 
-KEEP_S = 10.0
-"""Time for which a snapshot is reused, s: several scrapers cause one reading."""
-
+KEEP_S = 10.0  # time for which a snapshot is reused, s: several scrapers cause one reading
 LAG_S = 3600.0
 """Longest time, s, between the start of a finished run and its entry in the hash chain; a killed writer leaves it out."""
 
@@ -126,8 +122,6 @@ def _reason(problem: Exception, prefix: str) -> str:
 class Monitor:
     """Takes snapshots of an archive, the orchestrator of the environment and the stations of this computer.
 
-    Parameters
-    ----------
     window_d : number of days whose runs are counted
     free_gb : free space that the archive needs, GB
     expected : queues that must have a worker online

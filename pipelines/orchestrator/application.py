@@ -4,8 +4,6 @@ Prefect checks the key. It has no setting for trusted host names (DNS rebinding 
 of other origins, and its WebSockets check neither.
 """
 
-from __future__ import annotations
-
 import base64
 import secrets
 from collections.abc import Sequence
@@ -18,8 +16,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from pipelines.orchestrator.archive_address import REFUSED, credentials_in
 
-STORED = ("/api/flow_runs/", "/api/deployments/")
-"""Addresses that receive parameters of flows."""
+STORED = ("/api/flow_runs/", "/api/deployments/")  # addresses that receive parameters of flows
 LARGEST, LARGEST_LOGS = 1_000_000, 6_000_000
 """Bytes of a body; clients send their logs in batches of 4 MB at most and one message of 1 MB more."""
 LOGS = "/api/logs/"

@@ -4,8 +4,6 @@ A flow takes the credentials from its environment (``TUMBLELINE_ARCHIVE``, or th
 from a Secret block of the orchestrator, which is encrypted. Credentials in an address are detected, removed, or refused.
 """
 
-from __future__ import annotations
-
 import os
 import re
 from collections.abc import Generator
@@ -14,6 +12,7 @@ from typing import Any
 from urllib.parse import parse_qsl, quote, urlencode
 
 from pipelines.archive import Archive
+from pipelines.parallel import with_environment
 from schemas.errors import WrongUse
 
 VARIABLE = "TUMBLELINE_ARCHIVE"
@@ -33,15 +32,10 @@ ADDRESS = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*://[^\s\"'<>\\]+")
 def archive_of(parameter: str | None) -> Archive:
     """The archive of a flow's parameter, with the credentials of this process.
 
-    Parameters
-    ----------
     parameter : an address without credentials; ``block:NAME`` for the address in a Secret block; None: TUMBLELINE_ARCHIVE of
         the environment. The address of the environment is used where it differs only by its credentials.
 
-    Raises
-    ------
-    WrongUse
-        The parameter has credentials, or the block does not exist.
+    Raises WrongUse: the parameter has credentials, or the block does not exist.
     """
     refuse_credentials(parameter)
     if parameter is None:
@@ -55,20 +49,9 @@ def archive_of(parameter: str | None) -> Archive:
 @contextmanager
 def named(archive: Archive) -> Generator[str]:
     """A context in which flows of this process find an archive by its address without credentials; it gives this address."""
-    whole = archive.address
-    shown = without_credentials(whole)
-    if shown == whole:
+    shown = without_credentials(archive.address)
+    with with_environment({} if shown == archive.address else {VARIABLE: archive.address}):
         yield shown
-        return
-    before = os.environ.get(VARIABLE)
-    os.environ[VARIABLE] = whole
-    try:
-        yield shown
-    finally:
-        if before is None:
-            del os.environ[VARIABLE]
-        else:
-            os.environ[VARIABLE] = before
 
 
 def _of_block(name: str) -> str:

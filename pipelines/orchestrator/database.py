@@ -1,7 +1,5 @@
 """Copy and restoration of the orchestrator's database: SQLite while its server runs, or PostgreSQL with its own programs."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import sqlite3
@@ -41,10 +39,7 @@ def copy_into(folder: Path, keep: int) -> Path:
 def copy_database(source: str, target: Path) -> int:
     """Write a consistent copy of a database to a new file; its size, bytes.
 
-    Raises
-    ------
-    WrongUse
-        The database or a needed program is missing, the target exists, or the copy failed.
+    Raises WrongUse: the database or a needed program is missing, the target exists, or the copy failed.
     """
     if target.exists():
         raise WrongUse(f"backup: {target} exists, a new file is needed; name another")
@@ -66,10 +61,7 @@ def copy_database(source: str, target: Path) -> int:
 def restore_database(copy: Path, target: str) -> None:
     """Replace a database with a copy; its server must be stopped.
 
-    Raises
-    ------
-    WrongUse
-        The copy or a needed program is missing, it is no sound database, or the server still uses the database.
+    Raises WrongUse: the copy or a needed program is missing, it is no sound database, or the server still uses the database.
     """
     if not copy.is_file():
         raise WrongUse(f"restore: {copy} is not there, a copy of the database is needed; name it with --database")

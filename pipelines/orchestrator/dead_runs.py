@@ -5,8 +5,6 @@ shortest period that Prefect allows). An automation of the server marks a run as
 has no final state: its computer has no power, or its network is down.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
 from datetime import timedelta
@@ -15,16 +13,7 @@ from time import monotonic, sleep
 from uuid import UUID
 
 from prefect.client.orchestration import SyncPrefectClient, get_client
-from prefect.client.schemas.filters import (
-    FlowRunFilter,
-    FlowRunFilterName,
-    FlowRunFilterState,
-    FlowRunFilterStateType,
-    WorkPoolFilter,
-    WorkPoolFilterName,
-    WorkQueueFilter,
-    WorkQueueFilterName,
-)
+from prefect.client.schemas import filters
 from prefect.client.schemas.objects import FlowRun, StateType
 from prefect.client.schemas.sorting import FlowRunSort
 from prefect.events.actions import ActionTypes, ChangeFlowRunState
@@ -33,9 +22,7 @@ from prefect.events.schemas.events import ResourceSpecification
 from prefect.states import Crashed
 
 PROCESSES = Path("/proc")
-OF_KERNEL = 0x00200000
-"""Flag of a thread of the kernel (PF_KTHREAD of Linux), which never has an environment."""
-
+OF_KERNEL = 0x00200000  # flag of a thread of the kernel (PF_KTHREAD of Linux), which never has an environment
 STARTED_WITHIN = timedelta(seconds=1)
 """Longest time for which a process that is being started may have no environment yet."""
 
@@ -45,9 +32,7 @@ LOST_S = 60.0
 """Longest time from the moment at which a worker takes a run to the start of its process, s, with a large margin."""
 
 SUSPENDED = "Suspended"  # such a run has no process and gets a new one when it is resumed
-WORKER = "prefect.worker.name"
-"""Label that the worker of Prefect gives to the runs that it takes."""
-
+WORKER = "prefect.worker.name"  # label that the worker of Prefect gives to the runs that it takes
 GONE = "its process has ended: it was killed, or its worker ended; give the same order again to continue"
 
 
@@ -62,7 +47,7 @@ def close_dead_runs(name: str) -> None:
 
 def runs_of_name(client: SyncPrefectClient, name: str) -> list[FlowRun]:
     """Flow runs of a name, the newest first."""
-    flow_filter = FlowRunFilter(name=FlowRunFilterName(any_=[name]))
+    flow_filter = filters.FlowRunFilter(name=filters.FlowRunFilterName(any_=[name]))
     return client.read_flow_runs(flow_run_filter=flow_filter, sort=FlowRunSort.START_TIME_DESC, limit=MANY)
 
 
@@ -103,12 +88,7 @@ class LostRuns:
         self._since: dict[tuple[UUID, UUID | None], float] = {}
 
     def close(self, client: SyncPrefectClient, now: float) -> list[str]:
-        """Mark the lost runs as crashed; return their names.
-
-        Parameters
-        ----------
-        now : s, of a clock that only counts on
-        """
+        """Mark the lost runs as crashed; return their names. ``now``, s, is of a clock that only counts on."""
         lost = {(run.id, run.state_id): run for run in _without_process(client, *self._where)}
         self._since = {key: self._since.get(key, now) for key in lost}
         closed: list[str] = []
@@ -129,9 +109,11 @@ def runs_of_queue(
 ) -> list[FlowRun]:
     """Flow runs of a work queue in one of the states, in the order of their start."""
     return client.read_flow_runs(
-        flow_run_filter=FlowRunFilter(state=FlowRunFilterState(type=FlowRunFilterStateType(any_=list(states)))),
-        work_pool_filter=WorkPoolFilter(name=WorkPoolFilterName(any_=[pool])),
-        work_queue_filter=WorkQueueFilter(name=WorkQueueFilterName(any_=[queue])),
+        flow_run_filter=filters.FlowRunFilter(
+            state=filters.FlowRunFilterState(type=filters.FlowRunFilterStateType(any_=list(states)))
+        ),
+        work_pool_filter=filters.WorkPoolFilter(name=filters.WorkPoolFilterName(any_=[pool])),
+        work_queue_filter=filters.WorkQueueFilter(name=filters.WorkQueueFilterName(any_=[queue])),
         sort=sort,
         limit=MANY,
     )

@@ -91,11 +91,7 @@ def _made() -> bytes:
 def _migrate(made: Path) -> None:
     """Have Prefect make a database in a folder of its own, without the settings and the folder of this process."""
     environment = {name: value for name, value in os.environ.items() if not name.startswith("PREFECT_")}
-    environment |= {
-        "PREFECT_HOME": str(made.parent),
-        "PREFECT_SERVER_ANALYTICS_ENABLED": "false",
-        "DO_NOT_TRACK": "1",
-    }
+    environment |= {"PREFECT_HOME": str(made.parent), "PREFECT_SERVER_ANALYTICS_ENABLED": "false", "DO_NOT_TRACK": "1"}
     command = [sys.executable, "-m", "prefect", "server", "database", "upgrade", "-y"]
     subprocess.run(  # noqa: S603 - no input of a user
         command,

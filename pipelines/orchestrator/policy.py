@@ -9,8 +9,6 @@
       crashed: close         # or continue: a run whose process died continues from its checkpoint
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass, fields
@@ -50,10 +48,7 @@ class Policy:
 def policy_of(deployment: str, content: object) -> Policy:
     """The policy that a ``prefect.yaml`` states for a deployment.
 
-    Raises
-    ------
-    WrongUse
-        An unknown key or value.
+    Raises WrongUse: an unknown key or value.
     """
     if content is None:
         return Policy()

@@ -6,8 +6,6 @@ also while its worker is busy or dead. It also closes runs whose process ended w
 place in the queue for ever.
 """
 
-from __future__ import annotations
-
 import threading
 from collections import defaultdict
 from collections.abc import Generator, Mapping, Sequence
@@ -19,12 +17,7 @@ from typing import Any, cast
 from uuid import UUID
 
 from prefect.client.orchestration import SyncPrefectClient, get_client
-from prefect.client.schemas.filters import (
-    DeploymentFilter,
-    DeploymentFilterId,
-    FlowRunFilter,
-    FlowRunFilterExpectedStartTime,
-)
+from prefect.client.schemas import filters
 from prefect.client.schemas.objects import FlowRun, StateType
 from prefect.client.schemas.sorting import FlowRunSort
 from prefect.states import Cancelled, Scheduled
@@ -54,8 +47,6 @@ SETTLED = timedelta(seconds=30)
 def apply_rules(pool: str, queue: str, now: datetime | None = None, settled: timedelta = SETTLED) -> list[str]:
     """Apply the policies to the runs of a queue; one sentence for each run that changed.
 
-    Parameters
-    ----------
     settled : age of a crash from which its run may continue; zero where the worker has not started yet
     """
     at = now or datetime.now(UTC)
@@ -71,8 +62,6 @@ def apply_rules(pool: str, queue: str, now: datetime | None = None, settled: tim
 def applied(pool: str, queues: Sequence[str], worker: str) -> Generator[None]:
     """A context in which the rules are applied to the queues every ``EVERY_S`` seconds, in a thread of this process.
 
-    Parameters
-    ----------
     worker : name of the worker of Prefect that takes the runs
     """
     lost = {queue: LostRuns(pool, queue, worker) for queue in queues}
@@ -125,10 +114,10 @@ def newer_run(deployment: str, start: datetime, now: datetime | None = None) -> 
     after, before = cast("Any", start + timedelta(milliseconds=1)), cast("Any", now or datetime.now(UTC))
     with get_client(sync_client=True) as client:
         runs = client.read_flow_runs(
-            flow_run_filter=FlowRunFilter(
-                expected_start_time=FlowRunFilterExpectedStartTime(after_=after, before_=before)
+            flow_run_filter=filters.FlowRunFilter(
+                expected_start_time=filters.FlowRunFilterExpectedStartTime(after_=after, before_=before)
             ),
-            deployment_filter=DeploymentFilter(id=DeploymentFilterId(any_=[UUID(deployment)])),
+            deployment_filter=filters.DeploymentFilter(id=filters.DeploymentFilterId(any_=[UUID(deployment)])),
             sort=FlowRunSort.EXPECTED_START_TIME_DESC,
         )
     return next((run.name for run in runs if run.auto_scheduled and run.state_type != StateType.CANCELLED), "")

@@ -20,17 +20,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from pipelines.orchestrator import settings
 from pipelines.orchestrator.new_database import make_database
-from pipelines.orchestrator.settings import (
-    JSON_FORMAT,
-    LOOPBACK,
-    SERVER_KEY,
-    closed,
-    kept,
-    origins,
-    use_database,
-    use_key,
-)
 from pipelines.serving.connections import MOST, ConnectionLimits, TimedRequests, bound_socket
 from schemas import host
 from schemas.errors import TumblelineError, WrongUse
@@ -54,27 +45,28 @@ def serve(
 ) -> None:
     """Serve until the process is stopped, or, with a ``home``, until no client is left there.
 
-    Parameters
-    ----------
-    host, port : where to listen
     names : further names of this host; requests with other names are refused
     home : folder of the locks of the clients
     tls : files of the certificate and of its key, for https; clients name the authority in PREFECT_API_SSL_CERT_FILE
     """
-    known, scheme = [*LOOPBACK, *names], "http" if tls is None else "https"
-    own = origins(known, port, scheme)
+    known, scheme = [*settings.LOOPBACK, *names], "http" if tls is None else "https"
+    own = settings.origins(known, port, scheme)
     os.umask(PRIVATE)
-    key = use_key(SERVER_KEY)
-    os.environ.update(closed(key, own))
-    use_database()
+    key = settings.use_key(settings.SERVER_KEY)
+    os.environ.update(settings.closed(key, own))
+    settings.use_database()
     os.environ.setdefault("PREFECT_SERVER_UI_API_URL", f"{scheme}://{known[-1]}:{port}/api")
     if wants_json():
-        os.environ.setdefault(JSON_FORMAT, JSON)
+        os.environ.setdefault(settings.JSON_FORMAT, JSON)
     if home is None:
-        for name, value in kept().items():
+        for name, value in settings.kept().items():
             os.environ.setdefault(name, value)
     if PAGES not in os.environ:
-        os.environ[PAGES] = str(_pages_folder())
+        pages = (
+            state_folder() / "orchestrator-pages"
+        )  # once for a user and a version of Prefect, outside the installed packages
+        pages.mkdir(exist_ok=True)  # Prefect locks a file in it before it makes it
+        os.environ[PAGES] = str(pages)
     folder = os.environ.get("PREFECT_HOME")
     if folder:
         private_folder(Path(folder))
@@ -104,13 +96,6 @@ def serve(
         threading.Thread(target=_leave_when_alone, args=(home, server), daemon=True).start()
     with place:
         server.run(sockets=[place])
-
-
-def _pages_folder() -> Path:
-    """Where Prefect copies the files of its pages: once for a user and a version of Prefect, outside the installed packages."""
-    folder = state_folder() / "orchestrator-pages"
-    folder.mkdir(exist_ok=True)  # Prefect locks a file in it before it makes it
-    return folder
 
 
 def private_folder(path: Path) -> None:
@@ -160,7 +145,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="python -m pipelines.orchestrator.server", description="The orchestrator's server."
     )
-    parser.add_argument("--host", default=LOOPBACK[0], help="Address to listen on.")
+    parser.add_argument("--host", default=settings.LOOPBACK[0], help="Address to listen on.")
     parser.add_argument("--port", type=int, default=4200, help="Port to listen on.")
     parser.add_argument(
         "--name", action="append", default=[], help="A further host name that clients use; may be repeated."

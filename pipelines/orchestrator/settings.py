@@ -3,8 +3,6 @@
 :func:`check_server` finds out before Prefect, whose errors are tracebacks, whether a server answers and accepts the key.
 """
 
-from __future__ import annotations
-
 import base64
 import os
 import secrets
@@ -18,9 +16,7 @@ from pathlib import Path
 
 from schemas.errors import LinkLost, WrongUse
 
-LOCAL = "local"
-"""In place of the address of a Dask scheduler: a cluster of processes on this computer."""
-
+LOCAL = "local"  # in place of the address of a Dask scheduler: a cluster of processes on this computer
 STARTUP_S = 120
 SERVER_KEY, CLIENT_KEY = "PREFECT_SERVER_API_AUTH_STRING", "PREFECT_API_AUTH_STRING"
 CREDENTIAL = "prefect-auth"  # name in the systemd units (LoadCredential)
@@ -37,8 +33,7 @@ RETENTION_D = 90
 
 EVENTS_D = 7
 LOOPBACK = ("127.0.0.1", "localhost")
-POLL_S, TIMEOUT_S = 1.0, 5.0
-"""Time between two questions to a server that does not answer yet, and for its answer, s."""
+POLL_S, TIMEOUT_S = 1.0, 5.0  # time between two questions to a server that does not answer yet, and for its answer, s
 
 
 def cache_folder() -> Path:
@@ -104,10 +99,7 @@ def use_key(variable: str) -> str:
     Sources in this order: the environment, the file of TUMBLELINE_ORCHESTRATOR_KEY (secret of a container), and the
     credential ``prefect-auth`` of a systemd unit.
 
-    Raises
-    ------
-    WrongUse
-        The key is missing or too short, or other users may read its file.
+    Raises WrongUse: the key is missing or too short, or other users may read its file.
     """
     given = os.environ.get(variable) or os.environ.get(SERVER_KEY) or os.environ.get(CLIENT_KEY)
     key = given or _secret(KEY_FILE, CREDENTIAL, "key file")
@@ -127,10 +119,7 @@ def use_database() -> None:
     Sources in this order: the environment, the file of TUMBLELINE_ORCHESTRATOR_DATABASE, and the credential
     ``prefect-database`` of a systemd unit. Without one the database is SQLite in PREFECT_HOME.
 
-    Raises
-    ------
-    WrongUse
-        The file cannot be read, or other users may read it.
+    Raises WrongUse: the file cannot be read, or other users may read it.
     """
     address = os.environ.get(DATABASE) or _secret(DATABASE_FILE, DATABASE_CREDENTIAL, "database file")
     if address:
@@ -161,12 +150,8 @@ def _secret(variable: str, credential: str, what: str) -> str:
 def check_server(patience_s: float = 0.0) -> None:
     """Wait until the orchestrator of PREFECT_API_URL answers, and check that it accepts PREFECT_API_AUTH_STRING.
 
-    Raises
-    ------
-    WrongUse
-        The address is invalid, or the key is missing or wrong.
-    LinkLost
-        It does not answer in time.
+    Raises WrongUse: the address is invalid, or the key is missing or wrong.
+    Raises LinkLost: it does not answer in time.
     """
     address = os.environ.get("PREFECT_API_URL", "")
     if not address.startswith(("http://", "https://")):

@@ -10,8 +10,6 @@ progress, the watchdog of the station) have ended.
 ``stop`` pauses the station's queue and waits for the run in progress; the next ``start`` resumes the queue.
 """
 
-from __future__ import annotations
-
 import argparse
 import ctypes
 import os
@@ -42,16 +40,10 @@ def start(
 ) -> int:
     """Run a worker for a station's queue and further queues, one run at a time; its exit status when all its processes ended.
 
-    Parameters
-    ----------
     host : name of this computer, by which a worker knows the runs of its predecessor; that of the system where empty
 
-    Raises
-    ------
-    OperatorNeeded
-        Another worker of this computer works for the station.
-    WrongUse, LinkLost
-        The orchestrator does not accept the key, or does not answer.
+    Raises OperatorNeeded: another worker of this computer works for the station.
+    Raises WrongUse, LinkLost: the orchestrator does not accept the key, or does not answer.
     """
     from pipelines.orchestrator.dead_runs import FREQUENCY, HEARTBEAT_S, close_dead_runs_of_queue
     from pipelines.orchestrator.queue_rules import applied, apply_rules
@@ -195,16 +187,14 @@ def run_until_orphans_end(
     A service manager that stops a unit, and a container whose first process ends, kill the remaining processes. The main process
     must therefore end after the watchdog: it adopts the orphans of its descendants (Linux, ``PR_SET_CHILD_SUBREAPER``).
 
-    Parameters
-    ----------
     begun : called with the child; only this function waits for it.
 
-    Notes
-    -----
     A SIGTERM to this process is passed to the command, not to its orphans. The exit status of a child that a
     signal ended is 128 plus the signal's number, as in shells.
     """
-    _adopt_orphans()
+    library = ctypes.CDLL(None, use_errno=True)
+    if library.prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0):
+        raise OSError(ctypes.get_errno(), "prctl(PR_SET_CHILD_SUBREAPER)")
     stopped = False
 
     def pass_on(_number: int, _frame: FrameType | None) -> None:
@@ -229,12 +219,6 @@ def run_until_orphans_end(
         if pid == child.pid:
             child.returncode = code = os.waitstatus_to_exitcode(how)
             status = code if code >= 0 else 128 - code
-
-
-def _adopt_orphans() -> None:
-    library = ctypes.CDLL(None, use_errno=True)
-    if library.prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0):
-        raise OSError(ctypes.get_errno(), "prctl(PR_SET_CHILD_SUBREAPER)")
 
 
 if __name__ == "__main__":

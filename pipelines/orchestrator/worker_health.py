@@ -5,8 +5,6 @@ takes no run, and no service manager sees it. What counts is the worker's heartb
 monotonic clock of this computer; the heartbeat's time is compared for equality only, so that no clock needs to be right.
 """
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess
@@ -18,21 +16,14 @@ from contextlib import contextmanager
 from schemas.log_lines import tell
 
 VARIABLE = "PREFECT_WORKER_HEARTBEAT_SECONDS"
-PERIOD_S = 30.0
-"""Prefect's period between two heartbeats of a worker."""
-
-MISSED = 4
-"""Heartbeats in succession that a worker may owe."""
-
-STARTUP_S = 180.0
-"""Time that a worker may need on a busy computer until its first heartbeat."""
+PERIOD_S = 30.0  # Prefect's period between two heartbeats of a worker
+MISSED = 4  # heartbeats in succession that a worker may owe
+STARTUP_S = 180.0  # time that a worker may need on a busy computer until its first heartbeat
 
 
 class Silence:
     """Whether heartbeats have stopped, from what the server says at each question.
 
-    Parameters
-    ----------
     longest_s : time without a new heartbeat that is silence.
     startup_s : the same before the first heartbeat.
     gap_s : two questions further apart than this are no observation: this computer was suspended.
@@ -49,12 +40,7 @@ class Silence:
         self._since = float("nan")
 
     def heard(self, heartbeat: str, now: float) -> bool:
-        """Note the time of the last heartbeat that the server has (empty without one); whether the worker is silent.
-
-        Parameters
-        ----------
-        now : time of the monotonic clock, s.
-        """
+        """Note the time of the last heartbeat that the server has (empty without one); whether the worker is silent."""
         new, gap = heartbeat != self._last, not now - self._asked <= self.gap_s
         if self._last is not None and new:
             self._begun = True
@@ -81,8 +67,6 @@ def watched(
 ) -> Generator[None]:
     """A context in which a child that is silent is killed, by a thread of this process; its own children go on.
 
-    Parameters
-    ----------
     ask : time of the child's last heartbeat, empty without one; raises where the server does not answer.
     child : the process; None before it has started.
     every_s : period of the heartbeats.
@@ -115,8 +99,6 @@ def watched(
 def in_thread(name: str, repeat: Callable[[threading.Event], None], patience_s: float = 0.0) -> Generator[None]:
     """A context in which a function runs in a thread of this process; its event is set at the end.
 
-    Parameters
-    ----------
     patience_s : time to wait for the end of the thread, s
     """
     ended = threading.Event()

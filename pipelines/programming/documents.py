@@ -1,7 +1,5 @@
 """The JSON document of the writing of coefficients into devices: keys that other programs read."""
 
-from __future__ import annotations
-
 from typing import Annotated, Literal
 
 from typing_extensions import TypedDict

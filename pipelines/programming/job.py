@@ -1,7 +1,5 @@
 """The programming of the units of a run: choice of units and station, and their certificates."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -167,7 +165,4 @@ def _station(run: Run, config: StationConfig) -> Generator[tuple[Any, Callable[[
 
 def document(run: Run, outcomes: Sequence[ProgrammingOutcome], given: Mapping[str, str]) -> dict[str, Any]:
     """The result for JSON."""
-    return {
-        "run": run.id,
-        "units": [{**one.document(), "certificate": given.get(one.serial)} for one in outcomes],
-    }
+    return {"run": run.id, "units": [{**one.document(), "certificate": given.get(one.serial)} for one in outcomes]}

@@ -1,7 +1,5 @@
 """Options of the programming, the outcome of each unit, and checks of its output: offset registers, coefficients in a pose."""
 
-from __future__ import annotations
-
 import zlib
 from dataclasses import dataclass, field
 from typing import Any
@@ -71,16 +69,6 @@ class ProgrammingOutcome:
         }  # fmt: skip
 
 
-@dataclass(frozen=True)
-class InPose:
-    """Mean output (3,) of a unit under a known force (3,), g, at a temperature, °C."""
-
-    pose: str
-    force: Array
-    output: Array
-    temperature: float
-
-
 def require_moved(device: ProgrammingOutcome, plain: Array, moved: Array, tolerance_ug: float) -> None:
     """Refuses a device whose output did not change by the value of its offset registers."""
     if device.block is None:
@@ -95,9 +83,13 @@ def require_moved(device: ProgrammingOutcome, plain: Array, moved: Array, tolera
         )
 
 
-def require_in_pose(device: ProgrammingOutcome, at: InPose, tolerance_ug: float) -> None:
-    """Refuses coefficients in the device that do not give the force, or do not agree with those of the archive."""
-    pose, force, output, temperature = at.pose, at.force, at.output, at.temperature
+def require_in_pose(
+    device: ProgrammingOutcome, pose: str, force: Array, output: Array, temperature: float, tolerance_ug: float
+) -> None:
+    """Refuses coefficients in the device that do not give the force, or do not agree with those of the archive.
+
+    force, output : (3,), the known force of the pose, g, and the mean output under it · temperature : °C
+    """
     held = unpack(device.memory.read(device.copy))
     if held is None:
         raise StationRefused(

@@ -4,8 +4,6 @@ A unit that fails a step is not certified, and its previously valid copy is unch
 a device uses it only when it is complete.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -20,7 +18,6 @@ from pipelines.export.device_block import block_of, pack, unpack
 from pipelines.export.polynomials import UnitCalibration
 from pipelines.programming.outcome import (
     Choice,
-    InPose,
     ProgrammingOutcome,
     require_in_pose,
     require_moved,
@@ -29,7 +26,7 @@ from pipelines.programming.outcome import (
 from schemas.errors import OperatorNeeded, StationError, StationRefused, TumblelineError, WrongUse
 from schemas.recipe import Recipe
 from schemas.units import STANDARD_GRAVITY_M_S2
-from stations.devices.memory import COPIES, UnitMemory
+from stations.devices.memory import COPIES
 from stations.safety.suspenders import require_released
 from stations.station import Station
 
@@ -62,12 +59,11 @@ class Programmer:
     def program(self, units: Sequence[tuple[int, UnitCalibration]]) -> list[ProgrammingOutcome]:
         """Writes units (slot, calibration); the outcome of each.
 
-        Raises
-        ------
-        StationError, LeaseLost, EmergencyStop
-            The station fails for all units; every unit whose programming has begun is recorded as failed.
+        Raises StationError, LeaseLost, EmergencyStop: the station fails for all units; every unit whose programming has begun
+        is recorded as failed.
         """
-        outcomes = [ProgrammingOutcome(unit.unit, slot, unit, self._memory(slot)) for slot, unit in units]
+        slots, clock = self.station.reader.slots, self.station.clock
+        outcomes = [ProgrammingOutcome(unit.unit, slot, unit, slots[slot].memory(clock)) for slot, unit in units]
         self._check(outcomes)
         step = "archive the memory"
         try:
@@ -102,9 +98,6 @@ class Programmer:
                     self._failed(one, step, str(problem) or type(problem).__name__)
                 except (TumblelineError, OSError) as second:
                     problem.add_note(f"the failure of unit {one.serial} could not be recorded either: {second}")
-
-    def _memory(self, slot: int) -> UnitMemory:
-        return self.station.reader.slots[slot].memory(self.station.clock)
 
     def _require(self) -> None:
         """Ends the programming where the lease is lost, the emergency stop is pressed or the door is open.
@@ -276,7 +269,7 @@ class Programmer:
                 outcomes,
                 "verify",
                 lambda one, f=force, m=plain, t=temperatures, p=pose.name: require_in_pose(
-                    one, InPose(p, f, one.unit.with_forces(m[one.slot], f), t[one.slot]), self.choice.tolerance_ug
+                    one, p, f, one.unit.with_forces(m[one.slot], f), t[one.slot], self.choice.tolerance_ug
                 ),
             )
 

@@ -1,7 +1,5 @@
 """What a recipe will make a lot go through, as states of the science: for checks and budgets before any chamber time is spent."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterable, Sequence
 from typing import Any, NamedTuple
 
@@ -36,8 +34,6 @@ def planned_state(
     Quantities that the plan does not set (supply, vibration, what the station's reader records besides) wander a little, as they
     do on a station, so that effects of theirs are not refused.
 
-    Parameters
-    ----------
     station : the built-in simulated one where None
     history : whether the temperatures between the dwells go along, as a station records them
     recorded : columns that are recorded besides; those of the station's reader where None
@@ -94,8 +90,6 @@ def settled_state(
 ) -> State:
     """Dwells of a device that was switched on at time zero and has settled to every temperature: what a search of plans looks at.
 
-    Parameters
-    ----------
     force : (n, 3), g; time : (n,), s; temperature : (n,), °C, of the device and of the air
     angles : (n, 2), rad, outer and inner; since_move_s : s, time at rest before every dwell
     axes : those with an output
@@ -138,16 +132,10 @@ def _history(stretches: Sequence[Activity], station: StationConfig) -> History:
 def refuse_unidentified(recipe: Recipe, recorded: Iterable[str] = ()) -> None:
     """Refuse a model that the planned poses and temperatures cannot determine.
 
-    Parameters
-    ----------
     recorded : columns that are recorded beside every dwell, besides those that every station records
 
-    Raises
-    ------
-    NotIdentified
-        With the coefficients that cannot be separated.
-    MissingInput
-        The model depends on a column that is not recorded.
+    Raises NotIdentified: with the coefficients that cannot be separated.
+    Raises MissingInput: the model depends on a column that is not recorded.
     """
     state = planned_state(recipe, recorded=recorded)
     fit_lot(recipe.effects, state, of_axes(state.force, state.axes, -1).copy())
@@ -167,9 +155,6 @@ def planned_dwells(recipe: Recipe, station: StationConfig, activities: list[Acti
     whole = schedule(steps(recipe), station, recipe) if activities is None else activities
     own = [one for one in whole if one.kind == "dwell"]
     checks = [one for one in whole if one.kind == "verification"]
-    return Planned(
-        fit=state_of(whole, station, recipe),
-        verification=state_of(whole, station, recipe, kinds=("verification",)) if checks else None,
-        soak=np.array([one.step.soak for one in own]),
-        target_C=np.array([one.step.temperature for one in own]),
-    )
+    verification = state_of(whole, station, recipe, kinds=("verification",)) if checks else None
+    soak, target = (np.array([getattr(one.step, name) for one in own]) for name in ("soak", "temperature"))
+    return Planned(state_of(whole, station, recipe), verification, soak, target)

@@ -1,7 +1,5 @@
 """The steps of a capture: every record of a recipe, in order."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal
 
@@ -10,6 +8,8 @@ from schemas.poses import Pose
 from schemas.recipe import Recipe
 
 Kind = Literal["dwell", "verification", "allan", "procedure"]
+AS_STATED = ("kind", "pose", "wait_s", "settled", "off_s", "lasting_s", "rate_hz")
+"""What a step has from the step of its procedure as it is."""
 
 
 @dataclass(frozen=True)
@@ -60,17 +60,11 @@ def steps(recipe: Recipe) -> list[Step]:
         for one in own:
             step = Step(
                 record=len(records),
-                kind=one.kind,
                 soak=first + one.soak - own[0].soak,
                 temperature=one.temperature_C,
-                pose=one.pose,
-                wait_s=one.wait_s,
-                settled=one.settled,
-                off_s=one.off_s,
                 procedure=number if recipe.procedures else None,
-                lasting_s=one.lasting_s,
-                rate_hz=one.rate_hz,
                 order=one if recipe.procedures else None,
+                **{name: getattr(one, name) for name in AS_STATED},
             )
             records.append(step)
     return records

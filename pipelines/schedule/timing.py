@@ -1,7 +1,5 @@
 """Station time of a recipe, or of any steps: moves, soaks, dwells and the static record, before any of it is spent."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -67,8 +65,6 @@ class Activity:
 def minutes(steps: Sequence[Step], station: StationConfig, recipe: Recipe, start: StationPose | None = None) -> Minutes:
     """Station time of steps in order; a change of their ``soak`` is a soak, as capture does it.
 
-    Parameters
-    ----------
     steps : records to take, of a recipe (:func:`pipelines.capture.capture.steps`) or any others
     station : its speeds, its rule for soaks and its pace
     recipe : for the shortest soak, the settling after a move and the durations

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import fields, is_dataclass
 from typing import Any
 
 
 def json_value(value: Any) -> Any:
-    """A value with the types of JSON; numbers that are not finite become null."""
+    """A value with the types of JSON; numbers that are not finite become null, a dataclass an object."""
+    if not isinstance(value, type) and is_dataclass(value):
+        return {field.name: json_value(getattr(value, field.name)) for field in fields(value)}
     if isinstance(value, dict):
         return {str(key): json_value(item) for key, item in value.items()}
     if isinstance(value, list | tuple):

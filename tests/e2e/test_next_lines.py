@@ -109,7 +109,7 @@ def _improved(folder: Path) -> tuple[int, str, str]:
 
 
 CASES = {
-    "rerun": _rerun, "run": _run, "history": _refuted, "import_text": _imported, "improve_text": _improved,
+    "rerun": _rerun, "run": _run, "history": _refuted, "import_": _imported, "improve_text": _improved,
 }  # fmt: skip
 
 

@@ -1,11 +1,10 @@
 """The JSON documents of runs, of the maintenance of the archive, of versions of a model and of the demonstration."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any, Literal, NotRequired
 
 from typing_extensions import TypedDict
 
+from pipelines.archive import RunInfo
 from pipelines.capture.interruptions import Interruptions
 from pipelines.jobs.references import ReferencesDocument
 from pipelines.stages.judge import AdequacyDocument
@@ -74,28 +73,11 @@ class FillingsDocument(TypedDict):
     fillings: Annotated[list[RunDocument], "one per filling"]
 
 
-class ListedRun(TypedDict):
-    """A run of the archive."""
-
-    id: str
-    recipe: str
-    device: str
-    units: list[str]
-    started: Annotated[str, "ISO date and time, UTC"]
-    finished: bool
-    stages: list[str]
-    station: NotRequired[Annotated[str, "its name; empty for an import"]]
-    rerun_of: NotRequired[Annotated[str, "the run that it computes again; empty for others"]]
-    passed: NotRequired[Annotated[int | None, "units that passed; null before the grades are there"]]
-    graded: NotRequired[Annotated[int | None, "units with a decision; null before the grades are there"]]
-    verdict: NotRequired[Annotated[str | None, "adequate, not adequate, not judged; null without a model to judge"]]
-
-
 class ListDocument(TypedDict):
     """``list --json``: the runs of the archive, the oldest first."""
 
     archive: str
-    runs: list[ListedRun]
+    runs: list[RunInfo]
 
 
 class RunProvenance(TypedDict):

@@ -1,19 +1,12 @@
 """The JSON documents of stations: state, self-test, log, charts, server; and the keys of the files that describe them."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any, Literal, NotRequired
 
 from typing_extensions import TypedDict
 
-
-class SlotStatus(TypedDict):
-    """A slot of the fixture."""
-
-    slot: int
-    serial: str
-    unit_C: float | None
-    supply_V: float | None
+from stations.overview import SlotNow
+from stations.self_test import CheckResult
+from stations.serving import RegisterReading
 
 
 class LeaseStatus(TypedDict):
@@ -41,37 +34,12 @@ class StationStatusDocument(TypedDict):
     door: str
     emergency_stop: str
     sampling: str
-    slots: list[SlotStatus]
+    slots: list[SlotNow]
     lease: Annotated[LeaseStatus | None, "null: no process drives it"]
     faults: Annotated[dict[str, str], "message by part; `safe state`: a run ended without the safe state"]
     chamber: NotRequired[str]
     vibration_g: NotRequired[Annotated[float | None, "rms"]]
     time_s: NotRequired[Annotated[float, "clock of the station"]]
-
-
-class RegisterReading(TypedDict):
-    """A register with its present value."""
-
-    device: str
-    device_id: int
-    register: str
-    address: int
-    value: str
-    unit: str
-    fault: Annotated[str, "reason why it cannot be read; empty otherwise"]
-
-
-class CheckedPart(TypedDict):
-    """A test of the self-test."""
-
-    check: str
-    part: str
-    ok: bool
-    value: float | str
-    unit: str
-    low: Annotated[float | None, "smallest value allowed"]
-    high: Annotated[float | None, "largest value allowed"]
-    message: Annotated[str, "empty if it is good"]
 
 
 class StationCheckDocument(TypedDict):
@@ -80,7 +48,7 @@ class StationCheckDocument(TypedDict):
     ok: bool
     failed: Annotated[list[str], "a sentence for each failure"]
     registers: list[RegisterReading]
-    checks: NotRequired[Annotated[list[CheckedPart], "missing with `--registers`"]]
+    checks: NotRequired[Annotated[list[CheckResult], "missing with `--registers`"]]
 
 
 class StationEvent(TypedDict):

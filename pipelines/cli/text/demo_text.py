@@ -1,7 +1,5 @@
 """The end of a demonstration for people: what was hidden, what was found of it, and what an archive of many lots shows."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from pipelines.cli.printing import print_table, say, short

@@ -1,25 +1,20 @@
 """A diagnosis for people: the verdict in a sentence, then data faults, drivers, classes, the next command, hidden effects."""
 
-from __future__ import annotations
-
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from pipelines.cli.next_commands import FindData, JudgedData, command_line, print_extension, print_next
+from rich.console import Console
+
+from pipelines.cli.next_commands import FindData, command_line, print_extension, print_next
 from pipelines.cli.printing import console, print_table, say, warn
 from pipelines.cli.text.verdict_text import print_verdict
 from pipelines.diagnosis import sections, sentences
 from pipelines.diagnosis.sections import Section
 
-if TYPE_CHECKING:
-    from rich.console import Console
-
 
 def print_diagnosis(document: dict[str, Any], *, data: FindData | None, model: Path | None, brief: bool = True) -> None:
     """Print a diagnosis.
 
-    Parameters
-    ----------
     data : gives the data as they were named on the command line, where commands to give next are printed; None: none are printed
     model : the model file as it was given there
     brief : one sentence counts the effects of quantities that were not recorded
@@ -74,20 +69,15 @@ def _dim(text: str) -> None:
         say(text, style="dim")
 
 
-def _with_formula(document: dict[str, Any], data: JudgedData) -> str:
-    """The command that judges the model with the suggested formula, without a model file."""
-    offer = document["offer"]
-    formula = f"{offer['id']}={'; '.join(offer['columns'])}"
-    effects = ",".join([*document["effects"], offer["id"]])
-    return command_line("diagnose", data.source, "--effects", effects, "--formula", formula, *data.options)
-
-
 def _unexplained(document: dict[str, Any], data: FindData | None, model: Path | None) -> None:
     if not document["unexplained"]:
         return
     say(f"\n{sentences.UNEXPLAINED}: {sentences.unexplained_text(document)}")
-    if document["offer"]:
+    if offer := document["offer"]:
         say(f"Formula for {model or 'a model file'}, to be refined:\n")
-        say(document["offer"]["toml"])
-        if data is not None:
-            print_next([_with_formula(document, data())])
+        say(offer["toml"])
+        if data is not None:  # the command that judges the model with it, without a model file
+            found, effects = data(), ",".join([*document["effects"], offer["id"]])
+            formula = f"{offer['id']}={'; '.join(offer['columns'])}"
+            words = ("--effects", effects, "--formula", formula)
+            print_next([command_line("diagnose", found.source, *words, *found.options)])

@@ -1,7 +1,5 @@
 """Discoveries for people: what differs by what, how large it is, why it is beyond chance, and what to do next."""
 
-from __future__ import annotations
-
 from inertial.counts import number_of
 from pipelines.cli.printing import print_table, say, short
 from pipelines.discovery.documents import DiscoverDocument, DiscoveryRow

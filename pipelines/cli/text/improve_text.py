@@ -1,7 +1,5 @@
 """An improvement of a model for people: choices, error of each version, and the next command."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any
@@ -58,10 +56,6 @@ def _ladder(rows: list[dict[str, Any]]) -> None:
 def next_lines(document: dict[str, Any], target: Path, find: FindData, *, after: dict[str, Any]) -> list[str]:
     """The commands to give next; empty where the model is adequate and a fresh run has judged it.
 
-    Parameters
-    ----------
-    target : the model file
-    find : gives the data
     after : the diagnosis of the resulting model
     """
     from pipelines.cli.history import removal

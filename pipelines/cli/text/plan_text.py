@@ -1,7 +1,5 @@
 """A plan as text: station time, expected errors, reachable uncertainty, visible and hidden effects."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from typing import Any
@@ -12,8 +10,7 @@ from pipelines.cli.printing import print_table, remark, say, short
 from pipelines.planning.documents import worst_axes
 from schemas.decisions import LARGEST_ERROR
 
-RAISED = 3.0
-"""Factor by which 1/f and random walk must raise a floor to be listed."""
+RAISED = 3.0  # factor by which 1/f and random walk must raise a floor to be listed
 
 
 def print_plan(document: dict[str, Any]) -> None:
@@ -158,8 +155,7 @@ TITLES = {
     "bias_error_period": "error over the period, RMS",
     LARGEST_ERROR: "largest error of an axis over the period, 95 % bound",
 }
-LEAST = 0.01
-"""Smallest share of a contribution that is printed."""
+LEAST = 0.01  # smallest share of a contribution that is printed
 
 
 def print_reach(reach: dict[str, Any] | None) -> None:

@@ -12,8 +12,7 @@ if TYPE_CHECKING:
     from pipelines.stages.judge import AdequacyDocument
 
 
-STYLE_OF = {True: "bold green", False: "bold red", None: "bold yellow"}
-"""Style of a verdict; None: it cannot be judged."""
+STYLE_OF = {True: "bold green", False: "bold red", None: "bold yellow"}  # style of a verdict; None: it cannot be judged
 
 
 def print_verdict(document: dict[str, Any]) -> None:

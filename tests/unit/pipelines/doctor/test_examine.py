@@ -30,7 +30,8 @@ from pipelines.cli import app
 from pipelines.doctor import examine as host
 from pipelines.doctor import software
 from pipelines.doctor.archive import archive_checks, key_checks
-from pipelines.doctor.check import PROBE_BYTES, Check, clock_check, offset
+from pipelines.doctor.check import PROBE_BYTES, clock_check, offset
+from pipelines.doctor.documents import Check
 from pipelines.doctor.examine import host_checks, station_checks
 from pipelines.doctor.orchestrator import orchestrator_checks
 from stations.safety.lease_files import addresses
@@ -146,11 +147,12 @@ def test_an_archive_without_permission_to_write_or_to_look_into_it_is_a_fault(
 
 FULL = """
 import json, resource, signal, sys
+from dataclasses import astuple
 from pipelines.doctor.archive import archive_checks
 from pipelines.doctor.examine import host_checks
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[2]), int(sys.argv[2])))
-print(json.dumps([archive_checks(sys.argv[1], 0.0), host_checks()]))
+print(json.dumps([[astuple(check) for check in checks] for checks in (archive_checks(sys.argv[1], 0.0), host_checks())]))
 """
 
 
