@@ -71,8 +71,8 @@ def adequacy(dwells: pd.DataFrame, history: pd.DataFrame | None, effects: Sequen
         verdict = judged(lot, effects, generator())
     units = len(measurement.units) - len(faulty)
     error = error_of(verdict.rms, verdict.floor, verdict.log_p)
-    adequate, reason, error = told(verdict.search.base, verdict.adequate, verdict.unjudged, error)
-    return _document(adequate, reason or None, error, verdict.named, units, faulty)
+    adequate, reason, error = told(verdict.base, verdict.adequate, verdict.unjudged, error)
+    return _document(adequate, reason or None, error, verdict.found, units, faulty)
 
 
 def told_by(diagnosis: Mapping[str, Any], units: int) -> AdequacyDocument:
