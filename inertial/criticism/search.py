@@ -159,7 +159,7 @@ def size_where_it_acts(model: Model, term: Term) -> float:
     if not isinstance(term.effect, Handling):
         return size
     problem = model.problem
-    changed = np.any(problem.columns(term.effect, term.keywords) != 0.0, axis=-1) & problem.covariance.there
+    changed = np.any(term.columns(problem) != 0.0, axis=-1) & problem.covariance.there
     return size * float(np.sqrt(problem.count / max(int(changed.sum()), 1)))
 
 
@@ -288,7 +288,7 @@ def _begun(model: Model, term: Term) -> tuple[Term, ...]:
     if not term.memory:
         return (term,)
     term = replace(term, rest=False)
-    if not model.problem.start(term.effect, term.keywords).shape[-1]:
+    if not term.start(model.problem).shape[-1]:
         return (term,)
     return term, replace(term, rest=True)
 

@@ -203,15 +203,11 @@ def _together(model: Model, units: int) -> float:
 
 def _alike(model: Model, term: Term, units: int) -> float:
     """Part of a term that is equal in every unit, 0 … 1."""
-    fit = estimate(model)
-    at = 0
-    for other in (t for t in model.terms if not t.shared):
-        columns = model.problem.columns(other.effect, other.keywords)[..., : other.first]
+    for other, own in model.places(shared=False):
         if other.effect.id == term.effect.id:
-            series = np.einsum("bnp,bp->bn", columns, fit.local[:, at : at + columns.shape[-1]])
+            series = np.einsum("bnp,bp->bn", other.columns(model.problem), estimate(model).local[:, own])
             series = (series - series.mean(axis=1, keepdims=True)) / model.problem.error
             return max(_pairwise(series.reshape(units, -1)), 0.0)
-        at += columns.shape[-1]
     return 1.0
 
 
