@@ -24,7 +24,6 @@ class Transverse:
     direction_deg, direction_error_deg : from the first transverse axis towards the second; the error is 180 where it is unknown
     offset : constant over the angle: motion of the exciter along the sensitive axis
     chi_square, dof, p_value : of the residuals against the uncertainties of the points
-    fitted : (n,) at the points
     """
 
     value: float
@@ -37,7 +36,6 @@ class Transverse:
     chi_square: float
     dof: int
     p_value: float
-    fitted: Array
 
 
 def fit_transverse(first: Array, second: Array, output: Array, error: Array) -> Transverse:
@@ -87,7 +85,6 @@ def fit_transverse(first: Array, second: Array, output: Array, error: Array) -> 
         square,
         dof,
         float(chi2.sf(square, dof)),
-        np.asarray(fitted),
     )
 
 
