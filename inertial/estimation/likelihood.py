@@ -139,7 +139,7 @@ def scatter_of_poses(model: Model) -> float:
     change = pose_errors(lot.state)
     if units < 2 or lot.radial or not change.shape[-1]:
         return 1.0
-    there = np.flatnonzero(np.isfinite(lot.error).all(axis=-1).any(axis=0))
+    there = np.flatnonzero(lot.measured)
     columns = by_block(of_axes(np.broadcast_to(change, (units, n, 3, change.shape[-1])), lot.state.axes, 2))
     gain = model.space.gain_of_dwells(columns, there)
     drop = gain.drop[gain.rank == 2]

@@ -21,8 +21,8 @@ class PosesExchanged(Handling):
     def places(self, lot: Lot) -> list[dict[str, float]]:
         """Each dwell whose successor has another pose."""
         step = np.linalg.norm(np.diff(common_force(lot), axis=-2), axis=-1).max(axis=0)
-        there = set(np.flatnonzero(np.isfinite(lot.error).all(axis=-1).any(axis=0)).tolist())
-        return [{"at": float(k)} for k in np.flatnonzero(step > _APART) if {k, k + 1} <= there]
+        both = lot.measured[:-1] & lot.measured[1:]
+        return [{"at": float(k)} for k in np.flatnonzero((step > _APART) & both)]
 
     def change(self, lot: Lot, slope: Array | None, **place: float) -> Array:
         first, force = int(place["at"]), common_force(lot)
