@@ -144,15 +144,16 @@ def _judged(lot: Lot, effects: Sequence[str], rng: Generator, barred: frozenset[
         searched = SearchResult(base, (), searched.ladder)
     if not (unjudged or passed or searched.added):
         searched = _with_a_small_effect(search, base)
-    final, unexplained, curved = searched.model, None, None
+    final, unexplained = searched.model, None
     if not unjudged and (searched.added or not passed):
         final, unexplained = _with_curves(search.part, base, searched, drivers)
     # a drift can hide where adequacy does not look
-    unexplained = unexplained or (None if unjudged else run.drift)
+    unexplained, beside = unexplained or (None if unjudged else run.drift), final
     if not (unjudged or searched.added or unexplained):
         unexplained, curved = _taken_for_noise(search.part)
         if curved is not None and search.part.field is search.field:
             drivers.append(curved.driver)
+            beside = curved.model
     sound = passed is True and not searched.added and unexplained is None and run.drift is None
     return Verdict(
         run=run,
@@ -160,7 +161,7 @@ def _judged(lot: Lot, effects: Sequence[str], rng: Generator, barred: frozenset[
         drivers=drivers,
         result=searched,
         final=final,
-        beside=final if curved is None or search.part.field is not search.field else curved.model,
+        beside=beside,
         unexplained=unexplained,
         removed=removed,
         rms=rms,

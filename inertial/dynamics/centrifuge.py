@@ -123,8 +123,6 @@ ONE_WAY = BOTH[:4]
 class RadiiFit:
     """Result of a centrifuge test at several radii; pairs are a value and its standard uncertainty.
 
-    Attributes
-    ----------
     unit : the unit's own curve, without arm and mounting; residuals (n,), χ² and degrees of freedom are those of the whole fit
     mass_offset_m : of the proof mass from the turning centre of the mounting, outwards
     arm_stretch_s2 : κ of r = r₀(1 + κω²)

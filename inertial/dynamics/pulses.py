@@ -23,8 +23,6 @@ def velocity_change(peak_g: float, duration_s: float) -> float:
 class Pulse:
     """What a recorded pulse is. ``peak`` carries the sign of the pulse; the other figures are magnitudes.
 
-    Attributes
-    ----------
     peak, peak_error : above the baseline, and its standard uncertainty; unit of the record
     duration_s : of the half sine with these 10 % points
     velocity : integral over the pulse, unit of the record times s

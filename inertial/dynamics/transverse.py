@@ -17,8 +17,6 @@ Z95 = float(norm.ppf(0.975))
 class Transverse:
     """Largest transverse sensitivity as a share of the sensitivity, and its direction.
 
-    Attributes
-    ----------
     value, error : share of the sensitivity on the axis, and its standard uncertainty
     low, high : 95 % interval; low is 0 where the transverse sensitivity is not significant
     direction_deg, direction_error_deg : from the first transverse axis towards the second; the error is 180 where it is unknown

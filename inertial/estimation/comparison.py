@@ -59,7 +59,7 @@ CONDITION = 1e-8
 """Directions of the scaled normal matrix below this are scatter of the angles, not effects: they get no coefficient."""
 
 OWN = ("bias", "scale", "misalignment", "turn_on_bias")
-"""Ratio of the scatter between units to the errors above which coefficients are not combined."""
+"""Effects whose coefficients each unit has for itself: they are not shrunk towards the lot's mean."""
 
 _FEW_UNITS = 4
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from inertial.dynamics.wandering_means import IdentifiedNoise
+from inertial.dynamics.wander import IdentifiedNoise
 from inertial.errors import InertialError
 from pipelines.procedures import PROCEDURES, parts_of, steps_of
 from pipelines.procedures.base import Evaluated, Part
