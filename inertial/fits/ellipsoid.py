@@ -36,6 +36,11 @@ class EllipsoidFit:
     """(..., n) |f| - g, in g."""
 
     @property
+    def response(self) -> Array:
+        """K = C⁻¹ (..., 3, 3), output unit per g, upper triangular."""
+        return np.asarray(np.linalg.inv(self.correction), dtype=np.float64)
+
+    @property
     def rms(self) -> Array:
         """Root mean square of the norm residuals (...,), g."""
         return np.sqrt(np.mean(self.norm_residuals**2, axis=-1))

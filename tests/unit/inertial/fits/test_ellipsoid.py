@@ -36,7 +36,7 @@ def test_the_sphere_fit_returns_a_batch_of_units_without_noise(rng: np.random.Ge
     f = directions(rng, 5, 24)
     scale = 1.0 + 0.01 * np.arange(5)[:, None, None]
     fit = fit_ellipsoid(f @ K.T * scale + BIAS, norm=1.0)
-    np.testing.assert_allclose(np.linalg.inv(fit.correction), K * scale, rtol=1e-8, atol=1e-8)
+    np.testing.assert_allclose(fit.response, K * scale, rtol=1e-8, atol=1e-8)
     np.testing.assert_allclose(fit.bias, np.broadcast_to(BIAS, (5, 3)), rtol=1e-7)
     assert np.all(fit.rms < 1e-9)
     f, heat, offset = directions(rng, 60), rng.uniform(-20.0, 60.0, 60), np.array([0.02, -0.05, 0.01])
