@@ -24,7 +24,7 @@ sys.path.insert(0, str(ROOT))
 import numpy as np  # noqa: E402
 
 from inertial import poses  # noqa: E402
-from inertial.fits.faces import ferraris, six_position  # noqa: E402
+from inertial.fits.faces import ferraris  # noqa: E402
 from inertial.fits.linear import fit_lot  # noqa: E402
 from inertial.frames import force_from_angles  # noqa: E402
 from inertial.state import State  # noqa: E402
@@ -173,7 +173,7 @@ def six(units: int, rounds: int, rng: np.random.Generator) -> None:
     peer = with_imucal(up, down, 100)
     faces = np.concatenate([np.eye(3), -np.eye(3)])
     state, out = State(force=faces, time=np.arange(6.0)), np.concatenate([up, down], axis=1)
-    closed = best(lambda: six_position(up, down, 1.0), rounds)
+    closed = best(lambda: ferraris(up, down, 1.0), rounds)
     batch = best(lambda: fit_lot(LINEAR, state, out), rounds)
     own_loop = best(lambda: [ferraris(p, a, 1.0) for p, a in zip(up, down, strict=True)], rounds)
     slow = best(peer, 1)

@@ -21,10 +21,7 @@ import independent_noise as made  # noqa: E402
 import numpy as np  # noqa: E402
 import pandas as pd  # noqa: E402
 
-from inertial.fits.ellipsoid import fit_ellipsoid  # noqa: E402
-from inertial.fits.wander import student  # noqa: E402
 from inertial.noise.allan import overlapping  # noqa: E402
-from inertial.noise.measurands import of_a_day  # noqa: E402
 from inertial.noise.terms import fit_terms  # noqa: E402
 from inertial.population.change_points import change_points  # noqa: E402
 from inertial.population.control_charts import alarms, baseline, chance_of_alarms, signals  # noqa: E402
@@ -146,40 +143,6 @@ def bias(records: int, seed: int) -> None:
             print(made.told(key, held, total))
 
 
-def sphere(records: int, seed: int) -> None:
-    """Sphere fit of dwells with unknown poses: coverage of twice the stated error of bias and scale."""
-    rng = np.random.default_rng(seed)
-    thrice = (25.0, 25.0, 25.0)
-    for name, world in (
-        ("white 280 µg/√Hz", {"density": 280.0, "flicker": 0.0}),
-        ("25 µg/√Hz, B 30 µg", {"flicker": 30.0}),
-        ("25 µg/√Hz, B 30 µg, three rounds half an hour apart", {"flicker": 30.0, "temperatures": thrice}),
-        ("280 µg/√Hz, B 30 µg", {"density": 280.0, "flicker": 30.0}),
-        ("25 µg/√Hz, B 30 µg, K 4 µg/√s", {"flicker": 30.0, "walk": 4.0}),
-        ("25 µg/√Hz, B 30 µg, K 4 µg/√s, three rounds", {"flicker": 30.0, "walk": 4.0, "temperatures": thrice}),
-    ):
-        held = np.zeros(3, dtype=int)
-        for _ in range(records):
-            one = lots.world(rng, units=1, plan="fibonacci", checks=(), move_s=20, **world)
-            rows = one.dwells
-            output, time = rows[["out_x", "out_y", "out_z"]].to_numpy(), rows["time_s"].to_numpy()
-            error = (rows["sd_x"] / np.sqrt(rows["n"])).to_numpy()
-            fitted = fit_ellipsoid(output, time=time, error=error)
-            wrong = np.abs(1e6 * fitted.bias - one.record[0])
-            held[0] += int(np.sum(wrong <= 2e6 * np.sqrt(np.diagonal(fitted.covariance)[:3])))
-            late = np.abs(1e6 * fitted.bias - one.day[0])
-            u = np.sqrt(np.diagonal(fitted.covariance)[:3])
-            u = of_a_day(u, np.full(3, float(fitted.flicker)), time, slowest=4.0, widened=student(fitted.dof))
-            held[2] += int(np.sum(late <= 2e6 * u))
-            correction = np.linalg.cholesky(np.linalg.inv(one.gain[0] @ one.gain[0].T)).T
-            spread = np.sqrt(np.diagonal(fitted.covariance)[3:6])
-            held[1] += int(np.sum(np.abs(np.diagonal(fitted.correction) - np.diagonal(correction)) <= 2.0 * spread))
-        print(f"sphere fit, 24 poses of 10 s every 30 s, one unit, {name}")
-        print(made.told("  2·u contains the bias of the next day", int(held[2]), 3 * records))
-        print(made.told("  2·u contains the mean bias of the record", int(held[0]), 3 * records))
-        print(made.told("  2·u contains the inverse of the scale", int(held[1]), 3 * records))
-
-
 def series(records: int, seed: int) -> None:
     """Series with a constant level: false change points and alarms of control charts; and series with a step.
 
@@ -263,7 +226,6 @@ def record(records: int, seed: int) -> None:
 SCENES = {
     "record": record,
     "series": series,
-    "sphere": sphere,
     "terms": terms,
     "verification": verification,
     "bias": bias,

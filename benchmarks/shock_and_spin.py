@@ -19,8 +19,7 @@ from inertial.dynamics.centrifuge_diagnosis import DEFAULT as SPIN_MODEL
 from inertial.dynamics.centrifuge_diagnosis import diagnose_spins, fit_spins
 from inertial.dynamics.centrifuge_effects import Spins
 from inertial.dynamics.shock_diagnosis import DEFAULT as SHOCK_MODEL
-from inertial.dynamics.shock_diagnosis import diagnose_shock
-from inertial.dynamics.shock_fit import ShockRecord, Waves, fit_shock
+from inertial.dynamics.shock_diagnosis import ShockRecord, Waves, diagnose_shock, fit_shock
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 LOOKED_FOR = 2.0  # rms weighted residual that the hidden effect leaves in the judged model: twice the floor

@@ -45,8 +45,6 @@ class Varied:
 class Quantity:
     """A recorded quantity.
 
-    Attributes
-    ----------
     column : of the tables and of the exchange format
     attribute : of the state; empty for a covariate
     unit : of the column

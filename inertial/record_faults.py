@@ -172,9 +172,9 @@ def torn(x: ArrayLike) -> list[Torn]:
     return faults
 
 
-def running_median(x: Array, width: int = _MEDIAN) -> Array:
+def running_median(x: Array) -> Array:
     """Median of each sample (n,) and its neighbours; at the ends of those that there are."""
-    return np.asarray(median_filter(x, width, mode="mirror"), dtype=np.float64)
+    return np.asarray(median_filter(x, _MEDIAN, mode="mirror"), dtype=np.float64)
 
 
 def _wings(x: Array, step: float) -> tuple[Index, Index, int]:

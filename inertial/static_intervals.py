@@ -27,14 +27,6 @@ class StaticIntervals:
         """How many intervals there are."""
         return int(self.start.size)
 
-    def means(self, x: Array) -> Array:
-        """Mean of each interval (k, ...) of a record (n, ...)."""
-        return np.stack([x[a:b].mean(axis=0) for a, b in zip(self.start, self.stop, strict=True)])
-
-    def deviations(self, x: Array) -> Array:
-        """Standard deviation of a sample inside each interval (k, ...) of a record (n, ...)."""
-        return np.stack([x[a:b].std(axis=0, ddof=1) for a, b in zip(self.start, self.stop, strict=True)])
-
 
 def find(
     x: ArrayLike,

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from inertial.arrays import Array
-from inertial.criticism.drivers import Part
+from inertial.criticism.drivers import Driver
 from inertial.estimation.candidate import Candidate
 from inertial.estimation.model import Model
 from inertial.estimation.penalty import PER_COEFFICIENT, cost_of_model
@@ -18,41 +18,30 @@ _TURNS = 8  # alternating estimates of sizes and shape
 class CurveFit:
     """A common curve beside a model.
 
-    candidate : the columns that it was made of
-    part : what of the output follows the driver, as in :class:`inertial.criticism.drivers.Driver`
-    model : the model with the curve in it
+    driver : with the columns that the curve was made of; model : with the curve in it
     rank : number of coefficients, of sizes and shape
     cost : penalised deviance, on the scale of the search
-    period : of a swing with the time, s; None of another curve
     """
 
-    driver: str
-    candidate: Candidate
+    driver: Driver
     model: Model
     rank: int
     cost: float
-    part: Part = "bias"
-    period: float | None = None
 
 
-def fit_curve(model: Model, driver: str, candidate: Candidate, ways: int = 1) -> CurveFit:
-    """The best common curve of a driver added to a model, with the noise estimated again.
-
-    Parameters
-    ----------
-    ways : ways in which each block feels the curve, with a size for each: the candidate's columns are those of the curve for the
-        first way, then those for the second
-    """
+def fit_curve(model: Model, driver: Driver) -> CurveFit:
+    """The best common curve of a driver added to a model, with the noise estimated again."""
+    candidate = driver.candidate
     if candidate.shared:
         fitted = model.with_shared_curves(candidate.of_blocks[:, :, 0, :])
-        return CurveFit(driver, candidate, fitted, fitted.space.shared_rank, cost_of_model(fitted))
+        return CurveFit(driver, fitted, fitted.space.shared_rank, cost_of_model(fitted))
     noise, fitted, rank = model.noise, model, 0
     for _ in range(2):
-        columns, rank = _curve(model.at(noise), candidate, ways)
+        columns, rank = _curve(model.at(noise), candidate, driver.ways)
         fitted = model.with_curves(columns)
         noise = fitted.noise
-    shape = rank - ways * model.problem.blocks
-    return CurveFit(driver, candidate, fitted, rank, cost_of_model(fitted) + PER_COEFFICIENT * shape)
+    shape = rank - driver.ways * model.problem.blocks
+    return CurveFit(driver, fitted, rank, cost_of_model(fitted) + PER_COEFFICIENT * shape)
 
 
 def _curve(space: Space, candidate: Candidate, ways: int) -> tuple[Array, int]:

@@ -1,7 +1,7 @@
 """The diagnosis of a lot: adequacy, drivers of the residual, classes of missing effects, the unexplained remainder."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.random import Generator
@@ -12,13 +12,13 @@ from inertial.criticism.classes import EffectClass, class_of
 from inertial.criticism.drivers import Driver, Misfit, looks_of, places
 from inertial.criticism.evidence import Evidence, evidence
 from inertial.criticism.examination import Named, worst
-from inertial.criticism.field import Candidates, Rival
+from inertial.criticism.field import Candidates
 from inertial.criticism.influence import CarriedEvidence, carried_by, influence
 from inertial.criticism.left_out import left_out
 from inertial.criticism.unknown import Unexplained
-from inertial.criticism.unseen import Smallest, smallest_named, unseen
-from inertial.criticism.verdict import judged
-from inertial.data_errors.removed_dwells import BadDwell, model_without
+from inertial.criticism.unseen import InPart, Smallest, smallest_named, unseen
+from inertial.criticism.verdict import Verdict, judged
+from inertial.data_errors.removed_dwells import model_without
 from inertial.decisions import ADEQUATE_ABOVE
 from inertial.effects.covariate import Covariate
 from inertial.estimation.comparison import fitted_residuals
@@ -26,43 +26,27 @@ from inertial.estimation.comparison import rms as rms_of
 from inertial.estimation.model import Model
 from inertial.estimation.problem import Lot, Problem
 from inertial.estimation.space import Space
-from inertial.planning.ranges import UnseenRange
 
 
-@dataclass(frozen=True)
-class Diagnosis:
-    """The diagnosis of a model by a lot; errors in g.
+@dataclass(frozen=True, kw_only=True)
+class Diagnosis(Verdict):
+    """The verdict on a model by a lot, with what explains it; errors in g.
 
-    problem, base, final : the series without handling errors, the judged model, the model with all identified effects
-    rms : of the residuals of the base model; floor : of the noise of the measurement, white and wander
-    adequate : None if the data cannot decide, for the reason in ``unjudged``
+    named : the classes of missing effects
     without_removed : the verdict on the dwells that were not removed; None if there are none, or it cannot be given
-    handled : handling errors; removed : single dwells that were left out, those marked that are tails of the noise
     carried : dwells of largest influence: on the first class, or the largest residuals if there is no class
     unseen_in_part : effects that the plan cannot see at some values of their nonlinear parameters, with these
     smallest : the smallest detected size of each effect, those that slow noise hides most first
     """
 
-    problem: Problem
-    base: Model
-    final: Model
-    rms: float
-    floor: float
-    log_p: float
-    adequate: bool | None
     where: tuple[Misfit, ...]
     named: tuple[Named, ...]
-    unexplained: Unexplained | None
     unseen: tuple[str, ...]
-    ladder: tuple[Rival, ...]
-    handled: tuple[Named, ...] = ()
-    removed: tuple[BadDwell, ...] = ()
-    carried: CarriedEvidence = field(default_factory=CarriedEvidence)
-    unseen_in_part: tuple[tuple[str, tuple[UnseenRange, ...]], ...] = ()
-    smallest: tuple[Smallest, ...] = ()
-    evidence: Evidence | None = None
-    unjudged: str = ""
-    without_removed: bool | None = None
+    carried: CarriedEvidence
+    unseen_in_part: InPart
+    smallest: tuple[Smallest, ...]
+    evidence: Evidence
+    without_removed: bool | None
 
 
 def diagnose(lot: Lot, effects: Sequence[str], rng: Generator) -> Diagnosis:
@@ -75,12 +59,10 @@ def diagnose(lot: Lot, effects: Sequence[str], rng: Generator) -> Diagnosis:
     rng : draws the noise that adequacy is measured against
     """
     verdict = judged(lot, effects, rng)
-    run, drivers, base, final = verdict.run, verdict.drivers, verdict.search.base, verdict.final
-    beside = verdict.beside
-    fields, problem = verdict.search.field, base.problem
+    drivers, base, final, beside = verdict.drivers, verdict.base, verdict.final, verdict.beside
+    fields, problem = verdict.search.field, verdict.problem
     classes = _classes(fields, base, final)
     named = _named(problem, base, classes)
-    unexplained = verdict.unexplained or _covariate(classes)
     silent = verdict.sound or bool(verdict.unjudged)
     where = (
         ()
@@ -88,28 +70,18 @@ def diagnose(lot: Lot, effects: Sequence[str], rng: Generator) -> Diagnosis:
         else places(problem, drivers, base.at(beside.noise), beside.space.variance, _beyond_pose(base, drivers, beside))
     )
     charged = tuple(p for p in where if p.log_p + np.log(len(drivers)) < np.log(ADEQUATE_ABOVE))
-    every = [*run.handled, *named]
-    blind, in_part = unseen(fields, base, [e for e in catalogue.catalogue().values() if e.id not in set(run.effects)])
+    every = [*verdict.handled, *named]
+    others = [e for e in catalogue.catalogue().values() if e.id not in set(verdict.run.effects)]
+    blind, in_part = unseen(fields, base, others)
     return Diagnosis(
-        problem=problem,
-        base=base,
-        final=final,
-        rms=verdict.rms,
-        floor=verdict.floor,
-        log_p=verdict.log_p,
-        adequate=verdict.adequate,
+        **vars(replace(verdict, unexplained=verdict.unexplained or _covariate(classes))),
         where=charged,
         named=named,
-        unexplained=unexplained,
         unseen=blind,
         unseen_in_part=in_part,
         smallest=tuple(smallest_named(fields, final)),
-        ladder=verdict.result.ladder,
-        handled=tuple(run.handled),
-        removed=verdict.removed,
         carried=every[0].carried if every else _residuals(base, fields, None if silent else rng),
         evidence=evidence(base, fields),
-        unjudged=verdict.unjudged,
         without_removed=(None if verdict.unjudged else verdict.sound) if verdict.removed else None,
     )
 
@@ -151,9 +123,8 @@ def _named(problem: Problem, base: Model, classes: Sequence[EffectClass]) -> tup
     """Errors after each class is added to those before it."""
     named: list[Named] = []
     model = base
-    terms = [
-        (group.physics or group.members)[0].term for group in classes
-    ]  # an error of handling if there is no effect
+    # an error of handling if there is no effect
+    terms = [(group.physics or group.members)[0].term for group in classes]
     before = left_out(base, also=terms) if classes else None
     for group, first in zip(classes, terms, strict=True):
         model = model.with_term(first)

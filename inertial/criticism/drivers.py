@@ -40,14 +40,19 @@ class Driver:
 
     name : as in the exchange format (``unit_C``, ``time_s``, a covariate), or ``pose``, ``approach``, ``temperature_rate``
     make : its columns
-    values : (units, n) of the driver itself, None if it is not a single quantity
+    values : (units, n) of the driver itself, of a suspect (blocks, n), 0 … 1 over the run; None if it is not a single quantity
     part : what of the output follows it
+    ways : ways in which each block feels the dependence, with a size for each: the columns are those of the first way, then
+        those of the second
+    period : of a swing with the time, s; None of another curve
     """
 
     name: str
     make: Callable[[], Candidate]
-    values: Array | None
+    values: Array | None = None
     part: Part = "bias"
+    ways: int = 1
+    period: float | None = None
 
     @property
     def candidate(self) -> Candidate:
@@ -77,10 +82,10 @@ def drivers_of(problem: Problem) -> list[Driver]:
     ]
     pose = _pose_columns(state, most=max(4, (problem.n - 8) // 3))
     if pose.shape[-1]:
-        drivers.append(Driver("pose", partial(_by_block, problem, pose), None))
+        drivers.append(Driver("pose", partial(_by_block, problem, pose)))
     approach = np.tanh(state.force_step / 0.05)
     if np.any(np.abs(approach) > 0.1):
-        drivers.append(Driver("approach", partial(_by_axis, problem, approach), None))
+        drivers.append(Driver("approach", partial(_by_axis, problem, approach)))
     return drivers
 
 
@@ -95,9 +100,9 @@ def looks_of(problem: Problem) -> list[Driver]:
     state = problem.lot.state
     for name, values in (("unit_C", state.temperature), ("time_s", state.time)):
         if values is not None and varies(values):
-            looks.append(Driver(name, partial(_across_axes, problem, values), None, "axes"))
+            looks.append(Driver(name, partial(_across_axes, problem, values), part="axes"))
     if state.temperature is not None and varies(state.temperature):
-        looks.append(Driver("unit_C", partial(_transfer_curve, problem, state.temperature), None, "transfer"))
+        looks.append(Driver("unit_C", partial(_transfer_curve, problem, state.temperature), part="transfer"))
     return looks
 
 

@@ -109,8 +109,8 @@ def condition(model: Model) -> float:
 
 def _by_dwell(model: Model) -> tuple[float | None, float | None, tuple[int, int] | None]:
     """Jackknife of the bias, its largest change by leaving out one dwell, and which unit and dwell that is."""
-    columns = _bias_columns(model)
-    if not columns:
+    columns = next((own for term, own in model.places(shared=False) if term.effect.id == "bias"), None)
+    if columns is None:
         return None, None, None
     space, axes = model.space, model.problem.per_unit
     unit, size = unit_columns(space.local)
@@ -133,17 +133,6 @@ def _deleted(model: Model) -> tuple[Array, Array]:
     known = space.covariance.there & (size > 1e-9 * size.max(axis=1, keepdims=True))
     size = np.where(known, size, 1.0)
     return np.where(known, left / size, 0.0), np.where(known, left / np.sqrt(size), 0.0)
-
-
-def _bias_columns(model: Model) -> list[int]:
-    """Places of the bias among the columns with coefficients by block."""
-    at = 0
-    for term in (t for t in model.terms if not t.shared):
-        width = model.problem.columns(term.effect, term.keywords)[..., : term.first].shape[-1]
-        if term.effect.id == "bias":
-            return list(range(at, at + width))
-        at += width
-    return []
 
 
 def _largest(model: Model) -> tuple[float, int, int] | None:

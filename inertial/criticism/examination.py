@@ -169,7 +169,7 @@ def _placed_again(run: ExaminedRun, model: Model) -> bool:
         best = None if one.term is None else better_placed(model, one.term)
         if one.term is None or best is None or not isinstance(best.effect, Handling):
             continue
-        place = _place(best)
+        place = best.place
         size = model.without_term(one.term).with_term(best).shared_sizes(best)
         evidence, dwells = best.effect.describe(run.lot, size, **place), best.effect.dwells(run.lot, **place)
         run.beside = [best if t is one.term else t for t in run.beside]
@@ -220,17 +220,12 @@ def mended(run: ExaminedRun) -> EffectSearch:
             _mend(run, of, replace(searched, model=beside if others else searched.model), term)
 
 
-def _place(term: Term) -> dict[str, float]:
-    """The place of a handling error."""
-    return {k: v for k, v in term.keywords.items() if isinstance(v, float)}
-
-
 def _mend(run: ExaminedRun, fields: Candidates, searched: SearchResult, term: Term) -> None:
     """Remove a handling error from a run, and record it."""
-    alternative, place = term.effect, _place(term)
+    alternative = term.effect
     if not isinstance(alternative, Handling):
         raise TypeError(term.effect.id)
-    place = alternative.placed(run.lot, **place)
+    place = alternative.placed(run.lot, **term.place)
     term = Term(alternative, tuple(place.items()))
     model = searched.model.with_term(term)
     group = class_of(fields, model, term)
@@ -272,7 +267,7 @@ def _described(
     fields: Candidates, beside: Model, term: Term, alternative: Handling, size: Array
 ) -> tuple[str, tuple[int, ...]]:
     """The description of a handling error, and its dwells: at each place that explains the run equally well."""
-    lot, place = fields.problem.lot, _place(term)
+    lot, place = fields.problem.lot, term.place
     best = judge(fields, beside, term).cost
     texts: list[str] = []
     dwells = list(alternative.dwells(lot, **place))

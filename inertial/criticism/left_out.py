@@ -95,9 +95,7 @@ def left_out(model: Model, judged: Term | None = None, also: Sequence[Term] = ()
 
 def _begun(problem: Problem, terms: Iterable[Term]) -> Array:
     """Columns (n, k) of the states of memories before the first dwell, each of unit length; of every block."""
-    # a memory at rest has no unknown state
-    columns = [problem.start(t.effect, t.keywords) for t in terms if not t.rest]
-    flat = [np.moveaxis(each, 1, 0).reshape(problem.n, -1) for each in columns]
+    flat = [np.moveaxis(t.start(problem), 1, 0).reshape(problem.n, -1) for t in terms]
     joined = np.concatenate([np.zeros((problem.n, 0)), *flat], axis=1)
     size = np.linalg.norm(joined, axis=0)
     return joined[:, size > 0.0] / size[size > 0.0]
@@ -132,12 +130,10 @@ def _keeps(term: Term, judged: Term | None) -> bool:
 
 def _kept(model: Model, judged: Term | None) -> Flags:
     """The shared columns (q,) of a model that keep their coefficients."""
-    flags: list[bool] = []
-    for term in (t for t in model.terms if t.shared):
-        width = model.problem.columns(term.effect, term.keywords)[..., : term.first].shape[-1]
-        flags += [_keeps(term, judged)] * width
-    # curves and unknown states of memories follow
-    return np.array([*flags, *[False] * (model.shared.shape[-1] - len(flags))], dtype=bool)
+    kept = np.zeros(model.shared.shape[-1], dtype=bool)
+    for term, own in model.places(shared=True):
+        kept[own] = _keeps(term, judged)
+    return kept
 
 
 class _Parts:

@@ -7,9 +7,10 @@ from functools import cached_property
 import numpy as np
 
 from inertial import decisions
+from inertial.criticism.drivers import Driver
 from inertial.criticism.field import Candidates
 from inertial.criticism.search import anything
-from inertial.criticism.unknown import Suspect, Unexplained, better_curve, suspects, unexplained_by, wide_suspects
+from inertial.criticism.unknown import Unexplained, better_curve, suspects, unexplained_by, wide_suspects
 from inertial.estimation.alternative import Handling
 from inertial.estimation.model import Model
 from inertial.estimation.penalty import cost_of_model
@@ -32,16 +33,16 @@ class LotPart:
     base: Model
     wide: bool = False
 
-    def suspected(self, chosen: Sequence[Term]) -> list[Suspect]:
+    def suspected(self, chosen: Sequence[Term]) -> list[Driver]:
         """Curves of every driver; of every kind beside many effects, or where a drift had looked like sudden changes."""
         return self.every_suspect if self.wide or len(chosen) >= _MANY_EFFECTS else self._plain
 
     @cached_property
-    def _plain(self) -> list[Suspect]:
+    def _plain(self) -> list[Driver]:
         return suspects(self.field.problem)
 
     @cached_property
-    def every_suspect(self) -> list[Suspect]:
+    def every_suspect(self) -> list[Driver]:
         """Curves of every driver and of every kind."""
         return [*self._plain, *wide_suspects(self.field.problem)]
 

@@ -159,7 +159,7 @@ def size_where_it_acts(model: Model, term: Term) -> float:
     if not isinstance(term.effect, Handling):
         return size
     problem = model.problem
-    changed = np.any(problem.columns(term.effect, term.keywords) != 0.0, axis=-1) & problem.covariance.there
+    changed = np.any(term.columns(problem) != 0.0, axis=-1) & problem.covariance.there
     return size * float(np.sqrt(problem.count / max(int(changed.sum()), 1)))
 
 
@@ -282,13 +282,13 @@ def _begun(model: Model, term: Term) -> tuple[Term, ...]:
     """A term, and where it remembers, the same without coefficients for the state of each series before the first dwell.
 
     It is then at rest, or where the effect has a parameter for that state, as this says. Devices are at rest when a run begins,
-    as a rule. A coefficient for the state of every series would be paid for else, and an
-    effect without memory that leaves as little stands alone: a step between two soaks in place of hysteresis.
+    as a rule. A coefficient for the state of every series would be paid for else, and an effect without memory that leaves as
+    little stands alone: a step between two soaks in place of hysteresis.
     """
     if not term.memory:
         return (term,)
     term = replace(term, rest=False)
-    if not model.problem.start(term.effect, term.keywords).shape[-1]:
+    if not term.start(model.problem).shape[-1]:
         return (term,)
     return term, replace(term, rest=True)
 
@@ -316,7 +316,7 @@ def _reexamine(
     for term in tuple(chosen):
         if len(chosen) < 2:
             break
-        rest = model.without(term.effect.id)
+        rest, others = model.without(term.effect.id), [t for t in chosen if t is not term]
         every = contest(field, rest, finalists=_AGAIN)
         rivals = [r for r in every if not isinstance(r.term.effect, Handling)]
         ahead = min((r.cost for r in rivals), default=0.0) - CLASS_WIDTH
@@ -324,13 +324,12 @@ def _reexamine(
             (r for r in every[:1] if r.cost < ahead and r not in rivals and convincing(field, rest, r)), None
         )
         if handled is not None:
-            return rest, [t for t in chosen if t is not term], handled.term
+            return rest, others, handled.term
         best = next((r for r in rivals if convincing(field, rest, r)), None)
-        best = None if best is None else _parent_first(field, rest, best)
-        others = [t for t in chosen if t is not term]
         if best is None:
             chosen, model = others, rest
             continue
+        best = _parent_first(field, rest, best)
         chosen = [*others, term if best.term.effect.id == term.effect.id else best.term]
         model = Model(field.problem, [*base.terms, *chosen], near=model.noise)
     return model, chosen, None

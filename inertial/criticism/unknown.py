@@ -1,6 +1,6 @@
 """Effects outside the catalogue: one curve of one driver that is better than the effects that imitate it."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -8,7 +8,17 @@ import numpy as np
 from inertial import decisions, frames
 from inertial.arrays import Array, Flags
 from inertial.criticism.curves import CurveFit, fit_curve
-from inertial.criticism.drivers import Part, across, curve, forces_along, own_forces, quantities, transfer, varies
+from inertial.criticism.drivers import (
+    Driver,
+    Part,
+    across,
+    curve,
+    forces_along,
+    own_forces,
+    quantities,
+    transfer,
+    varies,
+)
 from inertial.design import of_axes
 from inertial.effects.covariate import COVARIATE_PREFIX
 from inertial.estimation.alternative import by_block, of_outputs, rotated_force
@@ -58,54 +68,31 @@ class Unexplained:
     period: float | None = None
 
 
-@dataclass(frozen=True)
-class Suspect:
-    """A driver, and columns flexible enough for any smooth dependence on it.
-
-    values : (blocks, n), the driver itself, 0 … 1 over the run; None if it is not a single quantity
-    ways : ways in which each block feels the dependence, as for :func:`inertial.criticism.curves.fit_curve`
-    part : what of the output follows the driver
-    period : of a swing with the time, s; None of another curve
-    """
-
-    driver: str
-    candidate: Candidate
-    values: Array | None = None
-    ways: int = 1
-    part: Part = "bias"
-    period: float | None = None
-
-    def fitted(self, model: Model) -> CurveFit:
-        """The best curve of the driver beside a model."""
-        fit = fit_curve(model, self.driver, self.candidate, self.ways)
-        return replace(fit, part=self.part, period=self.period)
-
-
-def suspects(problem: Problem) -> list[Suspect]:
-    """Every driver that varies in a lot, as columns of a flexible curve."""
+def suspects(problem: Problem) -> list[Driver]:
+    """Every driver that varies in a lot, as columns flexible enough for any smooth dependence on it."""
     state = problem.lot.state
-    suspected: list[Suspect] = []
+    suspected: list[Driver] = []
     for name, values, _ in quantities(state):
         if varies(values) and not (name == "chamber_C" and alike(values, state.temperature)):
             knots = _TIME_KNOTS if is_clock(name) else _KNOTS
             each = _unit_range(values if problem.lot.radial else np.repeat(values, problem.per_unit, axis=0))
-            suspected.append(Suspect(name, _alike(problem, curve(values, knots)), each))
+            suspected.append(Driver(name, _alike(problem, curve(values, knots)), each))
             # levels in time, one for each soak, could follow any memory of temperature: a dependence on time is smooth
             steps = None if is_clock(name) else _levels(values)
             if steps is not None:
-                suspected.append(Suspect(name, _alike(problem, steps)))
+                suspected.append(Driver(name, _alike(problem, steps)))
             if not problem.lot.radial and knots > 2:
                 # the same dependence of the scale factors: what the driver changes is then felt along each axis
-                suspected.append(Suspect(name, _columns(along_force(problem, curve(values, _FEW_KNOTS))), part="scale"))
+                suspected.append(Driver(name, _columns(along_force(problem, curve(values, _FEW_KNOTS))), part="scale"))
     if not problem.lot.radial:
         own = own_forces(problem).reshape(problem.blocks, problem.n)
-        suspected.append(Suspect("pose", _columns(curve(own, _KNOTS)), _unit_range(own)))
+        suspected.append(Driver("pose", _columns(curve(own, _KNOTS)), _unit_range(own)))
         suspected += _table(problem)
     whole = max(float(np.ptp(state.time)), 1.0)
     return [*suspected, *(_swing(problem, whole / cycles) for cycles in _CYCLES)]
 
 
-def wide_suspects(problem: Problem) -> list[Suspect]:
+def wide_suspects(problem: Problem) -> list[Driver]:
     """For every driver that varies in a lot, curves of its misalignment, of the fixture's rotation and of the transfer curve.
 
     A lot of columns: they are suspected only where several causes, changes of handling among them, were found together.
@@ -115,41 +102,41 @@ def wide_suspects(problem: Problem) -> list[Suspect]:
     state = problem.lot.state
     along = forces_along(problem)
     rotated = rotated_force(problem.lot)
-    suspected: list[Suspect] = []
+    suspected: list[Driver] = []
     for name, values, _ in quantities(state):
         if not varies(values) or (name == "chamber_C" and alike(values, state.temperature)):
             continue
         own = curve(values, _WIDE_KNOTS)  # (units or 1, n, d)
         if own.shape[-1] < 2:  # a line, or levels that handling errors already are
             continue
-        suspected.append(Suspect(name, _columns(across(along, own, problem.axes)), ways=2, part="axes"))
+        suspected.append(Driver(name, _columns(across(along, own, problem.axes)), ways=2, part="axes"))
         turned = rotated[..., :, None] * curve(values, _TURNED_KNOTS + is_clock(name))[:, :, None, None, :]
         whole = np.broadcast_to(turned, (problem.blocks // problem.per_unit, *turned.shape[1:]))
         columns = by_block(of_outputs(problem.lot, whole.reshape(*whole.shape[:3], -1)))
-        suspected.append(Suspect(name, _columns(columns, shared=True), part="axes"))
+        suspected.append(Driver(name, _columns(columns, shared=True), part="axes"))
         columns = transfer(of_axes(along, problem.axes, 1), values, _FORCE_KNOTS)
-        suspected.append(Suspect(name, _columns(columns), part="transfer"))
+        suspected.append(Driver(name, _columns(columns), part="transfer"))
     return suspected
 
 
-def better_curve(base: Model, chosen: Sequence[Term], field: Sequence[Suspect]) -> tuple[CurveFit, list[Term]] | None:
+def better_curve(base: Model, chosen: Sequence[Term], field: Sequence[Driver]) -> tuple[CurveFit, list[Term]] | None:
     """The curve that explains a lot better than the chosen effects, with the effects that remain; None if there is none."""
     held = {t.effect.id.removeprefix(COVARIATE_PREFIX) for t in chosen}
     whole = cost_of_model(Model(base.problem, [*base.terms, *chosen], near=base.noise))
     bare = cost_of_model(base)
     every = _promising(base, field)
-    promising = [s for s in every if s.driver not in held]
-    fits = [(s.fitted(base), s) for s in promising]
+    promising = [s for s in every if s.name not in held]
+    fits = [(fit_curve(base, s), s) for s in promising]
     fits += [(f, s) for s in promising[:_SHARPEST] if (f := _sharp(base, s)) is not None]
     if not fits:
         return None
     best, suspect = min(fits, key=lambda pair: pair[0].cost)
-    if any(s.fitted(base).cost <= best.cost for s in every if s.driver in held):
+    if any(fit_curve(base, s).cost <= best.cost for s in every if s.name in held):
         return None  # the recorded column that the effects hold already, in a shape of its own
     kept: list[Term] = []
     if len(chosen) > 1:
         # the first two of its driver: a dependence of the bias, and levels
-        alike = [s for s in field if s.driver == suspect.driver and s.ways == 1][:2] if suspect.ways == 1 else [suspect]
+        alike = [s for s in field if s.name == suspect.name and s.ways == 1][:2] if suspect.ways == 1 else [suspect]
         worth = max(decisions.CURVE_AHEAD, decisions.CURVE_SHARE * (bare - best.cost))
         best, kept = _with_others(base, chosen, alike, best, worth)
     replaced = [t for t in chosen if t not in kept]
@@ -162,13 +149,13 @@ def better_curve(base: Model, chosen: Sequence[Term], field: Sequence[Suspect]) 
     return (best, kept) if replaced and best.cost + doubt < whole else None
 
 
-def curve_in_noise(base: Model, field: Sequence[Suspect]) -> CurveFit | None:
+def curve_in_noise(base: Model, field: Sequence[Driver]) -> CurveFit | None:
     """The curve that explains far better, with the noise beside it, what a model has as noise; None if there is none.
 
     A tide that all units share is no random walk, and what each move leaves is no louder noise; but beside a model without it the
     noise is estimated so that it can be, and no test at that noise sees it.
     """
-    fits = [s.fitted(base) for s in _promising(base, field)]
+    fits = [fit_curve(base, s) for s in _promising(base, field)]
     if not fits:
         return None
     best = _tuned(base, min(fits, key=lambda f: f.cost))
@@ -183,15 +170,15 @@ def unexplained_by(base: Model, fit: CurveFit, looks: int) -> Unexplained:
     before = base.at(fit.model.noise)
     drop = max(before.rss - fit.model.space.rss, 0.0)
     log_p = log_p_value(before, drop, fit.rank) + float(np.log(looks))
-    there = base.problem.covariance.there
-    return Unexplained(fit.driver, "curve", log_p, fit.part, fit.model.floor(), fit.cost, there, fit.period)
+    there, driver = base.problem.covariance.there, fit.driver
+    return Unexplained(driver.name, "curve", log_p, driver.part, fit.model.floor(), fit.cost, there, driver.period)
 
 
-def _promising(base: Model, field: Sequence[Suspect]) -> list[Suspect]:
+def _promising(base: Model, field: Sequence[Driver]) -> list[Driver]:
     """The suspects whose own curves, block by block, reduce the residual most, at the noise of a model and with less wander."""
     less = base.noise.shares.times(decisions.LESS_FLICKER, decisions.LESS_WALK)
     spaces = [base.space] if less == base.noise.shares else [base.space, base.at(base.noise_at(less))]
-    picked: dict[int, Suspect] = {}
+    picked: dict[int, Driver] = {}
     for space in spaces:
         worth = [float(np.max(space.gain(s.candidate).drop)) for s in field]
         picked |= {int(i): field[i] for i in np.argsort(worth)[::-1][:_PROMISING] if worth[i] > 0.0}
@@ -199,7 +186,7 @@ def _promising(base: Model, field: Sequence[Suspect]) -> list[Suspect]:
 
 
 def _with_others(
-    base: Model, chosen: Sequence[Term], suspect: Sequence[Suspect], best: CurveFit, worth: float
+    base: Model, chosen: Sequence[Term], suspect: Sequence[Driver], best: CurveFit, worth: float
 ) -> tuple[CurveFit, list[Term]]:
     """The best curve with the effects that it does not replace: no functions of its own driver, and above their price."""
     kept: list[Term] = []
@@ -207,7 +194,7 @@ def _with_others(
         if _function_of(base, term, suspect[0]):
             continue
         beside = Model(base.problem, [*base.terms, *kept, term], near=base.noise)
-        tried = [s.fitted(beside) for s in suspect]
+        tried = [fit_curve(beside, s) for s in suspect]
         tried += [f for s in suspect[:1] if (f := _sharp(beside, s)) is not None]
         again = min(tried, key=lambda f: f.cost)
         if again.cost < best.cost - worth:
@@ -215,9 +202,9 @@ def _with_others(
     return best, kept
 
 
-def _function_of(base: Model, term: Term, suspect: Suspect) -> bool:
+def _function_of(base: Model, term: Term, suspect: Driver) -> bool:
     """Whether a flexible curve of the driver, block by block, reproduces nine tenths of a term's columns."""
-    columns = base.problem.columns(term.effect, term.keywords)[..., : term.first]
+    columns = term.columns(base.problem)
     before = base.at(base.problem.covariance.white_noise())
     whole = np.concatenate([base.local, suspect.candidate.of_blocks[:, :, 0, :]], axis=-1)
     after = type(before)(before.covariance, before.noise, base.problem.y, whole, base.shared)
@@ -225,7 +212,7 @@ def _function_of(base: Model, term: Term, suspect: Suspect) -> bool:
     return left[1] < 0.1 * left[0]
 
 
-def _sharp(model: Model, suspect: Suspect) -> CurveFit | None:
+def _sharp(model: Model, suspect: Driver) -> CurveFit | None:
     """The best bump or hinge of a driver beside a model: features narrower than a smooth curve can follow."""
     if suspect.values is None:
         return None
@@ -242,8 +229,7 @@ def _sharp(model: Model, suspect: Suspect) -> CurveFit | None:
         column = _narrowed(model, z, _CENTRES[best % len(_CENTRES)], _WIDTHS[best // len(_CENTRES)])
     fitted = model.with_curves(column)
     cost = cost_of_model(fitted) + 2.0 * PER_COEFFICIENT
-    columns = Candidate(column[:, :, None, :], shared=False)
-    return CurveFit(suspect.driver, columns, fitted, int(gain.rank[best]) + 2, cost)
+    return CurveFit(Driver(suspect.name, _columns(column)), fitted, int(gain.rank[best]) + 2, cost)
 
 
 def _narrowed(model: Model, z: Array, centre: float, width: float) -> Array:
@@ -286,14 +272,16 @@ def _levels(values: Array) -> Array | None:
     return np.stack([(values > e).astype(float) for e in edges], axis=-1)
 
 
-def _alike(problem: Problem, columns: Array) -> Candidate:
+def _alike(problem: Problem, columns: Array) -> Callable[[], Candidate]:
     """Columns (units, n, d), the same for every axis."""
     each = columns if problem.lot.radial else np.repeat(columns, problem.per_unit, axis=0)
     return _columns(np.broadcast_to(each, (problem.blocks, problem.n, columns.shape[-1])))
 
 
-def _columns(columns: Array, *, shared: bool = False) -> Candidate:
-    return Candidate(columns[:, :, None, :], shared=shared)
+def _columns(columns: Array, *, shared: bool = False) -> Callable[[], Candidate]:
+    """Columns (blocks, n, d) that are kept: every search looks at them again."""
+    candidate = Candidate(columns[:, :, None, :], shared=shared)
+    return lambda: candidate
 
 
 def along_force(problem: Problem, columns: Array) -> Array:
@@ -302,38 +290,38 @@ def along_force(problem: Problem, columns: Array) -> Array:
     return wide.reshape(problem.blocks, problem.n, -1)
 
 
-def _swing(problem: Problem, period: float) -> Suspect:
+def _swing(problem: Problem, period: float) -> Driver:
     """Sine and cosine of the time with a period, s."""
     time = problem.lot.state.time
     phase = 2.0 * np.pi * (time - time.min()) / period
-    return Suspect("time_s", _alike(problem, np.stack([np.sin(phase), np.cos(phase)], axis=-1)), period=period)
+    return Driver("time_s", _alike(problem, np.stack([np.sin(phase), np.cos(phase)], axis=-1)), period=period)
 
 
 def _tuned(base: Model, fit: CurveFit) -> CurveFit:
     """A swing with its period between those of the grid; any other curve as it is."""
-    if fit.period is None:
+    if fit.driver.period is None:
         return fit
     whole = float(np.ptp(base.problem.lot.state.time))
-    space, cycles = base.at(fit.model.noise), whole / fit.period
+    space, cycles = base.at(fit.model.noise), whole / fit.driver.period
     for reach in _BETWEEN:
         near = [_swing(base.problem, whole / (cycles + step * reach)) for step in (-2, -1, 0, 1, 2)]
         worth = [float(space.gain(suspect.candidate).drop[0]) for suspect in near]
         cycles += (int(np.argmax(worth)) - 2) * reach
-    tuned = _swing(base.problem, whole / cycles).fitted(base)
+    tuned = fit_curve(base, _swing(base.problem, whole / cycles))
     tuned = replace(tuned, rank=tuned.rank + 1, cost=tuned.cost + PER_COEFFICIENT)
     return tuned if tuned.cost < fit.cost else fit
 
 
-def _table(problem: Problem) -> list[Suspect]:
+def _table(problem: Problem) -> list[Driver]:
     """Rotations of the fixture that depend on one table angle, the same for all units."""
     state = problem.lot.state
     if state.outer is None or state.inner is None:
         return []
-    suspected: list[Suspect] = []
+    suspected: list[Driver] = []
     for name, angle in (("outer_deg", state.outer), ("inner_deg", state.inner)):
         if np.ptp(angle) > 0.1:
             turns = [h for k in range(1, _HARMONICS + 1) for h in (np.sin(k * angle), np.cos(k * angle))]
             tilts = [frames.to_fixture(v, state.outer, state.inner) for v in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))]
             change = np.stack([t[..., None] * v for t in turns for v in tilts], axis=-1)
-            suspected.append(Suspect(name, _columns(problem.seen(change), shared=True)))
+            suspected.append(Driver(name, _columns(problem.seen(change), shared=True)))
     return suspected

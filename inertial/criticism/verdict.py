@@ -12,10 +12,10 @@ from inertial.criticism.adequacy import adequacy
 from inertial.criticism.curves import CurveFit
 from inertial.criticism.drivers import Driver, looks_of
 from inertial.criticism.evidence import GROSS, not_judged
-from inertial.criticism.examination import EffectSearch, ExaminedRun, examined
+from inertial.criticism.examination import EffectSearch, ExaminedRun, Named, examined
 from inertial.criticism.lot_part import LotPart
 from inertial.criticism.search import SearchResult, evident, judge
-from inertial.criticism.unknown import Suspect, Unexplained, better_curve, curve_in_noise, unexplained_by
+from inertial.criticism.unknown import Unexplained, better_curve, curve_in_noise, unexplained_by
 from inertial.data_errors.removed_dwells import BadDwell
 from inertial.data_errors.tails import with_tails
 from inertial.decisions import ADEQUATE_ABOVE, NAMED_BELOW
@@ -26,7 +26,7 @@ from inertial.estimation.comparison import rms as rms_of
 from inertial.estimation.likelihood import shared_noise
 from inertial.estimation.model import Model
 from inertial.estimation.penalty import PER_COEFFICIENT, cost_of_model, log_p_value
-from inertial.estimation.problem import Lot
+from inertial.estimation.problem import Lot, Problem
 from inertial.planning.drivers import drivers_of
 from inertial.probability import passes
 
@@ -68,7 +68,22 @@ class Verdict:
     unjudged: str = ""
 
     @property
-    def named(self) -> bool:
+    def base(self) -> Model:
+        """The judged model, in the lot without handling errors and bad dwells."""
+        return self.search.base
+
+    @property
+    def problem(self) -> Problem:
+        """The series of that lot."""
+        return self.search.base.problem
+
+    @property
+    def handled(self) -> tuple[Named, ...]:
+        """Handling errors."""
+        return tuple(self.run.handled)
+
+    @property
+    def found(self) -> bool:
         """Whether something is found that the model lacks or the data spoils: in noise once in a thousand lots, by its bound."""
         spoilt = bool(self.run.handled) or any(not dwell.tail for dwell in self.removed)
         return spoilt or bool(self.result.added) or self.unexplained is not None
@@ -129,16 +144,16 @@ def _judged(lot: Lot, effects: Sequence[str], rng: Generator, barred: frozenset[
         searched = SearchResult(base, (), searched.ladder)
     if not (unjudged or passed or searched.added):
         searched = _with_a_small_effect(search, base)
-    final, unexplained, curved = searched.model, None, None
+    final, unexplained = searched.model, None
     if not unjudged and (searched.added or not passed):
         final, unexplained = _with_curves(search.part, base, searched, drivers)
     # a drift can hide where adequacy does not look
-    unexplained = unexplained or (None if unjudged else run.drift)
+    unexplained, beside = unexplained or (None if unjudged else run.drift), final
     if not (unjudged or searched.added or unexplained):
         unexplained, curved = _taken_for_noise(search.part)
         if curved is not None and search.part.field is search.field:
-            columns = curved.candidate
-            drivers.append(Driver(curved.driver, lambda: columns, None, curved.part))
+            drivers.append(curved.driver)
+            beside = curved.model
     sound = passed is True and not searched.added and unexplained is None and run.drift is None
     return Verdict(
         run=run,
@@ -146,7 +161,7 @@ def _judged(lot: Lot, effects: Sequence[str], rng: Generator, barred: frozenset[
         drivers=drivers,
         result=searched,
         final=final,
-        beside=final if curved is None or search.part.field is not search.field else curved.model,
+        beside=beside,
         unexplained=unexplained,
         removed=removed,
         rms=rms,
@@ -231,7 +246,7 @@ def _taken_for_noise(part: LotPart) -> tuple[Unexplained, CurveFit] | tuple[None
 
 
 def _curve_in_place_of(
-    part: LotPart, base: Model, searched: SearchResult, suspected: Sequence[Suspect]
+    part: LotPart, base: Model, searched: SearchResult, suspected: Sequence[Driver]
 ) -> tuple[Model, Unexplained] | None:
     """The model with a curve in place of effects that only imitate it, less the curve; None if there is none."""
     better = better_curve(part.base, searched.added, suspected) if searched.added else None

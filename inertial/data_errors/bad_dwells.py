@@ -107,13 +107,22 @@ class _Deletion:
         self.prior, self.looks = space.noise.prior, max(int(self.there.sum()) // axes, 1)
         self.left_to_poses = np.zeros(self.n, dtype=bool)
 
+    @property
+    def known(self) -> Flags:
+        """The dwells (blocks, n) that are there, and whose model the others determine."""
+        return self.there & (self.size > 1e-9 * self.size.max())
+
+    @property
+    def known_size(self) -> Array:
+        """P_ii of these, (blocks, n); one elsewhere."""
+        return np.where(self.known, self.size, 1.0)
+
     def off_every_time(self, pose: Places) -> Flags:
         """Dwells (n,) of poses (n,) all of whose dwells, two at least, are off by about the same."""
-        known = self.there & (self.size > 1e-9 * self.size.max())
-        size = np.where(known, self.size, 1.0)
-        there = known.reshape(self.units, self.axes, self.n).all(axis=1)
-        off = np.where(known, self.left / size, 0.0).reshape(self.units, self.axes, self.n) * there[:, None]
-        squares = self._studentised(np.where(known, self.left**2 / size, 0.0)).sum(axis=1)
+        there = self.known.reshape(self.units, self.axes, self.n).all(axis=1)
+        off = np.where(self.known, self.left / self.known_size, 0.0)
+        off = off.reshape(self.units, self.axes, self.n) * there[:, None]
+        squares = self.statistic()
         of_pose = (pose == np.arange(int(pose.max()) + 1)[:, None]).astype(np.float64)
         count = of_pose @ there.sum(axis=0)
         mean = of_pose @ off.sum(axis=0).T / np.maximum(count, 1.0)[:, None]
@@ -146,8 +155,7 @@ class _Deletion:
 
     def _squares(self) -> Array:
         """Its parts by axis, (units, axes, n)."""
-        known = self.there & (self.size > 1e-9 * self.size.max())
-        return self._studentised(np.where(known, self.left**2 / np.where(known, self.size, 1.0), 0.0))
+        return self._studentised(np.where(self.known, self.left**2 / self.known_size, 0.0))
 
     def _studentised(self, drop: Array) -> Array:
         """Squares of each dwell over a variance without it, (units, axes, n)."""
@@ -182,6 +190,5 @@ def deletion_residuals(model: Model) -> Array:
     """Deviation of each dwell when it is deleted, axis by axis, in standard deviations, (m,); without those left out."""
     space = model.space
     deletion = _Deletion(space, model.problem.per_unit)
-    known = deletion.there & (deletion.size > 1e-9 * deletion.size.max())
-    scaled = deletion.left / np.sqrt(np.where(known, deletion.size, 1.0)) / space.noise.scale[:, None]
-    return scaled[known]
+    scaled = deletion.left / np.sqrt(deletion.known_size) / space.noise.scale[:, None]
+    return scaled[deletion.known]

@@ -49,11 +49,15 @@ class Readings:
         there: Flags = np.all(np.isfinite(self.output), axis=-1)
         return there
 
+    @property
+    def warm(self) -> Array | None:
+        """Temperature of the units, or of the chamber where that alone was recorded, (units, n), °C."""
+        return self.temperature if self.temperature is not None else self.chamber
+
     @cached_property
     def turned(self) -> bool:
         """Whether the poses separate response and bias; else faults of response cannot be detected."""
-        force = self.force[0][:, self.axes]
-        x = np.concatenate([np.ones((len(force), 1)), force], axis=-1)
+        x = design(self.force[0][:, self.axes])
         return bool(np.linalg.svd(x, compute_uv=False)[-1] > _TURNED * np.sqrt(len(x)))
 
     @cached_property
@@ -87,7 +91,7 @@ class Readings:
 
         Of a sensor of 1 mg/K the dwells of a cold soak would else be far from those of the others.
         """
-        warm = self.temperature if self.temperature is not None else self.chamber
+        warm = self.warm
         if warm is None or not self.turned or not np.isfinite(warm[self.there]).all():
             return self.misfit
         left = np.empty_like(self.output)
@@ -100,14 +104,13 @@ class Readings:
     @cached_property
     def misfit(self) -> Array:
         """Output less the robust fit, over the unit's scale: g, (units, n, 3)."""
-        design = np.concatenate([np.ones((*self.force.shape[:2], 1)), self.force], axis=-1)
-        model = np.einsum("unp,uip->uni", design, self.fits)
+        model = np.einsum("unp,uip->uni", design(self.force), self.fits)
         return (self.output - model) / np.where(self.scale > 0.0, self.scale, 1.0)[:, None, None]
 
 
 def design(force: Array, theta: Array | None = None) -> Array:
-    """Columns (n, 4) of bias and response to a force (n, 3), g; with a temperature (n,), K, their slopes after them, (n, 8)."""
-    x = np.concatenate([np.ones((len(force), 1)), force], axis=-1)
+    """Columns (..., 4) of bias and response to a force (..., 3), g; with a temperature (...,), K, their slopes too, (..., 8)."""
+    x = np.concatenate([np.ones((*force.shape[:-1], 1)), force], axis=-1)
     return x if theta is None else np.concatenate([x, theta[:, None] * x], axis=-1)
 
 
@@ -189,7 +192,7 @@ def find_split(force: Array, output: Array) -> Split | None:
 
 def _far_from_split(force: Array, output: Array, places: Places) -> bool:
     """Whether no place comes near to what a split needs, by the products of all dwells up to each place."""
-    x = np.concatenate([np.ones((len(force), 1)), force], axis=-1)
+    x = design(force)
     left = output - x @ np.linalg.lstsq(x, output, rcond=1e-9)[0]
     both = np.concatenate([x, left], axis=-1)
     before = np.cumsum(both[:, :, None] * both[:, None, :], axis=0)
@@ -204,7 +207,7 @@ def _far_from_split(force: Array, output: Array, places: Places) -> bool:
 
 
 def _plain_fit(force: Array, output: Array) -> tuple[Array, float]:
-    x = np.concatenate([np.ones((len(force), 1)), force], axis=-1)
+    x = design(force)
     coefficients = np.linalg.lstsq(x, output, rcond=1e-9)[0].astype(np.float64)
     return coefficients, float(np.sum((output - x @ coefficients) ** 2))
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from inertial.arrays import Array
+from inertial.dynamics.centrifuge import radii_as_observed
 from inertial.dynamics.centrifuge_effects import EFFECTS, Spins
-from inertial.dynamics.centrifuge_radii import radii_as_observed
 from inertial.dynamics.missing_effects import FOLDS, Judged, breakers_of, judge
 from inertial.errors import NotIdentified
 

@@ -3,9 +3,21 @@
 from collections.abc import Iterable
 from importlib import import_module
 from pkgutil import iter_modules
-from typing import Any, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 AnyEffect = TypeVar("AnyEffect")
+
+
+class DynamicEffect:
+    """What every effect of a dynamic test states.
+
+    id : name of its module · equation, source : text for reports · breaker : measurement that separates it from other effects
+    """
+
+    id: ClassVar[str]
+    equation: ClassVar[str]
+    source: ClassVar[str]
+    breaker: ClassVar[str]
 
 
 class IncompleteEffect(Exception):

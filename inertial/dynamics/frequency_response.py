@@ -32,8 +32,6 @@ LARGEST_ERROR = 0.1
 class Response:
     """A frequency response in bands, (m,) each.
 
-    Attributes
-    ----------
     frequency : Hz, mean of the band's lines weighted by the power of the reference
     h1, h2 : output over reference, from the cross spectrum over the spectrum of the reference, and the output's over the cross
         spectrum: noise of the output leaves the first right, noise of the reference the second
@@ -101,7 +99,7 @@ def frequency_response(
         )
     made = made.picked(kept)
     back = np.exp(-2j * np.pi * made.frequency * delay)
-    return Response(made.frequency, made.h1 * back, made.h2 * back, made.coherence, made.error, made.lines)
+    return replace(made, h1=made.h1 * back, h2=made.h2 * back)
 
 
 def _lines(wave: Array, rate_hz: float, seconds: float, count: int) -> Complex:
@@ -169,7 +167,7 @@ def _sharpened(one: Response) -> Response:
     sound = one.error < LARGEST_ERROR
     bend[1:-1][~(sound[2:] & sound[1:-1] & sound[:-2])] = 0.0
     error = np.hypot(one.error, np.abs(bend) / np.maximum(np.abs(h), 1e-300) / 3.0)
-    return Response(one.frequency, h - bend, one.h2 - bend, one.coherence, error, one.lines)
+    return replace(one, h1=h - bend, h2=one.h2 - bend, error=error)
 
 
 _PARTS = 8

@@ -2,12 +2,13 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar, Generic, Protocol, TypeVar
+from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 
 from inertial.counts import degrees_of_freedom
 from inertial.distributions import chi2_tail
+from inertial.dynamics.effect_modules import DynamicEffect
 from inertial.probability import passes
 
 ADEQUATE_P = 0.005
@@ -87,13 +88,7 @@ class Judged(Generic[AnyFit]):
         return tuple(one.effects[0] for one in self.classes)
 
 
-class Separated(Protocol):
-    """An effect with the measurement that separates it from others."""
-
-    breaker: ClassVar[str]
-
-
-def breakers_of(classes: Sequence[EffectClass], effects: Mapping[str, Separated]) -> tuple[str, ...]:
+def breakers_of(classes: Sequence[EffectClass], effects: Mapping[str, DynamicEffect]) -> tuple[str, ...]:
     """The measurements that separate the first two members of each class of several effects."""
     open_classes = [one for one in classes if len(one.effects) > 1]
     return tuple(dict.fromkeys(effects[name].breaker for one in open_classes for name in one.effects[:2]))

@@ -23,8 +23,6 @@ def velocity_change(peak_g: float, duration_s: float) -> float:
 class Pulse:
     """What a recorded pulse is. ``peak`` carries the sign of the pulse; the other figures are magnitudes.
 
-    Attributes
-    ----------
     peak, peak_error : above the baseline, and its standard uncertainty; unit of the record
     duration_s : of the half sine with these 10 % points
     velocity : integral over the pulse, unit of the record times s
@@ -205,10 +203,10 @@ PER_OCTAVE = 12
 FEWEST_PER_PERIOD = 10.0
 
 
-def octave_frequencies(low_hz: float, high_hz: float, per_octave: int = PER_OCTAVE) -> Array:
-    """Frequencies (n,) in Hz from low to at most high, ``per_octave`` in an octave."""
-    count = int(np.floor(per_octave * np.log2(high_hz / low_hz) + 1e-9)) + 1
-    return low_hz * 2.0 ** (np.arange(count) / per_octave)
+def octave_frequencies(low_hz: float, high_hz: float) -> Array:
+    """Frequencies (n,) in Hz from low to at most high, twelve in an octave."""
+    count = int(np.floor(PER_OCTAVE * np.log2(high_hz / low_hz) + 1e-9)) + 1
+    return low_hz * 2.0 ** (np.arange(count) / PER_OCTAVE)
 
 
 def responses(record: Array, rate_hz: float, natural_hz: float, q: float) -> Array:

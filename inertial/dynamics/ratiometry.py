@@ -18,8 +18,6 @@ CLEAR_SQUARE_TERM = (
 class Follows:
     """Departures at n supply voltages, those at the first one being zero.
 
-    Attributes
-    ----------
     supply : (n,), V
     sensitivity, sensitivity_error : (n,), share of the sensitivity at the first supply, and its standard uncertainty
     zero_g, zero_error_g : (n,), g

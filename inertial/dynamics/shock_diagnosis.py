@@ -1,16 +1,200 @@
-"""Diagnosis of a shock comparison, the unit's waveform against the reference's: adequacy and missing effects."""
+"""Shocks, the unit's waveforms against the reference's: the fit of a sensitivity and effects, adequacy, and missing effects."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
+from scipy.optimize import least_squares
 
+from inertial.arrays import Array, Flags
 from inertial.dynamics.missing_effects import FOLDS, Judged, breakers_of, judge
 from inertial.dynamics.shock_effects import EFFECTS
-from inertial.dynamics.shock_fit import ShockFit, ShockRecord, fit_shock, residual_percent
+from inertial.dynamics.transfer_effects.base import Coordinates, Parameter
+from inertial.errors import NotIdentified
 
 DEFAULT = ("delay",)
 PARTS = ("before the pulse", "the pulse", "after the pulse")
+_KEPT = 200
+"""Largest number of waveforms that a design keeps."""
+
+
+@dataclass(frozen=True)
+class Waves:
+    """The waveforms of one shock on a common time base, without the baseline before the pulse.
+
+    reference, unit : (n,), g · error : (n,), standard uncertainty of the difference, g
+    """
+
+    reference: Array
+    unit: Array
+    error: Array
+
+
+@dataclass(frozen=True)
+class ShockRecord:
+    """Shocks of one unit: rate of the waveforms, Hz, duration of the pulse, s, and time from the first sample to it, s."""
+
+    rate_hz: float
+    duration_s: float
+    before_s: float
+    shocks: tuple[Waves, ...]
+
+
+@dataclass(frozen=True)
+class ShockFit:
+    """A fitted comparison.
+
+    sensitivity, sensitivity_error : unit over reference · coefficients : value and standard uncertainty by effect (added effects)
+    parameters : value and standard uncertainty by name, errors in the unit of the value
+    residuals : of each shock, (n,), g
+    """
+
+    effects: tuple[str, ...]
+    sensitivity: float
+    sensitivity_error: float
+    coefficients: Mapping[str, tuple[float, float]]
+    parameters: Mapping[str, tuple[float, float]]
+    residuals: tuple[Array, ...]
+    chi_square: float
+    dof: int
+
+
+def fit_shock(record: ShockRecord, effects: Sequence[str], rows: Sequence[Flags] | None = None) -> ShockFit:
+    """Least squares of sensitivity and effects over all shocks; nonlinear parameters from several starts.
+
+    Parameters
+    ----------
+    rows : of each shock, the samples that count; all where None
+
+    Raises
+    ------
+    NotIdentified
+        There are fewer samples than parameters.
+    """
+    duration = record.duration_s
+    parameters = [(name, p) for name in effects for p in EFFECTS[name].parameters(duration)]
+    used = [np.ones(len(one.unit), dtype=bool) for one in record.shocks] if rows is None else list(rows)
+    count = sum(int(one.sum()) for one in used)
+    if count < len(effects) + len(parameters) + 2:
+        raise NotIdentified(
+            f"shock: {count} samples for {len(effects) + len(parameters) + 1} parameters; record faster"
+        )
+    whole = np.concatenate(used)
+    target = np.concatenate([one.unit / one.error for one in record.shocks])[whole]
+    model = Design(record, effects, parameters)
+    coordinates = model.coordinates
+
+    def design(x: Array) -> Array:
+        return model.at(x)[whole]
+
+    def solved(x: Array) -> tuple[Array, Array]:
+        columns = design(x)
+        size = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+        c = np.linalg.lstsq(columns / size, target, rcond=1e-12)[0] / size
+        return c, columns @ c - target
+
+    x = _search([p for _, p in parameters], coordinates, lambda y: solved(y)[1])
+    c, left = solved(x)
+    errors = _errors(design, x, c)
+    added = [name for name in effects if EFFECTS[name].added(record.shocks[0].reference, record.rate_hz) is not None]
+    values = coordinates.values(x)
+    spread = np.where(coordinates.log, values * errors[len(c) :], errors[len(c) :])
+    return ShockFit(
+        tuple(effects),
+        float(c[0]),
+        float(errors[0]),
+        {name: (float(c[k + 1]), float(errors[k + 1])) for k, name in enumerate(added)},
+        {p.name: (float(v), float(u)) for (_, p), v, u in zip(parameters, values, spread, strict=True)},
+        tuple(_residuals(record, model.at(x), c)),
+        float(left @ left),
+        count - len(c) - len(x),
+    )
+
+
+class Design:
+    """Weighted design of all samples of all shocks, for values of the nonlinear parameters.
+
+    A waveform passes the effects in their order: a change of one parameter changes it only from the effect of that parameter on,
+    and what is before it is kept.
+    """
+
+    def __init__(
+        self, record: ShockRecord, effects: Sequence[str], parameters: Sequence[tuple[str, Parameter]]
+    ) -> None:
+        self.record, self.effects = record, tuple(effects)
+        self.coordinates = Coordinates([p for _, p in parameters])
+        self._own = [np.array([of == name for of, _ in parameters], dtype=bool) for name in self.effects]
+        extra = [[EFFECTS[name].added(one.reference, record.rate_hz) for name in self.effects] for one in record.shocks]
+        self._added = [[column for column in each if column is not None] for each in extra]
+        self._waves: dict[tuple[object, ...], Array] = {}
+
+    def at(self, x: Array) -> Array:
+        """The design (n of all shocks, 1 + added effects)."""
+        values, parts = self.coordinates.values(x), list[Array]()
+        if len(self._waves) > _KEPT:
+            self._waves.clear()
+        for place, (one, added) in enumerate(zip(self.record.shocks, self._added, strict=True)):
+            wave = self._passed(place, one.reference, values)
+            parts.append(np.column_stack([wave, *added]) / one.error[:, None])
+        return np.vstack(parts)
+
+    def _passed(self, place: int, wave: Array, values: Array) -> Array:
+        """The waveform of a shock's reference after all effects."""
+        key: tuple[object, ...] = (place,)
+        for name, own in zip(self.effects, self._own, strict=True):
+            mine = values[own]
+            key = (*key, name, *mine.tolist())
+            if key not in self._waves:
+                self._waves[key] = EFFECTS[name].changed(wave, self.record.rate_hz, mine)
+            wave = self._waves[key]
+        return wave
+
+
+def _residuals(record: ShockRecord, design: Array, c: Array) -> list[Array]:
+    """Residuals of all samples of every shock, g."""
+    left, at = list[Array](), 0
+    fitted = design @ c
+    for one in record.shocks:
+        n = len(one.unit)
+        left.append(one.unit - fitted[at : at + n] * one.error)
+        at += n
+    return left
+
+
+def _search(parameters: Sequence[Parameter], coordinates: Coordinates, residual: Callable[[Array], Array]) -> Array:
+    """The coordinates of the nonlinear parameters of the best fit; an empty array where there are none."""
+    if not parameters:
+        return np.zeros(0)
+    low, high = coordinates.low, coordinates.high
+    starts = [np.clip(coordinates.of(np.array(start)), low, high) for start in product(*(p.starts for p in parameters))]
+    best = sorted(starts, key=lambda x: float(np.sum(residual(x) ** 2)))[:2]
+    scale = np.where(coordinates.log, 1.0, high - low)
+    done = [
+        least_squares(residual, x, bounds=(low, high), x_scale=scale, max_nfev=60, xtol=1e-9, ftol=1e-9) for x in best
+    ]
+    return np.asarray(min(done, key=lambda one: one.cost).x)
+
+
+def _errors(design: Callable[[Array], Array], x: Array, c: Array) -> Array:
+    """Standard uncertainties of the linear coefficients and then of the nonlinear parameters, from the whole Jacobian."""
+    rows = design(x)
+    slopes: list[Array] = []
+    for k in range(len(x)):
+        step = np.zeros(len(x))
+        step[k] = 1e-5 * max(1.0, abs(x[k])) if abs(x[k]) > 1e-2 else 1e-7
+        slopes.append((design(x + step) - design(x - step)) @ c / (2.0 * step[k]))
+    jacobian = np.column_stack([rows, *slopes])
+    size = np.maximum(np.linalg.norm(jacobian, axis=0), 1e-300)
+    return np.sqrt(np.maximum(np.diag(np.linalg.pinv((jacobian / size).T @ (jacobian / size))), 0.0)) / size
+
+
+def residual_percent(record: ShockRecord, left: Sequence[Array]) -> float:
+    """Rms residual of the shocks, in % of the peak of each."""
+    squares = [
+        np.mean(one**2) / np.max(np.abs(shock.unit)) ** 2 for one, shock in zip(left, record.shocks, strict=True)
+    ]
+    return float(100.0 * np.sqrt(np.mean(squares)))
 
 
 @dataclass(frozen=True)

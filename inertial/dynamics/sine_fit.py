@@ -19,8 +19,6 @@ HARMONICS = 5
 class Tone:
     """A tone in several channels.
 
-    Attributes
-    ----------
     value : (channels,), complex amplitude: the real part belongs to cos ωt, minus the imaginary part to sin ωt
     sigma : (channels,), residual standard deviation of a sample
     amplitude_error : (channels,), σ√(2/N); the phase's in rad is this over the amplitude

@@ -3,18 +3,20 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import toeplitz
 from scipy.stats import chi2, norm
 
 from inertial.arrays import Array
-from inertial.dynamics.wander import Posterior, logarithmic_kernel, stated_error, wander, wander_posterior
-from inertial.dynamics.wandering_means import (
+from inertial.dynamics.wander import (
     IdentifiedNoise,
+    Posterior,
     dof_of_allan,
     dof_of_sd,
     kernels_of,
     line_of,
     remainders_of,
+    stated_error,
+    wander,
+    wander_posterior,
 )
 from inertial.errors import NotIdentified
 from inertial.noise.allan import overlapping
@@ -27,8 +29,6 @@ MEAN_S, MOST_MEANS = 100.0, 144  # of the means of a stability; of those whose n
 class StabilityFigures:
     """Stability of a bias record, in the record's unit; the definitions differ by up to thirty times for one unit.
 
-    Attributes
-    ----------
     sd_100s, sd_100s_error : standard deviation of 100 s means, and its standard uncertainty for white noise, 1/f noise and walk
     sd_1s, range_1s, range_100s : standard deviation and range of 1 s means, range of 100 s means
     allan_100s, allan_100s_error : Allan deviation at 100 s
@@ -141,8 +141,6 @@ def deviation_interval(deviation: float, dof: float) -> tuple[float, float]:
 class ShortNoise:
     """Noise of a short record by Allan variances N²/τ + F².
 
-    Attributes
-    ----------
     white : N², square of the record's unit times s
     flicker, flicker_error : F² and the standard deviation of its estimate
     """
@@ -171,9 +169,8 @@ def short_noise(record: Array, rate_hz: float, *, trend: int = 0) -> ShortNoise:
     step = min(4, size)
     white = max(0.0, (fast - slow) / (1.0 - 1.0 / step)) if step > 1 else 0.0  # of a sample
     place = np.linspace(-1.0, 1.0, means.size)
-    kernel = toeplitz(logarithmic_kernel(means.size) + np.log(means.size) + 1.0)
     known = white / size * np.eye(means.size) + 1e-12 * float(np.var(means)) * np.eye(means.size)
-    flicker = wander(np.vander(place, trend + 1), means, known, kernel)
+    flicker = wander(np.vander(place, trend + 1), means, known, kernels_of(means.size)[0])
     octave = 2.0 * np.log(2.0)
     return ShortNoise(white / rate_hz, octave * flicker.variance, octave * flicker.error)
 
@@ -249,8 +246,6 @@ def warm_up_time(time: Array, record: Array, *, band: float, window_s: float) ->
 class Repeatability:
     """Scatter of the bias from turn-on to turn-on, the cycles' own error removed.
 
-    Attributes
-    ----------
     value : standard deviation between cycles; 0 where their own error explains all
     low, high : 95 % interval
     upper : one-sided 95 % upper limit

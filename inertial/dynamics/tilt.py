@@ -22,8 +22,6 @@ GRID = 801
 class TiltFit:
     """Fit of one axis: output = bias + scale·sin(θ + φ), with K2 and K3 of the indicated force where asked for.
 
-    Attributes
-    ----------
     value, covariance : (terms,), (terms, terms), terms as in ``names``; output unit
     residuals : (n,), output unit
     weights : (terms, n), of the outputs in the terms

@@ -26,8 +26,6 @@ IDENTIFIED_SHARE = 0.2
 class Points:
     """A measured transfer function.
 
-    Attributes
-    ----------
     conditions : frequency, level, temperature and duration of the points
     value : (n,), complex, output per g
     magnitude_error : (n,), standard uncertainty of the magnitude as a share of it, without what all points share
@@ -50,8 +48,6 @@ class Points:
 class TransferFit:
     """A fitted model.
 
-    Attributes
-    ----------
     effects : ids of the effects besides the sensitivity
     sensitivity : output per g at low frequency, with the sign of the polarity; sensitivity_error : as a share
     parameters : of all effects in order; values, errors : (p,), errors of a log parameter are shares of the value

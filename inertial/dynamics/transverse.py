@@ -17,14 +17,11 @@ Z95 = float(norm.ppf(0.975))
 class Transverse:
     """Largest transverse sensitivity as a share of the sensitivity, and its direction.
 
-    Attributes
-    ----------
     value, error : share of the sensitivity on the axis, and its standard uncertainty
     low, high : 95 % interval; low is 0 where the transverse sensitivity is not significant
     direction_deg, direction_error_deg : from the first transverse axis towards the second; the error is 180 where it is unknown
     offset : constant over the angle: motion of the exciter along the sensitive axis
     chi_square, dof, p_value : of the residuals against the uncertainties of the points
-    fitted : (n,) at the points
     """
 
     value: float
@@ -37,7 +34,6 @@ class Transverse:
     chi_square: float
     dof: int
     p_value: float
-    fitted: Array
 
 
 def fit_transverse(first: Array, second: Array, output: Array, error: Array) -> Transverse:
@@ -87,7 +83,6 @@ def fit_transverse(first: Array, second: Array, output: Array, error: Array) -> 
         square,
         dof,
         float(chi2.sf(square, dof)),
-        np.asarray(fitted),
     )
 
 

@@ -20,11 +20,10 @@ FEWEST = 5  # means under the parabola
 
 @dataclass(frozen=True)
 class WarmUpTime:
-    """Time from power-on with its standard uncertainty and the ends of its 95 % interval, s; final value, unit of the record."""
+    """Time from power-on with its standard uncertainty and the ends of its 95 % interval, s."""
 
     value: float
     error: float
-    final: float
     low: float
     high: float
 
@@ -51,7 +50,7 @@ def entered(time: Array, record: Array, *, band: float, window_s: float) -> Warm
     """
     last, final = warm_up_time(time, record, band=band, window_s=window_s)
     if last <= time[0]:
-        return WarmUpTime(last, 0.0, final, last, last)  # within its band from the first mean on
+        return WarmUpTime(last, 0.0, last, last)  # within its band from the first mean on
     step, away = float(time[1] - time[0]), record - final
     noise = short_noise(record[len(record) // 2 :], 1.0 / step, trend=1)
     tail = np.zeros(len(record))
@@ -59,12 +58,10 @@ def entered(time: Array, record: Array, *, band: float, window_s: float) -> Warm
     tail /= tail.sum()
     best: WarmUpTime | None = None
     starts, reaches = [last, *(last - k * window_s for k in SPANS)], [SPANS[-1] * window_s]
-    for _ in range(
-        2
-    ):  # the longest span first; then the shortest that holds the entry with its uncertainty, and settles
-        tries = (
-            (start, reach) for reach in reaches for start in starts
-        )  # noise has left the band late: it crosses before
+    # the longest span first; then the shortest that holds the entry with its uncertainty, and settles
+    for _ in range(2):
+        # noise has left the band late: it crosses before
+        tries = ((start, reach) for reach in reaches for start in starts)
         crossing = next((one for start, reach in tries if (one := _crossing(time, away, band, start, reach))), None)
         if crossing is None:
             break
@@ -76,7 +73,7 @@ def entered(time: Array, record: Array, *, band: float, window_s: float) -> Warm
             of_slope @ of_slope
         )
         error = stated_error(variance, over, noise.flicker_error, float(np.sqrt(steep)) / slope) / slope
-        best = WarmUpTime(at, error, final, *_ends(at, error, band / slope, error * slope / band))
+        best = WarmUpTime(at, error, *_ends(at, error, band / slope, error * slope / band))
         starts, reaches = [at], [k * window_s for k in SPANS[:-1] if k * window_s >= REACH * error]
     if best is not None:
         return best

@@ -66,8 +66,6 @@ def place(state: State) -> tuple[Nonlinear, ...]:
 class Effect(ABC):
     """One physical cause of error. A subclass with an ``id`` in a module of this package is found by itself.
 
-    Attributes
-    ----------
     id : public name in model files, on the command line and in JSON
     symbol : as in IEEE Std 1293 where it has one
     equation : the term for output axis i, for people

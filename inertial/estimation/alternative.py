@@ -34,8 +34,6 @@ _SOAK_APART = 3.0  # K
 class Handling(Effect):
     """A handling error.
 
-    Attributes
-    ----------
     fewest_units : below which it cannot be separated from effects of the sensor, and is not searched
     of_one_axis : whether it concerns the bias of one axis of one unit, at an ``axis``
     several : whether an axis may have many of them, each from a ``dwell`` on, which are searched together

@@ -59,7 +59,7 @@ CONDITION = 1e-8
 """Directions of the scaled normal matrix below this are scatter of the angles, not effects: they get no coefficient."""
 
 OWN = ("bias", "scale", "misalignment", "turn_on_bias")
-"""Ratio of the scatter between units to the errors above which coefficients are not combined."""
+"""Effects whose coefficients each unit has for itself: they are not shrunk towards the lot's mean."""
 
 _FEW_UNITS = 4
 
@@ -98,12 +98,10 @@ def _pooled(model: Model, unit: Array, right: Array, scaled: Array, covariance: 
 
 def _shrinkable(model: Model, count: int) -> Flags:
     """The local coefficients that are shrunk: those of the effects beyond bias, scale and misalignment."""
-    flags: list[bool] = []
-    for term in model.terms:
-        if not term.shared:
-            columns = model.problem.columns(term.effect, term.keywords).shape[-1]
-            flags += [term.effect.id not in OWN] * (columns if term.first is None else min(term.first, columns))
-    return np.array([*flags, *[False] * (count - len(flags))], dtype=bool)
+    flags = np.zeros(count, dtype=bool)
+    for term, own in model.places(shared=False):
+        flags[own] = term.effect.id not in OWN
+    return flags
 
 
 def _free(unit: Array, inverse: Array, columns: Array) -> Array:
@@ -123,14 +121,13 @@ def residuals_of(problem: Problem, fit: Estimate) -> Array:
 
 def _columns(problem: Problem, terms: Sequence[Term]) -> Array:
     """Columns (blocks, n, p) of terms, without those of the unknown state of their memory."""
-    columns = [problem.columns(t.effect, t.keywords)[..., : t.first] for t in terms]
+    columns = [t.columns(problem) for t in terms]
     return np.concatenate(columns, axis=-1) if columns else np.zeros((problem.blocks, problem.n, 0))
 
 
 def _with_start(problem: Problem, terms: Sequence[Term]) -> Array:
-    """The same with them: as in the model, a memory that was at rest has no unknown state."""
-    started = [problem.start(t.effect, t.keywords) for t in terms if not t.rest]
-    return np.concatenate([_columns(problem, terms), *started], axis=-1)
+    """The same with them."""
+    return np.concatenate([_columns(problem, terms), *(t.start(problem) for t in terms)], axis=-1)
 
 
 def rms(values: Array) -> float:

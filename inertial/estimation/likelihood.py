@@ -139,7 +139,7 @@ def scatter_of_poses(model: Model) -> float:
     change = pose_errors(lot.state)
     if units < 2 or lot.radial or not change.shape[-1]:
         return 1.0
-    there = np.flatnonzero(np.isfinite(lot.error).all(axis=-1).any(axis=0))
+    there = np.flatnonzero(lot.measured)
     columns = by_block(of_axes(np.broadcast_to(change, (units, n, 3, change.shape[-1])), lot.state.axes, 2))
     gain = model.space.gain_of_dwells(columns, there)
     drop = gain.drop[gain.rank == 2]
@@ -203,15 +203,11 @@ def _together(model: Model, units: int) -> float:
 
 def _alike(model: Model, term: Term, units: int) -> float:
     """Part of a term that is equal in every unit, 0 … 1."""
-    fit = estimate(model)
-    at = 0
-    for other in (t for t in model.terms if not t.shared):
-        columns = model.problem.columns(other.effect, other.keywords)[..., : other.first]
+    for other, own in model.places(shared=False):
         if other.effect.id == term.effect.id:
-            series = np.einsum("bnp,bp->bn", columns, fit.local[:, at : at + columns.shape[-1]])
+            series = np.einsum("bnp,bp->bn", other.columns(model.problem), estimate(model).local[:, own])
             series = (series - series.mean(axis=1, keepdims=True)) / model.problem.error
             return max(_pairwise(series.reshape(units, -1)), 0.0)
-        at += columns.shape[-1]
     return 1.0
 
 

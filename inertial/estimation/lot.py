@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from inertial.arrays import Array
+from inertial.arrays import Array, Flags
 from inertial.state import State
 
 
@@ -31,6 +31,11 @@ class Lot:
     recorded: bool = False
     loudness: Array | None = None
     scale: Array | None = None
+
+    @property
+    def measured(self) -> Flags:
+        """The dwells (n,) that any unit has on all axes."""
+        return np.isfinite(self.error).all(axis=-1).any(axis=0)
 
     def units(self, index: Sequence[int]) -> "Lot":
         """The lot of some units only."""

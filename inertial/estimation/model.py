@@ -61,8 +61,8 @@ class Model:
     @cached_property
     def local(self) -> Array:
         """Columns with coefficients by block, (blocks, n, p)."""
-        columns = [self._of(t) for t in self.terms if not t.shared]
-        columns += [self._start(t) for t in self.terms if not t.shared]
+        columns = [t.columns(self.problem) for t in self.terms if not t.shared]
+        columns += [t.start(self.problem) for t in self.terms if not t.shared]
         if self._curves is not None:
             columns.append(self._curves)
         if not columns:
@@ -72,22 +72,19 @@ class Model:
     @cached_property
     def shared(self) -> Array:
         """Columns with coefficients of all blocks, (blocks, n, q)."""
-        columns = [self._of(t) for t in self.terms if t.shared]
+        columns = [t.columns(self.problem) for t in self.terms if t.shared]
         if self._shared_curves is not None:
             columns.append(self._shared_curves)
         if not columns:
             return np.zeros((self.problem.blocks, self.problem.n, 0))
-        columns += [self._start(t) for t in self.terms if t.shared]
+        columns += [t.start(self.problem) for t in self.terms if t.shared]
         return np.concatenate(columns, axis=-1)
 
-    def _of(self, term: Term) -> Array:
-        return self.problem.columns(term.effect, term.keywords)[..., : term.first]
-
-    def _start(self, term: Term) -> Array:
-        """Columns of the unknown state of a term's memory before the first dwell; none where it was at rest."""
-        if term.rest:
-            return np.zeros((self.problem.blocks, self.problem.n, 0))
-        return self.problem.start(term.effect, term.keywords)
+    def places(self, *, shared: bool) -> list[tuple[Term, slice]]:
+        """Terms whose coefficients all blocks share, or do not, and where their columns are; unknown states and curves follow."""
+        terms = [t for t in self.terms if t.shared == shared]
+        ends = np.cumsum([0, *(t.columns(self.problem).shape[-1] for t in terms)]).tolist()
+        return [(term, slice(start, end)) for term, start, end in zip(terms, ends[:-1], ends[1:], strict=True)]
 
     def at(self, noise: Noise) -> Space:
         """The residuals of the model, whitened for a noise; those for its own noise and for the last other one are kept."""
@@ -276,13 +273,8 @@ class Model:
 
     def shared_sizes(self, term: Term) -> Array:
         """Coefficients (k,) of a term that all blocks share."""
-        at = 0
-        for other in (t for t in self.terms if t.shared):
-            count = self._of(other).shape[-1]
-            if other.key == term.key:  # a model that was kept has an equal term
-                return self.space.shared_sizes[at : at + count]
-            at += count
-        raise KeyError(f"{term.effect.id}: not a term of the model")
+        # a model that was kept has an equal term
+        return self.space.shared_sizes[next(own for t, own in self.places(shared=True) if t.key == term.key)]
 
     def explained(self, candidate: Candidate, floor: float) -> float:
         """RMS, g, of the part of a candidate that the model cannot absorb, less that of noise of RMS ``floor``."""

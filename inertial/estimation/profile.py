@@ -71,28 +71,25 @@ class LikelihoodProfile:
         parameters = [p for p in wrong.effect.parameters(state) if not p.choices]
         if wrong.values:
             grid += [{**grid[0], **wrong.keywords}]
-        total, axes = self._over(wrong, grid)
-        best = [grid[int(k)] for k in np.argmin(total, axis=0)]
-        least = total.min(axis=0)
-        own = None if axes is None else [[grid[int(k)] for k in np.argmin(a, axis=0)] for a in axes]
-        least_own = None if axes is None else axes.min(axis=1)
-        if fine and parameters:
-            best, least = self._finer(wrong, parameters, best, least, None)
-            if own is not None and least_own is not None:
-                for axis in range(_AXES):
-                    own[axis], least_own[axis] = self._finer(wrong, parameters, own[axis], least_own[axis], axis)
-        if least_own is None or not parameters:
+        varied = parameters if fine else []
+        least = self._least(wrong, grid, varied, None)
+        if not parameters or self._over(wrong, grid)[1] is None:
             return least
-        apart = least_own.sum(axis=0)
+        apart = np.sum([self._least(wrong, grid, varied, axis) for axis in range(_AXES)], axis=0)
         return np.where(least - apart > self.by_axis, apart, least)
 
-    def _finer(
-        self, wrong: Term, parameters: Sequence[Nonlinear], best: list[Values], least: Array, axis: int | None
-    ) -> tuple[list[Values], Array]:
-        """The best values of each truth moved between those of the grid, one parameter after the other."""
-        best, least = list(best), least.copy()
+    def _least(self, wrong: Term, grid: Sequence[Values], varied: Sequence[Nonlinear], axis: int | None) -> Array:
+        """The same at the best values of a grid for all sensor axes, or for one.
+
+        Parameters
+        ----------
+        varied : parameters that are moved between those of the grid, one after the other
+        """
+        total, axes = self._over(wrong, grid)
+        squares = total if axis is None or axes is None else axes[axis]
+        best, least = [grid[int(k)] for k in np.argmin(squares, axis=0)], squares.min(axis=0)
         truths = range(len(best))
-        for parameter in parameters:
+        for parameter in varied:
             width = cell(parameter)
             for _ in range(_ROUNDS):
                 tried = [
@@ -108,7 +105,7 @@ class LikelihoodProfile:
                     if squares[place, r] < least[r]:
                         best[r], least[r] = tried[place], squares[place, r]
                 width *= 0.4
-        return best, least
+        return least
 
     def _over(self, wrong: Term, grid: Sequence[Values]) -> tuple[Array, Array | None]:
         """Remaining sums of squares (g, r) at each set of values; by sensor axis (3, g, r) if blocks have own coefficients.

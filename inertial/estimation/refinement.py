@@ -50,7 +50,7 @@ def _placed(space: Space, problem: Problem, term: Term) -> Term:
     """An alternative at the best dwell near its own."""
     if not isinstance(term.effect, Handling):
         return term
-    near = term.effect.near(problem.lot, **{k: v for k, v in term.keywords.items() if isinstance(v, float)})
+    near = term.effect.near(problem.lot, **term.place)
     if len(near) < 2:
         return term
     pieces = list(problem.pieces(term.effect, near))

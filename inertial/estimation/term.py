@@ -47,9 +47,24 @@ class Term:
         """Values as keywords of the effect's columns."""
         return dict(self.values)
 
+    @property
+    def place(self) -> dict[str, float]:
+        """The place of a handling error."""
+        return {name: value for name, value in self.values if isinstance(value, float)}
+
     def candidate(self, problem: Problem) -> Candidate:
         """The term's columns in a problem, as a candidate."""
         return problem.candidate(self.effect, [self.keywords], first=self.first)
+
+    def columns(self, problem: Problem) -> Array:
+        """The term's columns in a problem by block, (blocks, n, p), g per unit of the coefficient."""
+        return problem.columns(self.effect, self.keywords)[..., : self.first]
+
+    def start(self, problem: Problem) -> Array:
+        """Columns (blocks, n, k) of the unknown state of its memory before the first dwell; none where it was at rest."""
+        if self.rest:
+            return np.zeros((problem.blocks, problem.n, 0))
+        return problem.start(self.effect, self.keywords)
 
 
 class TurnOnBias(SensorEffect):

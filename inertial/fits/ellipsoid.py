@@ -10,8 +10,7 @@ from inertial.arrays import Array, Index
 from inertial.errors import NotIdentified
 from inertial.estimation.noise_shares import LONGEST
 from inertial.fits.descent import descended
-from inertial.fits.norm_noise import WALK_ABOUT_MEAN, NormNoise, norm_noise
-from inertial.fits.wander import student
+from inertial.fits.norm_noise import whitener_of_norms
 
 Shape = Literal["nine", "six"]
 
@@ -33,25 +32,13 @@ class EllipsoidFit:
     """(..., 3), output unit per °C; zero where no temperature was given."""
     reference_temperature: Array
     """(...,) T0, mean of the temperatures given, °C; NaN where none was."""
-    covariance: Array
-    """(..., p, p) of (bias, C upper: xx yy zz xy xz yz, temperature offset), from the residuals."""
     norm_residuals: Array
     """(..., n) |f| - g, in g."""
-    dof: int
-    wander: tuple[NormNoise, ...] = ()
-    """Of every unit, where the times of the dwells were given."""
-    flicker: Array | None = None
-    """(...,) standard deviation of the 1/f wander of an axis between dwells, g, where the times of the dwells were given."""
 
     @property
     def response(self) -> Array:
         """K = C⁻¹ (..., 3, 3), output unit per g, upper triangular."""
         return np.asarray(np.linalg.inv(self.correction), dtype=np.float64)
-
-    @property
-    def scale(self) -> Array:
-        """Sensitivity of each axis (..., 3), output unit per g: the diagonal of K."""
-        return np.diagonal(self.response, axis1=-2, axis2=-1)
 
     @property
     def rms(self) -> Array:
@@ -87,9 +74,8 @@ def fit_ellipsoid(
     norm : local gravity in g
     temperature : (..., n), °C; adds an offset per °C and axis
     shape : "nine" for bias, scale and non-orthogonality, "six" for bias and scale
-    time : (n,), s, of the dwells: what wanders between them is then estimated, the dwells are weighted by it, and the
-        covariance holds under it (with Student's factor for k = 2). Without it, and beyond 1500 dwells, whose covariance
-        would not fit, the residuals are taken for white and alike
+    time : (n,), s, of the dwells: what wanders between them is then estimated, and the dwells are weighted by it. Without it,
+        and beyond 1500 dwells, whose covariance would not fit, the residuals are taken for white and alike
     error : (..., n), white standard error of the norm of each dwell, g; alike and not known where None
 
     Raises
@@ -118,56 +104,28 @@ def fit_ellipsoid(
     chosen = np.concatenate([np.arange(free), 9 + np.arange(free_heat)]).astype(np.int64)
     problem = _Sphere(flat, rise, norm, chosen)
     theta = problem.solve(problem.algebraic())
-    dof = n - free - free_heat
-    noises: tuple[NormNoise, ...] = ()
-    flicker: Array | None = None
-    white = np.ones((len(flat), n)) if error is None else np.asarray(error, dtype=np.float64).reshape(len(flat), n)
     if time is not None and n <= LONGEST:
-        when = np.asarray(time, dtype=np.float64)
-        theta, noises = _with_wander(problem, theta, when, white)
-    residual, rows = problem.residuals(theta), problem.rows(theta)
-    if noises:
-        whiten = np.stack([noise.whiten for noise in noises])
-        white_left = (whiten @ residual[..., None])[..., 0]
-        covariance = student(dof) ** 2 * _covariance(whiten @ rows, white_left, dof)
-        scatter = np.sum(white_left**2, axis=-1) / dof
-        known = scatter if error is None else np.mean(white**2, axis=-1)
-        # scatter that the samples do not show counts as flicker: few dwells do not tell the kind of it
-        share = np.array([noise.flicker + noise.walk * WALK_ABOUT_MEAN for noise in noises])
-        flicker = np.sqrt(scatter * share + np.maximum(scatter - known, 0.0)).reshape(lead)
-    else:
-        covariance = _covariance(rows, residual, dof)
-    full = np.zeros((flat.shape[0], 12, 12))
-    full[:, problem.free[:, None], problem.free] = covariance
-    kept = 9 + free_heat
+        white = np.ones((len(flat), n)) if error is None else np.asarray(error, dtype=np.float64).reshape(len(flat), n)
+        theta = _with_wander(problem, theta, np.asarray(time, dtype=np.float64), white)
+    _scaled(problem.weighted(problem.rows(theta)))  # refused where the solution itself is not determined
     bias, c, h = _unpack(theta)
     return EllipsoidFit(
         bias=bias.reshape(*lead, 3),
         correction=c.reshape(*lead, 3, 3),
         temperature_offset=h.reshape(*lead, 3),
         reference_temperature=reference if temperature is not None else np.full(lead, np.nan),
-        covariance=full[:, :kept, :kept].reshape(*lead, kept, kept),
-        norm_residuals=residual.reshape(*lead, n),
-        dof=dof,
-        wander=noises,
-        flicker=flicker,
+        norm_residuals=problem.residuals(theta).reshape(*lead, n),
     )
 
 
-def _with_wander(problem: "_Sphere", theta: Array, time: Array, error: Array) -> tuple[Array, tuple[NormNoise, ...]]:
-    """Parameters (u, 12) weighted by the noise of the norms of each unit, and that noise."""
-    noises: tuple[NormNoise, ...] = ()
+def _with_wander(problem: "_Sphere", theta: Array, time: Array, error: Array) -> Array:
+    """Parameters (u, 12) weighted by the noise of the norms of each unit."""
     for _ in range(_ROUNDS):
         _, force, size = problem.force(theta)
-        residual, rows, direction = problem.residuals(theta), problem.rows(theta), force / size[..., None]
-        noises = tuple(
-            norm_noise(left, own, way, time, white)
-            for left, own, way, white in zip(residual, rows, direction, error, strict=True)
-        )
-        problem.whiten = np.stack([noise.whiten for noise in noises])
+        each = zip(problem.residuals(theta), problem.rows(theta), force / size[..., None], error, strict=True)
+        problem.whiten = np.stack([whitener_of_norms(left, own, way, time, white) for left, own, way, white in each])
         theta = problem.solve(theta)
-    problem.whiten = None
-    return theta, noises
+    return theta
 
 
 def _unpack(theta: Array) -> tuple[Array, Array, Array]:
@@ -230,17 +188,18 @@ class _Sphere:
 
         def step(at: Array) -> Array:
             change = np.zeros_like(at)
-            change[:, self.free] = _solve(self._weighted(self.rows(at)), -self._left(at))
+            change[:, self.free] = _solve(self.weighted(self.rows(at)), -self._left(at))
             return change
 
         return descended(theta, step, lambda at: np.sum(self._left(at) ** 2, axis=-1), _SETTLED)
 
-    def _weighted(self, rows: Array) -> Array:
+    def weighted(self, rows: Array) -> Array:
+        """Rows (u, n, p), weighted where the noise of the norms is known."""
         return rows if self.whiten is None else self.whiten @ rows
 
     def _left(self, theta: Array) -> Array:
-        """Residuals (u, n), weighted where their noise is known."""
-        return self._weighted(self.residuals(theta)[..., None])[..., 0]
+        """Residuals (u, n), likewise."""
+        return self.weighted(self.residuals(theta)[..., None])[..., 0]
 
 
 def _scaled(rows: Array) -> tuple[Array, Array]:
@@ -262,9 +221,3 @@ def _solve(rows: Array, target: Array) -> Array:
     return np.asarray(
         np.linalg.solve(gram, np.einsum("unp,un->up", unit, target)[..., None])[..., 0] / size, dtype=np.float64
     )
-
-
-def _covariance(rows: Array, residual: Array, dof: int) -> Array:
-    unit, size = _scaled(rows)
-    inverse = np.linalg.inv(np.swapaxes(unit, -1, -2) @ unit) / (size[:, :, None] * size[:, None, :])
-    return inverse * (np.sum(residual**2, axis=-1) / dof)[:, None, None]

@@ -17,26 +17,11 @@ from inertial.noise.flicker import flicker_kernel
 from inertial.noise.measurands import walk_kernel
 
 _SHARES = np.concatenate([[0.0], 10.0 ** np.arange(-1.0, 5.0)])
-WALK_ABOUT_MEAN = 1.0 / 6.0
-"""Mean variance about the record's mean of a walk that gathers a variance of one over it."""
-
 _FINER = (10.0**0.5, 10.0**0.25)
 
 
-@dataclass(frozen=True)
-class NormNoise:
-    """Noise of the norms of n dwells.
-
-    whiten : (n, n), inverse root of the covariance over s²; flicker, walk : shares, over the mean of e²
-    """
-
-    whiten: Array
-    flicker: float
-    walk: float
-
-
-def norm_noise(residual: Array, rows: Array, direction: Array, time: Array, error: Array) -> NormNoise:
-    """Noise of the residuals (n,) of a norm fit.
+def whitener_of_norms(residual: Array, rows: Array, direction: Array, time: Array, error: Array) -> Array:
+    """Inverse root (n, n) of the covariance, over s², of the residuals (n,) of a norm fit.
 
     Parameters
     ----------
@@ -63,8 +48,7 @@ def norm_noise(residual: Array, rows: Array, direction: Array, time: Array, erro
         f, w = best[1]
         near = [(f * a, w * b) for a in (1.0 / step, 1.0, step) for b in (1.0 / step, 1.0, step)]
         best = min([best, *((deviance(one), one) for one in dict.fromkeys(near))], key=lambda one: one[0])
-    low = root(*best[1])
-    return NormNoise(np.asarray(solve_triangular(low, np.eye(time.size), lower=True)), *best[1])
+    return np.asarray(solve_triangular(root(*best[1]), np.eye(time.size), lower=True))
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from inertial.arrays import Array
 from inertial.distributions import f_tail
 from inertial.errors import NotIdentified
 from inertial.fits.descent import descended
-from inertial.fits.norm_noise import norm_noise
+from inertial.fits.norm_noise import whitener_of_norms
 from inertial.fits.wander import student
 
 FLAT = 0.05
@@ -153,7 +153,8 @@ def fit_plane_norm(output: Array, across: int, norm: float, time: Array, error: 
     for _ in range(_ROUNDS):
         theta = _descended(flat, theta, norm, whiten)
         force, rows, left = _state(flat, theta, norm)
-        whiten = norm_noise(left, rows, force / np.linalg.norm(force, axis=1, keepdims=True), time, white).whiten
+        way = force / np.linalg.norm(force, axis=1, keepdims=True)
+        whiten = whitener_of_norms(left, rows, way, time, white)
     theta = _descended(flat, theta, norm, whiten)
     force, rows, left = _state(flat, theta, norm)
     along = np.ptp(force, axis=0) / norm
@@ -201,8 +202,7 @@ class _Series:
 def _solved(columns: Array, series: Array, direction: Array, time: Array, error: Array) -> _Series:
     """A linear fit of a series with the wander that its residuals show."""
     first = np.linalg.lstsq(columns / error[:, None], series / error, rcond=None)[0]
-    noise = norm_noise(series - columns @ first, columns, direction, time, error)
-    return _Series.of(columns, series, noise.whiten)
+    return _Series.of(columns, series, whitener_of_norms(series - columns @ first, columns, direction, time, error))
 
 
 def _harmonics(series: _Series, angle: Array, orders: Sequence[int]) -> float:

@@ -103,8 +103,6 @@ class TemperatureCurve:
     """(3,) standard deviation of a sample, from first differences, output unit."""
     p_value: Array
     """(3,) probability of such slow residuals if the polynomial were right: from means of blocks in order of time."""
-    residuals: Array
-    """(n, 3), output unit."""
 
     @property
     def adequate(self) -> bool | None:
@@ -142,7 +140,6 @@ def fit_temperature_curve(output: ArrayLike, temperature: ArrayLike, *, degree: 
         rms=np.sqrt(np.sum(residuals**2, axis=0) / (x.shape[0] - degree - 1)),
         noise=noise,
         p_value=_slow(residuals, noise, degree),
-        residuals=residuals,
     )
 
 

@@ -222,7 +222,7 @@ def _typical(problem: Problem, terms: Sequence[Term]) -> tuple[Array, list[int]]
     """
     scaled: list[Array] = []
     for term in terms:
-        columns = problem.columns(term.effect, term.keywords)[..., : term.first]
+        columns = term.columns(problem)
         largest = np.max(np.abs(columns), axis=(0, 1))
         low, high = term.effect.typical_ug
         size = 1e-6 * float(np.sqrt(max(low, 1e-3) * high))
@@ -251,7 +251,6 @@ def _needed(rivals: Rivals, separation: Apart) -> Array:
 def _coefficients(rivals: Rivals, term: Term) -> float:
     """Coefficients of a rival in the whole lot, the unknown state of its memory and nonlinear parameters among them."""
     problem = Problem(rivals.lot)
-    columns = problem.columns(term.effect, term.keywords)[..., : term.first].shape[-1]
-    columns += problem.start(term.effect, term.keywords).shape[-1]
+    columns = term.columns(problem).shape[-1] + term.start(problem).shape[-1]
     blocks = 1.0 if term.shared else problem.blocks * rivals.weight
     return blocks * columns + freedom(term)

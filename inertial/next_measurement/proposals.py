@@ -78,8 +78,7 @@ def sighting(
 ) -> Proposal | None:
     """The steps that best show unseen effects; None if none matters, or the station can show none.
 
-    An effect matters if its usual
-    size exceeds the noise.
+    An effect matters if its usual size exceeds the noise.
     """
     if not _goes_on(model):
         return None

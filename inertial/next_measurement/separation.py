@@ -102,7 +102,7 @@ def rivals_of(model: Model, terms: Sequence[Term], others: Sequence[Term], most:
 def _coefficients(model: Model, term: Term, blocks: Sequence[int]) -> Array:
     """Coefficients of the first term of a model: of some blocks, or shared."""
     fit = estimate(model)
-    columns = model.problem.columns(term.effect, term.keywords)[..., : term.first].shape[-1]
+    columns = term.columns(model.problem).shape[-1]
     return fit.shared[:columns] if term.shared else fit.local[list(blocks), :columns]
 
 
@@ -156,7 +156,7 @@ def predictions(rivals: Rivals, problem: Problem) -> Array:
     """Contribution of each rival to the series of a problem of the same units, (blocks, n, r), g."""
     contributions: list[Array] = []
     for term, coefficients in zip(rivals.terms, rivals.predicted, strict=True):
-        columns = problem.columns(term.effect, term.keywords)[..., : term.first]
+        columns = term.columns(problem)
         own = np.einsum("bnp,bp->bn", columns, np.broadcast_to(coefficients, (columns.shape[0], columns.shape[-1])))
         contributions.append(own)
     return np.stack(contributions, axis=-1)

@@ -7,7 +7,7 @@ from itertools import islice
 
 from inertial.estimation.alternative import Handling
 from inertial.estimation.term import Term
-from inertial.next_measurement.aims import Objective
+from inertial.next_measurement.aims import Objective, Promise
 from inertial.next_measurement.menus import (
     Kind,
     StepSequence,
@@ -35,28 +35,19 @@ _KEPT = 0.5
 Minutes = Callable[[Sequence[SequenceStep]], float]
 
 
-@dataclass(frozen=True)
-class Proposal:
-    """Steps to measure next.
+@dataclass(frozen=True, kw_only=True)
+class Proposal(Promise):
+    """Steps to measure next, with what is expected of them.
 
     ids : the effects of the aim; pair : the two rivals that it separates most; empty for unseen effects
-    minutes : of station time
-    before, after : chi-square between the two rivals so far, and expected with the steps, the smaller for either being true; of a
-    coefficient of typical size for unseen effects
-    if_true : expected with the steps, by true rival; remaining : rivals that are not separated from the best
-    settled : share of the aim that is reached afterwards, 0 … 1
+    minutes : of station time; settled : share of the aim that is reached afterwards, 0 … 1
     """
 
     kinds: tuple[Kind, ...]
     steps: tuple[SequenceStep, ...]
-    ids: tuple[str, ...]
     pair: tuple[str, ...]
     minutes: float
-    before: float
-    after: float
     settled: float
-    if_true: tuple[tuple[str, float], ...] = ()
-    remaining: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -238,16 +229,11 @@ class ProposalSearch:
     def _proposal(self, chosen: Sequence[StepSequence], worth: float) -> Proposal:
         steps = [s for c in chosen for s in c.steps]
         promise = self.aim.effect_of_steps(self.already, steps, self.pace)
-        whole, free = [*self.already, *steps], self.already
         return Proposal(
+            **vars(promise),
             kinds=tuple(dict.fromkeys(c.kind for c in chosen)),
             steps=tuple(steps),
-            ids=promise.ids,
             pair=promise.ids,
-            minutes=self.around.cost(self.aim, whole) - self.around.cost(self.aim, free),
-            before=promise.before,
-            after=promise.after,
+            minutes=self.minutes(chosen) - self.minutes([]),
             settled=worth,
-            if_true=promise.if_true,
-            remaining=promise.remaining,
         )

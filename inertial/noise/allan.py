@@ -15,6 +15,7 @@ Spacing = Literal["octave", "decade"] | Sequence[int] | Index
 
 FEWEST_SAMPLES = 8
 CONFIDENCE = 0.6827
+"""Two-sided, of the intervals of a curve."""
 
 
 @dataclass(frozen=True)
@@ -31,8 +32,6 @@ class AllanCurve:
     """(..., t) lower end of the interval, unit of the output."""
     high: Array
     """(..., t) upper end of the interval, unit of the output."""
-    confidence: float
-    """Two-sided confidence of `low`..`high`."""
     n: int
     """Samples of the record."""
     rate_hz: float
@@ -41,13 +40,7 @@ class AllanCurve:
     """(t,) averaging times in samples."""
 
 
-def overlapping(
-    x: ArrayLike,
-    rate_hz: float,
-    m: Spacing | None = None,
-    *,
-    confidence: float = CONFIDENCE,
-) -> AllanCurve:
+def overlapping(x: ArrayLike, rate_hz: float, m: Spacing | None = None) -> AllanCurve:
     """Overlapping Allan deviation of records of an output (not of its integral), with chi-square intervals.
 
     sigma^2(tau) = mean (x[k+2m] - 2 x[k+m] + x[k])^2 / (2 tau^2) with x the running integral: NIST SP 1065, eq. 11. The
@@ -59,7 +52,6 @@ def overlapping(
     x : (..., n), unit of the output
     rate_hz : Hz
     m : averaging times in samples, or "octave" (default: 1, 2, 4 …) or "decade" (1, 2, 5, 10 …); both to a third of n
-    confidence : two-sided confidence of the interval
 
     Raises
     ------
@@ -71,14 +63,13 @@ def overlapping(
     variance = _variances(data, spacings)
     n = data.shape[-1]
     edf = mixture.degrees_of_freedom(variance, spacings, n)
-    tail = 0.5 * (1.0 - confidence)
+    tail = 0.5 * (1.0 - CONFIDENCE)
     return AllanCurve(
         tau=spacings / rate_hz,
         deviation=np.sqrt(variance),
         edf=edf,
         low=np.sqrt(variance * edf / chi2_quantile(1.0 - tail, edf)),
         high=np.sqrt(variance * edf / chi2_quantile(tail, edf)),
-        confidence=confidence,
         n=n,
         rate_hz=rate_hz,
         m=spacings,

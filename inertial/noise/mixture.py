@@ -14,6 +14,7 @@ from inertial.noise.covariance import Sums, sums
 
 TERMS = ("Q", "N", "B", "K", "R")
 _ROUNDS = 4  # of weights from the strengths before
+_TURNS = 3  # of a covariance and the solution under it
 _STEPS = 12  # of Gauss-Newton, and halvings of one
 _SETTLED = 1e-6  # chi-square that a step no longer takes off
 _FEWEST_DOF = 1.0
@@ -50,9 +51,8 @@ def degrees_of_freedom(variance: Array, m: Index, n: int) -> Array:
 def _one_edf(variance: Array, moments: Sums) -> Array:
     if not np.all(variance > 0.0):  # a dead channel: nothing differs and nothing is estimated
         return np.ones_like(variance)
-    model = basis(moments.m)
     strengths = first_guess(variance, moments)
-    expected = model @ strengths
+    expected = basis(moments.m) @ strengths
     if not np.all(expected > 0.0):  # a dead channel: every difference is zero and nothing is estimated
         return np.ones_like(variance)
     spread = np.diagonal(moments.covariance(strengths[:4], strengths[4]))
@@ -152,18 +152,16 @@ def problem(variance: Array, moments: Sums, strengths: Array) -> MixtureFit:
     )
 
 
-def settled(
-    variance: Array, moments: Sums, free: Flags, start: Array, *, rounds: int = 3
-) -> tuple[MixtureFit, Array, float]:
+def settled(variance: Array, moments: Sums, free: Flags, start: Array) -> tuple[MixtureFit, Array, float]:
     """The problem whose covariance is that of its own solution, the solution and its chi-square."""
     strengths = start
-    for _ in range(rounds):
+    for _ in range(_TURNS):
         strengths, _ = problem(variance, moments, strengths).solve(free, strengths)
     task = problem(variance, moments, strengths)
     return task, *task.solve(free, strengths)
 
 
-def deviance(variance: Array, moments: Sums, free: Flags, start: Array, *, rounds: int = 3) -> tuple[float, Array]:
+def deviance(variance: Array, moments: Sums, free: Flags, start: Array) -> tuple[float, Array]:
     """Twice the negative log-likelihood of a curve (t,) with the terms that are `free`, and their strengths (5,).
 
     The covariance is that of the strengths at which it is taken: a ramp, which scatters nothing, then has to agree with the last
@@ -171,7 +169,7 @@ def deviance(variance: Array, moments: Sums, free: Flags, start: Array, *, round
     one that it was taken under always wins. The best of all rounds counts: the strengths solve for a covariance that is given.
     """
     best, likeliest, strengths = np.inf, start, start
-    for _ in range(rounds + 1):
+    for _ in range(_TURNS + 1):
         task = problem(variance, moments, strengths)
         now = task.cost(strengths) + task.volume
         if now < best:

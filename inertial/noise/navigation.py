@@ -17,8 +17,6 @@ TIMES_S = (1.0, 10.0, 60.0, 600.0, 3600.0)
 class NavigationError:
     """Standard deviations by one axis that is integrated from a known start.
 
-    Attributes
-    ----------
     velocity_random_walk : m/s/√h, 60·N; None where N is not identified
     q_n, q_b : N² in (m/s²)²/Hz and B² in (m/s²)², for the measurement and the bias state [a, b] of a filter; None likewise
     velocity, position : (n,) m/s and m, at the times asked for

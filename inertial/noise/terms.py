@@ -53,13 +53,6 @@ class NoiseTerm:
         """Whether the curve needs this term."""
         return self.value is not None
 
-    def text(self, unit: str) -> str:
-        """The coefficient in words, for an output in `unit`."""
-        suffix = self.unit.format(unit)
-        if self.value is None:
-            return f"{self.symbol} not identified, ≤ {self.high:.3g} {suffix}"
-        return f"{self.symbol} = {self.value:.4g} ({self.low:.3g} … {self.high:.3g}) {suffix}"
-
 
 @dataclass(frozen=True)
 class NoiseTerms:
@@ -76,7 +69,6 @@ class NoiseTerms:
     """(..., 5) lower end of the interval, 0 where not identified."""
     high: Array
     """(..., 5) upper end of the interval; the one-sided 95 % limit where not identified."""
-    confidence: float
     chi2: Array
     """(...,) of the curve about the fitted terms."""
     dof: Array
@@ -97,19 +89,18 @@ class NoiseTerms:
         return {s: NoiseTerm(s, NAMES[s], None if np.isnan(v) else v, a, b, UNITS[s]) for s, v, a, b in rows}
 
 
-def fit_terms(curve: AllanCurve, *, confidence: float = 0.95) -> NoiseTerms:
+CONFIDENCE = 0.95
+"""Two-sided, of the intervals of terms."""
+
+
+def fit_terms(curve: AllanCurve) -> NoiseTerms:
     """Coefficients of each channel of `curve` by generalised least squares on the log-variance.
 
     The covariance of the estimates at all averaging times is that of the fitted mixture itself. A term that the curve
     does not need is not identified and gets a limit: one whose removal costs less than chi-square 6.6, be it under the
-    covariance of
-    the fitted mixture or with that of what would stand in for it. Intervals are profiles with all other terms free, so a
-    coefficient that another could replace has a wide one; an interval that reached zero would not be one of an identified term.
-
-    Parameters
-    ----------
-    curve : from `overlapping`
-    confidence : two-sided, of the intervals
+    covariance of the fitted mixture or with that of what would stand in for it. Intervals are profiles with all other terms
+    free, so a coefficient that another could replace has a wide one; an interval that reached zero would not be one of an
+    identified term.
 
     Raises
     ------
@@ -128,7 +119,7 @@ def fit_terms(curve: AllanCurve, *, confidence: float = 0.95) -> NoiseTerms:
         )
     moments = sums(curve.n, tuple(curve.m.tolist()))
     variances = (curve.deviation**2).reshape(-1, curve.m.size)
-    rows = [profiles.fit_terms(variance, moments, float(chi2_quantile(confidence, 1))) for variance in variances]
+    rows = [profiles.fit_terms(variance, moments, float(chi2_quantile(CONFIDENCE, 1))) for variance in variances]
     lead = curve.deviation.shape[:-1]
     rate = curve.rate_hz
     scale = np.sqrt(np.array([1.0 / rate**2, 1.0 / rate, 1.0, rate, rate**2]))  # per unit strength in samples
@@ -141,7 +132,6 @@ def fit_terms(curve: AllanCurve, *, confidence: float = 0.95) -> NoiseTerms:
         value=coefficients([row.value for row in rows]),
         low=coefficients([row.low for row in rows]),
         high=coefficients([row.high for row in rows]),
-        confidence=confidence,
         chi2=np.array([row.chi2 for row in rows]).reshape(lead),
         dof=np.array([row.dof for row in rows]).reshape(lead),
         mixture=coefficients([row.mixture for row in rows]),

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from inertial.noise import terms as noise_terms
 from inertial.noise.allan import CONFIDENCE, overlapping
 from inertial.noise.navigation import TIMES_S, TO_M_S2, navigation_error
 from inertial.noise.psd import allan_variance, one_sided
@@ -67,8 +68,8 @@ def allan_document(series: EvenSeries, spacing: str = "octave", statistic: str =
         "samples": n,
         **about,
         "deviation_unit": unit,
-        "confidence": curve.confidence,
-        "term_confidence": terms.confidence,
+        "confidence": CONFIDENCE,
+        "term_confidence": noise_terms.CONFIDENCE,
         "curves": [
             {
                 "channel": name,
@@ -160,7 +161,7 @@ def allan_of_run(run: Run) -> dict[str, Any]:
         **ALLAN,
         "deviation_unit": "µg",
         "confidence": CONFIDENCE,
-        "term_confidence": 0.95,
+        "term_confidence": noise_terms.CONFIDENCE,
         "curves": channels,
         "terms": rows,
         "navigation": _navigation_rows(rows, "µg"),

@@ -191,7 +191,7 @@ def doubt_of_run(measurement: Measured, lot: Lot, before: Sequence[str], after: 
 
 def _with_effects(lot: Lot, after: Sequence[str]) -> str | None:
     verdict = judged(lot, after, generator())
-    named = [name for one in verdict.run.handled for name in one.effects.ids] + _bad(verdict.removed)
+    named = [name for one in verdict.handled for name in one.effects.ids] + _bad(verdict.removed)
     if named:
         return f"with it the diagnosis of the run names {_listed(named)}"
     if verdict.adequate is True:

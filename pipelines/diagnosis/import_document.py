@@ -84,7 +84,7 @@ def _table_of_dwells(
     table: pd.DataFrame, keys: dict[str, Any], path: Path, source: SourceFile, fit: str, archive: str | None
 ) -> dict[str, Any]:
     """A table of dwells in the exchange format, which states by its columns what a mapping would."""
-    from pipelines.diagnosis.inputs import history_beside
+    from pipelines.diagnosis.inputs import file_beside
     from pipelines.importers.exchange import checked, read_history
     from pipelines.importers.keep import complete_table, keep_table_of_dwells
 
@@ -94,7 +94,7 @@ def _table_of_dwells(
             f"import: {path.name} is a table of dwells in the exchange format, which takes --units output=… alone (found "
             f"{', '.join(more)}); import it without them, then 'tumbleline fit RUN', or map its columns with --map"
         )
-    beside = history_beside(str(path))
+    beside = file_beside(str(path), "history")
     dwells, told = complete_table(
         checked(table, where=path.name, foreign=True), keys.get("units", {}).get("output", "")
     )

@@ -135,11 +135,9 @@ def smallest_of(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     ]
 
 
-def evidence_of(diagnosis: Diagnosis, names: Names) -> dict[str, Any] | None:
+def evidence_of(diagnosis: Diagnosis, names: Names) -> dict[str, Any]:
     """The basis of the verdict: degrees of freedom, condition, the bias without single dwells, the smallest cubic detected."""
     evidence = diagnosis.evidence
-    if evidence is None:
-        return None
     largest = None
     if evidence.largest is not None:
         size, unit, dwell = evidence.largest

@@ -6,10 +6,17 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from inertial.dynamics.centrifuge import STANDARD_GRAVITY, Polynomial, columns, linearity_error, linearity_percent
+from inertial.dynamics.centrifuge import (
+    STANDARD_GRAVITY,
+    Polynomial,
+    RadiiFit,
+    columns,
+    fit_radii,
+    linearity_error,
+    linearity_percent,
+)
 from inertial.dynamics.centrifuge_diagnosis import SpinDiagnosis
 from inertial.dynamics.centrifuge_effects import EFFECTS
-from inertial.dynamics.centrifuge_radii import RadiiFit, fit_radii
 from pipelines.drawing.chart import SEVERAL, Trace
 from pipelines.procedures.figures import FigureValue, diagnosis_texts, verdict_of, with_uncertainty
 from pipelines.procedures.recorded import numbers

@@ -10,7 +10,7 @@ import numpy as np
 from inertial.counts import degrees_of_freedom
 from inertial.distributions import normal_upper
 from inertial.dynamics.missing_effects import Fitted, adequate, p_value
-from inertial.uncertainty.deviation_law import DeviationLaw
+from inertial.uncertainty.degrees import DeviationLaw
 from inertial.uncertainty.rounding import equal, rounded
 
 TAIL = 0.025
@@ -36,7 +36,7 @@ class FigureValue:
 
     ``low`` and ``high`` are the ends of a 95 % interval. Where ``identified`` is False the value passes no limit, and ``note``
     states why, and a measurement that determines it. A standard deviation has ``dof`` degrees of freedom, nan for other figures,
-    and ``removed`` is the known part that was taken out of it; see :class:`inertial.uncertainty.deviation_law.DeviationLaw`.
+    and ``removed`` is the known part that was taken out of it; see :class:`inertial.uncertainty.degrees.DeviationLaw`.
     """
 
     figure: str

@@ -9,8 +9,14 @@ from pydantic import Field, field_validator, model_validator
 from scipy.signal import welch
 
 from inertial.dynamics.frequency_response import clock_departure
-from inertial.dynamics.random_vibration import interpolated, overall_level, rectification
-from inertial.dynamics.spectra import HANN_HALF, density_confidence, hann_mean
+from inertial.dynamics.spectra import (
+    HANN_HALF,
+    density_confidence,
+    hann_mean,
+    interpolated,
+    overall_level,
+    rectification,
+)
 from inertial.dynamics.transfer_diagnosis import TransferDiagnosis
 from inertial.dynamics.transfer_effects import EFFECTS
 from inertial.errors import NotIdentified

@@ -9,7 +9,7 @@ import pandas as pd
 
 from inertial.arrays import Array
 from inertial.dynamics.stability import ShortNoise
-from inertial.dynamics.wandering_means import IdentifiedNoise
+from inertial.dynamics.wander import IdentifiedNoise
 from pipelines.tables.frames import empty_table
 from schemas.poses import Pose
 from schemas.units import AXES

@@ -10,9 +10,8 @@ from scipy.interpolate import CubicSpline
 
 from inertial.dynamics import pulses
 from inertial.dynamics.pulses import Pulse
-from inertial.dynamics.shock_diagnosis import ShockDiagnosis, diagnose_shock
+from inertial.dynamics.shock_diagnosis import ShockDiagnosis, ShockRecord, Waves, diagnose_shock
 from inertial.dynamics.shock_effects import EFFECTS
-from inertial.dynamics.shock_fit import ShockRecord, Waves
 from inertial.dynamics.wander import stated_error
 from inertial.errors import NotIdentified
 from inertial.record_faults import clipped as at_extreme

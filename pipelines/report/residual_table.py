@@ -106,9 +106,10 @@ def ladder_of(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     Rows have ``effect``, ``symbol``, ``coefficients``, ``chi2`` that it takes off, ``behind`` the best after the penalty for
     coefficients, and ``log10_p``.
     """
-    if not diagnosis.ladder:
+    ladder = diagnosis.result.ladder
+    if not ladder:
         return []
-    variance, best = diagnosis.final.space.variance, diagnosis.ladder[0].cost
+    variance, best = diagnosis.final.space.variance, ladder[0].cost
     return [
         {
             "effect": rival.term.effect.id,
@@ -118,5 +119,5 @@ def ladder_of(diagnosis: Diagnosis) -> list[dict[str, Any]]:
             "behind": float(rival.cost - best),
             "log10_p": float(max(rival.log_p / np.log(10.0), LEAST_LOG10_P)),
         }
-        for rival in diagnosis.ladder
+        for rival in ladder
     ]

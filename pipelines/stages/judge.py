@@ -52,11 +52,11 @@ def verdict_on(dwells: pd.DataFrame, history: pd.DataFrame | None, effects: Sequ
         with threadpool_limits(1):
             verdict = judged(lot, effects, generator())
         error = error_of(verdict.rms, verdict.floor, verdict.log_p)
-        adequate, reason, error = told(verdict.search.base, verdict.adequate, verdict.unjudged, error)
+        adequate, reason, error = told(verdict.base, verdict.adequate, verdict.unjudged, error)
     except (DataRejected, RecipeInvalid, InertialError) as problem:
         return _not_judged(str(problem).rstrip("."))
     units = len(measurement.units) - len(faulty)
-    return _document(adequate, reason or None, error, verdict.named, units, faulty)
+    return _document(adequate, reason or None, error, verdict.found, units, faulty)
 
 
 def told_by(diagnosis: Mapping[str, Any], units: int) -> AdequacyDocument:

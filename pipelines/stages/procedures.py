@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
-from inertial.dynamics.wandering_means import IdentifiedNoise
+from inertial.dynamics.wander import IdentifiedNoise
 from inertial.errors import InertialError
 from pipelines.procedures import PROCEDURES, parts_of, procedure_tables, steps_of
 from pipelines.procedures.base import Evaluated, Part

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from inertial.data_errors.faults.fault import Fault, Look, places_of
+from inertial.data_errors.faults.fault import Fault, Look
 from inertial.data_errors.readings import Readings
 
 
@@ -19,7 +19,7 @@ def clock(readings: Readings) -> Iterator[Fault]:
             yield Fault(
                 "clock_jitter",
                 unit,
-                places_of(places),
+                tuple(places.tolist()),
                 f"time steps back by {-step:.1f} s at dwell {{dwell[{places[0]}]}}",
             )
 

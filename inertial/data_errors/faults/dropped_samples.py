@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from inertial.data_errors.faults.fault import Fault, Look, places_of
+from inertial.data_errors.faults.fault import Fault, Look
 from inertial.data_errors.readings import Readings
 
 
@@ -25,7 +25,7 @@ def dropped(readings: Readings) -> Iterator[Fault]:
         places = np.flatnonzero(row < 0.85)
         if places.size:
             evidence = f"{places.size} dwells hold as little as {float(np.nanmin(row)):.0%} of the samples"
-            yield Fault("dropped_samples", unit, places_of(places), evidence)
+            yield Fault("dropped_samples", unit, tuple(places.tolist()), evidence)
 
 
 def _of_own_lengths(readings: Readings) -> bool:

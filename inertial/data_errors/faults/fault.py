@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from inertial.arrays import Places
 from inertial.data_errors.readings import Readings
 
 
@@ -44,11 +43,6 @@ class Look:
     of_missing: bool = False
 
 
-def places_of(places: Places) -> tuple[int, ...]:
-    """Places of dwells, as listed in a fault."""
-    return tuple(int(place) for place in places)
-
-
 def missing_dwells(readings: Readings, unit: int) -> tuple[int, ...]:
     """Places of the dwells that a unit lacks and other units have."""
-    return places_of(np.flatnonzero(~readings.there[unit]))
+    return tuple(np.flatnonzero(~readings.there[unit]).tolist())

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from inertial.arrays import Flags
-from inertial.data_errors.faults.fault import Fault, Look, places_of
+from inertial.data_errors.faults.fault import Fault, Look
 from inertial.data_errors.readings import Readings
 
 
@@ -30,7 +30,10 @@ def noisy(readings: Readings) -> Iterator[Fault]:
         name = "torn_words" if together > 2.0 and places.size >= 3 else "spikes"
         worst = float(np.nanmax(np.where(row, ratio[unit], 0.0)))
         yield Fault(
-            name, unit, places_of(places), f"scatter up to {worst:.0f} times the unit's own in {places.size} dwells"
+            name,
+            unit,
+            tuple(places.tolist()),
+            f"scatter up to {worst:.0f} times the unit's own in {places.size} dwells",
         )
 
 

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from inertial.data_errors.faults.fault import Fault, Look, places_of
+from inertial.data_errors.faults.fault import Fault, Look
 from inertial.data_errors.readings import Readings
 
 
@@ -18,7 +18,7 @@ def outliers(readings: Readings) -> Iterator[Fault]:
     for unit, row in enumerate(np.asarray(out)):
         places = np.flatnonzero(row)
         if 0 < places.size <= 0.1 * row.size:
-            yield Fault("spikes", unit, places_of(places), f"{places.size} dwells far from the others")
+            yield Fault("spikes", unit, tuple(places.tolist()), f"{places.size} dwells far from the others")
 
 
 LOOK = Look(outliers, ("spikes",), order=120)

@@ -81,11 +81,11 @@ def _coarse_step(readings: Readings, unit: int, axis: int) -> float | None:
 
 def _without_drivers(readings: Readings, unit: int, there: Flags, values: Array) -> Array:
     """Values of the dwells that are there, less their mean and what follows the temperature or the time."""
-    warm = readings.temperature if readings.temperature is not None else readings.chamber
-    drivers = [readings.time[unit], *([] if warm is None else [warm[unit]])]
     unit_ranges: list[Array] = []
-    for driver in reversed(drivers):
-        own = driver[there]
+    for driver in (readings.warm, readings.time):
+        if driver is None:
+            continue
+        own = driver[unit, there]
         if np.isfinite(own).all() and np.ptp(own) > 0.0:
             unit_ranges.append(2.0 * (own - own.min()) / np.ptp(own) - 1.0)
     powers = [own**k for k in range(1, _DEGREE + 1) for own in unit_ranges]

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from inertial.data_errors.faults.fault import Fault, Look, places_of
+from inertial.data_errors.faults.fault import Fault, Look
 from inertial.data_errors.readings import Array, Readings
 
 
@@ -23,7 +23,7 @@ def stale(readings: Readings) -> Iterator[Fault]:
         resolution = float(np.min(fine)) if fine.size else np.inf
         if moved > max(1.0, 3.0 * min(resolution, 1e9)) or (length > 0.15 * row.size and _noisy_steps(steps)):
             evidence = f"temperature stays at {row[start]:.3f} °C for {length} dwells"
-            yield Fault("stale_temperature", unit, places_of(np.arange(start, start + length)), evidence)
+            yield Fault("stale_temperature", unit, tuple(range(start, start + length)), evidence)
 
 
 def _noisy_steps(steps: Array) -> bool:

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from inertial.arrays import Places
-from inertial.data_errors.faults.fault import Fault, Look, places_of
+from inertial.data_errors.faults.fault import Fault, Look
 from inertial.data_errors.readings import Readings
 
 
@@ -15,14 +15,17 @@ def stuck(readings: Readings) -> Iterator[Fault]:
         still = _still(readings, unit)
         if still.size:
             evidence = f"an axis is constant in {still.size} dwells: it has no scatter, unlike in the others"
-            yield Fault("stuck_output", unit, places_of(still), evidence)
+            yield Fault("stuck_output", unit, tuple(still.tolist()), evidence)
             continue
         moved = np.linalg.norm(np.diff(readings.force[unit], axis=0), axis=-1) > 0.05
         same = (np.diff(out, axis=0) == 0.0).any(axis=-1) & moved
         if np.count_nonzero(same) >= 2:
             places = np.flatnonzero(same) + 1
             yield Fault(
-                "stuck_output", unit, places_of(places), f"output repeats exactly in {places.size} dwells of new poses"
+                "stuck_output",
+                unit,
+                tuple(places.tolist()),
+                f"output repeats exactly in {places.size} dwells of new poses",
             )
 
 

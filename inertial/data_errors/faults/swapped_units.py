@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from inertial.data_errors.faults.fault import Fault, Look
-from inertial.data_errors.readings import Readings
+from inertial.data_errors.readings import Readings, design
 
 _AWAY = 0.005
 """Distance, g, from its own calibration above which the output of a unit may be that of another."""
@@ -32,8 +32,7 @@ def swapped_units(readings: Readings) -> Iterator[Fault]:
 def _exchanges(readings: Readings, place: int) -> Iterator[tuple[int, int]]:
     """Pairs of units whose outputs at one dwell fit each other's calibration far better than their own."""
     there = np.flatnonzero(readings.there[:, place])
-    design = np.concatenate([np.ones((there.size, 1)), readings.force[there, place]], axis=-1)
-    predicted = np.einsum("vip,up->uvi", readings.fits[there], design)
+    predicted = np.einsum("vip,up->uvi", readings.fits[there], design(readings.force[there, place]))
     scale = readings.scale[there]
     distance = np.linalg.norm((readings.output[there, place][:, None] - predicted) / scale[:, None, None], axis=-1)
     own = np.diag(distance)

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from inertial.data_errors.faults.fault import Fault, Look, places_of
+from inertial.data_errors.faults.fault import Fault, Look
 from inertial.data_errors.readings import Readings
 
 ENDS_EARLY = 3
@@ -35,7 +35,7 @@ def truncated(readings: Readings) -> Iterator[Fault]:
             name = "dropped_samples"
         else:
             continue
-        yield Fault(name, unit, places_of(missing), f"{missing.size} of {row.size} dwells of the lot are missing")
+        yield Fault(name, unit, tuple(missing.tolist()), f"{missing.size} of {row.size} dwells of the lot are missing")
     if _cut_off(readings):
         evidence = "the record of temperature continues, and the last round of poses is incomplete"
         yield from (Fault("truncated_file", unit, (), evidence) for unit in range(len(there)))

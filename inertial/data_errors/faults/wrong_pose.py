@@ -6,7 +6,7 @@ import numpy as np
 
 from inertial.arrays import Places
 from inertial.data_errors.exchanged import PlainFit
-from inertial.data_errors.faults.fault import Fault, Look, places_of
+from inertial.data_errors.faults.fault import Fault, Look
 from inertial.data_errors.readings import Array, Readings
 
 _COMMON = 5.0
@@ -33,12 +33,12 @@ def wrong_poses(readings: Readings) -> Iterator[Fault]:
         if not turned.any():
             continue
         name, text = _which_pose(readings.force[unit], places[turned], felt[turned])
-        yield Fault(name, unit, places_of(places[turned]), text)
+        yield Fault(name, unit, tuple(places[turned].tolist()), text)
 
 
 def _exchanged(readings: Readings) -> Iterator[int]:
     """Units that have the readings of another one in a range of dwells."""
-    warm = readings.temperature if readings.temperature is not None else readings.chamber
+    warm = readings.warm
     theta = None if warm is None or not np.isfinite(warm[readings.there]).all() else warm
     output = readings.output
     fit = PlainFit(output, readings.force, theta, readings.there, lambda one, other: output[[other, one]])

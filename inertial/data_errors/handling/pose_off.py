@@ -18,8 +18,7 @@ class PoseOff(DirectionOff):
         """Every pose with more than one dwell; none if the directions are unknown."""
         if not pose_errors(lot.state).shape[-1]:
             return []
-        there = np.isfinite(lot.error).all(axis=-1).any(axis=0)
-        number, count = np.unique(poses(lot)[there], return_counts=True)
+        number, count = np.unique(poses(lot)[lot.measured], return_counts=True)
         several = number[count > 1]
         return [{"pose": float(k)} for k in several] if several.size > 3 * int(count.max() > 1) else []
 

@@ -21,8 +21,8 @@ class PosesExchanged(Handling):
     def places(self, lot: Lot) -> list[dict[str, float]]:
         """Each dwell whose successor has another pose."""
         step = np.linalg.norm(np.diff(common_force(lot), axis=-2), axis=-1).max(axis=0)
-        there = set(np.flatnonzero(np.isfinite(lot.error).all(axis=-1).any(axis=0)).tolist())
-        return [{"at": float(k)} for k in np.flatnonzero(step > _APART) if {k, k + 1} <= there]
+        both = lot.measured[:-1] & lot.measured[1:]
+        return [{"at": float(k)} for k in np.flatnonzero((step > _APART) & both)]
 
     def change(self, lot: Lot, slope: Array | None, **place: float) -> Array:
         first, force = int(place["at"]), common_force(lot)
@@ -39,25 +39,15 @@ class PosesExchanged(Handling):
 
     def mended(self, lot: Lot, size: Array, **place: float) -> Lot | None:
         first = int(place["at"])
-        state = lot.state
-        order = np.arange(state.time.shape[1])
+        order = np.arange(lot.state.time.shape[1])
         order[[first, first + 1]] = order[[first + 1, first]]
-
-        def turned(values: Array | None) -> Array | None:
-            return None if values is None else values[..., order]
-
-        return replace(
-            lot,
-            state=replace(
-                state,
-                force=state.force[..., order, :],
-                outer=turned(state.outer),
-                inner=turned(state.inner),
-                heading=turned(state.heading),
-                felt=None if state.felt is None else state.felt[..., order, :],
-                memory={},
-            ),
-        )
+        known = {name: getattr(lot.state, name) for name in ("outer", "inner", "heading", "force", "felt")}
+        turned = {
+            name: values[..., order, :] if name in {"force", "felt"} else values[..., order]
+            for name, values in known.items()
+            if values is not None
+        }
+        return replace(lot, state=replace(lot.state, **turned, memory={}))
 
     def dwells(self, lot: Lot, **place: float) -> list[int]:
         return [int(place["at"]), int(place["at"]) + 1]

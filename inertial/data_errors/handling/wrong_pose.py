@@ -15,8 +15,7 @@ class WrongPose(DirectionOff, OfOneDwell):
 
     def places(self, lot: Lot) -> list[dict[str, float]]:
         """Every dwell; none if the directions are unknown."""
-        there = np.flatnonzero(np.isfinite(lot.error).all(axis=-1).any(axis=0))
-        return [{"at": float(k)} for k in there] if pose_errors(lot.state).shape[-1] else []
+        return [{"at": float(k)} for k in np.flatnonzero(lot.measured)] if pose_errors(lot.state).shape[-1] else []
 
     def every_dwell(self, lot: Lot) -> Array:
         return pose_errors(lot.state)

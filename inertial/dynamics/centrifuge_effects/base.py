@@ -7,6 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from inertial.arrays import Array, Flags
+from inertial.dynamics.effect_modules import DynamicEffect
 
 
 @dataclass(frozen=True)
@@ -33,18 +34,10 @@ class Spins:
         )
 
 
-class CentrifugeEffect(ABC):
-    """A term of the output. Every module of this package defines one class.
+class CentrifugeEffect(DynamicEffect, ABC):
+    """A term of the output, with a coefficient in ``unit``. Every module of this package defines one class."""
 
-    id : name of the module · equation, source : text for reports · unit : of the coefficient
-    breaker : measurement that separates it from other effects
-    """
-
-    id: ClassVar[str]
-    equation: ClassVar[str]
-    source: ClassVar[str]
     unit: ClassVar[str]
-    breaker: ClassVar[str]
 
     @abstractmethod
     def column(self, points: Spins) -> Array:

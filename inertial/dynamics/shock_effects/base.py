@@ -7,23 +7,19 @@ import numpy as np
 from scipy.signal import cont2discrete, lfilter
 
 from inertial.arrays import Array
+from inertial.dynamics.effect_modules import DynamicEffect
 from inertial.dynamics.transfer_effects.base import Parameter
 
 
-class ShockEffect:
+class ShockEffect(DynamicEffect):
     """How the unit's waveform departs from that of the reference. Every module of this package defines one class.
 
     A waveform effect changes the reference's waveform; an added effect adds a waveform with a linear coefficient.
 
-    id : name of the module · equation, source : text for reports · breaker : measurement that separates it from other effects
     unit : of the coefficient, or of the first parameter
     """
 
-    id: ClassVar[str]
-    equation: ClassVar[str]
-    source: ClassVar[str]
     unit: ClassVar[str]
-    breaker: ClassVar[str]
 
     def parameters(self, duration_s: float) -> tuple[Parameter, ...]:
         """The nonlinear parameters, with bounds and starts that suit a pulse; none for an added effect."""

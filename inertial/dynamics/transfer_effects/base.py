@@ -8,6 +8,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from inertial.arrays import Array, Complex, Flags
+from inertial.dynamics.effect_modules import DynamicEffect
 
 
 class Parameter(NamedTuple):
@@ -61,18 +62,13 @@ class Conditions:
         return Conditions(self.frequency[rows], self.level[rows], self.temperature[rows], self.record_s[rows])
 
 
-class TransferEffect(ABC):
+class TransferEffect(DynamicEffect, ABC):
     """A factor of the transfer function, 1 where it does not act. Every module of this package defines one class.
 
-    id : of the module · equation, source : for people · breaker : the measurement that tells it from others
     in_every_device : a filter that a device has somewhere, if only far beyond the points: what the points say of the sensing
     element must hold beside it, too
     """
 
-    id: ClassVar[str]
-    equation: ClassVar[str]
-    source: ClassVar[str]
-    breaker: ClassVar[str]
     in_every_device: ClassVar[bool] = False
 
     @abstractmethod

@@ -12,7 +12,7 @@ import numpy as np
 from inertial.arrays import Array
 from inertial.distributions import normal_tail
 from inertial.state import ALL_AXES
-from inertial.uncertainty.deviation_law import DeviationLaw
+from inertial.uncertainty.degrees import DeviationLaw
 from pipelines.tables.calibration import Calibration
 from pipelines.tables.frames import UnitRows
 from schemas.recipe import Recipe

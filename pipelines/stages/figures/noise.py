@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from inertial.uncertainty.deviation_law import dof_of_upper
+from inertial.uncertainty.degrees import dof_of_upper
 from pipelines.stages.figures.base import FigureKind, UnitTables, Value
 from pipelines.stages.noise import B_BOUND, HOUR_S, TERM
 from pipelines.tables.frames import UnitRows

@@ -167,7 +167,8 @@ def test_a_power_order_reaches_the_recipe_the_minutes_and_the_words(tmp_path):
     place = state_after(job)
     plain = [SequenceStep(*UP, 25.0), SequenceStep(*UP, 25.0), SequenceStep(*DOWN, 25.0)]
     assert station_minutes(wanted, job, place) - station_minutes(plain, job, place) == pytest.approx(10.0, abs=0.02)
-    told = Proposal(("power",), tuple(wanted), ("warm_up", "aging_log"), ("warm_up", "aging_log"), 10.0, 1.0, 50.0, 1.0)
+    both = ("warm_up", "aging_log")
+    told = Proposal(1.0, 50.0, both, kinds=("power",), steps=tuple(wanted), pair=both, minutes=10.0, settled=1.0)
     assert what(run_of(), told) == "Switching the units off for 10 min: warm_up restarts, aging_log continues"
 
 

@@ -24,11 +24,11 @@ def test_a_curve_across_the_axes_has_the_shape_of_the_truth() -> None:
     run = run_of(world, SEED + 40)
     model = run.model()
     time = run.lot.state.time
-    suspect = next(s for s in wide_suspects(model.problem) if s.driver == "time_s" and s.ways == 2)
-    fit = fit_curve(model, suspect.driver, suspect.candidate, suspect.ways)
+    suspect = next(s for s in wide_suspects(model.problem) if s.name == "time_s" and s.ways == 2)
+    fit = fit_curve(model, suspect)
     # two sizes for each block; of the shape's columns those that the times of the soaks part
     assert 2 <= fit.rank - 2 * model.problem.blocks + 1 <= curve(time, 6).shape[-1]
-    bias_only = fit_curve(model, "time_s", next(s for s in wide_suspects(model.problem) if s.ways == 1).candidate)
+    bias_only = fit_curve(model, next(s for s in wide_suspects(model.problem) if s.ways == 1))
     assert fit.cost < bias_only.cost - 1000.0
     # with the truth itself as the only column the cost is the same, within the price of the shape
     course = np.exp(-time / 1500.0)[..., None]
@@ -83,7 +83,7 @@ def test_a_course_that_units_share_is_no_random_walk_and_walks_are_no_course() -
     model = lot_with(day)
     fit = curve_in_noise(model, suspects(model.problem))
     assert fit is not None
-    assert fit.driver in {"time_s", "since_power_s"}
+    assert fit.driver.name in {"time_s", "since_power_s"}
     floor = 1e-6 * make(World(units=4), SEED + 90).floor_ug
     assert fit.model.floor() == pytest.approx(floor, rel=0.15)
     assert model.floor() > 1.5 * floor

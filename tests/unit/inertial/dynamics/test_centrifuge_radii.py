@@ -4,9 +4,15 @@ import numpy as np
 import pytest
 from spun_centrifuge import RADIUS_ERROR, spins, spun
 
-from inertial.dynamics.centrifuge import TERMS, Polynomial, fit_polynomial, linearity_error, linearity_percent
+from inertial.dynamics.centrifuge import (
+    TERMS,
+    Polynomial,
+    fit_polynomial,
+    fit_radii,
+    linearity_error,
+    linearity_percent,
+)
 from inertial.dynamics.centrifuge_effects import Spins
-from inertial.dynamics.centrifuge_radii import fit_radii
 from inertial.errors import NotIdentified
 
 TRUE = {

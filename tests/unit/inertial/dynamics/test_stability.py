@@ -13,8 +13,7 @@ from inertial.dynamics.stability import (
     short_noise,
     stability,
 )
-from inertial.dynamics.wander import logarithmic_kernel, stated_error, variance_of_sum
-from inertial.dynamics.wandering_means import IdentifiedNoise
+from inertial.dynamics.wander import IdentifiedNoise, logarithmic_kernel, stated_error, variance_of_sum
 from inertial.dynamics.warm_up import entered
 from inertial.errors import NotIdentified
 from pipelines.stages.noise import bias_stability

@@ -1,28 +1,10 @@
-"""The sphere fit returns what went in, holds the bias under flicker, and refuses what cannot be determined."""
+"""The sphere fit returns what went in, and refuses what cannot be determined."""
 
-import independent_lots as lots
 import numpy as np
 import pytest
 
 from inertial.errors import NotIdentified
 from inertial.fits.ellipsoid import fit_ellipsoid
-
-
-def test_a_sphere_fit_holds_the_bias_under_flicker() -> None:
-    rng = np.random.default_rng(7_310_006)
-    held = plain = 0
-    for _ in range(10):
-        world = lots.world(rng, units=1, plan="fibonacci", checks=(), temperatures=(25.0,) * 3, flicker=30.0, day_s=0)
-        rows = world.dwells
-        output, time = rows[["out_x", "out_y", "out_z"]].to_numpy(), rows["time_s"].to_numpy()
-        for sphere in (
-            fit_ellipsoid(output, time=time, error=(rows["sd_x"] / np.sqrt(rows["n"])).to_numpy()),
-            fit_ellipsoid(output),
-        ):
-            inside = np.abs(1e6 * sphere.bias - world.record[0]) <= 2e6 * np.sqrt(np.diagonal(sphere.covariance)[:3])
-            held, plain = (held + int(inside.sum()), plain) if sphere.wander else (held, plain + int(inside.sum()))
-    assert held >= 26  # of 30
-    assert held >= plain
 
 
 def test_a_sphere_fit_refuses_what_cannot_be_determined(rng: np.random.Generator) -> None:
@@ -68,12 +50,3 @@ def test_the_sphere_fit_does_not_care_how_the_fixture_is_turned(rng: np.random.G
     noise = 0.01 * rng.normal(size=(30, 3))
     one, other = fit_ellipsoid(f @ K.T + BIAS + noise), fit_ellipsoid(-(f @ K.T + BIAS + noise) @ turn.T)
     assert float(one.rms) == pytest.approx(float(other.rms), rel=1e-6)
-
-
-def test_pulls_of_the_sphere_fit_are_standard_normal() -> None:
-    rng = np.random.default_rng(17)
-    f = np.broadcast_to(directions(rng, 40), (400, 40, 3))
-    fit = fit_ellipsoid(f @ K.T + BIAS + 0.05 * rng.normal(size=(400, 40, 3)))
-    pulls = (fit.bias - BIAS) / np.sqrt(np.diagonal(fit.covariance, axis1=-2, axis2=-1)[:, :3])
-    assert np.all(np.abs(pulls.mean(axis=0)) < 0.15)
-    assert np.all(np.abs(pulls.std(axis=0) - 1.0) < 0.1)

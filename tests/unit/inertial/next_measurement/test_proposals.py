@@ -83,6 +83,8 @@ def test_equal_steps_in_a_row_are_one_with_their_number_and_one_after_the_device
         ((STEP, STEP, replace(STEP, off=600.0), STEP, STEP), [2, 1, 2], [None, 600.0, None]),
     ):
         rivals_ = ("warm_up", "aging_log")
-        rows = rows_of(Proposal(("poses",), steps, rivals_, rivals_, 12.0, 1.0, 30.0, 1.0))
+        rows = rows_of(
+            Proposal(1.0, 30.0, rivals_, kinds=("poses",), steps=steps, pair=rivals_, minutes=12.0, settled=1.0)
+        )
         assert [row["repeats"] for row in rows] == repeats
         assert [row.get("off_s") for row in rows] == off

@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 from scipy.stats import norm
 
-from inertial.uncertainty.deviation_law import DeviationLaw, dof_of_upper
+from inertial.uncertainty.degrees import DeviationLaw, dof_of_upper
 from inertial.uncertainty.risk import lot_risk
 from pipelines.procedures.figures import FigureValue, worst
 from pipelines.stages.figures import UNITS
