@@ -182,6 +182,9 @@ AT_ROOM = (
 )
 """Changes of the small recipe: one soak at the temperature of the room, which a simulated station reaches at once."""
 
+BRIEF = (*AT_ROOM, ('poses = "nine"', 'poses = "six"'), ("static_record_s = 30.0", "static_record_s = 0.0"))
+"""Besides, the fewest records, for tests that a run is made, asked about or copied, whatever was measured."""
+
 
 def recipe_file(folder: Path, *changes: tuple[str, str], name: str = "small.toml") -> str:
     """Path of the small recipe in a folder, with pieces of its text replaced."""

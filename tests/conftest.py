@@ -18,6 +18,12 @@ for _name in ("COLUMNS", "LINES"):
     # workers of pytest-xdist have those of a terminal; the output of the tests goes into pipes
     os.environ.pop(_name, None)
 
+
+def fsync(fd: object) -> None:
+    """In place of ``os.fsync``: no test cuts the power, and a run waits for the disk some hundred times."""
+
+
+os.fsync = fsync
 pytest_plugins = ("left_open",)
 settings.register_profile("busy", deadline=None)  # other work on the machine decides how long a case takes
 settings.load_profile("busy")
