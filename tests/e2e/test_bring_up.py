@@ -208,10 +208,7 @@ def test_a_device_that_answers_late_is_read_and_said_to_be_slow():
     assert document["differs"] == 0
 
 
-STEPS = {
-    "oriental_az": ("MOVE", "STOP", "LINK"),
-    "watlow_f4t": ("SET", "OFF", "LINK"),
-}
+STEPS = {"oriental_az": ("MOVE", "STOP", "LINK"), "watlow_f4t": ("SET", "OFF", "LINK")}
 
 
 FIRST = (("cut", "oriental_az", "MOVE"), ("reboots", "watlow_f4t", "SET"), ("killed", "oriental_az", "LINK"))
