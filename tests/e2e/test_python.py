@@ -41,6 +41,7 @@ def lot() -> tl.Example:
     return tl.example("cubic_transfer", seed=5)
 
 
+@pytest.mark.usefixtures("no_next_measurement")
 def test_a_record_of_ones_own_from_reading_to_corrected_samples(turned: pd.DataFrame) -> None:
     run = tl.read(turned.drop(columns="turn"), units={"output": "g"})
     assert any("ax, ay, az" in line for line in run.told)
@@ -80,6 +81,7 @@ def test_the_answers_are_those_of_the_commands(lot: tl.Example, tmp_path: Path) 
     assert better.ladder["confirmed"].iloc[-1] is True or bool(better.ladder["confirmed"].iloc[-1])
 
 
+@pytest.mark.usefixtures("no_next_measurement")
 def test_objects_draw_themselves_and_export(turned: pd.DataFrame, tmp_path: Path) -> None:
     run = tl.read(turned.drop(columns="turn"), units={"output": "g"}, serial="SN7")
     fit = tl.fit(run)

@@ -87,6 +87,7 @@ def test_a_procedure_is_planned_measured_reported_and_says_what_it_lacks(recipe:
         )
 
 
+@pytest.mark.usefixtures("no_next_measurement")
 def test_the_quickest_recipe_passes_and_its_next_lines_can_be_pasted(tmp_path: Path) -> None:
     out, _ = went("run", QUICKEST, "--direct", "--archive", tmp_path)
     assert "4 of 4 passed" in out
