@@ -9,6 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from hypothesis import settings
+from once import begin, end
 from orchestrator import LOG, errors_in
 
 from inertial import effects
@@ -29,6 +30,12 @@ settings.register_profile("busy", deadline=None)  # other work on the machine de
 settings.load_profile("busy")
 
 FOLDERS = ("unit", "property", "contract", "reference", "faults", "e2e", "blind")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Begins a session of what is made once, before there are further processes, and ends it after them."""
+    if begin():
+        config.add_cleanup(end)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -89,7 +96,7 @@ def no_error_of_a_server(request: pytest.FixtureRequest) -> Iterator[None]:
 def no_next_measurement(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     """Diagnoses without proposed measurements, for tests of what is said of the measured ones: proposals are most of the time.
 
-    In the slow suites the document is whole, and so is that of every command and every blind run.
+    In the slow suites the document is whole, and so is that of every command and of the deals of hidden effects.
     """
     if request.node.get_closest_marker("slow") is None:
         monkeypatch.setattr("pipelines.diagnosis.diagnose.proposed", lambda _: SimpleNamespace(rows=list))

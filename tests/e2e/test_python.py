@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from demonstrations import demonstrations_measured_once
 from in_process import document_of
 
 import tumbleline as tl
@@ -38,7 +39,9 @@ def turned() -> pd.DataFrame:
 @pytest.fixture(scope="module")
 def lot() -> tl.Example:
     """What the demonstration measures with a cubic transfer hidden."""
-    return tl.example("cubic_transfer", seed=5)
+    with pytest.MonkeyPatch.context() as patch:
+        demonstrations_measured_once(patch)
+        return tl.example("cubic_transfer", seed=7)
 
 
 @pytest.mark.usefixtures("no_next_measurement")
