@@ -1,10 +1,8 @@
-"""The workbench on unusual archives: findings of an audit, 500 units, broken runs, scripts in every name, and an empty one."""
+"""The workbench on an unusual archive in a browser: findings of an audit, 500 units, and scripts in every name."""
 
 import csv
 import io
-import shutil
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 from urllib.parse import urlencode
 
@@ -12,7 +10,7 @@ import pytest
 from browser import Served, Tab, served, tab, until
 from unusual_archives import LONG, MANY, MARKUP, SCRIPT, unusual_archive
 
-# without a browser: tests/unit/pipelines/workbench/test_unusual_archives.py
+# without a browser, and broken runs: tests/unit/pipelines/workbench/test_unusual_archives.py
 pytestmark = pytest.mark.slow
 
 
@@ -102,24 +100,6 @@ def test_five_hundred_units_are_listed_found_and_paged(bench: Served, browser: A
         assert one.errors == []
 
 
-def test_a_broken_run_is_said_in_a_sentence_and_the_others_are_shown(bench: Served, browser: Any) -> None:
-    with tab(browser, bench.address) as one:
-        one.open("/units")
-        assert one.page.locator("[aria-label=Calibrations] tbody tr").count() == 50
-        for number in (2, 3, 4):
-            for path in ("/run", "/unit", "/station"):
-                answer = one.page.request.get(
-                    f"{bench.address}{path}?run=broken-{number}", headers={"accept": "text/html"}
-                )
-                assert answer.status in {200, 422}, (path, number, answer.text()[:2000])
-                assert "defect of the program" not in answer.text(), (path, number)
-            answer = one.page.request.get(
-                f"{bench.address}/missing?source=broken-{number}", headers={"accept": "text/html"}
-            )
-            assert answer.status in {200, 422}
-            assert "defect of the program" not in answer.text()
-
-
 def test_no_script_in_any_name_runs(bench: Served, browser: Any) -> None:
     run = run_of(bench, "named-")
     pages = [
@@ -139,16 +119,3 @@ def test_no_script_in_any_name_runs(bench: Served, browser: Any) -> None:
             assert one.page.evaluate("() => window.ran") is None, path
             assert one.page.locator("main img, main script").count() == 0, path
         assert one.outside == []
-
-
-def test_an_empty_archive_says_on_every_page_what_to_do(tmp_path: Path, browser: Any) -> None:
-    pages = {
-        "/units": "Measure a lot", "/missing": "Choose a source", "/models": "No model file yet", "/upload": "Drop a file",
-        "/operator": "Scan each unit", "/station": "Measure a lot", "/audit": "Measure a lot", "/run": "tumbleline run",
-    }  # fmt: skip
-    with served(tmp_path / "archive", tmp_path / "bench") as server, tab(browser, server.address) as one:
-        for path, words in pages.items():
-            one.page.goto(server.address + path)
-            until(lambda words=words: words in main_text(one), f"{path} says '{words}'")
-        assert one.outside == []
-    shutil.rmtree(tmp_path / "bench", ignore_errors=True)
