@@ -96,7 +96,7 @@ def no_error_of_a_server(request: pytest.FixtureRequest) -> Iterator[None]:
 def no_next_measurement(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     """Diagnoses without proposed measurements, for tests of what is said of the measured ones: proposals are most of the time.
 
-    In the slow suites the document is whole, and so is that of every command.
+    In the slow suites the document is whole, and so is that of every command and every blind run.
     """
     if request.node.get_closest_marker("slow") is None:
         monkeypatch.setattr("pipelines.diagnosis.diagnose.proposed", lambda _: SimpleNamespace(rows=list))

@@ -48,7 +48,6 @@ def figures(deal: dict[str, int]) -> tuple[dict[str, float], list[Score]]:
     return {row["figure"]: row["value"] for row in rows}, scores
 
 
-@pytest.mark.usefixtures("no_next_measurement")
 def test_names_what_hides_and_nothing_where_nothing_hides():
     shares, scores = figures(SMALL)
     missed = [(s.scenario, s.truth, s.named) for s in scores if s.exact is False]

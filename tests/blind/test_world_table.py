@@ -54,7 +54,6 @@ def marks(row: Row) -> list[pytest.MarkDecorator]:
     return slow + ([pytest.mark.xfail(strict=True, reason=row.not_reached)] if row.not_reached else [])
 
 
-@pytest.mark.usefixtures("no_next_measurement")
 @pytest.mark.parametrize("row", [pytest.param(r, id=str(r), marks=marks(r)) for r in ROWS])
 def test_a_world_gets_its_verdict(row: Row) -> None:
     lot = made(row.world, row.seed)
