@@ -1,15 +1,15 @@
 """A capture without a station: physics of a lot in a few lines, deterministic per record, with faults on request."""
 
-import os
 import shutil
-import tempfile
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import cache
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
+from once import once
 from root_process import ROOT
 
 from inertial.frames import force_from_angles
@@ -182,6 +182,9 @@ AT_ROOM = (
 )
 """Changes of the small recipe: one soak at the temperature of the room, which a simulated station reaches at once."""
 
+BRIEF = (*AT_ROOM, ('poses = "nine"', 'poses = "six"'), ("static_record_s = 30.0", "static_record_s = 0.0"))
+"""Besides, the fewest records, for tests that a run is made, asked about or copied, whatever was measured."""
+
 
 def recipe_file(folder: Path, *changes: tuple[str, str], name: str = "small.toml") -> str:
     """Path of the small recipe in a folder, with pieces of its text replaced."""
@@ -203,51 +206,35 @@ def small_job(folder: Path, *changes: tuple[str, str], **request: Any) -> Job:
 def small_run(folder: Path, faults: dict[str, str] | None = None, *changes: tuple[str, str]) -> Run:
     """A run of the small recipe in an archive of its own, done but for its report.
 
-    Each kind is made once per process and copied afterwards, which is ten times faster. A folder that has an archive already,
-    or a test with a signing key, gets a run that is made there.
+    Each kind is made once and copied afterwards, which is ten times faster. A folder that has an archive already, or a test
+    with a signing key, gets a run that is made there.
     """
-    faults, root = faults or {}, folder / "archive"
-    if root.exists() or key_place() is not None:
-        return _made(folder, faults, changes)
-    recipe_file(folder, *changes)  # it stands beside the archive
-    run = _kept(tuple(sorted(faults.items())), changes)
-    shutil.copytree(str(run.archive.root), root)
-    return Archive(root).run(run.id)
+    return _copied("run", folder, lambda place: _made(place, faults or {}, changes), faults or {}, changes)
 
 
 def finished_run(folder: Path, *changes: tuple[str, str]) -> Run:
-    """A run of the small recipe in an archive of its own, with its report; made once per process like the small run."""
+    """A run of the small recipe in an archive of its own, with its report; made once like the small run."""
+    return _copied("finished", folder, lambda place: _reported(place, changes), {}, changes)
+
+
+def _copied(
+    kind: str, folder: Path, make: Callable[[Path], Run], faults: dict[str, str], changes: tuple[tuple[str, str], ...]
+) -> Run:
+    """A copy of the run that ``make`` gives for another folder, once; or what it gives for this one."""
     root = folder / "archive"
     if root.exists() or key_place() is not None:
-        return _reported(folder, changes)
-    recipe_file(folder, *changes)
-    run = _kept_report(changes)
-    shutil.copytree(str(run.archive.root), root)
-    return Archive(root).run(run.id)
-
-
-@cache
-def _kept_report(changes: tuple[tuple[str, str], ...]) -> Run:
-    """The finished run that others of its kind are copies of."""
-    return _reported(Path(tempfile.mkdtemp(prefix="finished-", dir=_kept_folder().name)), changes)
+        return make(folder)
+    recipe_file(folder, *changes)  # it stands beside the archive
+    which = sha256(repr((sorted(faults.items()), changes)).encode()).hexdigest()[:16]
+    kept, run = once(f"{kind}-{which}", lambda place: (place / "archive", make(place).id))
+    shutil.copytree(kept, root)
+    return Archive(root).run(run)
 
 
 def _reported(folder: Path, changes: tuple[tuple[str, str], ...]) -> Run:
     run = small_run(folder, None, *changes)
     Runner(small_job(folder, *changes), Archive(folder / "archive"), measure=CaptureDouble()).stage(ORDER[-1])
     return run
-
-
-@cache
-def _kept(faults: tuple[tuple[str, str], ...], changes: tuple[tuple[str, str], ...]) -> Run:
-    """The run that others of its kind are copies of."""
-    return _made(Path(tempfile.mkdtemp(prefix="run-", dir=_kept_folder().name)), dict(faults), changes)
-
-
-@cache
-def _kept_folder() -> tempfile.TemporaryDirectory[str]:
-    """A folder that lasts as long as this process."""
-    return tempfile.TemporaryDirectory(prefix=f"tumbleline-{os.getpid()}-", ignore_cleanup_errors=True)
 
 
 def measured_run(job: Job, archive: Archive, measure: Any) -> Run:

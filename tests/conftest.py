@@ -9,6 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from hypothesis import settings
+from once import begin, end
 from orchestrator import LOG, errors_in
 
 from inertial import effects
@@ -18,11 +19,23 @@ for _name in ("COLUMNS", "LINES"):
     # workers of pytest-xdist have those of a terminal; the output of the tests goes into pipes
     os.environ.pop(_name, None)
 
+
+def fsync(fd: object) -> None:
+    """In place of ``os.fsync``: no test cuts the power, and a run waits for the disk some hundred times."""
+
+
+os.fsync = fsync
 pytest_plugins = ("left_open",)
 settings.register_profile("busy", deadline=None)  # other work on the machine decides how long a case takes
 settings.load_profile("busy")
 
 FOLDERS = ("unit", "property", "contract", "reference", "faults", "e2e", "blind")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Begins a session of what is made once, before there are further processes, and ends it after them."""
+    if begin():
+        config.add_cleanup(end)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -48,6 +48,11 @@ class Case:
     def kind(self) -> str:
         return parse_fault(self.fault).kind
 
+    @property
+    def of_the_second_soak(self) -> bool:
+        """Whether the fault begins, or shows, no earlier than in the second soak."""
+        return parse_fault(self.fault).at_s >= SOAKING or any(name in self.fault for name in SLOW_TO_SHOW)
+
 
 @dataclass
 class CaseResult:
@@ -139,6 +144,9 @@ WITHIN, MOVING, SOAKING, LATE = (
     900.0,
     1500.0,
 )  # s: in the third dwell, in the move after it, in the second soak, later
+SLOW_TO_SHOW = ("chamber_unsettled", "chamber_overshoot", "frozen_temperature")
+"""Faults that a soak shows alone."""
+
 CASES: tuple[Case, ...] = (
     # the wire
     Case(f"time_out:at_s={WITHIN}", RECOVERED),

@@ -17,6 +17,7 @@ from http import HTTPStatus
 from pathlib import Path
 from typing import Any
 
+import pytest
 from root_process import ROOT
 
 from pipelines.orchestrator.settings import CLIENT_KEY, SERVER_KEY, new_key
@@ -130,6 +131,18 @@ def served(home: Path, *, faultless: bool = True, log_name: str = LOG, **setting
         process.terminate()
         process.wait(60)
     assert not (faultless and errors_in(home / log_name)), errors_in(home / log_name)
+
+
+@contextmanager
+def client_of(server: Orchestrator) -> Iterator[None]:
+    """This process as a client of a server."""
+    from prefect.settings import temporary_settings
+
+    own = {name: server.environment[name] for name in ("PREFECT_API_URL", CLIENT_KEY, "PREFECT_HOME")}
+    with pytest.MonkeyPatch.context() as patch, temporary_settings(updates=own):
+        for name, value in own.items():
+            patch.setenv(name, value)
+        yield
 
 
 def _answers(orchestrator: Orchestrator, process: subprocess.Popen[bytes]) -> bool:

@@ -15,12 +15,7 @@ from stations.codec import encode
 from stations.opening import make_plant, open_station
 from stations.plant.plant import Plant
 
-QUIET = {
-    "noise_density_ug": 0.0,
-    "bias_instability_ug": 0.0,
-    "rate_random_walk_ug": 0.0,
-    "thermometer_noise_K": 0.0,
-}
+QUIET = {"noise_density_ug": 0.0, "bias_instability_ug": 0.0, "rate_random_walk_ug": 0.0, "thermometer_noise_K": 0.0}
 
 
 def lot_of(units: int = 3, device: str = "ADXL355", seed: int = 5, repeat: int = 0) -> Lot:

@@ -256,11 +256,7 @@ def rows_of_physics() -> Iterator[Row]:
     # a humidity that wanders slowly, with an effect that saturates: a curve of time follows it nearly as well
     for index in (0, 2):
         yield Row(
-            Case("covariate_curve", index),
-            8080,
-            "humidity",
-            physics=True,
-            unexplained=frozenset({"humidity_pct"}),
+            Case("covariate_curve", index), 8080, "humidity", physics=True, unexplained=frozenset({"humidity_pct"})
         )
     # groups of neighbouring temperatures are of unequal size on a ramp
     for name in ("ramps_B300", "ramps_K4"):

@@ -93,9 +93,7 @@ def test_a_link_that_leads_nowhere_stops_the_build(tmp_path: Path, monkeypatch: 
     linked = build_site._linked
     wrong = {"docs/decisions/README.md": f"\n{link}\n"}
     monkeypatch.setattr(
-        build_site,
-        "_linked",
-        lambda page, folder: linked(page, folder) + wrong.get(str(page.relative_to(ROOT)), ""),
+        build_site, "_linked", lambda page, folder: linked(page, folder) + wrong.get(str(page.relative_to(ROOT)), "")
     )
     monkeypatch.setattr(build_site, "modules", lambda: ["inertial.frames"])
     assert build_site.build(tmp_path) != 0

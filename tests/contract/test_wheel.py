@@ -90,6 +90,7 @@ def test_the_source_distribution_holds_what_the_wheel_was_built_from(built: tupl
     assert not [name for name in held if name.startswith((".venv", "tests", "archive/"))]
 
 
+@pytest.mark.slow  # that the wheel has these files: the test of every tracked file
 def test_every_file_that_is_used_by_name_is_read_from_the_wheel(unpacked: Path, tmp_path: Path) -> None:
     pipes = {"env": own_environment(PYTHONPATH=str(unpacked)), "capture_output": True, "text": True}
     done = subprocess.run([sys.executable, "-c", LOADS], cwd=tmp_path, check=False, **pipes)

@@ -303,19 +303,12 @@ def test_the_weekly_audit_leaves_its_findings_as_artifacts(tmp_path):
     assert "<svg" in (folder / "audit-2023-12-31.html").read_text(encoding="utf-8")
 
 
-def test_validity_is_looked_up_without_a_table_library(copy):
+def test_the_calibration_of_a_day_has_the_coefficients_of_its_run(copy):
     archive = Archive(copy)
     info = archive.runs()[0]
     unit = info.units[0]
     write_ledger(copy, [(unit, info.device, info.id, "line-1", info.started[:10])])
-    code = (
-        "import sys; from pipelines.cli import main; sys.argv = ['tumbleline', *sys.argv[1:]]\n"
-        "try:\n    main()\nexcept SystemExit as left:\n    print(left.code or 0, 'pandas' in sys.modules, file=sys.stderr)"
-    )
-    words = ["show", unit, "--at", info.started[:10], "--archive", str(copy), "--json"]
-    done = subprocess.run([sys.executable, "-c", code, *words], cwd=ROOT, capture_output=True, text=True, check=False)
-    assert done.stderr.split() == ["0", "False"]
-    shown = json.loads(done.stdout)
+    shown = document_of("show", unit, "--at", info.started[:10], "--archive", copy, status=0)
     assert shown["calibration"]["run"] == info.id
     rows = archive.run(info.id).table("coefficients")
     own = rows[rows["unit"] == unit]

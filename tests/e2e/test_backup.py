@@ -8,7 +8,7 @@ from contextlib import closing
 from pathlib import Path
 
 import pytest
-from capture_double import CaptureDouble, small_job
+from capture_double import BRIEF, CaptureDouble, small_job
 from each import each
 from in_process import document_of, given, text_of
 
@@ -23,7 +23,7 @@ from schemas.errors import ArchiveUnusable, WrongUse
 
 def measure(folder: Path, seed: int, stop: str = "") -> Runner:
     """A run of another lot in the archive of a folder, up to a stage or complete."""
-    runner = Runner(small_job(folder, seed=seed), Archive(folder / "archive"), measure=CaptureDouble())
+    runner = Runner(small_job(folder, *BRIEF, seed=seed), Archive(folder / "archive"), measure=CaptureDouble())
     for stage in ORDER[: ORDER.index(stop)] if stop else ORDER[:-1]:
         runner.stage(stage)
     if not stop:

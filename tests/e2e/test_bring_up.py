@@ -1,6 +1,7 @@
 """The first hour with a device: every family passes, wrong profiles are named, and whatever happens leaves a safe device."""
 
 import contextlib
+import io
 import json
 import os
 import signal
@@ -13,6 +14,7 @@ from pathlib import Path
 import pytest
 from brought_up import FAMILIES, Middle, Scripted, brought_up, id_of, served_device, verdicts
 from each import each
+from in_process import given
 from modbus_devices import VALUES, libmodbus_server, pymodbus_server, words_of
 
 from pipelines.commissioning.conformance import document_of, read_conformance
@@ -209,10 +211,7 @@ def test_a_device_that_answers_late_is_read_and_said_to_be_slow():
     assert document["differs"] == 0
 
 
-STEPS = {
-    "oriental_az": ("MOVE", "STOP", "LINK"),
-    "watlow_f4t": ("SET", "OFF", "LINK"),
-}
+STEPS = {"oriental_az": ("MOVE", "STOP", "LINK"), "watlow_f4t": ("SET", "OFF", "LINK")}
 
 
 FIRST = (("cut", "oriental_az", "MOVE"), ("reboots", "watlow_f4t", "SET"), ("killed", "oriental_az", "LINK"))
@@ -317,12 +316,21 @@ def test_a_kill_in_any_step_leaves_a_safe_device_and_a_whole_recording(what, nam
     assert len(recording.exchanges) > 10
 
 
-def test_the_command_writes_page_document_and_recording(tmp_path):
+def test_the_command_writes_page_document_and_recording(tmp_path, monkeypatch):
     name = "watlow_f4t"
+    monkeypatch.setattr(sys, "stdin", io.StringIO("23\n23\nsimulator\n"))
     with served_device(name) as (port, _):
-        process = started(name, port, tmp_path, ["23", "23"], "--readings", "--by", "A. Person", "--json")
-        out, errors = process.communicate("simulator\n", timeout=60)
-    assert process.returncode == 0, errors
+        words = (
+            "station",
+            "bring-up",
+            name,
+            "--link",
+            f"tcp://127.0.0.1:{port}",
+            "--device-id",
+            id_of(load_profile(name)),
+        )
+        status, out, errors = given(*words, "--out", "out", "--readings", "--by", "A. Person", "--json")
+    assert status == 0, errors
     document = json.loads(out)
     assert document == json_value(read_conformance(tmp_path / "out" / "conformance.json"))
     assert (document["verified_on"], document["by"], document["complete"]) == ("simulator", "A. Person", True)

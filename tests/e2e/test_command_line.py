@@ -135,12 +135,11 @@ def process_of(*words: str, change: str = "", **variables: str) -> tuple[set[str
 
 def test_help_loads_nothing_heavy_and_a_command_what_it_needs_on_one_thread(archive: Path) -> None:
     assert not process_of("--help")[0] & HEAVY
-    loaded, pools = process_of("plan", "production", "--json")
-    assert ("numpy" in loaded, pools) == (True, {1})
     # diagnose shows its first line before it loads what only the diagnosis needs
-    loaded, _ = process_of("diagnose", "latest", "--archive", str(archive), change=FIRST_LINE)
-    assert "pandas" in loaded
+    loaded, pools = process_of("diagnose", "latest", "--archive", str(archive), change=FIRST_LINE)
+    assert loaded >= {"numpy", "pandas"}
     assert not loaded & LATER
+    assert pools == {1}
 
 
 @pytest.mark.skipif((os.cpu_count() or 1) < 2, reason="BLAS takes no second thread on one processor")

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 from brought_up import Middle, Scripted, brought_up, served_device
-from capture_double import AT_ROOM, recipe_file
+from capture_double import BRIEF, recipe_file
 from each import each
 from in_process import command
 
@@ -48,7 +48,7 @@ def made(recipe, archive, *more):
     return Archive(archive).run("latest"), done
 
 
-QUICK = (*AT_ROOM, ('units = ["A1", "A2", "A3"]', 'units = ["A1"]'))
+QUICK = (*BRIEF, ('units = ["A1", "A2", "A3"]', 'units = ["A1"]'))
 
 
 @pytest.fixture(scope="module")

@@ -12,6 +12,7 @@ import pandas as pd
 import printed_pages as pages
 import pytest
 from capture_double import finished_run, small_run
+from demonstrations import demonstrations_measured_once
 from in_process import given
 
 from benchmarks.generated_archive import write_archive
@@ -152,6 +153,7 @@ def test_the_commands_of_a_guide_print_what_it_says(
     guide: Guide, home: Path, monkeypatch: pytest.MonkeyPatch, no_next_measurement: None
 ) -> None:
     monkeypatch.setenv("TUMBLELINE_ARCHIVE", "archive")
+    demonstrations_measured_once(monkeypatch)
     guide.prepare(guide.page)
     examples = [one for one in pages.examples(guide.page) if one[0].split()[1] not in guide.left_out]
     assert examples

@@ -21,6 +21,8 @@ from inertial.quantities import OUTPUT_COLUMNS, SPREAD_COLUMNS
 from pipelines.archive import Archive
 from schemas.errors import DONE
 
+pytestmark = pytest.mark.usefixtures("no_next_measurement")
+
 COLUMNS = "time=time_s,x=out_x,y=out_y,z=out_z"
 DWELLS = f"{COLUMNS},sd_x=sd_x,sd_y=sd_y,sd_z=sd_z,n=n,duration=duration_s"
 PLAIN = "bias,scale,misalignment"

@@ -14,6 +14,8 @@ from schemas.errors import DataRejected, TumblelineError, WrongUse
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "contract"))
 import test_readers as samples
 
+pytestmark = pytest.mark.usefixtures("no_next_measurement")
+
 NEW = ("spreadsheet", "ulog", "dataflash", "mcap", "rosbag", "mdf4", "miniseed")
 FACES = 9.81 * np.array([[0, 0, 1], [0, 0, -1], [1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]])
 IMU = """\

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import printed_pages as pages
 import pytest
+from demonstrations import demonstration, demonstrations_measured_once
 from each import each
 from in_process import document_of, given, refused, text_of
 from root_process import ROOT
@@ -14,7 +15,7 @@ from root_process import ROOT
 from benchmarks.truth import Spec, make_run
 from deploy.release import unpack
 from pipelines.cli import terminal
-from pipelines.demo.measure import DemoLot, measure
+from pipelines.demo.measure import DemoLot
 from pipelines.demo.scenes import scene
 from pipelines.jobs.model_files import read_model, versions
 
@@ -49,6 +50,7 @@ def improved(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     folder = tmp_path_factory.mktemp("demo")
     demo, improve = (command.split()[1:] for command, _ in pages.examples(PAGE)[:2])
     with pytest.MonkeyPatch.context() as patch:
+        demonstrations_measured_once(patch)
         patch.chdir(folder)
         for words in (demo, improve):
             status, out, err = given(*words, columns=80)
@@ -205,7 +207,7 @@ def test_a_run_of_an_archive_is_improved_and_its_next_line_names_the_archive(
 @pytest.fixture(scope="module")
 def measured_game() -> DemoLot:
     """What the demonstration measures with a cubic transfer hidden."""
-    return measure(scene("cubic_transfer", 7), 7)
+    return demonstration(scene("cubic_transfer", 7), 7)
 
 
 def test_the_demonstration_finds_what_it_hid_and_a_player_may_add_something_else(

@@ -171,10 +171,7 @@ def test_its_report_speaks_of_its_axis(measured) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "figures", "effect"),
-    [
-        ("cubic_transfer", "hardening = 400e-6", "third_order"),
-        ("warm_up", "size = 0.0009, tau = 1500.0", "warm_up"),
-    ],
+    [("cubic_transfer", "hardening = 400e-6", "third_order"), ("warm_up", "size = 0.0009, tau = 1500.0", "warm_up")],
 )
 def test_what_one_axis_hides_is_named(kind: str, figures: str, effect: str, tmp_path: Path) -> None:
     awry = (DEPLOY / "stations" / "simulated-awry.toml").read_text(encoding="utf-8")

@@ -7,7 +7,7 @@ import time
 from pathlib import Path
 
 import pytest
-from capture_double import AT_ROOM, CaptureDouble, recipe_file, small_job
+from capture_double import BRIEF, CaptureDouble, recipe_file, small_job
 from in_process import given, typed_document
 from root_process import ROOT
 
@@ -33,7 +33,7 @@ class Told:
 
 
 def attended(folder: Path, operator: Told, measure: object = None, fault: FaultOrder | None = None) -> None:
-    job = small_job(folder)
+    job = small_job(folder, *BRIEF)
     if fault is not None:
         job = type(job)(job.recipe, job.limits, job.lot, with_faults(job.station, [fault]))
     runner = Runner(job, Archive(folder / "archive"), measure=measure or CaptureDouble())
@@ -44,27 +44,21 @@ def attended(folder: Path, operator: Told, measure: object = None, fault: FaultO
     beside.unload(runner.run)
 
 
-def test_units_are_asked_for_before_and_after_and_not_again_when_a_run_goes_on(tmp_path: Path) -> None:
+def test_units_are_asked_for_before_and_after_with_results_and_not_again_when_a_run_goes_on(tmp_path: Path) -> None:
     first, again = Told(), Told()
-    attended(tmp_path, first)
-    assert [prompt.kind for prompt in first.asked] == ["load", "unload"]
-    assert first.asked[0].slots == ((0, "A1"), (1, "A2"), (2, "A3"))
-    assert [slot for slot, _ in first.asked[1].slots] == [0, 1, 2]
-    attended(tmp_path, again)
-    assert not again.asked
-
-
-def test_results_are_shown_slot_by_slot_before_the_units_are_taken_out(tmp_path: Path) -> None:
-    operator = Told()
-    attended(tmp_path, operator, CaptureDouble({"A2": "stuck"}))
-    unload = operator.asked[-1]
-    assert unload.kind == "unload"
+    attended(tmp_path, first, CaptureDouble({"A2": "stuck"}))
+    load, unload = first.asked
+    assert (load.kind, unload.kind) == ("load", "unload")
+    assert load.slots == ((0, "A1"), (1, "A2"), (2, "A3"))
     results = dict(unload.slots)
+    assert [*results] == [0, 1, 2]
     assert results[0].split("  ")[0] == "A1"
     assert results[1].startswith("A2  refused: ")
     assert all(results[slot].split("  ")[1].split(",")[0].split(":")[0] in {"pass", "fail"} for slot in (0, 2))
     passed = sum("  pass" in text for text in results.values())
     assert unload.text.startswith(f"{passed} of 3 units passed")
+    attended(tmp_path, again)
+    assert not again.asked
 
 
 def test_a_run_that_lost_its_lease_ends_though_somebody_is_beside_it(tmp_path: Path) -> None:
@@ -104,7 +98,7 @@ def test_trouble_is_asked_about_and_the_run_goes_on_behind_its_last_record(tmp_p
 
 
 def run_at_a_terminal(folder: Path, typed: str, *options: str) -> tuple[int, str, str]:
-    words = ("run", recipe_file(folder, *AT_ROOM), "--direct", "--prompts", "--archive", folder / "archive")
+    words = ("run", recipe_file(folder, *BRIEF), "--direct", "--prompts", "--archive", folder / "archive")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(sys, "stdin", io.StringIO(typed))
         return given(*words, *options)

@@ -18,11 +18,14 @@ import pytest
 import websockets
 from each import each
 from in_process import refused
-from orchestrator import Orchestrator, served
-from root_process import ROOT, python
+from orchestrator import Orchestrator, client_of, served
+from root_process import ROOT
 
 from pipelines.doctor.orchestrator import orchestrator_checks
+from pipelines.flows.deploy import register
 from pipelines.orchestrator.archive_address import REFUSED
+from pipelines.orchestrator.dead_runs import close_dead_runs_of_queue
+from pipelines.orchestrator.queue_rules import apply_rules
 from pipelines.orchestrator.settings import check_server
 from pipelines.serving.connections import MOST
 from schemas.errors import LinkLost
@@ -36,9 +39,10 @@ DEPLOYMENTS += ["discover_in_archive/nightly-discover"]
 def line(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Orchestrator]:
     """One server for the tests of this file, with the deployments of the product."""
     home = tmp_path_factory.mktemp("orchestrator")
-    with served(home, PREFECT_UI_STATIC_DIRECTORY=str(home / "ui")) as server:
-        names = python(server.environment, "-m", "pipelines.flows.deploy", "deploy/prefect.yaml").split()
-        assert names == DEPLOYMENTS
+    few = {f"PREFECT_SERVER_SERVICES_SCHEDULER_{name}_RUNS": "1" for name in ("MIN", "MAX")}  # else some hundred
+    with served(home, PREFECT_UI_STATIC_DIRECTORY=str(home / "ui"), **few) as server:
+        with client_of(server):
+            assert register(ROOT / "deploy" / "prefect.yaml") == DEPLOYMENTS
         yield server
 
 
@@ -134,14 +138,6 @@ def test_deployments_have_their_queue_and_are_found_by_their_module(line: Orches
     assert {one["job_variables"]["working_dir"] for one in deployments} == {str(ROOT)}
 
 
-CLOSING = """
-import json
-from pipelines.orchestrator.dead_runs import close_dead_runs_of_queue
-from pipelines.orchestrator.queue_rules import apply_rules
-print(json.dumps([close_dead_runs_of_queue("line", "line-1", "line-1 on here"), apply_rules("line", "line-1")]))
-"""
-
-
 def test_runs_whose_process_is_gone_are_closed_and_others_left_alone(line: Orchestrator) -> None:
     _, deployment = line.ask("/api/deployments/name/calibrate_lot/on-demand")
     _, elsewhere = line.ask("/api/deployments/name/audit_archive/weekly-audit")
@@ -172,7 +168,8 @@ def test_runs_whose_process_is_gone_are_closed_and_others_left_alone(line: Orche
     environment = {**os.environ, "PREFECT__FLOW_RUN_ID": alive}
     with subprocess.Popen(["sleep", "600"], env=environment) as process:
         line.ask(f"/api/flow_runs/{alive}", {"infrastructure_pid": str(process.pid)}, "PATCH")
-        closed, missed = json.loads(python(line.environment, "-c", CLOSING))
+        with client_of(line):
+            closed, missed = close_dead_runs_of_queue("line", "line-1", "line-1 on here"), apply_rules("line", "line-1")
         process.kill()
     assert sorted(closed) == ["another-process", "never-began", "of-this-worker", "power-cut", "waits-without-process"]
     assert missed == []

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from demonstrations import demonstrations_measured_once
 from in_process import document_of
 
 import tumbleline as tl
@@ -38,9 +39,12 @@ def turned() -> pd.DataFrame:
 @pytest.fixture(scope="module")
 def lot() -> tl.Example:
     """What the demonstration measures with a cubic transfer hidden."""
-    return tl.example("cubic_transfer", seed=5)
+    with pytest.MonkeyPatch.context() as patch:
+        demonstrations_measured_once(patch)
+        return tl.example("cubic_transfer", seed=7)
 
 
+@pytest.mark.usefixtures("no_next_measurement")
 def test_a_record_of_ones_own_from_reading_to_corrected_samples(turned: pd.DataFrame) -> None:
     run = tl.read(turned.drop(columns="turn"), units={"output": "g"})
     assert any("ax, ay, az" in line for line in run.told)
@@ -80,6 +84,7 @@ def test_the_answers_are_those_of_the_commands(lot: tl.Example, tmp_path: Path) 
     assert better.ladder["confirmed"].iloc[-1] is True or bool(better.ladder["confirmed"].iloc[-1])
 
 
+@pytest.mark.usefixtures("no_next_measurement")
 def test_objects_draw_themselves_and_export(turned: pd.DataFrame, tmp_path: Path) -> None:
     run = tl.read(turned.drop(columns="turn"), units={"output": "g"}, serial="SN7")
     fit = tl.fit(run)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 import yaml
-from orchestrator import Orchestrator, served
+from orchestrator import Orchestrator, client_of, served
 from root_process import ROOT
 
 from pipelines.flows.deploy import register
@@ -52,18 +52,10 @@ def line(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Orchestrator]:
     with (
         # of a hundred each, most of the time of these tests would be theirs
         served(home, PREFECT_SERVER_SERVICES_SCHEDULER_MAX_RUNS=str(MOST_SCHEDULED)) as server,
-        pytest.MonkeyPatch.context() as patch,
+        client_of(server),
     ):
-        own = {
-            name: server.environment[name] for name in ("PREFECT_API_URL", "PREFECT_API_AUTH_STRING", "PREFECT_HOME")
-        }
-        for name, value in own.items():
-            patch.setenv(name, value)
-        from prefect.settings import temporary_settings
-
-        with temporary_settings(updates=own):
-            register(Path(deployments(home)))
-            yield server
+        register(Path(deployments(home)))
+        yield server
 
 
 def test_an_automation_closes_runs_without_a_heartbeat_and_is_there_once(line: Orchestrator) -> None:

@@ -45,8 +45,8 @@ def test_ramps_go_from_end_to_end_and_a_ramp_that_stays_short_counts_as_worse():
 def ramp_recipe(folder: Path, name: str = "ramp") -> str:
     """The small recipe on two ramps."""
     base = Path(recipe_file(folder, ("temperatures_C = [0.0, 50.0]\n", ""), ('["A1", "A2", "A3"]', '["A1"]')))
-    text = base.read_text(encoding="utf-8").replace('poses = "nine"', 'poses = "fibonacci24"')
-    poses = [*range(1, 25), *range(24, 0, -1)]
+    text = base.read_text(encoding="utf-8").replace('poses = "nine"', 'poses = "twelve"')
+    poses = [*range(1, 13), *range(12, 0, -1)]
     path = folder / f"{name}.toml"
     path.write_text(text + RAMP.format(poses=poses), encoding="utf-8")
     return str(path)
@@ -59,7 +59,7 @@ def coefficients(archive: Path):
     return run, table.set_index([key for key in keys if key in table])["value"]
 
 
-DOOR = ("--fault", "door:at_s=600:for_s=60")
+DOOR = ("--fault", "door:at_s=200:for_s=60")
 
 
 def test_a_station_measures_on_ramps_through_an_open_door(tmp_path):
@@ -67,7 +67,7 @@ def test_a_station_measures_on_ramps_through_an_open_door(tmp_path):
 
 
 @pytest.mark.slow
-@each([(), ("--fault", "time_out:at_s=700")])
+@each([(), ("--fault", "time_out:at_s=250")])
 def test_a_station_measures_on_ramps_undisturbed_and_through_a_lost_answer(faults, tmp_path):
     on_ramps(faults, tmp_path)
 

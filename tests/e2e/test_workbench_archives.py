@@ -1,53 +1,25 @@
-"""The workbench on unusual archives: findings of an audit, 500 units, broken runs, scripts in every name, and an empty one."""
+"""The workbench on an unusual archive in a browser: findings of an audit, 500 units, and scripts in every name."""
 
 import csv
 import io
-import shutil
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 from urllib.parse import urlencode
 
 import pytest
 from browser import Served, Tab, served, tab, until
+from unusual_archives import LONG, MANY, MARKUP, SCRIPT, unusual_archive
 
-from benchmarks.generated_archive import write_archive
-from benchmarks.workbench import tables, write
-from pipelines.archive import Archive
-
-SCRIPT = "<img src=x onerror=window.ran=1>"
-MARKUP = '"><script>window.ran=1</script>'
-LONG = "S" * 64
-MANY = [f"MANY{k:04d}" for k in range(500)]
+# without a browser, and broken runs: tests/unit/pipelines/workbench/test_unusual_archives.py
+pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="module")
 def bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
     top = tmp_path_factory.mktemp("bench")
-    write_archive(top / "archive", 24, years=3.0, seed=7, workers=1)
-    archive = Archive(top / "archive")
-    write(archive, 1, MANY, tables(MANY, 24, 1))
-    for number, spoiled in ((2, "run.json"), (3, "grades.parquet"), (4, "dwells.json")):
-        run = write(archive, number, ["B1", "B2"], tables(["B1", "B2"], 24, number))
-        place = top / "archive" / "runs" / run / spoiled
-        place.write_bytes(place.read_bytes()[:40])
-        place.parent.rename(place.parent.with_name(f"broken-{number}"))
-    named(archive)
+    unusual_archive(top / "archive")
     with served(top / "archive", top / "bench") as one:
         yield one
-
-
-def named(archive: Archive) -> None:
-    """A run in which every name is a script: recipe, device, station, person, and a serial of 64 characters."""
-    made = tables([SCRIPT, LONG], 24, 5)
-    made["grades"]["reasons"] = MARKUP
-    made["dwells"]["pose"] = SCRIPT
-    lot = {"device": MARKUP, "units": [{"serial": name, "slot": k} for k, name in enumerate((SCRIPT, LONG))], "seed": 1}
-    about = {"recipe": {"name": SCRIPT, "effects": ["bias", SCRIPT]}, "lot": lot, "station": {"name": SCRIPT}}
-    run = archive.open_run("named", about, {"number": 5})
-    for stage, names in (("reduce", ("dwells",)), ("fit", ("residuals", "coefficients")), ("grade", ("grades",))):
-        run.save(stage, f"named-{stage}", {name: made[name] for name in names}, {"inputs": {}})
-    run.seal()
 
 
 def run_of(bench: Served, start: str) -> str:
@@ -128,24 +100,6 @@ def test_five_hundred_units_are_listed_found_and_paged(bench: Served, browser: A
         assert one.errors == []
 
 
-def test_a_broken_run_is_said_in_a_sentence_and_the_others_are_shown(bench: Served, browser: Any) -> None:
-    with tab(browser, bench.address) as one:
-        one.open("/units")
-        assert one.page.locator("[aria-label=Calibrations] tbody tr").count() == 50
-        for number in (2, 3, 4):
-            for path in ("/run", "/unit", "/station"):
-                answer = one.page.request.get(
-                    f"{bench.address}{path}?run=broken-{number}", headers={"accept": "text/html"}
-                )
-                assert answer.status in {200, 422}, (path, number, answer.text()[:2000])
-                assert "defect of the program" not in answer.text(), (path, number)
-            answer = one.page.request.get(
-                f"{bench.address}/missing?source=broken-{number}", headers={"accept": "text/html"}
-            )
-            assert answer.status in {200, 422}
-            assert "defect of the program" not in answer.text()
-
-
 def test_no_script_in_any_name_runs(bench: Served, browser: Any) -> None:
     run = run_of(bench, "named-")
     pages = [
@@ -165,16 +119,3 @@ def test_no_script_in_any_name_runs(bench: Served, browser: Any) -> None:
             assert one.page.evaluate("() => window.ran") is None, path
             assert one.page.locator("main img, main script").count() == 0, path
         assert one.outside == []
-
-
-def test_an_empty_archive_says_on_every_page_what_to_do(tmp_path: Path, browser: Any) -> None:
-    pages = {
-        "/units": "Measure a lot", "/missing": "Choose a source", "/models": "No model file yet", "/upload": "Drop a file",
-        "/operator": "Scan each unit", "/station": "Measure a lot", "/audit": "Measure a lot", "/run": "tumbleline run",
-    }  # fmt: skip
-    with served(tmp_path / "archive", tmp_path / "bench") as server, tab(browser, server.address) as one:
-        for path, words in pages.items():
-            one.page.goto(server.address + path)
-            until(lambda words=words: words in main_text(one), f"{path} says '{words}'")
-        assert one.outside == []
-    shutil.rmtree(tmp_path / "bench", ignore_errors=True)

@@ -12,7 +12,7 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from capture_double import CaptureDouble, small_job
+from capture_double import BRIEF, CaptureDouble, small_job
 from typer.testing import CliRunner, Result
 
 from pipelines.archive import Archive, Run, files, parquet, stage_key
@@ -35,7 +35,7 @@ def make(folder: Path) -> Path:
     archive = Archive(folder / "archive")
     for serials in (FIRST, SECOND):
         units = ", ".join(f'"{serial}"' for serial in serials)
-        job = small_job(folder, ('"A1", "A2", "A3"', units), ("static_record_s = 30.0", "static_record_s = 20.0"))
+        job = small_job(folder, *BRIEF, ('"A1", "A2", "A3"', units))
         runner = Runner(job, archive, measure=CaptureDouble())
         list(runner.all())
         certify(Ledger(archive), runner.run)

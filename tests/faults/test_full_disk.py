@@ -4,7 +4,7 @@ import errno
 from pathlib import Path
 
 import pytest
-from capture_double import CaptureDouble, small_job
+from capture_double import BRIEF, CaptureDouble, small_job
 
 from pipelines.archive import Archive, files
 from pipelines.chain.chain import ORDER
@@ -31,7 +31,7 @@ class Disk:
 
 
 def run(folder: Path, name: str) -> dict[str, bytes]:
-    runner = Runner(small_job(folder), Archive(folder / name), measure=CaptureDouble())
+    runner = Runner(small_job(folder, *BRIEF), Archive(folder / name), measure=CaptureDouble())
     for stage in ORDER[:-1]:
         runner.stage(stage)
     return {name: (runner.run.path / f"{name}.parquet").read_bytes() for name in RESULTS}

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from capture_double import PulledPlug, recipe_file, small_job
+from capture_double import BRIEF, PulledPlug, recipe_file, small_job
 from root_process import ROOT
 
 from pipelines.archive import Archive
@@ -101,8 +101,10 @@ def test_a_run_killed_there_ends_in_the_same_bytes(tmp_path: Path, undisturbed: 
 
 
 def test_a_plug_pulled_at_random_times_loses_no_finished_dwell(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    whole = Runner(small_job(tmp_path), Archive(tmp_path / "whole"))
+    job = small_job(tmp_path, *BRIEF)
+    whole = Runner(job, Archive(tmp_path / "whole"))
     whole.stage("capture")
+    length = station_seconds({"readings": (whole.run.path / "readings.parquet").read_bytes()})
     sleep, ends = PlantClock.sleep, [0.0]
 
     def fatal(clock: PlantClock, span: float) -> None:
@@ -111,13 +113,13 @@ def test_a_plug_pulled_at_random_times_loses_no_finished_dwell(tmp_path: Path, m
             raise PulledPlug
 
     pulled = Archive(tmp_path / "pulled")
-    for end in np.sort(np.random.default_rng(1).uniform(1.0, 2900.0, 3)):
+    for end in np.sort(np.random.default_rng(1).uniform(1.0, length, 3)):
         ends[0] = float(end)
         monkeypatch.setattr(PlantClock, "sleep", fatal)
         with pytest.raises(PulledPlug):
-            Runner(small_job(tmp_path), pulled).stage("capture")
+            Runner(job, pulled).stage("capture")
         monkeypatch.setattr(PlantClock, "sleep", sleep)
-    again = Runner(small_job(tmp_path), pulled)
+    again = Runner(job, pulled)
     again.stage("capture")
     for name in ("readings", "history"):
         path = f"{name}.parquet"

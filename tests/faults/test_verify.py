@@ -7,7 +7,7 @@ from datetime import timedelta
 from pathlib import Path
 
 import pytest
-from capture_double import CaptureDouble, PulledPlug, finished_run, small_job
+from capture_double import BRIEF, CaptureDouble, PulledPlug, finished_run, small_job
 from each import each
 from typer.testing import CliRunner
 
@@ -27,7 +27,7 @@ from schemas.event import Event
 
 def make(folder: Path) -> Path:
     """An archive with a finished run, certified, one unit of it revoked."""
-    run = finished_run(folder)
+    run = finished_run(folder, *BRIEF)
     ledger = Ledger(Archive(folder / "archive"))
     certify(ledger, run)
     ledger.revoke("A2", "dropped")
@@ -266,7 +266,7 @@ def interrupted(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv(VARIABLE, "")
-        list(Runner(small_job(folder), Archive(folder / "archive"), measure=noting).all())
+        list(Runner(small_job(folder, *BRIEF), Archive(folder / "archive"), measure=noting).all())
     return folder / "archive"
 
 
@@ -308,7 +308,7 @@ def test_a_writer_that_is_at_work_is_not_accused(copy: Path) -> None:
 def test_a_run_that_was_copied_here_is_named_with_its_seal_and_without(copy: Path, tmp_path: Path, monkeypatch) -> None:
     monkeypatch.setattr(seals, "JUST_NOW", timedelta(0))
     (tmp_path / "b").mkdir()
-    other = finished_run(tmp_path / "b", ("seed = 5", "seed = 6"))
+    other = finished_run(tmp_path / "b", *BRIEF, ("seed = 5", "seed = 6"))
     shutil.copytree(other.path, copy / "runs" / other.id)
     shutil.copytree(other.records.path, copy / "captures" / other.records.path.name)
     assert found(copy) == [("edited", "sealed.json")]

@@ -8,16 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from schemas.profile import Register
-from stations.codec import (
-    BITS,
-    OUTPUTS,
-    WORDS_PER_SAMPLE,
-    NotEncodable,
-    decode,
-    encode,
-    pack_samples,
-    unpack_samples,
-)
+from stations.codec import BITS, OUTPUTS, WORDS_PER_SAMPLE, NotEncodable, decode, encode, pack_samples, unpack_samples
 
 ORDERS = st.sampled_from(["high_first", "low_first", "high_first_swapped", "low_first_swapped"])
 RANGES = {

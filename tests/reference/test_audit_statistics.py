@@ -6,14 +6,7 @@ from scipy import stats
 
 from inertial.population.capability import cpk, fraction_interval
 from inertial.population.comparison import compare, e_n, holm, sigma_of
-from inertial.population.control_charts import (
-    EWMA_WEIGHT,
-    EWMA_WIDTH,
-    Baseline,
-    baseline,
-    ewma,
-    western_electric,
-)
+from inertial.population.control_charts import EWMA_WEIGHT, EWMA_WIDTH, Baseline, baseline, ewma, western_electric
 from inertial.population.gauge import gauge_study
 
 # NIST/SEMATECH e-Handbook of Statistical Methods, 6.3.2.2 (individuals) and 6.3.2.4 (EWMA)

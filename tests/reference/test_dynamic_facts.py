@@ -4,15 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import lsim
 
-from inertial.dynamics import (
-    centrifuge,
-    pulses,
-    random_vibration,
-    sine_fit,
-    spectra,
-    stability,
-    tilt,
-)
+from inertial.dynamics import centrifuge, pulses, random_vibration, sine_fit, spectra, stability, tilt
 from inertial.errors import NotIdentified
 
 

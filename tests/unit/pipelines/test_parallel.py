@@ -6,6 +6,7 @@ import subprocess
 import sys
 
 import pytest
+from partitions import refuse, square, square_and_process
 from threadpoolctl import threadpool_info
 
 from pipelines.flows.dask_cluster import on_dask
@@ -13,23 +14,11 @@ from pipelines.parallel import map_partitions, one_thread_each
 from schemas.errors import DataRejected, LinkLost, WrongUse
 
 
-def square(value: int) -> int:
-    return value * value
-
-
-def square_and_process(value: int) -> tuple[int, int]:
-    return value * value, os.getpid()
-
-
 def threads(_value: int) -> int:
     import numpy as np
 
     np.linalg.inv(np.eye(3))
     return max((one["num_threads"] for one in threadpool_info() if one["user_api"] == "blas"), default=1)
-
-
-def refuse(value: int) -> int:
-    raise DataRejected(f"part {value}: no dwell, one is needed; measure it")
 
 
 def test_results_come_in_the_order_of_the_partitions_and_nothing_to_do_starts_nothing() -> None:

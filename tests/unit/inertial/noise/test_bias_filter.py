@@ -7,12 +7,7 @@ from scipy.stats import chi2
 
 from inertial.noise.allan import overlapping
 from inertial.noise.bias_filter import BiasFilter, consistency, track
-from inertial.noise.gauss_markov import (
-    BiasModel,
-    bias_model,
-    flicker_of_steps,
-    flicker_terms,
-)
+from inertial.noise.gauss_markov import BiasModel, bias_model, flicker_of_steps, flicker_terms
 from inertial.noise.terms import LikelyTerms, likely_terms
 from pipelines.export.corrected import _within_a_step
 

@@ -16,6 +16,8 @@ sys.path.insert(0, str(ROOT / "benchmarks" / "worlds"))
 from tables import FAULTS
 from world import World, make
 
+pytestmark = pytest.mark.usefixtures("no_next_measurement")
+
 SEED = 5_500_000
 STATION = World(units=3, hidden=(("level_error", 3.0),))
 

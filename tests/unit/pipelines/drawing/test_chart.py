@@ -10,16 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from pipelines.drawing import (
-    Chart,
-    ColourScale,
-    Plot,
-    PlotAxis,
-    Trace,
-    csv_text,
-    plotly_figure,
-    svg_text,
-)
+from pipelines.drawing import Chart, ColourScale, Plot, PlotAxis, Trace, csv_text, plotly_figure, svg_text
 from pipelines.drawing.chart import density
 from pipelines.drawing.mollweide import project, sphere
 from pipelines.drawing.picture import picture

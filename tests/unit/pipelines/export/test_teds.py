@@ -110,10 +110,7 @@ def test_counts_have_no_sensitivity_in_volts() -> None:
 
 
 @each(
-    [
-        ("A", "TEDS hold the digits at its end, a number up to 16777215"),
-        ("16777216", "TEDS hold the digits at its end"),
-    ]
+    [("A", "TEDS hold the digits at its end, a number up to 16777215"), ("16777216", "TEDS hold the digits at its end")]
 )
 def test_a_serial_number_that_is_no_number_of_24_bits_is_refused(row: tuple[str, str]) -> None:
     with pytest.raises(WrongUse, match=row[1]):

@@ -319,9 +319,7 @@ def test_a_command_tells_its_error_as_json_on_request() -> None:
     assert "no command is called 'shw'" in content["message"]
 
 
-def test_a_receiver_that_redirects_has_accepted_nothing_and_one_refused_alert_holds_up_no_other(
-    tmp_path: Path,
-) -> None:
+def test_a_receiver_that_redirects_has_accepted_nothing_and_one_refused_alert_holds_up_no_other(tmp_path: Path) -> None:
     alerts = alerts_of(full(stations=StationNumbers(set(), {"line-1": "run-1"})))
     with receiver([307, 302, 301]) as (address, accepted):
         for status in ("307", "302", "301"):

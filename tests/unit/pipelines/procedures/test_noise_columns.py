@@ -59,10 +59,7 @@ def test_distortion_of_the_exciter_is_not_noise_of_a_point_of_a_sweep(rng: np.ra
         records = (UnitRecord(time, reference), UnitRecord(time, output))
         point = response_point(part, 0, {"frequency_hz": CYCLES_HZ}, records, 2, (0.0, 0.0), device)
         pulls.append(
-            (
-                (point["value"] - 1.0) / point["uncertainty"],
-                point["phase_deg"] / point["phase_uncertainty_deg"],
-            )
+            ((point["value"] - 1.0) / point["uncertainty"], point["phase_deg"] / point["phase_uncertainty_deg"])
         )
         sizes.append(point["uncertainty"])
     assert np.median(sizes) == pytest.approx(np.hypot(1e-3, 2e-4) * np.sqrt(2.0 / time.size), rel=0.05)

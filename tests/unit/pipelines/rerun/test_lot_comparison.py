@@ -46,9 +46,7 @@ def given(run: Run, request: pytest.FixtureRequest) -> tuple[ArchivedJob, Budget
     return job, BudgetTables(**tables), terms
 
 
-def test_every_quantity_has_the_numbers_of_the_table(
-    given: tuple[ArchivedJob, BudgetTables, BudgetTerms],
-) -> None:
+def test_every_quantity_has_the_numbers_of_the_table(given: tuple[ArchivedJob, BudgetTables, BudgetTerms]) -> None:
     _, tables, terms = given
     whole = budget(tables, terms)
     rows, known = whole["uncertainties"], DecisionBudget(tables, terms)

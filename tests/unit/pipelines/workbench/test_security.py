@@ -310,11 +310,16 @@ def told(client: AsgiClient, address: str, body: object) -> httpx.Response:
     return client.post(address, headers=headers, content=json.dumps(body))
 
 
-def test_an_empty_archive_has_every_page(tmp_path: Path) -> None:
+def test_an_empty_archive_has_every_page_with_what_to_do(tmp_path: Path) -> None:
     settings = WorkbenchSettings(archive=str(tmp_path / "none"), folder=tmp_path / "bench", token=TOKEN)
     client = AsgiClient(create_app(settings), ORIGIN)
-    for address in ("/units", "/missing", "/upload", "/operator", "/plan", "/station", "/audit"):
-        assert client.get(address).status_code == 200, address
+    pages = {
+        "/units": "Measure a lot", "/missing": "Choose a source", "/models": "No model file yet", "/upload": "Drop a file",
+        "/operator": "Scan each unit", "/plan": "", "/station": "Measure a lot", "/audit": "Measure a lot",
+    }  # fmt: skip
+    for address, words in pages.items():
+        answer = client.get(address)
+        assert (answer.status_code, words in answer.text) == (200, True), address
     assert not (tmp_path / "none").exists()
     assert client.get("/run?run=latest").status_code == 422
     assert client.get("/nowhere").status_code == 404

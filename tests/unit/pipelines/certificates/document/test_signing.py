@@ -5,11 +5,7 @@ from pathlib import Path
 
 import pytest
 from cryptography.hazmat.primitives.asymmetric import ec, rsa
-from cryptography.hazmat.primitives.serialization import (
-    BestAvailableEncryption,
-    Encoding,
-    pkcs12,
-)
+from cryptography.hazmat.primitives.serialization import BestAvailableEncryption, Encoding, pkcs12
 from signing_keys import made_key, openssl_accepts, pem
 
 from pipelines.certificates.document.signing import SigningKey, read_key, sign_pdf, sign_xml

@@ -1,0 +1,62 @@
+"""The workbench on an archive with many units, broken runs and scripts in every name; in a browser: tests/e2e."""
+
+from pathlib import Path
+from urllib.parse import urlencode
+
+import pytest
+from asgi_client import AsgiClient
+from unusual_archives import LONG, MANY, MARKUP, SCRIPT, unusual_archive
+
+from pipelines.workbench.application import create_app
+from pipelines.workbench.settings import WorkbenchSettings
+
+
+@pytest.fixture(scope="module")
+def top(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("unusual")
+    unusual_archive(folder / "archive")
+    return folder
+
+
+@pytest.fixture
+def client(top: Path) -> AsgiClient:
+    settings = WorkbenchSettings(archive=str(top / "archive"), folder=top / "bench", token="Zq8vXy3nR5tB7wK1mP4sD9")
+    return AsgiClient(create_app(settings), "http://127.0.0.1:8321")
+
+
+def page(client: AsgiClient, address: str) -> str:
+    """A page, which may be one that says what is wrong and is no defect."""
+    answer = client.get(address, headers={"accept": "text/html"})
+    assert answer.status_code in {200, 422}, (address, answer.text[:2000])
+    assert "defect of the program" not in answer.text, address
+    return answer.text
+
+
+def test_five_hundred_units_are_found_and_paged(top: Path, client: AsgiClient) -> None:
+    assert "51 to 100 of" in page(client, "/units?search=MANY0&outcome=pass&page=2")
+    run = next(path.name for path in top.glob("archive/runs/bench-*"))
+    text = page(client, f"/run?run={run}")
+    assert [one for one in MANY if one not in text] == []
+
+
+def test_a_broken_run_is_said_in_a_sentence_and_the_others_are_shown(client: AsgiClient) -> None:
+    for number in (2, 3, 4):
+        for path in ("/run?run=", "/unit?run=", "/station?run=", "/missing?source="):
+            page(client, f"{path}broken-{number}")
+    assert "1 to 50 of" in page(client, "/units")
+
+
+def test_a_script_in_a_name_is_text(top: Path, client: AsgiClient) -> None:
+    run = next(path.name for path in top.glob("archive/runs/named-*"))
+    addresses = [
+        "/units?" + urlencode({"search": MARKUP, "station": SCRIPT}), f"/run?run={run}", f"/unit?run={run}",
+        "/unit?" + urlencode({"run": run, "unit": SCRIPT, "against": "pose"}), f"/unit?run={run}&unit={LONG}",
+        f"/missing?source={run}", f"/station?run={run}", "/audit?" + urlencode({"device": MARKUP}),
+        "/plan?" + urlencode({"recipe": SCRIPT, "pose": MARKUP}), "/models?" + urlencode({"model": MARKUP}),
+        "/upload?" + urlencode({"file": SCRIPT}), "/units",
+    ]  # fmt: skip
+    for address in addresses:
+        text = page(client, address)
+        assert "<img src=x" not in text, address
+        assert "<script>window" not in text, address
+    assert "&lt;img src=x" in page(client, f"/run?run={run}")
