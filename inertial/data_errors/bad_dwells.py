@@ -119,7 +119,7 @@ class _Deletion:
 
     def off_every_time(self, pose: Places) -> Flags:
         """Dwells (n,) of poses (n,) all of whose dwells, two at least, are off by about the same."""
-        there = self.known.reshape(self.units, self.axes, self.n).all(axis=1)
+        there = np.asarray(self.known.reshape(self.units, self.axes, self.n).all(axis=1))
         off = np.where(self.known, self.left / self.known_size, 0.0)
         off = off.reshape(self.units, self.axes, self.n) * there[:, None]
         squares = self.statistic()

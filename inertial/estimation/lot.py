@@ -35,7 +35,7 @@ class Lot:
     @property
     def measured(self) -> Flags:
         """The dwells (n,) that any unit has on all axes."""
-        return np.isfinite(self.error).all(axis=-1).any(axis=0)
+        return np.asarray(np.isfinite(self.error).all(axis=-1).any(axis=0))
 
     def units(self, index: Sequence[int]) -> "Lot":
         """The lot of some units only."""
