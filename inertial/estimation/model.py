@@ -273,8 +273,10 @@ class Model:
 
     def shared_sizes(self, term: Term) -> Array:
         """Coefficients (k,) of a term that all blocks share."""
-        # a model that was kept has an equal term
-        return self.space.shared_sizes[next(own for t, own in self.places(shared=True) if t.key == term.key)]
+        for other, own in self.places(shared=True):
+            if other.key == term.key:  # a model that was kept has an equal term
+                return self.space.shared_sizes[own]
+        raise KeyError(f"{term.effect.id}: not a term of the model")
 
     def explained(self, candidate: Candidate, floor: float) -> float:
         """RMS, g, of the part of a candidate that the model cannot absorb, less that of noise of RMS ``floor``."""

@@ -201,7 +201,7 @@ def test_follow_ups_and_plans_take_the_same_time_and_the_same_temperatures(tmp_p
         Wanted(0.0, 3.0, -5.0, soaked=False), Wanted(1.2, -2.0, -5.0, soaked=False),
     ]  # fmt: skip
     pace = circumstances(job, job, 100.0).pace
-    ran = timeline(wanted, pace, place.step(), place.temperature)
+    ran = timeline(wanted, pace, pace.start, place.device)
     assert ran.end == pytest.approx(60.0 * station_minutes(wanted, job, place))
     for count in range(1, len(wanted)):
         assert ran.time[count - 1] + 0.5 * pace.dwell_s == pytest.approx(

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import lsim
 
-from inertial.dynamics import centrifuge, pulses, random_vibration, sine_fit, spectra, stability, tilt
+from inertial.dynamics import centrifuge, pulses, sine_fit, spectra, stability, tilt
 from inertial.errors import NotIdentified
 
 
@@ -131,10 +131,10 @@ def test_what_five_times_the_bandwidth_leaves_folded() -> None:
 
 def test_overall_level_and_the_hann_mean(rng: np.random.Generator) -> None:
     flat = np.array([20.0, 2000.0]), np.array([0.03, 0.03])
-    target = random_vibration.interpolated(np.fft.rfftfreq(16_000, 1.0 / 8000.0).clip(1e-12), *flat)
+    target = spectra.interpolated(np.fft.rfftfreq(16_000, 1.0 / 8000.0).clip(1e-12), *flat)
     z = rng.standard_normal((60, 2, target.size))
     made = np.fft.irfft(np.sqrt(target * 8000.0 * 4000.0) * (z[:, 0] + 1j * z[:, 1]), 16_000)[:, 4000:12_000]
-    assert np.std(made) == pytest.approx(random_vibration.overall_level(*flat), rel=0.01)
+    assert np.std(made) == pytest.approx(spectra.overall_level(*flat), rel=0.01)
     assert np.std([spectra.hann_mean(one[:, None])[0] for one in made]) < 3e-5
     assert np.std(made.mean(axis=1)) > 3e-3
 
@@ -219,7 +219,7 @@ def test_overall_level_of_the_profiles(name: str) -> None:
 
     assert set(OVERALL) == set(vibration_profiles())
     points = np.array(load_vibration_profile(name).breakpoints)
-    assert random_vibration.overall_level(points[:, 0], points[:, 1]) == pytest.approx(OVERALL[name], rel=2e-3)
+    assert spectra.overall_level(points[:, 0], points[:, 1]) == pytest.approx(OVERALL[name], rel=2e-3)
     fine = np.geomspace(points[0, 0], points[-1, 0], 200_001)
-    by_sum = np.trapezoid(random_vibration.interpolated(fine, points[:, 0], points[:, 1]), fine)
+    by_sum = np.trapezoid(spectra.interpolated(fine, points[:, 0], points[:, 1]), fine)
     assert np.sqrt(by_sum) == pytest.approx(OVERALL[name], rel=2e-3)
