@@ -33,7 +33,7 @@ lint: $(VENV)/.dev
 	$(BIN)/ruff format --check .
 
 types: $(VENV)/.dev
-	$(BIN)/pyright
+	$(BIN)/pyright --threads $(shell nproc)
 
 layers: $(VENV)/.dev
 	$(BIN)/lint-imports
