@@ -30,9 +30,10 @@ Array = NDArray[np.float64]
 KINDS = ("dwell", "verification")
 _SHOWN = 5  # dwells that a message names
 _LEAST_G = 1e-9  # scatter of dwells that are alike to the last digit
-UNTOLD = 0.1
-"""Share of the scatter of dwells that stands for the noise of their samples where none is recorded: it must be no more than the
-noise, and scatter beyond it counts as wander, which does not average out, unless the dwells refute that."""
+UNTOLD = 0.001
+"""Share of the scatter about a plain fit that stands for the noise of the samples where none is recorded. It must be below the
+noise also where the plain fit leaves the model's own curves; its size does not matter then: the strength of all noise is estimated
+from the residuals, and scatter beyond it counts as wander, which does not average out, unless the dwells refute that."""
 
 
 @dataclass(frozen=True)

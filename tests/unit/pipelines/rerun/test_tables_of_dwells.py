@@ -80,6 +80,24 @@ def test_errors_are_as_large_as_the_residuals_say_where_no_samples_tell_the_nois
     assert all(np.std(ratios) > 0.6 for ratios in found.values())
 
 
+def test_a_curve_over_temperature_that_the_model_has_is_no_noise() -> None:
+    """A bias that bends by 0.8 mg over the soaks, noise of 5 µg: the scatter about a plain fit is no measure of the noise."""
+    rng = np.random.default_rng(4)
+    model = (*PLAIN, "bias_temperature", "bias_temperature_quadratic")
+    ratios: list[float] = []
+    for _ in range(4):
+        soaks: list[pd.DataFrame] = []
+        for soak, warm in enumerate((0.0, 20.0, -20.0, 0.0)):
+            part = table(rng, 5e-6 * np.eye(len(directions())))
+            outputs = {name: part[name] + 1e-4 * warm + 2e-6 * warm**2 for name in ("out_x", "out_y", "out_z")}
+            later = {"dwell": part["dwell"] + 36 * soak, "time_s": part["time_s"] + 5000.0 * soak}
+            soaks.append(part.assign(unit_C=25.0 + warm, **outputs, **later))
+        rows = fit(complete_table(pd.concat(soaks, ignore_index=True))[0], None, model)["coefficients"]
+        rows = rows.query("effect == 'scale'")
+        ratios += ((rows["value"] - GAIN) / rows["standard_error"]).tolist()
+    assert 0.6 < np.std(ratios) < 1.5  # three deviations of 36 values
+
+
 def test_a_bad_dwell_of_one_unit_is_left_out_of_the_lot(tmp_path: Path) -> None:
     """As a diagnosis advises: the fit of a lot takes the dwells that every unit has."""
     dwells = table(np.random.default_rng(5))
