@@ -219,9 +219,7 @@ def _print_imports(imports: Sequence[dict[str, Any]], archive: str | None, _: ob
         dwells = number_of(one["dwells"], "dwell")
         rows = f"{number_of(one['samples'], 'sample')}, {dwells}" if one["samples"] else dwells
         unit = one["out_unit"] or "a unit that is not known (--units output=… states it)"
-        say(
-            f"{', '.join(one['units'])}: {rows} in {unit}, kept as run {one['run']}"
-        )
+        say(f"{', '.join(one['units'])}: {rows} in {unit}, kept as run {one['run']}")
         for remark in [*one["remarks"], *one["lines"]]:
             say(f"  {remark}")
         if list_dwells:

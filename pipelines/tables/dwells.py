@@ -32,8 +32,8 @@ _SHOWN = 5  # dwells that a message names
 _LEAST_G = 1e-9  # scatter of dwells that are alike to the last digit
 UNTOLD = 0.001
 """Share of the scatter about a plain fit that stands for the noise of the samples where none is recorded. It must be below the
-noise also where the plain fit leaves the model's own curves; its size does not matter then: the strength of all noise is estimated
-from the residuals, and scatter beyond it counts as wander, which does not average out, unless the dwells refute that."""
+noise also where the plain fit leaves the model's own curves; then its size does not matter. All noise is estimated
+from the residuals; scatter beyond it counts as wander, which does not average out, unless the dwells refute that."""
 
 
 @dataclass(frozen=True)
