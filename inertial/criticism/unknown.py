@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from inertial import decisions, frames
-from inertial.arrays import Array, Flags
+from inertial.arrays import Array
 from inertial.criticism.curves import CurveFit, fit_curve
 from inertial.criticism.drivers import (
     Driver,
@@ -53,8 +53,7 @@ class Unexplained:
 
     log_p : natural logarithm of the probability that noise follows it as much
     floor : noise of the measurement with the dependence in the model, g
-    cost : penalised deviance of that model, on the scale of the search
-    there : (blocks, n), the measurements that it is of; None where it is not known
+    model : that model; None where there is none
     period : of a swing with the time, s; None of another curve
     """
 
@@ -63,8 +62,7 @@ class Unexplained:
     log_p: float
     part: Part = "bias"
     floor: float = float("inf")
-    cost: float = float("inf")
-    there: Flags | None = field(default=None, compare=False, repr=False)
+    model: Model | None = field(default=None, compare=False, repr=False)
     period: float | None = None
 
 
@@ -140,13 +138,19 @@ def better_curve(base: Model, chosen: Sequence[Term], field: Sequence[Driver]) -
         worth = max(decisions.CURVE_AHEAD, decisions.CURVE_SHARE * (bare - best.cost))
         best, kept = _with_others(base, chosen, alike, best, worth)
     replaced = [t for t in chosen if t not in kept]
-    # more than two effects in place of one curve have no priority
-    doubt = decisions.CURVE_AHEAD / len(replaced) if 0 < len(replaced) < 3 else 0.0
-    if len(replaced) == 1:
-        # a curve over time can follow any memory of one run
-        share = (3.0 if replaced[0].effect.memory else 1.0) * decisions.CURVE_SHARE
-        doubt = max(doubt, share * (bare - best.cost))
-    return (best, kept) if replaced and best.cost + doubt < whole else None
+    if not replaced or best.cost + (decisions.CURVE_AHEAD / len(replaced) if len(replaced) < 3 else 0.0) >= whole:
+        return None  # more than two effects in place of one curve have no priority
+    # a memory for itself, too: what it leaves over, of inexact shape, is often chosen beside it
+    rivals = [t for t in replaced if t.effect.memory or len(replaced) == 1]
+    return None if any(_nearly_as_good(base, [*kept, t], bare - best.cost) for t in rivals) else (best, kept)
+
+
+def _nearly_as_good(base: Model, terms: Sequence[Term], gain: float) -> bool:
+    """Whether effects, of which the last is in question, explain so much of what a curve gains that they have priority."""
+    # a curve over time can follow any memory of one run
+    share = (3.0 if terms[-1].effect.memory else 1.0) * decisions.CURVE_SHARE
+    alone = cost_of_model(base) - cost_of_model(Model(base.problem, [*base.terms, *terms], near=base.noise))
+    return alone >= gain - max(decisions.CURVE_AHEAD, share * gain)
 
 
 def curve_in_noise(base: Model, field: Sequence[Driver]) -> CurveFit | None:
@@ -170,8 +174,8 @@ def unexplained_by(base: Model, fit: CurveFit, looks: int) -> Unexplained:
     before = base.at(fit.model.noise)
     drop = max(before.rss - fit.model.space.rss, 0.0)
     log_p = log_p_value(before, drop, fit.rank) + float(np.log(looks))
-    there, driver = base.problem.covariance.there, fit.driver
-    return Unexplained(driver.name, "curve", log_p, driver.part, fit.model.floor(), fit.cost, there, driver.period)
+    driver = fit.driver
+    return Unexplained(driver.name, "curve", log_p, driver.part, fit.model.floor(), fit.model, driver.period)
 
 
 def _promising(base: Model, field: Sequence[Driver]) -> list[Driver]:

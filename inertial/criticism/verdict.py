@@ -14,7 +14,7 @@ from inertial.criticism.drivers import Driver, looks_of
 from inertial.criticism.evidence import GROSS, not_judged
 from inertial.criticism.examination import EffectSearch, ExaminedRun, Named, examined
 from inertial.criticism.lot_part import LotPart
-from inertial.criticism.search import SearchResult, evident, judge
+from inertial.criticism.search import SearchResult, convincing, evident, judge
 from inertial.criticism.unknown import Unexplained, better_curve, curve_in_noise, unexplained_by
 from inertial.data_errors.removed_dwells import BadDwell
 from inertial.data_errors.tails import with_tails
@@ -25,8 +25,9 @@ from inertial.estimation.comparison import fitted_residuals
 from inertial.estimation.comparison import rms as rms_of
 from inertial.estimation.likelihood import shared_noise
 from inertial.estimation.model import Model
-from inertial.estimation.penalty import PER_COEFFICIENT, cost_of_model, log_p_value
+from inertial.estimation.penalty import PER_COEFFICIENT, log_p_value
 from inertial.estimation.problem import Lot, Problem
+from inertial.estimation.term import Term
 from inertial.planning.drivers import drivers_of
 from inertial.probability import passes
 
@@ -102,28 +103,23 @@ def judged(lot: Lot, effects: Sequence[str], rng: Generator) -> Verdict:
     rng : draws the noise that adequacy is measured against
     """
     verdict = _judged(lot, effects, rng)
-    told = {
-        m.term.effect.id
-        for one in verdict.run.handled
-        for m in one.effects.members
-        if isinstance(m.term.effect, Handling)
-    }
+    told = [m.term for one in verdict.run.handled for m in one.effects.members if isinstance(m.term.effect, Handling)]
     if verdict.unexplained is None or not told:
         return verdict
     # found before the driver was: what it left over may have looked like an error of handling
-    without = _judged(lot, effects, rng, frozenset(told))
-    return without if _as_good(without, verdict) else verdict
+    without = _judged(lot, effects, rng, frozenset(t.effect.id for t in told))
+    return without if _as_good(without, verdict, told) else verdict
 
 
-def _as_good(other: Verdict, verdict: Verdict) -> bool:
+def _as_good(other: Verdict, verdict: Verdict, told: Sequence[Term]) -> bool:
     """Whether a driver explains a lot as well without the errors of handling that were told beside it."""
     alone, beside = other.unexplained, verdict.unexplained
-    if alone is None or beside is None or alone.driver != beside.driver or alone.there is None or beside.there is None:
+    if alone is None or beside is None or alone.driver != beside.driver or alone.model is None:
         return False
-    if not np.array_equal(alone.there, beside.there):  # deviances of other measurements are not compared
-        return False
-    worth = len(verdict.run.handled) * float(np.log(max(int(alone.there.sum()), 1)))  # as in the search
-    return alone.cost < beside.cost + worth
+    model, field = alone.model, verdict.search.field
+    if model.problem.blocks != field.problem.blocks and any("unit" in t.keywords for t in told):
+        return False  # the curve was fitted to some of the units, and the error is of one
+    return not any(convincing(field, model, judge(field, model, term)) for term in told)
 
 
 def _judged(lot: Lot, effects: Sequence[str], rng: Generator, barred: frozenset[str] = frozenset()) -> Verdict:
@@ -206,22 +202,20 @@ def _with_curves(
     if by_curve is not None:
         return by_curve
     final = searched.model
-    convincing = [d for d in drivers if _convincing(final, d, len(drivers))]
-    if not convincing:
+    clear = [d for d in drivers if _convincing(final, d, len(drivers))]
+    if not clear:
         return final, None
     if searched.added and len(suspected) < len(part.every_suspect):
         # what the effects leave follows a driver: they may be pieces of a dependence of another kind
         by_curve = _curve_in_place_of(part, base, searched, part.every_suspect)
         if by_curve is not None:
             return by_curve
-    best = max(convincing, key=lambda d: _worth(final, d))
+    best = max(clear, key=lambda d: _worth(final, d))
     columns = best.candidate.of_blocks[:, :, 0, :]
     curved = final.with_curves(columns)
     log_p = _driver_log_p(final, best) + float(np.log(len(drivers)))
     shape = "line" if columns.shape[-1] == 1 else "curve"
-    return final, Unexplained(
-        best.name, shape, log_p, best.part, curved.floor(), cost_of_model(curved), base.problem.covariance.there
-    )
+    return final, Unexplained(best.name, shape, log_p, best.part, curved.floor(), curved)
 
 
 def _with_a_small_effect(search: EffectSearch, base: Model) -> SearchResult:
