@@ -104,22 +104,47 @@ def judged(lot: Lot, effects: Sequence[str], rng: Generator) -> Verdict:
     """
     verdict = _judged(lot, effects, rng)
     told = [m.term for one in verdict.run.handled for m in one.effects.members if isinstance(m.term.effect, Handling)]
-    if verdict.unexplained is None or not told:
+    if not told or (verdict.unexplained is None and not verdict.result.added):
         return verdict
-    # found before the driver was: what it left over may have looked like an error of handling
+    # found before the driver or the effect was: what that leaves over may have looked like an error of handling
     without = _judged(lot, effects, rng, frozenset(t.effect.id for t in told))
     return without if _as_good(without, verdict, told) else verdict
 
 
 def _as_good(other: Verdict, verdict: Verdict, told: Sequence[Term]) -> bool:
-    """Whether a driver explains a lot as well without the errors of handling that were told beside it."""
-    alone, beside = other.unexplained, verdict.unexplained
-    if alone is None or beside is None or alone.driver != beside.driver or alone.model is None:
+    """Whether the same explains a lot as well without the errors of handling that were told beside it."""
+    if other.handled or _bad(other) > _bad(verdict) or _causes(other) != _causes(verdict):
         return False
-    model, field = alone.model, verdict.search.field
+    model = _with_free_states(other) if other.unexplained is None else other.unexplained.model
+    if model is None:
+        return False
+    field = verdict.search.field
     if model.problem.blocks != field.problem.blocks and any("unit" in t.keywords for t in told):
         return False  # the curve was fitted to some of the units, and the error is of one
     return not any(convincing(field, model, judge(field, model, term)) for term in told)
+
+
+def _with_free_states(verdict: Verdict) -> Model:
+    """The model with all effects, and what each remembers from before the first dwell free for every unit.
+
+    Devices that were not at rest leave something over in the first dwells. It takes many coefficients, and a pose that was wrong
+    there takes two.
+    """
+    added = {t.key for t in verdict.result.added}
+    terms = [replace(t, rest=False) if t.key in added and t.memory else t for t in verdict.final.terms]
+    return Model(verdict.final.problem, terms, near=verdict.final.noise)
+
+
+def _bad(verdict: Verdict) -> int:
+    """Number of dwells that were left out as bad."""
+    return sum(not dwell.tail for dwell in verdict.removed)
+
+
+def _causes(verdict: Verdict) -> set[str]:
+    """The driver that nothing explains, else the effects."""
+    if verdict.unexplained is not None:
+        return {verdict.unexplained.driver}
+    return {t.effect.id for t in verdict.result.added}
 
 
 def _judged(lot: Lot, effects: Sequence[str], rng: Generator, barred: frozenset[str] = frozenset()) -> Verdict:
