@@ -57,6 +57,7 @@ def rows() -> Iterator[Row]:
     yield from rows_of_single_axes()
     yield from rows_of_steps()
     yield from rows_of_physics()
+    yield from rows_of_what_is_left_over()
     yield from rows_of_other_generators()
 
 
@@ -235,6 +236,23 @@ def rows_of_steps() -> Iterator[Row]:
                 World(units=units, noise=noise), 5_700_000 + seed, f"gain step of one of {units}", named=("gain_step",),
                 physics=True, also=changes.gain_step_is_certain, change=changes.last_unit_amplifies,
             )  # fmt: skip
+
+
+def rows_of_what_is_left_over() -> Iterator[Row]:
+    # an error of handling that was found first, and explains nothing beside what was found after it
+    for index, driver in ((26, "supply_V"), (14, "vibration_g")):
+        yield Row(Case("withheld", index), 9931, f"poses and {driver}", first=(), unexplained=frozenset({driver}))
+    # the state of a memory before the run had looked like a first pose that was wrong
+    for index, effect in ((199, "pose_hysteresis"), (32, "creep_after_move")):
+        yield Row(
+            Case("lot8_size1", index), 77_002, f"{effect} from before the run", first=(effect,), physics=True,
+            recommended=(effect,), unexplained=frozenset(), fast=index == 199,
+        )  # fmt: skip
+    # Preisach's hysteresis, of which the play leaves something over: a curve in time had followed both
+    yield Row(
+        Case("lot8_size2", 2), 77_001, "hysteresis in shuffled soaks", named=("thermal_hysteresis",), physics=True,
+        unexplained=frozenset(),
+    )  # fmt: skip
 
 
 def rows_of_physics() -> Iterator[Row]:
