@@ -127,7 +127,7 @@ SOURCES: dict[tuple[str, str], Callable[[Context], Iterable[str]]] = {
     ("units", "SN"): _units,
     ("serial", "SERIAL"): _units,
     ("effect", "NAME|random"): lambda ctx: ["random", *(scene.kind for scene in _scenes(ctx))],
-    ("effect", ""): _effects,
+    ("effect", "EFFECT"): _effects,
     ("effects", ""): _effects,
     ("remove", "EFFECT"): _effects,
     ("required_errors", "EFFECT="): lambda ctx: [f"{name}=" for name in _effects(ctx)],

@@ -14,7 +14,7 @@ ORDER = 250
 SUMMARY = "Show the error of a model, version by version."
 EXAMPLES = (
     "tumbleline history model.toml",
-    "tumbleline history model.toml --dwells dwells.csv --fresh fresh.csv --picture history.png",
+    "tumbleline history model.toml --dwells dwells.csv --fresh fresh.csv --output history.png",
 )
 
 
@@ -22,9 +22,9 @@ def command(
     model: Annotated[Path, argument("MODEL", "A model file.")],
     dwells: Annotated[str, option("--dwells DWELLS", "A file in the exchange format, or a run of the archive.")] = "",
     fresh: options.FreshOption = "",
-    history: options.HistoryOption = "",
-    fresh_history: options.FreshHistoryOption = "",
-    picture: Annotated[Path | None, option("--picture FILE.png", "Draw it, as PNG, SVG or PDF.")] = None,
+    temperatures: options.TemperaturesOption = "",
+    fresh_temperatures: options.FreshTemperaturesOption = "",
+    picture: Annotated[Path | None, option("--output -o FILE.png", "Draw it, as PNG, SVG or PDF.")] = None,
     effect_file: options.EffectFileOption = None,
     archive: options.ArchiveOption = None,
     *,
@@ -45,10 +45,10 @@ def command(
         from pipelines.drawing.picture import refuse_ending
 
         if not dwells:
-            raise WrongUse("history: --picture shows errors, they need --dwells; name the dwells too")
-        refuse_ending(picture, "--picture")
+            raise WrongUse("history: --output draws errors, they need --dwells; name the dwells too")
+        refuse_ending(picture, "--output")
     if dwells:
-        tables = ImprovedTables(*both_runs(dwells, history, fresh, fresh_history, archive))
+        tables = ImprovedTables(*both_runs(dwells, temperatures, fresh, fresh_temperatures, archive))
         rows = errors_by_version(versions(model_file), tables, lambda: error_console().status("fitting"))
     else:
         rows = [
@@ -102,7 +102,7 @@ def _print(rows: list[dict[str, Any]], name: str, file: Path) -> None:
 
 def removal(file: Path, effect: str) -> str:
     """The command that removes an effect which a fresh run refutes."""
-    return command_line("extend", str(file), "--remove", effect, "--why", "the fresh run is evidence against it")
+    return command_line("extend", str(file), "--remove", effect, "--reason", "the fresh run is evidence against it")
 
 
 def _change(row: dict[str, Any]) -> str:

@@ -39,7 +39,7 @@ class JudgedData:
     @property
     def options(self) -> list[str]:
         """The options that name history and archive."""
-        return [*(["--history", self.history] if self.history else []), *archive_words(self.archive)]
+        return [*(["--temperatures", self.history] if self.history else []), *archive_words(self.archive)]
 
 
 FindData = Callable[[], JudgedData]  # gives the data of a command; see :func:`judged_data`
@@ -110,7 +110,7 @@ def versions(file: Path | str, data: JudgedData) -> str:
     """The command that shows the errors of the versions of a model."""
     fresh = ["--fresh", data.fresh] if data.fresh else []
     if data.fresh_history:
-        fresh += ["--fresh-history", data.fresh_history]
+        fresh += ["--fresh-temperatures", data.fresh_history]
     return command_line("history", str(file), "--dwells", data.source, *data.options, *fresh)
 
 
@@ -137,7 +137,7 @@ def print_extension(document: dict[str, Any], find: FindData, model: Path | None
         say(why, "yellow")
     print_next(extension(file, document["recommended"], document["effects"], data, new=new))
     if not data.fresh:
-        its_own = " and its temperatures with --fresh-history" if data.history else ""
+        its_own = " and its temperatures with --fresh-temperatures" if data.history else ""
         say(MEASURE_AGAIN.format(history=its_own), "dim")
 
 

@@ -1,6 +1,7 @@
 """``tumbleline workbench``: archive, models and missing effects in a browser."""
 
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -32,8 +33,10 @@ def command(
     name: Annotated[
         list[str] | None, option("--name HOST", "Further host name of this server; may be repeated.")
     ] = None,
-    certificate: Annotated[Path | None, option("--certificate FILE.pem", "Certificate for HTTPS.")] = None,
-    key: Annotated[Path | None, option("--key FILE.pem", "Private key of the certificate.")] = None,
+    tls: Annotated[
+        list[Path] | None,
+        option("--tls FILE.pem", "Certificate for HTTPS and its private key; twice where they are two files."),
+    ] = None,
     workers: Annotated[int, option("--workers", "Processes for diagnoses and fits.", min=1, max=32)] = 2,
     *,
     pause_lots: Annotated[
@@ -62,8 +65,7 @@ def command(
     from pipelines.workbench.settings import WorkbenchSettings
     from schemas.station import load_station
 
-    if (certificate is None) != (key is None):
-        raise WrongUse("workbench: a certificate and its key are needed together; give both or neither")
+    certificate, key = _certificate_and_key(tls or ())
     given = os.environ.get("TUMBLELINE_WORKBENCH_TOKEN", "")
     for one in station or ():
         load_station(one)  # a broken file is refused now, not when the page is opened
@@ -84,3 +86,26 @@ def command(
         remark("Open the address above; Ctrl-C ends the workbench.")
         servers.append(page_server(app, place, certificate, key))
         run_until_stopped(servers[0], place, "workbench")
+
+
+def _certificate_and_key(files: Sequence[Path]) -> tuple[Path | None, Path | None]:
+    """The certificate and its private key among PEM files, which may be one; None without a file.
+
+    Raises WrongUse: a file cannot be read, or one of the two is not there.
+    """
+    if not files:
+        return None, None
+    try:
+        texts = {path: path.read_text(encoding="utf-8", errors="replace") for path in files}
+    except OSError as problem:
+        raise WrongUse(
+            f"workbench: --tls {problem.filename} cannot be read ({problem.strerror}); correct the name"
+        ) from None
+    key = next((path for path, text in texts.items() if "PRIVATE KEY-----" in text), None)
+    certificate = next((path for path, text in texts.items() if "CERTIFICATE-----" in text), None)
+    if key is None or certificate is None:
+        lacks = "private key" if key is None else "certificate"
+        raise WrongUse(
+            f"workbench: --tls: no {lacks} in {', '.join(map(str, files))}, both are needed; give --tls for its file too"
+        )
+    return certificate, key

@@ -194,7 +194,7 @@ def _tracked(recording: CorrectableRecording, fit: FitOfUnit, tracking: Tracking
     if not 2 <= steps <= LONGEST_STEPS:
         raise DataRejected(
             f"{recording.name}: {steps} steps of {tracking.step_s:g} s, 2 to {LONGEST_STEPS} are needed to track the bias; "
-            "change --step"
+            "change the step with --set step=S"
         )
     middle, force = (_means(values, per) for values in (time, plain.force))
     known, magnitude = _references(recording, tracking, plain.force, per, rate)

@@ -1,0 +1,174 @@
+"""Names of commands and options of the version before, which are accepted for one release with a line that says the new ones.
+
+A word of the tables stands for itself; ``{}`` is the value of the option. An option whose new name is one word keeps its value
+where it is; one that is replaced by several, or by none, goes to the front, so that what is given besides has priority; a value
+that becomes an argument goes to the end; ``+--option text`` adds a text to the value of another option.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fnmatch import fnmatchcase
+
+COMMANDS: dict[str, str] = {
+    "allan": "noise allan",
+    "certify": "certificate issue",
+    "choose": "plan choose",
+    "diff": "archive diff",
+    "keys": "plan keys",
+    "monitor": "station monitor",
+    "operator": "station operator",
+    "program": "station program",
+    "psd": "noise psd",
+    "query": "archive query",
+    "report": "show --report",
+    "revoke": "certificate revoke",
+    "waveforms": "export --waveforms 0",
+    "whatif": "release whatif",
+}
+
+_MODEL = {"--history": "--temperatures", "--fresh-history": "--fresh-temperatures"}
+_SERIES = {"--time": "--map time={}", "--columns": "--map"}
+_NOISE = _SERIES | {
+    "--time-unit": "--unit-of time={}", "--unit": "--unit-of output={}", "--plot": "--output", "--page": "--output",
+}  # fmt: skip
+_INCLUDE = {"--failed": "--include failed", "--revoked": "--include revoked"}
+_SEARCH = {f"--{name}": f"--set {name}={{}}" for name in ("factor", "temperatures", "poses", "size", "separation")}
+_SEARCH |= {"--verification": "--set verification={}"}
+_PLAN = {"--page": "--output", "--wander": "+--noise ,{}"}
+_CERTIFICATE = {"--from": "--since"}
+_FILES = {"--join": "--set join={}", "--group": "--set group={}"}
+_BRING_UP = {f"--{name}": f"--set {name}={{}}" for name in ("timeout", "silence", "watch")}
+_KEYS = {
+    f"--{name}": f"--set {name}={{}}" for name in ("rows", "axes", "signs", "poses", "headings", "face", "positions")
+}
+_KEYS |= {f"--{name}": f"--set {name}={{}}" for name in ("threshold", "gaps", "faulty", "verify", "measured")}
+
+OPTIONS: dict[str, dict[str, str]] = {
+    "archive compact": {"--before": "--until"},
+    "archive query": {"--csv": "--output -"},
+    "audit": {"--page": "--output"},
+    "certificate issue": {**_CERTIFICATE, "--months": "--until {}m", "--key": "--trust"},
+    "certificate revoke": {**_CERTIFICATE, "--certificate": "{}"},
+    "compare": _MODEL,
+    "correct": {
+        **_SERIES, **_INCLUDE, "--force": "--track {}", "--at-rest": "--track at-rest", "--cutoff": "+--filter :{}",
+        "--gravity": "--set gravity={}", "--turn-on": "--set turn_on={}", "--step": "--set step={}",
+    },
+    "demo": {"--effect": "{}", "--archive": "--lots 400", "--auto": "--yes"},
+    "diagnose": {**_MODEL, "--report": "--output", "--page": "--output", "--next": "--output"},
+    "export": {
+        **_INCLUDE, "--unit": "--units", "--record": "--waveforms", "--cutoff": "+--filter :{}", "--track": "--set track=yes",
+        "--nominal": "--set nominal={}", "--device-id": "--set device_id={}", "--sensor": "--set sensor={}",
+        "--arithmetic": "--set arithmetic={}", "--counts-per-g": "--set counts_per_g={}", "--teds": "--set teds={}",
+        "--turn-on": "--set turn_on={}", "--step": "--set step={}",
+    },
+    "extend": {"--why": "--reason", "--by": "--who", "--run": "--dwells", "--out": "--output"},
+    "history": {**_MODEL, "--picture": "--output"},
+    "import": {
+        **_FILES, **_KEYS, "--mapping": "--set", "--part": "--set", "--units *=*": "--unit-of", "--unit": "--units",
+        "--blocks": "--set block_s={}", "--window": "--set window_s={}", "--shortest": "--set shortest_s={}",
+        "--local-g": "--set local_gravity_m_s2={}", "--zero-output": "--set zero_output={}", "--list-dwells": "--all",
+    },
+    "improve": {**_MODEL, "--out": "--output", "--by": "--who", "--group": "--set group={}"},
+    "inspect": {**_FILES, "--picture": "--output", "--page": "--output"},
+    "lineage": {"--prov": "--output", "--crate": "--output"},
+    "noise allan": _NOISE,
+    "noise psd": _NOISE,
+    "plan": {**_PLAN, "--pictures": "--output"},
+    "plan choose": {f"--{name}": f"{name}={{}}" for name in ("range", "error", "temperature", "bandwidth")},
+    "plan optimise": {
+        **_PLAN, "--see": "--wanted", "--part": "+--criterion :{}", "--ramp": "--set ramp=yes",
+        **_SEARCH,
+    },
+    "release": {**_CERTIFICATE, "--list": ""},
+    "simulate": {
+        "--time": "--map time={}", "--units": "--unit-of force={}", "--no-noise": "--seed none", "--noise": "",
+        "--failed": "--include failed",
+    },
+    "station bring-up": {**_BRING_UP, "--out": "--output", "--by": "--who", "--readings": "--read-only"},
+    "station check": {"--registers": "--read-only", "--units": "--slots"},
+    "station frames": {"--limit": "--last", "--page": "--output", "--as-test": "--output"},
+    "station log": {"--limit": "--last"},
+    "station monitor": {"--serve": "--port 9464", "--metrics": "--format prometheus"},
+    "station operator": {"--go": "--answer go", "--stop": "--answer stop"},
+    "station program": {
+        "--form": "--format", "--tolerance": "--set tolerance={}", "--offset-registers": "--set offset_registers=yes",
+    },
+    "station serve": {"--units": "--slots"},
+    "station status": {"--watch": "--every 1", "--units": "--slots"},
+    "station watch": {"--once": "--every 0"},
+    "verify": {"--key": "--trust"},
+    "workbench": {"--certificate": "--tls", "--key": "--tls"},
+}  # fmt: skip
+"""By command: the option of the version before, with a pattern of its value where that decides, and what it is now."""
+
+
+def present(words: Sequence[str]) -> list[str]:
+    """The words of a command line, with the present names in place of former ones."""
+    if not words:
+        return []
+    name, *front = COMMANDS.get(words[0], words[0]).split()
+    rest = [*front, *words[1:]]
+    path = [name, rest.pop(0)] if rest and f"{name} {rest[0]}" in OPTIONS else [name]
+    rules, line = OPTIONS.get(" ".join(path), {}), _Line()
+    while rest:
+        word = rest.pop(0)
+        if word == "--":
+            line.kept += [word, *rest]
+            break
+        option, equals, value = word.partition("=")
+        new = _rule(rules, option, value if equals else next(iter(rest), ""))
+        if new is None:
+            line.kept.append(word)
+        elif "{}" in new:
+            line.put(new, value if equals or not rest else rest.pop(0))
+        elif " " in new or not new:
+            line.front += new.split()
+        else:
+            line.kept.append(f"{new}{equals}{value}")
+    return [*path, *line.words()]
+
+
+class _Line:
+    """The words behind the name of a command: constants, those that stay in their place, new arguments, texts to add."""
+
+    def __init__(self) -> None:
+        self.front, self.kept, self.behind, self.added = list[str](), list[str](), list[str](), list[list[str]]()
+
+    def put(self, new: str, value: str) -> None:
+        """What stands for an option with a value."""
+        text = new.replace("{}", value)
+        if text.startswith("+"):
+            self.added.append(text[1:].split(" ", 1))
+        elif text.startswith("-"):
+            self.kept += text.split(" ", 1)
+        else:
+            self.behind.append(text)
+
+    def words(self) -> list[str]:
+        """All of them."""
+        for option, text in self.added:
+            _add(self.kept, option, text)
+        return [*self.front, *self.kept, *self.behind]
+
+
+def _rule(rules: dict[str, str], option: str, value: str) -> str | None:
+    """What an option of the version before is now; None for an option that is present."""
+    for stated, new in rules.items():
+        name, _, pattern = stated.partition(" ")
+        if name == option and (not pattern or fnmatchcase(value, pattern)):
+            return new
+    return None
+
+
+def _add(words: list[str], option: str, text: str) -> None:
+    """Add a text to the value of an option, which is appended where it is not there."""
+    for place, word in enumerate(words):
+        if word == option and place + 1 < len(words):
+            words[place + 1] += text
+            return
+        if word.startswith(f"{option}="):
+            words[place] += text
+            return
+    words += [option, text]
