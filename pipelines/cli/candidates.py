@@ -139,6 +139,6 @@ SOURCES: dict[tuple[str, str], Callable[[Context], Iterable[str]]] = {
     ("fault", "KIND"): _of("stations.plant.faults.catalogue", "kinds"),
     ("form", ""): _of("pipelines.export", "FORMATS"),
     ("table", "TABLE"): lambda ctx: _archive(ctx).run(str(ctx.params.get("run") or "latest")).tables(),
-    ("subject", "SUBJECT"): _of("pipelines.cli.keys", "SUBJECTS"),
+    ("subject", "SUBJECT"): _of("pipelines.cli.plan_keys", "SUBJECTS"),
 }
 """The source of candidates by the name of a parameter and a part of its notation, the narrower notation first."""

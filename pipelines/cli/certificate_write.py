@@ -18,11 +18,12 @@ def write(
     ] = Path("laboratory.toml"),
     output: Annotated[Path, option("--output -o DIR", "Folder for the files; the current one.")] = Path(),
     sign_with: Annotated[
-        Path | None, option("--sign-with KEY", "Sign PDF and XML: PKCS#12, or PEM with key and certificates.")
-    ] = None,
-    password_file: Annotated[
-        Path | None, option("--password-file FILE", "Password of the key, on the first line.")
-    ] = None,
+        str,
+        option(
+            "--sign-with KEY[,FILE]",
+            "Sign PDF and XML: PKCS#12, or PEM with key and certificates; then a file with the password on its first line.",
+        ),
+    ] = "",
     address: Annotated[str, option("--address URL", "Print a QR code of this address; {number} is filled in.")] = "",
     archive: ArchiveOption = None,
     *,
@@ -30,8 +31,8 @@ def write(
 ) -> None:
     """Write, for every certified unit, SERIAL_N.pdf and SERIAL_N.xml with the content of ISO/IEC 17025, 7.8.2 and 7.8.4.
 
-    A unit has to be certified before ('tumbleline certify'): the number of its certificate is the one in the ledger. The same
-    certificate gives the same bytes, unless it is signed. Exit status 1: some units of a run have no certificate.
+    A unit has to be certified before ('tumbleline certificate issue'): the number of its certificate is the one in the ledger.
+    The same certificate gives the same bytes, unless it is signed. Exit status 1: some units of a run have no certificate.
     """
     from pipelines.certificates.document.issue import issue
     from pipelines.certificates.document.laboratory import read_laboratory
@@ -39,7 +40,8 @@ def write(
 
     refuse_standard_output(output, "certificate", "a folder for PDF and XML")
     who = read_laboratory(laboratory)
-    key = None if sign_with is None else read_key(sign_with, password_file)
+    file, _, password = sign_with.partition(",")
+    key = read_key(Path(file), Path(password) if password else None) if sign_with else None
     done = issue(Archive(archive), names, who, output, key=key, address=address)
     lines = [f"certificate {one.number}: {one.pdf}, {one.xml}" for one in done.written]
     kept = ("serial", "run", "pdf", "xml", "signature")

@@ -32,8 +32,8 @@ PART = "Results"
 ORDER = 345
 SUMMARY = "Correct a recording with a calibration, and track the bias."
 EXAMPLES = (
-    "tumbleline correct flight.csv --calibration latest:SN1 --output corrected.csv",
-    "tumbleline correct bench.csv --calibration latest:SN1 --track at-rest --set turn_on=300 --output corrected.parquet",
+    "tumbleline correct flight.csv latest:SN1 --output corrected.csv",
+    "tumbleline correct bench.csv latest:SN1 --track at-rest --set turn_on=300 --output corrected.parquet",
 )
 
 
@@ -47,7 +47,7 @@ SETTINGS = {
 
 def command(
     file: Annotated[Path, argument("FILE", "Raw output over time, with a column of temperature.")],
-    calibration: options.CalibrationOption = "latest",
+    calibration: options.CalibrationArgument = "latest",
     output: Annotated[
         Path | None, option("--output -o FILE", "Corrected samples, as .csv or .parquet; -: as CSV on standard output.")
     ] = None,

@@ -95,7 +95,7 @@ def extension(
     """
     start = ["--effects", ",".join(judged)] if new else []
     lines = [
-        command_line("extend", str(file), name, *(start if place == 0 else []), "--run", data.source)
+        command_line("extend", str(file), name, *(start if place == 0 else []), "--dwells", data.source)
         for place, name in enumerate(effects)
     ]
     return [*lines, *fresh_measurement(file, data)]

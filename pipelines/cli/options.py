@@ -254,7 +254,9 @@ SelectionArgument = Annotated[
         "Names of runs or their beginnings, 'latest', 'all', device:…, station:…, unit:…, recipe:…, since:DATE, until:DATE.",
     ),
 ]
-CalibrationOption = Annotated[str, option("--calibration RUN:UNIT", "The calibration: a run and one of its units.")]
+CalibrationArgument = Annotated[
+    str, argument("[RUN:UNIT]", "The calibration: a run, latest by default, and one of its units.")
+]
 DaskOption = Annotated[
     str, option("--dask ADDRESS|local", "Work on Dask workers: of the scheduler at an address, or started here.")
 ]

@@ -20,8 +20,8 @@ PART = "Results"
 ORDER = 346
 SUMMARY = "Pass a trajectory through a calibrated unit: its raw output with its errors."
 EXAMPLES = (
-    "tumbleline simulate trajectory.csv --calibration latest:SN1 --output raw.csv",
-    "tumbleline simulate trajectory.csv --calibration latest:SN1 --seed none --output raw.mat",
+    "tumbleline simulate trajectory.csv latest:SN1 --output raw.csv",
+    "tumbleline simulate trajectory.csv latest:SN1 --seed none --output raw.mat",
 )
 
 
@@ -33,7 +33,7 @@ def command(
         Path, argument("FILE", "True specific force over time: time_s, force_x, force_y, force_z, unit_C.")
     ],
     output: Annotated[Path, option("--output -o FILE", "Raw samples, as .csv, .parquet, .mat or .npy.")],
-    calibration: options.CalibrationOption = "latest",
+    calibration: options.CalibrationArgument = "latest",
     unit_of: Annotated[str, option("--unit-of force=g|m/s^2", "Unit of measure of the force.")] = "",
     columns: options.MapOption = None,
     rate: options.RateOption = None,

@@ -9,7 +9,7 @@ from pipelines.archive import Archive
 from pipelines.cli import options
 from pipelines.cli.groups import group
 from pipelines.cli.inputs import made_up
-from pipelines.cli.options import argument, option
+from pipelines.cli.options import Setting, argument, option, set_option, settings
 from pipelines.cli.printing import give, print_json, print_table, say
 from pipelines.cli.station_bring_up import bring_up, frames, replay
 from pipelines.cli.station_check import check
@@ -27,8 +27,8 @@ SUMMARY = "Connect, check, show, watch and serve stations; operator, health, pro
 EXAMPLES = ("tumbleline station status --station line-1.toml", "tumbleline station check --station line-1.toml")
 EXAMPLES_OF = {
     "bring-up": (
-        "tumbleline station bring-up watlow_f4t --link tcp://192.168.0.20 --read-only",
-        "tumbleline station bring-up oriental_az --link serial:/dev/ttyUSB0 --device-id 1",
+        "tumbleline station bring-up watlow_f4t tcp://192.168.0.20 --read-only",
+        "tumbleline station bring-up oriental_az serial:/dev/ttyUSB0 --device-id 1",
     ),
     "operator": ("tumbleline station operator", "tumbleline station operator line-six --answer go"),
     "monitor": (
@@ -56,7 +56,7 @@ EXAMPLES_OF = {
         "tumbleline station check --station line-1.toml --read-only",
     ),
     "log": ("tumbleline station log", "tumbleline station log latest --all"),
-    "watch": ("tumbleline station watch", "tumbleline station watch --station line-1.toml --minutes 30"),
+    "watch": ("tumbleline station watch", "tumbleline station watch --station line-1.toml --last 30"),
     "serve": ("tumbleline station serve --port 5020", "tumbleline station serve --slots 4 --speed 60"),
     "profiles": ("tumbleline station profiles", "tumbleline station profiles watlow_f4t"),
 }
@@ -151,6 +151,13 @@ SETTINGS = re.compile(r"[,:;(]| with | behind ")
 """What stands between the name of a model and the required settings of the device."""
 
 
+SERVING = {
+    "silence": Setting(
+        "S", "seconds without a request after which drives and reader stop, 30 by default; 0: never.", float, 0.0
+    )
+}
+
+
 def serve(
     station: options.StationOption = None,
     host: Annotated[str, option("--host", "Interface to listen on.")] = "127.0.0.1",
@@ -161,9 +168,7 @@ def serve(
     device: options.SimulatedDeviceOption = "ADXL355",
     units: options.SimulatedUnitsOption = 8,
     seed: Annotated[int, option("--seed", "Random seed of the simulated units.", min=0)] = 1,
-    silence: Annotated[
-        float, option("--silence", "Seconds without a request after which drives and reader stop; 0: never.", min=0.0)
-    ] = 30.0,
+    setting: Annotated[list[str] | None, set_option(SERVING)] = None,
     *,
     as_json: options.JsonOption = False,
 ) -> None:
@@ -189,8 +194,9 @@ def serve(
         print_table(["device", "id", "profile"], [[d.name, str(d.device_id), d.profile] for d in devices], title)
         say("stop with Ctrl-C")
 
+    silence_s = settings(setting, SERVING, "serve").get("silence", 30.0)
     lot = made_up(device, units, seed)
-    run(config, lot, host=host, port=port, speed=speed, stop=stop, ready=ready, silence_s=silence)
+    run(config, lot, host=host, port=port, speed=speed, stop=stop, ready=ready, silence_s=silence_s)
 
 
 def profiles(

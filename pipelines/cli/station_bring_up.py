@@ -32,9 +32,7 @@ def bring_up(
     profile: Annotated[
         str, argument("PROFILE", "The profile of the device; 'tumbleline station profiles' lists them.")
     ],
-    link: Annotated[
-        str, option("--link LINK", "tcp://HOST[:PORT], serial:DEVICE[,BAUD[,PARITY[,STOP]]] or visa:RESOURCE.")
-    ],
+    link: Annotated[str, argument("LINK", "tcp://HOST[:PORT], serial:DEVICE[,BAUD[,PARITY[,STOP]]] or visa:RESOURCE.")],
     device_id: Annotated[int, option("--device-id", "Unit id of the device; 0: look for it.", min=0, max=255)] = 0,
     out: Annotated[Path | None, option("--output -o DIR", "New folder for page, recording and profile.")] = None,
     setting: Annotated[list[str] | None, set_option(SECONDS)] = None,

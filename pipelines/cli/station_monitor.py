@@ -27,7 +27,7 @@ def monitor(
     queue: Annotated[
         list[str] | None, option("--queue NAME", "A queue that must have a worker online; may be repeated.")
     ] = None,
-    days: Annotated[int, option("--days", "Number of days whose runs are counted.", min=1, max=3650)] = 30,
+    days: Annotated[int, option("--last N", "Number of days before now whose runs are counted.", min=1, max=3650)] = 30,
     free_gb: Annotated[float, option("--free-gb GB", "Free space that the archive needs.", min=0.0)] = 1.0,
     webhook: Annotated[str, option("--webhook ADDRESS", "Post alerts to this address, with --port.")] = "",
     audits: Annotated[

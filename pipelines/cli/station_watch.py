@@ -140,7 +140,7 @@ def watch(
     station: options.StationOption = None,
     archive: options.ArchiveOption = None,
     minutes: Annotated[
-        float, option("--minutes", "Time span, minutes before now; default: the whole run.", min=0.1)
+        float, option("--last N", "Number of minutes before now; default: the whole run.", min=0.1)
     ] = math.inf,
     every: Annotated[float, option("--every S", "Seconds between two readings; 0: draw once and exit.", min=0.0)] = 1.0,
     *,

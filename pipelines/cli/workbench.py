@@ -16,6 +16,9 @@ SUMMARY = "Show archive, models and missing effects in a browser."
 EXAMPLES = ("tumbleline workbench", "tumbleline workbench archive --port 8765")
 
 
+HOST = "127.0.0.1"
+
+
 def command(
     archive: Annotated[str, argument("[ARCHIVE]", "The archive; TUMBLELINE_ARCHIVE or ./archive by default.")] = "",
     folder: Annotated[
@@ -29,10 +32,9 @@ def command(
         ),
     ] = None,
     port: Annotated[int, option("--port", "Port; 0: a free one.", min=0, max=65535)] = 8321,
-    host: Annotated[str, option("--host ADDRESS", "Interface to listen on.")] = "127.0.0.1",
-    name: Annotated[
-        list[str] | None, option("--name HOST", "Further host name of this server; may be repeated.")
-    ] = None,
+    host: Annotated[
+        str, option("--host ADDRESS[,NAME…]", "Interface to listen on, then further host names of this server.")
+    ] = HOST,
     tls: Annotated[
         list[Path] | None,
         option("--tls FILE.pem", "Certificate for HTTPS and its private key; twice where they are two files."),
@@ -72,10 +74,11 @@ def command(
     # a proxy connects for everybody from one address, and limits addresses itself
     own = {"of_one_address": MOST} if behind_proxy else {}
     limits = ConnectionLimits(plain=certificate is None, **own)
-    with listening_socket(host, port, "workbench", limits) as place:
+    address, *names = (part.strip() for part in host.split(","))
+    with listening_socket(address or HOST, port, "workbench", limits) as place:
         listening = place.getsockname()[1]
         settings = WorkbenchSettings(
-            archive=Archive(archive or None).address, folder=folder, host=host, port=listening, names=tuple(name or ()),
+            archive=Archive(archive or None).address, folder=folder, host=address or HOST, port=listening, names=tuple(names),
             tls=certificate is not None, proxied=behind_proxy, stations=tuple(station or ()), workers=workers,
             pause_lots=pause_lots, **({"token": given} if given else {}),
         )  # fmt: skip

@@ -122,7 +122,7 @@ def fit_of_unit(run: Run, unit: str, what: str, *, failed: bool, revoked: bool) 
     calibration = read_calibration(run.table("coefficients"), run.table("covariance"))
     if not unit and len(calibration.units) > 1:
         raise WrongUse(
-            f"--calibration: run {run.id} has {len(calibration.units)} units, one is needed as RUN:UNIT; "
+            f"RUN:UNIT: run {run.id} has {len(calibration.units)} units, one is needed as RUN:UNIT; "
             f"{did_you_mean('', calibration.units)}"
         )
     serial = unit or next(iter(calibration.units))

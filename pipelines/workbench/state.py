@@ -117,7 +117,7 @@ class UnitsPage(PageState):
 
     def arguments(self) -> list[str]:
         """A question in SQL."""
-        return ["query", self.question()]
+        return ["archive", "query", self.question()]
 
     def question(self, most: int = ROWS) -> str:
         """The question in SQL for a page of units with their runs."""

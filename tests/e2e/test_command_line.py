@@ -49,7 +49,7 @@ def test_run_prints_one_document_and_tells_its_stages_elsewhere(archive: Path) -
 
 
 def test_every_statistic_of_the_static_record_of_a_run_is_made_from_its_samples(archive: Path) -> None:
-    words = ("allan", "latest", "--archive", archive)
+    words = ("noise", "allan", "latest", "--archive", archive)
     usual, total = document_of(*words), document_of(*words, "--statistic", "total")
     assert (total["statistic"], total["deviation_unit"], usual["deviation_unit"]) == ("total", "µg", "µg")
     assert total["terms"] == usual["terms"]

@@ -77,14 +77,14 @@ def written(spec: Spec, seed: int, folder: Path) -> Path:
 
 @pytest.mark.usefixtures("no_next_measurement")
 def test_diagnose_names_what_is_missing_in_text_document_and_report(cubic: Path, tmp_path: Path) -> None:
-    lot, report = (cubic / "dwells.parquet", "--history", cubic / "history.parquet"), tmp_path / "report.html"
+    lot, report = (cubic / "dwells.parquet", "--temperatures", cubic / "history.parquet"), tmp_path / "report.html"
     printed = text_of("diagnose", *lot, status=1)
     for part in (
         "NOT ADEQUATE", "third_order (K3)", "Effects that this plan cannot show",
         "tumbleline extend model.toml third_order --effects bias,scale,misalignment",
     ):  # fmt: skip
         assert part in printed
-    document = document_of("diagnose", *lot, "--report", report, status=1)
+    document = document_of("diagnose", *lot, "--output", report, status=1)
     assert document["recommended"] == ["third_order"]
     assert set(document["breakers"]) == set(document["unseen"])
     text = report.read_text(encoding="utf-8")
@@ -99,7 +99,7 @@ def test_diagnose_names_what_is_missing_in_text_document_and_report(cubic: Path,
 def test_a_lot_of_faulty_units_is_blocked(cubic: Path, tmp_path: Path) -> None:
     dwells = pd.read_parquet(cubic / "dwells.parquet")
     dwells.assign(out_x=dwells["out_x"].iloc[0]).to_csv(tmp_path / "stuck.csv", index=False)
-    printed = text_of("diagnose", tmp_path / "stuck.csv", "--report", tmp_path / "stuck.html", status=1)
+    printed = text_of("diagnose", tmp_path / "stuck.csv", "--output", tmp_path / "stuck.html", status=1)
     assert printed.startswith("CANNOT BE JUDGED: every unit")
     assert "Data faults" in (tmp_path / "stuck.html").read_text(encoding="utf-8")
 
@@ -171,7 +171,7 @@ def test_the_suggested_formula_explains_what_no_effect_does(tmp_path: Path, name
     made = make(World(hidden=((name, 3.0),)), 6_400_002)
     for kind in ("dwells", "history", "fresh", "fresh_history"):
         getattr(made, kind).to_parquet(tmp_path / f"{kind}.parquet")
-    data = (tmp_path / "dwells.parquet", "--history", tmp_path / "history.parquet")
+    data = (tmp_path / "dwells.parquet", "--temperatures", tmp_path / "history.parquet")
     document = document_of("diagnose", *data, status=1)
     part, text = OF_NO_CATALOGUE[name]
     assert document["recommended"] == []
@@ -180,7 +180,7 @@ def test_the_suggested_formula_explains_what_no_effect_does(tmp_path: Path, name
     assert " ".join(document["unexplained"]["text"].split()) in printed(document, capsys)
     offer, own = document["offer"], ",".join(document["effects"])
     formula = ("--formula", f"{offer['id']}={'; '.join(offer['columns'])}")
-    fresh = ("--fresh", tmp_path / "fresh.parquet", "--fresh-history", tmp_path / "fresh_history.parquet")
+    fresh = ("--fresh", tmp_path / "fresh.parquet", "--fresh-temperatures", tmp_path / "fresh_history.parquet")
     before = document_of("compare", *data, *fresh, "--effects", own)
     after = document_of("compare", *data, *fresh, "--effects", f"{own},{offer['id']}", *formula)
     assert before["rms_ug"] > 2.5 * made.floor_ug
@@ -193,7 +193,7 @@ def test_the_course_of_a_day_is_offered_with_its_period_and_makes_the_model_adeq
     run = case("withheld", 5, 771)
     run.dwells.to_parquet(tmp_path / "dwells.parquet")
     run.history.to_parquet(tmp_path / "history.parquet")
-    data = (tmp_path / "dwells.parquet", "--history", tmp_path / "history.parquet", "--effects")
+    data = (tmp_path / "dwells.parquet", "--temperatures", tmp_path / "history.parquet", "--effects")
     document = document_of("diagnose", *data, "bias,scale,misalignment", status=1)
     floor = run.sealed.floor_ug
     assert document["error"]["floor_ug"] == pytest.approx(floor, rel=0.05)
@@ -268,7 +268,7 @@ def test_a_formula_is_fitted_by_the_chain_and_told_of_by_export(tmp_path: Path) 
     with effects.additions_forgotten():
         effects._extra.clear()
         assert "curl" in {row["effect"] for row in document_of("show", again, "coefficients", *where)["rows"]}
-        assert "curl" in text_of("export", again, "--failed", "--json", *where, status=0)
+        assert "curl" in text_of("export", again, "--include", "failed", "--json", *where, status=0)
 
 
 @pytest.fixture(scope="module")
@@ -282,7 +282,7 @@ def test_the_proposed_steps_are_a_recipe_that_plan_and_run_accept_and_that_separ
     six: Path, tmp_path: Path
 ) -> None:
     target = tmp_path / "next.toml"
-    words = ("diagnose", six / "dwells.parquet", "--effects", PLAIN, "--next", target, "--recipe", LINE_SIX)
+    words = ("diagnose", six / "dwells.parquet", "--effects", PLAIN, "--output", target, "--recipe", LINE_SIX)
     rows = document_of(*words, status=1)["next_measurements"]
     steps = [row for row in rows if row.get("measurable", True)]
     assert steps

@@ -24,7 +24,7 @@ from pipelines.cli import INTERRUPTED
 from schemas.errors import DONE, PART_FAILED, UNUSABLE
 
 ROOT = Path(__file__).resolve().parents[2]
-SERVE = ("workbench", "monitor --serve", "station serve", "station replay", "station watch", "--watch")
+SERVE = ("workbench", "station monitor --port", "station serve", "station replay", "station watch", "--every")
 """Examples that go on until Ctrl-C: they are started and ended in a process of their own."""
 
 WITH_A_DEVICE = ("station bring-up",)
@@ -69,7 +69,7 @@ def world(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, str
     with pytest.MonkeyPatch.context() as patch, chdir(folder):
         _at_home(patch, folder)
         names = made_in(folder)
-        assert command(["certify", "latest"]).returncode == DONE
+        assert command(["certificate", "issue", "latest"]).returncode == DONE
     return folder, names
 
 
@@ -134,7 +134,7 @@ def test_an_example_that_serves_ends_by_ctrl_c(example: str, world: tuple[Path, 
         with subprocess.Popen(words, env=environment, **pipes) as process:
             too_long = threading.Timer(40.0 + patience, process.kill)
             too_long.start()
-            if "--watch" in example:  # a live table, which is written to a pipe when it ends
+            if "--every" in example:  # a live table, which is written to a pipe when it ends
                 threading.Event().wait(patience)
                 first = ""
             else:

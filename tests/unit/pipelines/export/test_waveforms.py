@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 from pipelines.archive import Archive
 from pipelines.cli import app
-from pipelines.cli.waveforms import FORMATS
+from pipelines.cli.export import WAVEFORMS as FORMATS
 from pipelines.export.waveforms import WRITERS, Channel, write_waveforms
 from pipelines.importers import files
 from pipelines.importers.waveforms import RecordingLayout, import_waveforms
@@ -114,7 +114,7 @@ def test_dwells_and_steps_of_others_are_imported_by_the_command(tmp_path: Path, 
         paths += write_waveforms("csv", made, tmp_path / f"dwell{k}.csv")
     part = tmp_path / "part.toml"
     part.write_text('nominal_scale = 0.3\neffects = ["second_order"]\nfull_scale = 5.0\n')
-    words = ["--procedure", "sweep", "--part", str(part), "--map", "z=dut [V],reference=ref [m/s^2]", "--unit", "W1"]
+    words = ["--procedure", "sweep", "--set", str(part), "--map", "z=dut [V],reference=ref [m/s^2]", "--units", "W1"]
     words += ["--json", "--archive", str(tmp_path / "archive")]
     answer = CliRunner().invoke(app, ["import", *map(str, paths), *words])
     document = json.loads(answer.stdout)

@@ -60,7 +60,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Issued:
     folder = tmp_path_factory.mktemp("issued")
     run = small_run(folder)
     run.seal()
-    done = CliRunner().invoke(app, ["certify", run.id, "--archive", str(run.archive.root), "--json"])
+    done = CliRunner().invoke(app, ["certificate", "issue", run.id, "--archive", str(run.archive.root), "--json"])
     TypeAdapter(CertifyDocument).validate_json(done.stdout, strict=True, extra="forbid")
     key = made_key(ec.generate_private_key(ec.SECP256R1()))
     who = laboratory_file(folder)
