@@ -1,10 +1,12 @@
 """``tumbleline certificate issue``: certificates with a period of validity for the units of a run that passed."""
 
 import re
+from functools import partial
 from typing import Annotated, Any
 
 from inertial.counts import number_of
 from pipelines.archive import Archive, Run
+from pipelines.cli.next_commands import archive_words, command_line
 from pipelines.cli.options import (
     ArchiveOption,
     JsonOption,
@@ -62,7 +64,7 @@ def issue(
         remark(f"certificate issue: the report was not made again: {problem}")
     certified = [{"certificate": e.certificate, **e.document(), "was_there": e in done.there} for e in done.events]
     document = {"run": source.id, "certified": certified, "left_out": done.left_out}
-    conclude(document, _print, as_json=as_json, passed=not done.left_out)
+    conclude(document, partial(_print, archive), as_json=as_json, passed=not done.left_out)
 
 
 def _print_run(run: Run) -> None:
@@ -76,7 +78,7 @@ def _print_run(run: Run) -> None:
         remark(f"certificate issue: {line}")
 
 
-def _print(document: dict[str, Any]) -> None:
+def _print(archive: str | None, document: dict[str, Any]) -> None:
     lines = [
         [e["certificate"], e["grade"], e["from"], e["until"], "already certified" if e["was_there"] else e["action"],
          ", ".join(f"/{number}" for number in e["ends"])]
@@ -85,7 +87,7 @@ def _print(document: dict[str, Any]) -> None:
     if lines:
         print_table(["certificate", "grade", "from", "until", "entry", "ends"], lines, title=f"run {document['run']}")
         say(
-            f"The documents: tumbleline certificate write {document['run']} --laboratory FILE "
+            f"The documents: {command_line('certificate', 'write', document['run'], *archive_words(archive))} --laboratory FILE "
             "(docs/how-to/issue-a-certificate.md)",
             style="dim",
         )

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pipelines.cli.next_commands import command_line, extension, judged_data
+from pipelines.cli.next_commands import Given, command_line, extension, judged_data
 from pipelines.cli.options import JsonOption, argument, option
 from pipelines.cli.printing import error_console, give, print_json, publish, remark, say
 from pipelines.cli.text.demo_text import print_ending
@@ -199,7 +199,7 @@ class _Game:
         """The effects added, written to the model file one version each."""
         chosen = self._asked_for(recommended)
         file = self.folder / "model.toml"
-        data = judged_data(str(self.folder / "dwells.parquet"), str(self.folder / "history.parquet"), None)
+        data = judged_data(str(self.folder / "dwells.parquet"), str(self.folder / "history.parquet"), Given())
         lines = extension(file, chosen, self.hidden.model, data, new=True)[:-1]
         self._step("3. Add it.", "\n  ".join(lines) or "(nothing to add)")
         self.model = list(_write_model(file, self.hidden.model, chosen))

@@ -79,10 +79,11 @@ def command(
         from pipelines.jobs.recipes import folder_of
 
         write_next(following, document, base, folder_of(recipe) if recipe else Path(), dwells)
-    from pipelines.cli.next_commands import judged_data
+    from pipelines.cli.next_commands import Given, judged_data
     from pipelines.cli.text.diagnosis_text import print_diagnosis
 
-    show = partial(print_diagnosis, data=partial(judged_data, dwells, beside, archive), model=model, brief=not show_all)
+    given = Given(archive, leave_out=leave_out, effect_files=effect_file or (), formulas=formula or ())
+    show = partial(print_diagnosis, data=partial(judged_data, dwells, beside, given), model=model, brief=not show_all)
     conclude(document, show, as_json=as_json, passed=bool(document["adequate"]))
 
 

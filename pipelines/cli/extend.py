@@ -5,7 +5,16 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from pipelines.cli.options import EffectFileOption, JsonOption, ReasonOption, WhoOption, argument, option
+from pipelines.cli.options import (
+    EffectFileOption,
+    FormulaOption,
+    JsonOption,
+    ReasonOption,
+    WhoOption,
+    argument,
+    names_in,
+    option,
+)
 from pipelines.cli.printing import give, is_standard_output, print_text, remark, say
 from schemas.errors import WrongUse
 
@@ -45,6 +54,7 @@ def command(
         str, option("--effects a,b,c", "The starting model of a new file; default: bias to scale_temperature.")
     ] = "",
     effect_file: EffectFileOption = None,
+    formula: FormulaOption = None,
     *,
     as_json: JsonOption = False,
 ) -> None:
@@ -54,13 +64,15 @@ def command(
     history of the file, with the reason.
     """
     from pipelines.cli.inputs import add_effects
+    from pipelines.diagnosis.inputs import with_formulas
     from pipelines.jobs.model_files import extended, model_step, publish_model, reduced
 
     printed = is_standard_output(output, "extend", as_json=as_json)
     _refuse_contradiction(model, effect, remove, reason)
-    add_effects(effect_file)
+    add_effects(effect_file, formula, "extend")
     step = model_step(remove or effect, reason, who, dwells)
     text, begun = _start(model, effects, step)
+    text = with_formulas(text, formula or (), [*names_in(effects), effect])
     new, after = (reduced if remove else extended)(text, step, f"model {model.name}")
     target = output or model
     if printed:

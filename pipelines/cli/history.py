@@ -1,10 +1,12 @@
 """``tumbleline history``: the error of a model, version by version, beside the noise that its fit assumes."""
 
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
 from pipelines.cli import options
-from pipelines.cli.next_commands import command_line, print_next
+from pipelines.cli.next_commands import Given, command_line, print_next
 from pipelines.cli.options import argument, option
 from pipelines.cli.printing import error_console, give, print_table, publish, say, short, warn
 from schemas.errors import WrongUse
@@ -26,6 +28,7 @@ def command(
     fresh_temperatures: options.FreshTemperaturesOption = "",
     picture: Annotated[Path | None, option("--output -o FILE.png", "Draw it, as PNG, SVG or PDF.")] = None,
     effect_file: options.EffectFileOption = None,
+    leave_out: options.LeaveOutOption = "",
     archive: options.ArchiveOption = None,
     *,
     as_json: options.JsonOption = False,
@@ -34,7 +37,7 @@ def command(
 
     Without --dwells only the changes are shown.
     """
-    from pipelines.cli.inputs import add_effects, both_runs
+    from pipelines.cli.inputs import add_effects, both_runs, without_dwells
     from pipelines.diagnosis.confirmation import FIGURES, JUDGED, change_row
     from pipelines.improvement.improvement import ImprovedTables, errors_by_version
     from pipelines.jobs.model_files import read_model, versions
@@ -48,7 +51,8 @@ def command(
             raise WrongUse("history: --output draws errors, they need --dwells; name the dwells too")
         refuse_ending(picture, "--output")
     if dwells:
-        tables = ImprovedTables(*both_runs(dwells, temperatures, fresh, fresh_temperatures, archive))
+        first, *others = both_runs(dwells, temperatures, fresh, fresh_temperatures, archive)
+        tables = ImprovedTables(without_dwells(first, leave_out)[0], *others)
         rows = errors_by_version(versions(model_file), tables, lambda: error_console().status("fitting"))
     else:
         rows = [
@@ -62,10 +66,14 @@ def command(
         chart = evolution_chart(rows, model_file.model.name)
         publish(picture, drawn(chart, picture.suffix.lower()), "picture")
     document = {"model": model_file.model.name, "file": str(model), "versions": rows}
-    give(document, lambda _: _print(rows, model_file.model.name, model), as_json=as_json)
+    give(
+        document,
+        lambda _: _print(rows, model_file.model.name, partial(removal, model, effect_file or ())),
+        as_json=as_json,
+    )
 
 
-def _print(rows: list[dict[str, Any]], name: str, file: Path) -> None:
+def _print(rows: list[dict[str, Any]], name: str, removes: Callable[[str], str]) -> None:
     changes = [
         [str(row["version"]), _change(row), row["by"], row["at"][:16].replace("T", " "), row["why"]] for row in rows
     ]
@@ -97,12 +105,13 @@ def _print(rows: list[dict[str, Any]], name: str, file: Path) -> None:
             f"{', '.join(refuted)}: refuted. The fresh run does not show the predicted change; remove it from the model.",
             style="bold red",
         )
-        print_next([removal(file, effect) for effect in refuted if effect in rows[-1]["effects"]])
+        print_next([removes(effect) for effect in refuted if effect in rows[-1]["effects"]])
 
 
-def removal(file: Path, effect: str) -> str:
+def removal(file: Path, effect_files: Sequence[Path], effect: str) -> str:
     """The command that removes an effect which a fresh run refutes."""
-    return command_line("extend", str(file), "--remove", effect, "--reason", "the fresh run is evidence against it")
+    words = ("--reason", "the fresh run is evidence against it", *Given(effect_files=effect_files).effects)
+    return command_line("extend", str(file), "--remove", effect, *words)
 
 
 def _change(row: dict[str, Any]) -> str:

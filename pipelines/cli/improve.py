@@ -74,7 +74,7 @@ def command(
     the resulting model is adequate and no fresh run refutes it; 1: otherwise; 2: the input cannot be used.
     """
     from pipelines.cli.inputs import add_effects, both_runs, without_dwells
-    from pipelines.cli.next_commands import judged_data
+    from pipelines.cli.next_commands import Given, judged_data
     from pipelines.cli.terminal import attended
     from pipelines.cli.text.improve_text import next_lines, next_of_recording, print_improvement, print_recording
     from pipelines.diagnosis.inputs import file_beside, judged_effects
@@ -101,11 +101,12 @@ def command(
     attendant = _Terminal(data, model, archive, quiet=as_json or brief, measure=may_measure)
     improvement = Improvement(data, tables, model, target, beside, who, fresh, attendant)
     document = improvement.run(judged, list(names_in(choose)), yes=yes)
-    find = partial(judged_data, data, beside, archive)
-    document["next"] = next_lines(document, target, find, after=document["after"] or document["diagnosis"])
+    given = Given(archive, fresh, fresh_temperatures, leave_out, effect_file or ())
+    kept = [*(["--output", str(output)] if output else []), *(["--who", who] if who else [])]
+    document["next"] = next_lines(document, (model, target), partial(judged_data, data, beside, given), given, kept)
     if recording is not None:
         document["recording"] = recording
-        document["next"] = next_of_recording(document, archive)
+        document["next"] = next_of_recording(document, given, ["--model", str(model)] if model else [], kept)
     show = print_recording if brief else print_improvement
     conclude(document, show, as_json=as_json, passed=bool(document["adequate"] and not document["refuted"]))
 

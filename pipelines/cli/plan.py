@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from pipelines.archive import files
 from pipelines.cli import options
 from pipelines.cli.groups import group
+from pipelines.cli.next_commands import archive_words
 from pipelines.cli.options import Setting, argument, option
 from pipelines.cli.plan_choose import choose
 from pipelines.cli.plan_keys import keys
@@ -206,7 +208,8 @@ def optimise(
     if printed:  # the recipe alone: its first comments say what it reaches
         print_text(text)
     else:
-        give(document, print_optimum, as_json=as_json)
+        where = [*(["--station", str(station)] if station else []), *archive_words(archive)]
+        give(document, partial(print_optimum, where=where), as_json=as_json)
 
 
 def _densities(noise: str) -> tuple[float | None, float | None]:

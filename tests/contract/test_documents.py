@@ -77,8 +77,8 @@ CASES = {
         "--reason",
         "a test",
     ],
-    "release --list --json": ["release"],
-    "revoke UNIT --json": ["certificate", "revoke", "A1", "--reason", "a test"],
+    "release --json": ["release"],
+    "certificate revoke UNIT --json": ["certificate", "revoke", "A1", "--reason", "a test"],
     "lineage UNIT|RUN|FILE --json": ["lineage", "A1"],
     "import FILE… --json": ["import", "{folder}/rest.csv", *IMPORTED],
     "import FILE FILE… --json": ["import", "{folder}/rest.csv", "{folder}/rest.csv", *IMPORTED],
@@ -94,7 +94,7 @@ CASES = {
     "attributes list --json": ["attributes", "list"],
     "archive backup --json": ["archive", "backup", "{folder}/copy"],
 }
-WITHOUT_ARCHIVE = {"station frames", "plan", "inspect FILE", "keys [SUBJECT]", "extend", "archive key"}
+WITHOUT_ARCHIVE = {"station frames", "plan", "inspect FILE", "plan keys [SUBJECT]", "extend", "archive key"}
 WITHOUT_ARCHIVE |= {f"station {one}" for one in ("status", "check", "profiles")}
 
 
@@ -107,7 +107,7 @@ def kept(tmp_path_factory: pytest.TempPathFactory) -> Path:
         patch.setattr(certifying, "refuse_unstated", lambda run: None)  # certified by the version that made the archive
         status, out, err = given("certificate", "issue", "latest", "--json", "--archive", folder / "archive")
         assert status == 0, err
-        validate(BY_HEAD["certify --json"], out)
+        validate(BY_HEAD["certificate issue --json"], out)
     model = '[model]\nname = "m"\nversion = 1\neffects = ["bias", "scale", "misalignment"]\n'
     (folder / "model.toml").write_text(model, encoding="utf-8")
     rows = [f"{k / 10},{k % 3},{k % 2},16{k % 10}" for k in range(200)]
@@ -147,17 +147,17 @@ ELSEWHERE = {
     "run --json (several fillings)": "e2e/test_operator.py",
     "show RUN --json (no grades)": "e2e/test_inquiry.py",
     "investigate --json": "e2e/test_inquiry.py",
-    "operator --json": "e2e/test_inquiry.py",
+    "station operator --json": "e2e/test_inquiry.py",
     "discover --explain ID --json": "e2e/test_discover.py",
-    "demo --archive --json": "e2e/test_discover.py",
-    "certificate --json": "unit/pipelines/certificates/document/test_compose.py",
+    "demo --lots N --json": "e2e/test_discover.py",
+    "certificate write --json": "unit/pipelines/certificates/document/test_compose.py",
     "verify FILE… --json": "unit/pipelines/certificates/document/test_file_check.py",
-    "certify --json": "contract/test_documents.py",
-    "program --json": "faults/test_programming.py",
+    "certificate issue --json": "contract/test_documents.py",
+    "station program --json": "faults/test_programming.py",
     "fit --json (an import)": "e2e/test_imported_recording.py",
-    "choose --json": "unit/pipelines/planning/test_choice.py",
+    "plan choose --json": "unit/pipelines/planning/test_choice.py",
     "simulate --json": "e2e/test_correct.py",
-    "demo --auto --json": "e2e/test_models.py",
+    "demo --yes --json": "e2e/test_models.py",
     "demo --by-hand --json": "e2e/test_models.py",
     "station serve --json": "e2e/test_station.py",
     "station bring-up --json": "e2e/test_bring_up.py",

@@ -329,8 +329,8 @@ def test_faces_without_a_known_noise_print_no_number_that_is_none() -> None:
             face=["xp", "xm", "yp", "ym", "zp", "zm"]
         )
         _, said, _ = given(
-            "import", written(frame), "--map", "x=x,y=y,z=z,dwell=face", "--set", "rows=dwells", "--unit-of", "output=g", "--units", "S1", "--set", f"poses={UP}", "--set", "local_gravity_m_s2=9.81",
-            "--fit", "faces",
+            "import", written(frame), "--map", "x=x,y=y,z=z,dwell=face", "--set", "rows=dwells", "--unit-of", "output=g",
+            "--units", "S1", "--set", f"poses={UP}", "--set", "local_gravity_m_s2=9.81", "--fit", "faces",
         )  # fmt: skip
         assert "nan" not in said
         assert "lack of fit" in said
