@@ -102,7 +102,7 @@ def stated_references(path: Path, content: dict[str, Any]) -> ImportReferences:
 def _refuse_day(day: str, where: str) -> None:
     if not day:
         raise WrongUse(
-            f"{where}: the day of the measurement is not given, it decides which references were due; add --measured YYYY-MM-DD"
+            f"{where}: the day of the measurement is not given, it decides which references were due; add --set measured=YYYY-MM-DD"
         )
     try:
         parsed = date.fromisoformat(day)
@@ -110,5 +110,5 @@ def _refuse_day(day: str, where: str) -> None:
         return  # the check of the mapping reports it
     if parsed > datetime.now(tz=UTC).date():
         raise WrongUse(
-            f"{where}: --measured {day} lies in the future, the day of the measurement is needed; correct it"
+            f"{where}: measured {day} lies in the future, the day of the measurement is needed; correct it"
         )

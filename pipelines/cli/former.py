@@ -27,6 +27,9 @@ COMMANDS: dict[str, str] = {
     "whatif": "release whatif",
 }
 
+GROUPS = {"certificate": "write"}
+"""Commands that became groups, and the subcommand that does what they did."""
+
 _MODEL = {"--history": "--temperatures", "--fresh-history": "--fresh-temperatures"}
 _SERIES = {"--time": "--map time={}", "--columns": "--map"}
 _NOISE = _SERIES | {
@@ -58,7 +61,7 @@ OPTIONS: dict[str, dict[str, str]] = {
         "--gravity": "--set gravity={}", "--turn-on": "--set turn_on={}", "--step": "--set step={}",
     },
     "demo": {"--effect": "{}", "--archive": "--lots 400", "--auto": "--yes"},
-    "diagnose": {**_MODEL, "--report": "--output", "--page": "--output", "--next": "--output"},
+    "diagnose": {"--history": "--temperatures", "--report": "--output", "--page": "--output", "--next": "--output"},
     "export": {
         **_INCLUDE, "--unit": "--units", "--record": "--waveforms", "--cutoff": "+--filter :{}", "--track": "--set track=yes",
         "--nominal": "--set nominal={}", "--device-id": "--set device_id={}", "--sensor": "--set sensor={}",
@@ -114,6 +117,8 @@ def present(words: Sequence[str]) -> list[str]:
         return []
     name, *front = COMMANDS.get(words[0], words[0]).split()
     rest = [*front, *words[1:]]
+    if name in GROUPS and rest and rest[0] not in {"-h", "--help"} and f"{name} {rest[0]}" not in OPTIONS:
+        rest = [GROUPS[name], *rest]
     path = [name, rest.pop(0)] if rest and f"{name} {rest[0]}" in OPTIONS else [name]
     rules, line = OPTIONS.get(" ".join(path), {}), _Line()
     while rest:

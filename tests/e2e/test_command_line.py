@@ -165,8 +165,8 @@ OFFERED = {
     "diagnose latest --effects bias,sca": {"bias,scale", "bias,scale_temperature"},
     "plan opt": {"optimise"},
     "run --fau": {"--fault"},
-    "correct flight.csv --calibration la": {"latest"},
-    "plan optimise production --wanted third": {"third_order="},
+    "correct flight.csv la": {"latest"},
+    "plan optimise production --wanted third": {"third_order"},
     "nonsense ": set(),
 }
 

@@ -256,16 +256,16 @@ def test_a_recording_goes_on_where_the_one_before_it_ended(run: Run, home: Path,
     how = ("correct", "a.csv", "latest:A1", "--archive", run.archive.root, "--set", "turn_on=2000")
     assert "it begins at 0 s, the state was kept at" in refused(*how, "--state", "kept.json")
     assert "the state of unit A1, that of A2 is needed" in refused(
-        *how[:3], "latest:A2", *how[4:], "--state", "kept.json"
+        *how[:2], "latest:A2", *how[3:], "--state", "kept.json"
     )
     Path("kept.json").write_text("{}", encoding="utf-8")
     assert "not the state that" in refused(*how, "--state", "kept.json")
     assert "no bandwidth of unit A1 was measured" in refused(*how, "--filter", "fir")
     assert "did you mean butterworth" in refused(*how, "--filter", "buterworth:3")
     assert "at most 40 Hz is needed" in refused(*how, "--filter", "fir:49")
-    assert "add --filter" in refused(*how, "--filter", ":49")
+    assert "as butterworth:50" in refused(*how, "--filter", ":49")
     export = ("export", run.id, "--archive", run.archive.root, "--include", "failed", "--units", "A1")
-    assert "need --arithmetic double or float" in refused(
+    assert "need --set arithmetic=double or float" in refused(
         *export, "--format", "c", "--filter", "fir:3", "--rate", "100", "--set", "arithmetic=q24"
     )
     assert "are for format c" in refused(*export, "--format", "csv", "--set", "track=yes")
@@ -278,7 +278,7 @@ def test_a_trajectory_comes_back_from_the_output_of_a_unit(run: Run, home: Path,
     flight = flight.assign(time_s=np.arange(n) / RATE, unit_C=np.linspace(5.0, 45.0, n))
     flight.to_csv("flight.csv", index=False)
     own = ("simulate", "flight.csv", "latest:A1", "--archive", run.archive.root, "--include", "failed")
-    document = document_of(*own, "--no-noise", "--output", "raw.csv", status=0)
+    document = document_of(*own, "--seed", "none", "--output", "raw.csv", status=0)
     assert (document["samples"], document["noise"], document["clipped"], document["seed"]) == (n, {}, 0, None)
     back = ("correct", "raw.csv", "latest:A1", "--archive", run.archive.root)
     document_of(*back, "--map", "x,y,z", "--output", "back.parquet")
@@ -300,7 +300,7 @@ def test_a_trajectory_comes_back_from_the_output_of_a_unit(run: Run, home: Path,
     assert clipped["told"] == ["no unit_C: 25 °C taken"]
     assert clipped["clipped"] == n
     assert "a name that ends in .csv" in refused(*own, "--output", "raw.xls")
-    assert "one of g, m/s^2" in refused(*own, "--units", "mg", "--output", "raw.csv")
+    assert "one of g, m/s^2" in refused(*own, "--unit-of", "force=mg", "--output", "raw.csv")
     assert "at most 40 Hz" in refused(*own, "--bandwidth", "70", "--output", "raw.csv")
 
 
@@ -337,13 +337,13 @@ def test_samples_after_the_last_whole_step_have_the_uncertainty_of_their_time(
 
 
 REFUSED = {
-    "a.csv --calibration latest": "3 units, one is needed as RUN:UNIT",
-    "a.csv --calibration latest:A9": "no unit A9",
-    "a.csv --calibration latest:A1 --force 0,0,1": "--turn-on",
-    "a.csv --calibration latest:A1 --force 0,0 --turn-on 300": "three numbers X,Y,Z",
-    "back.csv --calibration latest:A1": "does not always increase",
-    "cold.csv --calibration latest:A1": "temperature",
-    "a.csv --calibration latest:A1 --output o.txt": ".csv or .parquet",
+    "a.csv latest": "3 units, one is needed as RUN:UNIT",
+    "a.csv latest:A9": "no unit A9",
+    "a.csv latest:A1 --track 0,0,1": "--set turn_on",
+    "a.csv latest:A1 --track 0,0 --set turn_on=300": "three numbers X,Y,Z",
+    "back.csv latest:A1": "does not always increase",
+    "cold.csv latest:A1": "temperature",
+    "a.csv latest:A1 --output o.txt": ".csv or .parquet",
 }
 
 

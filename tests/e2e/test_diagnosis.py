@@ -115,11 +115,11 @@ UNUSABLE = {
     "--effects bias,scael": "unknown effect 'scael'; did you mean scale",
     "--effects bias --model m.toml": "leave one out",
     "--effects bias,scale,vibration_rectification": "vibration_rectification: the dwells have no vibration",
-    "--history nowhere.csv": "nowhere.csv",
+    "--temperatures nowhere.csv": "nowhere.csv",
     "--model nowhere.toml": "nowhere.toml cannot be read",
     "--effect-file nowhere.py": "no such Python file",
     "--model wet.toml": "the dwells have no 'temprature'; did you mean temperature",
-    "--next next.toml": "add --recipe FILE",
+    "--output next.toml": "add --recipe FILE",
 }
 
 

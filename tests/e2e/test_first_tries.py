@@ -99,7 +99,7 @@ def test_a_shock_without_a_scale_is_refused_with_the_key(tmp_path: Path) -> None
     for part in ((), ("--set", tmp_path / "part.toml")):
         told = refused(*words, "--map", "z=z [V],reference=reference [g]", *part)
         assert "procedure shock has no scale, output per g is needed" in told
-        assert "--part" in told or "part.toml" in told
+        assert "--set FILE.toml" in told or "part.toml" in told
 
 
 def test_a_dash_is_standard_output(measured: Archive, home: Path) -> None:

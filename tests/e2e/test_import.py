@@ -108,9 +108,9 @@ def test_inspect_says_in_capitals_what_a_file_does_not_say_and_offers_to_join_se
     assert told.endswith("--rate HZ")
     parts = [written(part, name) for name, part in (("p1.csv", table[:half]), ("p2.csv", table[half:]))]
     _, out, _ = given("inspect", *parts)
-    assert "add --join rows (one after the other) or --join" in out
+    assert "add --set join=rows (one after the other) or --set join=" in out
     assert out.rstrip().splitlines()[-1].startswith("tumbleline import ")
-    assert "--join rows (one" not in text_of("inspect", *parts, "--set", "join=rows")
+    assert "--set join=rows (one" not in text_of("inspect", *parts, "--set", "join=rows")
 
 
 def test_an_axis_at_the_end_of_its_range_is_told_as_clipped() -> None:
@@ -171,7 +171,7 @@ def test_gaps_and_rows_without_a_number_are_refused_with_their_row_and_split_on_
     path.write_text(gapped_file(record), encoding="utf-8")
     told = refused_import(path, *MAPPED)
     assert "a.csv: row 701 (line 702), column 'ay': found nan" in told
-    assert "--gaps split" in told
+    assert "--set gaps=split" in told
     written(recordings.table(record).drop(index=range(1500, 1560)))
     gap = "1 gap in time longer than 5 samples, the first before row 1501, the longest 0.61 s"
     assert gap in refused_import(path, *MAPPED)
@@ -190,7 +190,7 @@ def test_positions_logged_back_to_back_are_seen_and_divided(rng: np.random.Gener
     frame = pd.DataFrame(full.output[keep], columns=["ax", "ay", "az"]).assign(t=np.arange(keep.size) / 100.0)
     told = refused_import(written(frame), *MAPPED)
     assert "positions logged back to back" in told
-    assert "--positions 20" in told
+    assert "--set positions=20" in told
     document = imported("a.csv", *MAPPED, "--set", "positions=20")
     means = np.array([one["mean"] for one in document["dwell_list"]])
     truth = np.array([full.output[a : a + 40].mean(axis=0) for a, _ in full.spans])
@@ -291,8 +291,8 @@ def test_one_pose_says_what_it_shows_and_is_not_told_to_fit_a_scale() -> None:
     frame = pd.DataFrame(output, columns=["ax", "ay", "az"]).assign(t=time, temp=25.0 + 5.0 * np.sin(time / 20.0))
     told = text_of("import", written(frame), *MAPPED, status=0)
     assert "12000 samples, 1 dwell in LSB" in told
-    assert "one pose whose force is not known: its noise by 'tumbleline allan'" in told
-    assert "--face +x … -z" in told
+    assert "one pose whose force is not known: its noise by 'tumbleline noise allan'" in told
+    assert "--set face=+x … -z" in told
     mapped = (
         "--map",
         f"{MAPPED[1]},temperature=temp",

@@ -125,7 +125,7 @@ def test_from_a_recording_of_unknown_poses_to_a_report_and_no_certificate() -> N
     assert "was imported without a statement of its references (noise only)" in refused(
         "certificate", "issue", fitted["run"]
     )
-    told = refused("certificate", "H1", "--laboratory", "laboratory.toml")
+    told = refused("certificate", "write", "H1", "--laboratory", "laboratory.toml")
     assert "unit H1 has no certificate, one is needed" in told
     # an adequate model is needed besides, however wide the limits are
     Path("wide.toml").write_text(BENCH.replace("300.0", "9000.0"), encoding="utf-8")
@@ -260,7 +260,7 @@ def test_from_a_recording_with_stated_references_to_its_certificate() -> None:
         assert words in page
     assert "not stated: level" not in page
     assert "H1/1" in text_of("export", fitted["run"])
-    text_of("certificate", "H1", status=0)
+    text_of("certificate", "write", "H1", status=0)
     assert "local gravity" in Path("H1_1.xml").read_text(encoding="utf-8")
     text_of("verify", status=0)
     text_of("certificate", "revoke", "H1", "--reason", "fell to the floor", status=0)
@@ -290,12 +290,12 @@ def test_the_rules_of_the_budget_hold_for_an_import(words: str) -> None:
 
 
 SLIPS = {
-    "they differ by -282 ppm; leave --local-g out": ("u_ppm = 200.0", "u_ppm = 0.5", *STANDARD),
+    "they differ by -282 ppm; leave local_gravity_m_s2 out": ("u_ppm = 200.0", "u_ppm = 0.5", *STANDARD),
     "9.80665 is standard gravity, not a site's value": ("value_m_s2 = 9.80942", "value_m_s2 = 9.80665"),
     "no [[reference]] is called 'PT-8'": ('reference = "PT-7"', 'reference = "PT-8"'),
     "key 'uncertainty.gravity' is missing": ("gravity = ", "# gravity = "),
     "offset_U_K": ("offset_U_K = 2.0", "offset_K = 2.0"),
-    "--measured 2999-01-01 lies in the future": ("", "", "--set", "measured=2999-01-01"),
+    "measured 2999-01-01 lies in the future": ("", "", "--set", "measured=2999-01-01"),
     "measured": ("", "", "--set", "measured=yesterday"),
     "leaves 8 of them, 12 are needed for the fit": ("", "", "--set", "verify=40"),
     "a number of dwells or a share such as 20% is needed": ("", "", "--set", "verify=some"),
@@ -310,7 +310,7 @@ def test_a_statement_with_a_slip_is_refused(words: str) -> None:
 
 
 def test_the_day_of_the_measurement_is_needed_beside_references() -> None:
-    assert "add --measured YYYY-MM-DD" in refused(*hand_held("--references", "lab.toml"))
+    assert "add --set measured=YYYY-MM-DD" in refused(*hand_held("--references", "lab.toml"))
 
 
 def test_a_level_error_of_a_plate_is_named_where_the_headings_are_given() -> None:
@@ -333,15 +333,15 @@ def test_a_level_error_of_a_plate_is_named_where_the_headings_are_given() -> Non
     frame = pd.DataFrame(np.concatenate(rows), columns=["x", "y", "z"]).assign(label=labels)
     frame.to_csv("plate.csv", index=False)
     words = ("plate.csv", "--map", "x=x,y=y,z=z,dwell=label", "--unit-of", "output=g", "--rate", "100", "--units", "P")
-    known = ("import", *words, "--set", f"poses={','.join(poses)}", *STANDARD, "--set", "headings=")
-    run = document_of(*known, ",".join(headings))["run"]
+    known = ("import", *words, "--set", f"poses={','.join(poses)}", *STANDARD, "--set")
+    run = document_of(*known, f"headings={','.join(headings)}")["run"]
     assert [group["effects"] for group in document_of("diagnose", run)["classes"]] == [["level_error"]]
     fitted = document_of("fit", run, "--effects", f"{PLAIN},level_error")
     assert fitted["adequate"] is True
     found = table(fitted["run"], "coefficients")
     level = found[found["effect"] == "level_error"].set_index("name")["value"]
     assert [level["level_1"], level["level_2"]] == pytest.approx([3e-3, -2e-3], abs=5e-5)
-    assert "a heading for every pose is needed" in refused(*known, ",".join(headings[:-1]))
+    assert "a heading for every pose is needed" in refused(*known, f"headings={','.join(headings[:-1])}")
 
 
 def test_a_file_of_one_plane_is_calibrated_in_that_plane() -> None:

@@ -57,7 +57,7 @@ def test_a_still_record_is_blocks_of_one_pose_without_the_hand_at_its_ends(rng: 
     frame.to_csv("still.csv", index=False, float_format="%.5f")
     document = document_of("improve", "still.csv", "--no-measure")
     one = document["recording"]
-    assert "--face +z --blocks 10" in one["command"]
+    assert "--set face=+z --set block_s=10" in one["command"]
     assert any(text.startswith("handling at the ends left out: 0 to 3") for text in one["remarks"])
     slope = Archive(None).run(one["run"]).table("dwells")
     fitted = np.polyfit(slope["unit_C"], slope["out_z"], 1)[0]

@@ -82,12 +82,12 @@ REFUSED = {
     "m.toml second_order": "in version 2 already",
     "m.toml forth_order": "did you mean fourth_order",
     "m.toml third_order --effects bias": "--effects is for a new file",
-    "m.toml --remove scale_temperatur --why x": "did you mean scale_temperature",
-    "m.toml --remove scale": "add --why TEXT",
-    "m.toml third_order --remove scale --why x": "EFFECT and --remove are both given",
+    "m.toml --remove scale_temperatur --reason x": "did you mean scale_temperature",
+    "m.toml --remove scale": "add --reason TEXT",
+    "m.toml third_order --remove scale --reason x": "EFFECT and --remove are both given",
     "m.toml": "no effect is given",
-    "one.toml --remove bias --why x": "the only effect",
-    "none.toml --remove bias --why x": "needs a model file",
+    "one.toml --remove bias --reason x": "the only effect",
+    "none.toml --remove bias --reason x": "needs a model file",
 }
 
 

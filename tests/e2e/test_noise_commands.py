@@ -113,7 +113,7 @@ def test_a_spectrum_is_drawn_and_a_picture_of_no_known_kind_is_refused(record: P
     )
     assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
     assert (tmp_path / "a.html").read_text(encoding="utf-8").count("<svg") == 1
-    assert "name a .png, .svg or .pdf file" in refused(
+    assert "picture: .svg, .png, .pdf" in refused(
         "noise", "allan", record, "--map", "time=t", "--output", tmp_path / "a.bmp"
     )
 
@@ -122,7 +122,7 @@ def test_a_wrong_name_a_gap_a_missing_rate_and_a_dead_channel_are_refused_or_tol
     message = refused("noise", "allan", record, "--map", "time=t", "--statistic", "hadamart")
     assert "--statistic: found 'hadamart', one of allan, modified, hadamard" in message
     assert "did you mean hadamard" in message
-    assert "one of --time COLUMN and --rate HZ is needed" in refused("noise", "allan", record)
+    assert "one of --map time=COLUMN and --rate HZ is needed" in refused("noise", "allan", record)
     table = pd.read_csv(record)
     table.drop(index=700).to_csv(tmp_path / "gap.csv", index=False)
     assert "after row 700 the time steps by 0.02 s" in refused(

@@ -272,7 +272,7 @@ def test_its_certificate_speaks_of_the_error_along_its_axis(measured, tmp_path: 
     folder, runs = measured
     archive = ("--archive", folder / "archive")
     given("certificate", "issue", runs["one"], *archive)
-    text_of("certificate", "SF-02", *archive, "--laboratory", laboratory_file(tmp_path), "--output", tmp_path)
+    text_of("certificate", "write", "SF-02", *archive, "--laboratory", laboratory_file(tmp_path), "--output", tmp_path)
     [document] = tmp_path.glob("*.xml")
     text = document.read_text(encoding="utf-8")
     assert "error of the corrected output, verification (largest of the poses)" in text

@@ -285,17 +285,17 @@ def test_limits_beside_the_first_recipe_are_found_and_missing_ones_are_a_warning
 
 REFUSED = {
     "--criterion worts": "did you mean worst",
-    "--poses twelv": "did you mean twelve",
-    "--temperatures cold,warm": "write -10,25,60",
+    "--set poses=twelv": "did you mean twelve",
+    "--set temperatures=cold,warm": "write -10,25,60",
     "--wanted bais=50": "did you mean bias",
     "--wanted bias=-3": "positive error",
-    "--see third_ordre": "third_order",
-    "--criterion T": "write --part third_order,odd_quadratic",
-    "--criterion T --part third_order": "two or more are needed",
-    "--criterion T --part third_order,odd_quadratics": "odd_quadratic",
-    "--criterion T --part third_order,level_error": "an effect of the station",
-    "--criterion T --part third_order,odd_quadratic --factor 2": "--factor does not go",
-    "--part third_order,odd_quadratic": "or write --criterion T",
+    "--wanted third_ordre": "third_order",
+    "--criterion T": "write --criterion T:third_order,odd_quadratic",
+    "--criterion T:third_order": "two or more are needed",
+    "--criterion T:third_order,odd_quadratics": "odd_quadratic",
+    "--criterion T:third_order,level_error": "an effect of the station",
+    "--criterion T:third_order,odd_quadratic --set factor=2": "--set factor does not go",
+    "--criterion A:third_order,odd_quadratic": "or write --criterion T",
 }
 
 

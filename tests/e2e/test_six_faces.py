@@ -73,5 +73,5 @@ def test_labels_of_a_file_name_its_faces(rng: np.random.Generator, *, moves: boo
     path = recorded(rng, "labels.csv", moves=moves)
     command = document_of("improve", path, "--yes", status=1)["recording"]["command"]
     assert "dwell=pose" in command
-    assert "--poses p0=+x,p1=-x,p2=+y,p3=-y,p4=+z,p5=-z" in command
-    assert command.startswith(document_of("inspect", path)["command"].split(" --gaps")[0])
+    assert "--set poses=p0=+x,p1=-x,p2=+y,p3=-y,p4=+z,p5=-z" in command
+    assert command.startswith(document_of("inspect", path)["command"].split(" --set gaps")[0])

@@ -40,14 +40,14 @@ ELSEWHERE = {"run", "investigate", "import"}
 """Commands whose runs are kept in another archive, so that the latest run is the one that the other examples mean."""
 
 OTHERWISE = {
-    "tumbleline operator": "no run waits",  # with one that waits: tests/e2e/test_inquiry.py
-    "tumbleline operator line-six --go": "no run waits",
+    "tumbleline station operator": "no run waits",  # with one that waits: tests/e2e/test_inquiry.py
+    "tumbleline station operator line-six --answer go": "no run waits",
     # the example before it has programmed other units: the simulated station goes on with that lot only
-    "tumbleline program latest --station line-1.toml --form q24 --yes": "it belongs to another station or lot",
+    "tumbleline station program latest --station line-1.toml --format q24 --yes": "it belongs to another station or lot",
     # the example before it has revoked the only certificate
-    "tumbleline revoke SN1 --certificate 2 --reason 'reference out of date'": "has no calibration that holds",
+    "tumbleline certificate revoke SN1 2 --reason 'reference out of date'": "has no calibration that holds",
     # the model of the folder is the one that the runs were fitted with
-    "tumbleline release model.toml --from 2026-01-01 --reason 'the error on fresh runs falls'": "says no better",
+    "tumbleline release model.toml --since 2026-01-01 --reason 'the error on fresh runs falls'": "says no better",
     # the lot of the folder was measured at one temperature
     "tumbleline fit latest --limits industrial": "needs effect bias_temperature",
 }

@@ -90,7 +90,7 @@ def test_a_tumble_is_its_fourier_series(tmp_path):
     ("words", "needed"),
     [
         (("--map", TILT, "--set", "axes=w"), "'x', 'y' or 'z'"),
-        (("--map", TILT), "or --axes x for a device with fewer axes"),
+        (("--map", TILT), "or --set axes=x for a device with fewer axes"),
         (("--map", TILT, "--set", "axes=x,y"), "axes are x, y, and x mapped"),
         (("--map", TILT.replace("volts", "vots"), "--set", "axes=x"), "'vots'"),
         (("--map", TILT, "--set", "axes=x", "--fit", "norm"), "needs three axes"),
