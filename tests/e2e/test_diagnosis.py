@@ -12,6 +12,7 @@ from capture_double import small_run
 from each import each
 from in_process import document_of, given, refused, text_of
 from root_process import ROOT
+from typed_commands import printed_commands
 
 from inertial import effects
 from pipelines.cli.text.diagnosis_text import print_diagnosis
@@ -217,6 +218,26 @@ def test_an_effect_file_takes_part(humid: Path, tmp_path: Path) -> None:
     document = document_of(*words, status=1)
     assert "damp" in {name for group in document["classes"] for name in group["effects"]}
     assert "damp" in document["recommended"]
+
+
+@pytest.mark.usefixtures("no_next_measurement")
+def test_the_lines_after_it_carry_effect_file_and_dwells_left_out_and_run(
+    humid: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("my damp.py").write_text(OWN, encoding="utf-8")
+    first = pd.read_parquet(humid / "dwells.parquet").iloc[0]
+    left = f"{first['unit']}:{first['dwell']}"
+    words = ("diagnose", humid / "dwells.parquet", "--effect-file", "my damp.py", "--leave-out", left)
+    with effects.additions_forgotten():
+        _, out, _ = given(*words)
+    lines = printed_commands(out.split("Next:", 1)[1])
+    assert [one[0] for one in lines] == [*["extend"] * (len(lines) - 1), "history"]
+    assert all(one[one.index("--effect-file") + 1] == "my damp.py" for one in lines)
+    assert lines[-1][lines[-1].index("--leave-out") + 1] == left
+    for one in lines:
+        with effects.additions_forgotten():  # as in a process of its own
+            assert given(*one)[0] in {0, 1}, one
 
 
 def test_an_installed_package_takes_part(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

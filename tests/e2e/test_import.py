@@ -311,7 +311,7 @@ def test_one_pose_says_what_it_shows_and_is_not_told_to_fit_a_scale() -> None:
     said = " ".join((out + err).split())
     assert "add 'scale'" not in said
     assert "divide the outputs" in said
-    assert "--units output=g" in said
+    assert "--unit-of output=g" in said
     frame[["ax", "ay", "az"]] /= 16384.0  # the advice, followed, leads to a fit
     imported(written(frame), *mapped, "--unit-of", "output=g", "--set", "block_s=10")
     text_of(*fit)

@@ -29,7 +29,7 @@ ELSEWHERE = {
     "investigate": HERE + "test_the_lines_after_an_investigation_name_the_judged_model",
     "improve_text": HERE + "test_the_lines_after_an_improvement_decide_between_alternatives",
     "demo": HERE + "test_the_lines_of_the_demonstration_run_by_hand",
-    "certificate_issue": "tests/unit/pipelines/chain/test_certify.py::test_the_line_about_the_documents_names_the_archive",
+    "certificate_issue": "tests/unit/pipelines/cli/test_next_commands.py::test_the_line_about_documents_names_the_archive",
     "plan_text": "tests/e2e/test_plan.py::test_the_line_after_a_search_measures_the_new_recipe",
 }
 """Where the lines of a module are run that prints them after minutes only, or after several commands."""

@@ -141,7 +141,7 @@ def test_its_teds_state_the_sensitivity_of_one_axis(measured, tmp_path: Path) ->
         assert 5e-7 * 1.0003 ** (bits >> 76 & 0xFFFF) == pytest.approx(scale / 9.80665, rel=1.5e-4)
     status, _, err = given(*words[:-2])
     assert status == UNUSABLE
-    assert "--teds: found no manufacturer, model" in " ".join(err.split())
+    assert "--set teds: found no manufacturer, model" in " ".join(err.split())
 
 
 def test_its_plan_speaks_of_one_axis(measured) -> None:

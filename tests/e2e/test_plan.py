@@ -340,9 +340,10 @@ def test_no_recipe_is_quicker_than_the_bound_of_dwells_without_end() -> None:
 @pytest.mark.timeout(1200)  # a whole run of the recipe that was found
 def test_the_line_after_a_search_measures_the_new_recipe(tmp_path: Path) -> None:
     target = tmp_path / "my new recipe.toml"
-    (words,) = printed_commands(given(*optimise("--set", "factor=4"), "-o", target)[1])
-    assert words == ["run", str(target)]
-    text_of(*words, "--direct", "--archive", tmp_path / "archive")
+    own = ("--archive", str(tmp_path / "archive"))
+    (words,) = printed_commands(given(*optimise("--set", "factor=4"), "-o", target, *own)[1])
+    assert words == ["run", str(target), *own]
+    text_of(*words, "--direct")
 
 
 @pytest.mark.slow

@@ -38,7 +38,7 @@ def units(typed: Typed, run: Run, *words: str) -> dict[str, dict]:
 def test_an_export_names_the_certificate_and_whether_it_holds(run: Run, typed: Typed) -> None:
     done = typed("export", run.id)
     assert {one["certificate"] for one in json.loads(done.stdout)["units"]} == {None}
-    assert "not certified: A1, A2; 'tumbleline certify" in done.stderr
+    assert "not certified: A1, A2; 'tumbleline certificate issue" in done.stderr
     typed("certificate", "issue", run.id)
     assert typed("export", run.id).stderr == ""
     wanted = {

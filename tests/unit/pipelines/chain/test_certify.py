@@ -204,7 +204,7 @@ def test_show_export_and_verify_name_who_did_not_sign(
     assert typed("verify").exit_code == 1
     refused = typed("certificate", "issue", run.id, "--until", "6m").exception
     assert isinstance(refused, ArchiveUnusable)
-    assert "a signature by the own key, or by one given with --key, is needed" in str(refused)
+    assert "a signature by the own key, or by one given with --trust, is needed" in str(refused)
 
 
 def test_an_edit_behind_a_signature_stops_show_and_export(

@@ -81,7 +81,7 @@ def test_a_file_without_unit_or_sample_interval_is_refused(tmp_path: Path, rng: 
     bare.write_text(f"dut,ref\n{rows}\n")
     (part := tmp_path / "part.toml").write_text("scale = 0.3\n")
     columns = {"z": "dut", "reference": "ref"}
-    with pytest.raises(DataRejected, match=r"bare.csv: column 'dut' has no unit.*--units output"):
+    with pytest.raises(DataRejected, match=r"bare.csv: column 'dut' has no unit.*--unit-of output"):
         import_waveforms([bare], "shock", part, "S1", RecordingLayout(columns, {}), str(tmp_path / "a"))
     units = {"output": "V", "reference": "g"}
     with pytest.raises(DataRejected, match=r"no sample interval is stated.*--rate"):
@@ -92,7 +92,7 @@ def test_a_file_without_unit_or_sample_interval_is_refused(tmp_path: Path, rng: 
     stated = tmp_path / "stated.csv"
     stated.write_text(f"dut [V],ref [g]\n{rows}\n")
     layout = RecordingLayout({"z": "dut [V]", "reference": "ref [g]"}, {"output": "mV"}, RATE)
-    with pytest.raises(WrongUse, match=r"states V, --units has mV"):
+    with pytest.raises(WrongUse, match=r"states V, --unit-of has mV"):
         import_waveforms([stated], "shock", part, "S1", layout, str(tmp_path / "a"))
     with pytest.raises(WrongUse, match="can be imported"):
         import_waveforms([bare], "tilt", None, "S1", RecordingLayout(columns, units, RATE), str(tmp_path / "a"))
