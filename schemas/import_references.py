@@ -109,6 +109,4 @@ def _refuse_day(day: str, where: str) -> None:
     except ValueError:
         return  # the check of the mapping reports it
     if parsed > datetime.now(tz=UTC).date():
-        raise WrongUse(
-            f"{where}: measured {day} lies in the future, the day of the measurement is needed; correct it"
-        )
+        raise WrongUse(f"{where}: measured {day} lies in the future, the day of the measurement is needed; correct it")

@@ -10,6 +10,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from fnmatch import fnmatchcase
 
+from pipelines.cli.groups import SPELLED
+
 COMMANDS: dict[str, str] = {
     "allan": "noise allan",
     "certify": "certificate issue",
@@ -30,83 +32,80 @@ COMMANDS: dict[str, str] = {
 GROUPS = {"certificate": "write"}
 """Commands that became groups, and the subcommand that does what they did."""
 
+
+def _set(names: str) -> dict[str, str]:
+    return {f"--{name}": f"--set {name}={{}}" for name in names.split()}
+
+
+_PAGE = {"--page": "--output"}
 _MODEL = {"--history": "--temperatures", "--fresh-history": "--fresh-temperatures"}
 _SERIES = {"--time": "--map time={}", "--columns": "--map"}
-_NOISE = _SERIES | {
-    "--time-unit": "--unit-of time={}", "--unit": "--unit-of output={}", "--plot": "--output", "--page": "--output",
-}  # fmt: skip
+_NOISE = _SERIES | {"--time-unit": "--unit-of time={}", "--unit": "--unit-of output={}", "--plot": "--output", **_PAGE}
 _INCLUDE = {"--failed": "--include failed", "--revoked": "--include revoked"}
-_SEARCH = {f"--{name}": f"--set {name}={{}}" for name in ("factor", "temperatures", "poses", "size", "separation")}
-_SEARCH |= {"--verification": "--set verification={}"}
-_PLAN = {"--page": "--output", "--wander": "+--noise ,{}"}
-_CERTIFICATE = {"--from": "--since"}
-_FILES = {"--join": "--set join={}", "--group": "--set group={}"}
-_BRING_UP = {f"--{name}": f"--set {name}={{}}" for name in ("timeout", "silence", "watch")}
-_KEYS = {
-    f"--{name}": f"--set {name}={{}}" for name in ("rows", "axes", "signs", "poses", "headings", "face", "positions")
-}
-_KEYS |= {f"--{name}": f"--set {name}={{}}" for name in ("threshold", "gaps", "faulty", "verify", "measured")}
+_SINCE = {"--from": "--since"}
+_PLAN = {**_PAGE, "--wander": "+--noise ,{}"}
 
 OPTIONS: dict[str, dict[str, str]] = {
     "archive compact": {"--before": "--until"},
     "archive query": {"--csv": "--output -"},
-    "audit": {"--page": "--output"},
-    "certificate issue": {**_CERTIFICATE, "--months": "--until {}m", "--key": "--trust"},
+    "audit": _PAGE,
+    "certificate issue": {**_SINCE, "--months": "--until {}m", "--key": "--trust"},
     "certificate write": {"--password-file": "+--sign-with ,{}"},
-    "certificate revoke": {**_CERTIFICATE, "--certificate": "{}"},
+    "certificate revoke": {**_SINCE, "--certificate": "{}"},
     "compare": _MODEL,
     "correct": {
         **_SERIES, **_INCLUDE, "--calibration": "{}",
         "--force": "--track {}", "--at-rest": "--track at-rest", "--cutoff": "+--filter :{}",
-        "--gravity": "--set gravity={}", "--turn-on": "--set turn_on={}", "--step": "--set step={}",
+        **_set("gravity step"), "--turn-on": "--set turn_on={}",
     },
     "demo": {"--effect": "{}", "--archive": "--lots 400", "--auto": "--yes"},
-    "diagnose": {"--history": "--temperatures", "--report": "--output", "--page": "--output", "--next": "--output"},
+    "diagnose": {"--history": "--temperatures", "--report": "--output", "--next": "--output", **_PAGE},
     "export": {
         **_INCLUDE, "--unit": "--units", "--record": "--waveforms", "--cutoff": "+--filter :{}", "--track": "--set track=yes",
-        "--nominal": "--set nominal={}", "--device-id": "--set device_id={}", "--sensor": "--set sensor={}",
-        "--arithmetic": "--set arithmetic={}", "--counts-per-g": "--set counts_per_g={}", "--teds": "--set teds={}",
-        "--turn-on": "--set turn_on={}", "--step": "--set step={}",
+        **_set("nominal sensor arithmetic teds step"), "--device-id": "--set device_id={}",
+        "--counts-per-g": "--set counts_per_g={}", "--turn-on": "--set turn_on={}",
     },
     "extend": {"--why": "--reason", "--by": "--who", "--run": "--dwells", "--out": "--output"},
     "history": {**_MODEL, "--picture": "--output"},
     "import": {
-        **_FILES, **_KEYS, "--mapping": "--set", "--part": "--set", "--units *=*": "--unit-of", "--unit": "--units",
+        **_set("join group rows axes signs poses headings face positions threshold gaps faulty verify measured"),
+        "--mapping": "--set", "--part": "--set", "--units *=*": "--unit-of", "--unit": "--units",
         "--blocks": "--set block_s={}", "--window": "--set window_s={}", "--shortest": "--set shortest_s={}",
         "--local-g": "--set local_gravity_m_s2={}", "--zero-output": "--set zero_output={}", "--list-dwells": "--all",
     },
-    "improve": {**_MODEL, "--out": "--output", "--by": "--who", "--group": "--set group={}"},
-    "inspect": {**_FILES, "--picture": "--output", "--page": "--output"},
+    "improve": {**_MODEL, "--out": "--output", "--by": "--who", **_set("group")},
+    "inspect": {**_set("join group"), "--picture": "--output", **_PAGE},
     "lineage": {"--prov": "--output", "--crate": "--output"},
     "noise allan": _NOISE,
     "noise psd": _NOISE,
     "plan": {**_PLAN, "--pictures": "--output"},
     "plan choose": {f"--{name}": f"{name}={{}}" for name in ("range", "error", "temperature", "bandwidth")},
     "plan optimise": {
-        **_PLAN, "--see": "--wanted", "--part": "+--criterion :{}", "--ramp": "--set ramp=yes",
-        **_SEARCH,
+        **_PLAN, **_set("factor temperatures poses size separation verification"),
+        "--see": "--wanted", "--part": "+--criterion :{}", "--ramp": "--set ramp=yes",
     },
-    "release": {**_CERTIFICATE, "--list": ""},
+    "release": {**_SINCE, "--list": ""},
     "run": {"--prompts": "--ask", "--no-prompts": "--yes"},
     "simulate": {
-        "--calibration": "{}", "--time": "--map time={}",
-        "--units": "--unit-of force={}", "--no-noise": "--seed none", "--noise": "",
-        "--failed": "--include failed",
+        "--calibration": "{}", "--time": "--map time={}", "--units": "--unit-of force={}",
+        "--no-noise": "--seed none", "--noise": "", "--failed": "--include failed",
     },
-    "station bring-up": {**_BRING_UP, "--link": "{}", "--out": "--output", "--by": "--who", "--readings": "--read-only"},
+    "station bring-up": {
+        **_set("timeout silence watch"), "--link": "{}", "--out": "--output", "--by": "--who", "--readings": "--read-only",
+    },
     "station check": {"--registers": "--read-only", "--units": "--slots"},
-    "station frames": {"--limit": "--last", "--page": "--output", "--as-test": "--output"},
+    "station frames": {"--limit": "--last", **_PAGE, "--as-test": "--output"},
     "station log": {"--limit": "--last"},
     "station monitor": {"--serve": "--port 9464", "--metrics": "--format prometheus", "--days": "--last"},
     "station operator": {"--go": "--answer go", "--stop": "--answer stop"},
     "station program": {
         "--form": "--format", "--tolerance": "--set tolerance={}", "--offset-registers": "--set offset_registers=yes",
     },
-    "station serve": {"--units": "--slots", "--silence": "--set silence={}"},
+    "station serve": {"--units": "--slots", **_set("silence")},
     "station status": {"--watch": "--every 1", "--units": "--slots"},
     "station watch": {"--once": "--every 0", "--minutes": "--last"},
     "verify": {"--key": "--trust"},
-    "workbench": {"--certificate": "--tls", "--key": "--tls", "--name": "+--host ,{}"},
+    "workbench": {"--certificate": "--tls", "--key": "+--tls ,{}", "--name": "+--host ,{}"},
 }  # fmt: skip
 """By command: the option of the version before, with a pattern of its value where that decides, and what it is now."""
 
@@ -119,8 +118,9 @@ def present(words: Sequence[str]) -> list[str]:
     rest = [*front, *words[1:]]
     if name in GROUPS and rest and rest[0] not in {"-h", "--help"} and f"{name} {rest[0]}" not in OPTIONS:
         rest = [GROUPS[name], *rest]
-    path = [name, rest.pop(0)] if rest and f"{name} {rest[0]}" in OPTIONS else [name]
-    rules, line = OPTIONS.get(" ".join(path), {}), _Line()
+    below = " ".join([name, *(SPELLED.get(word, word) for word in rest[:1])])
+    path = [name, rest.pop(0)] if below in OPTIONS and rest else [name]
+    rules, line = OPTIONS.get(below, OPTIONS.get(name, {})), _Line()
     while rest:
         word = rest.pop(0)
         if word == "--":

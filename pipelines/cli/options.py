@@ -75,14 +75,12 @@ def included(given: Sequence[str] | None) -> dict[str, bool]:
 
     Raises WrongUse: another word.
     """
-    names = names_in(",".join(given or ()))
-    for name in names:
-        if name not in INCLUDED:
-            raise WrongUse(f"--include: found '{shown(name)}'; {did_you_mean(name, INCLUDED)}")
-    return {name: name in names for name in INCLUDED}
-
-
-INCLUDED = ("failed", "revoked")
+    chosen = dict.fromkeys(("failed", "revoked"), False)
+    for name in names_in(",".join(given or ())):
+        if name not in chosen:
+            raise WrongUse(f"--include: found '{shown(name)}'; {did_you_mean(name, chosen)}")
+        chosen[name] = True
+    return chosen
 
 
 class Setting(NamedTuple):

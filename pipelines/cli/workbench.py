@@ -1,7 +1,6 @@
 """``tumbleline workbench``: archive, models and missing effects in a browser."""
 
 import sys
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -9,6 +8,7 @@ from pipelines.archive import Archive
 from pipelines.cli.options import argument, option
 from pipelines.cli.printing import remark, say
 from schemas.errors import WrongUse
+from schemas.foreign import shown
 
 PART = "Start here"
 ORDER = 40
@@ -36,9 +36,9 @@ def command(
         str, option("--host ADDRESS[,NAME…]", "Interface to listen on, then further host names of this server.")
     ] = HOST,
     tls: Annotated[
-        list[Path] | None,
-        option("--tls FILE.pem", "Certificate for HTTPS and its private key; twice where they are two files."),
-    ] = None,
+        str,
+        option("--tls FILE.pem[,FILE.pem]", "Certificate for HTTPS, then its private key where another file has it."),
+    ] = "",
     workers: Annotated[int, option("--workers", "Processes for diagnoses and fits.", min=1, max=32)] = 2,
     *,
     pause_lots: Annotated[
@@ -67,7 +67,11 @@ def command(
     from pipelines.workbench.settings import WorkbenchSettings
     from schemas.station import load_station
 
-    certificate, key = _certificate_and_key(tls or ())
+    certificate, key = (Path(name) if name else None for name in (*tls.split(",", 1), "")[:2])
+    if tls and certificate is None:
+        raise WrongUse(
+            f"workbench: --tls {shown(tls)}: the certificate is missing, it is needed; name it before its key"
+        )
     given = os.environ.get("TUMBLELINE_WORKBENCH_TOKEN", "")
     for one in station or ():
         load_station(one)  # a broken file is refused now, not when the page is opened
@@ -89,26 +93,3 @@ def command(
         remark("Open the address above; Ctrl-C ends the workbench.")
         servers.append(page_server(app, place, certificate, key))
         run_until_stopped(servers[0], place, "workbench")
-
-
-def _certificate_and_key(files: Sequence[Path]) -> tuple[Path | None, Path | None]:
-    """The certificate and its private key among PEM files, which may be one; None without a file.
-
-    Raises WrongUse: a file cannot be read, or one of the two is not there.
-    """
-    if not files:
-        return None, None
-    try:
-        texts = {path: path.read_text(encoding="utf-8", errors="replace") for path in files}
-    except OSError as problem:
-        raise WrongUse(
-            f"workbench: --tls {problem.filename} cannot be read ({problem.strerror}); correct the name"
-        ) from None
-    key = next((path for path, text in texts.items() if "PRIVATE KEY-----" in text), None)
-    certificate = next((path for path, text in texts.items() if "CERTIFICATE-----" in text), None)
-    if key is None or certificate is None:
-        lacks = "private key" if key is None else "certificate"
-        raise WrongUse(
-            f"workbench: --tls: no {lacks} in {', '.join(map(str, files))}, both are needed; give --tls for its file too"
-        )
-    return certificate, key

@@ -29,6 +29,7 @@ NOW = {
     "correct a.csv --cutoff 9": "correct a.csv --filter :9",
     "plan r --noise 25 --wander 8": "plan r --noise 25,8",
     "plan optimise r --criterion T --part a,b --ramp": "plan optimise --set ramp=yes r --criterion T:a,b",
+    "plan optimize r --factor 2": "plan optimize r --set factor=2",
     "monitor --port 9000 --serve": "station monitor --port 9464 --port 9000",
     "query 'select 1' --csv": "archive query --output - 'select 1'",
     "extend m.toml --remove x --why -- --why": "extend m.toml --remove x --reason -- --why",

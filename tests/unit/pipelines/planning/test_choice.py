@@ -41,8 +41,8 @@ def test_the_first_reaches_the_error_with_the_least_calibration_and_a_calibratio
 
 
 REFUSED = [
-    (("range=4", "error=2mg"), "--range: found '4', a positive number with g or mg is needed"),
-    (("range=4g", "error=nang"), "--error: found 'nang'"),
+    (("range=4", "error=2mg"), "range: found '4', a positive number with g or mg is needed"),
+    (("range=4g", "error=nang"), "error: found 'nang'"),
     (("range=4g", "error=2mg", "temperature=85..-40"), "LOW..HIGH in °C is needed"),
     (("range=4g", "error=2mg", "bandwidth=0"), "a frequency above 0 Hz is needed"),
     (("range=4g", "error=2mg", "--device", "adxl335"), "did you mean ADXL355"),

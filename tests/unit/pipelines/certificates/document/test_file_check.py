@@ -515,7 +515,7 @@ def test_wrong_use_is_told(issued: Issued, tmp_path: Path) -> None:
         ([pdf, "latest"], "give files or runs, not both"),
         ([str(tmp_path / "missing.pdf")], "is not there"),
         ([pdf, "--trust", str(tmp_path / "none.pem")], "holds no certificate that can be read"),
-        (["latest", "--trust", str(issued.trust)], "no file of a certificate is given"),
+        (["latest", "--laboratory", str(tmp_path)], "no file of a certificate is given"),
     ):
         problem = CliRunner().invoke(app, ["verify", *words]).exception
         assert isinstance(problem, WrongUse)
