@@ -102,7 +102,8 @@ def stated_references(path: Path, content: dict[str, Any]) -> ImportReferences:
 def _refuse_day(day: str, where: str) -> None:
     if not day:
         raise WrongUse(
-            f"{where}: the day of the measurement is not given, it decides which references were due; add --set measured=YYYY-MM-DD"
+            f"{where}: the day of the measurement is not given, it decides which references were due; add "
+            "--set measured=YYYY-MM-DD"
         )
     try:
         parsed = date.fromisoformat(day)

@@ -39,9 +39,9 @@ EXAMPLES = (
 
 AT_REST = "at-rest"
 SETTINGS = {
-    "gravity": Setting("M/S2", "local gravity at rest, m/s², that of the run by default;", float),
-    "turn_on": Setting("UG", "change of the bias from switch-on to switch-on, µg (standard deviation);", float, 0.0),
-    "step": Setting("S", "time between updates of the bias, 1 s by default.", float, 1e-3),
+    "gravity": Setting("M/S2", "local gravity at rest, m/s², that of the run by default", float),
+    "turn_on": Setting("UG", "change of the bias from switch-on to switch-on, µg (standard deviation)", float, 0.0),
+    "step": Setting("S", "time between updates of the bias, 1 s by default", float, 1e-3),
 }
 
 

@@ -53,21 +53,21 @@ if TYPE_CHECKING:
 WAVEFORMS = "csv, hdf5, lvm, mat, tdms, uff58, wav"  # names of the writers, which help does not import
 SETTINGS = {
     "nominal": Setting(
-        "N", "ardupilot, betaflight, px4: output per g by which the driver divides, the preset's by default;", float
+        "N", "ardupilot, betaflight, px4: output per g by which the driver divides, the preset's by default", float
     ),
     "device_id": Setting(
-        "ID|SN=ID,…", "px4 (CAL_ACC0_ID), ardupilot (INS_ACC_ID): number of the sensor in the autopilot;"
+        "ID|SN=ID,…", "px4 (CAL_ACC0_ID), ardupilot (INS_ACC_ID): number of the sensor in the autopilot"
     ),
-    "sensor": Setting("0…3", "ardupilot, px4: place of the accelerometer in the autopilot;", int, 0.0),
-    "arithmetic": Setting("double|float|q24", "c: arithmetic of the code;"),
-    "counts_per_g": Setting("N", "betaflight: counts of 1 g (acc_1G), 2048 by default;", int, 1.0),
+    "sensor": Setting("0…3", "ardupilot, px4: place of the accelerometer in the autopilot", int, 0.0),
+    "arithmetic": Setting("double|float|q24", "c: arithmetic of the code"),
+    "counts_per_g": Setting("N", "betaflight: counts of 1 g (acc_1G), 2048 by default", int, 1.0),
     "teds": Setting(
         "KEY=VALUE,…",
-        "teds: manufacturer, model, version (A1), mass_g, initials, and period_days where no certificate states it;",
+        "teds: manufacturer, model, version (A1), mass_g, initials, and period_days where no certificate states it",
     ),
-    "track": Setting("yes", "c: with the filter of the bias, as in correct;", yes),
-    "turn_on": Setting("UG", "c, with track: as in correct;", float, 0.0),
-    "step": Setting("S", "c, with track: as in correct.", float, 1e-3),
+    "track": Setting("yes", "c: with the filter of the bias, as in correct", yes),
+    "turn_on": Setting("UG", "c, with track: as in correct", float, 0.0),
+    "step": Setting("S", "c, with track: as in correct", float, 1e-3),
 }
 
 

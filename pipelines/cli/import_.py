@@ -45,23 +45,23 @@ def _listed(text: str) -> list[str]:
 
 
 KEYS = {
-    "rows": Setting("samples|dwells", "content of a row, samples by default;"),
-    "local_gravity_m_s2": Setting("M/S2", "local gravity at the place of the measurement;", float),
-    "poses": Setting("LABEL=+x,…", "dwells to keep by label, with the face that is up;", _pairs),
-    "headings": Setting("LABEL=deg,…", "direction of x in each pose, degrees (of y where x is vertical);", _pairs),
-    "face": Setting("+x|…|-z", "the face that is up all the time;"),
-    "block_s": Setting("S", "dwells of this length, for a record in one pose;", float),
-    "positions": Setting("N", "positions logged back to back, without the moves;", int),
-    "window_s": Setting("S", "sliding window of the search for dwells, 1 s by default;", float),
-    "threshold": Setting("SD", "standard deviation in a window that means motion, in the output unit;", float),
-    "shortest_s": Setting("S", "shortest dwell, 1 s by default;", float),
-    "gaps": Setting("refuse|split", "rows without a number, and gaps in time; refuse by default;"),
-    "faulty": Setting("refuse|leave-out|keep", "constant axes and torn words; refuse by default;"),
-    "axes": Setting("x,y,z", "order of the mapped axes;", _listed),
-    "signs": Setting("+,+,+", "signs of the axes in that order;", _listed),
-    "verify": Setting("N|N%", "dwells that the fit does not use; they verify it;"),
-    "measured": Setting("DATE", "day of the measurement;"),
-    "zero_output": Setting("VALUE", "nominal output at 0 g, 0 by default;", float),
+    "rows": Setting("samples|dwells", "content of a row, samples by default"),
+    "local_gravity_m_s2": Setting("M/S2", "local gravity at the place of the measurement", float),
+    "poses": Setting("LABEL=+x,…", "dwells to keep by label, with the face that is up", _pairs),
+    "headings": Setting("LABEL=deg,…", "direction of x in each pose, degrees (of y where x is vertical)", _pairs),
+    "face": Setting("+x|…|-z", "the face that is up all the time"),
+    "block_s": Setting("S", "dwells of this length, for a record in one pose", float),
+    "positions": Setting("N", "positions logged back to back, without the moves", int),
+    "window_s": Setting("S", "sliding window of the search for dwells, 1 s by default", float),
+    "threshold": Setting("SD", "standard deviation in a window that means motion, in the output unit", float),
+    "shortest_s": Setting("S", "shortest dwell, 1 s by default", float),
+    "gaps": Setting("refuse|split", "rows without a number, and gaps in time; refuse by default"),
+    "faulty": Setting("refuse|leave-out|keep", "constant axes and torn words; refuse by default"),
+    "axes": Setting("x,y,z", "order of the mapped axes", _listed),
+    "signs": Setting("+,+,+", "signs of the axes in that order", _listed),
+    "verify": Setting("N|N%", "dwells that the fit does not use; they verify it"),
+    "measured": Setting("DATE", "day of the measurement"),
+    "zero_output": Setting("VALUE", "nominal output at 0 g, 0 by default", float),
     **READING,
 }
 
@@ -87,7 +87,7 @@ def command(
         list[str] | None,
         set_option(
             KEYS,
-            "Or --set FILE.toml: a file with these keys and the tables [columns] and [units], with --procedure the keys of the "
+            "Or --set FILE.toml: a file with these keys and the tables columns and units; with --procedure the keys of the "
             "procedure and full_scale. What the command line gives has priority; may be repeated.",
         ),
     ] = None,

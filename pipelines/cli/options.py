@@ -75,7 +75,7 @@ def included(given: Sequence[str] | None) -> dict[str, bool]:
 
     Raises WrongUse: another word.
     """
-    chosen = dict.fromkeys(("failed", "revoked"), False)
+    chosen = {"failed": False, "revoked": False}
     for name in names_in(",".join(given or ())):
         if name not in chosen:
             raise WrongUse(f"--include: found '{shown(name)}'; {did_you_mean(name, chosen)}")
@@ -100,7 +100,12 @@ def yes(text: str) -> bool:
 
 def set_option(keys: Mapping[str, Setting], text: str = "Further settings; may be repeated.") -> Any:
     """The option ``--set``, whose help lists its keys."""
-    return option("--set KEY=VALUE", " ".join([text, *(f"{k}={one.notation}: {one.text}" for k, one in keys.items())]))
+    lines = [f"{key}={one.notation}: {one.text}." for key, one in keys.items()]
+
+    def offered(incomplete: str) -> list[str]:
+        return [f"{key}=" for key in keys if key.startswith(incomplete)]
+
+    return option("--set KEY=VALUE", "\n\n".join([text, *lines]), autocompletion=offered)
 
 
 def settings(
@@ -166,8 +171,8 @@ ArchiveOption = Annotated[
 AllOption = Annotated[bool, option("--all", "Print the long tables, too.")]
 RecordOption = Annotated[Path | None, option("--record FILE", "Record every frame on the links into this new file.")]
 READING = {
-    "join": Setting("rows|columns", "join several files into one recording;"),
-    "group": Setting("NAME", "group of channels, if the file has several."),
+    "join": Setting("rows|columns", "join several files into one recording"),
+    "group": Setting("NAME", "group of channels, if the file has several"),
 }
 """Keys of ``--set`` for the reading of files."""
 JsonOption = Annotated[bool, option("--json", "Print one JSON document and nothing else.")]

@@ -54,18 +54,16 @@ EffectsOption = Annotated[str, option("--effects a,b,c", "Effects of the model; 
 
 
 SEARCH = {
-    "factor": Setting("N", "required errors as a multiple of the textbook plan's;", float, 0.01),
-    "temperatures": Setting(
-        "a,b,c", "required temperatures, °C; the ends of the recipe's range and others by default;"
-    ),
-    "poses": Setting("PLAN", "named plan of candidate poses; a Fibonacci lattice by default;"),
-    "size": Setting("UG", "with --criterion T: largest contribution of each effect, µg; 100 by default;", float, 1e-3),
+    "factor": Setting("N", "required errors as a multiple of the textbook plan's", float, 0.01),
+    "temperatures": Setting("a,b,c", "required temperatures, °C; the ends of the recipe's range and others by default"),
+    "poses": Setting("PLAN", "named plan of candidate poses; a Fibonacci lattice by default"),
+    "size": Setting("UG", "with --criterion T: largest contribution of each effect, µg; 100 by default", float, 1e-3),
     "separation": Setting(
-        "N", "with --criterion T: required χ² of the wrong effect over the lot; 50 by default;", float, 1.0
+        "N", "with --criterion T: required χ² of the wrong effect over the lot; 50 by default", float, 1.0
     ),
-    "verification": Setting("N", "repetitions of each verification pose; as in the recipe by default;", int, 1.0),
+    "verification": Setting("N", "repetitions of each verification pose; as in the recipe by default", int, 1.0),
     "ramp": Setting(
-        "yes", "measure while the chamber ramps, without soaks; the device's temperature is read.", options.yes
+        "yes", "measure while the chamber ramps, without soaks; the device's temperature is read", options.yes
     ),
 }
 

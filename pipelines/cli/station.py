@@ -153,7 +153,7 @@ SETTINGS = re.compile(r"[,:;(]| with | behind ")
 
 SERVING = {
     "silence": Setting(
-        "S", "seconds without a request after which drives and reader stop, 30 by default; 0: never.", float, 0.0
+        "S", "seconds without a request after which drives and reader stop, 30 by default; 0: never", float, 0.0
     )
 }
 

@@ -22,9 +22,9 @@ ON = "What is at the other end: hardware, simulator or replay? (Enter: not state
 
 
 SECONDS = {
-    "timeout": Setting("S", "longest answer, 2 s by default;", float, 0.05, 60.0),
-    "silence": Setting("S", "how long the link is cut in that step, 40 s by default;", float, 1.0, 600.0),
-    "watch": Setting("S", "how long the air of a chamber is watched, 20 s by default.", float, 0.0, 3600.0),
+    "timeout": Setting("S", "longest answer, 2 s by default", float, 0.05, 60.0),
+    "silence": Setting("S", "how long the link is cut in that step, 40 s by default", float, 1.0, 600.0),
+    "watch": Setting("S", "how long the air of a chamber is watched, 20 s by default", float, 0.0, 3600.0),
 }
 
 

@@ -29,8 +29,8 @@ UNATTENDED = "program: standard input ended before an answer, a line is needed; 
 
 
 SETTINGS = {
-    "tolerance": Setting("UG", "largest allowed error in the two poses, 3000 µg by default;", float, 1.0),
-    "offset_registers": Setting("yes", "also write the offset registers of an ADXL355.", yes_or_no),
+    "tolerance": Setting("UG", "largest allowed error in the two poses, 3000 µg by default", float, 1.0),
+    "offset_registers": Setting("yes", "also write the offset registers of an ADXL355", yes_or_no),
 }
 
 

@@ -159,13 +159,14 @@ printf '%s\\n' "${COMPREPLY[@]}"
 OFFERED = {
     "dia": {"diagnose"},
     "run m": {"my"},
-    "report la": {"latest"},
+    "show la": {"latest"},
     "show A": {"A1", "A2"},
     "extend model.toml third": {"third_order"},
     "diagnose latest --effects bias,sca": {"bias,scale", "bias,scale_temperature"},
     "plan opt": {"optimise"},
     "run --fau": {"--fault"},
     "correct flight.csv la": {"latest"},
+    "import a.csv --set blo": {"block_s="},
     "plan optimise production --wanted third": {"third_order"},
     "nonsense ": set(),
 }
