@@ -225,8 +225,8 @@ def test_samples_in_the_hand_become_dwells_that_agree_with_the_truth() -> None:
 
 def test_an_import_that_was_not_fitted_is_advised_and_a_fit_that_fails_leaves_no_run() -> None:
     run = imported(Recording(20), 2)["run"]
-    for command in ("export", "report"):
-        _, _, err = given(command, run)
+    for words in (("export", run), ("show", run, "--report")):
+        _, _, err = given(*words)
         assert f"fit it with 'tumbleline fit {run} --effects" in " ".join(err.split())
     assert f"tumbleline fit {run} --limits FILE" in refused("certificate", "issue", run)
     for command in ("fit", "rerun"):
@@ -375,5 +375,5 @@ def test_a_file_of_one_plane_is_calibrated_in_that_plane() -> None:
     found = table(fitted["run"], "coefficients")
     scale = found[found["effect"] == "scale"].set_index("axis")["value"]
     assert dict(scale) == pytest.approx({"x": 1.01, "z": 1.005}, abs=5e-5)
-    for command in ("export", "certify"):
-        assert "the scale of y is not known" in refused(command, fitted["run"])
+    for words in (("export",), ("certificate", "issue")):
+        assert "the scale of y is not known" in refused(*words, fitted["run"])
