@@ -112,18 +112,18 @@ def command(
     from pipelines.export.teds import data_sheet
     from pipelines.jobs.model_files import use_formulas_of
 
-    source = Archive(archive).run(run)
     if waveforms is not None:
         if as_json:
             raise WrongUse(
                 "export: --json prints coefficients, --waveforms writes files, one is possible; leave one out"
             )
-        write_record(source, waveforms, units, form or "csv", output)
+        write_record(Archive(archive).run(run), waveforms, units, form or "csv", output)
         return
     form = "json" if as_json or not form else form
     given = settings(setting, SETTINGS, "export")
     if form not in FORMATS:
         raise WrongUse(f"export: no format is called '{form}'; {did_you_mean(form, FORMATS)}")
+    source = Archive(archive).run(run)
     use_formulas_of(source)
     serials = tuple(serial.strip() for serial in units.split(",")) if units else ()
     chosen = unit_calibrations(source, serials, **included(include))

@@ -44,7 +44,7 @@ SLIPS: list[tuple[tuple[str, ...], str]] = [  # words of a command, and what is 
     (("import", NO_FILE, *MAPPED), ""),
     (("import", "{}/nosuch.csv"), "nosuch.csv: cannot be read (No such file or directory)"),
     (("import", "{}/a.csv"), "no column of a.csv is mapped, x, y and z are needed at least (its columns: t, ax,"),
-    (("import", "{}/a.csv", "--map", "x=ax,y=ay,z=az"), "one of g, mg, m/s^2, V, mV, LSB is needed; add --units output=…"),
+    (("import", "{}/a.csv", "--map", "x=ax,y=ay,z=az"), "one of g, mg, m/s^2, V, mV, LSB is needed; add --unit-of output=…"),
     (("export", "nosuch"), "there is no run yet"),
     (("rerun", "all", "--check", "--effects", "bias"), "--check with another model or limits has no stored result"),
     (("export", "--format", "hex"), "no format is called 'hex'"),
