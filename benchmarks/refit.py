@@ -1,8 +1,8 @@
 """Re-fit and re-grade of an archive with another model, 10 000 units × 72 dwells: `python benchmarks/refit.py`.
 
 An archive of lots of ten units is generated (see generated_archive.py), then run again with the present program by two worker
-processes of one BLAS thread each, once in memory only (as in `tumbleline whatif`), once with all tables written (`tumbleline
-rerun`). For comparison, in the same processes on the same files: the time to read the tables of a fit and to solve
+processes of one BLAS thread each, once in memory only (as in `tumbleline release whatif`), once with all tables written
+(`tumbleline rerun`). For comparison, in the same processes on the same files: the time to read the tables of a fit and to solve
 one weighted batch fit per lot. Memory is the largest total of the parent and its workers. `--units` may be
 repeated, for the cost by number of units. `--stages` prints the processor time of every step.
 """

@@ -32,8 +32,8 @@ def transcript() -> list[tuple[str, str]]:
         try:
             while server.stdout is not None and "Ctrl-C" not in server.stdout.readline():
                 pass
-            command = ["bring-up", "watlow_f4t", "--link", f"tcp://127.0.0.1:{PORT}", "--device-id", "3"]
-            quick = ["--silence", "3", "--watch", "3", "--out", "f4t"]
+            command = ["bring-up", "watlow_f4t", f"tcp://127.0.0.1:{PORT}", "--device-id", "3"]
+            quick = ["--set", "silence=3", "--set", "watch=3", "--output", "f4t"]
             own = {"cwd": folder, "env": environment, "capture_output": True, "text": True}
             given = [*words, *command, *quick]
             done = subprocess.run(given, input="\n".join(TYPED) + "\n", check=True, **own)  # noqa: S603 - likewise

@@ -6,13 +6,13 @@ import sys
 from pathlib import Path
 
 from docs.generated_page import cell, write_or_check
-from pipelines.cli.keys import SUBJECTS
+from pipelines.cli.plan_keys import SUBJECTS
 
 PAGE = Path(__file__).resolve().parent / "reference" / "keys.md"
 HEAD = """\
 # Keys and names
 
-Written by `python -m docs.keys_page`; `tumbleline keys` shows the same lists. The meanings of the keys are in
+Written by `python -m docs.keys_page`; `tumbleline plan keys` shows the same lists. The meanings of the keys are in
 `schemas/key_texts.toml`. Every file is TOML; the tables of recipes and stations are given in the order of the classes that check
 them, and a table that several keys have is listed once.
 
@@ -28,7 +28,7 @@ A recipe, limits, station, profile or preset is given by its path, or by its nam
 
 A file of your own with the name of a built-in one is refused, so that a name means one file. The command says on standard error
 which file it uses. The hash of a profile or preset of your own is part of the name of a measurement: a changed file is measured
-anew. `tumbleline keys names` lists everything that is found.
+anew. `tumbleline plan keys names` lists everything that is found.
 """
 TITLES = {
     "recipe": "Recipe", "limits": "Limits", "station": "Station", "fault": "Faults of a simulated station",
@@ -39,7 +39,7 @@ LEADS = {
         "`tumbleline run --fault KIND:KEY=VALUE:KEY=VALUE`. Every kind also has `at_s` (start on the clock of the station, s) "
         "and `for_s` (duration, s; permanent by default). [Outcomes](faults.md).\n"
     ),
-    "demo": "The option `--effect` takes a name of either column, or `random`.\n",
+    "demo": "`tumbleline demo NAME` takes a name of either column, or `random`.\n",
 }
 
 

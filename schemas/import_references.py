@@ -66,7 +66,7 @@ def stated_references(path: Path, content: dict[str, Any]) -> ImportReferences:
     Raises
     ------
     RecipeInvalid
-        A key is wrong, or gravity contradicts --local-g.
+        A key is wrong, or gravity contradicts local_gravity_m_s2.
     WrongUse
         The day of the measurement is not given, which is needed to check whether references were due; or the device has fewer
         axes than a budget.
@@ -74,7 +74,7 @@ def stated_references(path: Path, content: dict[str, Any]) -> ImportReferences:
     axes = content.get("axes")
     if axes and len(axes) < len(AXES):
         raise WrongUse(
-            f"import: --references states a budget of three axes, --axes has {', '.join(axes)} alone; leave --references out: "
+            f"import: --references states a budget of three axes, axes are {', '.join(axes)} alone; leave --references out: "
             "the uncertainties are then those of the noise"
         )
     where = f"references {path.name}"
@@ -92,8 +92,8 @@ def stated_references(path: Path, content: dict[str, Any]) -> ImportReferences:
     u = gravity.relative().u
     if not abs(apart) <= GRAVITY_SIGMAS * u:
         raise RecipeInvalid(
-            f"{where}: key 'uncertainty.gravity': {gravity.value:.8g} m/s² ± {2e6 * u:.2g} ppm (k = 2), --local-g is "
-            f"{float(given):.8g}, they differ by {1e6 * apart:.0f} ppm; leave --local-g out, or correct one of the two",
+            f"{where}: key 'uncertainty.gravity': {gravity.value:.8g} m/s² ± {2e6 * u:.2g} ppm (k = 2), local_gravity_m_s2 is "
+            f"{float(given):.8g}, they differ by {1e6 * apart:.0f} ppm; leave local_gravity_m_s2 out, or correct one of the two",
             key="uncertainty.gravity",
         )
     return references
@@ -102,13 +102,12 @@ def stated_references(path: Path, content: dict[str, Any]) -> ImportReferences:
 def _refuse_day(day: str, where: str) -> None:
     if not day:
         raise WrongUse(
-            f"{where}: the day of the measurement is not given, it decides which references were due; add --measured YYYY-MM-DD"
+            f"{where}: the day of the measurement is not given, it decides which references were due; add "
+            "--set measured=YYYY-MM-DD"
         )
     try:
         parsed = date.fromisoformat(day)
     except ValueError:
         return  # the check of the mapping reports it
     if parsed > datetime.now(tz=UTC).date():
-        raise WrongUse(
-            f"{where}: --measured {day} lies in the future, the day of the measurement is needed; correct it"
-        )
+        raise WrongUse(f"{where}: measured {day} lies in the future, the day of the measurement is needed; correct it")

@@ -43,7 +43,7 @@ def serial_fault(text: str) -> str:
 def refuse_unusable_serials(
     serials: Iterable[str],
     where: str,
-    remedy: str = "correct it, or give another with --unit",
+    remedy: str = "correct it, or give another with --units",
     error: type[TumblelineError] = DataRejected,
 ) -> None:
     """Refuse invalid serial numbers.

@@ -111,7 +111,7 @@ def recordings(folder: Path) -> None:
     forces = pd.DataFrame({"force_x": np.sin(turn), "force_y": np.cos(turn), "force_z": 0.0 * turn})
     forces.assign(time_s=np.arange(400) / 100.0, unit_C=25.0).to_csv(folder / "trajectory.csv", index=False)
     shutil.copy(ROOT / "tests" / "data" / "frames" / "mbpoll-editcap.pcapng", folder / "capture.pcapng")
-    command(["station", "check", "--registers", "--record", "frames.jsonl"])
+    command(["station", "check", "--read-only", "--record", "frames.jsonl"])
     for name in ("flight", "bench"):
         frame.to_csv(folder / f"{name}.csv", index=False)
 

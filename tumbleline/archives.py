@@ -119,7 +119,7 @@ class ArchiveView:
         return Picture(Chart(title, (Plot(title, PlotAxis("measured", dates=True), PlotAxis(value), traces),)))
 
     def query(self, sql: str) -> pd.DataFrame:
-        """The answer to one SELECT over all runs; the views are those of ``tumbleline query``."""
+        """The answer to one SELECT over all runs; the views are those of ``tumbleline archive query``."""
         from pipelines.audit.sql import ask
 
         answer = ask(self.store, sql)

@@ -156,6 +156,6 @@ def _public(text: str) -> Ed25519PublicKey:
         key = None
     if not isinstance(key, Ed25519PublicKey):
         raise WrongUse(
-            f"verify: '{text}' is no public key, an Ed25519 key in PEM or 64 hexadecimal digits are needed; correct --key"
+            f"verify: '{text}' is no public key, an Ed25519 key in PEM or 64 hexadecimal digits are needed; correct --trust"
         )
     return key

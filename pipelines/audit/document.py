@@ -16,7 +16,7 @@ from pipelines.audit.parameters import unit_text
 from pipelines.audit.stations_over_time import ControlChart, StationSeries
 from pipelines.audit.unit_drifts import UnitDrift
 
-MOST_UNITS = 200  # histories in the document; ``tumbleline query`` gives the others by their serial
+MOST_UNITS = 200  # histories in the document; ``tumbleline archive query`` gives the others by their serial
 SCHEMA = 1
 
 

@@ -42,7 +42,7 @@ class CertifiedDocument(LedgerEntryDocument):
 
 
 class CertifyDocument(TypedDict):
-    """``certify --json``: the calibrations of a run that were entered into the ledger."""
+    """``certificate issue --json``: the calibrations of a run that were entered into the ledger."""
 
     run: str
     certified: list[CertifiedDocument]
@@ -124,14 +124,14 @@ class CertificateFiles(TypedDict):
 
 
 class CertificateDocument(TypedDict):
-    """``certificate --json``: the files of the certificates that were written."""
+    """``certificate write --json``: the files of the certificates that were written."""
 
     certificates: list[CertificateFiles]
     left_out: Annotated[dict[str, str], "units of a run that have no certificate, with the reason"]
 
 
 class RevokeDocument(LedgerEntryDocument):
-    """``revoke UNIT --json``: the entry of the ledger that ends calibrations."""
+    """``certificate revoke UNIT --json``: the entry of the ledger that ends calibrations."""
 
     action: Literal["certify", "supersede", "revoke"]
     unit: str

@@ -75,5 +75,5 @@ def refuse_unproved(root: Place, serial: str) -> None:
     why = unproved(root, serial)
     if why:
         raise WrongUse(
-            f"certify: unit {serial}: {why}; write it again with 'tumbleline program', which proves what it holds"
+            f"certify: unit {serial}: {why}; write it again with 'tumbleline station program', which proves what it holds"
         )

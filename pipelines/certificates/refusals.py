@@ -25,7 +25,7 @@ def refuse_period(run: Run, first: str, last: str) -> None:
     if first < measured:
         raise WrongUse(
             f"certify: valid from {first}, run {run.id} was measured on {measured}, that day or a later one is needed; correct "
-            "--from"
+            "--since"
         )
     rule = (
         f"limits '{limits}' allow {months} months; state validity_months in a limits file before the units are graded"

@@ -175,7 +175,7 @@ def refuse_unstated(run: Run) -> None:
             f"certify: run {run.id}: not stated: {listed}; add it to [uncertainty] (a 0 needs exact = true) and {again}"
         )
     if not run.table("uncertainties")["quantity"].eq("bias_error_period").any():
-        kept = "verification poses" if run.about.get("capture") else "dwells held out by --verify N"
+        kept = "verification poses" if run.about.get("capture") else "dwells held out by --set verify=N"
         raise WrongUse(
             f"certify: run {run.id} has no error over the period of validity ({terms.certificate.validity_months} months): state "
             f"[stability] of the device with a horizon_days that reaches so far, and {kept}, and {again}"

@@ -84,11 +84,11 @@ def certify(  # noqa: PLR0913 - each is an option of the command
     WrongUse
         The dates are not allowed, a unit may not be certified, or another process certified one of the units meanwhile.
     """
-    first = day_of(start, "--from") if start else today()
+    first = day_of(start, "--since") if start else today()
     last = day_of(until, "--until") if until else months_after(first, months or allowed_months(run))
     if first >= last:
         raise WrongUse(
-            f"certify: valid from {first} until {last}, a day after the first is needed; correct --from or --until"
+            f"certify: valid from {first} until {last}, a day after the first is needed; correct --since or --until"
         )
     proposals, result = _proposals(run, units, first, last, reason)
     seen = {proposal.serial: len(ledger.events(proposal.serial)) for proposal in proposals}

@@ -46,7 +46,7 @@ class NavigationRow(TypedDict):
 
 
 class AllanDocument(TypedDict):
-    """``allan --json``: the overlapping Allan deviation of a record, or another statistic, and the noise terms."""
+    """``noise allan --json``: the overlapping Allan deviation of a record, or another statistic, and the noise terms."""
 
     source: str
     unit: Annotated[str, "of the output; empty if not given"]
@@ -75,7 +75,7 @@ class SpectrumChannel(TypedDict):
 
 
 class PsdDocument(TypedDict):
-    """``psd --json``: the one-sided power spectral density of a record."""
+    """``noise psd --json``: the one-sided power spectral density of a record."""
 
     source: str
     unit: str

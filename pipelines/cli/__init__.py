@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import re
+import shlex
 import sys
 from collections.abc import Callable, Sequence
 from importlib import import_module
@@ -17,6 +18,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from inertial.errors import InertialError
+from pipelines.cli.former import present
 from schemas.errors import DONE, UNEXPECTED, UNUSABLE, TumblelineError, WrongUse, did_you_mean
 from schemas.foreign import shown
 from schemas.log_lines import VARIABLE as LOG
@@ -35,7 +37,7 @@ THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB
 
 
 CONSTANT = re.compile(r'^(PART|ORDER|SUMMARY) = (?:"(.+)"|(\d+))$', re.MULTILINE)
-COMMAND = re.compile(r"^(?:def command\(|app = typer\.Typer\()", re.MULTILINE)
+COMMAND = re.compile(r"^(?:def command|app = group)\(", re.MULTILINE)
 
 
 class IncompleteCommand(Exception):
@@ -166,7 +168,15 @@ class _Commands(TyperGroup):
         return [*COMMANDS]  # after its import the module cli.list hides the built-in ``list`` here
 
     def resolve_command(self, ctx: Context, args: list[str]) -> tuple[str | None, Command | None, list[str]]:
-        """The command that the first argument names; an unknown name is refused with similar names."""
+        """The command that the first argument names; a former name is followed, an unknown one refused with similar names."""
+        words = present(args)
+        if words != [*args]:
+            if COMPLETES not in os.environ:
+                tell(
+                    f"former names, accepted for one release; now: {shlex.join(['tumbleline', *words])}",
+                    level="warning",
+                )
+            args = words
         if args and args[0] not in COMMANDS and not args[0].startswith("-"):
             raise WrongUse(f"no command is called '{shown(args[0])}'; {did_you_mean(args[0], COMMANDS)}")
         return super().resolve_command(ctx, args)

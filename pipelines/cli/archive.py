@@ -1,26 +1,32 @@
-"""``tumbleline archive``: the signing key, the temporary files of killed writers, compaction, backup and restore."""
+"""``tumbleline archive``: queries, differences between runs, signing key, leftovers, compaction, backup and restore."""
 
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 from inertial.counts import number_of, size_text
 from pipelines.archive import Archive
+from pipelines.cli.archive_diff import diff
+from pipelines.cli.archive_query import query
+from pipelines.cli.groups import group
 from pipelines.cli.options import ArchiveOption, JsonOption, argument, option
 from pipelines.cli.printing import conclude, give, refuse_standard_output
 from schemas.errors import WrongUse
 
 PART = "Certificates, trace, audit"
 ORDER = 460
-SUMMARY = "Maintain the archive: signing key, leftovers, compaction, backup, restore."
+SUMMARY = "Query the archive, compare its runs, and maintain it: key, compaction, backup."
 EXAMPLES = (
-    "tumbleline archive compact --before 2026-05-01",
+    "tumbleline archive query 'SELECT * FROM units' --output units.csv",
     "tumbleline archive backup /mnt/copy --database /mnt/copies",
 )
 EXAMPLES_OF = {
-    "compact": ("tumbleline archive compact", "tumbleline archive compact --before 2026-05-01"),
+    "query": (
+        "tumbleline archive query 'SELECT station, count(*) AS runs FROM runs GROUP BY station'",
+        "tumbleline archive query 'SELECT * FROM units' --output units.csv",
+    ),
+    "diff": ("tumbleline archive diff latest RE-RUN", "tumbleline archive diff RUN-A RUN-B --all"),
+    "compact": ("tumbleline archive compact", "tumbleline archive compact --until 2026-05-01"),
     "clean": ("tumbleline archive clean --dry-run", "tumbleline archive clean --archive /srv/archive"),
     "key": ("tumbleline archive key", "tumbleline archive key --public"),
     "backup": (
@@ -34,12 +40,7 @@ EXAMPLES_OF = {
 }
 """Of the subcommands."""
 
-app = typer.Typer(
-    help="Maintain the archive.", no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False
-)
 
-
-@app.command()
 def clean(
     archive: ArchiveOption = None,
     *,
@@ -64,7 +65,6 @@ def clean(
     give({"archive": str(store.root), "only_looked": only_look, **asdict(done)}, lines, as_json=as_json)
 
 
-@app.command()
 def key(
     output: Annotated[
         Path | None, option("--output FILE", "File of the private key; default: in the user's configuration folder.")
@@ -96,7 +96,6 @@ def key(
     give({"name": name, "public": hexadecimal, "private_file": str(path)}, lines, as_json=as_json)
 
 
-@app.command()
 def backup(
     target: Annotated[str, argument("COPY", "Folder or address of the copy: empty, or an earlier copy.")],
     archive: ArchiveOption = None,
@@ -124,10 +123,9 @@ def backup(
     give(document, [*lines, *([f"database  {file}"] if file else [])], as_json=as_json)
 
 
-@app.command()
 def compact(
     archive: ArchiveOption = None,
-    before: Annotated[str, option("--before DATE", "Only runs that began before this day; default: all.")] = "",
+    until: Annotated[str, option("--until DATE", "Only runs that began before this day; default: all.")] = "",
     *,
     as_json: JsonOption = False,
 ) -> None:
@@ -142,9 +140,9 @@ def compact(
     from pipelines.audit.index import up_to_date
 
     try:
-        day = date.fromisoformat(before).isoformat() if before else ""
+        day = date.fromisoformat(until).isoformat() if until else ""
     except ValueError:
-        raise WrongUse(f"archive compact: --before {before!r} is no date, one such as 2026-05-01 is needed") from None
+        raise WrongUse(f"archive compact: --until {until!r} is no date, one such as 2026-05-01 is needed") from None
     store = Archive(archive)
     store.refuse_none()
     done = compacted(store, day)
@@ -159,7 +157,6 @@ def compact(
     give({"archive": str(store.root), **asdict(done)}, lines, as_json=as_json)
 
 
-@app.command()
 def restore(
     source: Annotated[str, argument("COPY", "Folder or address of the copy.")],
     archive: ArchiveOption = None,
@@ -190,3 +187,11 @@ def restore(
         f"verified: {number_of(report.runs, 'run')}, {state}",
     ]
     conclude({**document, **asdict(done)}, lines, as_json=as_json, passed=report.whole)
+
+
+app = group(
+    SUMMARY,
+    {
+        "query": query, "diff": diff, "compact": compact, "clean": clean, "key": key, "backup": backup, "restore": restore,
+    },
+)  # fmt: skip

@@ -3,9 +3,8 @@
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 from pipelines.archive import Archive
+from pipelines.cli.groups import group
 from pipelines.cli.options import ArchiveOption, JsonOption, argument, option
 from pipelines.cli.printing import give, print_table, say
 from pipelines.discovery.documents import ListedAttributes
@@ -19,10 +18,7 @@ EXAMPLES_OF = {
     "list": ("tumbleline attributes list", "tumbleline attributes list --json"),
 }
 
-app = typer.Typer(no_args_is_help=True, help=SUMMARY)
 
-
-@app.command()
 def add(
     table: Annotated[Path, argument("FILE", "A .csv or .parquet file with a column serial, or run.")],
     by: Annotated[str, option("--by serial|run", "What a row is about.")] = "serial",
@@ -36,7 +32,6 @@ def add(
     give(*added_from(Archive(archive), table, by), as_json=as_json)
 
 
-@app.command("list")
 def list_(archive: ArchiveOption = None, *, as_json: JsonOption = False) -> None:
     """List the attributes with their levels, and of how many units they are known."""
     from pipelines.discovery.attributes import listed
@@ -53,3 +48,6 @@ def _print(document: ListedAttributes) -> None:
         return
     lines = [[row["attribute"], row["of"], str(row["known"]), str(row["levels"]), row["such_as"]] for row in rows]
     print_table(["attribute", "of", "known", "levels", "such as"], lines)
+
+
+app = group(SUMMARY, {"add": add, "list": list_})

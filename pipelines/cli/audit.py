@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 PART = "Certificates, trace, audit"
 ORDER = 450
 SUMMARY = "Audit the archive: drift, calibrations due, stations that changed, the population."
-EXAMPLES = ("tumbleline audit --page audit.html", "tumbleline audit --since 2026-01-01 --device ADXL355")
+EXAMPLES = ("tumbleline audit --output audit.html", "tumbleline audit --since 2026-01-01 --device ADXL355")
 
 SHOWN = 12  # findings of one kind
 BEGINNING = -700000.0  # days before any calibration
@@ -38,7 +38,7 @@ def command(
         Path | None, option("--rules FILE", "Intervals, tolerances, check standards; built-in ones by default.")
     ] = None,
     page: Annotated[
-        Path | None, option("--page FILE.html", "Write the report as one page that opens without a network.")
+        Path | None, option("--output -o FILE.html", "Write the report as one page that opens without a network.")
     ] = None,
     dask: Annotated[str, option("--dask ADDRESS|local", "Read runs on Dask workers.")] = "",
     workers: Annotated[
@@ -112,7 +112,7 @@ def _show(audited: Audit, audit_findings: list[AuditFinding], root: str, page: P
             for message in messages[:SHOWN]:
                 say(f"  · {message}")
             if len(messages) > SHOWN:
-                say(f"  · … {len(messages) - SHOWN} more of this kind; --json and --page list all", style="dim")
+                say(f"  · … {len(messages) - SHOWN} more of this kind; --json and --output list all", style="dim")
     if not audit_findings:
         say("no action is needed")
     for device, count in discovered_before(Archive(root)):

@@ -1,58 +1,28 @@
-"""``tumbleline certificate``: the calibration certificate of a certified unit, as PDF for people and as XML for programs."""
+"""``tumbleline certificate``: the certificates of units: issued for a period, written as documents, revoked."""
 
-from pathlib import Path
-from typing import Annotated
-
-import typer
-
-from pipelines.archive import Archive
-from pipelines.cli.options import ArchiveOption, JsonOption, argument, option
-from pipelines.cli.printing import give, refuse_standard_output, remark
-from schemas.errors import DONE, PART_FAILED
+from pipelines.cli.certificate_issue import issue
+from pipelines.cli.certificate_revoke import revoke
+from pipelines.cli.certificate_write import write
+from pipelines.cli.groups import group
 
 PART = "Certificates, trace, audit"
-ORDER = 415
-SUMMARY = "Write the certificates of certified units: PDF with the XML (DCC) attached."
+ORDER = 410
+SUMMARY = "Issue certificates for a period of validity, write them as documents, revoke them."
 EXAMPLES = (
-    "tumbleline certificate latest --laboratory laboratory.toml --output certificates",
-    "tumbleline certificate SN1 --laboratory laboratory.toml --output certificates --sign-with key.pem",
+    "tumbleline certificate issue latest --until 12m",
+    "tumbleline certificate write latest --laboratory laboratory.toml --output certificates",
 )
+EXAMPLES_OF = {
+    "issue": ("tumbleline certificate issue latest --until 12m", "tumbleline certificate issue latest --units SN1"),
+    "write": (
+        "tumbleline certificate write latest --laboratory laboratory.toml --output certificates",
+        "tumbleline certificate write SN1 --laboratory laboratory.toml --output certificates --sign-with key.pem",
+    ),
+    "revoke": (
+        "tumbleline certificate revoke SN1 --reason 'fell to the floor'",
+        "tumbleline certificate revoke SN1 2 --reason 'reference out of date'",
+    ),
+}
+"""Of the subcommands."""
 
-
-def command(
-    names: Annotated[list[str], argument("RUN|UNIT…", "Runs, serial numbers or numbers of certificates (A1/2).")],
-    laboratory: Annotated[
-        Path, option("--laboratory FILE.toml", "TOML file with laboratory, customer, signatory and item.")
-    ] = Path("laboratory.toml"),
-    output: Annotated[Path, option("--output -o DIR", "Folder for the files; the current one.")] = Path(),
-    sign_with: Annotated[
-        Path | None, option("--sign-with KEY", "Sign PDF and XML: PKCS#12, or PEM with key and certificates.")
-    ] = None,
-    password_file: Annotated[
-        Path | None, option("--password-file FILE", "Password of the key, on the first line.")
-    ] = None,
-    address: Annotated[str, option("--address URL", "Print a QR code of this address; {number} is filled in.")] = "",
-    archive: ArchiveOption = None,
-    *,
-    as_json: JsonOption = False,
-) -> None:
-    """Write, for every certified unit, SERIAL_N.pdf and SERIAL_N.xml with the content of ISO/IEC 17025, 7.8.2 and 7.8.4.
-
-    A unit has to be certified before ('tumbleline certify'): the number of its certificate is the one in the ledger. The same
-    certificate gives the same bytes, unless it is signed. Exit status 1: some units of a run have no certificate.
-    """
-    from pipelines.certificates.document.issue import issue
-    from pipelines.certificates.document.laboratory import read_laboratory
-    from pipelines.certificates.document.signing import read_key
-
-    refuse_standard_output(output, "certificate", "a folder for PDF and XML")
-    who = read_laboratory(laboratory)
-    key = None if sign_with is None else read_key(sign_with, password_file)
-    done = issue(Archive(archive), names, who, output, key=key, address=address)
-    lines = [f"certificate {one.number}: {one.pdf}, {one.xml}" for one in done.written]
-    kept = ("serial", "run", "pdf", "xml", "signature")
-    written = [{"certificate": one.number, **{key: getattr(one, key) for key in kept}} for one in done.written]
-    give({"certificates": written, "left_out": done.left_out}, lines, as_json=as_json)
-    for serial, why in done.left_out.items():
-        remark(f"certificate: {serial}: {why}")
-    raise typer.Exit(PART_FAILED if done.left_out else DONE)
+app = group(SUMMARY, {"issue": issue, "write": write, "revoke": revoke})

@@ -21,8 +21,8 @@ def command(
     effects: options.EffectsOption = "",
     model: options.ModelOption = None,
     fresh: options.FreshOption = "",
-    history: options.HistoryOption = "",
-    fresh_history: options.FreshHistoryOption = "",
+    temperatures: options.TemperaturesOption = "",
+    fresh_temperatures: options.FreshTemperaturesOption = "",
     effect_file: options.EffectFileOption = None,
     formula: options.FormulaOption = None,
     leave_out: options.LeaveOutOption = "",
@@ -38,10 +38,10 @@ def command(
 
     add_effects(effect_file, formula, "compare")
     chosen = judged_effects(dwells, archive, effects, model, "compare")
-    first, temperatures, again, again_temperatures = both_runs(dwells, history, fresh, fresh_history, archive)
+    first, history, again, again_history = both_runs(dwells, temperatures, fresh, fresh_temperatures, archive)
     table, _ = without_dwells(first, leave_out)
     with error_console().status("fitting"):
-        document = compare(table, chosen or default_model(table), temperatures, again, again_temperatures)
+        document = compare(table, chosen or default_model(table), history, again, again_history)
     give(document, print_comparison, as_json=as_json)
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from pipelines.archive import Archive
 from pipelines.cli import options
-from pipelines.cli.options import argument, option
+from pipelines.cli.options import Setting, argument, option
 from pipelines.cli.printing import (
     STANDARD_OUTPUT,
     conclude,
@@ -32,52 +32,50 @@ PART = "Results"
 ORDER = 345
 SUMMARY = "Correct a recording with a calibration, and track the bias."
 EXAMPLES = (
-    "tumbleline correct flight.csv --calibration latest:SN1 --output corrected.csv",
-    "tumbleline correct bench.csv --calibration latest:SN1 --at-rest --turn-on 300 --output corrected.parquet",
+    "tumbleline correct flight.csv latest:SN1 --output corrected.csv",
+    "tumbleline correct bench.csv latest:SN1 --track at-rest --set turn_on=300 --output corrected.parquet",
 )
+
+
+AT_REST = "at-rest"
+SETTINGS = {
+    "gravity": Setting("M/S2", "local gravity at rest, m/s², that of the run by default", float),
+    "turn_on": Setting("UG", "change of the bias from switch-on to switch-on, µg (standard deviation)", float, 0.0),
+    "step": Setting("S", "time between updates of the bias, 1 s by default", float, 1e-3),
+}
 
 
 def command(
     file: Annotated[Path, argument("FILE", "Raw output over time, with a column of temperature.")],
-    calibration: options.CalibrationOption = "latest",
+    calibration: options.CalibrationArgument = "latest",
     output: Annotated[
         Path | None, option("--output -o FILE", "Corrected samples, as .csv or .parquet; -: as CSV on standard output.")
     ] = None,
-    columns: Annotated[str, option("--columns x,y,z", "Columns of the output; x,y,z or out_x,… by default.")] = "",
-    time: options.TimeColumnOption = "",
+    columns: options.MapOption = None,
     rate: options.RateOption = None,
-    force: Annotated[str, option("--force X,Y,Z", "True specific force, g, the same for all samples.")] = "",
-    gravity: Annotated[
-        float | None, option("--gravity M_S2", "Local gravity with --at-rest, m/s²; that of the run by default.")
+    track: Annotated[
+        list[str] | None,
+        option(
+            "--track at-rest|X,Y,Z",
+            "Track the bias: where the unit is at rest, by the magnitude of gravity; or by the true specific force, g, of all "
+            "samples. May be repeated.",
+        ),
     ] = None,
-    turn_on: Annotated[
-        float | None,
-        option("--turn-on UG", "Change of the bias from switch-on to switch-on, µg (standard deviation).", min=0.0),
-    ] = None,
-    step: Annotated[float, option("--step S", "Time between updates of the bias.", min=1e-3)] = 1.0,
-    low_pass: Annotated[str, option("--filter butterworth|fir|moving-average", "Low-pass behind the correction.")] = "",
-    cutoff: Annotated[
-        float | None,
-        option("--cutoff HZ", "Its -3 dB frequency; the unit's bandwidth that a run measured by default.", min=1e-9),
-    ] = None,
+    low_pass: options.FilterOption = "",
     state: Annotated[
         Path | None, option("--state FILE", "Go on with filter and bias as kept in this file, and keep them in it.")
     ] = None,
+    setting: Annotated[list[str] | None, options.set_option(SETTINGS)] = None,
+    include: options.IncludeOption = None,
     archive: options.ArchiveOption = None,
     *,
-    at_rest: Annotated[
-        bool, option("--at-rest", "Find where the unit is at rest and use the magnitude of gravity there.")
-    ] = False,
-    failed: Annotated[bool, option("--failed", "Also use a unit that failed its limits.")] = False,
-    revoked: Annotated[bool, option("--revoked", "Also use a revoked calibration.")] = False,
     as_json: options.JsonOption = False,
 ) -> None:
     """Correct a recording: a = K⁻¹(ã − b) with all effects of the model, and the covariance of each sample.
 
-    The bias is tracked where the specific force is known (--force, or columns force_x, force_y, force_z) or the unit is at rest
-    (--at-rest); between updates its standard deviation grows according to the unit's noise. --filter smooths the corrected
-    force and delays it, as stated. Exit status 1: the updates
-    contradict the stated noise.
+    The bias is tracked where the specific force is known (--track X,Y,Z, or columns force_x, force_y, force_z) or the unit is
+    at rest (--track at-rest); between updates its standard deviation grows according to the unit's noise. --filter smooths the
+    corrected force and delays it, as stated. Exit status 1: the updates contradict the stated noise.
     """
     from pipelines.export import filtering
     from pipelines.export.corrected import corrected, fit_of_unit
@@ -88,20 +86,27 @@ def command(
 
     printed = is_standard_output(output, "correct", as_json=as_json)
     name, _, unit = calibration.partition(":")
-    if cutoff is not None and not low_pass:
-        raise WrongUse("correct: --cutoff is given and no filter; add --filter butterworth|fir|moving-average")
+    time, named = options.mapped_outputs(columns)
+    given = options.settings(setting, SETTINGS, "correct")
+    forces = [one for one in track or () if one != AT_REST]
+    if len(forces) > 1:
+        raise WrongUse(f"correct: --track {' and '.join(forces)}, one specific force is needed; leave one out")
     store = Archive(archive)
     run = store.run(name)
     use_formulas_of(run)
-    fit = fit_of_unit(run, unit, "correct", failed=failed, revoked=revoked)
+    fit = fit_of_unit(run, unit, "correct", **options.included(include))
     with error_console().status(f"reading {file.name}"):
-        recording = read_recording(file, [c.strip() for c in columns.split(",") if c.strip()], time=time, rate_hz=rate)
+        recording = read_recording(file, named, time=time, rate_hz=rate)
     terms = archived_terms(run.about)
     if terms is not None and terms.follows is not None:
         recording = at_nominal_supply(recording, terms.follows)
+    turn_on = given.get("turn_on")
     if turn_on is None and terms is not None and terms.stability is not None:
         turn_on = terms.stability.switch_on_ug
-    tracking = tracking_of(run, recording, force, gravity, turn_on, step, at_rest=at_rest)
+    tracking = tracking_of(
+        run, recording, "".join(forces), given.get("gravity"), turn_on, given.get("step", 1.0),
+        at_rest=AT_REST in (track or ()),
+    )  # fmt: skip
     serial = fit.exported.unit
     begin = None if state is None else filtering.read_state(state, serial)
     if tracking is not None and begin is not None:
@@ -110,7 +115,7 @@ def command(
     chosen, end, source = None, None, ""
     if low_pass:
         chosen, source = filtering.chosen_filter(
-            low_pass, cutoff, filtering.filter_rate(recording, begin), store, serial
+            *options.filter_of(low_pass), filtering.filter_rate(recording, begin), store, serial
         )
         done, end = filtering.filtered(recording, done, chosen, begin)
     if output is not None:

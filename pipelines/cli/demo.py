@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pipelines.cli.next_commands import command_line, extension, judged_data
-from pipelines.cli.options import JsonOption, option
+from pipelines.cli.next_commands import Given, command_line, extension, judged_data
+from pipelines.cli.options import JsonOption, argument, option
 from pipelines.cli.printing import error_console, give, print_json, publish, remark, say
 from pipelines.cli.text.demo_text import print_ending
 from schemas.progress import Progress
@@ -23,23 +23,25 @@ if TYPE_CHECKING:
 PART = "Start here"
 ORDER = 50
 SUMMARY = "Hide an effect in the simulated station, find it, add it and see the error fall."
-EXAMPLES = ("tumbleline demo", "tumbleline demo --effect pendulous_mass --seed 11 --by-hand")
+EXAMPLES = ("tumbleline demo", "tumbleline demo pendulous_mass --seed 11 --by-hand")
 
 
 def command(
     effect: Annotated[
-        str, option("--effect NAME|random", "Hidden effect, by the name of its physics or its id.")
+        str, argument("[NAME|random]", "Hidden effect, by the name of its physics or its id; random by default.")
     ] = "random",
     seed: Annotated[
         int | None, option("--seed", "Seed of the simulation; the same seed gives the same data.", min=0)
     ] = None,
     folder: Annotated[Path, option("--folder DIR", "Folder for measurements, model and report.")] = Path("demo"),
-    lots: Annotated[int, option("--lots", "Lots of the archive of --archive.", min=60)] = 400,
+    lots: Annotated[
+        int | None,
+        option(
+            "--lots N", "Hide something in a wafer of an archive of so many lots, and find it with discover.", min=60
+        ),
+    ] = None,
     *,
-    archive: Annotated[
-        bool, option("--archive", "Hide something in a wafer of an archive of many lots, and find it with discover.")
-    ] = False,
-    auto: Annotated[bool, option("--auto", "Run without questions.")] = False,
+    yes: Annotated[bool, option("--yes -y", "Run without questions.")] = False,
     by_hand: Annotated[
         bool, option("--by-hand", "Only measure and write the files; continue with the commands yourself.")
     ] = False,
@@ -50,7 +52,7 @@ def command(
     The same lot is measured twice; the second run is fresh data that no fit sees.
     """
     drawn = secrets.randbelow(100000) if seed is None else seed
-    if archive:
+    if lots is not None:
         _archive(folder, drawn, lots, as_json=as_json)
         return
     from pipelines.archive.files import ELSEWHERE, writing
@@ -70,7 +72,7 @@ def command(
     if by_hand:
         _hand_over(folder, hidden, as_json=as_json)
         return
-    game = _Game(folder, hidden, lot, asks=not (auto or as_json), quiet=as_json)
+    game = _Game(folder, hidden, lot, asks=not (yes or as_json), quiet=as_json)
     document = game.play()
     if as_json:
         print_json({"seed": drawn, **document})
@@ -124,9 +126,9 @@ def _hand_over(folder: Path, hidden: Scene, *, as_json: bool) -> None:
 def _command(name: str, folder: Path, model: tuple[str, ...] | None) -> str:
     """A command to type, on the files of the demonstration."""
     chosen = ["--effects", ",".join(model)] if model else ["--model", str(folder / "model.toml")]
-    again = ["--fresh", str(folder / "fresh.parquet"), "--fresh-history", str(folder / "fresh-history.parquet")]
-    start = [name, str(folder / "dwells.parquet"), *chosen, "--history", str(folder / "history.parquet")]
-    return command_line(*start, *(again if name == "compare" else ["--report", str(folder / "report.html")]))
+    again = ["--fresh", str(folder / "fresh.parquet"), "--fresh-temperatures", str(folder / "fresh-history.parquet")]
+    start = [name, str(folder / "dwells.parquet"), *chosen, "--temperatures", str(folder / "history.parquet")]
+    return command_line(*start, *(again if name == "compare" else ["--output", str(folder / "report.html")]))
 
 
 class _Game:
@@ -197,7 +199,7 @@ class _Game:
         """The effects added, written to the model file one version each."""
         chosen = self._asked_for(recommended)
         file = self.folder / "model.toml"
-        data = judged_data(str(self.folder / "dwells.parquet"), str(self.folder / "history.parquet"), None)
+        data = judged_data(str(self.folder / "dwells.parquet"), str(self.folder / "history.parquet"), Given())
         lines = extension(file, chosen, self.hidden.model, data, new=True)[:-1]
         self._step("3. Add it.", "\n  ".join(lines) or "(nothing to add)")
         self.model = list(_write_model(file, self.hidden.model, chosen))

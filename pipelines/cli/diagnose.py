@@ -23,7 +23,7 @@ ORDER = 220
 SUMMARY = "Judge whether a model is adequate, where it fails, and which effect is missing."
 EXAMPLES = (
     "tumbleline diagnose latest",
-    "tumbleline diagnose dwells.csv --effects bias,scale,misalignment --report report.html",
+    "tumbleline diagnose dwells.csv --effects bias,scale,misalignment --output report.html",
 )
 
 
@@ -31,18 +31,20 @@ def command(
     dwells: options.DwellsArgument,
     effects: options.EffectsOption = "",
     model: options.ModelOption = None,
-    history: options.HistoryOption = "",
+    temperatures: options.TemperaturesOption = "",
     effect_file: options.EffectFileOption = None,
     formula: options.FormulaOption = None,
     leave_out: options.LeaveOutOption = "",
-    report: Annotated[
-        Path | None, option("--report --page FILE.html", "Write the diagnosis with pictures, as one HTML file.")
-    ] = None,
-    following: Annotated[
-        Path | None, option("--next FILE.toml", "Write a recipe: the measured one with the proposed steps.")
+    output: Annotated[
+        list[Path] | None,
+        option(
+            "--output -o FILE",
+            "The diagnosis with pictures as a page (.html), or a recipe (.toml): the measured one with the proposed steps; may "
+            "be repeated.",
+        ),
     ] = None,
     recipe: Annotated[
-        str, option("--recipe RECIPE", "Recipe of the dwells, for --next; a run of the archive has its own.")
+        str, option("--recipe RECIPE", "Recipe of the dwells, for the one to write; a run of the archive has its own.")
     ] = "",
     archive: options.ArchiveOption = None,
     *,
@@ -58,15 +60,17 @@ def command(
     from pipelines.diagnosis.inputs import file_beside, judged_effects
     from pipelines.importers.files import is_file
 
+    files = options.outputs(output, {"page": options.PAGES, "recipe": (".toml",)}, "diagnose")
+    report, following = files.get("page"), files.get("recipe")
     add_effects(effect_file, formula, "diagnose")
     base = measured_recipe(dwells, recipe, archive) if following is not None else None
     judged = judged_effects(dwells, archive, effects, model, "diagnose")
-    table, temperatures = dwells_and_history(dwells, history, archive)
+    table, history = dwells_and_history(dwells, temperatures, archive)
     table, left_out = without_dwells(table, leave_out)
-    beside = history or (file_beside(dwells, "history") if is_file(dwells) else "")
+    beside = temperatures or (file_beside(dwells, "history") if is_file(dwells) else "")
     kept_name = dwells if is_file(dwells) else Archive(archive).run(dwells).id  # what 'latest' means changes
     document, report_text = diagnosed(
-        table, temperatures, judged, kept_name, with_report=report is not None, left_out=left_out
+        table, history, judged, kept_name, with_report=report is not None, left_out=left_out
     )
     document["history"] = beside or None
     if report is not None:
@@ -75,10 +79,11 @@ def command(
         from pipelines.jobs.recipes import folder_of
 
         write_next(following, document, base, folder_of(recipe) if recipe else Path(), dwells)
-    from pipelines.cli.next_commands import judged_data
+    from pipelines.cli.next_commands import Given, judged_data
     from pipelines.cli.text.diagnosis_text import print_diagnosis
 
-    show = partial(print_diagnosis, data=partial(judged_data, dwells, beside, archive), model=model, brief=not show_all)
+    given = Given(archive, leave_out=leave_out, effect_files=effect_file or (), formulas=formula or ())
+    show = partial(print_diagnosis, data=partial(judged_data, dwells, beside, given), model=model, brief=not show_all)
     conclude(document, show, as_json=as_json, passed=bool(document["adequate"]))
 
 
@@ -118,8 +123,8 @@ def measured_recipe(dwells: str, recipe: str, archive: str | None) -> Recipe:
         return load_recipe(recipe)
     if is_file(dwells) or not Archive(archive).run(dwells).about.get("capture"):
         raise WrongUse(
-            f"diagnose: --next needs the recipe that {dwells} was measured with (device, poses, soaks), which dwells do not "
-            "state; add --recipe FILE"
+            f"diagnose: a recipe to measure next needs the one that {dwells} was measured with (device, poses, soaks), which "
+            "dwells do not state; add --recipe FILE"
         )
     return job_of_run(Archive(archive).run(dwells)).recipe
 
@@ -141,7 +146,7 @@ def write_next(path: Path, document: dict[str, Any], base: Recipe, home: Path, s
         return
     limits = limits_from(base.limits, home, path.parent)
     recipe = next_recipe(base, rows, path.stem).model_copy(update={"limits": limits})
-    remarks = [f"Written by 'tumbleline diagnose --next' from {source}: recipe {base.name}, then", *reasons(rows)]
+    remarks = [f"Written by 'tumbleline diagnose' from {source}: recipe {base.name}, then", *reasons(rows)]
     remarks += [f"without formula {formula.id}: name the model file with 'model'" for formula in base.formulas]
     files.publish(path, recipe_text(recipe, remarks).encode(), "recipe", files.ELSEWHERE)
     out.print(f"next: {path}; to see what it determines:")

@@ -13,7 +13,7 @@ from schemas.errors import WrongUse
 PART = "Certificates, trace, audit"
 ORDER = 452
 SUMMARY = "Find effects, far smaller than the noise of a lot, that an archive of many lots shows."
-EXAMPLES = ("tumbleline discover --html discoveries.html", "tumbleline discover --driver station,slot --reach --json")
+EXAMPLES = ("tumbleline discover --output discoveries.html", "tumbleline discover --driver station,slot --reach --json")
 
 
 def command(
@@ -29,7 +29,9 @@ def command(
     model: Annotated[
         Path | None, option("--model FILE", "A model file: what is left with its effects in the model of every lot.")
     ] = None,
-    html: Annotated[Path | None, option("--html FILE", "Write the findings with pictures as one page.")] = None,
+    html: Annotated[
+        Path | None, option("--output --html -o FILE", "Write the findings with pictures as one page.")
+    ] = None,
     workers: Annotated[
         int | None, option("--workers", "Processes that score new runs; as many as cores by default.", min=1)
     ] = None,

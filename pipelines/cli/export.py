@@ -6,19 +6,33 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from pkgutil import iter_modules
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from pipelines.archive import Archive, Run, files
-from pipelines.cli.options import ArchiveOption, JsonOption, RunArgument, option
+from pipelines.cli.export_waveforms import write_record
+from pipelines.cli.options import (
+    ArchiveOption,
+    FilterOption,
+    IncludeOption,
+    JsonOption,
+    RunArgument,
+    Setting,
+    filter_of,
+    included,
+    option,
+    set_option,
+    settings,
+    yes,
+)
 from pipelines.cli.printing import STANDARD_OUTPUT, print_text, remark
 from schemas.errors import WrongUse, did_you_mean
 
 PART = "Results"
 ORDER = 340
-SUMMARY = "Write coefficients for firmware and autopilots."
+SUMMARY = "Write coefficients for firmware and autopilots, or waveforms for other programs."
 EXAMPLES = (
     "tumbleline export latest --format c --output calibration.h",
-    "tumbleline export latest --format px4 --nominal 256000 --units SN1 --device-id 1310988 --output SN1.params",
+    "tumbleline export latest --format px4 --units SN1 --set nominal=256000 --set device_id=1310988 --output SN1.params",
 )
 
 BINARY = ".mat"
@@ -28,7 +42,7 @@ _FORMATS = {module.name: "" for module in iter_modules([str(_FOLDER)])}  # their
 for _name in _FORMATS:  # the first line of a module says what it writes
     _line = (_FOLDER / f"{_name}.py").read_text(encoding="utf-8").partition("\n")[0]
     _FORMATS[_name] = _line.strip('"').partition(": ")[2].replace("``", "")
-EPILOG = ("Formats:", *(f"{name}: {text}" for name, text in _FORMATS.items()))
+EPILOG = ("Formats of coefficients:", *(f"{name}: {text}" for name, text in _FORMATS.items()))
 
 
 if TYPE_CHECKING:
@@ -36,10 +50,33 @@ if TYPE_CHECKING:
     from pipelines.export.settings import Firmware
 
 
+WAVEFORMS = "csv, hdf5, lvm, mat, tdms, uff58, wav"  # names of the writers, which help does not import
+SETTINGS = {
+    "nominal": Setting(
+        "N", "ardupilot, betaflight, px4: output per g by which the driver divides, the preset's by default", float
+    ),
+    "device_id": Setting(
+        "ID|SN=ID,…", "px4 (CAL_ACC0_ID), ardupilot (INS_ACC_ID): number of the sensor in the autopilot"
+    ),
+    "sensor": Setting("0…3", "ardupilot, px4: place of the accelerometer in the autopilot", int, 0.0),
+    "arithmetic": Setting("double|float|q24", "c: arithmetic of the code"),
+    "counts_per_g": Setting("N", "betaflight: counts of 1 g (acc_1G), 2048 by default", int, 1.0),
+    "teds": Setting(
+        "KEY=VALUE,…",
+        "teds: manufacturer, model, version (A1), mass_g, initials, and period_days where no certificate states it",
+    ),
+    "track": Setting("yes", "c: with the filter of the bias, as in correct", yes),
+    "turn_on": Setting("UG", "c, with track: as in correct", float, 0.0),
+    "step": Setting("S", "c, with track: as in correct", float, 1e-3),
+}
+
+
 def command(
     run: RunArgument = "latest",
-    form: Annotated[str, option("--format", f"{', '.join(_FORMATS)}; described below.")] = "json",
-    units: Annotated[str, option("--units SN,…", "Export only these units; default: all that passed.")] = "",
+    form: Annotated[
+        str, option("--format NAME", f"{', '.join(_FORMATS)}; see below. json, with --waveforms csv, by default.")
+    ] = "",
+    units: Annotated[str, option("--units SN,…", "Only these units; default: all that passed.")] = "",
     output: Annotated[
         Path | None,
         option(
@@ -47,48 +84,27 @@ def command(
             "Output file, or a folder where each unit has a file of its own; default, or -: standard output.",
         ),
     ] = None,
-    nominal: Annotated[
-        float | None,
-        option(
-            "--nominal",
-            "ardupilot, betaflight, px4: output per g by which the driver divides; that of the device's preset.",
-        ),
-    ] = None,
-    device_id: Annotated[
-        str,
-        option(
-            "--device-id ID|SN=ID,…",
-            "px4 (CAL_ACC0_ID), ardupilot (INS_ACC_ID): number of the sensor in the autopilot.",
-        ),
-    ] = "",
-    sensor: Annotated[int, option("--sensor 0…3", "ardupilot, px4: place of the accelerometer in the autopilot.")] = 0,
-    arithmetic: Annotated[str, option("--arithmetic double|float|q24", "c: arithmetic of the code.")] = "double",
     rate: Annotated[
         float | None, option("--rate HZ", "kalibr, ros: rate of the receiver; that of the static record.", min=1e-9)
     ] = None,
-    counts_per_g: Annotated[int, option("--counts-per-g", "betaflight: counts of 1 g (acc_1G).")] = 2048,
-    low_pass: Annotated[str, option("--filter KIND", "c: low-pass of the force, as in correct; with --rate.")] = "",
-    cutoff: Annotated[float | None, option("--cutoff HZ", "c: its -3 dB frequency, as in correct.", min=1e-9)] = None,
-    turn_on: Annotated[float | None, option("--turn-on UG", "c, with --track: as in correct.", min=0.0)] = None,
-    teds: Annotated[
-        str,
-        option(
-            "--teds KEY=VALUE,…",
-            "teds: manufacturer, model, version (A1), mass_g, initials, and period_days where no certificate states it.",
-        ),
-    ] = "",
-    step: Annotated[float, option("--step S", "c, with --track: as in correct.", min=1e-3)] = 1.0,
+    low_pass: FilterOption = "",
+    setting: Annotated[list[str] | None, set_option(SETTINGS)] = None,
+    include: IncludeOption = None,
+    waveforms: Annotated[
+        int | None,
+        option("--waveforms N", f"Instead, the waveforms of this record of a test, from 0, of one unit: {WAVEFORMS}."),
+    ] = None,
     archive: ArchiveOption = None,
     *,
-    track: Annotated[bool, option("--track", "c: with the filter of the bias, as in correct.")] = False,
-    failed: Annotated[bool, option("--failed", "Also export units that failed their limits.")] = False,
-    revoked: Annotated[bool, option("--revoked", "Also export units whose calibration was revoked.")] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Write coefficients: bias b and response K as polynomials in temperature, to apply as a = K⁻¹(ã − b).
 
     Files for autopilots hold one unit each, and state in µg what the format cannot hold. Only units that passed are exported;
-    revoked calibrations are left out. An option that begins with names of formats is for these formats.
+    revoked calibrations are left out. A setting that begins with names of formats is for these formats.
+
+    With --waveforms the channels of a unit and of the reference sensor are written, with unit and sample interval; a format that
+    holds only one clock gets one file for each clock: ``…_units`` and ``…_reference``.
     """
     from pipelines.certificates.coefficient_remarks import signature_remarks
     from pipelines.certificates.measured import measured_on
@@ -96,22 +112,29 @@ def command(
     from pipelines.export.teds import data_sheet
     from pipelines.jobs.model_files import use_formulas_of
 
-    form = "json" if as_json else form
+    if waveforms is not None:
+        if as_json:
+            raise WrongUse(
+                "export: --json prints coefficients, --waveforms writes files, one is possible; leave one out"
+            )
+        write_record(Archive(archive).run(run), waveforms, units, form or "csv", output)
+        return
+    form = "json" if as_json or not form else form
+    given = settings(setting, SETTINGS, "export")
     if form not in FORMATS:
         raise WrongUse(f"export: no format is called '{form}'; {did_you_mean(form, FORMATS)}")
     source = Archive(archive).run(run)
     use_formulas_of(source)
     serials = tuple(serial.strip() for serial in units.split(",")) if units else ()
-    chosen = unit_calibrations(source, serials, failed=failed, revoked=revoked)
-    ids = device_ids(device_id, [c.unit for c in chosen])
-    settings = ExportSettings(nominal, ids, sensor, arithmetic, rate, counts_per_g)
+    chosen = unit_calibrations(source, serials, **included(include))
+    ids = device_ids(given.get("device_id", ""), [c.unit for c in chosen])
+    stated = {key: given[key] for key in ("nominal", "sensor", "arithmetic", "counts_per_g") if key in given}
+    receiver = ExportSettings(device_ids=ids, rate_hz=rate, **stated)
     if form == "teds":
-        settings = replace(settings, data_sheet=data_sheet(teds, measured_on(source)))
-    if low_pass or track:
-        settings = replace(
-            settings, firmware=_firmware(source, chosen, form, (low_pass, cutoff, rate), (track, step, turn_on))
-        )
-    contents = export_files(form, chosen, source.id, settings)
+        receiver = replace(receiver, data_sheet=data_sheet(given.get("teds", ""), measured_on(source)))
+    if low_pass or given.get("track"):
+        receiver = replace(receiver, firmware=_firmware(source, chosen, form, (low_pass, rate), given))
+    contents = export_files(form, chosen, source.id, receiver)
     _print_certificates(source, chosen, signature_remarks(source, [c.unit for c in chosen]))
     _write(contents, output)
 
@@ -120,32 +143,34 @@ def _firmware(
     run: Run,
     chosen: Sequence[UnitCalibration],
     form: str,
-    low_pass: tuple[str, float | None, float | None],
-    tracking: tuple[bool, float, float | None],
+    low_pass: tuple[str, float | None],
+    given: dict[str, Any],
 ) -> Firmware:
     """The low-pass and the models of the bias that C code gets.
 
-    low_pass : kind, cut-off and rate, Hz · tracking : whether, step in s, change of the bias from switch-on to switch-on in µg
+    low_pass : as it was given, and rate, Hz · given : settings
     """
     from pipelines.export.filtering import chosen_filter
     from pipelines.export.settings import Firmware, bias_models
 
-    kind, cutoff, rate = low_pass
+    text, rate = low_pass
+    kind, cutoff = filter_of(text) if text else ("", None)
     if form != "c":
-        raise WrongUse(
-            f"export: --filter and --track are for format c, found {form}; leave them out, or add --format c"
-        )
+        raise WrongUse(f"export: --filter and track are for format c, found {form}; leave them out, or add --format c")
     if kind and rate is None:
         raise WrongUse("export: --filter needs the rate of the receiver's samples; add --rate HZ")
     if kind and cutoff is None and len(chosen) > 1:
-        raise WrongUse(f"export: {len(chosen)} units share one filter, its cut-off is needed; add --cutoff HZ")
+        raise WrongUse(
+            f"export: {len(chosen)} units share one filter, its cut-off is needed; give it as --filter {kind}:HZ"
+        )
     made = (
         chosen_filter(kind, cutoff, rate, Archive(run.archive.root), chosen[0].unit)[0]
         if kind and rate is not None
         else None
     )
-    wanted, step, turn_on = tracking
-    models = bias_models(run, [unit.unit for unit in chosen], step, turn_on) if wanted else None
+    step = given.get("step", 1.0)
+    units = [unit.unit for unit in chosen]
+    models = bias_models(run, units, step, given.get("turn_on")) if given.get("track") else None
     return Firmware(made, models, step)
 
 
@@ -187,7 +212,9 @@ def _print_certificates(run: Run, chosen: Sequence[UnitCalibration], signers: Se
         )
     bare = [c.unit for c in chosen if c.certificate is None]
     if bare:
-        lines.append(f"not certified: {', '.join(bare)}; 'tumbleline certify {run.id}' gives them a period of validity")
+        lines.append(
+            f"not certified: {', '.join(bare)}; 'tumbleline certificate issue {run.id}' gives them a period of validity"
+        )
     lines += [*library_remarks(run), *signers]
     for line in lines:
         remark(f"export: {line}")

@@ -5,7 +5,16 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from pipelines.cli.options import ByOption, EffectFileOption, JsonOption, argument, option
+from pipelines.cli.options import (
+    EffectFileOption,
+    FormulaOption,
+    JsonOption,
+    ReasonOption,
+    WhoOption,
+    argument,
+    names_in,
+    option,
+)
 from pipelines.cli.printing import give, is_standard_output, print_text, remark, say
 from schemas.errors import WrongUse
 
@@ -17,8 +26,8 @@ PART = "Is the model good enough, and what is missing?"
 ORDER = 230
 SUMMARY = "Write the next version of a model: one effect more, or one removed."
 EXAMPLES = (
-    "tumbleline extend model.toml third_order --why 'the diagnosis names it'",
-    "tumbleline extend model.toml --remove third_order --why 'not seen in the fresh run'",
+    "tumbleline extend model.toml third_order --reason 'the diagnosis names it'",
+    "tumbleline extend model.toml --remove third_order --reason 'not seen in the fresh run'",
 )
 
 
@@ -31,19 +40,21 @@ def command(
     remove: Annotated[
         str, option("--remove EFFECT", "Effect to remove instead; earlier versions stay in the file.")
     ] = "",
-    why: Annotated[str, option("--why TEXT", "Reason for the change; needed with --remove.")] = "",
-    by: ByOption = "",
-    run: Annotated[str, option("--run RUN", "Run or file with the evidence.")] = "",
+    reason: ReasonOption = "",
+    who: WhoOption = "",
+    dwells: Annotated[str, option("--dwells DWELLS", "Run or file with the evidence.")] = "",
     output: Annotated[
         Path | None,
         option(
-            "--out -o FILE", "Write the new version to this file, or with - to standard output; MODEL is not changed."
+            "--output -o FILE",
+            "Write the new version to this file, or with - to standard output; MODEL is not changed.",
         ),
     ] = None,
     effects: Annotated[
         str, option("--effects a,b,c", "The starting model of a new file; default: bias to scale_temperature.")
     ] = "",
     effect_file: EffectFileOption = None,
+    formula: FormulaOption = None,
     *,
     as_json: JsonOption = False,
 ) -> None:
@@ -53,13 +64,15 @@ def command(
     history of the file, with the reason.
     """
     from pipelines.cli.inputs import add_effects
+    from pipelines.diagnosis.inputs import with_formulas
     from pipelines.jobs.model_files import extended, model_step, publish_model, reduced
 
     printed = is_standard_output(output, "extend", as_json=as_json)
-    _refuse_contradiction(model, effect, remove, why)
-    add_effects(effect_file)
-    step = model_step(remove or effect, why, by, run)
+    _refuse_contradiction(model, effect, remove, reason)
+    add_effects(effect_file, formula, "extend")
+    step = model_step(remove or effect, reason, who, dwells)
     text, begun = _start(model, effects, step)
+    text = with_formulas(text, formula or (), [*names_in(effects), effect])
     new, after = (reduced if remove else extended)(text, step, f"model {model.name}")
     target = output or model
     if printed:
@@ -86,18 +99,18 @@ def command(
     give(document, lambda _: [(remark if printed else say)(line) for line in lines], as_json=as_json)
 
 
-def _refuse_contradiction(model: Path, effect: str, remove: str, why: str) -> None:
+def _refuse_contradiction(model: Path, effect: str, remove: str, reason: str) -> None:
     """Refuse a change that is none, two, or a removal without a reason or a model."""
     if bool(effect.strip()) == bool(remove.strip()):
         found = "EFFECT and --remove are both given" if effect.strip() else "no effect is given"
         raise WrongUse(
             f"extend: {found}, one effect is needed; give 'extend {model} EFFECT' to add it, or 'extend {model} --remove EFFECT "
-            "--why TEXT' to remove it"
+            "--reason TEXT' to remove it"
         )
-    if remove and not why.strip():
+    if remove and not reason.strip():
         raise WrongUse(
-            f"extend: --remove {remove} has no reason, the history needs one; add --why TEXT, such as the verdict of 'tumbleline "
-            f"history {model}'"
+            f"extend: --remove {remove} has no reason, the history needs one; add --reason TEXT, such as the verdict of "
+            f"'tumbleline history {model}'"
         )
     if remove and not model.exists():
         raise WrongUse(f"extend: {model} does not exist, --remove needs a model file; correct the name")

@@ -26,6 +26,7 @@ def command(
     model: options.ModelOption = None,
     limits: options.OtherLimitsOption = "",
     leave_out: options.LeaveOutOption = "",
+    effect_file: options.EffectFileOption = None,
     archive: options.ArchiveOption = None,
     *,
     as_json: options.JsonOption = False,
@@ -36,6 +37,7 @@ def command(
     cannot be judged, or a unit did not pass.
     """
     from pipelines.chain.runner import Runner
+    from pipelines.cli.inputs import add_effects
     from pipelines.cli.summary import all_passed, print_result, summary
     from pipelines.cli.text.verdict_text import judged
     from pipelines.jobs.job import job_of_run
@@ -49,9 +51,10 @@ def command(
     store = Archive(archive)
     stored = store.run(run)
     if not stored.about.get("capture"):
-        _fit_import(stored, (effects, model, limits), leave_out, as_json=as_json)
+        _fit_import(stored, (effects, model, limits, effect_file), leave_out, as_json=as_json)
     if leave_out:
         raise WrongUse(f"run {stored.id}: --leave-out is for imports, this run was captured; measure the dwell again")
+    add_effects(effect_file)
     listed = [name.strip() for name in effects.split(",")] if effects else []
     job = job_of_run(store.run(run), effects=listed, model=model, limits=limits)
     runner = Runner(job, store)
@@ -65,10 +68,12 @@ def command(
     conclude(document, print_result, as_json=as_json, passed=all_passed(document))
 
 
-def _fit_import(run: Run, change: tuple[str, Path | None, str], leave_out: str, *, as_json: bool) -> NoReturn:
+def _fit_import(
+    run: Run, change: tuple[str, Path | None, str, list[Path] | None], leave_out: str, *, as_json: bool
+) -> NoReturn:
     """Fit a model to an import, keep it as a run of its own and print it.
 
-    change : effects, model file and limits; empty or None if not given
+    change : effects, model file, limits and files with effects; empty or None if not given
     """
     from pipelines.jobs.model_change import change_from_options
     from pipelines.rerun.imported_fit import fit_document

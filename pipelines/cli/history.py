@@ -1,10 +1,12 @@
 """``tumbleline history``: the error of a model, version by version, beside the noise that its fit assumes."""
 
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
 from pipelines.cli import options
-from pipelines.cli.next_commands import command_line, print_next
+from pipelines.cli.next_commands import Given, command_line, print_next
 from pipelines.cli.options import argument, option
 from pipelines.cli.printing import error_console, give, print_table, publish, say, short, warn
 from schemas.errors import WrongUse
@@ -14,7 +16,7 @@ ORDER = 250
 SUMMARY = "Show the error of a model, version by version."
 EXAMPLES = (
     "tumbleline history model.toml",
-    "tumbleline history model.toml --dwells dwells.csv --fresh fresh.csv --picture history.png",
+    "tumbleline history model.toml --dwells dwells.csv --fresh fresh.csv --output history.png",
 )
 
 
@@ -22,10 +24,11 @@ def command(
     model: Annotated[Path, argument("MODEL", "A model file.")],
     dwells: Annotated[str, option("--dwells DWELLS", "A file in the exchange format, or a run of the archive.")] = "",
     fresh: options.FreshOption = "",
-    history: options.HistoryOption = "",
-    fresh_history: options.FreshHistoryOption = "",
-    picture: Annotated[Path | None, option("--picture FILE.png", "Draw it, as PNG, SVG or PDF.")] = None,
+    temperatures: options.TemperaturesOption = "",
+    fresh_temperatures: options.FreshTemperaturesOption = "",
+    picture: Annotated[Path | None, option("--output -o FILE.png", "Draw it, as PNG, SVG or PDF.")] = None,
     effect_file: options.EffectFileOption = None,
+    leave_out: options.LeaveOutOption = "",
     archive: options.ArchiveOption = None,
     *,
     as_json: options.JsonOption = False,
@@ -34,7 +37,7 @@ def command(
 
     Without --dwells only the changes are shown.
     """
-    from pipelines.cli.inputs import add_effects, both_runs
+    from pipelines.cli.inputs import add_effects, both_runs, without_dwells
     from pipelines.diagnosis.confirmation import FIGURES, JUDGED, change_row
     from pipelines.improvement.improvement import ImprovedTables, errors_by_version
     from pipelines.jobs.model_files import read_model, versions
@@ -45,10 +48,11 @@ def command(
         from pipelines.drawing.picture import refuse_ending
 
         if not dwells:
-            raise WrongUse("history: --picture shows errors, they need --dwells; name the dwells too")
-        refuse_ending(picture, "--picture")
+            raise WrongUse("history: --output draws errors, they need --dwells; name the dwells too")
+        refuse_ending(picture, "--output")
     if dwells:
-        tables = ImprovedTables(*both_runs(dwells, history, fresh, fresh_history, archive))
+        first, *others = both_runs(dwells, temperatures, fresh, fresh_temperatures, archive)
+        tables = ImprovedTables(without_dwells(first, leave_out)[0], *others)
         rows = errors_by_version(versions(model_file), tables, lambda: error_console().status("fitting"))
     else:
         rows = [
@@ -62,10 +66,14 @@ def command(
         chart = evolution_chart(rows, model_file.model.name)
         publish(picture, drawn(chart, picture.suffix.lower()), "picture")
     document = {"model": model_file.model.name, "file": str(model), "versions": rows}
-    give(document, lambda _: _print(rows, model_file.model.name, model), as_json=as_json)
+    give(
+        document,
+        lambda _: _print(rows, model_file.model.name, partial(removal, model, effect_file or ())),
+        as_json=as_json,
+    )
 
 
-def _print(rows: list[dict[str, Any]], name: str, file: Path) -> None:
+def _print(rows: list[dict[str, Any]], name: str, removes: Callable[[str], str]) -> None:
     changes = [
         [str(row["version"]), _change(row), row["by"], row["at"][:16].replace("T", " "), row["why"]] for row in rows
     ]
@@ -97,12 +105,13 @@ def _print(rows: list[dict[str, Any]], name: str, file: Path) -> None:
             f"{', '.join(refuted)}: refuted. The fresh run does not show the predicted change; remove it from the model.",
             style="bold red",
         )
-        print_next([removal(file, effect) for effect in refuted if effect in rows[-1]["effects"]])
+        print_next([removes(effect) for effect in refuted if effect in rows[-1]["effects"]])
 
 
-def removal(file: Path, effect: str) -> str:
+def removal(file: Path, effect_files: Sequence[Path], effect: str) -> str:
     """The command that removes an effect which a fresh run refutes."""
-    return command_line("extend", str(file), "--remove", effect, "--why", "the fresh run is evidence against it")
+    words = ("--reason", "the fresh run is evidence against it", *Given(effect_files=effect_files).effects)
+    return command_line("extend", str(file), "--remove", effect, *words)
 
 
 def _change(row: dict[str, Any]) -> str:

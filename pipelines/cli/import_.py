@@ -7,7 +7,17 @@ from typing import Annotated, Any, NoReturn
 
 from inertial.counts import number_of
 from pipelines.cli.next_commands import archive_words, command_line, print_next
-from pipelines.cli.options import ArchiveOption, GroupOption, JoinOption, JsonOption, argument, option
+from pipelines.cli.options import (
+    READING,
+    AllOption,
+    ArchiveOption,
+    JsonOption,
+    Setting,
+    argument,
+    option,
+    set_option,
+    settings,
+)
 from pipelines.cli.printing import conclude, error_console, print_table, say, short, short_values
 from pipelines.cli.text.verdict_text import print_verdict_of_fit
 from schemas.errors import WrongUse, did_you_mean
@@ -17,11 +27,43 @@ PART = "Measure"
 ORDER = 160
 SUMMARY = "Import recordings of other systems into the archive."
 EXAMPLES = (
-    "tumbleline import acc.csv --map time=t,x=ax,y=ay,z=az --units output=LSB --unit SN1",
-    "tumbleline import acc.csv --mapping columns.toml --fit norm",
+    "tumbleline import acc.csv --map time=t,x=ax,y=ay,z=az --unit-of output=LSB --units SN1",
+    "tumbleline import acc.csv --set columns.toml --fit norm",
 )
 
 METHODS = ("norm", "plane", "faces", "temperature")
+
+
+def _pairs(text: str) -> dict[str, str]:
+    from pipelines.importers.mapping import pairs
+
+    return pairs(text, "--set")
+
+
+def _listed(text: str) -> list[str]:
+    return [part.strip() for part in text.split(",")]
+
+
+KEYS = {
+    "rows": Setting("samples|dwells", "content of a row, samples by default"),
+    "local_gravity_m_s2": Setting("M/S2", "local gravity at the place of the measurement", float),
+    "poses": Setting("LABEL=+x,…", "dwells to keep by label, with the face that is up", _pairs),
+    "headings": Setting("LABEL=deg,…", "direction of x in each pose, degrees (of y where x is vertical)", _pairs),
+    "face": Setting("+x|…|-z", "the face that is up all the time"),
+    "block_s": Setting("S", "dwells of this length, for a record in one pose", float),
+    "positions": Setting("N", "positions logged back to back, without the moves", int),
+    "window_s": Setting("S", "sliding window of the search for dwells, 1 s by default", float),
+    "threshold": Setting("SD", "standard deviation in a window that means motion, in the output unit", float),
+    "shortest_s": Setting("S", "shortest dwell, 1 s by default", float),
+    "gaps": Setting("refuse|split", "rows without a number, and gaps in time; refuse by default"),
+    "faulty": Setting("refuse|leave-out|keep", "constant axes and torn words; refuse by default"),
+    "axes": Setting("x,y,z", "order of the mapped axes", _listed),
+    "signs": Setting("+,+,+", "signs of the axes in that order", _listed),
+    "verify": Setting("N|N%", "dwells that the fit does not use; they verify it"),
+    "measured": Setting("DATE", "day of the measurement"),
+    "zero_output": Setting("VALUE", "nominal output at 0 g, 0 by default", float),
+    **READING,
+}
 
 
 def command(
@@ -33,52 +75,25 @@ def command(
             "DataFlash, MCAP, ROS bags, MDF, miniSEED. Also .gz.",
         ),
     ],
-    columns: Annotated[str, option("--map time=…,x=…,y=…,z=…", "Meaning of the columns of the file.")] = "",
-    mapping: Annotated[
-        Path | None, option("--mapping TOML", "TOML file with these options; options given here have priority.")
+    columns: Annotated[
+        list[str] | None, option("--map time=…,x=…,y=…,z=…", "Meaning of the columns of the file.")
     ] = None,
-    units: Annotated[str, option("--units output=LSB,time=s,temperature=degC", "Units of the columns.")] = "",
-    unit: Annotated[str, option("--unit SN", "Serial number, if no column has it.")] = "",
-    rows: Annotated[str, option("--rows samples|dwells", "Content of a row; samples by default.")] = "",
+    unit_of: Annotated[
+        list[str] | None, option("--unit-of output=LSB,time=s,temperature=degC", "Units of measure of the columns.")
+    ] = None,
+    units: Annotated[str, option("--units SN", "Serial number, if no column has it.")] = "",
     rate: Annotated[float | None, option("--rate HZ", "Rate of samples without a time.")] = None,
-    axes: Annotated[str, option("--axes x,y,z", "Order of the mapped axes.")] = "",
-    signs: Annotated[str, option("--signs +,+,+", "Signs of the axes in that order.")] = "",
-    poses: Annotated[str, option("--poses LABEL=+x,…", "Dwells to keep by label, with the face that is up.")] = "",
-    headings: Annotated[
-        str, option("--headings LABEL=deg,…", "Direction of x in each pose, degrees (of y where x is vertical).")
-    ] = "",
-    face: Annotated[str, option("--face +x|…|-z", "The face that is up all the time.")] = "",
-    blocks: Annotated[float | None, option("--blocks S", "Dwells of this length, for a record in one pose.")] = None,
-    positions: Annotated[
-        int | None, option("--positions N", "Positions logged back to back, without the moves.")
+    setting: Annotated[
+        list[str] | None,
+        set_option(
+            KEYS,
+            "Or --set FILE.toml: a file with these keys and the tables columns and units; with --procedure the keys of the "
+            "procedure and full_scale. What the command line gives has priority; may be repeated.",
+        ),
     ] = None,
-    window: Annotated[
-        float | None, option("--window S", "Sliding window of the search for dwells; 1 s by default.")
-    ] = None,
-    threshold: Annotated[
-        float | None, option("--threshold SD", "Standard deviation in a window that means motion, in the output unit.")
-    ] = None,
-    shortest: Annotated[float | None, option("--shortest S", "Shortest dwell; 1 s by default.")] = None,
-    gaps: Annotated[
-        str, option("--gaps refuse|split", "Rows without a number, and gaps in time; refuse by default.")
-    ] = "",
-    faulty: Annotated[
-        str, option("--faulty refuse|leave-out|keep", "Constant axes and torn words; refuse by default.")
-    ] = "",
-    join: JoinOption = "",
-    group: GroupOption = "",
-    list_dwells: Annotated[
-        bool, option("--list-dwells", "List every dwell: start, end, mean, sd, residual, influence.")
-    ] = False,
-    local_g: Annotated[
-        float | None, option("--local-g M/S2", "Local gravity at the place of the measurement, m/s².")
-    ] = None,
-    verify: Annotated[str, option("--verify N|N%", "Dwells that the fit does not use; they verify it.")] = "",
     references: Annotated[
         Path | None, option("--references TOML", "Uncertainty of the references; a certificate needs it.")
     ] = None,
-    measured: Annotated[str, option("--measured DATE", "Day of the measurement.")] = "",
-    zero_output: Annotated[float | None, option("--zero-output VALUE", "Nominal output at 0 g; 0.")] = None,
     fit: Annotated[str, option("--fit norm|plane|faces|temperature", "Fit, and judge the fit.")] = "",
     procedure: Annotated[
         str,
@@ -87,12 +102,12 @@ def command(
             "Dynamic test: the transfer function of a sweep, or with --map reference=… the waveforms of a procedure.",
         ),
     ] = "",
-    part: Annotated[Path | None, option("--part TOML", "Keys of the procedure, and full_scale of the output.")] = None,
     effects: Annotated[
         str, option("--effects a,b,…", "Model of the transfer function; second_order,delay by default.")
     ] = "",
     archive: ArchiveOption = None,
     *,
+    list_dwells: AllOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Import recordings of other systems into the archive: a raw record and its dwells in the exchange format.
@@ -103,40 +118,28 @@ def command(
     from pipelines.importers import limited
 
     limited.start()
-    if procedure and (columns or procedure != "sweep"):
-        _waveforms(files, procedure, part, unit, (columns, units, rate, group), archive, as_json=as_json)
-    if procedure:
-        _transfer(files, unit, effects, archive, as_json=as_json)
-    from pipelines.diagnosis.import_document import import_document
     from pipelines.importers import mapping as mapped
 
-    given: dict[str, Any] = mapped.from_file(mapping) if mapping else {}
-    options: dict[str, Any] = {
-        "columns": mapped.pairs(columns, "--map"),
-        "units": mapped.pairs(units, "--units"),
-        "poses": mapped.pairs(poses, "--poses"),
-        "headings": mapped.pairs(headings, "--headings"),
-        "unit": unit,
-        "face": face,
-        "block_s": blocks,
-        "positions": positions,
-        "window_s": window,
-        "threshold": threshold,
-        "shortest_s": shortest,
-        "gaps": gaps,
-        "faulty": faulty,
-        "join": join,
-        "group": group,
-        "rows": rows,
+    file, given = _settings(setting)
+    listed, stated_units = ",".join(columns or ()), ",".join(unit_of or ())
+    if procedure and (columns or procedure != "sweep"):
+        if other := sorted(given.keys() - {"group"}):
+            raise WrongUse(f"import: --set {other[0]} is for records at rest, --procedure is given; leave it out")
+        layout = (listed, stated_units, rate, given.get("group", ""))
+        _waveforms(files, procedure, file, units, layout, archive, as_json=as_json)
+    if procedure:
+        _transfer(files, units, effects, archive, as_json=as_json)
+    from pipelines.diagnosis.import_document import import_document
+
+    keys: dict[str, Any] = mapped.from_file(file) if file else {}
+    options = {
+        "columns": mapped.pairs(listed, "--map"),
+        "units": mapped.pairs(stated_units, "--unit-of"),
+        "unit": units,
         "rate_hz": rate,
-        "axes": [part.strip() for part in axes.split(",")] if axes else None,
-        "signs": [part.strip() for part in signs.split(",")] if signs else None,
-        "local_gravity_m_s2": local_g,
-        "verify": verify,
-        "measured": measured,
-        "zero_output": zero_output,
+        **given,
     }
-    keys = given | {key: value for key, value in options.items() if value not in ("", None, {}, [])}  # 0 is a value
+    keys |= {key: value for key, value in options.items() if value not in ("", None, {}, [])}  # 0 is a value
     if fit and fit not in METHODS:
         raise WrongUse(
             f"--fit: found '{shown(fit)}', one of {', '.join(METHODS)} is needed; {did_you_mean(fit, METHODS)}"
@@ -147,7 +150,7 @@ def command(
 
         stated = stated_references(references, keys)
     sets = [files] if keys.get("join") else [[path] for path in files]
-    working, where = error_console().status, str(mapping or "import")
+    working, where = error_console().status, str(file or "import")
     imports = [import_document(paths, keys, where, fit, archive, stated, working) for paths in sets]
     verdicts = [one["adequate"] for one in imports if one["fit"]]
     adequate = False if False in verdicts else None if None in verdicts else True
@@ -156,12 +159,21 @@ def command(
     conclude(document, show, as_json=as_json, passed=adequate is True)
 
 
+def _settings(given: list[str] | None) -> tuple[Path | None, dict[str, Any]]:
+    """The file among the values of ``--set``, and the keys that the others state."""
+    files = [text for text in given or () if "=" not in text]
+    if len(files) > 1:
+        raise WrongUse(f"import: --set {' and --set '.join(files)}, one file is possible; leave one out")
+    keys = settings([text for text in given or () if "=" in text], KEYS, "import")
+    return (Path(files[0]) if files else None), keys
+
+
 def _transfer(files: list[Path], unit: str, effects: str, archive: str | None, *, as_json: bool) -> NoReturn:
     """Judge, store and print transfer functions; a part failed where one is not adequate or cannot be judged."""
     from pipelines.importers.transfer import import_transfer
 
     if not unit:
-        raise WrongUse("import: no serial number, a transfer function needs one; add --unit SN")
+        raise WrongUse("import: no serial number, a transfer function needs one; add --units SN")
     model = [part.strip() for part in effects.split(",")] if effects else ["second_order", "delay"]
     imported = [import_transfer(path, unit, model, archive) for path in files]
     document = dict(imported[0]) if len(imported) == 1 else {"imports": imported}
@@ -187,9 +199,9 @@ def _waveforms(
     from pipelines.importers.waveforms import RecordingLayout, import_waveforms
 
     if not unit:
-        raise WrongUse("import: no serial number, the recordings of a test need one; add --unit SN")
+        raise WrongUse("import: no serial number, the recordings of a test need one; add --units SN")
     columns, units, rate, group = stated
-    layout = RecordingLayout(pairs(columns, "--map"), pairs(units, "--units"), rate, group)
+    layout = RecordingLayout(pairs(columns, "--map"), pairs(units, "--unit-of"), rate, group)
     imported = import_waveforms(paths, procedure, part, unit, layout, archive)
     passed = all(one["identified"] for one in imported["figures"])
     conclude(dict(imported), _print_waveforms, as_json=as_json, passed=passed)
@@ -218,7 +230,7 @@ def _print_imports(imports: Sequence[dict[str, Any]], archive: str | None, _: ob
     for one in imports:
         dwells = number_of(one["dwells"], "dwell")
         rows = f"{number_of(one['samples'], 'sample')}, {dwells}" if one["samples"] else dwells
-        unit = one["out_unit"] or "a unit that is not known (--units output=… states it)"
+        unit = one["out_unit"] or "a unit that is not known (--unit-of output=… states it)"
         say(f"{', '.join(one['units'])}: {rows} in {unit}, kept as run {one['run']}")
         for remark in [*one["remarks"], *one["lines"]]:
             say(f"  {remark}")

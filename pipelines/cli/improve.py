@@ -26,6 +26,7 @@ CHOICES = "y or Enter adds it, n leaves it out; Ctrl-C stops, and nothing is wri
 UNATTENDED = "improve: standard input ended before an answer, a line is needed; give --yes to run without an operator"
 
 
+GROUP = {"group": options.READING["group"]}
 MEASURES = "y or Enter measures them, n leaves it; Ctrl-C stops, and the same command continues"
 
 
@@ -38,18 +39,18 @@ def command(
         Path | None, option("--model FILE", "Model file to judge; its next versions are written to it.")
     ] = None,
     output: Annotated[
-        Path | None, option("--out -o FILE", "Model file to write; --model or model.toml by default.")
+        Path | None, option("--output -o FILE", "Model file to write; --model or model.toml by default.")
     ] = None,
     choose: Annotated[
         str, option("--effect a,b", "Effects to add, one per class of the diagnosis, without a question.")
     ] = "",
-    history: options.HistoryOption = "",
+    temperatures: options.TemperaturesOption = "",
     fresh: options.FreshOption = "",
-    fresh_history: options.FreshHistoryOption = "",
+    fresh_temperatures: options.FreshTemperaturesOption = "",
     leave_out: options.LeaveOutOption = "",
-    by: options.ByOption = "",
+    who: options.WhoOption = "",
     effect_file: options.EffectFileOption = None,
-    group: options.GroupOption = "",
+    setting: Annotated[list[str] | None, options.set_option(GROUP)] = None,
     archive: options.ArchiveOption = None,
     *,
     yes: Annotated[bool, option("--yes -y", "Answer yes; a class of several effects needs --effect.")] = False,
@@ -73,7 +74,7 @@ def command(
     the resulting model is adequate and no fresh run refutes it; 1: otherwise; 2: the input cannot be used.
     """
     from pipelines.cli.inputs import add_effects, both_runs, without_dwells
-    from pipelines.cli.next_commands import judged_data
+    from pipelines.cli.next_commands import Given, judged_data
     from pipelines.cli.terminal import attended
     from pipelines.cli.text.improve_text import next_lines, next_of_recording, print_improvement, print_recording
     from pipelines.diagnosis.inputs import file_beside, judged_effects
@@ -81,6 +82,7 @@ def command(
     from pipelines.importers.files import is_file
     from pipelines.improvement.recording import bring_in
 
+    group = options.settings(setting, GROUP, "improve").get("group", "")
     add_effects(effect_file)
     recording = None
     if is_file(data):
@@ -90,20 +92,21 @@ def command(
     yes = yes or (recording is not None and not attended())
     judged = judged_effects(data, archive, effects, model, "improve")
     target = _target(model, output)
-    dwells, temperatures, again, again_temperatures = both_runs(data, history, fresh, fresh_history, archive)
+    dwells, history, again, again_history = both_runs(data, temperatures, fresh, fresh_temperatures, archive)
     dwells, _ = without_dwells(dwells, leave_out)
-    tables = ImprovedTables(dwells, temperatures, again, again_temperatures)
-    beside = history or (file_beside(data, "history") if is_file(data) else "")
+    tables = ImprovedTables(dwells, history, again, again_history)
+    beside = temperatures or (file_beside(data, "history") if is_file(data) else "")
     may_measure = True if yes and measure is None else measure
     brief = recording is not None and not show_all
     attendant = _Terminal(data, model, archive, quiet=as_json or brief, measure=may_measure)
-    improvement = Improvement(data, tables, model, target, beside, by, fresh, attendant)
+    improvement = Improvement(data, tables, model, target, beside, who, fresh, attendant)
     document = improvement.run(judged, list(names_in(choose)), yes=yes)
-    find = partial(judged_data, data, beside, archive)
-    document["next"] = next_lines(document, target, find, after=document["after"] or document["diagnosis"])
+    given = Given(archive, fresh, fresh_temperatures, leave_out, effect_file or ())
+    kept = [*(["--output", str(output)] if output else []), *(["--who", who] if who else [])]
+    document["next"] = next_lines(document, (model, target), partial(judged_data, data, beside, given), given, kept)
     if recording is not None:
         document["recording"] = recording
-        document["next"] = next_of_recording(document, archive)
+        document["next"] = next_of_recording(document, given, ["--model", str(model)] if model else [], kept)
     show = print_recording if brief else print_improvement
     conclude(document, show, as_json=as_json, passed=bool(document["adequate"] and not document["refuted"]))
 
@@ -167,7 +170,7 @@ def _target(model: Path | None, output: Path | None) -> Path:
     if target != model and target.exists():
         raise WrongUse(
             f"improve: {target} exists and is not the model that is judged; give --model {target} to extend it, or another "
-            "--out"
+            "--output"
         )
     return target
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from inertial.counts import number_of
-from pipelines.cli.options import GroupOption, JoinOption, JsonOption, argument, option
+from pipelines.cli.options import PAGES, PICTURES, READING, JsonOption, argument, option, outputs, set_option, settings
 from pipelines.cli.printing import conclude, error_console, print_table, publish, say
 from schemas.errors import WrongUse
 
@@ -17,20 +17,23 @@ if TYPE_CHECKING:
 PART = "Start here"
 ORDER = 30
 SUMMARY = "Look at recordings of other systems and propose how to import them."
-EXAMPLES = ("tumbleline inspect recording.csv", "tumbleline inspect part-1.csv part-2.csv --join rows")
+EXAMPLES = ("tumbleline inspect recording.csv", "tumbleline inspect part-1.csv part-2.csv --set join=rows")
 
 MOST_INTERVALS, MOST_FAULTS = 12, 6
 NUMBERS: tuple[tuple[Literal["low", "high", "resolution"], int], ...] = (("low", 6), ("high", 6), ("resolution", 4))
 """Numbers of a column, with their digits."""
-PICTURES = (".svg", ".png", ".pdf")
 
 
 def command(
     files: Annotated[list[Path], argument("FILE…", "Recordings in any format that import reads.")],
-    join: JoinOption = "",
-    group: GroupOption = "",
-    picture: Annotated[Path | None, option("--picture FILE", "Draw the record: .svg, .png or .pdf.")] = None,
-    page: Annotated[Path | None, option("--page FILE.html", "Write the result as an HTML page.")] = None,
+    setting: Annotated[list[str] | None, set_option(READING)] = None,
+    output: Annotated[
+        list[Path] | None,
+        option(
+            "--output -o FILE",
+            "Picture of the record (.svg, .png, .pdf), or the result as a page (.html); may be repeated.",
+        ),
+    ] = None,
     *,
     as_json: JsonOption = False,
 ) -> None:
@@ -45,13 +48,17 @@ def command(
     limited.start()
     from pipelines.importers.inspection import inspect
 
+    paths_of = outputs(output, {"picture": PICTURES, "page": PAGES}, "inspect")
+    picture, page = paths_of.get("picture"), paths_of.get("page")
+    given = settings(setting, READING, "inspect")
+    join, group = given.get("join", ""), given.get("group", "")
     if join not in {"", "rows", "columns"}:
-        raise WrongUse(f"--join: found '{join}', rows or columns is needed; correct it")
-    if picture is not None and picture.suffix not in PICTURES:
-        raise WrongUse(f"--picture: {picture}: one of {', '.join(PICTURES)} is needed; choose another ending")
+        raise WrongUse(f"--set join: found '{join}', rows or columns is needed; correct it")
     sets = [files] if join or len(files) == 1 else [[path] for path in files]
     if len(sets) > 1 and (picture or page):
-        raise WrongUse(f"inspect: {len(sets)} recordings, --picture and --page show one; name one file, or add --join")
+        raise WrongUse(
+            f"inspect: {len(sets)} recordings, --output shows one; name one file, or add --set join=rows|columns"
+        )
     inspections: list[Inspection] = []
     for paths in sets:
         with error_console().status(f"reading {paths[0].name}"):
@@ -67,8 +74,8 @@ def command(
 def _print_all(documents: list[InspectDocument]) -> None:
     if len(documents) > 1:
         say(
-            f"{len(documents)} recordings; if they are parts of one, add --join rows (one after the other) or --join "
-            "columns (side by side)"
+            f"{len(documents)} recordings; if they are parts of one, add --set join=rows (one after the other) or "
+            "--set join=columns (side by side)"
         )
     for document in documents:
         _print(document)
@@ -79,13 +86,11 @@ def _write(inspection: Inspection, picture: Path | None, page: Path | None) -> N
 
     if picture is not None:
         from pipelines.drawing.picture import picture as drawn
-        from pipelines.drawing.picture import refuse_ending
 
-        refuse_ending(picture, "--picture")
         chart = recording.chart_of(inspection)
         if chart is None:
             raise WrongUse(
-                "inspect: no samples of acceleration over time were recognised, nothing can be drawn; leave out --picture"
+                "inspect: no samples of acceleration over time were recognised, nothing can be drawn; leave out the picture"
             )
         publish(picture, drawn(chart, picture.suffix.lower()), "picture")
     if page is not None:

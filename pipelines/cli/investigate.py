@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from pipelines.archive import Archive
 from pipelines.cli import options
-from pipelines.cli.next_commands import command_line, judged_data, print_extension, print_next
+from pipelines.cli.next_commands import Given, command_line, judged_data, print_extension, print_next
 from pipelines.cli.options import option
 from pipelines.cli.printing import conclude, error_console, print_table, remark, say, short
 from pipelines.cli.run import shown
@@ -125,7 +125,7 @@ def print_inquiry(document: dict[str, Any], archive: str | None = None) -> None:
         print_next_measurement(document["next_measurements"])
         print_next([document["command"]])
     else:
-        print_extension(document, partial(judged_data, document["run"], "", archive), None)
+        print_extension(document, partial(judged_data, document["run"], "", Given(archive)), None)
 
 
 def _rounds(document: dict[str, Any]) -> None:

@@ -1,8 +1,10 @@
 """Commands to give next, as lines that can be pasted: every file, run and archive in them exists, and every word is quoted."""
 
+from __future__ import annotations
+
 import shlex
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -18,6 +20,32 @@ MEASURE_AGAIN = (
 
 
 @dataclass(frozen=True)
+class Given:
+    """Options of a command that the next ones need as well.
+
+    archive : None for the default one · fresh, fresh_history, leave_out : as given, empty where not
+    effect_files : Python files with effects · formulas : effects as formulas of the command line
+    """
+
+    archive: str | None = None
+    fresh: str = ""
+    fresh_history: str = ""
+    leave_out: str = ""
+    effect_files: Sequence[Path] = ()
+    formulas: Sequence[str] = ()
+
+    @property
+    def effects(self) -> list[str]:
+        """The options that name the files with effects."""
+        return [word for path in self.effect_files for word in ("--effect-file", str(path))]
+
+    @property
+    def written(self) -> list[str]:
+        """The options that write the formulas."""
+        return [word for formula in self.formulas for word in ("--formula", formula)]
+
+
+@dataclass(frozen=True)
 class JudgedData:
     """The data that a command judged, as they were named on the command line.
 
@@ -25,21 +53,29 @@ class JudgedData:
     fresh, fresh_history : the same units measured again; empty where no such data are known
     measure : the words of the command that measures ``fresh``; none where it is there
     refusal : why the recipe of a run cannot fit a model; None where the data are not from a recipe
-    archive : as it was given; None for the default one
+    given : what else the command was given
     """
 
     source: str
     history: str = ""
     fresh: str = ""
     fresh_history: str = ""
-    archive: str | None = None
     measure: tuple[str, ...] = ()
     refusal: Callable[[Sequence[str]], str] | None = None
+    given: Given = field(default_factory=Given)
 
     @property
     def options(self) -> list[str]:
-        """The options that name history and archive."""
-        return [*(["--history", self.history] if self.history else []), *archive_words(self.archive)]
+        """The options that name history, archive, effects of the user and dwells left out."""
+        history = ["--temperatures", self.history] if self.history else []
+        left = ["--leave-out", self.given.leave_out] if self.given.leave_out else []
+        return [*history, *archive_words(self.given.archive), *self.given.effects, *left]
+
+    @property
+    def again(self) -> list[str]:
+        """The options that name the fresh run and its temperatures."""
+        history = ["--fresh-temperatures", self.fresh_history] if self.fresh_history else []
+        return ["--fresh", self.fresh, *history] if self.fresh else []
 
 
 FindData = Callable[[], JudgedData]  # gives the data of a command; see :func:`judged_data`
@@ -55,8 +91,8 @@ def archive_words(archive: str | None) -> list[str]:
     return ["--archive", str(archive)] if archive else []
 
 
-def judged_data(source: str, history: str, archive: str | None) -> JudgedData:
-    """The data of a command, with a fresh run: the one beside a file, or the one that an archive holds or will hold.
+def judged_data(source: str, history: str, given: Given) -> JudgedData:
+    """The data of a command, with a fresh run: the one given, beside a file, or the one that an archive holds or will hold.
 
     history : the file of temperatures against time that was read; empty where there was none
     """
@@ -64,25 +100,24 @@ def judged_data(source: str, history: str, archive: str | None) -> JudgedData:
     from pipelines.importers.files import is_file
 
     if is_file(source):
-        fresh = file_beside(source, "fresh")
-        return JudgedData(source, history, fresh, file_beside(fresh, "history") if fresh and history else "", archive)
+        fresh = given.fresh or file_beside(source, "fresh")
+        beside = file_beside(fresh, "history") if fresh and history else ""
+        return JudgedData(source, history, fresh, given.fresh_history or beside, given=given)
     from pipelines.chain.runner import decisive
     from pipelines.jobs.fresh_run import fresh_repeat, fresh_run_of, repeatable
     from pipelines.jobs.job import OF_RUN, job_of_run, measured_again
 
-    store = Archive(archive)
+    store = Archive(given.archive)
     run = store.run(source)
-    if not repeatable(run):
-        return JudgedData(run.id, history, archive=archive)
-    refusal = partial(fit_refusal, run)
-    fresh_run = fresh_run_of(store, run)
-    if fresh_run is not None:
-        return JudgedData(run.id, history, fresh_run.id, archive=archive, refusal=refusal)
+    refusal = partial(fit_refusal, run) if repeatable(run) else None
+    known = given.fresh or ("" if refusal is None or (found := fresh_run_of(store, run)) is None else found.id)
+    if known or refusal is None:
+        return JudgedData(run.id, history, known, given.fresh_history, refusal=refusal, given=given)
     repeat = fresh_repeat(store, run)
     job = measured_again(job_of_run(run), repeat)
-    words = ("run", f"{OF_RUN}{run.id}", "--repeat", str(repeat), *archive_words(archive))
+    words = ("run", f"{OF_RUN}{run.id}", "--repeat", str(repeat), *archive_words(given.archive))
     fresh = store.run_name(job.recipe.name, decisive(job))
-    return JudgedData(run.id, history, fresh, archive=archive, measure=words, refusal=refusal)
+    return JudgedData(run.id, history, fresh, measure=words, refusal=refusal, given=given)
 
 
 def extension(
@@ -93,9 +128,11 @@ def extension(
     judged : the model that was judged; a new file begins with it
     new : whether the file does not exist yet
     """
-    start = ["--effects", ",".join(judged)] if new else []
+    start = ["--effects", ",".join(judged), *data.given.written] if new else []
     lines = [
-        command_line("extend", str(file), name, *(start if place == 0 else []), "--run", data.source)
+        command_line(
+            "extend", str(file), name, *(start if place == 0 else []), "--dwells", data.source, *data.given.effects
+        )
         for place, name in enumerate(effects)
     ]
     return [*lines, *fresh_measurement(file, data)]
@@ -108,10 +145,7 @@ def fresh_measurement(file: Path | str, data: JudgedData) -> list[str]:
 
 def versions(file: Path | str, data: JudgedData) -> str:
     """The command that shows the errors of the versions of a model."""
-    fresh = ["--fresh", data.fresh] if data.fresh else []
-    if data.fresh_history:
-        fresh += ["--fresh-history", data.fresh_history]
-    return command_line("history", str(file), "--dwells", data.source, *data.options, *fresh)
+    return command_line("history", str(file), "--dwells", data.source, *data.options, *data.again)
 
 
 def print_next(lines: Sequence[str]) -> None:
@@ -137,7 +171,7 @@ def print_extension(document: dict[str, Any], find: FindData, model: Path | None
         say(why, "yellow")
     print_next(extension(file, document["recommended"], document["effects"], data, new=new))
     if not data.fresh:
-        its_own = " and its temperatures with --fresh-history" if data.history else ""
+        its_own = " and its temperatures with --fresh-temperatures" if data.history else ""
         say(MEASURE_AGAIN.format(history=its_own), "dim")
 
 

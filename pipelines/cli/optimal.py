@@ -34,15 +34,15 @@ class OptimiseOptions:
 
     see: str
     required_errors: Sequence[str]
-    factor: float
-    temperatures: str
-    poses: str
     criterion: str
-    verification: int | None
     part: str
-    size: float | None
-    separation: float | None
-    ramp: bool
+    factor: float = 1.0
+    temperatures: str = ""
+    poses: str = ""
+    size: float | None = None
+    separation: float | None = None
+    verification: int | None = None
+    ramp: bool = False
 
 
 def levels_of(base: Recipe, temperatures: str) -> tuple[float, ...]:
@@ -51,12 +51,12 @@ def levels_of(base: Recipe, temperatures: str) -> tuple[float, ...]:
         given = [float(part) for part in temperatures.split(",")] if temperatures else base.temperatures_C
     except ValueError:
         raise WrongUse(
-            f"plan: --temperatures '{temperatures}' is no list of numbers, one is needed; write -10,25,60"
+            f"plan: --set temperatures='{temperatures}' is no list of numbers, one is needed; write -10,25,60"
         ) from None
     outside = [level for level in given if not COLDEST_C <= level <= HOTTEST_C]
     if outside:
         found, needed = f"found {outside[0]:g} °C", f"{COLDEST_C:g} to {HOTTEST_C:g} °C is needed"
-        raise WrongUse(f"plan: --temperatures '{temperatures}': {found}, {needed}; correct it")
+        raise WrongUse(f"plan: --set temperatures='{temperatures}': {found}, {needed}; correct it")
     return tuple(sorted(set(given)))
 
 
@@ -64,19 +64,19 @@ def _discriminates(options: OptimiseOptions) -> bool:
     """Whether the options require discrimination; options that do not go together are refused."""
     parts = options.criterion.upper() == "T"
     other = (
-        {"--wanted": options.required_errors, "--factor": options.factor != 1.0}
+        {"--wanted EFFECT=µg": options.required_errors, "--set factor": options.factor != 1.0}
         if parts
         else {
-            "--part": options.part,
-            "--size": options.size is not None,
-            "--separation": options.separation is not None,
+            f":{options.part}": options.part,
+            "--set size": options.size is not None,
+            "--set separation": options.separation is not None,
         }
     )
     for option, given in other.items():
         if given:
             raise WrongUse(
                 f"plan: {option} does not go with --criterion {options.criterion}; leave one of the two out"
-                + ("" if parts else ", or write --criterion T")
+                + ("" if parts else ", or write --criterion T:a,b")
             )
     return parts
 
@@ -85,10 +85,10 @@ def _discrimination(options: OptimiseOptions, against: PlanContext, levels: tupl
     rivals, see = names_in(options.part), names_in(options.see)
     if not rivals:
         raise WrongUse(
-            "plan: --criterion T needs the effects to discriminate between; write --part third_order,odd_quadratic"
+            "plan: --criterion T needs the effects to discriminate between; write --criterion T:third_order,odd_quadratic"
         )
-    refuse_unknown_effects(rivals, "plan: --part")
-    refuse_unknown_effects(see, "plan: --see")
+    refuse_unknown_effects(rivals, "plan: --criterion T")
+    refuse_unknown_effects(see, "plan: --wanted")
     _refuse_unknown_plan(options.poses)
     size, enough = options.size or SIZE_UG, options.separation or ENOUGH
     return discrimination_requirement(against, rivals, levels, size_ug=size, enough=enough, plan=options.poses, see=see)
@@ -110,7 +110,7 @@ def _required_errors(
         raise WrongUse(f"plan: no criterion '{options.criterion}'; {did_you_mean(options.criterion, known)}")
     _refuse_unknown_plan(options.poses)
     see = names_in(options.see)
-    refuse_unknown_effects(see, "plan: --see")
+    refuse_unknown_effects(see, "plan: --wanted")
     errors = options.factor * reference_errors(against, base)
     names = [name for name, _ in local_names(split(base.effects)[0], 0)]
     for effect, limit in _limits(options.required_errors, names).items():

@@ -1,91 +1,80 @@
-"""``tumbleline plan``: visible effects, expected errors and station time of a recipe; ``plan optimise``: a quicker recipe."""
+"""``tumbleline plan``: visible effects, errors and station time of a recipe; a quicker one; a device; the keys of files."""
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-from typer.core import TyperGroup
-
 from pipelines.archive import files
 from pipelines.cli import options
-from pipelines.cli.options import argument, option
+from pipelines.cli.groups import group
+from pipelines.cli.next_commands import archive_words
+from pipelines.cli.options import Setting, argument, option
+from pipelines.cli.plan_choose import choose
+from pipelines.cli.plan_keys import keys
 from pipelines.cli.printing import conclude, give, is_standard_output, print_text, remark
 from pipelines.cli.text.plan_text import print_optimum, print_plan, print_procedures
 from schemas.errors import RecipeInvalid
 
 if TYPE_CHECKING:
-    from typer._click import Context
-
     from pipelines.planning.context import PlanContext
 
 PART = "Measure"
 ORDER = 120
-SUMMARY = "Show what a recipe can and cannot determine, before anything is measured."
+SUMMARY = "Show what a recipe can determine, before it is measured; choose a device; list keys."
 EXAMPLES = ("tumbleline plan my.toml", "tumbleline plan optimise my.toml")
 EXAMPLES_OF = {
-    "recipe": ("tumbleline plan my.toml", "tumbleline plan my.toml --station line-1.toml --page plan.html"),
+    "recipe": ("tumbleline plan my.toml", "tumbleline plan my.toml --station line-1.toml --output plan.html"),
     "optimise": (
         "tumbleline plan optimise my.toml",
-        "tumbleline plan optimise my.toml --criterion T --part third_order,odd_quadratic --size 10000",
+        "tumbleline plan optimise my.toml --criterion T:third_order,odd_quadratic --set size=10000",
     ),
+    "choose": (
+        "tumbleline plan choose range=4g temperature=-40..85 error=2mg bandwidth=100",
+        "tumbleline plan choose range=30g error=5mg --device QA700,SF1500",
+    ),
+    "keys": ("tumbleline plan keys recipe", "tumbleline plan keys fault --json"),
 }
 """Of the subcommands."""
-
-
-RECIPE = "recipe"
 
 
 DeviceOption = Annotated[
     str, option("--device PRESET", "Preset with the noise of the device; the recipe's device by default.")
 ]
 NoiseOption = Annotated[
-    float | None, option("--noise", "White noise density of the device, µg/√Hz; the preset's by default.", min=0.0)
-]
-WanderOption = Annotated[
-    float | None,
+    str,
     option(
-        "--wander",
-        "Flicker floor of the Allan deviation, µg, without random walk; flicker and random walk of the preset by default.",
-        min=0.0,
+        "--noise N[,B]",
+        "White noise density of the device, µg/√Hz, then the flicker floor of its Allan deviation, µg, without random walk; the "
+        "preset's by default.",
     ),
 ]
 EffectsOption = Annotated[str, option("--effects a,b,c", "Effects of the model; the recipe's by default.")]
-PageOption = Annotated[Path | None, option("--page FILE.html", "Also write an HTML page with pictures to this file.")]
 
 
-class _RecipeFirst(TyperGroup):
-    """A group whose first argument may be a recipe instead of a subcommand."""
-
-    usual = RECIPE
-
-    def parse_args(self, ctx: Context, args: list[str]) -> list[str]:
-        """The arguments, with the default subcommand added where none is given."""
-        args = ["optimise", *args[1:]] if args[:1] == ["optimize"] else args  # American spelling
-        if not args or args[0] not in {*self.commands, "--help", "-h"}:
-            args = [self.usual, *args]
-        return super().parse_args(ctx, args)
-
-
-app = typer.Typer(
-    cls=_RecipeFirst,
-    help="Show visible effects, expected errors and station time of a recipe, or write a quicker one ('plan optimise').",
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    context_settings={"help_option_names": ["-h", "--help"]},
-)
+SEARCH = {
+    "factor": Setting("N", "required errors as a multiple of the textbook plan's", float, 0.01),
+    "temperatures": Setting("a,b,c", "required temperatures, °C; the ends of the recipe's range and others by default"),
+    "poses": Setting("PLAN", "named plan of candidate poses; a Fibonacci lattice by default"),
+    "size": Setting("UG", "with --criterion T: largest contribution of each effect, µg; 100 by default", float, 1e-3),
+    "separation": Setting(
+        "N", "with --criterion T: required χ² of the wrong effect over the lot; 50 by default", float, 1.0
+    ),
+    "verification": Setting("N", "repetitions of each verification pose; as in the recipe by default", int, 1.0),
+    "ramp": Setting(
+        "yes", "measure while the chamber ramps, without soaks; the device's temperature is read", options.yes
+    ),
+}
 
 
-@app.command(RECIPE)
-def command(
+def plan_recipe(
     recipe: options.RecipeArgument = "production",
     device: DeviceOption = "",
     station: options.StationOption = None,
     effects: EffectsOption = "",
     model: options.ModelOption = None,
-    noise: NoiseOption = None,
-    wander: WanderOption = None,
+    noise: NoiseOption = "",
     pose: Annotated[
         list[str] | None,
         option(
@@ -94,11 +83,14 @@ def command(
             "verification; may be repeated.",
         ),
     ] = None,
-    page: PageOption = None,
-    archive: options.ArchiveOption = None,
-    pictures: Annotated[
-        Path | None, option("--pictures DIR", "Also write the pictures to this folder, as RECIPE-NAME.svg.")
+    output: Annotated[
+        list[Path] | None,
+        option(
+            "--output -o FILE|DIR",
+            "A page with pictures (.html), or a folder for the pictures as RECIPE-NAME.svg; may be repeated.",
+        ),
     ] = None,
+    archive: options.ArchiveOption = None,
     *,
     as_json: options.JsonOption = False,
 ) -> None:
@@ -115,6 +107,8 @@ def command(
     from pipelines.planning.plan import plan
     from schemas.station import load_station
 
+    made = options.outputs(output, {"page": options.PAGES, "pictures": ("",)}, "plan")
+    page, pictures = made.get("page"), made.get("pictures")
     config = load_station(station)
     planned = planned_recipe(recipe, effects, model, archive, config.name)
     planned = with_moved_poses(planned, moves_of(pose or (), "plan"), "plan")
@@ -127,7 +121,7 @@ def command(
     if not planned.tumbles and page is None and pictures is None:
         give(plan_of_procedures(planned, config, limits), print_procedures, as_json=as_json)
         return
-    context = plan_context(planned, config, noise_of(planned, device or planned.device, noise, wander))
+    context = plan_context(planned, config, noise_of(planned, device or planned.device, *_densities(noise)))
     document = plan(context, planned_terms(planned, config, limits), limits)
     if planned.procedures:
         document["procedures"] = procedure_rows(planned, config, limits)
@@ -139,75 +133,46 @@ def command(
     conclude(document, print_plan, as_json=as_json, passed=not (document.get("uncertainty") or {}).get("unreachable"))
 
 
-@app.command()
 def optimise(
     recipe: Annotated[
         str, argument("[RECIPE]", "Recipe to start from: device, sample rate, soak, temperature range, limits.")
     ] = "production",
     output: Annotated[
-        Path | None,
-        option("--output -o FILE.toml", "File of the new recipe; - prints it; NAME-optimal.toml by default."),
+        list[Path] | None,
+        option(
+            "--output -o FILE",
+            "The new recipe (.toml; - prints it; NAME-optimal.toml by default), and a page with pictures (.html).",
+        ),
     ] = None,
     device: DeviceOption = "",
     station: options.StationOption = None,
     effects: EffectsOption = "",
     model: options.ModelOption = None,
-    see: Annotated[
-        str, option("--see a,b,c", "Further effects that must be visible; those of the textbook plan by default.")
-    ] = "",
-    required_errors: Annotated[
+    wanted: Annotated[
         list[str] | None,
-        option("--wanted EFFECT=µg", "Required error (1σ) of an effect's coefficients; may be repeated."),
-    ] = None,
-    factor: Annotated[
-        float, option("--factor", "Required errors as a multiple of the textbook plan's.", min=0.01)
-    ] = 1.0,
-    temperatures: Annotated[
-        str,
         option(
-            "--temperatures a,b,c",
-            "Required temperatures, °C; by default the ends of the recipe's range, and others between as needed.",
+            "--wanted EFFECT[=µg]",
+            "Effect that must be visible, or with the required error (1σ) of its coefficients, besides those of the textbook "
+            "plan; may be repeated.",
         ),
-    ] = "",
-    poses: Annotated[
-        str, option("--poses PLAN", "Named plan of candidate poses; a Fibonacci lattice of directions by default.")
-    ] = "",
+    ] = None,
     criterion: Annotated[
         str,
         option(
             "--criterion",
-            "worst (coefficient), A (mean variance), D (volume), or T (discrimination between effects, see --part).",
+            "worst (coefficient), A (mean variance), D (volume), or T:a,b (discrimination between these effects).",
         ),
     ] = "worst",
-    part: Annotated[str, option("--part a,b", "With --criterion T: effects to discriminate between.")] = "",
-    size: Annotated[
-        float | None,
-        option("--size", "With --criterion T: largest contribution of each effect, µg; 100 by default.", min=1e-3),
-    ] = None,
-    separation: Annotated[
-        float | None,
-        option(
-            "--separation", "With --criterion T: required χ² of the wrong effect over the lot; 50 by default.", min=1.0
-        ),
-    ] = None,
-    verification: Annotated[
-        int | None,
-        option("--verification", "Repetitions of each verification pose; as in the recipe by default.", min=1),
-    ] = None,
-    noise: NoiseOption = None,
-    wander: WanderOption = None,
-    page: PageOption = None,
+    setting: Annotated[list[str] | None, options.set_option(SEARCH)] = None,
+    noise: NoiseOption = "",
     archive: options.ArchiveOption = None,
     *,
-    ramp: Annotated[
-        bool, option("--ramp", "Measure while the chamber ramps, without soaks; the device's temperature is read.")
-    ] = False,
     as_json: options.JsonOption = False,
 ) -> None:
     """Write the recipe with the least station time that reaches the required errors.
 
     By default these are the errors of the textbook plan (24 orthogonal poses at nine soaks up and down, 15 min each, dwells of
-    10 s) over the same temperatures, and every effect that is visible under it stays visible. With --criterion T --part a,b: the
+    10 s) over the same temperatures, and every effect that is visible under it stays visible. With --criterion T:a,b: the
     recipe with the least station time that discriminates between these effects.
     """
     from pipelines.cli.optimal import OptimiseOptions, cheapest_recipe, missing_limits, written
@@ -216,15 +181,19 @@ def optimise(
     from pipelines.planning.context import noise_of
     from schemas.station import load_station
 
-    printed = is_standard_output(output, "plan optimise", as_json=as_json)
+    files_by_kind = options.outputs(output, {"recipe": (".toml", "-"), "page": options.PAGES}, "plan optimise")
+    file, page = files_by_kind.get("recipe"), files_by_kind.get("page")
+    printed = is_standard_output(file, "plan optimise", as_json=as_json)
     config = load_station(station)
     base = planned_recipe(recipe, effects, model, archive, config.name)
-    wanted = OptimiseOptions(
-        see, required_errors or (), factor, temperatures, poses, criterion, verification, part, size, separation, ramp
-    )
-    noise_of_device = noise_of(base, device or base.device, noise, wander)
-    optimum, document = cheapest_recipe(base, Path(recipe).name, config, noise_of_device, wanted)
-    target = output or Path(f"{optimum.planned.recipe.name}.toml")
+    given = options.settings(setting, SEARCH, "plan optimise")
+    kind, _, parts = criterion.partition(":")
+    see = [text for text in wanted or () if "=" not in text]
+    errors = [text for text in wanted or () if "=" in text]
+    search = OptimiseOptions(see=",".join(see), required_errors=errors, criterion=kind, part=parts, **given)
+    noise_of_device = noise_of(base, device or base.device, *_densities(noise))
+    optimum, document = cheapest_recipe(base, Path(recipe).name, config, noise_of_device, search)
+    target = file or Path(f"{optimum.planned.recipe.name}.toml")
     document["file"] = str(target)
     home = folder_of(recipe)
     document["limits_missing"] = missing_limits(base, home)
@@ -237,7 +206,23 @@ def optimise(
     if printed:  # the recipe alone: its first comments say what it reaches
         print_text(text)
     else:
-        give(document, print_optimum, as_json=as_json)
+        where = [*(["--station", str(station)] if station else []), *archive_words(archive)]
+        give(document, partial(print_optimum, where=where), as_json=as_json)
+
+
+def _densities(noise: str) -> tuple[float | None, float | None]:
+    """Density and flicker floor of ``--noise``; None for what is not given."""
+    white, _, flicker = noise.partition(",")
+    values = options.settings(
+        [f"{key}={text}" for key, text in (("noise", white), ("flicker", flicker)) if text.strip()],
+        NOISE,
+        "plan",
+        "--noise: ",
+    )
+    return values.get("noise"), values.get("flicker")
+
+
+NOISE = {key: Setting("N", "", float, 0.0) for key in ("noise", "flicker")}
 
 
 def write_page(page: Path, document: dict[str, Any], context: PlanContext) -> None:
@@ -255,3 +240,10 @@ def write_pictures(folder: Path, document: dict[str, Any], context: PlanContext)
     for name, text in pictures(document, context).items():
         if text:
             files.publish(folder / f"{document['recipe']}-{name}.svg", alone(text).encode(), "plan", files.ELSEWHERE)
+
+
+app = group(
+    "Show visible effects, expected errors and station time of a recipe; write a quicker one; choose a device; list keys.",
+    {"recipe": plan_recipe, "optimise": optimise, "choose": choose, "keys": keys},
+    usual="recipe",
+)

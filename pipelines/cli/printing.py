@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import typer
 
 from inertial.uncertainty import rounding
+from pipelines.cli.options import STANDARD_OUTPUT
 from pipelines.tables.json_values import json_value
 from schemas.errors import DONE, PART_FAILED, WrongUse
 
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.text import Text
 
-STANDARD_OUTPUT = Path("-")  # the name of standard output in place of a file, as the programs of a system understand it
 
 short, short_values = rounding.short, rounding.short_values  # numbers as commands print them
 NARROW = 28  # characters of a word that a narrow terminal shows unbroken: the longest name of an effect has 27

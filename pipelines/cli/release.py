@@ -6,8 +6,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from pipelines.archive import Archive
-from pipelines.cli.options import ArchiveOption, EffectFileOption, JsonOption, argument, option
+from pipelines.cli.groups import group
+from pipelines.cli.options import ArchiveOption, EffectFileOption, JsonOption, ReasonOption, argument, option
 from pipelines.cli.printing import give, print_table, say
+from pipelines.cli.release_whatif import whatif
 from schemas.errors import WrongUse
 
 if TYPE_CHECKING:
@@ -15,49 +17,55 @@ if TYPE_CHECKING:
 
 PART = "Old data, new models"
 ORDER = 550
-SUMMARY = "Release a model to the line from a date, or list the releases."
+SUMMARY = "Release a model to the line from a date, list the releases, see the effect before."
 EXAMPLES = (
-    "tumbleline release model.toml --from 2026-01-01 --reason 'the error on fresh runs falls'",
-    "tumbleline release --list",
+    "tumbleline release model.toml --since 2026-01-01 --reason 'the error on fresh runs falls'",
+    "tumbleline release whatif model.toml",
 )
+EXAMPLES_OF = {
+    "model": (
+        "tumbleline release",
+        "tumbleline release model.toml --since 2026-01-01 --reason 'the error on fresh runs falls'",
+    ),
+    "whatif": ("tumbleline release whatif model.toml", "tumbleline release whatif model.toml device:adxl355"),
+}
+"""Of the subcommands."""
 
 
-def command(
-    model: Annotated[Path | None, argument("[MODEL]", "A model file.")] = None,
-    since: Annotated[str, option("--from DATE", "First day of use (UTC).")] = "",
+def model(
+    file: Annotated[Path | None, argument("[MODEL]", "A model file.")] = None,
+    since: Annotated[str, option("--since DATE", "First day of use (UTC).")] = "",
     device: Annotated[str, option("--device KIND", "For this kind of device only.")] = "",
     station: Annotated[str, option("--station NAME", "For this station only.")] = "",
-    reason: Annotated[str, option("--reason TEXT", "Reason for the release.")] = "",
+    reason: ReasonOption = "",
     effect_file: EffectFileOption = None,
     archive: ArchiveOption = None,
     *,
     force: Annotated[bool, option("--force", "Release the model without a what-if with the verdict 'better'.")] = False,
-    listed: Annotated[bool, option("--list", "List the releases.")] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Release a model to the line from a date, or list the releases.
+    """Release a model to the line from a date; without a model, list the releases.
 
     Recipes with model = "line" use the model from this date on. It needs a what-if in the archive with the verdict 'better' (see
-    'tumbleline whatif'), or --force and a reason. Releases are never changed; a later release replaces an earlier one.
+    'tumbleline release whatif'), or --force and a reason. Releases are never changed; a later release replaces an earlier one.
     """
     from pipelines.jobs.model_change import change_from_options
     from pipelines.jobs.releases import release as publish
     from pipelines.rerun.selection import moment
 
     store = Archive(archive)
-    if listed:
-        if model is not None:
-            raise WrongUse(f"release: --list and the model {model.name} are both given, one is needed; leave one out")
+    if file is None and not (since or device or station or reason or force):
         _list(store, as_json=as_json)
         return
-    if model is None or not since:
-        missing = ["a model file"] * (model is None) + ["--from DATE"] * (not since)
+    if file is None or not since:
+        missing = ["a model file"] * (file is None) + ["--since DATE"] * (not since)
         are = "are" if len(missing) > 1 else "is"
         raise WrongUse(
-            f"release: {' and '.join(missing)} {are} missing; give 'tumbleline release MODEL --from DATE', or --list"
+            f"release: {' and '.join(missing)} {are} missing; give 'tumbleline release MODEL --since DATE', or "
+            "'tumbleline release' alone for the list"
         )
-    change = change_from_options("", model, "", effect_file, where="release")
-    first = moment(since, "--from")
+    change = change_from_options("", file, "", effect_file, where="release")
+    first = moment(since, "--since")
     record = publish(store, change, first, device=device, station=station, reason=reason, force=force)
     lines = [
         f"release {record.number}: {_name(record)} for {_where(record)} from {record.since:%Y-%m-%d %H:%M} UTC",
@@ -98,3 +106,6 @@ def _name(record: Release) -> str:
 
 def _where(record: Release) -> str:
     return f"{record.device} on {record.station}".removeprefix(" on ").removesuffix(" on ") or "all"
+
+
+app = group(SUMMARY, {"model": model, "whatif": whatif}, usual="model")

@@ -59,7 +59,7 @@ def command(
     if check and (effects or model or limits):
         raise WrongUse(
             "rerun: --check with another model or limits has no stored result to compare with; leave --effects, --model and "
-            "--limits out, or leave --check out and compare with 'tumbleline diff'"
+            "--limits out, or leave --check out and compare with 'tumbleline archive diff'"
         )
     store = Archive(archive)
     runs = [entry.id for entry in selected(store, selection)]
@@ -98,7 +98,9 @@ def _print(outcomes: list[RerunOutcome], archive: str | None, document: dict[str
         f"{document['failed']} failed"
     )
     anew = [one for one in outcomes if one.new and one.new != one.run and not one.error]
-    print_next([command_line("diff", one.run, one.new, *archive_words(archive)) for one in anew[:DIFFERENCES]])
+    print_next(
+        [command_line("archive", "diff", one.run, one.new, *archive_words(archive)) for one in anew[:DIFFERENCES]]
+    )
 
 
 def _line(one: RerunOutcome) -> list[str]:

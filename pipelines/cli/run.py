@@ -45,9 +45,12 @@ def command(
         list[str] | None, option("--fault KIND[:KEY=VALUE…]", "Fault of the simulated station; may be repeated.")
     ] = None,
     *,
-    prompts: Annotated[
+    yes: Annotated[
         bool | None,
-        option("--prompts/--no-prompts", "Ask the operator to load and unload; default: on hardware, at a terminal."),
+        option(
+            "--yes/--ask",
+            "Run without an operator, or ask them to load and unload; default: ask on hardware, at a terminal.",
+        ),
     ] = None,
     record: options.RecordOption = None,
     replay: Annotated[
@@ -77,10 +80,10 @@ def command(
     slots = 0 if recipe.startswith(OF_RUN) else load_station(station).devices.slots.count
     seating = scanned(slots) if units == SCAN else read_seating(units)
     request_of_lot = Request(recipe, station, seating.units, seating.slots, seed, repeat, tuple(fault or ()))
-    asks = prompts if prompts is not None else attended() and not as_json
+    asks = not yes if yes is not None else attended() and not as_json
     requests = request_of_lot.fillings(slots) if asks else [request_of_lot]
     jobs = [request.job(Archive(archive)) for request in requests]
-    asks = asks and (bool(prompts) or len(requests) > 1 or jobs[0].station.kind == "modbus")
+    asks = asks and (yes is False or len(requests) > 1 or jobs[0].station.kind == "modbus")
     if record is not None or replay is not None:
         refuse_recorded(jobs, Archive(archive), replays=replay is not None)
         direct, asks = True, asks and replay is None
@@ -130,7 +133,7 @@ def _next(run: Run, document: dict[str, Any], archive: str | None) -> list[str]:
     certain = adequate and any(
         unit["outcome"] == "pass" and unit.get("basis") == "budget" for unit in document["units"]
     )
-    return [*lines, command_line("certify", *own)] if certain else lines
+    return [*lines, command_line("certificate", "issue", *own)] if certain else lines
 
 
 def measured(job: Job, store: Archive, request: Request | None, *, asks: bool) -> Run:

@@ -11,12 +11,12 @@ from inertial.counts import number_of
 from pipelines.archive import Archive, Run
 from pipelines.certificates import Calibration
 from pipelines.cli.options import ArchiveOption, JsonOption, argument, option
-from pipelines.cli.printing import cell, give, print_json, print_table, remark, say
+from pipelines.cli.printing import cell, error_console, give, print_json, print_table, remark, say
 from schemas.errors import DONE, PART_FAILED, WrongUse
 
 PART = "Results"
 ORDER = 320
-SUMMARY = "Show a run, one of its tables, or the calibration of a unit that is valid on a date."
+SUMMARY = "Show a run, one of its tables, its report, or the valid calibration of a unit."
 EXAMPLES = ("tumbleline show latest coefficients", "tumbleline show SN1 --at 2026-03-01")
 
 MANY = 40
@@ -38,6 +38,9 @@ def command(
     known: Annotated[str, option("--known DATE", "With --at: as the archive was on this day.")] = "",
     archive: ArchiveOption = None,
     *,
+    report: Annotated[
+        bool, option("--report", "Print the path of the run's report; made if it is missing or older than the tables.")
+    ] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Show the result of a run, one of its tables, or the calibration of a unit that is valid on a date (default: today).
@@ -45,10 +48,17 @@ def command(
     Exit status 1: no calibration of the unit is valid on that date.
     """
     store = Archive(archive)
-    if at or known or _is_unit(store, run):
+    if at or known or (not report and _is_unit(store, run)):
         raise typer.Exit(DONE if show_validity(store, run, at, known, as_json=as_json) else PART_FAILED)
     shown_run = store.run(run)
-    if table:
+    if report:
+        from pipelines.report import make_report
+
+        with error_console().status("drawing the report"):
+            make_report(shown_run)
+        path = str(shown_run.report)
+        give({"run": shown_run.id, "report": path}, lambda _: typer.echo(path), as_json=as_json)
+    elif table:
         _show_table(shown_run, table, as_json=as_json)
     else:
         _show_run(shown_run, as_json=as_json)
@@ -123,7 +133,7 @@ def show_validity(archive: Archive, serial: str, at: str, known: str, *, as_json
     history = Ledger(archive).calibrations(serial, day_of(known, "--known") if known else "")
     if not history:
         raise WrongUse(
-            f"show: unit {serial!r} has no calibration in archive {archive.root}; certify one with 'tumbleline certify'"
+            f"show: unit {serial!r} has no calibration in archive {archive.root}; certify one with 'tumbleline certificate issue'"
         )
     valid = next((one for one in history if one.holds(day)), None)
     if as_json:

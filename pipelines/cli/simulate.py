@@ -9,6 +9,8 @@ from pipelines.archive import Archive
 from pipelines.cli import options
 from pipelines.cli.options import argument, option
 from pipelines.cli.printing import error_console, give, say, short
+from schemas.errors import WrongUse
+from schemas.foreign import shown
 
 if TYPE_CHECKING:
     from inertial.dynamics.output_filter import OutputFilter
@@ -18,9 +20,12 @@ PART = "Results"
 ORDER = 346
 SUMMARY = "Pass a trajectory through a calibrated unit: its raw output with its errors."
 EXAMPLES = (
-    "tumbleline simulate trajectory.csv --calibration latest:SN1 --output raw.csv",
-    "tumbleline simulate trajectory.csv --calibration latest:SN1 --no-noise --output raw.mat",
+    "tumbleline simulate trajectory.csv latest:SN1 --output raw.csv",
+    "tumbleline simulate trajectory.csv latest:SN1 --seed none --output raw.mat",
 )
+
+
+NO_NOISE = "none"
 
 
 def command(
@@ -28,18 +33,19 @@ def command(
         Path, argument("FILE", "True specific force over time: time_s, force_x, force_y, force_z, unit_C.")
     ],
     output: Annotated[Path, option("--output -o FILE", "Raw samples, as .csv, .parquet, .mat or .npy.")],
-    calibration: options.CalibrationOption = "latest",
-    units: Annotated[str, option("--units g|m/s^2", "Unit of the force.")] = "g",
-    time: options.TimeColumnOption = "",
+    calibration: options.CalibrationArgument = "latest",
+    unit_of: Annotated[str, option("--unit-of force=g|m/s^2", "Unit of measure of the force.")] = "",
+    columns: options.MapOption = None,
     rate: options.RateOption = None,
     bandwidth: Annotated[
         float | None, option("--bandwidth HZ", "Of the sensor, two poles; by default none is applied.", min=1e-9)
     ] = None,
-    seed: Annotated[int, option("--seed", "Of the noise; the same seed gives the same samples.", min=0)] = 0,
+    seed: Annotated[
+        str, option("--seed N|none", "Of the noise: the same gives the same samples; none: no noise.")
+    ] = "0",
+    include: options.IncludeOption = None,
     archive: options.ArchiveOption = None,
     *,
-    noise: Annotated[bool, option("--noise/--no-noise", "Add the noise of the unit's static record.")] = True,
-    failed: Annotated[bool, option("--failed", "Also use a unit that failed its limits.")] = False,
     as_json: options.JsonOption = False,
 ) -> None:
     """Pass a trajectory through a calibrated unit: bias, scale, misalignment, temperature, all effects of the model, and noise.
@@ -51,23 +57,32 @@ def command(
     from pipelines.export.corrected import fit_of_unit, rate_and_gaps
     from pipelines.export.recording import read_recording
     from pipelines.export.trajectory import simulated, simulation_document, write_output
+    from pipelines.importers.mapping import pairs
     from pipelines.jobs.model_files import use_formulas_of
 
+    time, unknown = options.mapped_outputs(columns)
+    if unknown:
+        raise WrongUse(
+            f"simulate: --map {unknown[0]}: the force is force_x, force_y, force_z; only time=COLUMN can be mapped"
+        )
+    units = pairs(unit_of, "--unit-of").get("force", "g")
+    if seed != NO_NOISE and not seed.isdecimal():
+        raise WrongUse(f"simulate: --seed {shown(seed)}: a whole number or none is needed; correct it")
+    begin = None if seed == NO_NOISE else int(seed)
     name, _, unit = calibration.partition(":")
     run = Archive(archive).run(name)
     use_formulas_of(run)
-    fit = fit_of_unit(run, unit, "simulate", failed=failed, revoked=False)
+    fit = fit_of_unit(run, unit, "simulate", **options.included(include))
     with error_console().status(f"reading {file.name}"):
         recording = read_recording(file, FORCE_COLUMNS, time=time, rate_hz=rate)
     low_pass = None if bandwidth is None else _low_pass(bandwidth, rate_and_gaps(recording.time)[0])
-    made = simulated(recording, units, fit, low_pass, seed if noise else None)
+    made = simulated(recording, units, fit, low_pass, begin)
     write_output(made, output)
-    give(simulation_document(made, fit, low_pass, seed if noise else None, output), _print, as_json=as_json)
+    give(simulation_document(made, fit, low_pass, begin, output), _print, as_json=as_json)
 
 
 def _low_pass(bandwidth_hz: float, rate_hz: float) -> OutputFilter:
     from inertial.dynamics.output_filter import designed
-    from schemas.errors import WrongUse
 
     try:
         return designed("butterworth", bandwidth_hz, rate_hz)

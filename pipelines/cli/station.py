@@ -1,19 +1,21 @@
-"""``tumbleline station``: bring-up, recordings, state, self-test, log and charts of a station, profiles, simulated station."""
+"""``tumbleline station``: bring-up, recordings, state, self-test, log, operator, health and programming of a station."""
 
 from __future__ import annotations
 
 import re
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
 from pipelines.archive import Archive
 from pipelines.cli import options
+from pipelines.cli.groups import group
 from pipelines.cli.inputs import made_up
-from pipelines.cli.options import argument, option
+from pipelines.cli.options import Setting, argument, option, set_option, settings
 from pipelines.cli.printing import give, print_json, print_table, say
 from pipelines.cli.station_bring_up import bring_up, frames, replay
 from pipelines.cli.station_check import check
+from pipelines.cli.station_monitor import monitor
+from pipelines.cli.station_operator import operator
+from pipelines.cli.station_program import program
 from pipelines.cli.station_watch import status, watch
 
 if TYPE_CHECKING:
@@ -21,16 +23,25 @@ if TYPE_CHECKING:
 
 PART = "Measure"
 ORDER = 150
-SUMMARY = "Connect, show, check, serve and describe stations."
+SUMMARY = "Connect, check, show, watch and serve stations; operator, health, programming of units."
 EXAMPLES = ("tumbleline station status --station line-1.toml", "tumbleline station check --station line-1.toml")
 EXAMPLES_OF = {
     "bring-up": (
-        "tumbleline station bring-up watlow_f4t --link tcp://192.168.0.20 --readings",
-        "tumbleline station bring-up oriental_az --link serial:/dev/ttyUSB0 --device-id 1",
+        "tumbleline station bring-up watlow_f4t tcp://192.168.0.20 --read-only",
+        "tumbleline station bring-up oriental_az serial:/dev/ttyUSB0 --device-id 1",
+    ),
+    "operator": ("tumbleline station operator", "tumbleline station operator line-six --answer go"),
+    "monitor": (
+        "tumbleline station monitor --queue line-1",
+        "tumbleline station monitor --port 9464 --webhook https://alerts.example/hook --audits audits",
+    ),
+    "program": (
+        "tumbleline station program latest --units SN1,SN2",
+        "tumbleline station program latest --station line-1.toml --format q24 --yes",
     ),
     "frames": (
         "tumbleline station frames frames.jsonl",
-        "tumbleline station frames frames.jsonl --as-test test_slow_chamber.py",
+        "tumbleline station frames frames.jsonl --output test_slow_chamber.py",
     ),
     "replay": (
         "tumbleline station replay frames.jsonl",
@@ -38,15 +49,15 @@ EXAMPLES_OF = {
     ),
     "status": (
         "tumbleline station status --station line-1.toml",
-        "tumbleline station status --station line-1.toml --watch",
+        "tumbleline station status --station line-1.toml --every 2",
     ),
     "check": (
         "tumbleline station check --station line-1.toml",
-        "tumbleline station check --station line-1.toml --registers",
+        "tumbleline station check --station line-1.toml --read-only",
     ),
     "log": ("tumbleline station log", "tumbleline station log latest --all"),
-    "watch": ("tumbleline station watch", "tumbleline station watch --station line-1.toml --minutes 30"),
-    "serve": ("tumbleline station serve --port 5020", "tumbleline station serve --units 4 --speed 60"),
+    "watch": ("tumbleline station watch", "tumbleline station watch --station line-1.toml --last 30"),
+    "serve": ("tumbleline station serve --port 5020", "tumbleline station serve --slots 4 --speed 60"),
     "profiles": ("tumbleline station profiles", "tumbleline station profiles watlow_f4t"),
 }
 """Of the subcommands."""
@@ -71,7 +82,7 @@ QUIET = {"reference", "soak"}  # shown only with --all, because they occur in ev
 def log(
     run: Annotated[str, argument("[RUN]", "Show only this run of the archive.")] = "",
     archive: options.ArchiveOption = None,
-    limit: Annotated[int, option("--limit", "Number of events, newest last.", min=1)] = 50,
+    last: Annotated[int, option("--last N", "Number of events, newest last.", min=1)] = 50,
     *,
     everything: Annotated[bool, option("--all", "Also show soaks and reference readings.")] = False,
     as_json: options.JsonOption = False,
@@ -79,7 +90,7 @@ def log(
     """Show events that paused or ended runs (from the archive) and events of stations (from the log of this computer)."""
     recorded = [*_of_runs(Archive(archive), run), *([] if run else _of_machine())]
     events = [event for event in recorded if everything or event["kind"] not in QUIET]
-    events = sorted(events, key=lambda event: event["when"])[-limit:]
+    events = sorted(events, key=lambda event: event["when"])[-last:]
     give({"events": events}, _print, as_json=as_json)
 
 
@@ -139,18 +150,14 @@ SHORT = {"read": "r", "write": "w", "read_write": "rw"}
 SETTINGS = re.compile(r"[,:;(]| with | behind ")
 """What stands between the name of a model and the required settings of the device."""
 
-app = typer.Typer(help=SUMMARY, no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
 
-app.command("bring-up")(bring_up)
-app.command()(frames)
-app.command()(replay)
-app.command()(status)
-app.command()(check)
-app.command()(log)
-app.command()(watch)
+SERVING = {
+    "silence": Setting(
+        "S", "seconds without a request after which drives and reader stop, 30 by default; 0: never", float, 0.0
+    )
+}
 
 
-@app.command()
 def serve(
     station: options.StationOption = None,
     host: Annotated[str, option("--host", "Interface to listen on.")] = "127.0.0.1",
@@ -161,9 +168,7 @@ def serve(
     device: options.SimulatedDeviceOption = "ADXL355",
     units: options.SimulatedUnitsOption = 8,
     seed: Annotated[int, option("--seed", "Random seed of the simulated units.", min=0)] = 1,
-    silence: Annotated[
-        float, option("--silence", "Seconds without a request after which drives and reader stop; 0: never.", min=0.0)
-    ] = 30.0,
+    setting: Annotated[list[str] | None, set_option(SERVING)] = None,
     *,
     as_json: options.JsonOption = False,
 ) -> None:
@@ -189,11 +194,11 @@ def serve(
         print_table(["device", "id", "profile"], [[d.name, str(d.device_id), d.profile] for d in devices], title)
         say("stop with Ctrl-C")
 
+    silence_s = settings(setting, SERVING, "serve").get("silence", 30.0)
     lot = made_up(device, units, seed)
-    run(config, lot, host=host, port=port, speed=speed, stop=stop, ready=ready, silence_s=silence)
+    run(config, lot, host=host, port=port, speed=speed, stop=stop, ready=ready, silence_s=silence_s)
 
 
-@app.command()
 def profiles(
     name: Annotated[str, argument("[PROFILE]", "Show the registers of this profile.")] = "",
     *,
@@ -233,3 +238,12 @@ def _print_profile(profile: Profile) -> None:
     for register in profile.registers:
         if register.disputed:
             say(f"disputed  {register.name}: {register.disputed}")
+
+
+app = group(
+    SUMMARY,
+    {
+        "bring-up": bring_up, "status": status, "check": check, "watch": watch, "log": log, "operator": operator,
+        "monitor": monitor, "program": program, "frames": frames, "replay": replay, "serve": serve, "profiles": profiles,
+    },
+)  # fmt: skip

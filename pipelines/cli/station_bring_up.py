@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, get_args
 
 import typer
 
-from pipelines.cli.options import JsonOption, argument, option
+from pipelines.cli.options import PAGES, JsonOption, Setting, argument, option, outputs, set_option, settings
 from pipelines.cli.printing import give, print_json, print_table, publish, remark, say
 from schemas.errors import STATION, StationError, WrongUse
 
@@ -21,25 +21,24 @@ if TYPE_CHECKING:
 ON = "What is at the other end: hardware, simulator or replay? (Enter: not stated)"
 
 
+SECONDS = {
+    "timeout": Setting("S", "longest answer, 2 s by default", float, 0.05, 60.0),
+    "silence": Setting("S", "how long the link is cut in that step, 40 s by default", float, 1.0, 600.0),
+    "watch": Setting("S", "how long the air of a chamber is watched, 20 s by default", float, 0.0, 3600.0),
+}
+
+
 def bring_up(
     profile: Annotated[
         str, argument("PROFILE", "The profile of the device; 'tumbleline station profiles' lists them.")
     ],
-    link: Annotated[
-        str, option("--link LINK", "tcp://HOST[:PORT], serial:DEVICE[,BAUD[,PARITY[,STOP]]] or visa:RESOURCE.")
-    ],
+    link: Annotated[str, argument("LINK", "tcp://HOST[:PORT], serial:DEVICE[,BAUD[,PARITY[,STOP]]] or visa:RESOURCE.")],
     device_id: Annotated[int, option("--device-id", "Unit id of the device; 0: look for it.", min=0, max=255)] = 0,
-    out: Annotated[Path | None, option("--out DIR", "New folder for page, recording and profile.")] = None,
-    timeout: Annotated[float, option("--timeout", "Longest answer, s.", min=0.05, max=60.0)] = 2.0,
-    silence: Annotated[
-        float, option("--silence", "How long the link is cut in that step, s.", min=1.0, max=600.0)
-    ] = 40.0,
-    watch: Annotated[
-        float, option("--watch", "How long the air of a chamber is watched, s.", min=0.0, max=3600.0)
-    ] = 20.0,
-    by: Annotated[str, option("--by NAME", "Who does it, for the page.")] = "",
+    out: Annotated[Path | None, option("--output -o DIR", "New folder for page, recording and profile.")] = None,
+    setting: Annotated[list[str] | None, set_option(SECONDS)] = None,
+    who: Annotated[str, option("--who NAME", "Who does it, for the page.")] = "",
     *,
-    readings: Annotated[bool, option("--readings", "Read only: no order is offered.")] = False,
+    readings: Annotated[bool, option("--read-only", "No order is offered.")] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Connect one real device step by step, and say for every register and promise: held, differs, or not tried.
@@ -53,6 +52,7 @@ def bring_up(
     from stations.links.recorder import recorded
     from stations.profile_files import load_profile
 
+    seconds = settings(setting, SECONDS, "bring-up")
     loaded = load_profile(profile)
     device = device_at(link, loaded, device_id or 1)
     folder = _new_folder(out, loaded.name)
@@ -66,16 +66,16 @@ def bring_up(
             device_id,
             search,
             orders=not readings,
-            timeout_s=timeout,
-            silence_s=silence,
-            watch_s=watch,
+            timeout_s=seconds.get("timeout", 2.0),
+            silence_s=seconds.get("silence", 40.0),
+            watch_s=seconds.get("watch", 20.0),
         )
         try:
             session.run()
         except (StationError, KeyboardInterrupt):
-            _written(session, folder, person, by, as_json=as_json)
+            _written(session, folder, person, who, as_json=as_json)
             raise
-    document = _written(session, folder, person, by, as_json=as_json)
+    document = _written(session, folder, person, who, as_json=as_json)
     raise typer.Exit(STATION if document["differs"] else 0)
 
 
@@ -84,9 +84,9 @@ def _new_folder(out: Path | None, profile: str) -> Path:
     try:
         folder.mkdir(parents=True)
     except FileExistsError:
-        raise WrongUse(f"bring-up: {folder} is there already, a new folder is needed; give another --out") from None
+        raise WrongUse(f"bring-up: {folder} is there already, a new folder is needed; give another --output") from None
     except OSError as problem:
-        raise WrongUse(f"bring-up: {folder} cannot be made ({problem.strerror}); give another --out") from None
+        raise WrongUse(f"bring-up: {folder} cannot be made ({problem.strerror}); give another --output") from None
     return folder
 
 
@@ -154,32 +154,35 @@ SHOWN = 200
 
 def frames(
     file: FrameFileArgument,
-    limit: Annotated[int, option("--limit", "Number of frames, the last ones.", min=1)] = 40,
-    page: Annotated[Path | None, option("--page FILE", "Write the time line as a page (HTML).")] = None,
-    as_test: Annotated[
-        Path | None, option("--as-test FILE", "Write a test for pytest, with the recording beside it.")
+    last: Annotated[int, option("--last N", "Number of frames, the last ones.", min=1)] = 40,
+    output: Annotated[
+        list[Path] | None,
+        option(
+            "--output -o FILE",
+            "The time line as a page (.html), or a test for pytest (.py) with the recording beside it; may be repeated.",
+        ),
     ] = None,
     *,
     as_json: JsonOption = False,
 ) -> None:
     """Show a recording of a station's links: every request with its time, meaning and answer.
 
-    With --as-test a recorded defect becomes a test: it holds the client to what it gets from the recorded device.
+    With --output FILE.py a recorded defect becomes a test: it holds the client to what it gets from the recorded device.
     """
     from pipelines.commissioning.frames import as_test as text_of
     from pipelines.commissioning.frames import frames_document, frames_page
     from stations.recordings.other_programs import read_recording
 
+    files = outputs(output, {"page": PAGES, "test": (".py",)}, "frames")
+    page, as_test = files.get("page"), files.get("test")
     recording = read_recording(file)
     if page is not None:
         publish(page, frames_page(recording), "page")
     if as_test is not None:
-        if as_test.suffix != ".py":
-            raise WrongUse(f"frames: --as-test {as_test}, a file that ends in .py is needed; correct its name")
         beside = as_test.with_name(f"{as_test.stem}{file.suffix}")
         publish(beside, file.read_bytes(), "recording")
         publish(as_test, text_of(file, beside.name), "test")
-    document = frames_document(recording, None if as_json else limit)
+    document = frames_document(recording, None if as_json else last)
     give(document, partial(_print_frames, len(recording.exchanges)), as_json=as_json)
 
 
@@ -236,7 +239,7 @@ def _print_frames(total: int, document: FramesDocument) -> None:
     ]
     print_table(["time, s", "answer, ms", "device", "kind", "what", "answer"], lines)
     if total > len(lines):
-        say(f"the last {len(lines)} of {total} frames; --limit shows more, --json all")
+        say(f"the last {len(lines)} of {total} frames; --last shows more, --json all")
     if document["remark"]:
         remark(document["remark"])
 

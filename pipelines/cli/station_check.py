@@ -25,7 +25,7 @@ def check(
     device: options.SimulatedDeviceOption = "ADXL355",
     units: options.SimulatedUnitsOption = 8,
     *,
-    registers: Annotated[bool, option("--registers", "Only read every register once; no motion.")] = False,
+    registers: Annotated[bool, option("--read-only", "Only read every register once; no motion.")] = False,
     record: options.RecordOption = None,
     as_json: options.JsonOption = False,
 ) -> None:

@@ -34,9 +34,10 @@ def status(
     station: options.StationOption = None,
     device: options.SimulatedDeviceOption = "ADXL355",
     units: options.SimulatedUnitsOption = 8,
-    every: Annotated[float, option("--every", "Seconds between two readings with --watch.", min=0.1)] = 1.0,
+    every: Annotated[
+        float, option("--every S", "Read again after so many seconds, until Ctrl-C; 0: once.", min=0.0)
+    ] = 0.0,
     *,
-    watch: Annotated[bool, option("--watch", "Repeat until Ctrl-C.")] = False,
     as_json: options.JsonOption = False,
 ) -> None:
     """Show angles, temperatures, states, slots and the run that drives the station.
@@ -53,7 +54,7 @@ def status(
         now = look()
         if as_json:
             print_json({"ok": not now.faults, **now.document()})
-        elif watch:
+        elif every:
             now = _live(look, overview, every)
         else:
             say(overview(now))
@@ -139,18 +140,17 @@ def watch(
     station: options.StationOption = None,
     archive: options.ArchiveOption = None,
     minutes: Annotated[
-        float, option("--minutes", "Time span, minutes before now; default: the whole run.", min=0.1)
+        float, option("--last N", "Number of minutes before now; default: the whole run.", min=0.1)
     ] = math.inf,
-    every: Annotated[float, option("--every", "Seconds between two readings.", min=0.1)] = 1.0,
+    every: Annotated[float, option("--every S", "Seconds between two readings; 0: draw once and exit.", min=0.0)] = 1.0,
     *,
-    once: Annotated[bool, option("--once", "Draw once and exit.")] = False,
     as_json: options.JsonOption = False,
 ) -> None:
     """Draw temperatures and angles over time, live: of a run in the archive, or with --station of a station."""
     with _source(run, station, archive) as look:
         if as_json:
             print_json(look().document())
-        elif once or not sys.stdout.isatty():
+        elif not every or not sys.stdout.isatty():
             say(picture(look(), minutes))
         else:
             _live(look, lambda seen: picture(seen, minutes), every, lambda seen: seen.over)

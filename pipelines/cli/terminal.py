@@ -40,9 +40,7 @@ def scanned(slots: int) -> Seating:
 
 
 MEASURES = "y or Enter measures it, n leaves it; Ctrl-C stops, and the same command continues"
-UNATTENDED = (
-    "operator: standard input ended before an answer, a line is needed; run without an operator with --no-prompts"
-)
+UNATTENDED = "operator: standard input ended before an answer, a line is needed; run without an operator with --yes"
 
 
 def agreed(question: str, choices: str = MEASURES, unattended: str = UNATTENDED) -> bool:

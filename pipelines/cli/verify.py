@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 from inertial.counts import number_of
 from pipelines.archive import Archive
-from pipelines.cli.options import ArchiveOption, JsonOption, argument, option
+from pipelines.cli.options import ArchiveOption, JsonOption, TrustOption, argument, option
 from pipelines.cli.printing import conclude, console, error_console, say
 from pipelines.integrity import Report
 from schemas.errors import WrongUse
@@ -34,25 +34,12 @@ def command(
             "Only these runs and their captures, or files of certificates (.pdf, .xml, .sig); default: the whole archive.",
         ),
     ] = None,
-    trust: Annotated[
-        list[Path] | None,
-        option(
-            "--trust FILE.pem",
-            "Certificate of a laboratory's key, or of its authority, that vouches for the signatures of FILE.",
-        ),
-    ] = None,
+    trust: TrustOption = None,
     laboratory: Annotated[
         Path | None,
         option(
             "--laboratory FILE.toml",
-            "The laboratory's file, as for 'certificate': with --archive it proves names and addresses of FILE.",
-        ),
-    ] = None,
-    key: Annotated[
-        list[str] | None,
-        option(
-            "--key FILE|HEX",
-            "A public key; each manifest must have a signature of one of these keys. Default: the own key.",
+            "The laboratory's file, as for 'certificate write': with --archive it proves names and addresses of FILE.",
         ),
     ] = None,
     head: Annotated[str, option("--head HASH", "Hash of an entry of the chain from an earlier verification.")] = "",
@@ -62,24 +49,24 @@ def command(
 ) -> None:
     """Compute every hash again: find changed bytes, missing files, edited manifests, foreign tables, false signatures.
 
-    Files of certificates are checked alone: form, schema, signatures, attachment. --trust decides who may sign. With --archive
-    the XML is made again from the archive and compared whole, and revoked and replaced certificates are found. Exit status 1:
-    there are findings, or nothing proves where a certificate comes from.
+    Each manifest must have a signature of a key of --trust, where it is given, or of the own key. Files of certificates are
+    checked alone: form, schema, signatures, attachment; --trust names who may sign. With --archive the XML is made again from
+    the archive and compared whole, and revoked and replaced certificates are found. Exit status 1: there are findings, or
+    nothing proves where a certificate comes from.
     """
     from pipelines.archive.signatures import public_keys
     from pipelines.audit.index import check_index
     from pipelines.integrity import verify
 
     if files := certificate_files(runs or ()):
-        check_certificates(files, trust or (), archive, laboratory, as_json=as_json)
-    if trust or laboratory:
+        check_certificates(files, [Path(one) for one in trust or ()], archive, laboratory, as_json=as_json)
+    if laboratory:
         raise WrongUse(
-            f"{'--trust' if trust else '--laboratory'}: no file of a certificate is given, one is needed; give FILE.pdf or "
-            "FILE.xml, or leave it out"
+            "--laboratory: no file of a certificate is given, one is needed; give FILE.pdf or FILE.xml, or leave it out"
         )
     store = Archive(archive)
     store.refuse_none()
-    keys = public_keys(key or ())
+    keys = public_keys(trust or ())
     with error_console().status("reading") as status:
         report = verify(
             store,

@@ -8,11 +8,15 @@ from pipelines.archive import Archive
 from pipelines.cli.options import argument, option
 from pipelines.cli.printing import remark, say
 from schemas.errors import WrongUse
+from schemas.foreign import shown
 
 PART = "Start here"
 ORDER = 40
 SUMMARY = "Show archive, models and missing effects in a browser."
 EXAMPLES = ("tumbleline workbench", "tumbleline workbench archive --port 8765")
+
+
+HOST = "127.0.0.1"
 
 
 def command(
@@ -28,12 +32,13 @@ def command(
         ),
     ] = None,
     port: Annotated[int, option("--port", "Port; 0: a free one.", min=0, max=65535)] = 8321,
-    host: Annotated[str, option("--host ADDRESS", "Interface to listen on.")] = "127.0.0.1",
-    name: Annotated[
-        list[str] | None, option("--name HOST", "Further host name of this server; may be repeated.")
-    ] = None,
-    certificate: Annotated[Path | None, option("--certificate FILE.pem", "Certificate for HTTPS.")] = None,
-    key: Annotated[Path | None, option("--key FILE.pem", "Private key of the certificate.")] = None,
+    host: Annotated[
+        str, option("--host ADDRESS[,NAME…]", "Interface to listen on, then further host names of this server.")
+    ] = HOST,
+    tls: Annotated[
+        str,
+        option("--tls FILE.pem[,FILE.pem]", "Certificate for HTTPS, then its private key where another file has it."),
+    ] = "",
     workers: Annotated[int, option("--workers", "Processes for diagnoses and fits.", min=1, max=32)] = 2,
     *,
     pause_lots: Annotated[
@@ -62,18 +67,22 @@ def command(
     from pipelines.workbench.settings import WorkbenchSettings
     from schemas.station import load_station
 
-    if (certificate is None) != (key is None):
-        raise WrongUse("workbench: a certificate and its key are needed together; give both or neither")
+    certificate, key = (Path(name) if name else None for name in (*tls.split(",", 1), "")[:2])
+    if tls and certificate is None:
+        raise WrongUse(
+            f"workbench: --tls {shown(tls)}: the certificate is missing, it is needed; name it before its key"
+        )
     given = os.environ.get("TUMBLELINE_WORKBENCH_TOKEN", "")
     for one in station or ():
         load_station(one)  # a broken file is refused now, not when the page is opened
     # a proxy connects for everybody from one address, and limits addresses itself
     own = {"of_one_address": MOST} if behind_proxy else {}
     limits = ConnectionLimits(plain=certificate is None, **own)
-    with listening_socket(host, port, "workbench", limits) as place:
+    address, *names = (part.strip() for part in host.split(","))
+    with listening_socket(address or HOST, port, "workbench", limits) as place:
         listening = place.getsockname()[1]
         settings = WorkbenchSettings(
-            archive=Archive(archive or None).address, folder=folder, host=host, port=listening, names=tuple(name or ()),
+            archive=Archive(archive or None).address, folder=folder, host=address or HOST, port=listening, names=tuple(names),
             tls=certificate is not None, proxied=behind_proxy, stations=tuple(station or ()), workers=workers,
             pause_lots=pause_lots, **({"token": given} if given else {}),
         )  # fmt: skip

@@ -110,7 +110,7 @@ def _compared(
     if again is not None:
         answer["warnings"] += [
             f"{name} depends on the temperature between the dwells, and no history of the fresh run was given: its prediction "
-            "there is unreliable; give --fresh-history FILE"
+            "there is unreliable; give --fresh-temperatures FILE"
             for name in _remember(again, model.terms)
         ]
     return answer
@@ -120,7 +120,7 @@ def without_history(measurement: Measured, terms: Sequence[Term]) -> list[str]:
     """A warning for every effect that depends on the temperature between the dwells if its history is missing."""
     return [
         f"{name} depends on the temperature between the dwells, and no history was given: its size is unreliable; give "
-        "--history FILE"
+        "--temperatures FILE"
         for name in _remember(measurement, terms)
     ]
 

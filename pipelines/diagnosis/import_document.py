@@ -91,7 +91,7 @@ def _table_of_dwells(
     if fit or set(keys) - {"units"}:
         more = [*sorted(set(keys) - {"units"}), *(["fit"] if fit else [])]
         raise WrongUse(
-            f"import: {path.name} is a table of dwells in the exchange format, which takes --units output=… alone (found "
+            f"import: {path.name} is a table of dwells in the exchange format, which takes --unit-of output=… alone (found "
             f"{', '.join(more)}); import it without them, then 'tumbleline fit RUN', or map its columns with --map"
         )
     beside = file_beside(str(path), "history")
@@ -123,14 +123,14 @@ def _mapping(keys: dict[str, Any], content: Content, where: str, name: str) -> M
     if "columns" not in keys:
         raise WrongUse(
             f"import: no column of {name} is mapped, x, y and z are needed at least (its columns: "
-            f"{', '.join(map(str, content.table.columns))}); add --map time=…,x=…,y=…,z=… and --units output=…, or --mapping "
+            f"{', '.join(map(str, content.table.columns))}); add --map time=…,x=…,y=…,z=… and --unit-of output=…, or --set "
             f"FILE.toml; 'tumbleline inspect {name}' proposes a command"
         )
     complete = stated_units.completed(keys, content)
     if "output" not in complete.get("units", {}) and all(axis in keys["columns"] for axis in mapped.NEEDED):
         raise WrongUse(
             f"import: the unit of the output is not given and {name} states none, one of {', '.join(mapped.OUTPUT_UNITS)} is "
-            f"needed; add --units output=…; 'tumbleline inspect {name}' shows the size of the numbers"
+            f"needed; add --unit-of output=…; 'tumbleline inspect {name}' shows the size of the numbers"
         )
     how = mapped.build(complete, where)
     stated_units.refuse_contradiction(how, content, name)

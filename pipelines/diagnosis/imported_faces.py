@@ -125,7 +125,7 @@ def _by_face(dwells: pd.DataFrame, mapping: Mapping) -> tuple[Array, Array, Arra
     if missing or len(dwells) != len(FACES):
         raise DataRejected(
             f"import: {len(dwells)} dwells, faces {', '.join(missing) or 'none'} missing; each of {', '.join(FACES)} is needed "
-            "once; name them with --poses LABEL=+x,…"
+            "once; name them with --set poses=LABEL=+x,…"
         )
     means = dwells[list(OUTPUT_COLUMNS)].to_numpy(dtype=np.float64)
     up, down = (means[[faces_there[f"{sign}{axis}"] for axis in AXES]] for sign in "+-")

@@ -230,6 +230,6 @@ def judge(method: str, data: Imported, mapping: Mapping) -> FitAnswer:
     if method == "norm" and data.dwells is not None and not mapping.poses and len(data.dwells) <= _NORM_NEEDS:
         raise DataRejected(
             f"import: {len(data.dwells)} dwells of unknown orientation, more than {_NORM_NEEDS} are needed for --fit norm; add "
-            "positions; or, if faces were up, name them with --poses LABEL=+x,LABEL=-x,… and give --fit faces"
+            "positions; or, if faces were up, name them with --set poses=LABEL=+x,LABEL=-x,… and give --fit faces"
         )
     return METHODS[method](data, mapping)

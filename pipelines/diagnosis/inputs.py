@@ -88,3 +88,14 @@ def _specified(text: str, where: str) -> FormulaSpec:
             f"{where}: formula '{shown(text)}': an id of letters, digits and _ is needed; write one such as humid = …"
         )
     return FormulaSpec(id=name.strip().lower(), columns=columns, why=WHY)
+
+
+def with_formulas(text: str, formulas: Sequence[str], used: Sequence[str]) -> str:
+    """The text with the formulas that are used and that it lacks."""
+    for written in formulas:
+        name, _, rest = written.partition("=")
+        known = name.strip().lower()
+        if known in used and f'id = "{known}"' not in text:
+            columns = ", ".join(f'"{part.strip()}"' for part in rest.split(";") if part.strip())
+            text = f'{text.rstrip()}\n\n[[formula]]\nid = "{known}"\ncolumns = [{columns}]\nwhy = "{WHY}"\n'
+    return text

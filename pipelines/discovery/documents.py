@@ -207,7 +207,7 @@ class HiddenInWafer(TypedDict):
 
 
 class DiscoveryDemo(TypedDict):
-    """``demo --archive --json``: what was hidden in an archive of many lots, and what was found of it."""
+    """``demo --lots N --json``: what was hidden in an archive of many lots, and what was found of it."""
 
     seed: int
     hidden: HiddenInWafer

@@ -74,7 +74,7 @@ class DiscoveryArchive:
         if not counts:
             raise WrongUse(
                 f"discover: {self.archive.root} has no run with dwells, thirty at least are needed; see 'tumbleline demo "
-                "--archive'"
+                "--lots N'"
             )
         return counts.most_common(1)[0][0]
 

@@ -122,7 +122,7 @@ def fit_of_unit(run: Run, unit: str, what: str, *, failed: bool, revoked: bool) 
     calibration = read_calibration(run.table("coefficients"), run.table("covariance"))
     if not unit and len(calibration.units) > 1:
         raise WrongUse(
-            f"--calibration: run {run.id} has {len(calibration.units)} units, one is needed as RUN:UNIT; "
+            f"RUN:UNIT: run {run.id} has {len(calibration.units)} units, one is needed as RUN:UNIT; "
             f"{did_you_mean('', calibration.units)}"
         )
     serial = unit or next(iter(calibration.units))
@@ -194,7 +194,7 @@ def _tracked(recording: CorrectableRecording, fit: FitOfUnit, tracking: Tracking
     if not 2 <= steps <= LONGEST_STEPS:
         raise DataRejected(
             f"{recording.name}: {steps} steps of {tracking.step_s:g} s, 2 to {LONGEST_STEPS} are needed to track the bias; "
-            "change --step"
+            "change the step with --set step=S"
         )
     middle, force = (_means(values, per) for values in (time, plain.force))
     known, magnitude = _references(recording, tracking, plain.force, per, rate)

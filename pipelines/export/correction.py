@@ -43,18 +43,22 @@ def tracking_of(
         except ValueError:
             known = np.array([])
         if known.shape != (3,) or not np.isfinite(known).all():
-            raise WrongUse(f"--force: found '{shown(force)}', three numbers X,Y,Z in g are needed; correct it")
+            raise WrongUse(
+                f"--track: found '{shown(force)}', at-rest or three numbers X,Y,Z in g are needed; correct it"
+            )
     if turn_on is None:
         raise WrongUse(
             f"correct: run {run.id} states no change of the bias from switch-on to switch-on, it is needed to weigh the first "
-            "updates; give it with --turn-on UG (data sheet, or the power cycles of a run)"
+            "updates; give it with --set turn_on=UG (data sheet, or the power cycles of a run)"
         )
     local = gravity if gravity is not None else run.about.get("recipe", {}).get("local_gravity_m_s2")
     magnitude = None
     if at_rest:
         if not isinstance(local, int | float) or not 9.7 < local < 9.9:
             found = f"local gravity {local}"
-            raise WrongUse(f"correct: {found}, 9.7 to 9.9 m/s² is needed with --at-rest; give it with --gravity")
+            raise WrongUse(
+                f"correct: {found}, 9.7 to 9.9 m/s² is needed with --track at-rest; give it with --set gravity=M/S2"
+            )
         magnitude = float(local) / STANDARD_GRAVITY_M_S2
     return Tracking(known, magnitude, turn_on, step)
 

@@ -58,7 +58,7 @@ def chosen_filter(
         if measured is None:
             raise WrongUse(
                 f"--filter: no bandwidth of unit {unit} was measured (procedures sweep, random_vibration) and no cut-off is "
-                "given; add --cutoff HZ"
+                f"given; give it as --filter {kind}:HZ"
             )
         cutoff_hz, source = measured[0], f"bandwidth of unit {unit} in run {measured[1]}"
         if cutoff_hz > HIGHEST * rate_hz:
@@ -66,7 +66,7 @@ def chosen_filter(
     try:
         return designed(known[kind], cutoff_hz, rate_hz), source
     except ValueError as problem:
-        raise WrongUse(f"--filter: {problem}; give another --cutoff") from None
+        raise WrongUse(f"--filter: {problem}; give another frequency") from None
 
 
 @dataclass(frozen=True)

@@ -66,7 +66,7 @@ def fixed_point(unit: UnitCalibration) -> FixedPoint:
     if not largest <= _LARGEST:
         raise WrongUse(
             f"export: a coefficient of unit {unit.unit} is {largest / ONE:.4g} in fixed point, ±{_LARGEST / ONE:.0f} is the "
-            "range; export with --arithmetic float"
+            "range; export with --set arithmetic=float"
         )
     bias, matrix = (v.astype(np.int64) for v in values)
     return FixedPoint(scale, bias, matrix, thousandths(unit.temperatures))

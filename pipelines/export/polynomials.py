@@ -152,7 +152,7 @@ def _exportable(run: Run, serials: tuple[str, ...], *, failed: bool, revoked: bo
     chosen = [unit for unit in (serials or tuple(table.index)) if table.loc[unit, "outcome"] in allowed]
     if not chosen:
         raise WrongUse(
-            f"export: no unit of run {run.id} passed, at least one is needed; --failed exports failed ones too"
+            f"export: no unit of run {run.id} passed, at least one is needed; --include failed exports failed ones too"
         )
     certificates = stated(run, chosen)
     if not revoked:
@@ -225,7 +225,7 @@ def _not_revoked(
     if gone and (named or len(gone) == len(chosen)):
         raise WrongUse(
             f"export: the calibration of unit {gone[0]} in run {run.id} was revoked ({certificates[gone[0]].reason}), a "
-            "valid one is needed; measure the unit again, or export the old coefficients with --revoked"
+            "valid one is needed; measure the unit again, or export the old coefficients with --include revoked"
         )
     return [unit for unit in chosen if unit not in gone]
 
@@ -245,7 +245,7 @@ def _refuse(grades: pd.DataFrame, serials: tuple[str, ...], *, failed: bool) -> 
                 f"export: the data of unit {unit} were refused ({reasons}), so it has no coefficients; measure it again"
             )
         if outcome == "fail" and not failed:
-            raise WrongUse(f"export: unit {unit} failed ({reasons}); --failed exports its coefficients")
+            raise WrongUse(f"export: unit {unit} failed ({reasons}); --include failed exports its coefficients")
 
 
 def effects_left_out(calibration: Calibration) -> tuple[str, ...]:

@@ -68,12 +68,12 @@ def recording_of(
     if len(chosen) != 3:
         raise WrongUse(
             f"{where}: columns {', '.join(shown(name) for name in there[:8])}, three columns of output are needed; name "
-            "them with --columns x,y,z"
+            "them with --map x=…,y=…,z=…"
         )
     output = np.stack([finite_column(table, name, where) for name in chosen], axis=1)
     n = len(output)
     if rate_hz is not None and time:
-        raise WrongUse(f"{where}: --time and --rate are both given, one is needed; leave one out")
+        raise WrongUse(f"{where}: --map time=… and --rate are both given, one is needed; leave one out")
     moments = np.arange(n) / rate_hz if rate_hz is not None else finite_column(table, time or TIME, where)
     if n < 2 or not np.all(np.diff(moments) > 0.0):
         raise DataRejected(

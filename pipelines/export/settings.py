@@ -102,14 +102,14 @@ class ExportSettings:
         """Refuses settings outside their range."""
         if self.arithmetic not in ARITHMETICS:
             raise WrongUse(
-                f"--arithmetic: found '{shown(self.arithmetic)}'; {did_you_mean(self.arithmetic, ARITHMETICS)}"
+                f"--set arithmetic: found '{shown(self.arithmetic)}'; {did_you_mean(self.arithmetic, ARITHMETICS)}"
             )
         if not 0 <= self.sensor < MOST_SENSORS:
-            raise WrongUse(f"--sensor: found {self.sensor}, 0 to {MOST_SENSORS - 1} is needed; correct it")
+            raise WrongUse(f"--set sensor: found {self.sensor}, 0 to {MOST_SENSORS - 1} is needed; correct it")
         if self.rate_hz is not None and not self.rate_hz > 0.0:
             raise WrongUse(f"--rate: found {self.rate_hz:g} Hz, a rate above 0 is needed; correct it")
         if self.counts_per_g < 1:
-            raise WrongUse(f"--counts-per-g: found {self.counts_per_g}, 1 or more is needed; correct it")
+            raise WrongUse(f"--set counts_per_g: found {self.counts_per_g}, 1 or more is needed; correct it")
 
     def nominal_for(self, unit: UnitCalibration, what: str) -> float:
         """The driver's output per g: the one given, else that of the unit's preset; refused where neither states it."""
@@ -118,7 +118,7 @@ class ExportSettings:
             found = "none is given and no preset states it" if nominal is None else f"{nominal:g}"
             raise WrongUse(
                 f"export: nominal scale of unit {unit.unit}: {found}, a positive output per g is needed for {what} (their driver "
-                "divides by it); give it with --nominal"
+                "divides by it); give it with --set nominal=N"
             )
         return nominal
 
@@ -136,16 +136,16 @@ def device_ids(text: str, units: Sequence[str]) -> dict[str, int]:
         unit, equals, number = part.rpartition("=")
         if not equals and len(units) != 1:
             raise WrongUse(
-                f"--device-id: found '{shown(part)}' for {len(units)} units, one for each is needed as UNIT=ID,…; or choose one "
-                "unit with --units"
+                f"--set device_id: found '{shown(part)}' for {len(units)} units, one for each is needed as UNIT=ID,…; or choose "
+                "one unit with --units"
             )
         unit = unit.strip() if equals else units[0]
         if unit not in units:
-            raise WrongUse(f"--device-id: unit '{shown(unit)}' is not exported; {did_you_mean(unit, units)}")
+            raise WrongUse(f"--set device_id: unit '{shown(unit)}' is not exported; {did_you_mean(unit, units)}")
         ids[unit] = _number(number.strip() if equals else part)
     if len(set(ids.values())) < len(ids):
         raise WrongUse(
-            f"--device-id: found '{shown(text)}', a different number for each unit is needed; an autopilot "
+            f"--set device_id: found '{shown(text)}', a different number for each unit is needed; an autopilot "
             "identifies its sensors by it; correct it"
         )
     return ids
@@ -157,7 +157,7 @@ def _number(text: str) -> int:
         number = int(text, 0)
     if not 0 < number <= HIGHEST_ID:
         raise WrongUse(
-            f"--device-id: found '{shown(text)}', a whole number from 1 to {HIGHEST_ID} is needed, as in the "
+            f"--set device_id: found '{shown(text)}', a whole number from 1 to {HIGHEST_ID} is needed, as in the "
             "autopilot's parameter of the sensor; correct it"
         )
     return number
@@ -180,7 +180,8 @@ def bias_models(run: Run, serials: Sequence[str], step_s: float, turn_on_ug: flo
         turn_on_ug = terms.stability.switch_on_ug
     if turn_on_ug is None:
         raise WrongUse(
-            f"export: run {run.id} states no change of the bias from switch-on to switch-on, --track needs it; add --turn-on UG"
+            f"export: run {run.id} states no change of the bias from switch-on to switch-on, the "
+            "filter of the bias needs it; add --set turn_on=UG"
         )
     models: dict[str, BiasModel] = {}
     for serial in serials:

@@ -21,7 +21,7 @@ from schemas.foreign import shown
 
 PAGE_BYTES = 32
 HIGHEST_SERIAL = 2**24 - 1
-_EXAMPLE = "--teds manufacturer=17,model=4507,version=B5,mass_g=4.6,initials=QA"
+_EXAMPLE = "--set teds=manufacturer=17,model=4507,version=B5,mass_g=4.6,initials=QA"
 _EPOCH = date(1998, 1, 1)
 _TEMPLATE = 25
 _END = 3  # selector: no further template
@@ -127,9 +127,11 @@ def data_sheet(text: str, measured: str) -> DataSheet:
     known = [one.name for one in fields(DataSheet) if one.name != "measured"]
     for key in given:
         if key not in known:
-            raise WrongUse(f"--teds: no key is called '{shown(key)}'; {did_you_mean(key, known)}")
+            raise WrongUse(f"--set teds: no key is called '{shown(key)}'; {did_you_mean(key, known)}")
     if missing := [key for key in known if not given.get(key) and key != "period_days"]:
-        raise WrongUse(f"--teds: found no {', '.join(missing)}, a run does not contain it; add it, as in {_EXAMPLE}")
+        raise WrongUse(
+            f"--set teds: found no {', '.join(missing)}, a run does not contain it; add it, as in {_EXAMPLE}"
+        )
     kinds = {"manufacturer": int, "model": int, "mass_g": float, "period_days": int}
     values: dict[str, Any] = dict(given)
     for key in values.keys() & kinds:
@@ -137,7 +139,7 @@ def data_sheet(text: str, measured: str) -> DataSheet:
             values[key] = kinds[key](given[key])
         except ValueError:
             raise WrongUse(
-                f"--teds: {key}: found '{shown(given[key])}', a number is needed; correct it, as in {_EXAMPLE}"
+                f"--set teds: {key}: found '{shown(given[key])}', a number is needed; correct it, as in {_EXAMPLE}"
             ) from None
     return DataSheet(**values, measured=measured)
 

@@ -70,7 +70,7 @@ def simulated(
     """
     if unit_of_force not in UNITS:
         raise WrongUse(
-            f"simulate: unit of force '{unit_of_force}', one of {', '.join(UNITS)} is needed; correct --units"
+            f"simulate: unit of force '{unit_of_force}', one of {', '.join(UNITS)} is needed; correct --unit-of force=…"
         )
     recording, told = with_temperature(recording)
     force = recording.output * UNITS[unit_of_force]

@@ -1,7 +1,7 @@
 """The flow ``investigate``: run, diagnose, propose, measure only that, diagnose again; a task per stage of every run.
 
 Where a person must approve extra station time the flow run pauses with the question and waits for the answer, as for the
-operator: from the server's page, from ``tumbleline operator``, or from any client of the server.
+operator: from the server's page, from ``tumbleline station operator``, or from any client of the server.
 """
 
 from dataclasses import dataclass, replace

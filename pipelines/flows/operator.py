@@ -1,6 +1,6 @@
 """The operator behind the orchestrator: the flow run pauses with the question and continues with the answer.
 
-The answer comes from the server's page, from ``tumbleline operator`` at any terminal, or from any client of the server.
+The answer comes from the server's page, from ``tumbleline station operator`` at any terminal, or from any client of the server.
 """
 
 import json

@@ -202,12 +202,12 @@ def clock(numbers: Array, name: str, claimed: str, stated: str, where: str) -> R
     possible, found = recognition.possible or tuple(TIME_UNITS), f"steps of {step:.6g}"
     if not claimed and not recognition.unit and step > 0.0:
         raise WrongUse(
-            f"{where}: {column}: {found}: {', '.join(rates_in(step, possible))}; the unit is needed; add --units time="
+            f"{where}: {column}: {found}: {', '.join(rates_in(step, possible))}; the unit is needed; add --unit-of time="
             f"{'|'.join(possible)}"
         )
     if claimed and recognition.unit and claimed != recognition.unit and not recognition.reason.startswith("steps"):
         raise WrongUse(
-            f"{where}: {column}: {recognition.reason}, but --units time={claimed} was given; leave it out, or correct it"
+            f"{where}: {column}: {recognition.reason}, but --unit-of time={claimed} was given; leave it out, or correct it"
         )
     unit = claimed or recognition.unit or "s"
     seconds = (numbers - numbers[0]) * TIME_UNITS[unit]  # the difference keeps the digits of Unix time in ns

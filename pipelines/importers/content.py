@@ -88,5 +88,5 @@ def chosen(groups: Sequence[tuple[str, int]], group: str, where: str, missing: s
     more = "" if len(groups) <= _MOST_LISTED else f" and {len(groups) - _MOST_LISTED} more"
     raise WrongUse(
         f"{where}: {len(names)} groups of channels with clocks of their own, one is needed: {listed}{more}; "
-        "choose one with --group NAME"
+        "choose one with --set group=NAME"
     )

@@ -191,12 +191,12 @@ def _dynamic_guess(path: Path, content: Content, guessed: Guesses, rate_hz: floa
     if guessed.time_unit.meaning and not content.units.get(guessed.column("time"), ""):
         stated.append(f"time={guessed.time_unit.meaning}")
     words = ["tumbleline", "import", str(path), "--procedure", procedure, "--map", mapped]
-    words += ["--units", ",".join(stated)] if stated else []
-    open_ = [f"the unit of column '{name}': --units {what}=…" for what, name in missing]
+    words += ["--unit-of", ",".join(stated)] if stated else []
+    open_ = [f"the unit of column '{name}': --unit-of {what}=…" for what, name in missing]
     if procedure == "shock" and units[output] in {"V", "mV"}:
-        words += ["--part", "SHOCK.toml"]
+        words += ["--set", "SHOCK.toml"]
         open_.append(f"the scale of column '{output}': a file SHOCK.toml with the line scale = … (output per g)")
-    words += ["--unit", serial_of(path)]
+    words += ["--units", serial_of(path)]
     return _DynamicGuess(shlex.join(words), reference, output, open_)
 
 

@@ -55,6 +55,7 @@ def gravity_of(mapping: Mapping) -> float:
     """Local gravity at the place of the measurement, g."""
     if mapping.norm_g is None:
         raise WrongUse(
-            "import: gravity at the place of measurement is needed for this fit and has no default; give --local-g M/S2"
+            "import: gravity at the place of measurement is needed for this fit and has no default; give "
+            "--set local_gravity_m_s2=M/S2"
         )
     return mapping.norm_g

@@ -163,7 +163,7 @@ class Mapping(BaseModel):
         mapped = [name for name in NEEDED if name in self.columns]
         missing = [name for name in NEEDED if name in self.axes and name not in mapped]
         if missing and len(self.axes) == len(NEEDED):
-            fewer = f", or --axes {','.join(mapped)} for a device with fewer axes" if mapped else ""
+            fewer = f", or --set axes={','.join(mapped)} for a device with fewer axes" if mapped else ""
             raise ValueError(f"{', '.join(missing)} not mapped; x, y and z are needed{fewer}")
         if set(mapped) != set(self.axes):
             raise ValueError(
@@ -193,7 +193,7 @@ class Mapping(BaseModel):
         if missing or more:
             words = f"'{shown(missing[0])}' has none" if missing else f"'{shown(more[0])}' is no pose"
             raise ValueError(
-                f"headings: {words}, a heading for every pose is needed; give --headings for the labels of --poses"
+                f"headings: {words}, a heading for every pose is needed; give headings for the labels of poses"
             )
         return self
 

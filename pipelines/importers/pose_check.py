@@ -18,8 +18,8 @@ _MISFIT = 0.1
 """Largest unexplained part of gravity for a response of exchanged axes."""
 CHECK_AXIS = "CHECK AXIS"
 ONE_POSE = (
-    "one pose whose force is not known: its noise by 'tumbleline allan'; for the bias and what drives it give the face that is "
-    "up (--face +x … -z) and --blocks S, with the output in g; scale and misalignment need more poses"
+    "one pose whose force is not known: its noise by 'tumbleline noise allan'; for the bias and what drives it give the face "
+    "that is up (--set face=+x … -z) and --set block_s=S, with the output in g; scale and misalignment need more poses"
 )
 OUT, FORCE = list(OUTPUT_COLUMNS), list(FORCE_COLUMNS)
 
@@ -81,6 +81,6 @@ def refuse_or_remark(dwells: pd.DataFrame, mapping: Mapping, where: str) -> tupl
     inverse = {j: (mapping.axes[i], "+" if same == (mapping.signs[i] == "+") else "-") for i, j, same in reads}
     order, turned = (",".join(inverse[k][part] for k in range(3)) for part in (0, 1))
     raise DataRejected(
-        f"{where}: by the stated faces, {found}; each output must read its own axis; correct --poses, or add --axes {order} "
-        f"--signs={turned}"
+        f"{where}: by the stated faces, {found}; each output must read its own axis; correct poses, or add --set axes={order} "
+        f"--set signs={turned}"
     )

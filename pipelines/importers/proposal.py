@@ -30,22 +30,11 @@ _BLOCKS, _SHORTEST_BLOCK_S = 60, 1.0
 _UP = 0.9
 """Part of the size along an axis from which the face of a still record is known: 25° of a hand."""
 _WARMS_C = 5.0
-_OPTIONS = {
-    "rows": "--rows",
-    "rate_hz": "--rate",
-    "window_s": "--window",
-    "shortest_s": "--shortest",
-    "threshold": "--threshold",
-    "join": "--join",
-    "group": "--group",
-    "gaps": "--gaps",
-    "faulty": "--faulty",
-    "positions": "--positions",
-    "face": "--face",
-    "block_s": "--blocks",
-    "local_gravity_m_s2": "--local-g",
-}
-"""Keys of a mapping with an option of their own, in the order in which they are printed."""
+_KEYS = (
+    "rows", "window_s", "shortest_s", "threshold", "join", "group", "gaps", "faulty", "positions", "face", "block_s",
+    "local_gravity_m_s2",
+)  # fmt: skip
+"""Keys of a mapping with a value, in the order in which they are printed."""
 
 
 @dataclass(frozen=True)
@@ -62,17 +51,22 @@ class Proposal:
         """The import as a line for a shell; a value that nothing states is in capitals."""
         words = ["tumbleline", "import", *(str(path) for path in paths)]
         words += ["--map", ",".join(f"{meaning}={name}" for meaning, name in self.keys["columns"].items())]
-        words += ["--units", ",".join(f"{what}={unit}" for what, unit in self.keys["units"].items())]
-        words += [] if "unit" in self.keys["columns"] else ["--unit", self.keys["unit"]]
-        words += ["--axes", ",".join(self.keys["axes"])] if "axes" in self.keys else []
+        words += ["--unit-of", ",".join(f"{what}={unit}" for what, unit in self.keys["units"].items())]
+        words += [] if "unit" in self.keys["columns"] else ["--units", self.keys["unit"]]
+        words += ["--rate", _text(self.keys["rate_hz"])] if "rate_hz" in self.keys else []
         poses = self.keys.get("poses", {})
-        words += ["--poses", ",".join(f"{label}={face}" for label, face in poses.items())] if poses else []
-        for key, option in _OPTIONS.items():
-            if key in self.keys:
-                value = self.keys[key]
-                words += [option, f"{value:g}" if isinstance(value, float) else str(value)]
+        stated = {
+            "axes": ",".join(self.keys.get("axes", ())),
+            "poses": ",".join(f"{label}={face}" for label, face in poses.items()),
+            **{key: _text(self.keys[key]) for key in _KEYS if key in self.keys},
+        }
+        words += [word for key, value in stated.items() if value for word in ("--set", f"{key}={value}")]
         words += ["--fit", self.fit] if self.fit else []
         return shlex.join(words)
+
+
+def _text(value: Any) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def columns_and_units(content: Content, guessed: guesses.Guesses, path: Path) -> dict[str, Any]:
@@ -137,7 +131,10 @@ def for_fit(
         )
     if has_reference(keys):  # the import is fitted as a run is
         return Proposal(keys, "", tuple(assumed))
-    gravity = f"local gravity not stated: {STANDARD_GRAVITY_M_S2:.5f} m/s² taken; scale factors are relative to it (--local-g)"
+    gravity = (
+        f"local gravity not stated: {STANDARD_GRAVITY_M_S2:.5f} m/s² taken; scale factors are relative to it "
+        "(--set local_gravity_m_s2=M/S2)"
+    )
     own = {"local_gravity_m_s2": STANDARD_GRAVITY_M_S2}
     sphere = guessed.triad.sphere
     if sphere is not None and sphere.still and duration_s is not None:

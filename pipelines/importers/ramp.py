@@ -16,7 +16,7 @@ def ramp(data: Imported, mapping: Mapping) -> FitAnswer:
     """A cubic in temperature of a record in one pose; adequate only if the residual is sample noise."""
     if data.samples is None or "unit_C" not in data.samples.columns:
         raise WrongUse(
-            "import: --fit temperature works on samples with a temperature; map temperature=…, without --rows dwells"
+            "import: --fit temperature works on samples with a temperature; map temperature=…, without --set rows=dwells"
         )
     output = data.samples[list(AXES)].to_numpy(dtype=np.float64)
     fit = fit_temperature_curve(output, data.samples["unit_C"].to_numpy(dtype=np.float64))
@@ -43,7 +43,7 @@ def ramp(data: Imported, mapping: Mapping) -> FitAnswer:
         f"noise of a sample ({fit.noise[k]:.3g}, from first differences)"
         for k in range(3)
     )
-    again = "import it again with --face FACE (the face that is up) --local-g M/S2 --blocks 60, then "
+    again = "import it again with --set face=FACE (the face that is up) --set local_gravity_m_s2=M/S2 --set block_s=60, then "
     advice = [
         "something other than temperature itself drives this output, such as its rate or a lag",
         f"to look further: {'' if mapping.face else again}'tumbleline diagnose RUN'",

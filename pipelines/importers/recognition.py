@@ -141,7 +141,7 @@ def of_content(
     )  # fmt: skip
 
 
-_OUTPUT_UNIT = "the unit of the output: --units output=g|mg|m/s^2|V|mV|LSB"
+_OUTPUT_UNIT = "the unit of the output: --unit-of output=g|mg|m/s^2|V|mV|LSB"
 
 
 def _open(guessed: Guesses, output: Array | None) -> list[str]:
@@ -155,8 +155,9 @@ def _open(guessed: Guesses, output: Array | None) -> list[str]:
         if guessed.few:
             found = " and ".join(f"{axis}: {column}" for axis, column in guessed.few.items())
             open_.append(
-                f"{found} taken for a device of fewer than three axes, which an import takes by --axes and 'tumbleline fit RUN' "
-                "fits; a record at rest has its noise by 'tumbleline allan' and 'tumbleline psd'"
+                f"{found} taken for a device of fewer than three axes, which an import takes by --set axes=… and "
+                "'tumbleline fit RUN' "
+                "fits; a record at rest has its noise by 'tumbleline noise allan' and 'tumbleline noise psd'"
             )
             open_.append(_OUTPUT_UNIT)
             return open_
@@ -191,7 +192,7 @@ def _time(content: Content, guessed: Guesses) -> tuple[Array | None, list[str]]:
         unit = guessed.time_unit.meaning
         if not unit:
             open_.append(
-                f"the unit of time: {guessed.time_unit.reason}; --units time=s|ms|us|ns, or time=samples and --rate HZ"
+                f"the unit of time: {guessed.time_unit.reason}; --unit-of time=s|ms|us|ns, or time=samples and --rate HZ"
             )
         first = numbers[np.isfinite(numbers)][0] if np.any(np.isfinite(numbers)) else 0.0
         time = (numbers - first) * (1.0 / guesses.FINE_HZ if unit == "samples" else TIME_UNITS.get(unit, 1.0))

@@ -172,7 +172,7 @@ def _serials(columns: dict[str, pd.Series], mapping: Mapping, where: str) -> lis
         refuse_unusable_serials(dict.fromkeys(serials), place, "correct it in the file")
         return serials
     if not mapping.unit:
-        raise WrongUse(f"{where}: no unit is mapped, a serial number is needed; give --unit SN")
+        raise WrongUse(f"{where}: no unit is mapped, a serial number is needed; give --units SN")
     refuse_unusable_serials([mapping.unit], where)
     return [mapping.unit] * len(next(iter(columns.values())))
 

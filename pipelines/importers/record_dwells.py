@@ -94,7 +94,9 @@ def finished(frame: pd.DataFrame, mapping: Mapping) -> pd.DataFrame:
     if not (mapping.poses or mapping.face):
         return _turned(frame, mapping)
     if mapping.norm_g is None:
-        raise WrongUse("import: poses are stated, local gravity is needed with them; give --local-g M/S2")
+        raise WrongUse(
+            "import: poses are stated, local gravity is needed with them; give --set local_gravity_m_s2=M/S2"
+        )
     up = [mapping.poses.get(label, mapping.face) for label in frame["pose"]]
     frame[[*FORCE_COLUMNS]] = np.array([FACES[face] for face in up]) * mapping.norm_g
     if mapping.headings:
@@ -130,7 +132,7 @@ def _held_out_count(text: str, dwells: int) -> int:
         number = float(text.removesuffix("%"))
     if not (0.0 < number < (100.0 if share else 1e6)) or (not share and number != int(number)):
         raise WrongUse(
-            f"--verify: found '{shown(text)}', a number of dwells or a share such as 20% is needed; correct it"
+            f"--set verify: found '{shown(text)}', a number of dwells or a share such as 20% is needed; correct it"
         )
     return max(1, round(0.01 * number * dwells)) if share else int(number)
 
@@ -156,7 +158,7 @@ def with_held_out(dwells: pd.DataFrame, text: str, where: str) -> tuple[pd.DataF
         count = _held_out_count(text, len(places))
         if len(places) - count < FEWEST_FITTED:
             raise DataRejected(
-                f"{where}: {len(places)} dwells of unit {unit}, --verify {shown(text)} leaves {max(len(places) - count, 0)} "
+                f"{where}: {len(places)} dwells of unit {unit}, verify={shown(text)} leaves {max(len(places) - count, 0)} "
                 f"of them, {FEWEST_FITTED} are needed for the fit at least; hold out fewer, or measure more positions"
             )
         chosen = places[_drawn(len(places), count)]

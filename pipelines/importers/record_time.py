@@ -62,7 +62,7 @@ def seconds(
         found = "1 sample" if len(time) < 2 else f"{len(time)} samples, all at {columns['time'].iloc[0]:g} s"
         raise DataRejected(
             f"{where}: {found}, a record of two at least that takes some time is needed; map another column as time, give "
-            "--rate HZ without one, or say --rows dwells"
+            "--rate HZ without one, or say --set rows=dwells"
         )
     return clock
 
@@ -163,7 +163,7 @@ def gaps_of(
     found = f"{gaps} in time longer than {GAP:g} samples, the first before row {first + 1}, the longest {longest:.4g} s"
     if mapping.gaps == "refuse":
         raise DataRejected(
-            f"{where}: {found}; samples without gaps are needed; record again, or add --gaps split to use what lies between"
+            f"{where}: {found}; samples without gaps are needed; record again, or add --set gaps=split to use what lies between"
         )
     return sorted({*breaks, *wide.tolist()}), (f"{found}; dwells end there",)
 

@@ -59,7 +59,7 @@ def content_of(rows: Sequence[tuple[int, dict[str, float]]], kind: str, name: st
     """
     if not rows or not any(own for _, own in rows):
         raise DataRejected(
-            f"{name}: topic {topic} ({kind}) has no numbers, a topic with numbers is needed; name another --group"
+            f"{name}: topic {topic} ({kind}) has no numbers, a topic with numbers is needed; name another with --set group=NAME"
         )
     stamps = [int(own.pop(STAMP, 0)) for _, own in rows]
     stamped = min(stamps) > 0

@@ -118,7 +118,7 @@ def sound_dwells(
     if mapping.faulty == "refuse":
         raise DataRejected(
             f"{where}: {found} ({rows.size} such dwells); samples of the sensor are needed; measure them again, or add "
-            "--faulty leave-out, or --faulty keep if this is what the sensor does"
+            "--set faulty=leave-out, or --set faulty=keep if this is what the sensor does"
         )
     if mapping.faulty == "leave-out":
         sound[rows] = False
@@ -141,12 +141,12 @@ def refuse_or_remark(faults: SampleFaults, output: Array, time: Array, mapping: 
         axis = AXES[whole[0].axis]
         raise DataRejected(
             f"{where}: axis {axis} never changes in {len(output)} samples while another axis does; map another column as "
-            f"{axis}, repair the sensor's channel, or import it all the same with --faulty keep"
+            f"{axis}, repair the sensor's channel, or import it all the same with --set faulty=keep"
         )
     if mapping.faulty == "refuse":
         raise DataRejected(
-            f"{where}: {words}; samples of the sensor are needed; measure again, or add --faulty leave-out for what is sound, "
-            "or --faulty keep if this is what the sensor does"
+            f"{where}: {words}; samples of the sensor are needed; measure again, or add --set faulty=leave-out for what is "
+            "sound, or --set faulty=keep if this is what the sensor does"
         )
     done = "left out" if mapping.faulty == "leave-out" else "kept"
     return (f"{int(faults.bad.sum())} samples with faults {done}: {words}",)

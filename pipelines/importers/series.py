@@ -61,13 +61,15 @@ def series_of_file(
         A column is not there or not of numbers, a value is not finite, or the samples are not evenly spaced.
     """
     if bool(time) == (rate_hz is not None):
-        raise WrongUse(f"{path.name}: one of --time COLUMN and --rate HZ is needed; give one of the two")
+        raise WrongUse(f"{path.name}: one of --map time=COLUMN and --rate HZ is needed; give one of the two")
     if time_unit not in TIME_UNITS:
-        raise WrongUse(f"--time-unit: found '{shown(time_unit)}', one of {', '.join(TIME_UNITS)} is needed; correct it")
+        raise WrongUse(
+            f"--unit-of: time: found '{shown(time_unit)}', one of {', '.join(TIME_UNITS)} is needed; correct it"
+        )
     table, _ = files.read(path)
     chosen = list(columns) or [n for n in table.columns if n != time and pd.api.types.is_numeric_dtype(table[n])]
     if not chosen:
-        raise DataRejected(f"{path.name}: no column of numbers, one at least is needed; name one with --columns")
+        raise DataRejected(f"{path.name}: no column of numbers, one at least is needed; name one with --map")
     values = np.stack([finite_column(table, name, path.name) for name in chosen])
     _refuse_clock(chosen, values, path.name, named=bool(columns), timed=bool(time))
     rate = rate_hz or _rate(TIME_UNITS[time_unit] * finite_column(table, time, path.name), path.name)
@@ -113,10 +115,10 @@ def _refuse_clock(names: Sequence[str], values: Array, where: str, *, named: boo
         if steps.size < FEWEST_STEPS or not bool(np.all(steps > 0.0)):
             continue
         if not named or float(np.ptp(steps)) < EVEN * float(steps.mean()):
-            instead = "" if timed else f"give --time {shown(name)} instead of --rate, or "
+            instead = "" if timed else f"give --map time={shown(name)} instead of --rate, or "
             raise DataRejected(
                 f"{where}: column '{shown(name)}' rises in every row (from {column[0]:g} to {column[-1]:g}) as a time or a "
-                f"counter does, the output of a sensor at rest is needed; {instead}name the channels with --columns"
+                f"counter does, the output of a sensor at rest is needed; {instead}name the channels with --map"
             )
 
 
@@ -133,6 +135,6 @@ def _rate(time: Array, where: str) -> float:
         raise DataRejected(
             f"{where}: after row {off[0] + 1} the time steps by {time[off[0] + 1] - time[off[0]]:.6g} s, {step:.6g} s is the "
             f"step elsewhere ({off.size} such places), evenly spaced samples are needed; cut the record there, or give --rate "
-            "without --time if only the time stamps are late"
+            "with --rate alone if only the time stamps are late"
         )
     return 1.0 / float(typical)

@@ -56,7 +56,7 @@ def _after(contents: Sequence[Content], names: list[str], time: str) -> tuple[Co
         if list(content.table.columns) != columns:
             raise DataRejected(
                 f"{name}: its columns ({shown(', '.join(content.table.columns))}) are not those of {names[0]} "
-                f"({shown(', '.join(columns))}), the same are needed; join files side by side with --join columns"
+                f"({shown(', '.join(columns))}), the same are needed; join files side by side with --set join=columns"
             )
         breaks.append(breaks[-1] + len(tables[-1]))
         label = column_name(columns, time)

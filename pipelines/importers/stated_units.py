@@ -53,15 +53,16 @@ def refuse_contradiction(mapping: Mapping, content: Content, where: str) -> None
     stated = _of_axes(mapping.columns, content) - {"", mapping.units.output}
     if stated:
         raise WrongUse(
-            f"{where}: the file states {' and '.join(sorted(stated))} for its output, but --units output={mapping.units.output} "
-            "was given; leave it out, or correct it"
+            f"{where}: the file states {' and '.join(sorted(stated))} for its output, but --unit-of "
+            f"output={mapping.units.output} was given; leave it out, or correct it"
         )
     _refuse_other_spreads(mapping, content, where)
     heat = column_name(list(content.table.columns), mapping.columns.get("temperature", ""))
     unit = TEMPERATURE.get(content.units.get(heat, "").strip().lower(), "")
     if unit and unit != mapping.units.temperature:
         raise WrongUse(
-            f"{where}: column '{shown(heat)}' states {unit}, {mapping.units.temperature} is used; add --units temperature={unit}"
+            f"{where}: column '{shown(heat)}' states {unit}, {mapping.units.temperature} is used; add --unit-of "
+            f"temperature={unit}"
         )
 
 

@@ -249,7 +249,7 @@ def _of_one_position(intervals: Stretches, output: Array, time: Array, edges: Se
     if len(stops.found) and not stops.several:
         offer = f"{options_of(stops)} finds {len(stops.found)} stops, one position in each"
     elif (total := change_of_level.several_levels(output)) > 1:
-        offer = f"--positions {total} divides the record at the changes"
+        offer = f"--set positions={total} divides the record at the changes"
     else:
         offer = f"{options_of(stops)} finds shorter dwells"
     raise DataRejected(
@@ -260,8 +260,8 @@ def _of_one_position(intervals: Stretches, output: Array, time: Array, edges: Se
 
 def options_of(stops: Stops) -> str:
     """The options of an import that find these stops."""
-    limit = "" if stops.threshold is None else f" --threshold {stops.threshold:g}"
-    return f"--window {stops.window_s:g} --shortest {stops.window_s:g}{limit}"
+    limit = "" if stops.threshold is None else f" --set threshold={stops.threshold:g}"
+    return f"--set window_s={stops.window_s:g} --set shortest_s={stops.window_s:g}{limit}"
 
 
 def _named(intervals: Stretches, mapping: Mapping, where: str) -> Stretches:
@@ -271,6 +271,6 @@ def _named(intervals: Stretches, mapping: Mapping, where: str) -> Stretches:
     missing = [label for label in mapping.poses if label not in intervals.labels]
     if missing:
         raise DataRejected(
-            f"{where}: no dwell is labelled '{missing[0]}' (in --poses); {did_you_mean(missing[0], intervals.labels)}"
+            f"{where}: no dwell is labelled '{missing[0]}' (in poses); {did_you_mean(missing[0], intervals.labels)}"
         )
     return intervals.only([k for k, label in enumerate(intervals.labels) if label in mapping.poses])

@@ -106,9 +106,9 @@ def refuse_other_unit(output: Array, claimed: str, where: str, *, means: bool = 
     if claimed in GRAVITY:
         if LIKELY[0] < size / GRAVITY[claimed] < LIKELY[1]:
             return ()
-        advice = f"the unit looks like {other}, give --units output={other}"
+        advice = f"the unit looks like {other}, give --unit-of output={other}"
         if not other:
-            advice = "numbers of a converter are LSB, of a voltmeter V or mV: --units output=LSB|V|mV"
+            advice = "numbers of a converter are LSB, of a voltmeter V or mV: --unit-of output=LSB|V|mV"
         raise DataRejected(
             f"{where}: the norm of the output is {size:.5g}, about {GRAVITY[claimed]:.5g} is needed if its unit is {claimed}; "
             f"{advice}"
@@ -121,7 +121,7 @@ def refuse_other_unit(output: Array, claimed: str, where: str, *, means: bool = 
         other = f"the unit looks like {other}" if other else "V and mV differ by a thousand"
         raise DataRejected(
             f"{where}: the norm of the output is {size:.5g} {claimed}, {VOLTS_PER_G[0]:g} to {VOLTS_PER_G[1]:g} V is what analog "
-            f"accelerometers give at rest; {other}; correct --units output=…"
+            f"accelerometers give at rest; {other}; correct --unit-of output=…"
         )
     if close:
         return (f"CHECK THE UNIT: the norm of the output is {size:.5g}, as gravity in {close}; {claimed} was given",)
@@ -141,7 +141,7 @@ def _counts(output: Array, size: float, close: str, where: str, *, may_be_parts:
     if close and not whole and not may_be_parts:
         raise DataRejected(
             f"{where}: the norm of the output is {size:.5g} and its values are not whole numbers, counts are needed if its "
-            f"unit is LSB; the unit looks like {close}, give --units output={close}"
+            f"unit is LSB; the unit looks like {close}, give --unit-of output={close}"
         )
     if close:
         return (f"CHECK THE UNIT: the norm of the output is {size:.5g}, as gravity in {close}; LSB was given",)

@@ -79,8 +79,8 @@ def finite(
         row = int(bad[0])
         raise DataRejected(
             f"{where}: {content.row(row)}, column '{shown(str(values.name))}': found {shown(str(values.iloc[row]))}, "
-            f"{needed} is needed ({bad.size} such {'row' if bad.size == 1 else 'rows'}); repair the file, or add --gaps split to "
-            "use what lies between"
+            f"{needed} is needed ({bad.size} such {'row' if bad.size == 1 else 'rows'}); repair the file, or add "
+            "--set gaps=split to use what lies between"
         )
     refuse_outside(numbers, "", where, label=str(values.name))
     return numbers

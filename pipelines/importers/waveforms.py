@@ -109,7 +109,7 @@ def import_waveforms(
     values = outcome.figures.get(unit, [])
     texts = [(f.subject, f.text) for f in outcome.findings]
     if not np.isfinite(full_scale):
-        texts.append(("not judged", "clipping: full_scale is not given; add it to the file of --part"))
+        texts.append(("not judged", "clipping: full_scale is not given; add it to the file of --set"))
     content |= own.model_dump(include={"duration_ms", "before_ms"} - set(content))
     about = {
         "name": f"{one.title} of {unit}, recorded elsewhere",
@@ -160,7 +160,7 @@ def _part(procedure: str, path: Path | None) -> tuple[FromWaveforms, Any, dict[s
     try:
         own = part.model_validate(content)
     except ValidationError as problem:
-        raise explain(problem, str(path or "--part"), part) from None
+        raise explain(problem, str(path or "--set FILE.toml"), part) from None
     return can[procedure], own, content, float(full_scale)
 
 
@@ -175,7 +175,7 @@ def _scaled(part: Any, procedure: FromWaveforms, out_unit: str, path: Path | Non
         return part.model_copy(update={"scale": 1.0 / ACCELERATION[out_unit]})
     raise WrongUse(
         f"import: procedure {procedure.name} has no scale, output per g is needed for figures in g; add scale = … to "
-        f"{path or 'a file and give it with --part'}"
+        f"{path or 'a file and give it with --set FILE.toml'}"
     )
 
 
@@ -212,7 +212,7 @@ def _recording(path: Path, layout: RecordingLayout, part: Any, procedure: FromWa
     if reference_unit not in known:
         raise DataRejected(
             f"{path.name}: reference in '{shown(reference_unit)}', one of {', '.join(known)} is needed; state it with "
-            "--units reference=…"
+            "--unit-of reference=…"
         )
     drive_time = _clock(other, layout, path.name)
     drive = np.zeros((len(drive_time), 3))
@@ -231,11 +231,12 @@ def _unit(content: Content, layout: RecordingLayout, meaning: str, column: str, 
     given = layout.units.get(meaning, "")
     if not (given or stated):
         raise DataRejected(
-            f"{where}: column '{shown(column)}' has no unit, one is needed; add --units {meaning}=… from the sensor's data sheet"
+            f"{where}: column '{shown(column)}' has no unit, one is needed; add --unit-of {meaning}=… from the "
+            "sensor's data sheet"
         )
     if given and stated and given != stated:
         raise WrongUse(
-            f"{where}: column '{shown(column)}' states {shown(stated)}, --units has {shown(given)}; correct one"
+            f"{where}: column '{shown(column)}' states {shown(stated)}, --unit-of has {shown(given)}; correct one"
         )
     return given or stated
 
@@ -253,7 +254,8 @@ def _clock(content: Content, layout: RecordingLayout, where: str) -> np.ndarray:
         unit = layout.units.get("time") or content.units.get(column, "") or unit_in(column)
         if unit not in TIMES:
             raise DataRejected(
-                f"{where}: column '{shown(column)}' has no unit of time, one of {', '.join(TIMES)} is needed; add --units time=…"
+                f"{where}: column '{shown(column)}' has no unit of time, one of {', '.join(TIMES)} is needed; add "
+                "--unit-of time=…"
             )
         time = TIMES[unit] * finite_column(content.table, column, where)
         steps = np.diff(time)

@@ -76,5 +76,5 @@ def _too_little(seen: Recognition, proposal: Proposal) -> str:
     else:
         stops = len(seen.output) if seen.guessed.dwells and seen.output is not None else proposal.stops
         found, needed = f"{stops} stops in all", f"{FEWEST_OF_NORM} positions at rest for a fit to the norm of gravity"
-    remedy = "record each position for some seconds, or see its noise with 'tumbleline allan'"
+    remedy = "record each position for some seconds, or see its noise with 'tumbleline noise allan'"
     return f"{found}, {needed} are needed; {remedy}"

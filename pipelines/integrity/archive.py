@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
 
 
-NEEDED = "a signature by the own key, or by one given with --key, is needed"
+NEEDED = "a signature by the own key, or by one given with --trust, is needed"
 MADE_AGAIN = "remove the file, it is made again automatically"
 FROM_A_COPY = "restore it from a copy"
 READERS = min(8, 2 * (os.cpu_count() or 1))
@@ -223,7 +223,7 @@ def _trust(total: VerifiedPart) -> str:
         return "UNSIGNED: nothing shows who wrote this archive; make a key with 'tumbleline archive key'"
     parts = {
         GOOD: f"{signatures[GOOD]} of {count} manifests signed by {', '.join(sorted(total.keys))}",
-        UNKNOWN: f"{signatures[UNKNOWN]} signed by a key that is not known here (give it with --key)",
+        UNKNOWN: f"{signatures[UNKNOWN]} signed by a key that is not known here (give it with --trust)",
         UNSIGNED: f"{signatures[UNSIGNED]} unsigned",
     }
     return ", ".join(text for state, text in parts.items() if signatures[state])

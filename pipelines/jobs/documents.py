@@ -37,7 +37,7 @@ class ListedRelease(ReleaseRecord):
 
 
 class ReleaseListDocument(TypedDict):
-    """``release --list --json``: the releases of the archive, the oldest first."""
+    """``release --json``: the releases of the archive, the oldest first."""
 
     archive: str
     releases: list[ListedRelease]

@@ -141,7 +141,7 @@ def _refuse_without(evidence: dict[str, Any] | None, change: ModelChange, device
     if evidence is None:
         raise WrongUse(
             f"release: nothing in the archive shows the effect of {name} on lots{where}, a what-if is needed; run "
-            "'tumbleline whatif', or give --force with a reason that says why not"
+            "'tumbleline release whatif', or give --force with a reason that says why not"
         )
     if evidence["verdict"] != "better":
         raise WrongUse(

@@ -15,5 +15,5 @@ class LineageDocument(TypedDict):
     focus: Annotated[list[str], "ids of what was asked for"]
     things: list[Node]
     steps: list[ProvActivity]
-    prov: Annotated[str | None, "the file of `--prov`; null: none"]
-    crate: Annotated[str | None, "the folder of `--crate`; null: none"]
+    prov: Annotated[str | None, "the file of `--output`; null: none"]
+    crate: Annotated[str | None, "the folder of `--output`; null: none"]

@@ -6,7 +6,7 @@ from typing_extensions import TypedDict
 
 
 class HealthDocument(TypedDict):
-    """``monitor --json``: whether the line is healthy; also the answer of ``/healthz``."""
+    """``station monitor --json``: whether the line is healthy; also the answer of ``/healthz``."""
 
     ok: Annotated[bool, "no problem"]
     when: Annotated[str, "ISO date and time, UTC"]

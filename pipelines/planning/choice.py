@@ -99,17 +99,17 @@ def need_of(range_text: str, temperature: str, error: str, bandwidth_hz: float) 
 
     Raises WrongUse: a text is of another form, or a value is not positive.
     """
-    size = _quantity(range_text, "--range", {"g": 1.0, "mg": 1e-3})
-    allowed = _quantity(error, "--error", {"ug": 1.0, "µg": 1.0, "mg": MILLI, "g": MICRO})
+    size = _quantity(range_text, "range", {"g": 1.0, "mg": 1e-3})
+    allowed = _quantity(error, "error", {"ug": 1.0, "µg": 1.0, "mg": MILLI, "g": MICRO})
     low, dots, high = temperature.partition("..")
     try:
         ends = (float(low), float(high if dots else low))
     except ValueError:
         ends = (1.0, 0.0)
     if not -273.0 < ends[0] <= ends[1] < 1000.0:
-        raise WrongUse(f"--temperature: found '{temperature}', LOW..HIGH in °C is needed, such as -40..85; correct it")
+        raise WrongUse(f"temperature: found '{temperature}', LOW..HIGH in °C is needed, such as -40..85; correct it")
     if not (math.isfinite(bandwidth_hz) and bandwidth_hz > 0.0):
-        raise WrongUse(f"--bandwidth: found {bandwidth_hz:g}, a frequency above 0 Hz is needed; correct it")
+        raise WrongUse(f"bandwidth: found {bandwidth_hz:g}, a frequency above 0 Hz is needed; correct it")
     return Need(size, *ends, allowed, bandwidth_hz)
 
 

@@ -72,12 +72,12 @@ def unit_effects(model: Sequence[str]) -> tuple[str, ...]:
 def _refuse(rivals: Sequence[str], effects: Sequence[str]) -> None:
     if len(rivals) < 2:
         raise WrongUse(
-            f"plan: --part names {len(rivals)} effect, two or more are needed; write third_order,odd_quadratic"
+            f"plan: --criterion T:names {len(rivals)} effect, two or more are needed; write third_order,odd_quadratic"
         )
     station = [effect.id for effect in design.split(effects)[1]]
     if station:
         raise WrongUse(
-            f"plan: --part {station[0]}: found an effect of the station, effects of the device are needed; "
+            f"plan: --criterion T:{station[0]}: found an effect of the station, effects of the device are needed; "
             "'tumbleline investigate' discriminates between effects of the station"
         )
 

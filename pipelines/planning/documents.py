@@ -150,7 +150,7 @@ class PlanDocument(TypedDict):
     coefficients: NotRequired[list[PlannedCoefficient]]
     bias: NotRequired[Annotated[PlannedBias | None, "null: the model has no bias"]]
     uncertainty: NotRequired[Annotated[ReachableUncertainty | None, "null: noise only, no `[uncertainty]` is stated"]]
-    page: NotRequired[Annotated[str, "path of the page that `--page` wrote"]]
+    page: NotRequired[Annotated[str, "path of the page that `--output` wrote"]]
 
 
 class ChoiceRow(TypedDict):
@@ -167,7 +167,7 @@ class ChoiceRow(TypedDict):
 
 
 class ChoiceDocument(TypedDict):
-    """``choose --json``: which kind of device, with which calibration, reaches an error."""
+    """``plan choose --json``: which kind of device, with which calibration, reaches an error."""
 
     range_g: float
     temperatures_C: list[float]

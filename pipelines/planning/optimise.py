@@ -108,7 +108,7 @@ def _refusal(search: RecipeSearch) -> str:
     start = f"plan optimise: no recipe of up to {MOST} dwells "
     if search.unseen:
         unseen = ", ".join(search.unseen)
-        return f"{start}makes {unseen} visible; require fewer effects (--see) or more temperatures (--temperatures)"
+        return f"{start}makes {unseen} visible; require fewer effects (--wanted) or more temperatures (--set temperatures=…)"
     if requirement.discrimination is not None:
         needed = requirement.discrimination.chi_square
         reached = f"χ² {needed / near**2:.2g}, {needed:g} is needed"

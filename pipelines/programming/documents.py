@@ -36,7 +36,7 @@ class ProgrammedUnitDocument(TypedDict):
 
 
 class ProgramDocument(TypedDict):
-    """``program --json``: the devices whose memory was written."""
+    """``station program --json``: the devices whose memory was written."""
 
     run: str
     units: list[ProgrammedUnitDocument]

@@ -122,7 +122,8 @@ def _refuse_older(ledger: Ledger, run: Run, serial: str, day: str) -> None:
         if same or theirs >= ours:
             raise WrongUse(
                 f"program: unit {serial}: certificate {one.certificate} is of run {one.run}, measured {theirs}, and run {run.id} "
-                f"was measured {ours}, not after it; write that run, or end its certificate with 'tumbleline revoke {serial}'"
+                f"was measured {ours}, not after it; write that run, or end its certificate with "
+                f"'tumbleline certificate revoke {serial}'"
             )
 
 

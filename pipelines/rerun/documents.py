@@ -61,7 +61,7 @@ class CauseOfDifference(TypedDict):
 
 
 class DiffDocument(TypedDict):
-    """``diff --json``: what differs between two runs, by how much against its uncertainty, and why."""
+    """``archive diff --json``: what differs between two runs, by how much against its uncertainty, and why."""
 
     a: Annotated[str, "id of the first run"]
     b: Annotated[str, "id of the second run"]
@@ -121,7 +121,7 @@ class FailedLot(TypedDict):
 
 
 class WhatIfDocument(TypedDict):
-    """``whatif --json``: what a model would make of the archive's lots."""
+    """``release whatif --json``: what a model would make of the archive's lots."""
 
     archive: str
     name: Annotated[str, "of the model"]

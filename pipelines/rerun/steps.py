@@ -45,8 +45,10 @@ from schemas.units import AXES
 
 PROVENANCE = ("who", "where", "when", "software", "libraries", ENTRY, "rerun_of", "because", "measured")
 _REFERENCE = "a fit needs the force at every dwell: import the file again, which adds it at the angles of a table"
-_UNIT = "a fit states coefficients in it: import the file again with --units output=g|mg|m/s^2|V|mV|LSB"
-_AS_IMPORTED = "a fit needs them: import the file with 'tumbleline import FILE --rows dwells --map … --units output=…'"
+_UNIT = "a fit states coefficients in it: import the file again with --unit-of output=g|mg|m/s^2|V|mV|LSB"
+_AS_IMPORTED = (
+    "a fit needs them: import the file with 'tumbleline import FILE --set rows=dwells --map … --unit-of output=…'"
+)
 """What a fit needs of imported dwells, and what to do where they lack it."""
 
 
@@ -206,7 +208,7 @@ def _fit_for_a_fit(run: Run) -> pd.DataFrame:
     """The run's dwells, refused where the fit of a lot has nothing to work with."""
     if "dwells" not in run.tables():
         raise DataRejected(
-            f"run {run.id}: imported without dwells, a fit needs them; import it with poses, a face or --blocks"
+            f"run {run.id}: imported without dwells, a fit needs them; import it with poses, a face or block_s"
         )
     dwells = run.table("dwells")
     by_reason = {_UNIT: ("out_unit",), _AS_IMPORTED: ("kind", "pose")}

@@ -147,7 +147,7 @@ def _per_g(lot: LotArrays, lot_fit: LotFit) -> Array:
         raise DataRejected(
             f"fit: the model {', '.join(lot_fit.effects)} has no 'scale', and the outputs are in {lot.out_unit}: residuals in µg "
             f"need the output per g; {scale_too}divide the outputs by that of the data sheet and import them with "
-            "--units output=g"
+            "--unit-of output=g"
         )
     return np.full_like(scale, _PER_G[lot.out_unit])
 

@@ -108,8 +108,8 @@ def refuse_one_pose(output: Array) -> None:
     if len(output) > 1 and float(np.linalg.norm(spans)) < _ONE_POSE * float(np.median(np.linalg.norm(output, axis=1))):
         raise NotIdentified(
             "fit: the sensor was not turned: all dwells have one direction, in which the norm of gravity shows neither scale nor "
-            "misalignment; turn it; or judge its bias and what drives it: import the record again with --face FACE (+x, -x … "
-            "-z, the face that is up) --local-g M/S2, and with --blocks 60 where it is one long rest"
+            "misalignment; turn it; or judge its bias and what drives it: import the record again with --set face=FACE (+x, -x … "
+            "-z, the face that is up) --set local_gravity_m_s2=M/S2, and with --set block_s=60 where it is one long rest"
         )
 
 

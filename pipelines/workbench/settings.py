@@ -102,7 +102,6 @@ class WorkbenchSettings:
         refuse_weak(self.token)
         if not self.local and not self.tls and not self.proxied:
             raise WrongUse(
-                f"workbench: host {self.host} is reachable from other machines, encryption is needed; give --certificate and "
-                "--key, "
-                "or --behind-proxy if a proxy encrypts, or leave --host out"
+                f"workbench: host {self.host} is reachable from other machines, encryption is needed; give --tls with a "
+                "certificate and its key, or --behind-proxy if a proxy encrypts, or leave --host out"
             )

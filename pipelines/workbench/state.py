@@ -117,7 +117,7 @@ class UnitsPage(PageState):
 
     def arguments(self) -> list[str]:
         """A question in SQL."""
-        return ["query", self.question()]
+        return ["archive", "query", self.question()]
 
     def question(self, most: int = ROWS) -> str:
         """The question in SQL for a page of units with their runs."""
@@ -235,15 +235,18 @@ class UploadPage(PageState):
         usual = {("output", ""), ("time", "s"), ("temperature", "degC")}
         values = {
             "--map": ",".join(self.columns),
-            "--units": ",".join(f"{name}={unit}" for name, unit in units.items() if (name, unit) not in usual),
-            "--unit": self.serial,
-            "--rows": self.rows if self.rows != "samples" else "",
+            "--unit-of": ",".join(f"{name}={unit}" for name, unit in units.items() if (name, unit) not in usual),
+            "--units": self.serial,
             "--rate": repr(self.rate) if self.rate else "",
-            "--local-g": repr(self.gravity) if self.gravity else "",
-            "--poses": self.poses,
             "--fit": self.fit,
         }
-        return ["import", self.file, *options(values)]
+        keys = {
+            "rows": self.rows if self.rows != "samples" else "",
+            "local_gravity_m_s2": repr(self.gravity) if self.gravity else "",
+            "poses": self.poses,
+        }
+        stated = [word for key, value in keys.items() if value for word in ("--set", f"{key}={value}")]
+        return ["import", self.file, *options(values), *stated]
 
 
 class ModelsPage(PageState):
@@ -258,7 +261,7 @@ class ModelsPage(PageState):
 
     def arguments(self) -> list[str]:
         """The what-if, or the list of releases."""
-        return ["whatif", f"{self.model}.toml"] if self.model else ["release", "--list"]
+        return ["release", *(["whatif", f"{self.model}.toml"] if self.model else [])]
 
 
 class PlanPage(PageState):

@@ -46,10 +46,10 @@ def device_at(link: str, profile: Profile, device_id: int) -> Device:
     elif kind == "visa" and rest:
         content |= {"link": "visa", "resource": rest.removeprefix("//")}
     else:
-        raise WrongUse(f"bring-up: link '{link[:80]}', one of {FORMS} is needed; correct --link")
+        raise WrongUse(f"bring-up: link '{link[:80]}', one of {FORMS} is needed; correct it")
     if content["link"] not in profile.links:
         raise WrongUse(
-            f"bring-up: link {content['link']}, profile {profile.name} is carried by {' or '.join(profile.links)}; correct --link"
+            f"bring-up: link {content['link']}, profile {profile.name} is carried by {' or '.join(profile.links)}; correct it"
         )
     try:
         return Device.model_validate(content)

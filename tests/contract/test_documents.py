@@ -23,14 +23,14 @@ BY_HEAD = {head_of(kind): kind for kind in documents()}
 MODEL = (
     "bias,scale,misalignment,bias_temperature,scale_temperature,bias_temperature_quadratic,scale_temperature_quadratic"
 )
-IMPORTED = ["--map", "x=x,y=y,z=z", "--units", "output=g", "--rate", "100", "--unit", "S1", "--face", "+z"]
-IMPORTED += ["--blocks", "5", "--local-g", "9.81"]
-CORRECTED = ["--rate", "100", "--force", "0,0,1", "--turn-on", "100"]
+IMPORTED = ["--map", "x=x,y=y,z=z", "--unit-of", "output=g", "--rate", "100", "--units", "S1", "--set", "face=+z"]
+IMPORTED += ["--set", "block_s=5", "--set", "local_gravity_m_s2=9.81"]
+CORRECTED = ["--rate", "100", "--track", "0,0,1", "--set", "turn_on=100"]
 CASES = {
     "plan --json": ["plan"],
     "station status --json": ["station", "status"],
     "diagnose --json": ["diagnose", "latest", "--effects", MODEL],
-    "improve --json": ["improve", "latest", "--effects", MODEL, "--out", "{folder}/new.toml", "--yes"],
+    "improve --json": ["improve", "latest", "--effects", MODEL, "--output", "{folder}/new.toml", "--yes"],
     "compare --json": ["compare", "latest", "--fresh", "latest"],
     "history --json": ["history", "{folder}/model.toml", "--dwells", "latest"],
     "list --json": ["list"],
@@ -42,31 +42,47 @@ CASES = {
     "audit --json": ["audit"],
     "rerun --json": ["rerun", "latest", "--effects", "bias,scale,misalignment,bias_temperature"],
     "rerun --check --json": ["rerun", "latest", "--check"],
-    "query --json": ["query", "select * from units"],
-    "diff --json": ["diff", "latest", "latest"],
-    "whatif --json": ["whatif", "{folder}/model.toml"],
-    "station check --json": ["station", "check", "--registers"],
+    "archive query --json": ["archive", "query", "select * from units"],
+    "archive diff --json": ["archive", "diff", "latest", "latest"],
+    "release whatif --json": ["release", "whatif", "{folder}/model.toml"],
+    "station check --json": ["station", "check", "--read-only"],
     "station log --json": ["station", "log"],
-    "import FILE --procedure sweep": ["import", "{folder}/sweep.csv", "--procedure", "sweep", "--unit", "S1"],
+    "import FILE --procedure sweep": ["import", "{folder}/sweep.csv", "--procedure", "sweep", "--units", "S1"],
     "import FILE… --procedure NAME --map reference=…": [
-        *("import", "{folder}/step.csv", "{folder}/step.csv", "{folder}/step.csv", "{folder}/step.csv", "--unit", "S1"),
+        *(
+            "import",
+            "{folder}/step.csv",
+            "{folder}/step.csv",
+            "{folder}/step.csv",
+            "{folder}/step.csv",
+            "--units",
+            "S1",
+        ),
         *("--procedure", "step_response", "--map", "z=out [V],reference=drive [V]", "--rate", "50000"),
     ],
     "run --json": ["fit", "latest", "--limits", "consumer"],
-    "allan --json": ["allan", "{folder}/rest.csv", "--rate", "100"],
-    "psd --json": ["psd", "{folder}/rest.csv", "--rate", "100"],
+    "noise allan --json": ["noise", "allan", "{folder}/rest.csv", "--rate", "100"],
+    "noise psd --json": ["noise", "psd", "{folder}/rest.csv", "--rate", "100"],
     "doctor --json": ["doctor"],
-    "monitor --json": ["monitor"],
-    "keys [SUBJECT] --json": ["keys", "recipe"],
-    "report RUN --json": ["report", "latest"],
+    "station monitor --json": ["station", "monitor"],
+    "plan keys [SUBJECT] --json": ["plan", "keys", "recipe"],
+    "show RUN --report --json": ["show", "latest", "--report"],
     "extend --json": ["extend", "{folder}/model.toml", "second_order"],
-    "release MODEL --json": ["release", "{folder}/model.toml", "--from", "2026-01-01", "--force", "--reason", "a test"],
-    "release --list --json": ["release", "--list"],
-    "revoke UNIT --json": ["revoke", "A1", "--reason", "a test"],
+    "release MODEL --json": [
+        "release",
+        "{folder}/model.toml",
+        "--since",
+        "2026-01-01",
+        "--force",
+        "--reason",
+        "a test",
+    ],
+    "release --json": ["release"],
+    "certificate revoke UNIT --json": ["certificate", "revoke", "A1", "--reason", "a test"],
     "lineage UNIT|RUN|FILE --json": ["lineage", "A1"],
     "import FILE… --json": ["import", "{folder}/rest.csv", *IMPORTED],
     "import FILE FILE… --json": ["import", "{folder}/rest.csv", "{folder}/rest.csv", *IMPORTED],
-    "correct --json": ["correct", "{folder}/corrected.csv", "--calibration", "latest:A1", *CORRECTED],
+    "correct --json": ["correct", "{folder}/corrected.csv", "latest:A1", *CORRECTED],
     "station watch --json": ["station", "watch", "latest"],
     "station profiles --json": ["station", "profiles"],
     "station frames --json": ["station", "frames", str(ROOT / "tests" / "data" / "frames" / "mbpoll-tcpdump.pcap")],
@@ -78,7 +94,7 @@ CASES = {
     "attributes list --json": ["attributes", "list"],
     "archive backup --json": ["archive", "backup", "{folder}/copy"],
 }
-WITHOUT_ARCHIVE = {"station frames", "plan", "inspect FILE", "keys [SUBJECT]", "extend", "archive key"}
+WITHOUT_ARCHIVE = {"station frames", "plan", "inspect FILE", "plan keys [SUBJECT]", "extend", "archive key"}
 WITHOUT_ARCHIVE |= {f"station {one}" for one in ("status", "check", "profiles")}
 
 
@@ -89,9 +105,9 @@ def kept(tmp_path_factory: pytest.TempPathFactory) -> Path:
     unpack(KEPT, folder / "archive")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(certifying, "refuse_unstated", lambda run: None)  # certified by the version that made the archive
-        status, out, err = given("certify", "latest", "--json", "--archive", folder / "archive")
+        status, out, err = given("certificate", "issue", "latest", "--json", "--archive", folder / "archive")
         assert status == 0, err
-        validate(BY_HEAD["certify --json"], out)
+        validate(BY_HEAD["certificate issue --json"], out)
     model = '[model]\nname = "m"\nversion = 1\neffects = ["bias", "scale", "misalignment"]\n'
     (folder / "model.toml").write_text(model, encoding="utf-8")
     rows = [f"{k / 10},{k % 3},{k % 2},16{k % 10}" for k in range(200)]
@@ -131,17 +147,17 @@ ELSEWHERE = {
     "run --json (several fillings)": "e2e/test_operator.py",
     "show RUN --json (no grades)": "e2e/test_inquiry.py",
     "investigate --json": "e2e/test_inquiry.py",
-    "operator --json": "e2e/test_inquiry.py",
+    "station operator --json": "e2e/test_inquiry.py",
     "discover --explain ID --json": "e2e/test_discover.py",
-    "demo --archive --json": "e2e/test_discover.py",
-    "certificate --json": "unit/pipelines/certificates/document/test_compose.py",
+    "demo --lots N --json": "e2e/test_discover.py",
+    "certificate write --json": "unit/pipelines/certificates/document/test_compose.py",
     "verify FILE… --json": "unit/pipelines/certificates/document/test_file_check.py",
-    "certify --json": "contract/test_documents.py",
-    "program --json": "faults/test_programming.py",
+    "certificate issue --json": "contract/test_documents.py",
+    "station program --json": "faults/test_programming.py",
     "fit --json (an import)": "e2e/test_imported_recording.py",
-    "choose --json": "unit/pipelines/planning/test_choice.py",
+    "plan choose --json": "unit/pipelines/planning/test_choice.py",
     "simulate --json": "e2e/test_correct.py",
-    "demo --auto --json": "e2e/test_models.py",
+    "demo --yes --json": "e2e/test_models.py",
     "demo --by-hand --json": "e2e/test_models.py",
     "station serve --json": "e2e/test_station.py",
     "station bring-up --json": "e2e/test_bring_up.py",

@@ -7,7 +7,7 @@ import pytest
 from each import each
 from in_process import document_of, given, refused
 
-from pipelines.cli.keys import SUBJECTS
+from pipelines.cli.plan_keys import SUBJECTS
 from pipelines.demo.scenes import SCENES
 from schemas.key_list import FILES, keys_of
 from stations.plant.faults.catalogue import kinds
@@ -48,7 +48,7 @@ def test_every_hidden_effect_of_the_demo_is_listed() -> None:
 
 @each(["", *SUBJECTS])
 def test_the_command_prints_a_list_within_80_columns(subject: str) -> None:
-    words = ("keys", *([subject] if subject else []))
+    words = ("plan", "keys", *([subject] if subject else []))
     document = document_of(*words)
     assert document["subject"] == subject
     assert document["rows"]
@@ -56,4 +56,4 @@ def test_the_command_prints_a_list_within_80_columns(subject: str) -> None:
 
 
 def test_an_unknown_list_is_refused_with_the_known_ones() -> None:
-    assert "did you mean recipe" in refused("keys", "recipes")
+    assert "did you mean recipe" in refused("plan", "keys", "recipes")

@@ -12,6 +12,7 @@ from each import each
 from typed_commands import unknown_options
 
 from pipelines.cli import COMMANDS
+from pipelines.cli.former import COMMANDS as FORMER
 
 ROOT = Path(__file__).resolve().parents[2]
 PRODUCT = [
@@ -44,7 +45,7 @@ def quoted(text: str) -> list[str]:
     return [groups[0] or groups[1] for groups in re.findall(pattern, text, re.MULTILINE)]
 
 
-NAMES = "|".join(re.escape(name) for name in COMMANDS)
+NAMES = "|".join(re.escape(name) for name in (*COMMANDS, *FORMER))
 SOURCES = {path: path.read_text(encoding="utf-8") for path in PRODUCT}
 FOUND = [
     (path.relative_to(ROOT).as_posix(), line)

@@ -271,7 +271,7 @@ def test_several_groups_of_channels_are_asked_about(tmp_path: Path) -> None:
             writer.write_segment([nptdms.ChannelObject(group, name, np.arange(float(count))) for name in AXES])
     (tmp_path / "a.tdms").write_bytes(sink.getvalue())
     with pytest.raises(
-        WrongUse, match=r"2 groups .*'fast' \(40 samples\), 'slow' \(4 samples\); choose one with --group"
+        WrongUse, match=r"2 groups .*'fast' \(40 samples\), 'slow' \(4 samples\); choose one with --set group=NAME"
     ):
         files.read_content(tmp_path / "a.tdms")
     with pytest.raises(WrongUse, match=r"no group is called 'fas'.*fast"):

@@ -62,7 +62,7 @@ def content(folder: Path, pattern: str = "*") -> dict[Path, bytes]:
 
 def test_the_command_tells_findings_by_who_must_act_and_leaves_one(made, tmp_path):
     page, words = tmp_path / "audit.html", ("audit", "--archive", made, "--until", UNTIL, "--workers", "1")
-    found = document_of(*words, "--page", page, status=1)
+    found = document_of(*words, "--output", page, status=1)
     assert found["counts"]["runs"] == 24
     order = [finding["who"] for finding in found["findings"]]
     assert order == sorted(order, key=["quality", "station", "line", "product", "archive"].index)
@@ -186,11 +186,17 @@ def test_every_way_to_read_is_answered(question, made):
 
 
 def test_the_query_command_prints_a_table_json_and_csv(made):
-    words = ("query", "SELECT station, count(*) AS n FROM runs GROUP BY station ORDER BY station", "--archive", made)
+    words = (
+        "archive",
+        "query",
+        "SELECT station, count(*) AS n FROM runs GROUP BY station ORDER BY station",
+        "--archive",
+        made,
+    )
     assert document_of(*words, status=0)["rows"][0] == {"station": "line-1", "n": 6}
-    assert given(*words, "--csv")[1].splitlines()[:2] == ["station,n", "line-1,6"]
+    assert given(*words, "--output", "-")[1].splitlines()[:2] == ["station,n", "line-1,6"]
     assert "line-1" in text_of(*words)
-    refused(*words, "--csv", "--json")
+    refused(*words, "--output", "-", "--json")
 
 
 def test_what_cannot_be_audited_is_refused(made, tmp_path):

@@ -257,8 +257,8 @@ def started(name, port, folder, answers, *more):
     """The command in a process of its own, with what a person types."""
     # a suite in the background of a shell inherits an interrupt that is ignored
     program = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); from pipelines.cli import main; main()"
-    command = [sys.executable, "-c", program, "station", "bring-up", name, "--link", f"tcp://127.0.0.1:{port}"]
-    command += ["--device-id", str(id_of(load_profile(name))), "--out", "out", *more]
+    command = [sys.executable, "-c", program, "station", "bring-up", name, f"tcp://127.0.0.1:{port}"]
+    command += ["--device-id", str(id_of(load_profile(name))), "--output", "out", *more]
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
     environment = {**os.environ, "PYTHONPATH": str(Path(__file__).resolve().parents[2])}
     process = subprocess.Popen(command, cwd=folder, env=environment, **pipes)
@@ -282,7 +282,7 @@ def test_a_kill_in_any_step_leaves_a_safe_device_and_a_whole_recording(what, nam
         ]
         if word == "LINK" and profile.kind == "axis":
             answers.insert(-1, "")  # the emergency stop
-        process = started(name, port, tmp_path, answers, "--silence", "20", "--watch", "20")
+        process = started(name, port, tmp_path, answers, "--set", "silence=20", "--set", "watch=20")
         frames = tmp_path / "out" / "frames.jsonl"
 
         def moved():
@@ -324,12 +324,11 @@ def test_the_command_writes_page_document_and_recording(tmp_path, monkeypatch):
             "station",
             "bring-up",
             name,
-            "--link",
             f"tcp://127.0.0.1:{port}",
             "--device-id",
             id_of(load_profile(name)),
         )
-        status, out, errors = given(*words, "--out", "out", "--readings", "--by", "A. Person", "--json")
+        status, out, errors = given(*words, "--output", "out", "--read-only", "--who", "A. Person", "--json")
     assert status == 0, errors
     document = json.loads(out)
     assert document == json_value(read_conformance(tmp_path / "out" / "conformance.json"))
@@ -434,7 +433,7 @@ def test_ctrl_c_leaves_the_device_as_it_was_and_a_page_that_says_so(name, tmp_pa
     with served_device(name, silence_s=0.0) as (port, plant):
         # the axis is on its way for twenty seconds, so that a busy machine does not come too late
         answers = ["", "", "", "", "LINK"] if axis else ["", "", "SET"]
-        process = started(name, port, tmp_path, answers, "--watch", "20", "--silence", "20")
+        process = started(name, port, tmp_path, answers, "--set", "watch=20", "--set", "silence=20")
 
         def changed():
             return plant.outer.moving(plant.now) if axis else plant.fixture.chamber.set_point != 23.0

@@ -49,7 +49,7 @@ def test_run_prints_one_document_and_tells_its_stages_elsewhere(archive: Path) -
 
 
 def test_every_statistic_of_the_static_record_of_a_run_is_made_from_its_samples(archive: Path) -> None:
-    words = ("allan", "latest", "--archive", archive)
+    words = ("noise", "allan", "latest", "--archive", archive)
     usual, total = document_of(*words), document_of(*words, "--statistic", "total")
     assert (total["statistic"], total["deviation_unit"], usual["deviation_unit"]) == ("total", "µg", "µg")
     assert total["terms"] == usual["terms"]
@@ -159,14 +159,15 @@ printf '%s\\n' "${COMPREPLY[@]}"
 OFFERED = {
     "dia": {"diagnose"},
     "run m": {"my"},
-    "report la": {"latest"},
+    "show la": {"latest"},
     "show A": {"A1", "A2"},
     "extend model.toml third": {"third_order"},
     "diagnose latest --effects bias,sca": {"bias,scale", "bias,scale_temperature"},
     "plan opt": {"optimise"},
     "run --fau": {"--fault"},
-    "correct flight.csv --calibration la": {"latest"},
-    "plan optimise production --wanted third": {"third_order="},
+    "correct flight.csv la": {"latest"},
+    "import a.csv --set blo": {"block_s="},
+    "plan optimise production --wanted third": {"third_order"},
     "nonsense ": set(),
 }
 

@@ -64,7 +64,7 @@ def corrected(
 ) -> tuple[dict[str, Any], pd.DataFrame]:
     """Document and table of a correction; the recording and its correction stand in the working folder."""
     table.to_csv("a.csv", index=False)
-    own = ("a.csv", "--calibration", "latest:A1", "--archive", run.archive.root, "--output", "o.parquet", *words)
+    own = ("a.csv", "latest:A1", "--archive", run.archive.root, "--output", "o.parquet", *words)
     return document_of("correct", *own, status=status), pd.read_parquet("o.parquet")
 
 
@@ -126,7 +126,7 @@ def test_the_bias_is_found_where_the_force_is_known_and_its_uncertainty_grows_af
     table = still(run, rng, n, warm=30.0, force=force, bias=bias)
     table[["force_x", "force_y", "force_z"]] = force
     table.loc[6000:, ["force_x", "force_y", "force_z"]] = np.nan
-    document, done = corrected(run, table, "--turn-on", "2000")
+    document, done = corrected(run, table, "--set", "turn_on=2000")
     own = document["bias"]
     error, u = (np.array([own[name][axis] for axis in "xyz"]) for name in ("last_ug", "u_last_ug"))
     # 30 µg: what the fit itself is wrong by in this pose is found as bias
@@ -140,14 +140,14 @@ def test_the_bias_is_found_where_the_force_is_known_and_its_uncertainty_grows_af
 
 def test_at_rest_the_bias_along_gravity_alone_is_found(run: Run, home: Path, rng: np.random.Generator) -> None:
     table = still(run, rng, 6000, force=[0.0, 0.0, GRAVITY_G], bias=np.array([0.0, 0.0, 3e-3]))
-    document, _ = corrected(run, table, "--turn-on", "3000", "--at-rest")
+    document, _ = corrected(run, table, "--set", "turn_on=3000", "--track", "at-rest")
     own = document["bias"]
     assert own["last_ug"]["z"] == pytest.approx(3000.0, abs=150.0)
     assert own["u_last_ug"]["x"] > 2900.0
     assert own["u_last_ug"]["z"] < 300.0
 
 
-UP = ("--turn-on", "300", "--force", "0,0,1")
+UP = ("--set", "turn_on=300", "--track", "0,0,1")
 
 
 FILTERED_C = """
@@ -195,11 +195,11 @@ def test_the_filters_are_those_of_scipy_and_of_the_exported_c_with_the_bias(
     run: Run, home: Path, rng: np.random.Generator
 ) -> None:
     table = tracked(run, rng)
-    own = ("--turn-on", "2000")
+    own = ("--set", "turn_on=2000")
     _, plain = corrected(run, table, *own)
     force = plain[FORCES].to_numpy()
     for kind in ("butterworth", "fir", "moving-average"):
-        document, done = corrected(run, table, *own, "--filter", kind, "--cutoff", "9")
+        document, done = corrected(run, table, *own, "--filter", f"{kind}:9")
         one = document["filter"]
         b, a = (np.array(one[name]) for name in ("numerator", "denominator"))
         expected = signal.lfilter(b, a, force - force[0], axis=0) + force[0]
@@ -216,16 +216,16 @@ def test_the_filters_are_those_of_scipy_and_of_the_exported_c_with_the_bias(
         words = (
             "--format",
             "c",
-            "--failed",
+            "--include",
+            "failed",
             "--units",
             "A1",
             "--filter",
-            kind,
-            "--cutoff",
-            "9",
+            f"{kind}:9",
             "--rate",
             "100",
-            "--track",
+            "--set",
+            "track=yes",
             *own,
         )
         header = text_of_export(run, "--format", "c", *words)
@@ -241,7 +241,7 @@ def text_of_export(run: Run, *words: str) -> str:
 
 def test_a_recording_goes_on_where_the_one_before_it_ended(run: Run, home: Path, rng: np.random.Generator) -> None:
     table = tracked(run, rng)
-    words = ("--turn-on", "2000", "--filter", "butterworth", "--cutoff", "12")
+    words = ("--set", "turn_on=2000", "--filter", "butterworth:12")
     _, whole = corrected(run, table, *words)
     document, first = corrected(run, table.iloc[:7000], *words, "--state", "kept.json")
     assert document["state"] == "kept.json"
@@ -253,22 +253,22 @@ def test_a_recording_goes_on_where_the_one_before_it_ended(run: Run, home: Path,
     assert np.allclose(second[FORCES].to_numpy()[:100], whole[FORCES].to_numpy()[7000:7100], atol=1e-9)
     assert second["u_bias_x_ug"].iloc[0] == pytest.approx(whole["u_bias_x_ug"].iloc[7000], rel=1e-6)
     table.iloc[:500].to_csv("a.csv", index=False)
-    how = ("correct", "a.csv", "--calibration", "latest:A1", "--archive", run.archive.root, "--turn-on", "2000")
+    how = ("correct", "a.csv", "latest:A1", "--archive", run.archive.root, "--set", "turn_on=2000")
     assert "it begins at 0 s, the state was kept at" in refused(*how, "--state", "kept.json")
     assert "the state of unit A1, that of A2 is needed" in refused(
-        *how[:3], "latest:A2", *how[4:], "--state", "kept.json"
+        *how[:2], "latest:A2", *how[3:], "--state", "kept.json"
     )
     Path("kept.json").write_text("{}", encoding="utf-8")
     assert "not the state that" in refused(*how, "--state", "kept.json")
     assert "no bandwidth of unit A1 was measured" in refused(*how, "--filter", "fir")
-    assert "did you mean butterworth" in refused(*how, "--filter", "buterworth", "--cutoff", "3")
-    assert "at most 40 Hz is needed" in refused(*how, "--filter", "fir", "--cutoff", "49")
-    assert "add --filter" in refused(*how, "--cutoff", "49")
-    export = ("export", run.id, "--archive", run.archive.root, "--failed", "--units", "A1")
-    assert "need --arithmetic double or float" in refused(
-        *export, "--format", "c", "--filter", "fir", "--cutoff", "3", "--rate", "100", "--arithmetic", "q24"
+    assert "did you mean butterworth" in refused(*how, "--filter", "buterworth:3")
+    assert "at most 40 Hz is needed" in refused(*how, "--filter", "fir:49")
+    assert "as butterworth:50" in refused(*how, "--filter", ":49")
+    export = ("export", run.id, "--archive", run.archive.root, "--include", "failed", "--units", "A1")
+    assert "need --set arithmetic=double or float" in refused(
+        *export, "--format", "c", "--filter", "fir:3", "--rate", "100", "--set", "arithmetic=q24"
     )
-    assert "are for format c" in refused(*export, "--format", "csv", "--track")
+    assert "are for format c" in refused(*export, "--format", "csv", "--set", "track=yes")
 
 
 def test_a_trajectory_comes_back_from_the_output_of_a_unit(run: Run, home: Path, rng: np.random.Generator) -> None:
@@ -277,11 +277,11 @@ def test_a_trajectory_comes_back_from_the_output_of_a_unit(run: Run, home: Path,
     flight = pd.DataFrame(np.sin(turns), columns=["force_x", "force_y", "force_z"])
     flight = flight.assign(time_s=np.arange(n) / RATE, unit_C=np.linspace(5.0, 45.0, n))
     flight.to_csv("flight.csv", index=False)
-    own = ("simulate", "flight.csv", "--calibration", "latest:A1", "--archive", run.archive.root, "--failed")
-    document = document_of(*own, "--no-noise", "--output", "raw.csv", status=0)
+    own = ("simulate", "flight.csv", "latest:A1", "--archive", run.archive.root, "--include", "failed")
+    document = document_of(*own, "--seed", "none", "--output", "raw.csv", status=0)
     assert (document["samples"], document["noise"], document["clipped"], document["seed"]) == (n, {}, 0, None)
-    back = ("correct", "raw.csv", "--calibration", "latest:A1", "--archive", run.archive.root)
-    document_of(*back, "--columns", "x,y,z", "--output", "back.parquet")
+    back = ("correct", "raw.csv", "latest:A1", "--archive", run.archive.root)
+    document_of(*back, "--map", "x,y,z", "--output", "back.parquet")
     force = flight[["force_x", "force_y", "force_z"]].to_numpy()
     away = pd.read_parquet("back.parquet")[FORCES].to_numpy() - force
     assert np.max(np.abs(away)) < 0.6 / LSB_PER_G  # whole counts
@@ -300,7 +300,7 @@ def test_a_trajectory_comes_back_from_the_output_of_a_unit(run: Run, home: Path,
     assert clipped["told"] == ["no unit_C: 25 °C taken"]
     assert clipped["clipped"] == n
     assert "a name that ends in .csv" in refused(*own, "--output", "raw.xls")
-    assert "one of g, m/s^2" in refused(*own, "--units", "mg", "--output", "raw.csv")
+    assert "one of g, m/s^2" in refused(*own, "--unit-of", "force=mg", "--output", "raw.csv")
     assert "at most 40 Hz" in refused(*own, "--bandwidth", "70", "--output", "raw.csv")
 
 
@@ -337,13 +337,13 @@ def test_samples_after_the_last_whole_step_have_the_uncertainty_of_their_time(
 
 
 REFUSED = {
-    "a.csv --calibration latest": "3 units, one is needed as RUN:UNIT",
-    "a.csv --calibration latest:A9": "no unit A9",
-    "a.csv --calibration latest:A1 --force 0,0,1": "--turn-on",
-    "a.csv --calibration latest:A1 --force 0,0 --turn-on 300": "three numbers X,Y,Z",
-    "back.csv --calibration latest:A1": "does not always increase",
-    "cold.csv --calibration latest:A1": "temperature",
-    "a.csv --calibration latest:A1 --output o.txt": ".csv or .parquet",
+    "a.csv latest": "3 units, one is needed as RUN:UNIT",
+    "a.csv latest:A9": "no unit A9",
+    "a.csv latest:A1 --track 0,0,1": "--set turn_on",
+    "a.csv latest:A1 --track 0,0 --set turn_on=300": "three numbers X,Y,Z",
+    "back.csv latest:A1": "does not always increase",
+    "cold.csv latest:A1": "temperature",
+    "a.csv latest:A1 --output o.txt": ".csv or .parquet",
 }
 
 

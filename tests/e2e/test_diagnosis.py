@@ -12,6 +12,7 @@ from capture_double import small_run
 from each import each
 from in_process import document_of, given, refused, text_of
 from root_process import ROOT
+from typed_commands import printed_commands
 
 from inertial import effects
 from pipelines.cli.text.diagnosis_text import print_diagnosis
@@ -77,14 +78,14 @@ def written(spec: Spec, seed: int, folder: Path) -> Path:
 
 @pytest.mark.usefixtures("no_next_measurement")
 def test_diagnose_names_what_is_missing_in_text_document_and_report(cubic: Path, tmp_path: Path) -> None:
-    lot, report = (cubic / "dwells.parquet", "--history", cubic / "history.parquet"), tmp_path / "report.html"
+    lot, report = (cubic / "dwells.parquet", "--temperatures", cubic / "history.parquet"), tmp_path / "report.html"
     printed = text_of("diagnose", *lot, status=1)
     for part in (
         "NOT ADEQUATE", "third_order (K3)", "Effects that this plan cannot show",
         "tumbleline extend model.toml third_order --effects bias,scale,misalignment",
     ):  # fmt: skip
         assert part in printed
-    document = document_of("diagnose", *lot, "--report", report, status=1)
+    document = document_of("diagnose", *lot, "--output", report, status=1)
     assert document["recommended"] == ["third_order"]
     assert set(document["breakers"]) == set(document["unseen"])
     text = report.read_text(encoding="utf-8")
@@ -99,7 +100,7 @@ def test_diagnose_names_what_is_missing_in_text_document_and_report(cubic: Path,
 def test_a_lot_of_faulty_units_is_blocked(cubic: Path, tmp_path: Path) -> None:
     dwells = pd.read_parquet(cubic / "dwells.parquet")
     dwells.assign(out_x=dwells["out_x"].iloc[0]).to_csv(tmp_path / "stuck.csv", index=False)
-    printed = text_of("diagnose", tmp_path / "stuck.csv", "--report", tmp_path / "stuck.html", status=1)
+    printed = text_of("diagnose", tmp_path / "stuck.csv", "--output", tmp_path / "stuck.html", status=1)
     assert printed.startswith("CANNOT BE JUDGED: every unit")
     assert "Data faults" in (tmp_path / "stuck.html").read_text(encoding="utf-8")
 
@@ -115,11 +116,11 @@ UNUSABLE = {
     "--effects bias,scael": "unknown effect 'scael'; did you mean scale",
     "--effects bias --model m.toml": "leave one out",
     "--effects bias,scale,vibration_rectification": "vibration_rectification: the dwells have no vibration",
-    "--history nowhere.csv": "nowhere.csv",
+    "--temperatures nowhere.csv": "nowhere.csv",
     "--model nowhere.toml": "nowhere.toml cannot be read",
     "--effect-file nowhere.py": "no such Python file",
     "--model wet.toml": "the dwells have no 'temprature'; did you mean temperature",
-    "--next next.toml": "add --recipe FILE",
+    "--output next.toml": "add --recipe FILE",
 }
 
 
@@ -171,7 +172,7 @@ def test_the_suggested_formula_explains_what_no_effect_does(tmp_path: Path, name
     made = make(World(hidden=((name, 3.0),)), 6_400_002)
     for kind in ("dwells", "history", "fresh", "fresh_history"):
         getattr(made, kind).to_parquet(tmp_path / f"{kind}.parquet")
-    data = (tmp_path / "dwells.parquet", "--history", tmp_path / "history.parquet")
+    data = (tmp_path / "dwells.parquet", "--temperatures", tmp_path / "history.parquet")
     document = document_of("diagnose", *data, status=1)
     part, text = OF_NO_CATALOGUE[name]
     assert document["recommended"] == []
@@ -180,7 +181,7 @@ def test_the_suggested_formula_explains_what_no_effect_does(tmp_path: Path, name
     assert " ".join(document["unexplained"]["text"].split()) in printed(document, capsys)
     offer, own = document["offer"], ",".join(document["effects"])
     formula = ("--formula", f"{offer['id']}={'; '.join(offer['columns'])}")
-    fresh = ("--fresh", tmp_path / "fresh.parquet", "--fresh-history", tmp_path / "fresh_history.parquet")
+    fresh = ("--fresh", tmp_path / "fresh.parquet", "--fresh-temperatures", tmp_path / "fresh_history.parquet")
     before = document_of("compare", *data, *fresh, "--effects", own)
     after = document_of("compare", *data, *fresh, "--effects", f"{own},{offer['id']}", *formula)
     assert before["rms_ug"] > 2.5 * made.floor_ug
@@ -193,7 +194,7 @@ def test_the_course_of_a_day_is_offered_with_its_period_and_makes_the_model_adeq
     run = case("withheld", 5, 771)
     run.dwells.to_parquet(tmp_path / "dwells.parquet")
     run.history.to_parquet(tmp_path / "history.parquet")
-    data = (tmp_path / "dwells.parquet", "--history", tmp_path / "history.parquet", "--effects")
+    data = (tmp_path / "dwells.parquet", "--temperatures", tmp_path / "history.parquet", "--effects")
     document = document_of("diagnose", *data, "bias,scale,misalignment", status=1)
     floor = run.sealed.floor_ug
     assert document["error"]["floor_ug"] == pytest.approx(floor, rel=0.05)
@@ -217,6 +218,26 @@ def test_an_effect_file_takes_part(humid: Path, tmp_path: Path) -> None:
     document = document_of(*words, status=1)
     assert "damp" in {name for group in document["classes"] for name in group["effects"]}
     assert "damp" in document["recommended"]
+
+
+@pytest.mark.usefixtures("no_next_measurement")
+def test_the_lines_after_it_carry_effect_file_and_dwells_left_out_and_run(
+    humid: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("my damp.py").write_text(OWN, encoding="utf-8")
+    first = pd.read_parquet(humid / "dwells.parquet").iloc[0]
+    left = f"{first['unit']}:{first['dwell']}"
+    words = ("diagnose", humid / "dwells.parquet", "--effect-file", "my damp.py", "--leave-out", left)
+    with effects.additions_forgotten():
+        _, out, _ = given(*words)
+    lines = printed_commands(out.split("Next:", 1)[1])
+    assert [one[0] for one in lines] == [*["extend"] * (len(lines) - 1), "history"]
+    assert all(one[one.index("--effect-file") + 1] == "my damp.py" for one in lines)
+    assert lines[-1][lines[-1].index("--leave-out") + 1] == left
+    for one in lines:
+        with effects.additions_forgotten():  # as in a process of its own
+            assert given(*one)[0] in {0, 1}, one
 
 
 def test_an_installed_package_takes_part(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -268,7 +289,7 @@ def test_a_formula_is_fitted_by_the_chain_and_told_of_by_export(tmp_path: Path) 
     with effects.additions_forgotten():
         effects._extra.clear()
         assert "curl" in {row["effect"] for row in document_of("show", again, "coefficients", *where)["rows"]}
-        assert "curl" in text_of("export", again, "--failed", "--json", *where, status=0)
+        assert "curl" in text_of("export", again, "--include", "failed", "--json", *where, status=0)
 
 
 @pytest.fixture(scope="module")
@@ -282,7 +303,7 @@ def test_the_proposed_steps_are_a_recipe_that_plan_and_run_accept_and_that_separ
     six: Path, tmp_path: Path
 ) -> None:
     target = tmp_path / "next.toml"
-    words = ("diagnose", six / "dwells.parquet", "--effects", PLAIN, "--next", target, "--recipe", LINE_SIX)
+    words = ("diagnose", six / "dwells.parquet", "--effects", PLAIN, "--output", target, "--recipe", LINE_SIX)
     rows = document_of(*words, status=1)["next_measurements"]
     steps = [row for row in rows if row.get("measurable", True)]
     assert steps

@@ -26,7 +26,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.slow  # of fewer lots with a larger effect: the tests below
 def test_the_demonstration_finds_the_wafer_and_its_evidence_goes_with_the_effect(tmp_path: Path) -> None:
-    said = document_of("demo", "--archive", "--lots", "110", "--seed", "4", "--folder", tmp_path / "line", status=0)
+    said = document_of("demo", "--lots", "110", "--seed", "4", "--folder", tmp_path / "line", status=0)
     assert said["found"]
     assert said["wafer_named"]
     (row,) = said["discoveries"]
@@ -111,7 +111,7 @@ def test_few_lots_are_told_and_a_full_folder_is_refused(tmp_path: Path, folder: 
     document = document_of("discover", "--archive", made.folder)
     assert document["pooled"]["lots"] == 3
     assert document["reach"] == []
-    assert "has files already" in refused("demo", "--archive", "--folder", folder)
+    assert "has files already" in refused("demo", "--lots", "400", "--folder", folder)
 
 
 def test_the_evidence_is_in_order_of_arrival(folder: Path) -> None:
@@ -137,7 +137,7 @@ def test_scores_on_dask_are_those_of_this_machine(folder: Path, tmp_path: Path) 
 
 @pytest.mark.slow
 def test_the_demonstration_for_people_ends_with_a_command_that_runs(tmp_path: Path) -> None:
-    status, out, err = given("demo", "--archive", "--lots", "60", "--seed", "4", "--folder", tmp_path / "few")
+    status, out, err = given("demo", "--lots", "60", "--seed", "4", "--folder", tmp_path / "few")
     assert status == 0, err
     assert "What was hidden?" in out
     words = out.strip().splitlines()[-1].split()

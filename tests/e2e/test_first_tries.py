@@ -91,32 +91,32 @@ def test_a_shock_without_a_scale_is_refused_with_the_key(tmp_path: Path) -> None
         tmp_path / "shock.csv",
         "--procedure",
         "shock",
-        "--unit",
+        "--units",
         "S1",
         "--archive",
         tmp_path / "archive",
     )
-    for part in ((), ("--part", tmp_path / "part.toml")):
+    for part in ((), ("--set", tmp_path / "part.toml")):
         told = refused(*words, "--map", "z=z [V],reference=reference [g]", *part)
         assert "procedure shock has no scale, output per g is needed" in told
-        assert "--part" in told or "part.toml" in told
+        assert "--set FILE.toml" in told or "part.toml" in told
 
 
 def test_a_dash_is_standard_output(measured: Archive, home: Path) -> None:
     archive = ("--archive", measured.root)
-    export = ("export", "latest", "--units", "A1", "--failed", *archive)
+    export = ("export", "latest", "--units", "A1", "--include", "failed", *archive)
     _, printed, _ = given(*export)
     assert given(*export, "--output", "-")[1] == printed
     assert json.loads(printed)
-    assert given("waveforms", "latest", "--record", "0", "--output", "-", *archive)[1].startswith("time [s],")
-    _, model, told = given("extend", "model.toml", "third_order", "--out", "-")
+    assert given("export", "latest", "--waveforms", "0", "--output", "-", *archive)[1].startswith("time [s],")
+    _, model, told = given("extend", "model.toml", "third_order", "--output", "-")
     assert '"third_order"' in model
     assert "version 2 has third_order" in told
     for words in (
-        ("improve", "latest", "--out", "-", *archive),
+        ("improve", "latest", "--output", "-", *archive),
         ("archive", "key", "--output", "-"),
-        ("waveforms", "latest", "--format", "mat", "--output", "-", *archive),
-        ("extend", "model.toml", "third_order", "--out", "-", "--json"),
+        ("export", "latest", "--waveforms", "0", "--format", "mat", "--output", "-", *archive),
+        ("extend", "model.toml", "third_order", "--output", "-", "--json"),
         ("plan", "optimise", "--output", "-", "--json"),
     ):
         refused(*words)
@@ -125,19 +125,19 @@ def test_a_dash_is_standard_output(measured: Archive, home: Path) -> None:
 
 def test_exports_need_a_nominal_scale_and_a_file_for_each_unit(measured: Archive, home: Path) -> None:
     words = ("export", "latest", "--archive", measured.root, "--format")
-    one = (*words, "ardupilot", "--units", "A1", "--failed")
+    one = (*words, "ardupilot", "--units", "A1", "--include", "failed")
     _, by_preset, _ = given(*one)
     assert by_preset.startswith("# accelerometer calibration of unit A1")
-    assert by_preset == given(*one, "--nominal", "256000")[1]
-    told = refused(*one, "--nominal", "-1")
+    assert by_preset == given(*one, "--set", "nominal=256000")[1]
+    told = refused(*one, "--set", "nominal=-1")
     assert "nominal scale of unit A1: -1, a positive output per g is needed" in told
-    assert "3 files in this format" in refused(*words, "ardupilot", "--failed")
-    assert "is not text" in refused(*words, "matlab", "--failed")
+    assert "3 files in this format" in refused(*words, "ardupilot", "--include", "failed")
+    assert "is not text" in refused(*words, "matlab", "--include", "failed")
 
 
 def test_a_recipe_of_procedures_has_no_dwells_to_optimise(home: Path) -> None:
     recipe = ROOT / "deploy" / "recipes" / "procedures" / "tilt.toml"
-    for words in (("optimise", recipe), (recipe, "--page", "page.html")):
+    for words in (("optimise", recipe), (recipe, "--output", "page.html")):
         assert "its procedures have no multi_position" in refused("plan", *words)
 
 
@@ -169,7 +169,7 @@ def test_a_port_in_use_is_refused_before_an_address_is_printed() -> None:
         port = taken.getsockname()[1]
         with pytest.raises(WrongUse, match=rf"port {port} of 127.0.0.1 cannot be used \(Address already in use\)"):
             listening_socket("127.0.0.1", port, "workbench")
-        for words in (["workbench"], ["monitor", "--serve"]):
+        for words in (["workbench"], ["station", "monitor", "--port", "9464"]):
             done = command([*words, "--port", str(port)])
             assert (done.returncode, done.stdout) == (2, "")
             assert done.stderr.count("\n") == 1, done.stderr

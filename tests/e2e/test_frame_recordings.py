@@ -171,9 +171,9 @@ def test_silences_are_replayed_as_silences_and_a_recording_becomes_a_test(tmp_pa
             "station",
             "frames",
             str(path),
-            "--as-test",
+            "--output",
             str(folder / "test_chamber.py"),
-            "--page",
+            "--output",
             str(tmp_path / "p.html"),
         ]
     )
@@ -311,14 +311,14 @@ def test_a_password_is_withheld(tmp_path):
 
 def test_a_station_check_is_recorded_with_every_device_and_drawn(tmp_path):
     path = tmp_path / "check.jsonl"
-    done = command(["station", "check", "--registers", "--record", str(path), "--units", "2"])
+    done = command(["station", "check", "--read-only", "--record", str(path), "--slots", "2"])
     assert done.returncode == 0, done.stderr
     recording = read_frames(path)
     assert {d.place for d in recording.devices} >= {"outer", "inner", "chamber", "reader", "slot 0", "slot 1"}
     chart = timeline(recording)
     assert set(chart.plots[0].y.names) >= {"outer", "chamber", "reader"}
     assert recording_module.active_recorder() is None
-    printed = command(["station", "frames", str(path), "--limit", "5"])
+    printed = command(["station", "frames", str(path), "--last", "5"])
     assert "the last 5 of" in printed.stdout
     document = json.loads(command(["station", "frames", str(path), "--json"]).stdout)
     assert len(document["frames"]) == len(recording.exchanges)

@@ -219,7 +219,7 @@ def test_a_certificate_is_told_as_its_guide_shows(line: Path, monkeypatch: pytes
     shown = [one for one in pages.examples(page) if one[1].strip()]
     assert [command.split()[1] for command, _ in shown] == ["certificate", "verify"]
     (line / "laboratory.toml").write_text(pages.blocks(page, "toml")[0], encoding="utf-8")
-    assert given("certify", "latest")[0] == 0
+    assert given("certificate", "issue", "latest")[0] == 0
     assert not wrong(*shown[0], 0.5)
     (signed,) = (command for command, _ in pages.examples(page) if "--sign-with" in command)
     key = made_key(ec.generate_private_key(ec.SECP256R1()))

@@ -17,8 +17,8 @@ from pipelines.importers.exchange import read_dwells
 from schemas.errors import DONE
 
 UP = "xp=+x,xm=-x,yp=+y,ym=-y,zp=+z,zm=-z"
-MAPPED = ("--map", "time=t,x=ax,y=ay,z=az", "--units", "output=LSB", "--unit", "A1")
-FITTED = ("--local-g", "9.80665", "--fit", "norm")
+MAPPED = ("--map", "time=t,x=ax,y=ay,z=az", "--unit-of", "output=LSB", "--units", "A1")
+FITTED = ("--set", "local_gravity_m_s2=9.80665", "--fit", "norm")
 
 pytestmark = pytest.mark.usefixtures("home")
 
@@ -92,7 +92,7 @@ def test_the_command_that_inspect_prints_imports_the_file(write, record: Recordi
 
 def test_inspect_draws_the_record_and_writes_a_page(record: Recording) -> None:
     Path("a.csv").write_text(frozen_file(record), encoding="utf-8")
-    document = document_of("inspect", "a.csv", "--picture", "a.svg", "--page", "a.html", status=0)
+    document = document_of("inspect", "a.csv", "--output", "a.svg", "--output", "a.html", status=0)
     assert [(fault["fault"], fault["axis"]) for fault in document["faults"]] == [("stuck_output", "z")]
     assert [column["resolution"] for column in document["columns"]][1:] == [1.0, 1.0, 1.0]
     assert "<svg" in Path("a.svg").read_text(encoding="utf-8")
@@ -108,9 +108,9 @@ def test_inspect_says_in_capitals_what_a_file_does_not_say_and_offers_to_join_se
     assert told.endswith("--rate HZ")
     parts = [written(part, name) for name, part in (("p1.csv", table[:half]), ("p2.csv", table[half:]))]
     _, out, _ = given("inspect", *parts)
-    assert "add --join rows (one after the other) or --join" in out
+    assert "add --set join=rows (one after the other) or --set join=" in out
     assert out.rstrip().splitlines()[-1].startswith("tumbleline import ")
-    assert "--join rows (one" not in text_of("inspect", *parts, "--join", "rows")
+    assert "--set join=rows (one" not in text_of("inspect", *parts, "--set", "join=rows")
 
 
 def test_an_axis_at_the_end_of_its_range_is_told_as_clipped() -> None:
@@ -159,11 +159,11 @@ def test_comments_quoted_line_breaks_and_joined_files_do_not_confuse_the_line(re
     assert "row 501, column 'az'" in refused_import(written(noted), *MAPPED)
     first = written(whole.iloc[:900])
     second = written(damaged(whole.iloc[900:].reset_index(drop=True), 40, "ax"), "b.csv", "# two\n")
-    told = refused_import(first, second, "--join", "rows", *MAPPED)
+    told = refused_import(first, second, "--set", "join=rows", *MAPPED)
     assert f"row 941 (line {line_of(second)} of b.csv)" in told
     beside = (written(damaged(whole[["t", "ax"]], 40, "ax"), "c.csv"), written(whole[["t", "ay", "az"]], "d.csv"))
     # two files side by side have no line in common
-    assert "row 41, column 'ax'" in refused_import(*beside, "--join", "columns", *MAPPED)
+    assert "row 41, column 'ax'" in refused_import(*beside, "--set", "join=columns", *MAPPED)
 
 
 def test_gaps_and_rows_without_a_number_are_refused_with_their_row_and_split_on_request(record: Recording) -> None:
@@ -171,12 +171,12 @@ def test_gaps_and_rows_without_a_number_are_refused_with_their_row_and_split_on_
     path.write_text(gapped_file(record), encoding="utf-8")
     told = refused_import(path, *MAPPED)
     assert "a.csv: row 701 (line 702), column 'ay': found nan" in told
-    assert "--gaps split" in told
+    assert "--set gaps=split" in told
     written(recordings.table(record).drop(index=range(1500, 1560)))
     gap = "1 gap in time longer than 5 samples, the first before row 1501, the longest 0.61 s"
     assert gap in refused_import(path, *MAPPED)
     path.write_text(gapped_file(record), encoding="utf-8")
-    document = imported(path, *MAPPED, "--gaps", "split")
+    document = imported(path, *MAPPED, "--set", "gaps=split")
     assert document["remarks"][0].startswith("2 of ")
     assert "the first is row 701 (line 702)" in document["remarks"][0]
     assert document["samples"] == len(record.time) - 62
@@ -190,8 +190,8 @@ def test_positions_logged_back_to_back_are_seen_and_divided(rng: np.random.Gener
     frame = pd.DataFrame(full.output[keep], columns=["ax", "ay", "az"]).assign(t=np.arange(keep.size) / 100.0)
     told = refused_import(written(frame), *MAPPED)
     assert "positions logged back to back" in told
-    assert "--positions 20" in told
-    document = imported("a.csv", *MAPPED, "--positions", "20")
+    assert "--set positions=20" in told
+    document = imported("a.csv", *MAPPED, "--set", "positions=20")
     means = np.array([one["mean"] for one in document["dwell_list"]])
     truth = np.array([full.output[a : a + 40].mean(axis=0) for a, _ in full.spans])
     np.testing.assert_allclose(means, truth, atol=5.0)
@@ -202,10 +202,10 @@ def test_a_frozen_axis_among_unknown_poses_is_named_and_what_is_sound_is_used(re
     told = refused_import("a.csv", *MAPPED)
     assert "axis z is constant for" in told
     assert f"from row {record.spans[4][0] + 1} on" in told
-    document = imported("a.csv", *MAPPED, "--faulty", "leave-out")
+    document = imported("a.csv", *MAPPED, "--set", "faulty=leave-out")
     assert document["dwells"] == 8
     assert [fault["fault"] for fault in document["faults"]] == ["stuck_output"]
-    assert imported("a.csv", *MAPPED, "--faulty", "keep")["dwells"] == 9
+    assert imported("a.csv", *MAPPED, "--set", "faulty=keep")["dwells"] == 9
 
 
 def test_torn_words_are_named_and_left_out_of_the_means(record: Recording, rng: np.random.Generator) -> None:
@@ -216,7 +216,7 @@ def test_torn_words_are_named_and_left_out_of_the_means(record: Recording, rng: 
     told = refused_import(written(frame), *MAPPED)
     assert "axis x has torn words" in told
     assert "±256 steps of its resolution" in told
-    document = imported("a.csv", *MAPPED, "--faulty", "leave-out")
+    document = imported("a.csv", *MAPPED, "--set", "faulty=leave-out")
     assert document["dwells"] == clean["dwells"]
     for one, other in zip(document["dwell_list"], clean["dwell_list"], strict=True):
         np.testing.assert_allclose(one["mean"], other["mean"], atol=2.0)  # 7 with the torn words
@@ -227,27 +227,27 @@ def test_two_files_one_after_another_are_one_recording(record: Recording) -> Non
     half = record.spans[4][0] + 100
     first = written(frame.iloc[:half], "1.csv")
     second = written(frame.iloc[half:].assign(t=lambda f: f.t - f.t.iloc[0]), "2.csv")
-    document = imported(first, second, *MAPPED, "--join", "rows")
+    document = imported(first, second, *MAPPED, "--set", "join=rows")
     assert document["samples"] == len(frame)
     assert [one["path"] for one in document["source"]["files"]] == [str(first), str(second)]
     assert "2.csv: its clock restarts; it is continued after 1.csv" in document["remarks"]
     boundary = (half - 0.5) / 100.0
     assert all(not one["start_s"] < boundary < one["end_s"] for one in document["dwell_list"])
     other = written(frame.rename(columns={"ax": "bx"}), "3.csv")
-    assert "the same are needed" in refused_import(first, other, *MAPPED, "--join", "rows")
+    assert "the same are needed" in refused_import(first, other, *MAPPED, "--set", "join=rows")
 
 
 def test_columns_of_two_files_stand_side_by_side_by_their_clocks(record: Recording) -> None:
     slow = np.arange(0.0, record.time[-1] + 2.0, 1.0)
     files = (written(recordings.table(record), "acc.csv"), written(pd.DataFrame({"t": slow, "ax": 20.0 + 0.1 * slow})))
-    words = ("--map", "time=t,x=ax,y=ay,z=az,temperature=2:ax", *MAPPED[2:], "--join", "columns")
+    words = ("--map", "time=t,x=ax,y=ay,z=az,temperature=2:ax", *MAPPED[2:], "--set", "join=columns")
     dwells = read_dwells(imported(*files, *words)["run"])
     np.testing.assert_allclose(dwells["unit_C"], 20.0 + 0.1 * dwells["time_s"], atol=1e-6)
 
 
 def test_a_list_of_dwells_has_residual_and_influence_of_a_fit(rng: np.random.Generator) -> None:
     path = written(recordings.table(recordings.counts(rng, positions=16)))
-    assert "residual, µg" in text_of("import", path, *MAPPED, *FITTED, "--list-dwells")
+    assert "residual, µg" in text_of("import", path, *MAPPED, *FITTED, "--all")
     document = imported(path, *MAPPED, *FITTED, status=None)
     residual = np.array([row["residual_ug"] for row in document["dwell_list"]])
     assert np.sqrt(np.mean(residual**2)) == pytest.approx(document["error"]["rms_ug"], rel=0.05)
@@ -257,9 +257,9 @@ def test_a_list_of_dwells_has_residual_and_influence_of_a_fit(rng: np.random.Gen
 
 def test_window_threshold_and_shortest_decide_what_a_dwell_is(record: Recording) -> None:
     path = written(recordings.table(record))
-    assert imported(path, *MAPPED, "--shortest", "4")["dwells"] < 9
-    assert imported(path, *MAPPED, "--threshold", "0.001")["dwells"] == 0
-    found = imported(path, *MAPPED, "--window", "0.5")
+    assert imported(path, *MAPPED, "--set", "shortest_s=4")["dwells"] < 9
+    assert imported(path, *MAPPED, "--set", "threshold=0.001")["dwells"] == 0
+    found = imported(path, *MAPPED, "--set", "window_s=0.5")
     assert found["dwells"] == 9
     status, _, err = given("export", found["run"])
     assert status in {2, 3}
@@ -271,9 +271,9 @@ def test_a_unit_that_the_file_states_is_taken_and_not_contradicted(record: Recor
     frame = recordings.table(record)
     frame[["ax", "ay", "az"]] /= 16384.0
     path = written(frame.set_axis(["t [s]", "ax [g]", "ay [g]", "az [g]"], axis=1))
-    words = (path, "--map", "time=t [s],x=ax [g],y=ay [g],z=az [g]", "--unit", "A1")
+    words = (path, "--map", "time=t [s],x=ax [g],y=ay [g],z=az [g]", "--units", "A1")
     assert imported(*words)["out_unit"] == "g"
-    assert "the file states g for its output" in refused_import(*words, "--units", "output=m/s^2")
+    assert "the file states g for its output" in refused_import(*words, "--unit-of", "output=m/s^2")
 
 
 def test_a_dead_axis_is_named_instead_of_asking_for_more_poses(record: Recording) -> None:
@@ -291,10 +291,19 @@ def test_one_pose_says_what_it_shows_and_is_not_told_to_fit_a_scale() -> None:
     frame = pd.DataFrame(output, columns=["ax", "ay", "az"]).assign(t=time, temp=25.0 + 5.0 * np.sin(time / 20.0))
     told = text_of("import", written(frame), *MAPPED, status=0)
     assert "12000 samples, 1 dwell in LSB" in told
-    assert "one pose whose force is not known: its noise by 'tumbleline allan'" in told
-    assert "--face +x … -z" in told
-    mapped = ("--map", f"{MAPPED[1]},temperature=temp", "--unit", "P1", "--face", "+z", "--local-g", "9.81")
-    told = text_of("import", "a.csv", *mapped, "--units", "output=LSB", "--blocks", "10")
+    assert "one pose whose force is not known: its noise by 'tumbleline noise allan'" in told
+    assert "--set face=+x … -z" in told
+    mapped = (
+        "--map",
+        f"{MAPPED[1]},temperature=temp",
+        "--units",
+        "P1",
+        "--set",
+        "face=+z",
+        "--set",
+        "local_gravity_m_s2=9.81",
+    )
+    told = text_of("import", "a.csv", *mapped, "--unit-of", "output=LSB", "--set", "block_s=10")
     assert "12 dwells in LSB" in told
     assert "one pose whose" not in told
     fit = ("fit", "latest", "--effects", "bias,bias_temperature")
@@ -302,9 +311,9 @@ def test_one_pose_says_what_it_shows_and_is_not_told_to_fit_a_scale() -> None:
     said = " ".join((out + err).split())
     assert "add 'scale'" not in said
     assert "divide the outputs" in said
-    assert "--units output=g" in said
+    assert "--unit-of output=g" in said
     frame[["ax", "ay", "az"]] /= 16384.0  # the advice, followed, leads to a fit
-    imported(written(frame), *mapped, "--units", "output=g", "--blocks", "10")
+    imported(written(frame), *mapped, "--unit-of", "output=g", "--set", "block_s=10")
     text_of(*fit)
 
 
@@ -320,8 +329,8 @@ def test_faces_without_a_known_noise_print_no_number_that_is_none() -> None:
             face=["xp", "xm", "yp", "ym", "zp", "zm"]
         )
         _, said, _ = given(
-            "import", written(frame), "--map", "x=x,y=y,z=z,dwell=face", "--rows", "dwells", "--units", "output=g",
-            "--unit", "S1", "--poses", UP, "--local-g", "9.81", "--fit", "faces",
+            "import", written(frame), "--map", "x=x,y=y,z=z,dwell=face", "--set", "rows=dwells", "--unit-of", "output=g",
+            "--units", "S1", "--set", f"poses={UP}", "--set", "local_gravity_m_s2=9.81", "--fit", "faces",
         )  # fmt: skip
         assert "nan" not in said
         assert "lack of fit" in said

@@ -71,8 +71,8 @@ verification_norm_ug = { max = 3000.0, unit = "µg" }
 bias_error_ug = { max = 3000.0, unit = "µg" }
 zero_g_offset_mg = { max = 150.0, unit = "mg" }
 """
-STATED = ("--references", "lab.toml", "--measured", "2026-11-20", "--verify", "8", "--zero-output", "32768")
-STANDARD = ("--local-g", "9.80665")
+STATED = ("--references", "lab.toml", "--set", "measured=2026-11-20", "--set", "verify=8", "--set", "zero_output=32768")
+STANDARD = ("--set", "local_gravity_m_s2=9.80665")
 
 
 @pytest.fixture(autouse=True)
@@ -88,7 +88,7 @@ def words_of(what: Recording, seed: int, *more: str) -> tuple[str, ...]:
     """The import of a recording as dwells."""
     path = f"hand-{seed}.csv"
     make(what, seed).dwells.to_csv(path, index=False)
-    return ("import", path, "--map", DWELLS, "--units", "output=LSB", "--unit", "H1", "--rows", "dwells", *more)
+    return ("import", path, "--map", DWELLS, "--unit-of", "output=LSB", "--units", "H1", "--set", "rows=dwells", *more)
 
 
 def imported(what: Recording, seed: int, *more: str, status: int | None = DONE) -> dict[str, Any]:
@@ -119,17 +119,19 @@ def test_from_a_recording_of_unknown_poses_to_a_report_and_no_certificate() -> N
     (unit,) = json.loads(given("export", fitted["run"])[1])["units"]
     np.testing.assert_allclose(unit["bias"][0], make(DRIFTING, 71).bias, atol=3.0)
     assert "warm_up" in str(unit)
-    page = Path(given("report", fitted["run"])[1].strip()).read_text(encoding="utf-8")
+    page = Path(given("show", fitted["run"], "--report")[1].strip()).read_text(encoding="utf-8")
     assert "Coefficients" in page
     assert "degrees of freedom" in page
-    assert "was imported without a statement of its references (noise only)" in refused("certify", fitted["run"])
-    told = refused("certificate", "H1", "--laboratory", "laboratory.toml")
+    assert "was imported without a statement of its references (noise only)" in refused(
+        "certificate", "issue", fitted["run"]
+    )
+    told = refused("certificate", "write", "H1", "--laboratory", "laboratory.toml")
     assert "unit H1 has no certificate, one is needed" in told
     # an adequate model is needed besides, however wide the limits are
     Path("wide.toml").write_text(BENCH.replace("300.0", "9000.0"), encoding="utf-8")
     plain = document_of("fit", first["run"], "--effects", PLAIN, "--limits", "wide.toml", status=1)
     assert ([unit["outcome"] for unit in plain["units"]], plain["adequate"]) == (["pass"], False)
-    assert "is NOT ADEQUATE" in refused("certify", plain["run"])
+    assert "is NOT ADEQUATE" in refused("certificate", "issue", plain["run"])
     text_of("verify", status=0)
 
 
@@ -168,13 +170,13 @@ def test_known_poses_go_the_same_way() -> None:
         dwells[f"sd_{axis}"] = 3e-5 * np.sqrt(dwells["n"])
     dwells.to_csv("poses.csv", index=False)
     columns = f"{DWELLS},force_x=fx,force_y=fy,force_z=fz,hum=hum"
-    words = ("poses.csv", "--map", columns, "--units", "output=g", "--unit", "P1", "--rows", "dwells")
+    words = ("poses.csv", "--map", columns, "--unit-of", "output=g", "--units", "P1", "--set", "rows=dwells")
     run = document_of("import", *words)["run"]
     fitted = document_of("fit", run, "--effects", f"{PLAIN},covariate:hum", status=0)
     assert fitted["adequate"] is True
     unit = json.loads(given("export", fitted["run"])[1])["units"][0]
     np.testing.assert_allclose(unit["bias"][0], [0.01, -0.02, 0.03], atol=1e-4)
-    text_of("report", fitted["run"], status=0)
+    text_of("show", fitted["run"], "--report", status=0)
 
 
 def test_angles_of_a_table_are_poses_for_a_fit_as_for_a_diagnosis() -> None:
@@ -189,13 +191,21 @@ def test_angles_of_a_table_are_poses_for_a_fit_as_for_a_diagnosis() -> None:
     )
     dwells[[*SPREAD_COLUMNS]] = np.outer(3e-5 * np.sqrt(dwells["n"]), np.ones(3))
     dwells.assign(unit="P1", dwell=range(len(outer))).to_csv("table.csv", index=False)
-    words = ("table.csv", "--map", f"{DWELLS},outer=outer_deg,inner=inner_deg", "--units", "output=g", "--unit", "P1")
-    run = document_of("import", *words, "--rows", "dwells")["run"]
+    words = (
+        "table.csv",
+        "--map",
+        f"{DWELLS},outer=outer_deg,inner=inner_deg",
+        "--unit-of",
+        "output=g",
+        "--units",
+        "P1",
+    )
+    run = document_of("import", *words, "--set", "rows=dwells")["run"]
     fitted, of_file = document_of("fit", run, status=0), document_of("diagnose", "table.csv", status=0)
     assert fitted["adequate"] is of_file["adequate"] is True
     assert document_of("diagnose", run)["error"] == pytest.approx(of_file["error"])
     bare = document_of(
-        "import", *words[:2], f"{COLUMNS},outer=outer_deg,inner=inner_deg", *words[3:], "--rows", "dwells"
+        "import", *words[:2], f"{COLUMNS},outer=outer_deg,inner=inner_deg", *words[3:], "--set", "rows=dwells"
     )["run"]
     by_residuals = document_of("fit", bare, status=0)  # the noise that no samples tell is that of the residuals
     assert by_residuals["adequate"] is True
@@ -206,7 +216,7 @@ def test_angles_of_a_table_are_poses_for_a_fit_as_for_a_diagnosis() -> None:
 def test_samples_in_the_hand_become_dwells_that_agree_with_the_truth() -> None:
     what = Recording(26, "white 100, axes 1:2:3", sensor=3)
     samples_of(what, 31).round({"x": 2, "y": 2, "z": 2}).to_csv("hand.csv", index=False)
-    words = ("--map", "time=time_s,x=x,y=y,z=z", "--units", "output=LSB", "--unit", "H2", *STANDARD, "--fit", "norm")
+    words = ("--map", "time=time_s,x=x,y=y,z=z", "--unit-of", "output=LSB", "--units", "H2", *STANDARD, "--fit", "norm")
     answer = document_of("import", "hand.csv", *words)
     assert 24 <= answer["dwells"] <= 28
     off = np.abs(np.array(answer["bias"]) - make(what, 31).bias)
@@ -215,10 +225,10 @@ def test_samples_in_the_hand_become_dwells_that_agree_with_the_truth() -> None:
 
 def test_an_import_that_was_not_fitted_is_advised_and_a_fit_that_fails_leaves_no_run() -> None:
     run = imported(Recording(20), 2)["run"]
-    for command in ("export", "report"):
-        _, _, err = given(command, run)
+    for words in (("export", run), ("show", run, "--report")):
+        _, _, err = given(*words)
         assert f"fit it with 'tumbleline fit {run} --effects" in " ".join(err.split())
-    assert f"tumbleline fit {run} --limits FILE" in refused("certify", run)
+    assert f"tumbleline fit {run} --limits FILE" in refused("certificate", "issue", run)
     for command in ("fit", "rerun"):
         status, out, err = given(command, run, "--effects", f"{PLAIN},supply_sensitivity")
         assert "supply" in out + err
@@ -242,18 +252,18 @@ def test_from_a_recording_with_stated_references_to_its_certificate() -> None:
     assert sums.loc[("bias_error", "x"), "shown"] < 1.0
     assert sums.loc[("bias_error", "x"), "unseen"] > 100.0
     assert not {("misalignment", axis) for axis in ("yx", "zx", "zy")} & set(sums.index)
-    text_of("report", fitted["run"], status=0)
-    (certified,) = document_of("certify", fitted["run"])["certified"]
+    text_of("show", fitted["run"], "--report", status=0)
+    (certified,) = document_of("certificate", "issue", fitted["run"])["certified"]
     assert (certified["certificate"], certified["station"]) == ("H1/1", "lab-2")
     page = Archive(None).run(fitted["run"]).report.read_text(encoding="utf-8")
     for words in ("H1/1", "Uncertainty budget", "G-2025-7", "dwells were held out of the fit", "of the worst axis"):
         assert words in page
     assert "not stated: level" not in page
     assert "H1/1" in text_of("export", fitted["run"])
-    text_of("certificate", "H1", status=0)
+    text_of("certificate", "write", "H1", status=0)
     assert "local gravity" in Path("H1_1.xml").read_text(encoding="utf-8")
     text_of("verify", status=0)
-    text_of("revoke", "H1", "--reason", "fell to the floor", status=0)
+    text_of("certificate", "revoke", "H1", "--reason", "fell to the floor", status=0)
     page = (
         Archive(None).run(fitted["run"]).report.read_text(encoding="utf-8")
     )  # made again, as that of a captured run is
@@ -276,19 +286,19 @@ RULES = {
 def test_the_rules_of_the_budget_hold_for_an_import(words: str) -> None:
     Path("lab.toml").write_text(REFERENCES.replace(*RULES[words]), encoding="utf-8")
     fitted = document_of("fit", document_of(*hand_held(*STATED))["run"], "--limits", "limits.toml")
-    assert words in refused("certify", fitted["run"])
+    assert words in refused("certificate", "issue", fitted["run"])
 
 
 SLIPS = {
-    "they differ by -282 ppm; leave --local-g out": ("u_ppm = 200.0", "u_ppm = 0.5", *STANDARD),
+    "they differ by -282 ppm; leave local_gravity_m_s2 out": ("u_ppm = 200.0", "u_ppm = 0.5", *STANDARD),
     "9.80665 is standard gravity, not a site's value": ("value_m_s2 = 9.80942", "value_m_s2 = 9.80665"),
     "no [[reference]] is called 'PT-8'": ('reference = "PT-7"', 'reference = "PT-8"'),
     "key 'uncertainty.gravity' is missing": ("gravity = ", "# gravity = "),
     "offset_U_K": ("offset_U_K = 2.0", "offset_K = 2.0"),
-    "--measured 2999-01-01 lies in the future": ("", "", "--measured", "2999-01-01"),
-    "measured": ("", "", "--measured", "yesterday"),
-    "leaves 8 of them, 12 are needed for the fit": ("", "", "--verify", "40"),
-    "a number of dwells or a share such as 20% is needed": ("", "", "--verify", "some"),
+    "measured 2999-01-01 lies in the future": ("", "", "--set", "measured=2999-01-01"),
+    "measured": ("", "", "--set", "measured=yesterday"),
+    "leaves 8 of them, 12 are needed for the fit": ("", "", "--set", "verify=40"),
+    "a number of dwells or a share such as 20% is needed": ("", "", "--set", "verify=some"),
 }
 
 
@@ -300,7 +310,7 @@ def test_a_statement_with_a_slip_is_refused(words: str) -> None:
 
 
 def test_the_day_of_the_measurement_is_needed_beside_references() -> None:
-    assert "add --measured YYYY-MM-DD" in refused(*hand_held("--references", "lab.toml"))
+    assert "add --set measured=YYYY-MM-DD" in refused(*hand_held("--references", "lab.toml"))
 
 
 def test_a_level_error_of_a_plate_is_named_where_the_headings_are_given() -> None:
@@ -322,16 +332,16 @@ def test_a_level_error_of_a_plate_is_named_where_the_headings_are_given() -> Non
             headings.append(f"{label}={heading}")
     frame = pd.DataFrame(np.concatenate(rows), columns=["x", "y", "z"]).assign(label=labels)
     frame.to_csv("plate.csv", index=False)
-    words = ("plate.csv", "--map", "x=x,y=y,z=z,dwell=label", "--units", "output=g", "--rate", "100", "--unit", "P")
-    known = ("import", *words, "--poses", ",".join(poses), *STANDARD, "--headings")
-    run = document_of(*known, ",".join(headings))["run"]
+    words = ("plate.csv", "--map", "x=x,y=y,z=z,dwell=label", "--unit-of", "output=g", "--rate", "100", "--units", "P")
+    known = ("import", *words, "--set", f"poses={','.join(poses)}", *STANDARD, "--set")
+    run = document_of(*known, f"headings={','.join(headings)}")["run"]
     assert [group["effects"] for group in document_of("diagnose", run)["classes"]] == [["level_error"]]
     fitted = document_of("fit", run, "--effects", f"{PLAIN},level_error")
     assert fitted["adequate"] is True
     found = table(fitted["run"], "coefficients")
     level = found[found["effect"] == "level_error"].set_index("name")["value"]
     assert [level["level_1"], level["level_2"]] == pytest.approx([3e-3, -2e-3], abs=5e-5)
-    assert "a heading for every pose is needed" in refused(*known, ",".join(headings[:-1]))
+    assert "a heading for every pose is needed" in refused(*known, f"headings={','.join(headings[:-1])}")
 
 
 def test_a_file_of_one_plane_is_calibrated_in_that_plane() -> None:
@@ -342,7 +352,18 @@ def test_a_file_of_one_plane_is_calibrated_in_that_plane() -> None:
     columns = {f"out_{axis}": out[:, k] for k, axis in enumerate("xyz")}
     frame = pd.DataFrame({**columns, **{f"f{axis}": force[:, k] for k, axis in enumerate("xyz")}})
     frame.assign(time_s=30.0 * np.arange(24), sd=2e-4, n=100).to_csv("tilt.csv", index=False)
-    words = ("import", "tilt.csv", "--units", "output=g,time=s", "--unit", "T", "--rows", "dwells", *STANDARD, "--map")
+    words = (
+        "import",
+        "tilt.csv",
+        "--unit-of",
+        "output=g,time=s",
+        "--units",
+        "T",
+        "--set",
+        "rows=dwells",
+        *STANDARD,
+        "--map",
+    )
     mapped = f"{COLUMNS},sd_x=sd,sd_y=sd,sd_z=sd,n=n"
     unknown = document_of(*words, mapped, "--fit", "norm")
     assert (unknown["adequate"], unknown["across"]) == (True, "y")
@@ -354,5 +375,5 @@ def test_a_file_of_one_plane_is_calibrated_in_that_plane() -> None:
     found = table(fitted["run"], "coefficients")
     scale = found[found["effect"] == "scale"].set_index("axis")["value"]
     assert dict(scale) == pytest.approx({"x": 1.01, "z": 1.005}, abs=5e-5)
-    for command in ("export", "certify"):
-        assert "the scale of y is not known" in refused(command, fitted["run"])
+    for words in (("export",), ("certificate", "issue")):
+        assert "the scale of y is not known" in refused(*words, fitted["run"])

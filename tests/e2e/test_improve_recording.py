@@ -57,7 +57,7 @@ def test_a_still_record_is_blocks_of_one_pose_without_the_hand_at_its_ends(rng: 
     frame.to_csv("still.csv", index=False, float_format="%.5f")
     document = document_of("improve", "still.csv", "--no-measure")
     one = document["recording"]
-    assert "--face +z --blocks 10" in one["command"]
+    assert "--set face=+z --set block_s=10" in one["command"]
     assert any(text.startswith("handling at the ends left out: 0 to 3") for text in one["remarks"])
     slope = Archive(None).run(one["run"]).table("dwells")
     fitted = np.polyfit(slope["unit_C"], slope["out_z"], 1)[0]
@@ -90,10 +90,21 @@ def test_six_faces_are_named_by_what_they_read_and_two_exchanged_labels_are_told
     table = Archive(None).run(document["recording"]["run"]).table("coefficients")
     bias = [row["value"] for row in table.to_dict("records") if row["effect"] == "bias"]
     np.testing.assert_allclose(bias, [0.02, -0.01, 0.03], atol=0.004)
-    how = ["--map", "x=X,y=Y,z=Z,dwell=Position", "--units", "output=g", "--rows", "dwells", "--unit", "A"]
+    how = ["--map", "x=X,y=Y,z=Z,dwell=Position", "--unit-of", "output=g", "--set", "rows=dwells", "--units", "A"]
     labels = dict(zip([f"side {k}" for k in (2, 1, 0, 3, 4, 5)], faces, strict=True))  # +x and +y exchanged
     poses = ",".join(f"{label}={face}" for label, face in labels.items())
-    answer = document_of("import", "six.csv", *how, "--poses", poses, "--local-g", G, "--fit", "faces", status=1)
+    answer = document_of(
+        "import",
+        "six.csv",
+        *how,
+        "--set",
+        f"poses={poses}",
+        "--set",
+        f"local_gravity_m_s2={G}",
+        "--fit",
+        "faces",
+        status=1,
+    )
     assert "with +x and +y exchanged they agree" in answer["reason"]
 
 

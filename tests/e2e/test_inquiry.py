@@ -85,7 +85,7 @@ def test_a_follow_up_has_a_report_is_listed_and_shown_and_is_no_model_of_its_own
     kept = json.loads((follower.path / "inquiry.json").read_text(encoding="utf-8"))
     assert kept["runs"][0] == told_apart[1]["run"]
     assert next(info for info in archive.runs() if info.id == follower.id).finished
-    text_of("report", follower.id, "--archive", archive.root, status=0)
+    text_of("show", follower.id, "--report", "--archive", archive.root, status=0)
     document_of("show", follower.id, "--archive", archive.root)
     assert follower.id not in [entry.id for entry in selected(archive, ["all"])]
     with pytest.raises(WrongUse, match="has too few poses for a model of its own"):
@@ -184,7 +184,7 @@ def test_a_flow_waits_for_approval_and_goes_on_when_it_is_given(tmp_path: Path) 
     words = [*command, *map(str, investigation(tmp_path)), "--ask", "--json"]
     pipes = {"stdin": subprocess.DEVNULL, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
     process = subprocess.Popen(words, cwd=ROOT, env=environment, **pipes)
-    operator = [*command, "operator", "--archive", str(tmp_path / "archive"), "--json"]
+    operator = [*command, "station", "operator", "--archive", str(tmp_path / "archive"), "--json"]
 
     def asked(*more: str) -> subprocess.CompletedProcess[str]:
         own = {"cwd": ROOT, "env": environment, "capture_output": True, "text": True}
@@ -194,12 +194,12 @@ def test_a_flow_waits_for_approval_and_goes_on_when_it_is_given(tmp_path: Path) 
         end, waiting = time.monotonic() + 150.0, []
         while not waiting and time.monotonic() < end and process.poll() is None:
             done = asked()
-            waiting = typed_document("operator", done.stdout)["waiting"] if done.returncode == 0 else []
+            waiting = typed_document("station", "operator", done.stdout)["waiting"] if done.returncode == 0 else []
         assert "approve: measure " in waiting[0]["question"]
         assert "third_order" in waiting[0]["question"]
         for _ in range(6):
             with suppress(subprocess.TimeoutExpired):
-                asked("--go")
+                asked("--answer", "go")
                 process.wait(10.0)
                 break
         output, errors = process.communicate(timeout=120)

@@ -84,7 +84,7 @@ def test_a_recording_of_a_robot_becomes_a_model(tmp_path, monkeypatch):
     assert content.units["linear_acceleration.x"] == "m/s^2"
     with pytest.raises(DataRejected, match=r"/state .* has no numbers"):
         files.read_content(tmp_path / "imu.mcap", "/state")
-    done = command(["improve", "imu.mcap", "--group", "/imu/data"])
+    done = command(["improve", "imu.mcap", "--set", "group=/imu/data"])
     assert done.returncode in {0, 1}, done.stderr
     assert "x: bias 0.10" in done.stdout, done.stdout
 

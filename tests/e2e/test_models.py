@@ -62,13 +62,13 @@ def test_compare_extend_and_history_see_the_error_fall(tmp_path: Path) -> None:
     spec = Spec(effects=("third_order",), sizes=(3.0,), plan="fibonacci24", soaks="one", repeats=3, units=4)
     folder, model = written(spec, tmp_path), tmp_path / "model.toml"
     lot = (folder / "dwells.parquet", "--fresh", folder / "fresh.parquet")
-    made = text_of("extend", model, "third_order", "--effects", PLAIN, "--why", "the maps", "--by", "Q", status=0)
+    made = text_of("extend", model, "third_order", "--effects", PLAIN, "--reason", "the maps", "--who", "Q", status=0)
     assert "created with version 1" in made
     assert document_of("extend", model, "bias_asymmetry")["version"] == 3
     after, before = (document_of("compare", *lot, *how) for how in (("--model", model), ("--effects", PLAIN)))
     assert after["fresh_rms_ug"] < 0.5 * before["fresh_rms_ug"]
     picture = tmp_path / "history.png"
-    words = ("history", model, "--dwells", *lot, "--picture", picture)
+    words = ("history", model, "--dwells", *lot, "--output", picture)
     rows = document_of(*words)["versions"]
     assert [row["confirmed"] for row in rows[:2]] == [None, True]
     assert rows[2]["confirmed"] is not True
@@ -82,12 +82,12 @@ REFUSED = {
     "m.toml second_order": "in version 2 already",
     "m.toml forth_order": "did you mean fourth_order",
     "m.toml third_order --effects bias": "--effects is for a new file",
-    "m.toml --remove scale_temperatur --why x": "did you mean scale_temperature",
-    "m.toml --remove scale": "add --why TEXT",
-    "m.toml third_order --remove scale --why x": "EFFECT and --remove are both given",
+    "m.toml --remove scale_temperatur --reason x": "did you mean scale_temperature",
+    "m.toml --remove scale": "add --reason TEXT",
+    "m.toml third_order --remove scale --reason x": "EFFECT and --remove are both given",
     "m.toml": "no effect is given",
-    "one.toml --remove bias --why x": "the only effect",
-    "none.toml --remove bias --why x": "needs a model file",
+    "one.toml --remove bias --reason x": "the only effect",
+    "none.toml --remove bias --reason x": "needs a model file",
 }
 
 
@@ -104,12 +104,12 @@ def test_a_version_that_cannot_be_is_refused_and_leaves_the_file_alone(
 
 
 def test_another_file_takes_the_next_version_and_a_removed_effect_stays_in_the_history(home: Path) -> None:
-    text_of("extend", "m.toml", "third_order", "--by", "Q")
+    text_of("extend", "m.toml", "third_order", "--who", "Q")
     text = Path("m.toml").read_text(encoding="utf-8")
-    text_of("extend", "m.toml", "second_order", "--out", "next.toml")
+    text_of("extend", "m.toml", "second_order", "--output", "next.toml")
     assert Path("m.toml").read_text(encoding="utf-8") == text
     assert "second_order" in Path("next.toml").read_text(encoding="utf-8")
-    document = document_of("extend", "m.toml", "--remove", "third_order", "--why", "refuted", "--by", "R", status=0)
+    document = document_of("extend", "m.toml", "--remove", "third_order", "--reason", "refuted", "--who", "R", status=0)
     assert (document["version"], document["added"], document["removed"]) == (3, None, "third_order")
     history = versions(read_model(Path("m.toml")))
     assert [(v.added, v.removed) for v in history] == [((), ()), (("third_order",), ()), ((), ("third_order",))]
@@ -117,7 +117,7 @@ def test_another_file_takes_the_next_version_and_a_removed_effect_stays_in_the_h
     told = text_of("history", "m.toml", status=0)
     assert "+ third_order" in told
     assert "− third_order" in told
-    assert "they need --dwells" in refused("history", "m.toml", "--picture", "p.png")
+    assert "they need --dwells" in refused("history", "m.toml", "--output", "p.png")
 
 
 def test_the_guide_finds_adds_and_confirms_the_hidden_effect(improved: tuple[Path, str]) -> None:
@@ -139,7 +139,7 @@ def test_a_question_that_is_refused_or_not_answered_writes_nothing(
     alike: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     target = tmp_path / "m.toml"
-    words = ("improve", alike / "dwells.parquet", "--effects", PLAIN, "--out", target)
+    words = ("improve", alike / "dwells.parquet", "--effects", PLAIN, "--output", target)
     typing(monkeypatch, "perhaps\nn\n")
     status, out, err = given(*words, columns=80)
     assert status == 1
@@ -152,14 +152,14 @@ def test_a_question_that_is_refused_or_not_answered_writes_nothing(
     status, _, err = given(*words)
     assert (status, "give --yes to run without an operator" in " ".join(err.split())) == (2, True)
     assert not target.exists()
-    assert "--no-prompts" in terminal.UNATTENDED  # other questions keep their words
+    assert "--yes" in terminal.UNATTENDED  # other questions keep their words
 
 
 def test_a_class_of_several_is_not_decided_by_yes_but_by_an_answer_or_a_name(
     alike: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     target = tmp_path / "m.toml"
-    words = ("improve", alike / "dwells.parquet", "--effects", PLAIN, "--out", target)
+    words = ("improve", alike / "dwells.parquet", "--effects", PLAIN, "--output", target)
     (choice, *_) = document_of(*words, "--yes", status=1)["choices"]
     assert choice["not_separated_from"]
     assert (choice["decided_by"], choice["added"], target.exists()) == ("undecided", False, False)
@@ -181,7 +181,7 @@ def test_an_adequate_model_is_left_alone_and_what_cannot_be_writes_nothing(alike
     assert (document["added"], document["choices"], document["after"], document["next"]) == ([], [], None, [])
     assert len(document["ladder"]) == 1
     assert model.read_text(encoding="utf-8") == before
-    words = ("improve", data, "--effects", PLAIN, "--out", target)
+    words = ("improve", data, "--effects", PLAIN, "--output", target)
     status, _, err = given(*words, "--effect", "second_ordr")
     assert (status, "did you mean second_order" in err) == (2, True)
     target.write_text("a model of somebody else", encoding="utf-8")
@@ -196,7 +196,7 @@ def test_a_run_of_an_archive_is_improved_and_its_next_line_names_the_archive(
     kept, target = tmp_path / "kept", tmp_path / "m.toml"
     unpack(ROOT / "tests" / "archives" / "v1.tar.xz", kept)
     typing(monkeypatch, "\n" * 9)
-    words = ("--archive", kept, "--out", target, "--effects", f"{PLAIN},scale_temperature")
+    words = ("--archive", kept, "--output", target, "--effects", f"{PLAIN},scale_temperature")
     document = document_of("improve", "latest", *words)
     assert document["added"]
     assert document["next"]
@@ -215,7 +215,7 @@ def test_the_demonstration_finds_what_it_hid_and_a_player_may_add_something_else
 ) -> None:
     asked = []
     monkeypatch.setattr("pipelines.demo.measure.measure", lambda *which: asked.append(which[:2]) or measured_game)
-    words = ("demo", "--effect", "cubic_transfer", "--seed", "7", "--folder")
+    words = ("demo", "cubic_transfer", "--seed", "7", "--folder")
     document = document_of(*words, tmp_path / "game", status=0)
     assert asked == [(scene("cubic_transfer", 7), 7)]
     assert document["hidden"]["effect"] == "third_order"
@@ -228,6 +228,6 @@ def test_the_demonstration_finds_what_it_hid_and_a_player_may_add_something_else
     assert "a spring that hardens" in told
     assert "Found." in told
     assert "fifth_order" in (tmp_path / "played" / "model.toml").read_text(encoding="utf-8")
-    wrong = ("demo", "--effect", "cubic_transfr", "--auto", "--folder", tmp_path / "none")
+    wrong = ("demo", "cubic_transfr", "--yes", "--folder", tmp_path / "none")
     assert "did you mean cubic_transfer" in refused(*wrong)
     assert not (tmp_path / "none").exists()

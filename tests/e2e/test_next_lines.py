@@ -29,6 +29,7 @@ ELSEWHERE = {
     "investigate": HERE + "test_the_lines_after_an_investigation_name_the_judged_model",
     "improve_text": HERE + "test_the_lines_after_an_improvement_decide_between_alternatives",
     "demo": HERE + "test_the_lines_of_the_demonstration_run_by_hand",
+    "certificate_issue": "tests/unit/pipelines/cli/test_next_commands.py::test_the_line_about_documents_names_the_archive",
     "plan_text": "tests/e2e/test_plan.py::test_the_line_after_a_search_measures_the_new_recipe",
 }
 """Where the lines of a module are run that prints them after minutes only, or after several commands."""
@@ -84,12 +85,23 @@ def _run(folder: Path) -> tuple[int, str, str]:
 
 
 def _refuted(folder: Path) -> tuple[int, str, str]:
-    return 0, f"  {removal(folder / 'm.toml', 'third_order')}", ""
+    return 0, f"  {removal(folder / 'm.toml', (), 'third_order')}", ""
 
 
 def _imported(folder: Path) -> tuple[int, str, str]:
     columns = "unit=unit,dwell=dwell,time=time_s,x=out_x,y=out_y,z=out_z,n=n"
-    words = ("--map", columns, "--units", "output=g", "--rows", "dwells", "--fit", "norm", "--local-g", "9.80665")
+    words = (
+        "--map",
+        columns,
+        "--unit-of",
+        "output=g",
+        "--set",
+        "rows=dwells",
+        "--fit",
+        "norm",
+        "--set",
+        "local_gravity_m_s2=9.80665",
+    )
     return given("import", folder / "norms.csv", *words, "--archive", folder / "kept runs")
 
 
@@ -104,7 +116,12 @@ def _improved(folder: Path) -> tuple[int, str, str]:
         folder / "turned by hand.csv", index=False
     )
     return given(
-        "improve", folder / "turned by hand.csv", "--out", folder / "improved.toml", "--archive", folder / "kept runs"
+        "improve",
+        folder / "turned by hand.csv",
+        "--output",
+        folder / "improved.toml",
+        "--archive",
+        folder / "kept runs",
     )
 
 
@@ -165,7 +182,7 @@ def test_the_lines_after_a_diagnosis_of_a_run_measure_it_again_and_judge_by_it(h
     lines = printed_commands(out)
     assert [words[0] for words in lines] == ["extend", "run", "history"]
     assert re.search(r"(?<!not )confirmed:", pasted(lines))
-    _, _, err = given("improve", "latest", "--out", home / "again.toml", "--yes", *where)
+    _, _, err = given("improve", "latest", "--output", home / "again.toml", "--yes", *where)
     assert "fresh run: ambiguous-" in err  # the first run is a fresh run of the second
 
 
@@ -173,7 +190,7 @@ def test_the_lines_after_a_diagnosis_of_a_run_measure_it_again_and_judge_by_it(h
 def test_improve_lets_the_station_measure_the_fresh_run(home: Path, hardening) -> None:
     kept = Archive(home / "kept runs")
     text_of("run", inquiries.recipe_file(home, "fibonacci24"), *hardening)
-    words = ("improve", "latest", "--out", home / "m.toml", "--yes", "--archive", kept.root)
+    words = ("improve", "latest", "--output", home / "m.toml", "--yes", "--archive", kept.root)
     document = document_of(*words, "--no-measure", status=0)
     assert document["fresh"] is None
     assert [line.split()[1] for line in document["next"]] == ["run", "history"]
@@ -201,13 +218,17 @@ def test_the_lines_after_an_improvement_decide_between_alternatives(home: Path) 
     _, out, _ = given("improve", "dwells.parquet", "--effects", "bias,scale,misalignment", "--yes")
     lines = printed_commands(out)
     assert len(lines) > 1  # one for each effect of the class
-    _, out, _ = given(*lines[0])
-    pasted(printed_commands(out))
+    # the fresh run beside the dwells stands in them: it judges the effect that is chosen, and nothing is left to give
+    assert all(words[words.index("--fresh") + 1] == "fresh.parquet" for words in lines)
+    status, out, err = given(*lines[0])
+    assert status in {0, 1}, err
+    assert "fresh run" in out
+    assert printed_commands(out) == []
 
 
 @pytest.mark.slow
 def test_the_lines_of_the_demonstration_run_by_hand(home: Path) -> None:
-    status, out, err = given("demo", "--effect", "cubic_transfer", "--seed", "1", "--auto", "--folder", "my game")
+    status, out, err = given("demo", "cubic_transfer", "--seed", "1", "--yes", "--folder", "my game")
     assert status == 0, err
     Path("my game/model.toml").unlink()
     lines = printed_commands(out)
@@ -238,14 +259,14 @@ def test_the_printed_lines_carry_the_history_and_confirm_the_effect(lagging: Run
         "fresh_history": "b/again-temperatures.parquet",
     }  # fmt: skip
     written(lagging, names)
-    _, out, _ = given("diagnose", "a/run7.parquet", "--history", "b/temperatures.parquet")
+    _, out, _ = given("diagnose", "a/run7.parquet", "--temperatures", "b/temperatures.parquet")
     lines = printed_commands(out.split("Next:", 1)[1])
     assert [words[0] for words in lines] == ["extend", "history"]
-    assert lines[1][lines[1].index("--history") + 1] == "b/temperatures.parquet"
-    told = "give it to history with --fresh and its temperatures with --fresh-history"
+    assert lines[1][lines[1].index("--temperatures") + 1] == "b/temperatures.parquet"
+    told = "give it to history with --fresh and its temperatures with --fresh-temperatures"
     assert told in " ".join(out.split())
     pasted(lines)
-    again = ["--fresh", "a/again.parquet", "--fresh-history", "b/again-temperatures.parquet"]
+    again = ["--fresh", "a/again.parquet", "--fresh-temperatures", "b/again-temperatures.parquet"]
     out = pasted([[*lines[1], *again]])
     assert re.search(r"(?<!not )confirmed:", out)
     assert "warning" not in out
@@ -262,7 +283,7 @@ def test_files_beside_the_dwells_are_found_and_stand_in_the_printed_lines(laggin
     _, out, err = given("diagnose", "dwells.parquet")
     assert "history: history.parquet, found beside the dwells" in err
     lines = printed_commands(out.split("Next:", 1)[1])
-    assert lines[-1][lines[-1].index("--history") + 1] == "history.parquet"
+    assert lines[-1][lines[-1].index("--temperatures") + 1] == "history.parquet"
     pasted(lines[:1])
     assert document_of(*lines[1])["versions"][-1]["confirmed"] is True
     # the fresh run's own history stands beside it as well
@@ -279,7 +300,7 @@ def test_without_a_history_the_effect_is_warned_of_and_never_refuted(lagging: Ru
     told = text_of("compare", "a/run7.parquet", "--effects", model)
     assert "thermal_lag depends on the temperature between the dwells, and no history was given" in told
     text_of("extend", "m.toml", "thermal_lag")
-    files = ("--dwells", "a/run7.parquet", "--history", "b/then.parquet", "--fresh", "c/again.parquet")
+    files = ("--dwells", "a/run7.parquet", "--temperatures", "b/then.parquet", "--fresh", "c/again.parquet")
     told = text_of("history", "m.toml", *files, status=0)
     assert "no history of the fresh run was given" in told
     assert "remove it from the model" not in told

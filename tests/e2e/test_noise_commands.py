@@ -16,7 +16,7 @@ from inertial.noise.terms import fit_terms
 
 RATE = 100.0
 N = 0.002  # g/√Hz, two-sided as in IEEE Std 952
-OF_G = ("--time", "t", "--unit", "g")
+OF_G = ("--map", "time=t", "--unit-of", "output=g")
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +37,7 @@ def within(curve: dict) -> bool:
 
 
 def test_the_deviations_are_those_of_allantools_and_terms_have_a_value_or_a_limit(record: Path) -> None:
-    allan, table = document_of("allan", record, *OF_G), pd.read_csv(record)
+    allan, table = document_of("noise", "allan", record, *OF_G), pd.read_csv(record)
     assert (allan["samples"], allan["rate_hz"]) == (40_000, pytest.approx(RATE))
     for curve in allan["curves"]:
         values = table[curve["channel"]].to_numpy()
@@ -52,13 +52,15 @@ def test_the_deviations_are_those_of_allantools_and_terms_have_a_value_or_a_limi
     assert terms["ay", "K"]["low"] < 0.004 < terms["ay", "K"]["high"]
     assert terms["ax", "K"]["value"] is None
     assert terms["ax", "K"]["high"] < 0.002
-    printed = text_of("allan", record, *OF_G)
+    printed = text_of("noise", "allan", record, *OF_G)
     assert "not identified" in printed
     assert "≤" in printed
 
 
 def test_the_density_gives_the_deviation_and_the_level_of_white_noise(record: Path) -> None:
-    (spectrum,) = document_of("psd", record, "--rate", "100", "--columns", "ax", "--unit", "g")["spectra"]
+    (spectrum,) = document_of("noise", "psd", record, "--rate", "100", "--map", "ax", "--unit-of", "output=g")[
+        "spectra"
+    ]
     assert spectrum["median_amplitude"] == pytest.approx(N * np.sqrt(2.0), rel=0.03)
     np.testing.assert_allclose(spectrum["deviation_from_density"], spectrum["deviation"], rtol=0.15)
     np.testing.assert_allclose(spectrum["deviation"], N / np.sqrt(spectrum["tau_s"]), rtol=0.15)
@@ -80,8 +82,8 @@ def test_other_statistics_are_those_of_allantools_with_intervals_where_they_have
     statistic: str, record: Path, tmp_path: Path
 ) -> None:
     peer, factor, unit = STATISTICS[statistic]
-    words = ("allan", record, *OF_G, "--statistic", statistic, "--columns", "ax")
-    found = document_of(*words, "--plot", tmp_path / "a.png", "--page", tmp_path / "a.html")
+    words = ("noise", "allan", record, *OF_G, "--statistic", statistic, "--map", "ax")
+    found = document_of(*words, "--output", tmp_path / "a.png", "--output", tmp_path / "a.html")
     assert (found["statistic"], found["deviation_unit"]) == (statistic, unit)
     (curve,) = found["curves"]
     values = pd.read_csv(record)["ax"].to_numpy()
@@ -97,41 +99,58 @@ def test_other_statistics_are_those_of_allantools_with_intervals_where_they_have
 
 
 def test_a_spectrum_is_drawn_and_a_picture_of_no_known_kind_is_refused(record: Path, tmp_path: Path) -> None:
-    text_of("psd", record, "--time", "t", "--plot", tmp_path / "a.png", "--page", tmp_path / "a.html", status=0)
+    text_of(
+        "noise",
+        "psd",
+        record,
+        "--map",
+        "time=t",
+        "--output",
+        tmp_path / "a.png",
+        "--output",
+        tmp_path / "a.html",
+        status=0,
+    )
     assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
     assert (tmp_path / "a.html").read_text(encoding="utf-8").count("<svg") == 1
-    assert "name a .png, .svg or .pdf file" in refused("allan", record, "--time", "t", "--plot", tmp_path / "a.bmp")
+    assert "picture: .svg, .png, .pdf" in refused(
+        "noise", "allan", record, "--map", "time=t", "--output", tmp_path / "a.bmp"
+    )
 
 
 def test_a_wrong_name_a_gap_a_missing_rate_and_a_dead_channel_are_refused_or_told(record: Path, tmp_path: Path) -> None:
-    message = refused("allan", record, "--time", "t", "--statistic", "hadamart")
+    message = refused("noise", "allan", record, "--map", "time=t", "--statistic", "hadamart")
     assert "--statistic: found 'hadamart', one of allan, modified, hadamard" in message
     assert "did you mean hadamard" in message
-    assert "one of --time COLUMN and --rate HZ is needed" in refused("allan", record)
+    assert "one of --map time=COLUMN and --rate HZ is needed" in refused("noise", "allan", record)
     table = pd.read_csv(record)
     table.drop(index=700).to_csv(tmp_path / "gap.csv", index=False)
-    assert "after row 700 the time steps by 0.02 s" in refused("allan", tmp_path / "gap.csv", "--time", "t")
+    assert "after row 700 the time steps by 0.02 s" in refused(
+        "noise", "allan", tmp_path / "gap.csv", "--map", "time=t"
+    )
     table.assign(ay=1.0).to_csv(tmp_path / "dead.csv", index=False)
-    dead = ("allan", tmp_path / "dead.csv", "--time", "t")
+    dead = ("noise", "allan", tmp_path / "dead.csv", "--map", "time=t")
     assert document_of(*dead)["notes"] == ["ay: the output never changes"]
-    assert "no channel ever changes" in refused(*dead, "--columns", "ay")
+    assert "no channel ever changes" in refused(*dead, "--map", "ay")
 
 
 @each(["allan", "psd"])
 def test_a_time_taken_for_an_output_is_refused(command: str, record: Path) -> None:
-    words = (command, record, "--rate", 100)
+    words = ("noise", command, record, "--rate", 100)
     message = refused(*words)
     assert "column 't' rises in every row (from 0 to 399.99)" in message
-    assert "give --time t instead of --rate, or name the channels with --columns" in message
-    assert "column 't' rises" in refused(*words, "--columns", "t,ax")
-    text_of(*words, "--columns", "ax", status=0)
+    assert "give --map time=t instead of --rate, or name the channels with --map" in message
+    assert "column 't' rises" in refused(*words, "--map", "t,ax")
+    text_of(*words, "--map", "ax", status=0)
 
 
 def test_flicker_made_by_fractional_summation_is_found(tmp_path: Path) -> None:
     rng = np.random.default_rng(8)
     x = 1e-3 * fractional(rng, 1, 60_000)[0] + 1e-4 * rng.standard_normal(60_000)
     pd.DataFrame({"x": x}).to_csv(tmp_path / "flicker.csv", index=False)
-    terms = {row["term"]: row for row in document_of("allan", tmp_path / "flicker.csv", "--rate", "1")["terms"]}
+    terms = {
+        row["term"]: row for row in document_of("noise", "allan", tmp_path / "flicker.csv", "--rate", "1")["terms"]
+    }
     assert 0.7e-3 < terms["B"]["value"] < 1.4e-3
 
 

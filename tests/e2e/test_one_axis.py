@@ -113,19 +113,19 @@ def test_samples_of_an_axis_that_is_not_there_are_no_numbers(measured) -> None:
 def test_its_certificate_and_its_memory_hold_one_axis(measured) -> None:
     folder, runs = measured
     archive = ("--archive", folder / "archive")
-    assert "SF-01/1" in text_of("certify", runs["one"], *archive)
+    assert "SF-01/1" in text_of("certificate", "issue", runs["one"], *archive)
     shown = document_of("show", "SF-01", *archive, "--json")
     assert {row["axis"] for row in shown["calibration"]["coefficients"]} == {"x"}
     exported = text_of("export", runs["one"], *archive, "--format", "c")
     assert "axes x; output[1] and output[2]: force along that axis in g" in exported
-    programmed = document_of("program", runs["one"], *archive, "--units", "SF-01", "--yes", "--json")
+    programmed = document_of("station", "program", runs["one"], *archive, "--units", "SF-01", "--yes", "--json")
     assert [unit["outcome"] for unit in programmed["units"]] == ["proved"]
 
 
 def test_its_teds_state_the_sensitivity_of_one_axis(measured, tmp_path: Path) -> None:
     folder, runs = measured
     teds = "manufacturer=17,model=1500,version=A1,mass_g=40,initials=QA,period_days=365"
-    words = ("export", runs["one"], "--archive", folder / "archive", "--format", "teds", "--teds", teds)
+    words = ("export", runs["one"], "--archive", folder / "archive", "--format", "teds", "--set", f"teds={teds}")
     text_of(*words, "--output", tmp_path)
     assert sorted(file.name for file in tmp_path.iterdir()) == sorted(
         f"SF-0{unit}{ending}" for unit in (1, 2, 3) for ending in ("-x.teds", ".txt")
@@ -141,12 +141,12 @@ def test_its_teds_state_the_sensitivity_of_one_axis(measured, tmp_path: Path) ->
         assert 5e-7 * 1.0003 ** (bits >> 76 & 0xFFFF) == pytest.approx(scale / 9.80665, rel=1.5e-4)
     status, _, err = given(*words[:-2])
     assert status == UNUSABLE
-    assert "--teds: found no manufacturer, model" in " ".join(err.split())
+    assert "--set teds: found no manufacturer, model" in " ".join(err.split())
 
 
 def test_its_plan_speaks_of_one_axis(measured) -> None:
     folder, _ = measured
-    planned = document_of("plan", folder / "one.toml", "--page", folder / "plan.html", "--json")
+    planned = document_of("plan", folder / "one.toml", "--output", folder / "plan.html", "--json")
     assert {row["axis"] for row in planned["coefficients"]} == {"x"}
     assert {len(row["left_by_axis"]) for row in planned["effects"]} == {1}
     page = (folder / "plan.html").read_text(encoding="utf-8")
@@ -233,7 +233,7 @@ def test_a_limit_of_angles_between_axes_is_refused_for_one(measured, tmp_path: P
 def test_a_command_that_needs_three_axes_names_itself(measured, command: str, tmp_path: Path) -> None:
     folder, runs = measured
     (tmp_path / "in.csv").write_text("time_s,x,y,z\n0,0,0,1\n0.01,0,0,1\n", encoding="utf-8")
-    words = (tmp_path / "in.csv", "--calibration", f"{runs['one']}:SF-01", "--archive", folder / "archive")
+    words = (tmp_path / "in.csv", f"{runs['one']}:SF-01", "--archive", folder / "archive")
     status, _, err = given(command, *words, "--output", tmp_path / "out.csv")
     assert status == UNUSABLE
     text = " ".join(err.split())
@@ -245,7 +245,7 @@ def test_its_waveforms_have_one_channel(measured, tmp_path: Path) -> None:
     archive = ("--archive", folder / "archive")
     for name, letters in (("one", "x"), ("three", "xyz")):
         path = tmp_path / f"{name}.csv"
-        said = "".join(text_of("waveforms", runs[name], "--record", "0", *archive, "--output", path).split())
+        said = "".join(text_of("export", runs[name], "--waveforms", "0", *archive, "--output", path).split())
         names = [f"SF-01 {letter}" for letter in letters]
         assert said.endswith(f"{path.name}:{','.join(names)}".replace(" ", ""))
         assert [column.split(" [")[0] for column in pd.read_csv(path).columns] == ["time", *names]
@@ -271,8 +271,8 @@ def test_a_discovery_in_runs_of_one_axis_says_that_no_lot_can_be_used_and_why(
 def test_its_certificate_speaks_of_the_error_along_its_axis(measured, tmp_path: Path) -> None:
     folder, runs = measured
     archive = ("--archive", folder / "archive")
-    given("certify", runs["one"], *archive)
-    text_of("certificate", "SF-02", *archive, "--laboratory", laboratory_file(tmp_path), "--output", tmp_path)
+    given("certificate", "issue", runs["one"], *archive)
+    text_of("certificate", "write", "SF-02", *archive, "--laboratory", laboratory_file(tmp_path), "--output", tmp_path)
     [document] = tmp_path.glob("*.xml")
     text = document.read_text(encoding="utf-8")
     assert "error of the corrected output, verification (largest of the poses)" in text

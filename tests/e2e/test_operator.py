@@ -98,7 +98,7 @@ def test_trouble_is_asked_about_and_the_run_goes_on_behind_its_last_record(tmp_p
 
 
 def run_at_a_terminal(folder: Path, typed: str, *options: str) -> tuple[int, str, str]:
-    words = ("run", recipe_file(folder, *BRIEF), "--direct", "--prompts", "--archive", folder / "archive")
+    words = ("run", recipe_file(folder, *BRIEF), "--direct", "--ask", "--archive", folder / "archive")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(sys, "stdin", io.StringIO(typed))
         return given(*words, *options)
@@ -145,14 +145,14 @@ def answered(environment: dict[str, str]) -> str:
     while time.monotonic() < end:
         waiting = operator(environment)["waiting"]
         if waiting:
-            assert operator(environment, waiting[0]["id"], "--go")["answered"] == "go"
+            assert operator(environment, waiting[0]["id"], "--answer", "go")["answered"] == "go"
             return waiting[0]["question"]
         time.sleep(0.2)
     pytest.fail("no flow run asked for anything")
 
 
 def operator(environment: dict[str, str], *arguments: str) -> dict:
-    command = [sys.executable, "-m", "pipelines.cli", "operator", *arguments, "--json"]
+    command = [sys.executable, "-m", "pipelines.cli", "station", "operator", *arguments, "--json"]
     done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=60, check=False)
     assert done.returncode == 0, done.stderr
-    return typed_document("operator", done.stdout)
+    return typed_document("station", "operator", done.stdout)

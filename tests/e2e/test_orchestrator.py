@@ -196,7 +196,7 @@ def test_a_client_with_no_key_a_wrong_one_or_no_server_is_told(
     monkeypatch.setenv("PREFECT_API_URL", line.environment["PREFECT_API_URL"])
     for key, told in (("", "requires a key"), ("tumbleline:" + "x" * 32, "refuses the key")):
         monkeypatch.setenv("PREFECT_API_AUTH_STRING", key)
-        assert told in refused("operator")
+        assert told in refused("station", "operator")
     monkeypatch.setenv("PREFECT_API_AUTH_STRING", line.key)
     check_server()
     monkeypatch.setenv("PREFECT_API_URL", "http://127.0.0.1:9/api")

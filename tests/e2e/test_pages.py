@@ -205,7 +205,7 @@ def test_pictures_of_pages_are_there_small_and_need_no_network(tmp_path: Path) -
         assert f"../pictures/{name}.svg" in operator
         assert part in read(pictures / f"{name}.svg")
         assert 'url("http' not in read(pictures / f"{name}.svg")
-    assert given("plan", "production", "--pictures", tmp_path, "--json")[0] == 0
+    assert given("plan", "production", "--output", tmp_path, "--json")[0] == 0
     drawn = sorted(path.name for path in tmp_path.iterdir())
     assert drawn == [f"production-{name}.svg" for name in ("aliases", "budget", "sights", "sphere", "temperature")]
     assert all(read(path).startswith("<svg") for path in tmp_path.iterdir())
@@ -236,7 +236,7 @@ def test_the_mapping_file_of_the_guide_to_imports_does_what_its_options_do(share
     (tumble,) = (command for command, _ in pages.examples(page) if "xsens_acc" in command and " import " in command)
     by_options = document_of(*shlex.split(tumble.replace("$DATA", str(shared_data)))[1:])
     file = shared_data / "xsens-tumble" / "xsens_acc.mat.gz"
-    by_file = document_of("import", file, "--mapping", "mapping.toml", "--fit", "norm")
+    by_file = document_of("import", file, "--set", "mapping.toml", "--fit", "norm")
     assert json.dumps(by_file) == json.dumps(by_options)
     assert by_file["source"]["sha256"] == hashlib.sha256(file.read_bytes()).hexdigest()
     assert len(read_dwells(by_file["run"])) == by_file["dwells"] == 38

@@ -66,9 +66,9 @@ def pages(run: Run, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]
     """The pages of the product, each written by its command."""
     folder = tmp_path_factory.mktemp("pages")
     commands = {
-        "plan": ("plan", recipe_file(folder), "--page"),
-        "audit": ("audit", "--archive", run.archive.root, "--page"),
-        "diagnosis": ("diagnose", one_soak(folder), "--report"),
+        "plan": ("plan", recipe_file(folder), "--output"),
+        "audit": ("audit", "--archive", run.archive.root, "--output"),
+        "diagnosis": ("diagnose", one_soak(folder), "--output"),
     }
     made = {name: folder / f"{name}.html" for name in commands}
     for name, words in commands.items():

@@ -103,7 +103,7 @@ def test_plan_refuses_a_model_that_the_recipe_cannot_determine_with_what_is_miss
 
 
 def test_plan_tells_the_error_to_be_expected_of_every_coefficient(faces: Path) -> None:
-    document = planned(faces, "--noise", "25", "--wander", "0")
+    document = planned(faces, "--noise", "25,0")
     rows = {(r["effect"], r["axis"]): r for r in document["coefficients"] if r["effect"] != "misalignment"}
     white = document["dwell_error_ug"]["white"]
     assert white == pytest.approx(25.0 / 20.0**0.5)
@@ -119,10 +119,10 @@ def test_wander_of_the_device_counts_beside_its_white_noise(faces: Path) -> None
     assert restless["dwell_error_ug"]["together"] > 5.0 * quiet["dwell_error_ug"]["together"]
     floors = [{r["effect"]: r["floor_ug"] for r in d["effects"]}["second_order"] for d in (quiet, restless)]
     assert floors[1] > 5.0 * floors[0]
-    told = text_of("plan", "--noise", "2", "--wander", "40")
+    told = text_of("plan", "--noise", "2,40")
     listed = told.partition("raised by slow noise")[2].partition("effect visible in part")[0]
     assert re.search(r"step_change|warm_up|bias_temperature_quadratic|creep_after_move", listed)
-    assert "raised by slow noise" not in text_of("plan", "--noise", "2", "--wander", "0")
+    assert "raised by slow noise" not in text_of("plan", "--noise", "2,0")
 
 
 def test_a_slow_station_needs_more_minutes(faces: Path, tmp_path: Path) -> None:
@@ -134,12 +134,12 @@ def test_a_slow_station_needs_more_minutes(faces: Path, tmp_path: Path) -> None:
 
 
 def test_the_page_of_a_plan_opens_without_a_network(faces: Path, tmp_path: Path) -> None:
-    text_of("plan", faces, "--page", tmp_path / "plan.html", status=0)
+    text_of("plan", faces, "--output", tmp_path / "plan.html", status=0)
     text = (tmp_path / "plan.html").read_text(encoding="utf-8")
     assert text.count("<svg") == 5
     assert not re.search(r"(src|href)=.http", text)
     assert "β in 90° steps" in text
-    _, _, err = given("plan", faces, "--page", tmp_path / "plan.html" / "plan.html")
+    _, _, err = given("plan", faces, "--output", tmp_path / "plan.html" / "plan.html")
     assert "cannot be written" in err
 
 
@@ -195,7 +195,7 @@ def optimised(target: Path, *options: str) -> dict[str, Any]:
 def optimal(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, Any], Path]:
     """The cheapest recipe with errors up to four times the textbook plan's: little to search."""
     target = tmp_path_factory.mktemp("optimal") / "found.toml"
-    return optimised(target, "--factor", "4"), target
+    return optimised(target, "--set", "factor=4"), target
 
 
 def forces(recipe: Recipe, poses: str) -> np.ndarray:
@@ -285,17 +285,17 @@ def test_limits_beside_the_first_recipe_are_found_and_missing_ones_are_a_warning
 
 REFUSED = {
     "--criterion worts": "did you mean worst",
-    "--poses twelv": "did you mean twelve",
-    "--temperatures cold,warm": "write -10,25,60",
+    "--set poses=twelv": "did you mean twelve",
+    "--set temperatures=cold,warm": "write -10,25,60",
     "--wanted bais=50": "did you mean bias",
     "--wanted bias=-3": "positive error",
-    "--see third_ordre": "third_order",
-    "--criterion T": "write --part third_order,odd_quadratic",
-    "--criterion T --part third_order": "two or more are needed",
-    "--criterion T --part third_order,odd_quadratics": "odd_quadratic",
-    "--criterion T --part third_order,level_error": "an effect of the station",
-    "--criterion T --part third_order,odd_quadratic --factor 2": "--factor does not go",
-    "--part third_order,odd_quadratic": "or write --criterion T",
+    "--wanted third_ordre": "third_order",
+    "--criterion T": "write --criterion T:third_order,odd_quadratic",
+    "--criterion T:third_order": "two or more are needed",
+    "--criterion T:third_order,odd_quadratics": "odd_quadratic",
+    "--criterion T:third_order,level_error": "an effect of the station",
+    "--criterion T:third_order,odd_quadratic --set factor=2": "--set factor does not go",
+    "--criterion A:third_order,odd_quadratic": "or write --criterion T",
 }
 
 
@@ -308,8 +308,8 @@ def test_what_cannot_be_asked_is_told_in_one_message(options: str, tmp_path: Pat
 
 def test_effects_that_may_be_mistaken_are_told_apart_by_the_cheapest_recipe(tmp_path: Path) -> None:
     rivals, target = ("third_order", "odd_quadratic"), tmp_path / "found.toml"
-    options = ("--criterion", "t", "--part", ",".join(rivals), "--effects", PLAIN, "--size", "400")
-    document = optimised(target, *options, "--verification", "1")
+    options = ("--criterion", f"t:{','.join(rivals)}", "--effects", PLAIN, "--set", "size=400")
+    document = optimised(target, *options, "--set", "verification=1")
     assert [(r["true"], r["wrong"]) for r in document["rivals"]] == [rivals, rivals[::-1]]
     assert all(r["chi_square"] >= 50.0 and r["textbook"] < 1e-3 for r in document["rivals"])
     assert document["share"] < 0.6
@@ -340,9 +340,10 @@ def test_no_recipe_is_quicker_than_the_bound_of_dwells_without_end() -> None:
 @pytest.mark.timeout(1200)  # a whole run of the recipe that was found
 def test_the_line_after_a_search_measures_the_new_recipe(tmp_path: Path) -> None:
     target = tmp_path / "my new recipe.toml"
-    (words,) = printed_commands(given(*optimise("--factor", "4"), "-o", target)[1])
-    assert words == ["run", str(target)]
-    text_of(*words, "--direct", "--archive", tmp_path / "archive")
+    own = ("--archive", str(tmp_path / "archive"))
+    (words,) = printed_commands(given(*optimise("--set", "factor=4"), "-o", target, *own)[1])
+    assert words == ["run", str(target), *own]
+    text_of(*words, "--direct")
 
 
 @pytest.mark.slow
@@ -352,6 +353,6 @@ def test_errors_that_no_recipe_reaches_are_refused_and_the_textbook_plan_is_matc
     message = refused(*optimise("--wanted", "bias=0.01"), "-o", tmp_path / "none.toml")
     assert "times those" in message
     assert "uninterrupted measurement" in message
-    document = optimised(tmp_path / "found.toml", "--verification", "1")
+    document = optimised(tmp_path / "found.toml", "--set", "verification=1")
     assert document["share"] <= 0.60
     assert document["worst"] <= 1.0

@@ -19,68 +19,68 @@ WIDE = 80
 OUTPUTS = {
     "list": ["list"],
     "show": ["show", "latest", "coefficients"],
-    "report": ["report", "latest"],
+    "show-report": ["show", "latest", "--report"],
     "lineage": ["lineage", "latest"],
     "verify": ["verify"],
-    "certify": ["certify", "latest", "--units", "A1"],
-    "revoke": ["revoke", "A1", "--reason", "fell to the floor"],
+    "certificate-issue": ["certificate", "issue", "latest", "--units", "A1"],
+    "certificate-revoke": ["certificate", "revoke", "A1", "--reason", "fell to the floor"],
     "export": ["export", "latest", "--format", "csv"],
     "audit": ["audit"],
-    "query": ["query", "select unit, figure, value from figures limit 5"],
+    "archive-query": ["archive", "query", "select unit, figure, value from figures limit 5"],
     "rerun": ["rerun", "all", "--check"],
     "fit": ["fit", "latest", "--limits", "industrial"],
-    "diff": ["diff", "latest", "latest"],
-    "release": ["release", "--list"],
+    "archive-diff": ["archive", "diff", "latest", "latest"],
+    "release": ["release"],
     "compare": ["compare", "latest"],
     "diagnose": ["diagnose", "latest", "--effects", "bias,scale,misalignment"],
     "history": ["history", "m.toml"],
     "extend": ["extend", "n.toml", "third_order"],
-    "choose": ["choose", "--range", "4g", "--temperature", "-40..85", "--error", "2mg", "--bandwidth", "100"],
+    "plan-choose": ["plan", "choose", "range=4g", "temperature=-40..85", "error=2mg", "bandwidth=100"],
     "plan": ["plan", "small.toml"],
     "run": ["run", "small.toml", "--direct"],
     "station": ["station", "log"],
-    "keys": ["keys", "recipe"],
+    "plan-keys": ["plan", "keys", "recipe"],
     "inspect": ["inspect", "rest.csv"],
-    "import": ["import", "rest.csv", "--map", "time=t,x=x,y=y,z=z", "--units", "output=g", "--unit", "R1"],
-    "allan": ["allan", "rest.csv", "--rate", "100", "--columns", "x,y,z"],
-    "psd": ["psd", "rest.csv", "--rate", "100", "--columns", "x,y,z"],
-    "monitor": ["monitor"],
+    "import": ["import", "rest.csv", "--map", "time=t,x=x,y=y,z=z", "--unit-of", "output=g", "--units", "R1"],
+    "noise-allan": ["noise", "allan", "rest.csv", "--rate", "100", "--map", "x,y,z"],
+    "noise-psd": ["noise", "psd", "rest.csv", "--rate", "100", "--map", "x,y,z"],
+    "station-monitor": ["station", "monitor"],
     "archive": ["archive", "clean", "--dry-run"],
     "attributes": ["attributes", "list"],
     "discover": ["discover", "--reach"],
 }
-"""The main output of each command, in a folder with one run."""
+"""The main output of each command, in a folder with one run; a subcommand follows with a hyphen."""
 
 UNSTEADY = {
     "audit": "its periods are those up to today",
-    "monitor": "tells of now",
+    "station-monitor": "tells of now",
     "station": "tells what the machine has noted",
     "lineage": "names the machine and its libraries",
-    "keys": "its text is that of docs/reference",
+    "plan-keys": "its text is that of docs/reference",
 }
 """Commands whose text is not compared, each with its reason."""
 
-BEFORE = {"revoke": OUTPUTS["certify"]}
+BEFORE = {"certificate-revoke": OUTPUTS["certificate-issue"]}
 """What is given before a command whose output needs it."""
 
 ELSEWHERE = {
     "demo": "measures for half a minute; its tables are those of compare and diagnose",
     "improve": "tests/e2e/test_models.py: its tables, of eighty columns",
     "investigate": "measures for minutes; its tables are those of diagnose",
-    "whatif": "fits the archive twice; its table is that of diff",
+    "release-whatif": "fits the archive twice; its table is that of archive diff",
     "workbench": "serves pages",
-    "operator": "asks an orchestrator",
+    "station-operator": "asks an orchestrator",
     "doctor": "asks an orchestrator; its table is tested in tests/unit/pipelines/doctor/test_examine.py",
-    "program": "moves a station",
-    "certificate": "writes documents, prints one line each",
+    "station-program": "moves a station",
+    "certificate-write": "writes documents, prints one line each",
     "correct": "prints lines, tests/e2e/test_correct.py",
     "simulate": "prints lines, tests/e2e/test_correct.py",
-    "waveforms": "prints one line",
+    "export-waveforms": "prints one line",
 }
 
 
 def test_every_command_has_an_output_here_or_a_reason() -> None:
-    assert set(COMMANDS) == set(OUTPUTS) | set(ELSEWHERE)
+    assert set(COMMANDS) == {name.partition("-")[0] for name in (*OUTPUTS, *ELSEWHERE)}
     assert not set(OUTPUTS) & set(ELSEWHERE)
 
 

@@ -115,9 +115,20 @@ def test_a_run_on_ramps_that_was_stopped_goes_on_to_the_same_tables(tmp_path, mo
 
 def test_the_command_writes_a_recipe_on_ramps_with_its_bound(tmp_path):
     target = tmp_path / "quick.toml"
-    words = ["plan", "optimise", "--ramp", "--effects", ",".join(THERMAL), "--device", "analogue", "--factor", "3"]
+    words = [
+        "plan",
+        "optimise",
+        "--set",
+        "ramp=yes",
+        "--effects",
+        ",".join(THERMAL),
+        "--device",
+        "analogue",
+        "--set",
+        "factor=3",
+    ]
     page = tmp_path / "quick.html"
-    done = command([*words, "--verification", "1", "-o", str(target), "--page", str(page), "--json"])
+    done = command([*words, "--set", "verification=1", "-o", str(target), "--output", str(page), "--json"])
     assert done.returncode == 0, done.stderr
     document = json.loads(done.stdout)
     assert document["ramp"] is True

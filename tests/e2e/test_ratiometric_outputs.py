@@ -190,8 +190,8 @@ def test_a_recording_at_another_supply_is_corrected_to_the_same_force(lot: Simpl
     raw = own[columns].assign(supply_V=2.97)  # the dwells are at 3 V: at 2.97 V each output is a hundredth lower
     raw[["out_x", "out_y", "out_z"]] *= 0.99
     raw.to_csv(tmp_path / "raw.csv", index=False)
-    archive = ("--archive", lot.run.path.parents[1], "--failed")
-    correct = ("--calibration", f"{lot.run.id}:C0", *archive)
+    archive = ("--archive", lot.run.path.parents[1], "--include", "failed")
+    correct = (f"{lot.run.id}:C0", *archive)
     text_of("correct", tmp_path / "raw.csv", *correct, "--output", tmp_path / "corrected.csv", status=0)
     force = pd.read_csv(tmp_path / "corrected.csv")[[f"force_{axis}_g" for axis in AXES]].to_numpy()
     assert np.abs(force - own[[f"force_{axis}" for axis in AXES]].to_numpy()).max() < 1e-3

@@ -13,8 +13,17 @@ pytestmark = pytest.mark.usefixtures("home", "no_next_measurement")
 
 FACES = np.array([sign * axis for axis in np.eye(3) for sign in (1.0, -1.0)])
 POSES = ",".join(f"dwell {k}={face}" for k, face in enumerate(("+x", "-x", "+y", "-y", "+z", "-z")))
-MAPPED = ("--map", "time=time_s,x=x,y=y,z=z", "--units", "output=g,time=s", "--unit", "S1", "--local-g", "9.80665")
-FIT = (*MAPPED, "--poses", POSES, "--fit", "faces")
+MAPPED = (
+    "--map",
+    "time=time_s,x=x,y=y,z=z",
+    "--unit-of",
+    "output=g,time=s",
+    "--units",
+    "S1",
+    "--set",
+    "local_gravity_m_s2=9.80665",
+)
+FIT = (*MAPPED, "--set", f"poses={POSES}", "--fit", "faces")
 
 
 def recorded(rng: np.random.Generator, path: str, *, tilt_deg: float = 0.0, moves: bool = True) -> str:
@@ -64,5 +73,5 @@ def test_labels_of_a_file_name_its_faces(rng: np.random.Generator, *, moves: boo
     path = recorded(rng, "labels.csv", moves=moves)
     command = document_of("improve", path, "--yes", status=1)["recording"]["command"]
     assert "dwell=pose" in command
-    assert "--poses p0=+x,p1=-x,p2=+y,p3=-y,p4=+z,p5=-z" in command
-    assert command.startswith(document_of("inspect", path)["command"].split(" --gaps")[0])
+    assert "--set poses=p0=+x,p1=-x,p2=+y,p3=-y,p4=+z,p5=-z" in command
+    assert command.startswith(document_of("inspect", path)["command"].split(" --set gaps")[0])

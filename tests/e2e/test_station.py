@@ -306,7 +306,7 @@ def test_a_served_station_speaks_in_lines_one_port_behind_its_registers() -> Non
 @contextmanager
 def served_by_command(*options: str) -> Iterator[int]:
     """``tumbleline station serve`` as a process of its own; gives its port."""
-    words = [sys.executable, "-m", "pipelines.cli", "station", "serve", "--port", "0", "--units", "2", "--json"]
+    words = [sys.executable, "-m", "pipelines.cli", "station", "serve", "--port", "0", "--slots", "2", "--json"]
     buffered = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
     pipes = {"stdout": subprocess.PIPE, "text": True, "env": buffered}
     with subprocess.Popen([*words, *options], cwd=ROOT, **pipes) as process:

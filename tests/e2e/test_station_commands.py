@@ -42,14 +42,14 @@ def changed(folder: Path, **sections: dict) -> Path:
 
 
 def test_status_tells_angles_temperatures_states_and_units():
-    now = status_of("--units", "3")
+    now = status_of("--slots", "3")
     assert now["ok"]
     assert now["angles_deg"] == pytest.approx({"outer": 0.0, "inner": 0.0}, abs=0.01)
     assert now["axes"] == {"outer": "in position", "inner": "in position"}
     assert now["chamber_C"] == pytest.approx(23.0, abs=0.2)
     assert (now["door"], now["emergency_stop"], now["sampling"]) == ("closed", "released", "stopped")
     assert [slot["serial"] for slot in now["slots"]] == ["SIM0000", "SIM0001", "SIM0002"]
-    shown = text_of("station", "status", "--units", "1")
+    shown = text_of("station", "status", "--slots", "1")
     assert "closed" in shown
     assert "[" not in shown
 
@@ -70,7 +70,7 @@ def test_status_of_a_station_that_is_driven_says_by_whom_and_disturbs_nothing(tm
 
 
 def test_a_healthy_station_passes_its_self_test():
-    document = checked("--units", "3")
+    document = checked("--slots", "3")
     assert (document["ok"], document["failed"]) == (True, [])
     tested = [finding["check"] for finding in document["checks"]]
     assert set(tested) >= {
@@ -78,7 +78,7 @@ def test_a_healthy_station_passes_its_self_test():
     }  # fmt: skip
     assert tested.count("noise") == 3
     assert {row["device"] for row in document["registers"]} >= {"outer axis", "chamber", "slot 2"}
-    assert "checks" not in checked("--units", "2", "--registers")  # moves nothing
+    assert "checks" not in checked("--slots", "2", "--read-only")  # moves nothing
 
 
 FAULTS = {
@@ -93,7 +93,7 @@ FAULTS = {
 @each(FAULTS)
 def test_what_fails_is_named_with_status_3(words, tmp_path):
     path = changed(tmp_path, simulation={"faults": [FAULTS[words]]})
-    document = checked("--station", path, "--units", "3", status=3)
+    document = checked("--station", path, "--slots", "3", status=3)
     assert not document["ok"]
     assert any(words in message for message in document["failed"]), document["failed"]
 
@@ -101,7 +101,7 @@ def test_what_fails_is_named_with_status_3(words, tmp_path):
 def failed(folder: Path, units: int = 1, **self_test: object) -> list[str]:
     """What a self-test with other limits finds."""
     path = changed(folder, self_test=self_test)
-    return checked("--station", path, "--units", str(units), status=3)["failed"]
+    return checked("--station", path, "--slots", str(units), status=3)["failed"]
 
 
 def test_a_slot_noisier_than_its_neighbours_is_named(tmp_path):
@@ -110,7 +110,7 @@ def test_a_slot_noisier_than_its_neighbours_is_named(tmp_path):
 
 def test_the_check_standard_is_held_against_the_limits_of_the_file(tmp_path):
     good = changed(tmp_path, self_test={"standard": "SIM0000", "scale": [250e3, 262e3], "offset": [-12e3, 12e3]})
-    document = checked("--station", good, "--units", "2")
+    document = checked("--station", good, "--slots", "2")
     scale = next(finding for finding in document["checks"] if finding["check"] == "scale")
     assert (scale["value"], scale["unit"]) == (pytest.approx(256e3, rel=0.02), "LSB/g")
     (message,) = failed(tmp_path, 2, standard="SIM0000", scale=[1.0, 2.0])[:1]
@@ -124,7 +124,7 @@ def test_without_limits_the_check_standard_makes_its_own_from_its_history(tmp_pa
     own = {"standard": "SIM0000", "history_min": 5}
     path, kept = changed(tmp_path, self_test=own), state / "checks" / "simulated.jsonl"
     for _ in range(5):
-        checked("--station", path, "--units", "1")
+        checked("--station", path, "--slots", "1")
     history = read_history(kept)
     assert len({standard.offset for standard in history}) == 5  # each time new noise
     kept.unlink()
@@ -167,7 +167,7 @@ def test_log_tells_why_a_run_was_paused_and_watch_draws_it(tmp_path):
     seen = document_of("station", "watch", "latest", *archive)
     assert seen["over"]
     assert max(value for _, value in seen["chamber"]) > 45.0
-    drawn = text_of("station", "watch", "latest", "--once", *archive)
+    drawn = text_of("station", "watch", "latest", "--every", "0", *archive)
     assert "warmest unit" in drawn
     assert re.search("[⠀-⣿]", drawn)
 

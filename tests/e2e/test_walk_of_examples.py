@@ -24,7 +24,7 @@ from pipelines.cli import INTERRUPTED
 from schemas.errors import DONE, PART_FAILED, UNUSABLE
 
 ROOT = Path(__file__).resolve().parents[2]
-SERVE = ("workbench", "monitor --serve", "station serve", "station replay", "station watch", "--watch")
+SERVE = ("workbench", "station monitor --port", "station serve", "station replay", "station watch", "--every")
 """Examples that go on until Ctrl-C: they are started and ended in a process of their own."""
 
 WITH_A_DEVICE = ("station bring-up",)
@@ -40,14 +40,14 @@ ELSEWHERE = {"run", "investigate", "import"}
 """Commands whose runs are kept in another archive, so that the latest run is the one that the other examples mean."""
 
 OTHERWISE = {
-    "tumbleline operator": "no run waits",  # with one that waits: tests/e2e/test_inquiry.py
-    "tumbleline operator line-six --go": "no run waits",
+    "tumbleline station operator": "no run waits",  # with one that waits: tests/e2e/test_inquiry.py
+    "tumbleline station operator line-six --answer go": "no run waits",
     # the example before it has programmed other units: the simulated station goes on with that lot only
-    "tumbleline program latest --station line-1.toml --form q24 --yes": "it belongs to another station or lot",
+    "tumbleline station program latest --station line-1.toml --format q24 --yes": "it belongs to another station or lot",
     # the example before it has revoked the only certificate
-    "tumbleline revoke SN1 --certificate 2 --reason 'reference out of date'": "has no calibration that holds",
+    "tumbleline certificate revoke SN1 2 --reason 'reference out of date'": "has no calibration that holds",
     # the model of the folder is the one that the runs were fitted with
-    "tumbleline release model.toml --from 2026-01-01 --reason 'the error on fresh runs falls'": "says no better",
+    "tumbleline release model.toml --since 2026-01-01 --reason 'the error on fresh runs falls'": "says no better",
     # the lot of the folder was measured at one temperature
     "tumbleline fit latest --limits industrial": "needs effect bias_temperature",
 }
@@ -69,7 +69,7 @@ def world(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, str
     with pytest.MonkeyPatch.context() as patch, chdir(folder):
         _at_home(patch, folder)
         names = made_in(folder)
-        assert command(["certify", "latest"]).returncode == DONE
+        assert command(["certificate", "issue", "latest"]).returncode == DONE
     return folder, names
 
 
@@ -134,7 +134,7 @@ def test_an_example_that_serves_ends_by_ctrl_c(example: str, world: tuple[Path, 
         with subprocess.Popen(words, env=environment, **pipes) as process:
             too_long = threading.Timer(40.0 + patience, process.kill)
             too_long.start()
-            if "--watch" in example:  # a live table, which is written to a pipe when it ends
+            if "--every" in example:  # a live table, which is written to a pipe when it ends
                 threading.Event().wait(patience)
                 first = ""
             else:

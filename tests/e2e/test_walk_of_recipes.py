@@ -78,8 +78,8 @@ def test_a_procedure_is_planned_measured_reported_and_says_what_it_lacks(recipe:
         assert figure in " ".join(out.split())
     out, _ = went("run", recipe, "--direct", *archive)
     assert "2 of 2 passed" in out
-    assert Path(went("report", "latest", *archive)[0].strip()).is_file()
-    for words in (("export",), ("diagnose",), ("compare",), ("correct", QUICKEST, "--calibration", "latest")):
+    assert Path(went("show", "latest", "--report", *archive)[0].strip()).is_file()
+    for words in (("export",), ("diagnose",), ("compare",), ("correct", QUICKEST, "latest")):
         _, err = went(*words, *(() if words[0] == "correct" else ("latest",)), *archive, allowed=(UNUSABLE,))
         assert f"it measured {kind}" in err
         assert pasted(err, tmp_path / "archive", also_quoted=words[0] == "diagnose") == (
@@ -134,4 +134,4 @@ def test_a_recipe_runs_on_the_built_in_station_and_the_quickest_on_every_simulat
     out, _ = went("run", recipe, *where, "--direct", "--archive", tmp_path, allowed=(0, PART_FAILED))
     assert re.search(r"\d of \d passed, \d failed, 0 refused", out)
     assert pasted(out, tmp_path) >= 1
-    went("export", "latest", "--failed", "--archive", tmp_path)
+    went("export", "latest", "--include", "failed", "--archive", tmp_path)

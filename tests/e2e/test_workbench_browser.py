@@ -65,7 +65,7 @@ def test_a_model_is_evaluated_on_the_archive_and_released_only_if_it_is_better(
 ) -> None:
     place = bench.folder / "models" / "cubic.toml"
     place.parent.mkdir(exist_ok=True)
-    text_of("extend", place, "third_order", "--why", "a trial", status=0)
+    text_of("extend", place, "third_order", "--reason", "a trial", status=0)
     with tab(browser, bench.address) as one:
         one.open("/models?model=cubic")
         assert "+ third_order" in one.page.inner_text("[aria-label=Versions]")

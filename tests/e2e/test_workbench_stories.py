@@ -30,7 +30,7 @@ def test_the_demonstration_from_its_measurement_to_the_error_falling(
     tmp_path: Path, browser: Any, pictures: Path
 ) -> None:
     folder = tmp_path / "bench"
-    command = [sys.executable, "-m", "pipelines.cli", "demo", "--effect", "cubic_transfer", "--seed", "1", "--by-hand"]
+    command = [sys.executable, "-m", "pipelines.cli", "demo", "cubic_transfer", "--seed", "1", "--by-hand"]
     subprocess.run([*command, "--folder", str(folder)], cwd=ROOT, check=True, capture_output=True, timeout=280)
     with served(tmp_path / "archive", folder) as server, tab(browser, server.address) as one:
         one.open("/missing")

@@ -102,7 +102,7 @@ def test_a_foreign_table_anywhere_is_told_by_name_and_disturbs_nothing(root: Pat
 def test_what_a_newer_version_wrote_is_told_by_every_command(root: Path) -> None:
     manifest = Archive(root).run("latest").path / "dwells.json"
     manifest.write_text(manifest.read_text().replace('"schema": 1', '"schema": 8'))
-    for command in (("show", "latest", "dwells"), ("export", "latest"), ("report", "latest")):
+    for command in (("show", "latest", "dwells"), ("export", "latest"), ("show", "latest", "--report")):
         refused("dwells.json has schema 8, this version knows up to", *command, "--archive", root)
     (root / "archive.json").write_text('{"format": 9, "product": "tumbleline"}\n')
     for command in (("list",), ("show", "latest"), ("show", "small"), ("verify",), ("lineage", "A1")):
@@ -146,8 +146,8 @@ def test_a_serial_that_could_be_a_path_or_a_line_is_refused_by_run_and_import(se
     refused("", "run", "--direct", "--units", serial, "--archive", tmp_path / "a")
     frame = pd.DataFrame({"sn": [serial] * 200, "t": [0.01 * n for n in range(200)], "x": 0.0, "y": 0.0, "z": 1.0})
     frame.to_csv(tmp_path / "record.csv", index=False)
-    for columns, option in (("time=t,x=x,y=y,z=z,unit=sn", ()), ("time=t,x=x,y=y,z=z", ("--unit", serial))):
-        command = ("import", tmp_path / "record.csv", "--map", columns, "--units", "output=g,time=s", *option)
+    for columns, option in (("time=t,x=x,y=y,z=z,unit=sn", ()), ("time=t,x=x,y=y,z=z", ("--units", serial))):
+        command = ("import", tmp_path / "record.csv", "--map", columns, "--unit-of", "output=g,time=s", *option)
         refused("serial", *command, "--archive", tmp_path / "a")
     assert not (tmp_path / "a").exists()
 
@@ -191,8 +191,8 @@ def test_a_run_that_was_cut_off_tells_how_to_go_on_everywhere(root: Path) -> Non
         for path in run.path.glob(f"{name}.*"):
             path.unlink()
     assert "to continue" in given("show", "latest", "--archive", root)[1]
-    for command in ("certify", "report"):
-        status, _, message = given(command, "latest", "--archive", root)
+    for words in (("certificate", "issue", "latest"), ("show", "latest", "--report")):
+        status, _, message = given(*words, "--archive", root)
         assert (status, "not finished" in message) == (2, True)
 
 

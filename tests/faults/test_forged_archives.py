@@ -337,7 +337,7 @@ def test_a_forged_run_is_not_certified(root: Path, forge: Callable[[Path], objec
     name = runs(root)[0].id
     before = sorted(root.glob("calibrations/*/*/*.json"))
     forge(root)
-    done = typed(root, "certify", name, "--months", "6")
+    done = typed(root, "certificate", "issue", name, "--until", "6m")
     assert isinstance(done.exception, ArchiveUnusable), done.output
     assert sorted(root.glob("calibrations/*/*/*.json")) == before
 
@@ -360,7 +360,12 @@ def test_numbers_that_moved_under_a_certificate_leave_by_no_door(root: Path) -> 
     """A table that was removed is made again under a library that moves a number; the certificate is of the one before."""
     run = runs(root)[0]
     (run.path / "coefficients.json").write_bytes(files.manifest_bytes(moved(run)))
-    for words in (("export", run.id), ("export", run.id, "--format", "c"), ("report", run.id), ("show", "A1")):
+    for words in (
+        ("export", run.id),
+        ("export", run.id, "--format", "c"),
+        ("show", run.id, "--report"),
+        ("show", "A1"),
+    ):
         done = typed(root, *words)
         assert isinstance(done.exception, ArchiveUnusable), (words, done.output)
         assert "other coefficients" in str(done.exception) or "is not the table of certificate" in str(done.exception)
@@ -370,7 +375,7 @@ def test_numbers_that_moved_under_a_certificate_leave_by_no_door(root: Path) -> 
 def test_query_and_audit_notice_an_edit_of_the_index_and_answer_from_the_runs(root: Path, caplog) -> None:
     question = "SELECT sum(abs(value)) FROM coefficients"
     before = ask(Archive(root), question).rows
-    for words in (("query", question), ("audit", "--workers", "1")):
+    for words in (("archive", "query", question), ("audit", "--workers", "1")):
         place = an_edited_part_of_the_index(root)
         caplog.clear()
         typed(root, *words)
@@ -406,7 +411,7 @@ def test_a_crate_of_a_foreign_archive_stays_in_its_folder(root: Path, tmp_path: 
         for entry, value in (("recipe", {**recipe, "name": name}), ("capture", name), ("parents", [name])):
             write(place, {**json.loads(data), entry: value})
             outside = {path for path in tmp_path.rglob("*") if not path.is_relative_to(crates)}
-            done = typed(root, "lineage", run.id, "--crate", str(crates / f"{entry}{number}"))
+            done = typed(root, "lineage", run.id, "--output", str(crates / f"{entry}{number}"))
             assert {path for path in tmp_path.rglob("*") if not path.is_relative_to(crates)} == outside
             if entry != "recipe":
                 assert isinstance(done.exception, ArchiveUnusable)

@@ -20,7 +20,7 @@ from stations.plant.plant import PlantClock
 
 PATIENCE_S = 120.0
 RESULTS = ("readings", "history", "verdicts", "dwells", "coefficients", "covariance", "residuals", "verification")
-MORE_RESULTS = ("allan", "noise", "figures", "grades")
+MORE_RESULTS = ("noise", "allan", "noise", "figures", "grades")
 TIMES, CHAINS = 50, 5
 
 

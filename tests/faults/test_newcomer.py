@@ -28,7 +28,7 @@ from pipelines.jobs.model_files import chosen_effects
 from schemas.errors import ArchiveUnusable, RecipeInvalid, WrongUse, did_you_mean
 
 NO_FILE = "x" * 5000
-MAPPED = ("--map", "time=t,x=ax,y=ay,z=az", "--units", "output=g", "--unit", "A1")
+MAPPED = ("--map", "time=t,x=ax,y=ay,z=az", "--unit-of", "output=g", "--units", "A1")
 SLIPS: list[tuple[tuple[str, ...], str]] = [  # words of a command, and what is told; {} is a folder with a.csv
     (("diagnos", "x"), "tumbleline: no command is called 'diagnos'; did you mean diagnose?\n"),
     (("run", "nosuch"), "no recipe is called 'nosuch'"),
@@ -44,7 +44,7 @@ SLIPS: list[tuple[tuple[str, ...], str]] = [  # words of a command, and what is 
     (("import", NO_FILE, *MAPPED), ""),
     (("import", "{}/nosuch.csv"), "nosuch.csv: cannot be read (No such file or directory)"),
     (("import", "{}/a.csv"), "no column of a.csv is mapped, x, y and z are needed at least (its columns: t, ax,"),
-    (("import", "{}/a.csv", "--map", "x=ax,y=ay,z=az"), "one of g, mg, m/s^2, V, mV, LSB is needed; add --units output=…"),
+    (("import", "{}/a.csv", "--map", "x=ax,y=ay,z=az"), "one of g, mg, m/s^2, V, mV, LSB is needed; add --unit-of output=…"),
     (("export", "nosuch"), "there is no run yet"),
     (("rerun", "all", "--check", "--effects", "bias"), "--check with another model or limits has no stored result"),
     (("export", "--format", "hex"), "no format is called 'hex'"),
@@ -102,8 +102,8 @@ def test_a_run_that_was_stopped_is_refused_with_the_way_on_and_shown_as_such(tmp
     archive = Archive(tmp_path / "archive")
     with pytest.raises(PulledPlug):
         list(Runner(small_job(tmp_path), archive, measure=CaptureDouble(stop_after=7)).all())
-    for command in ("report", "diagnose", "export"):
-        status, out, message = given(command, "latest", "--archive", archive.root)
+    for command, *option in (("show", "--report"), ("diagnose",), ("export",)):
+        status, out, message = given(command, "latest", *option, "--archive", archive.root)
         assert (status, out) == (2, "")
         assert re.search(
             r"repeat its 'tumbleline run'|give (its|the) .*again|again (to continue|and it goes on)", message

@@ -294,7 +294,7 @@ def test_a_process_that_is_killed_leaves_the_unit_not_certified_until_it_is_writ
 
 
 def test_the_command_asks_before_it_writes(run: Run) -> None:
-    words = ["program", "latest", "--archive", str(run.archive.root), "--units", "A2"]
+    words = ["station", "program", "latest", "--archive", str(run.archive.root), "--units", "A2"]
     refused = CliRunner().invoke(app, words, input="")
     assert isinstance(refused.exception, WrongUse)
     no = CliRunner().invoke(app, words, input="n\n")

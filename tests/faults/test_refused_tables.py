@@ -49,11 +49,11 @@ RECORDS: list[tuple[Change, tuple[str, ...], str]] = [  # a change of the record
     (lambda t: t.assign(t=3.0), (), "400 samples, all at 3 s"),
     (lambda t: t, ("--rate", "inf"), "rate_hz: found inf"),
     (lambda t: t, ("--rate", "0"), "rate_hz: found 0"),
-    (lambda t: t, ("--blocks", "1e-300"), "block_s: found 1e-300"),
-    (lambda t: t, ("--units", "output=LSB"), "not whole numbers"),
+    (lambda t: t, ("--set", "block_s=1e-300"), "block_s: found 1e-300"),
+    (lambda t: t, ("--unit-of", "output=LSB"), "not whole numbers"),
     (lambda t: t.assign(ax=t.ax > -1.0), (), "column 'ax' holds true and false"),
     (lambda t: t.assign(t=t.t * 1e300), (), "column t: found 1e+298"),
-    (lambda t: t.assign(t=t.t * 1e12), ("--units", "output=g,time=s"), "-1e+11 to 1e+11 s is needed"),
+    (lambda t: t.assign(t=t.t * 1e12), ("--unit-of", "output=g,time=s"), "-1e+11 to 1e+11 s is needed"),
     (lambda t: t.assign(az=1e200), (), "column az: found 1e+200"),
     (lambda t: t.rename(columns={"ax": "acc_x"}), (), "column 'ax' (for x) is not there; "),
     (lambda t: t.assign(ay=t.ay.where(t.index != 7)), (), "row 8 (line 9), column 'ay': found nan"),
@@ -72,7 +72,7 @@ RECORDS: list[tuple[Change, tuple[str, ...], str]] = [  # a change of the record
 def test_records_that_cannot_be_are_refused_and_leave_nothing(row: tuple[Change, tuple, str], tmp_path: Path) -> None:
     change, more, words = row
     change(record()).to_csv(tmp_path / "a.csv", index=False)
-    options = {"--map": "time=t,x=ax,y=ay,z=az", "--units": "output=g", "--unit": "A1"}
+    options = {"--map": "time=t,x=ax,y=ay,z=az", "--unit-of": "output=g", "--units": "A1"}
     options |= dict(zip(more[::2], more[1::2], strict=True))
     options["--archive"] = str(tmp_path / "b")
     status, out, message = given("import", tmp_path / "a.csv", *(word for pair in options.items() for word in pair))
@@ -273,7 +273,7 @@ def test_a_column_called_like_a_formula_is_written_as_it_is(tmp_path: Path, rng:
     frame["out_x"] += 1e-3 * frame[name]
     frame.to_csv(tmp_path / "d.csv", index=False)
     page = tmp_path / "page.html"
-    status, _, message = given("diagnose", tmp_path / "d.csv", "--report", page)
+    status, _, message = given("diagnose", tmp_path / "d.csv", "--output", page)
     assert status == 1, message
     assert page.read_text().count(name) > 1
 

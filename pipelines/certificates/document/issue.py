@@ -153,7 +153,9 @@ def _of_run(ledger: Ledger, run: Run, done: Issued) -> dict[str, tuple[Calibrati
         if own:
             certificates[own[-1].certificate] = own[-1], known
         else:
-            done.left_out[serial] = reason or f"passed and not certified; certify it with 'tumbleline certify {run.id}'"
+            done.left_out[serial] = (
+                reason or f"passed and not certified; certify it with 'tumbleline certificate issue {run.id}'"
+            )
     if not certificates:
         listed = "; ".join(f"{serial}: {why}" for serial, why in done.left_out.items()) or "it has no grades"
         raise WrongUse(f"certificate: no unit of run {run.id} has a certificate, one is needed ({listed})")
@@ -177,5 +179,5 @@ def _why(archive: Archive, serial: str) -> str:
         if reason:
             return f"run {run.id}: {reason}"
         if reason is not None:
-            return f"it passed: certify it with 'tumbleline certify {run.id}' first"
+            return f"it passed: certify it with 'tumbleline certificate issue {run.id}' first"
     return "see 'tumbleline list'"

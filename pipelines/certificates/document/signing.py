@@ -57,7 +57,7 @@ def read_key(path: Path, password_file: Path | None = None) -> SigningKey:
     except (ValueError, TypeError) as problem:
         raise WrongUse(
             f"--sign-with: {path} is no key that can be used ({problem}); give a PKCS#12 file, or a PEM file with the key and "
-            "its certificate, and --password-file where it is encrypted"
+            "its certificate, and the file of its password as --sign-with KEY,FILE where it is encrypted"
         ) from None
     if key is None or own is None:
         raise WrongUse(f"--sign-with: {path} holds no key with a certificate, both are needed; give a file with both")

@@ -116,14 +116,14 @@ class ShowTableDocument(TypedDict):
 
 
 class QueryDocument(TypedDict):
-    """``query --json``: the rows of an SQL query."""
+    """``archive query --json``: the rows of an SQL query."""
 
     columns: list[str]
     rows: Annotated[list[dict[str, Any]], "value by column"]
 
 
 class ReportDocument(TypedDict):
-    """``report RUN --json``: the report of a run."""
+    """``show RUN --report --json``: the report of a run."""
 
     run: str
     report: Annotated[str, "path of the HTML report"]
@@ -219,7 +219,7 @@ class HiddenEffect(TypedDict):
 
 
 class DemoDocument(TypedDict):
-    """``demo --auto --json``: the hidden effect, the diagnosis, and the errors before and after."""
+    """``demo --yes --json``: the hidden effect, the diagnosis, and the errors before and after."""
 
     seed: int
     hidden: HiddenEffect

@@ -48,7 +48,7 @@ class StationCheckDocument(TypedDict):
     ok: bool
     failed: Annotated[list[str], "a sentence for each failure"]
     registers: list[RegisterReading]
-    checks: NotRequired[Annotated[list[CheckResult], "missing with `--registers`"]]
+    checks: NotRequired[Annotated[list[CheckResult], "missing with `--read-only`"]]
 
 
 class StationEvent(TypedDict):
@@ -79,7 +79,7 @@ class WaitingRun(TypedDict):
 
 
 class OperatorDocument(TypedDict):
-    """``operator --json``: the runs that wait for the operator, and the answer that was given."""
+    """``station operator --json``: the runs that wait for the operator, and the answer that was given."""
 
     waiting: list[WaitingRun]
     answered: Annotated[Literal["go", "stop"] | None, "null: none was answered"]
@@ -120,7 +120,7 @@ class StationProfilesDocument(TypedDict):
 
 
 class KeysDocument(TypedDict):
-    """``keys [SUBJECT] --json``: the keys of a file, or the names that an option takes."""
+    """``plan keys [SUBJECT] --json``: the keys of a file, or the names that an option takes."""
 
     subject: Annotated[str, "empty: the list of subjects"]
     rows: Annotated[list[dict[str, str]], "one for each key or name, by the heads of the printed table"]

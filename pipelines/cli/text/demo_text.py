@@ -82,4 +82,4 @@ def print_discovery_demo(document: DiscoveryDemo) -> None:
         f"{hidden['physics']} in wafer {hidden['wafer']} ({hidden['effect']}). {'Found.' if right else 'Not found.'}",
         style="bold green" if right else "bold red",
     )
-    print_next([command_line("discover", "--archive", archive, "--html", f"{document['folder']}/discoveries.html")])
+    print_next([command_line("discover", "--archive", archive, "--output", f"{document['folder']}/discoveries.html")])

@@ -79,5 +79,5 @@ def _unexplained(document: dict[str, Any], data: FindData | None, model: Path | 
         if data is not None:  # the command that judges the model with it, without a model file
             found, effects = data(), ",".join([*document["effects"], offer["id"]])
             formula = f"{offer['id']}={'; '.join(offer['columns'])}"
-            words = ("--effects", effects, "--formula", formula)
+            words = ("--effects", effects, *found.given.written, "--formula", formula)
             print_next([command_line("diagnose", found.source, *words, *found.options)])

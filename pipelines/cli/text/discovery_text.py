@@ -93,7 +93,7 @@ def print_explained(row: DiscoveryRow) -> None:
         ]
         print_table([row["driver"], "size\nµg", "u\nµg", "units"], lines[:_SHOWN_LEVELS])
         if len(lines) > _SHOWN_LEVELS:
-            say(f"{len(lines) - _SHOWN_LEVELS} more; --json and --html have them")
+            say(f"{len(lines) - _SHOWN_LEVELS} more; --json and --output have them")
     say(f"next: {row['next']}")
 
 

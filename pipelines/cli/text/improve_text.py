@@ -1,12 +1,22 @@
 """An improvement of a model for people: choices, error of each version, and the next command."""
 
 import math
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from inertial.counts import number_of
 from pipelines.cli.chart import Line, chart
-from pipelines.cli.next_commands import FindData, archive_words, command_line, fresh_measurement, print_next
+from pipelines.cli.next_commands import (
+    FindData,
+    Given,
+    JudgedData,
+    archive_words,
+    command_line,
+    fresh_measurement,
+    print_next,
+)
 from pipelines.cli.printing import console, print_table, say, short, warn
 from pipelines.cli.text.verdict_text import print_verdict
 from pipelines.diagnosis import sections, sentences
@@ -53,21 +63,26 @@ def _ladder(rows: list[dict[str, Any]]) -> None:
         say(f"{', '.join(row['added'])}: {row['text']}", style=style)
 
 
-def next_lines(document: dict[str, Any], target: Path, find: FindData, *, after: dict[str, Any]) -> list[str]:
+def next_lines(
+    document: dict[str, Any], files: tuple[Path | None, Path], find: FindData, given: Given, kept: Sequence[str]
+) -> list[str]:
     """The commands to give next; empty where the model is adequate and a fresh run has judged it.
 
-    after : the diagnosis of the resulting model
+    files : the model that was judged, None for a list of effects, and the one to write
+    kept : options of ``improve`` that name the file to write and the author, as they were given
     """
     from pipelines.cli.history import removal
 
+    (model, target), after = files, document["after"] or document["diagnosis"]
     if document["refuted"]:
-        return [removal(target, effect) for effect in document["refuted"]]
+        return [removal(target, given.effect_files, effect) for effect in document["refuted"]]
     left = [c for c in document["choices"] if not c["added"]]
     if not (left or after["recommended"] or (document["added"] and not document["fresh"])):
         return []
     data = find()
-    own = ["--model", str(target)] if document["file"] else ["--effects", ",".join(document["effects"])]
-    again = ["improve", data.source, *own, *data.options]
+    judged = target if document["added"] else model
+    own = ["--model", str(judged)] if judged else ["--effects", ",".join(document["effects"])]
+    again = ["improve", data.source, *own, *data.options, *([] if data.measure else data.again), *kept]
     if left:
         names = (left[0]["effect"], *left[0]["not_separated_from"])
         return [command_line(*again, "--effect", name) for name in names]
@@ -98,11 +113,15 @@ def print_recording(document: dict[str, Any]) -> None:
     print_next(document["next"])
 
 
-def next_of_recording(document: dict[str, Any], archive: str | None) -> list[str]:
-    """The commands to give next: the fit of a changed model; without faulty dwells, else the coefficients, else the diagnosis."""
-    run, words = document["recording"]["run"], archive_words(archive)
+def next_of_recording(document: dict[str, Any], given: Given, model: Sequence[str], kept: Sequence[str]) -> list[str]:
+    """The commands to give next: the fit of a changed model; without faulty dwells, else the coefficients, else the diagnosis.
+
+    model, kept : options of ``improve``: the model that was judged; the file to write and the author
+    """
+    data = JudgedData(document["recording"]["run"], "", given.fresh, given.fresh_history, given=given)
+    run, words = data.source, archive_words(given.archive)
     if document["added"]:
-        return [command_line("fit", run, "--model", document["file"], *words), *document["next"]]
+        return [command_line("fit", run, "--model", document["file"], *data.options), *document["next"]]
     if document["next"]:
         return document["next"]
     judged = document["after"] or document["diagnosis"]
@@ -110,10 +129,12 @@ def next_of_recording(document: dict[str, Any], archive: str | None) -> list[str
     for fault in judged["blocked_by"]:
         left += [f"{unit}:{dwell}" for unit in fault["units"] for dwell in fault["dwells"]]
     if left:
-        return [command_line("improve", run, "--leave-out", ",".join(dict.fromkeys(left)), *words)]
+        without = replace(given, leave_out=",".join(dict.fromkeys([*filter(None, [given.leave_out]), *left])))
+        own = [*model, *replace(data, given=without).options, *data.again, *kept]
+        return [command_line("improve", run, *own)]
     if judged["adequate"] and document["recording"]["fit"]:
         return [command_line("export", run, "--format", "csv", *words)]
-    return [command_line("diagnose", run, "--all", *words)]
+    return [command_line("diagnose", run, "--all", *model, *data.options)]
 
 
 def _recognised(one: dict[str, Any]) -> None:

@@ -2,6 +2,7 @@
 
 import math
 from collections import Counter
+from collections.abc import Sequence
 from typing import Any
 
 from inertial.counts import number_of
@@ -194,8 +195,8 @@ def print_reach(reach: dict[str, Any] | None) -> None:
 ERROR_HEADS = ("coefficient, unit", "error\n1σ", "required", "ratio", "given\n1σ")
 
 
-def print_optimum(document: dict[str, Any]) -> None:
-    """Print the recipe found."""
+def print_optimum(document: dict[str, Any], where: Sequence[str]) -> None:
+    """Print the recipe found; ``where``: options that name its station and archive."""
     temperatures = ", ".join(f"{t:g}" for t in document["temperatures_C"])
     say(
         f"{document['recipe']}: {document['dwells']} dwells of {document['dwell_s']:g} s "
@@ -221,7 +222,7 @@ def print_optimum(document: dict[str, Any]) -> None:
     if document["limits_missing"]:
         remark(f"warning: {document['limits_missing']}", style="yellow")
     else:
-        print_next([command_line("run", str(document["file"]))])
+        print_next([command_line("run", str(document["file"]), *where)])
     if "page" in document:
         say(f"Page: {document['page']}")
 

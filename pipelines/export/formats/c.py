@@ -27,12 +27,12 @@ _COUNTS_BITS = 48  # of the factor from counts to fixed point
 
 
 def write(units: Sequence[UnitCalibration], run: str, settings: ExportSettings) -> str:
-    """The header as text, in double or single precision or in fixed point (``--arithmetic``)."""
+    """The header as text, in double or single precision or in fixed point (``--set arithmetic``)."""
     kind = settings.arithmetic
     fixed = kind == "q24"
     behind = bool(settings.firmware.low_pass or settings.firmware.bias)
     if fixed or behind:
-        refuse_fewer_axes(units, "export: --arithmetic q24, --filter or --track")
+        refuse_fewer_axes(units, "export: --set arithmetic=q24, --filter or track")
     real, suffix = ("float", "f") if kind == "float" else ("double", "")
     head, tail = _template("q24" if fixed else "real").split("@UNITS@\n")
     blocks = [_fixed_unit(unit) if fixed else _real_unit(unit, kind) for unit in units]
@@ -41,7 +41,7 @@ def write(units: Sequence[UnitCalibration], run: str, settings: ExportSettings) 
     names |= {"BYTES": str(struct.calcsize(_PACKED[kind])), "BITS": "uint64_t" if kind == "double" else "uint32_t"}
     names |= {"NUMBER": "int32_t" if fixed else real, "MATRIX": "inverse" if fixed else "response"}
     if fixed and behind:
-        raise WrongUse("export: --filter and --track need --arithmetic double or float; choose one of them")
+        raise WrongUse("export: --filter and track need --set arithmetic=double or float; choose one of them")
     exact = np.float32 if kind == "float" else np.float64
     own = settings.firmware.names(_literal(exact), _braces)
     tail = tail.replace("#endif", _filled(_template("filter"), own) + "#endif") if own else tail

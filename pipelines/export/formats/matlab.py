@@ -28,7 +28,7 @@ def write(units: Sequence[UnitCalibration], run: str, settings: ExportSettings) 
     """The file: one structure per unit, and ``tumbleline`` with run, certificates and what accelparams does not hold.
 
     ``NoiseDensity`` is N (``NoiseType`` double-sided), vectors are rows, in m/s² with a nominal scale: the output divided by
-    ``--nominal``, or by the unit's own mean scale where it is not given.
+    ``--set nominal=N``, or by the unit's own mean scale where it is not given.
 
     Raises
     ------

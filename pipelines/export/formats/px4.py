@@ -36,7 +36,7 @@ def write(units: Sequence[UnitCalibration], run: str, settings: ExportSettings) 
     if unit.unit not in settings.device_ids:
         raise WrongUse(
             f"export: no device id of unit {unit.unit}, PX4 applies a calibration only where CAL_ACC{settings.sensor}_ID is the "
-            f"id of its sensor; read the parameter in QGroundControl and give it with --device-id {unit.unit}=ID"
+            f"id of its sensor; read the parameter in QGroundControl and give it with --set device_id={unit.unit}=ID"
         )
     device, n = settings.device_ids[unit.unit], settings.sensor
     bias = bias_m_s2(unit, nominal)

@@ -87,7 +87,7 @@ def _with_period(unit: UnitCalibration, sheet: DataSheet) -> DataSheet:
     if days is None:
         raise WrongUse(
             f"export: unit {unit.unit} is not certified, so nothing states its period of calibration, TEDS needs it; add "
-            "period_days=DAYS to --teds, or certify the run"
+            "period_days=DAYS to --set teds=…, or certify the run"
         )
     return replace(sheet, period_days=days)
 

@@ -37,7 +37,9 @@ def read(name: str, data: bytes, group: str) -> Content:
         signals = [_signal(file, counts[title][0], k) for k in range(len(file.groups[counts[title][0]].channels))]
     own = [signal for signal in signals if signal is not None]
     if not own:
-        raise DataRejected(f"{name}: group '{title}' has no numeric channel, one is needed; name another --group")
+        raise DataRejected(
+            f"{name}: group '{title}' has no numeric channel, one is needed; name another with --set group=NAME"
+        )
     columns: dict[str, Any] = {"time": own[0].timestamps}
     units: dict[str, str] = {"time": "s"}
     for signal in own:

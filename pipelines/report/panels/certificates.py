@@ -17,7 +17,7 @@ TEMPLATE = """\
 </table>
 <p class="note">State of the ledger when this page was written; a certificate is valid from its first day until the day before "until". State today: tumbleline show UNIT --at DATE.</p>
 {% else %}
-<p class="note">No unit of this run had a certificate when this page was written: its coefficients have no period of validity (tumbleline certify {{ run }}).</p>
+<p class="note">No unit of this run had a certificate when this page was written: its coefficients have no period of validity (tumbleline certificate issue {{ run }}).</p>
 {% endif %}
 """
 

@@ -69,5 +69,5 @@ def report(request: Request) -> Response:
     bench, state, _ = asked(request, RunPage)
     stored = bench.archive.run(state.run)
     if not stored.report.is_file():
-        raise WrongUse(f"run {stored.id} has no report; make it with 'tumbleline report {stored.id}'")
+        raise WrongUse(f"run {stored.id} has no report; make it with 'tumbleline show {stored.id} --report'")
     return Response(stored.report.read_bytes(), media_type="text/html", headers=saved_as(f"{stored.id}.html"))

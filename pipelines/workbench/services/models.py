@@ -8,7 +8,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from inertial import effects
-from pipelines.diagnosis.inputs import WHY, use_written_formulas
+from pipelines.diagnosis.inputs import use_written_formulas, with_formulas
 from pipelines.improvement.improvement import with_effects
 from pipelines.jobs.model_files import ModelStep, model_text, new_model, publish_model
 from pipelines.jobs.releases import Release
@@ -91,7 +91,7 @@ def save(
     with _ALONE, effects.additions_forgotten():
         use_written_formulas(formulas, "model")
         text = model_text(place) if place.is_file() else new_model(place, list(start), by, at)
-        text = _with_formulas(text, formulas, [*start, *added])
+        text = with_formulas(text, formulas, [*start, *added])
         lacking = [effect for effect in dict.fromkeys(added) if f'"{effect}"' not in text.partition("[[change]]")[0]]
         steps = [ModelStep(effect, by, at, why.strip(), source) for effect in lacking]
         text, after = with_effects(text, steps, place)
@@ -100,14 +100,3 @@ def save(
         place.parent.mkdir(parents=True, exist_ok=True)
         publish_model(place, text)
     return place, after.model.version if after else 1
-
-
-def _with_formulas(text: str, formulas: Sequence[str], used: Sequence[str]) -> str:
-    """The text with the formulas that are used and that it lacks."""
-    for written in formulas:
-        name, _, rest = written.partition("=")
-        known = name.strip().lower()
-        if known in used and f'id = "{known}"' not in text:
-            columns = ", ".join(f'"{part.strip()}"' for part in rest.split(";") if part.strip())
-            text = f'{text.rstrip()}\n\n[[formula]]\nid = "{known}"\ncolumns = [{columns}]\nwhy = "{WHY}"\n'
-    return text

@@ -224,7 +224,7 @@ def test_every_start_of_a_server_or_worker_is_one_that_is_there() -> None:
 def test_every_command_of_the_product_is_one_that_is_there() -> None:
     matches = [re.search(r"(?:^|/)tumbleline ([a-z].*)", text) for text in lines()]
     given = [shlex.split(match[1]) for match in matches if match]
-    assert {"monitor", "workbench", "archive", "doctor", "run"} >= {words[0] for words in given}
+    assert {"station", "workbench", "archive", "doctor", "run"} >= {words[0] for words in given}
     for name, *words in given:
         command = get_command(app).get_command(None, name)._load()
         below = getattr(command, "commands", {})

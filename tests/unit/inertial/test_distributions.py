@@ -78,7 +78,7 @@ except SystemExit as left:
 """
 
 
-@each(["allan", "psd", "diagnose"])
+@each(["noise allan", "noise psd", "diagnose"])
 def test_commands_load_no_library_that_they_do_not_need(command: str, tmp_path: Path) -> None:
     path, options, idle = (
         tmp_path / "given.csv",
@@ -91,7 +91,7 @@ def test_commands_load_no_library_that_they_do_not_need(command: str, tmp_path: 
     else:
         values = np.random.default_rng(62).normal(0.0, 1e-3, (2000, 3))
         np.savetxt(path, values, fmt="%.7f", delimiter=",", header="x,y,z", comments="")
-    call = [sys.executable, "-c", LOADED, command, str(path), *options]
+    call = [sys.executable, "-c", LOADED, *command.split(), str(path), *options]
     status, *loaded = subprocess.run(call, capture_output=True, text=True, check=True).stderr.split()[-3000:]
     assert status in ({"0", "1"} if command == "diagnose" else {"0"})
     assert ("scipy.linalg" if command == "diagnose" else "numpy") in loaded

@@ -177,16 +177,16 @@ def ask(run: Run, *arguments: str) -> tuple[int, dict]:
 
 
 def test_only_units_that_passed_are_certified_and_the_others_are_named(run: Run) -> None:
-    status, document = ask(run, "certify", run.id)
+    status, document = ask(run, "certificate", "issue", run.id)
     assert status == 1
     assert {one["serial"] for one in document["certified"]} == {"A1", "A2"}
     assert list(document["left_out"]) == ["A3"]
     with pytest.raises(WrongUse, match=r"unit A3 of run .* did not pass"):
-        ask(run, "certify", run.id, "--units", "A3")
+        ask(run, "certificate", "issue", run.id, "--units", "A3")
 
 
 def test_show_tells_the_calibration_of_a_date_with_its_coefficients_origin_and_end(run: Run) -> None:
-    ask(run, "certify", run.id, "--units", "A1,A2")
+    ask(run, "certificate", "issue", run.id, "--units", "A1,A2")
     status, shown = ask(run, "show", "A1", "--at", day(100))
     calibration = shown["calibration"]
     assert (status, shown["valid"], calibration["run"]) == (0, True, run.id)

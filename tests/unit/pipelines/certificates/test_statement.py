@@ -38,14 +38,14 @@ def units(typed: Typed, run: Run, *words: str) -> dict[str, dict]:
 def test_an_export_names_the_certificate_and_whether_it_holds(run: Run, typed: Typed) -> None:
     done = typed("export", run.id)
     assert {one["certificate"] for one in json.loads(done.stdout)["units"]} == {None}
-    assert "not certified: A1, A2; 'tumbleline certify" in done.stderr
-    typed("certify", run.id)
+    assert "not certified: A1, A2; 'tumbleline certificate issue" in done.stderr
+    typed("certificate", "issue", run.id)
     assert typed("export", run.id).stderr == ""
     wanted = {
         "certificate": "A1/1", "from": day(), "until": months_after(day(), 12), "state": "valid", "reason": "", "valid_now": True,
     }  # fmt: skip
     assert units(typed, run)["A1"]["certificate"] == wanted
-    px4 = ("--format", "px4", "--nominal", "256000", "--units", "A1", "--device-id", "1310988")
+    px4 = ("--format", "px4", "--set", "nominal=256000", "--units", "A1", "--set", "device_id=1310988")
     line = f"certificate A1/1, valid from {day()} until {months_after(day(), 12)}"
     assert f"/* A1: {line} */" in typed("export", run.id, "--format", "c").stdout
     assert f"# {line}\n" in typed("export", run.id, *px4).stdout
@@ -53,7 +53,7 @@ def test_an_export_names_the_certificate_and_whether_it_holds(run: Run, typed: T
 
 
 def test_a_certificate_that_has_ended_is_told(run: Run, typed: Typed, monkeypatch: pytest.MonkeyPatch) -> None:
-    typed("certify", run.id, "--until", day(30))
+    typed("certificate", "issue", run.id, "--until", day(30))
     for place in ("pipelines.certificates.days.today", "pipelines.certificates.validity.today"):
         monkeypatch.setattr(place, lambda: day(31))
     assert units(typed, run)["A1"]["certificate"]["valid_now"] is False
@@ -61,32 +61,32 @@ def test_a_certificate_that_has_ended_is_told(run: Run, typed: Typed, monkeypatc
 
 
 def test_revoked_coefficients_leave_the_house_only_when_they_are_asked_for(run: Run, typed: Typed) -> None:
-    typed("certify", run.id)
-    typed("revoke", "A1", "--reason", "dropped */ on the floor")
+    typed("certificate", "issue", run.id)
+    typed("certificate", "revoke", "A1", "--reason", "dropped */ on the floor")
     done = typed("export", run.id)
     assert [one["unit"] for one in json.loads(done.stdout)["units"]] == ["A2"]
     assert "left out: A1, certificate A1/1 REVOKED (dropped */ on the floor)" in done.stderr
     refused = typed("export", run.id, "--units", "A1")
     assert "the calibration of unit A1" in str(refused.exception)
-    given = typed("export", run.id, "--units", "A1", "--revoked")
+    given = typed("export", run.id, "--units", "A1", "--include", "revoked")
     assert json.loads(given.stdout)["units"][0]["certificate"]["state"] == "revoked"
     assert "A1: certificate A1/1 REVOKED" in given.stderr
-    header = typed("export", run.id, "--units", "A1", "--revoked", "--format", "c").stdout
+    header = typed("export", run.id, "--units", "A1", "--include", "revoked", "--format", "c").stdout
     assert "REVOKED (dropped * / on the floor) */" in header
-    typed("revoke", "A2", "--reason", "wrong reference")
+    typed("certificate", "revoke", "A2", "--reason", "wrong reference")
     assert "was revoked (" in str(typed("export", run.id).exception)  # no unit is left
-    typed("certify", run.id, "--units", "A1")
+    typed("certificate", "issue", run.id, "--units", "A1")
     assert units(typed, run)["A1"]["certificate"]["certificate"] == "A1/3"
 
 
 def test_the_report_names_the_certificates_and_follows_the_ledger(run: Run, typed: Typed) -> None:
     make_report(run)
     assert "No unit of this run had a certificate" in run.report.read_text(encoding="utf-8")
-    typed("certify", run.id)
+    typed("certificate", "issue", run.id)
     page = re.sub(r"<[^>]*>", " ", run.report.read_text(encoding="utf-8"))
     assert re.search(rf"A1\s+A1/1\s+{day()}\s+{months_after(day(), 12)}\s+valid", page)
     assert re.search(r"A3\s+not certified", page)
-    typed("revoke", "A1", "--reason", "dropped")
+    typed("certificate", "revoke", "A1", "--reason", "dropped")
     page = re.sub(r"<[^>]*>", " ", run.report.read_text(encoding="utf-8"))
     assert re.search(rf"A1\s+A1/1\s+{day()}\s+{day()}\s+revoked\s+dropped", page)
     assert verify(run.archive, keys={}).checked.findings == []

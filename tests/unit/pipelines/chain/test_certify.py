@@ -65,18 +65,18 @@ def test_the_run_is_named_before_it_is_signed(run: Run, typed: Typed, monkeypatc
 
     with monkeypatch.context() as patch:
         patch.setattr(certifying, "refuse_unsound", refused)
-        stopped = typed("certify")
+        stopped = typed("certificate", "issue")
     assert str(stopped.exception) == "stopped before anything was written"
-    assert f"certify: run {run.id}, measured on {end_of(run)}, 3 units: A1, A2, A3" in stopped.stderr
-    done = typed("certify", "--json")
-    assert f"certify: run {run.id}, measured on {end_of(run)}" in done.stderr
+    assert f"certificate issue: run {run.id}, measured on {end_of(run)}, 3 units: A1, A2, A3" in stopped.stderr
+    done = typed("certificate", "issue", "--json")
+    assert f"certificate issue: run {run.id}, measured on {end_of(run)}" in done.stderr
     assert json.loads(done.stdout)["run"] == run.id
 
 
 def test_a_certificate_begins_at_the_measurement_or_later_and_lasts_no_longer_than_is_allowed(
     run: Run, typed: Typed
 ) -> None:
-    refused = typed("certify", run.id, "--from", "2020-01-01").exception
+    refused = typed("certificate", "issue", run.id, "--since", "2020-01-01").exception
     assert isinstance(refused, WrongUse)
     assert (
         f"valid from 2020-01-01, run {run.id} was measured on {end_of(run)}, that day or a later one is needed"
@@ -84,14 +84,14 @@ def test_a_certificate_begins_at_the_measurement_or_later_and_lasts_no_longer_th
     )
     assert allowed_months(run) == VALIDITY_MONTHS
     for words in (
-        ("--from", day(-1)), ("--months", "13"), ("--until", "2099-01-01"), ("--from", day(400)), ("--months", "1200"),
+        ("--since", day(-1)), ("--until", "13m"), ("--until", "2099-01-01"), ("--since", day(400)), ("--until", "1200m"),
     ):  # fmt: skip
-        assert typed("certify", run.id, *words).exit_code != 0, words
+        assert typed("certificate", "issue", run.id, *words).exit_code != 0, words
     ledger = Ledger(run.archive)
     assert ledger.events("A1") == []
-    assert typed("certify", run.id).exit_code == 0
+    assert typed("certificate", "issue", run.id).exit_code == 0
     assert ledger.events("A1")[0].until == months_after(end_of(run), VALIDITY_MONTHS)
-    assert typed("certify", run.id, "--from", day(1)).exit_code == 0
+    assert typed("certificate", "issue", run.id, "--since", day(1)).exit_code == 0
 
 
 def test_the_limits_file_says_how_long(run: Run, tmp_path: Path) -> None:
@@ -190,7 +190,7 @@ def sign(run: Run, key: Path | None) -> None:
 def test_show_export_and_verify_name_who_did_not_sign(
     run: Run, typed: Typed, keys: dict[str, Path], monkeypatch: pytest.MonkeyPatch, by: str, said: str
 ) -> None:
-    typed("certify", run.id)
+    typed("certificate", "issue", run.id)
     sign(run, keys.get(by))
     for words in (("show", run.id), ("show", "A1"), ("export", run.id)):
         assert said not in typed(*words).stderr
@@ -202,9 +202,9 @@ def test_show_export_and_verify_name_who_did_not_sign(
         assert f"runs/{run.id}/coefficients.json" in done.stderr
         assert "calibrations/" in done.stderr  # the certificate was not signed either
     assert typed("verify").exit_code == 1
-    refused = typed("certify", run.id, "--months", "6").exception
+    refused = typed("certificate", "issue", run.id, "--until", "6m").exception
     assert isinstance(refused, ArchiveUnusable)
-    assert "a signature by the own key, or by one given with --key, is needed" in str(refused)
+    assert "a signature by the own key, or by one given with --trust, is needed" in str(refused)
 
 
 def test_an_edit_behind_a_signature_stops_show_and_export(
@@ -229,9 +229,9 @@ def test_a_run_of_a_station_with_another_key_is_certified_where_that_key_is_trus
     public = load_pem_private_key(keys["foreign"].read_bytes(), None).public_key()
     pem.write_bytes(public.public_bytes(Encoding.PEM, PublicFormat.SubjectPublicKeyInfo))
     monkeypatch.setenv(VARIABLE, str(keys["own"]))
-    words = ["certify", run.id, "--archive", str(run.archive.root)]
+    words = ["certificate", "issue", run.id, "--archive", str(run.archive.root)]
     assert isinstance(CliRunner().invoke(app, words).exception, ArchiveUnusable)
-    assert CliRunner().invoke(app, [*words, "--key", str(pem)]).exit_code == 0
+    assert CliRunner().invoke(app, [*words, "--trust", str(pem)]).exit_code == 0
 
 
 def test_tables_made_with_different_libraries_are_told_wherever_they_are_handed_out(run: Run, typed: Typed) -> None:
@@ -239,7 +239,7 @@ def test_tables_made_with_different_libraries_are_told_wherever_they_are_handed_
     path = run.path / "coefficients.json"
     content = json.loads(path.read_text())
     path.write_bytes(files.json_bytes({**content, "libraries": {**content["libraries"], "scipy": "0.1"}}))
-    for words in (("show", run.id), ("export", run.id), ("certify", run.id)):
+    for words in (("show", run.id), ("export", run.id), ("certificate", "issue", run.id)):
         assert "tables made with scipy 0.1 (coefficients)" in typed(*words).stderr, words
     assert "tables made with scipy 0.1 (coefficients)" in typed("verify").stdout
 

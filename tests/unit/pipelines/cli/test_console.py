@@ -38,7 +38,8 @@ def test_a_sentence_is_wrapped_between_words_and_a_command_stays_whole() -> None
     out = WordConsole(file=sink, width=40, force_terminal=True, color_system=None)
     out.print("the largest deviation of the norm from local gravity over all poses", soft_wrap=True)
     out.print(
-        "  tumbleline diagnose a/long/path/of/dwells.parquet --history a/long/path/of/history.parquet", soft_wrap=True
+        "  tumbleline diagnose a/long/path/of/dwells.parquet --temperatures a/long/path/of/history.parquet",
+        soft_wrap=True,
     )
     out.print(f"report  /{'folder/' * 12}report.html", soft_wrap=True)
     first, second, command, report = sink.getvalue().splitlines()

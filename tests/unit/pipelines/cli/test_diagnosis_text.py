@@ -35,7 +35,7 @@ def test_dwells_that_carry_a_verdict_stand_in_text_document_and_page(tmp_path, c
     made = make(world, SEED)
     made.dwells.to_parquet(tmp_path / "dwells.parquet")
     page = tmp_path / "page.html"
-    given = ["diagnose", str(tmp_path / "dwells.parquet"), "--report", str(page), "--json"]
+    given = ["diagnose", str(tmp_path / "dwells.parquet"), "--output", str(page), "--json"]
     document = json.loads(CliRunner().invoke(app, given).stdout)
     (group,) = document["classes"]
     assert (group["scope"], name in group["effects"]) == (scope, True)
@@ -70,7 +70,7 @@ def test_missing_dwells_are_told_in_the_report_and_at_the_terminal(tmp_path):
     table = table.drop(index=table.index[(table["unit"] == "W002") & table["dwell"].isin([4, 9])])
     table.to_parquet(tmp_path / "dwells.parquet")
     page = tmp_path / "page.html"
-    done = CliRunner().invoke(app, ["diagnose", str(tmp_path / "dwells.parquet"), "--report", str(page)])
+    done = CliRunner().invoke(app, ["diagnose", str(tmp_path / "dwells.parquet"), "--output", str(page)])
     notice = "of 36 dwells of the lot are missing: W002 2 (4, 9); these units are judged by the others"
     assert notice in " ".join(done.stdout.split())
     assert notice in page.read_text(encoding="utf-8")

@@ -287,9 +287,9 @@ def test_device_ids_are_one_for_each_unit_and_px4_needs_the_one_that_it_compares
     assert device_ids("1310988", ["A"]) == {"A": 1310988}
     assert device_ids("A=0x140, B=2", ["A", "B"]) == {"A": 320, "B": 2}
     for text, units in (("7", ["A", "B"]), ("A=1,B=1", ["A", "B"]), ("C=1", ["A"]), ("-1", ["A"]), ("x", ["A"])):
-        with pytest.raises(WrongUse, match="--device-id"):
+        with pytest.raises(WrongUse, match="--set device_id"):
             device_ids(text, units)
-    with pytest.raises(WrongUse, match=r"no device id of unit SN 1.*--device-id SN 1=ID"):
+    with pytest.raises(WrongUse, match=r"no device id of unit SN 1.*--set device_id=SN 1=ID"):
         export_text("px4", [unit()], "run-1", ExportSettings(nominal=NOMINAL))
     ignored = px4(qgroundcontrol(export_text("px4", [unit()], "r", IDS)), np.ones(3), 25.0, 99)
     assert np.array_equal(ignored, np.ones(3))

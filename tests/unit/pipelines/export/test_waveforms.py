@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 from pipelines.archive import Archive
 from pipelines.cli import app
-from pipelines.cli.waveforms import FORMATS
+from pipelines.cli.export import WAVEFORMS as FORMATS
 from pipelines.export.waveforms import WRITERS, Channel, write_waveforms
 from pipelines.importers import files
 from pipelines.importers.waveforms import RecordingLayout, import_waveforms
@@ -81,7 +81,7 @@ def test_a_file_without_unit_or_sample_interval_is_refused(tmp_path: Path, rng: 
     bare.write_text(f"dut,ref\n{rows}\n")
     (part := tmp_path / "part.toml").write_text("scale = 0.3\n")
     columns = {"z": "dut", "reference": "ref"}
-    with pytest.raises(DataRejected, match=r"bare.csv: column 'dut' has no unit.*--units output"):
+    with pytest.raises(DataRejected, match=r"bare.csv: column 'dut' has no unit.*--unit-of output"):
         import_waveforms([bare], "shock", part, "S1", RecordingLayout(columns, {}), str(tmp_path / "a"))
     units = {"output": "V", "reference": "g"}
     with pytest.raises(DataRejected, match=r"no sample interval is stated.*--rate"):
@@ -92,7 +92,7 @@ def test_a_file_without_unit_or_sample_interval_is_refused(tmp_path: Path, rng: 
     stated = tmp_path / "stated.csv"
     stated.write_text(f"dut [V],ref [g]\n{rows}\n")
     layout = RecordingLayout({"z": "dut [V]", "reference": "ref [g]"}, {"output": "mV"}, RATE)
-    with pytest.raises(WrongUse, match=r"states V, --units has mV"):
+    with pytest.raises(WrongUse, match=r"states V, --unit-of has mV"):
         import_waveforms([stated], "shock", part, "S1", layout, str(tmp_path / "a"))
     with pytest.raises(WrongUse, match="can be imported"):
         import_waveforms([bare], "tilt", None, "S1", RecordingLayout(columns, units, RATE), str(tmp_path / "a"))
@@ -114,7 +114,7 @@ def test_dwells_and_steps_of_others_are_imported_by_the_command(tmp_path: Path, 
         paths += write_waveforms("csv", made, tmp_path / f"dwell{k}.csv")
     part = tmp_path / "part.toml"
     part.write_text('nominal_scale = 0.3\neffects = ["second_order"]\nfull_scale = 5.0\n')
-    words = ["--procedure", "sweep", "--part", str(part), "--map", "z=dut [V],reference=ref [m/s^2]", "--unit", "W1"]
+    words = ["--procedure", "sweep", "--set", str(part), "--map", "z=dut [V],reference=ref [m/s^2]", "--units", "W1"]
     words += ["--json", "--archive", str(tmp_path / "archive")]
     answer = CliRunner().invoke(app, ["import", *map(str, paths), *words])
     document = json.loads(answer.stdout)

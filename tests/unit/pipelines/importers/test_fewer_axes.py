@@ -11,7 +11,7 @@ from in_process import document_of, given, refused, text_of
 from pipelines.archive import Archive
 
 SCALE, BIAS, ACROSS, K2 = 0.35, 2e-3, 1.5e-3, 50e-6  # V/g, V, rad, g/g²
-OF_ONE = ("--axes", "x", "--units", "output=V", "--rows", "dwells", "--unit", "SF1")
+OF_ONE = ("--set", "axes=x", "--unit-of", "output=V", "--set", "rows=dwells", "--units", "SF1")
 TILT = "x=volts,tilt=angle_deg,sd_x=noise_V,n=samples"
 
 
@@ -41,7 +41,14 @@ def test_two_positions_give_half_the_sum_and_half_the_difference(tmp_path):
         (name, volts, 1e-5, 100) for pair in zip(up, down, strict=True) for name, volts in zip("ud", pair, strict=True)
     ]
     pd.DataFrame(rows, columns=["position", "volts", "noise_V", "samples"]).to_csv(tmp_path / "two.csv", index=False)
-    mapped = ("--map", "x=volts,dwell=position,sd_x=noise_V,n=samples", "--poses", "u=+x,d=-x", "--local-g", "9.80665")
+    mapped = (
+        "--map",
+        "x=volts,dwell=position,sd_x=noise_V,n=samples",
+        "--set",
+        "poses=u=+x,d=-x",
+        "--set",
+        "local_gravity_m_s2=9.80665",
+    )
     fit = document_of("fit", imported(tmp_path, tmp_path / "two.csv", *mapped), "--archive", tmp_path / "archive")
     assert fit["effects"] == ["bias", "scale"]  # nothing across is shown: no misalignment is pretended
     assert fit["adequate"] is None
@@ -72,7 +79,7 @@ def test_a_tumble_is_its_fourier_series(tmp_path):
     for name, (value, error) in found.items():
         assert value == pytest.approx(harmonic[name], abs=0.5 * error), name
         assert abs(value - truth[name]) < 4.0 * error, name
-    assert "report.html" in text_of("report", fit["run"], "--archive", archive)
+    assert "report.html" in text_of("show", fit["run"], "--report", "--archive", archive)
     unit = json.loads(given("export", fit["run"], "--format", "json", "--archive", archive)[1])["units"][0]
     assert (unit["axes"], np.shape(unit["bias"]), np.shape(unit["response"])) == (["x"], (4, 1), (4, 1, 3))
     assert unit["response"][0][0] == pytest.approx([found["K1"][0], found["Kxy"][0], 0.0])
@@ -82,16 +89,16 @@ def test_a_tumble_is_its_fourier_series(tmp_path):
 @pytest.mark.parametrize(
     ("words", "needed"),
     [
-        (("--map", TILT, "--axes", "w"), "'x', 'y' or 'z'"),
-        (("--map", TILT), "or --axes x for a device with fewer axes"),
-        (("--map", TILT, "--axes", "x,y"), "axes are x, y, and x mapped"),
-        (("--map", TILT.replace("volts", "vots"), "--axes", "x"), "'vots'"),
-        (("--map", TILT, "--axes", "x", "--fit", "norm"), "needs three axes"),
+        (("--map", TILT, "--set", "axes=w"), "'x', 'y' or 'z'"),
+        (("--map", TILT), "or --set axes=x for a device with fewer axes"),
+        (("--map", TILT, "--set", "axes=x,y"), "axes are x, y, and x mapped"),
+        (("--map", TILT.replace("volts", "vots"), "--set", "axes=x"), "'vots'"),
+        (("--map", TILT, "--set", "axes=x", "--fit", "norm"), "needs three axes"),
     ],
 )
 def test_a_slip_in_the_axes_is_refused_with_one_message(tmp_path, words, needed):
     path, _ = tilt_file(tmp_path)
-    plain = ("--units", "output=V", "--rows", "dwells", "--unit", "SF1", "--archive", tmp_path / "archive")
+    plain = ("--unit-of", "output=V", "--set", "rows=dwells", "--units", "SF1", "--archive", tmp_path / "archive")
     assert needed in refused("import", path, *words, *plain)
 
 

@@ -337,7 +337,7 @@ def test_columns_named_as_in_the_exchange_format_serials_and_numbers_of_dwells_a
     assert seen.keys is not None
     assert seen.keys["columns"] == expected | {"x": "ax", "y": "ay", "z": "az"}
     assert (seen.keys["units"], seen.keys["rows"], seen.open) == ({"output": "g"}, "dwells", ())
-    assert "--unit " not in seen.import_command
+    assert "--units " not in seen.import_command
     proposal = seen.for_fit()
     assert proposal is not None
     assert proposal.fit == ""  # its poses are known

@@ -109,10 +109,10 @@ def test_the_unit_of_a_counter_is_recognised_and_said(time, name: str, stated: d
 
 def test_times_in_a_doubtful_or_another_unit_than_claimed_are_asked_about_refused_or_remarked_upon() -> None:
     for step in (1, 2, 1000, 500_000):
-        with pytest.raises(WrongUse, match=r"steps of .* Hz in .* Hz in .*add --units time="):
+        with pytest.raises(WrongUse, match=r"steps of .* Hz in .* Hz in .*add --unit-of time="):
             seconds(STEPS * step)
     for first, step, claimed in ((1_700_000_000_000, 10, "s"), (1_700_000_000_000_000, 10_000, "ms")):
-        with pytest.raises(WrongUse, match=r"Unix time, in .*, but --units time=.* was given"):
+        with pytest.raises(WrongUse, match=r"Unix time, in .*, but --unit-of time=.* was given"):
             seconds(first + STEPS * step, claimed)
     assert any("CHECK THE UNIT OF TIME" in remark for remark in seconds(STEPS * 10_000, "s")[1])
     # a unit is read from a name and not from a letter

@@ -143,7 +143,7 @@ def test_minutes_and_seconds_of_a_spreadsheet_go_on_over_the_hour() -> None:
 def test_a_row_of_a_summary_is_left_out_where_gaps_may_be_and_rows_that_stand_twice_are_remarked_upon(
     rng: np.random.Generator,
 ) -> None:
-    """The message asked for `--gaps split`, which was given."""
+    """The message asked for `--set gaps=split`, which was given."""
     table = recordings.table(recordings.recording(rng))
     last = pd.DataFrame({"t": ["mean"], "ax": [0.0], "ay": [0.0], "az": [0.0]})
     summed = pd.concat([table.astype(object), last], ignore_index=True)
@@ -181,7 +181,7 @@ def test_a_sheet_of_positions_is_proposed_as_dwells_and_unknown_axes_stand_in_ca
     document = inspect([tmp_path / "a.csv"]).document
     assert document["open"] == []
     assert "dwell=Position" in document["command"]
-    assert document["command"].endswith("--rows dwells")
+    assert document["command"].endswith("--set rows=dwells")
     (tmp_path / "a.csv").write_text("time,gyro\n" + "".join(f"{0.01 * k:.2f},0.{(7 * k) % 10}\n" for k in range(20)))
     document = inspect([tmp_path / "a.csv"]).document
     assert "x=COLUMN,y=COLUMN,z=COLUMN" in document["command"]
@@ -190,9 +190,9 @@ def test_a_sheet_of_positions_is_proposed_as_dwells_and_unknown_axes_stand_in_ca
 @pytest.mark.parametrize(
     ("heads", "mapped"),
     [
-        (("a",), "x=a --units output=UNIT,time=s --unit S --axes x"),
-        (("acc_x", "acc_z"), "x=acc_x,z=acc_z --units output=UNIT,time=s --unit S --axes x,z"),
-        (("temp", "az"), "temperature=temp,z=az --units output=UNIT,time=s --unit S --axes z"),
+        (("a",), "x=a --unit-of output=UNIT,time=s --units S --set axes=x"),
+        (("acc_x", "acc_z"), "x=acc_x,z=acc_z --unit-of output=UNIT,time=s --units S --set axes=x,z"),
+        (("temp", "az"), "temperature=temp,z=az --unit-of output=UNIT,time=s --units S --set axes=z"),
     ],
 )
 def test_a_record_of_one_axis_or_two_is_proposed_by_its_columns(
@@ -203,7 +203,7 @@ def test_a_record_of_one_axis_or_two_is_proposed_by_its_columns(
     table.to_csv(tmp_path / "S.csv", index=False)
     document = inspect([tmp_path / "S.csv"]).document
     assert document["command"].endswith(f"--map time=time,{mapped}")
-    assert any("fewer than three axes" in one and "--axes" in one for one in document["open"])
+    assert any("fewer than three axes" in one and "--set axes" in one for one in document["open"])
     assert not any("were not recognised" in one for one in document["open"])
 
 
@@ -237,6 +237,6 @@ def test_counts_far_from_zero_are_fitted(rng: np.random.Generator) -> None:
 def test_a_sensor_that_was_not_turned_is_told_so_and_what_to_do(rng: np.random.Generator) -> None:
     """A chamber cycle was told to add poses."""
     still = np.array([0.1, -0.05, -9.7]) + rng.normal(0.0, 0.05, (30, 3))
-    with pytest.raises(NotIdentified, match=r"was not turned.*--face FACE"):
+    with pytest.raises(NotIdentified, match=r"was not turned.*--set face=FACE"):
         refuse_one_pose(still)
     refuse_one_pose(np.concatenate([still, -still]))

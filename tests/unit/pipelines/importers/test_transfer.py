@@ -49,7 +49,7 @@ def test_the_missing_pole_is_named_the_error_falls_and_the_command_says_so_by_it
     assert "one_pole" in diagnosis["classes"][0]["effects"]
     assert diagnosis["extended_percent"] < 0.2 * diagnosis["error_percent"]
     assert diagnosis["left_out"][1] == pytest.approx(1.0, abs=0.25)
-    words = ["import", str(path), "--procedure", "sweep", "--unit", "S1", "--archive", archive, "--json"]
+    words = ["import", str(path), "--procedure", "sweep", "--units", "S1", "--archive", archive, "--json"]
     result = CliRunner().invoke(app, words)
     assert result.exit_code == 1
     assert json.loads(result.stdout)["recommended"]

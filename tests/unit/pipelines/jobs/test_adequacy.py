@@ -178,5 +178,5 @@ def test_a_certificate_is_offered_for_units_that_pass_by_a_budget_under_an_adequ
     ):
         seen = document | {"units": [unit | change], "adequacy": verdict | {"adequate": adequate}}
         lines = _next(run, seen, None)
-        assert any(line.startswith("tumbleline certify") for line in lines) is offered
+        assert any(line.startswith("tumbleline certificate issue") for line in lines) is offered
         assert lines[0] == f"tumbleline diagnose {run.id}"

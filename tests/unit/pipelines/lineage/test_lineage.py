@@ -194,7 +194,7 @@ def test_the_command_shows_the_way_once_and_writes_prov_crate_and_json(run: Run,
     known = ("certificate A1/1", "by fit", "raw samples  23 records", "reference AG-7", "station simulated", "pyarrow")
     assert [words for words in known if words not in shown] == []
     assert shown.count("by fit") == 1
-    document = json.loads(ask("--json", "--prov", str(tmp_path / "p.jsonld"), "--crate", str(tmp_path / "c")))
+    document = json.loads(ask("--json", "--output", str(tmp_path / "p.jsonld"), "--output", str(tmp_path / "c")))
     assert document["focus"] == [node["id"] for node in document["things"] if node["kind"] == "certificate"]
-    assert json.loads((tmp_path / "p.jsonld").read_text()) == json.loads(ask("--prov", "-"))
+    assert json.loads((tmp_path / "p.jsonld").read_text()) == json.loads(ask("--output", "-"))
     assert (tmp_path / "c" / "ro-crate-metadata.json").is_file()

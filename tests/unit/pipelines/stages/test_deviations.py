@@ -10,7 +10,7 @@ import pytest
 from inertial.noise.allan import overlapping
 from inertial.noise.mixture import basis
 from inertial.noise.terms import fit_terms
-from pipelines.cli import allan
+from pipelines.cli import noise
 from pipelines.stages.deviations import STATISTICS, Deviations, deviations
 
 RECORDS, N = 150, 2048
@@ -62,7 +62,7 @@ def test_the_maximum_time_interval_error_is_that_of_allantools() -> None:
     mine = STATISTICS["mtie"].compute(record, 50.0, m)
     peer = allantools.mtie(record, rate=50.0, data_type="freq", taus=m / 50.0)[1]
     np.testing.assert_allclose(mine, peer, rtol=1e-12)
-    assert ("allan", *STATISTICS) == allan.STATISTICS  # the command offers every statistic
+    assert ("allan", *STATISTICS) == noise.STATISTICS  # the command offers every statistic
 
 
 def test_integrals_of_an_acceleration_are_velocities() -> None:

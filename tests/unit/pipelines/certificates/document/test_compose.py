@@ -83,9 +83,9 @@ def laboratory(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def typed(run: Run, laboratory: Path, tmp_path: Path) -> Typed:
-    def type_(*words: str, command: str = "certificate") -> Result:
-        own = ["--laboratory", str(laboratory), "--output", str(tmp_path / "out")] if command == "certificate" else []
-        return CliRunner().invoke(app, [command, *words, *own, "--archive", str(run.archive.root)])
+    def type_(*words: str, command: str = "write") -> Result:
+        own = ["--laboratory", str(laboratory), "--output", str(tmp_path / "out")] if command == "write" else []
+        return CliRunner().invoke(app, ["certificate", command, *words, *own, "--archive", str(run.archive.root)])
 
     return type_
 

@@ -60,13 +60,13 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Issued:
     folder = tmp_path_factory.mktemp("issued")
     run = small_run(folder)
     run.seal()
-    done = CliRunner().invoke(app, ["certify", run.id, "--archive", str(run.archive.root), "--json"])
+    done = CliRunner().invoke(app, ["certificate", "issue", run.id, "--archive", str(run.archive.root), "--json"])
     TypeAdapter(CertifyDocument).validate_json(done.stdout, strict=True, extra="forbid")
     key = made_key(ec.generate_private_key(ec.SECP256R1()))
     who = laboratory_file(folder)
     (folder / "key.pem").write_bytes(pem(key))
     (folder / "trust.pem").write_bytes(key.certificate.public_bytes(Encoding.PEM))
-    words = ["certificate", run.id, "--laboratory", str(who), "--archive", str(run.archive.root)]
+    words = ["certificate", "write", run.id, "--laboratory", str(who), "--archive", str(run.archive.root)]
     signed = ["--sign-with", str(folder / "key.pem"), "--address", "https://example.org/{number}"]
     for out, more in (("signed", signed), ("unsigned", [])):
         done = CliRunner().invoke(app, [*words, "--output", str(folder / out), *more])
@@ -491,7 +491,7 @@ def test_an_expired_key_does_not_sign_and_vouches_for_nothing_even_where_it_is_t
 ) -> None:
     old, trust = self_signed("Example Sensor Works", -400, -369), tmp_path / "trust.pem"
     (tmp_path / "old.pem").write_bytes(pem(old))
-    words = ["certificate", made.run.id, "--laboratory", str(made.folder / "laboratory.toml"), "--archive"]
+    words = ["certificate", "write", made.run.id, "--laboratory", str(made.folder / "laboratory.toml"), "--archive"]
     words += [str(made.run.archive.root), "--output", str(tmp_path / "out"), "--sign-with", str(tmp_path / "old.pem")]
     problem = CliRunner().invoke(app, words).exception
     assert isinstance(problem, WrongUse)
@@ -515,7 +515,7 @@ def test_wrong_use_is_told(issued: Issued, tmp_path: Path) -> None:
         ([pdf, "latest"], "give files or runs, not both"),
         ([str(tmp_path / "missing.pdf")], "is not there"),
         ([pdf, "--trust", str(tmp_path / "none.pem")], "holds no certificate that can be read"),
-        (["latest", "--trust", str(issued.trust)], "no file of a certificate is given"),
+        (["latest", "--laboratory", str(tmp_path)], "no file of a certificate is given"),
     ):
         problem = CliRunner().invoke(app, ["verify", *words]).exception
         assert isinstance(problem, WrongUse)

@@ -1,27 +1,29 @@
-"""``tumbleline choose``: which kind of device, with which calibration, reaches an error that an application asks for."""
+"""``tumbleline plan choose``: which kind of device, with which calibration, reaches an error that an application asks for."""
 
 from typing import Annotated
 
-from pipelines.cli.options import JsonOption, option
+from pipelines.cli.options import JsonOption, Setting, argument, option, settings
 from pipelines.cli.printing import conclude, print_table, say, short
 from pipelines.planning.documents import ChoiceDocument, ChoiceRow
+from schemas.errors import WrongUse
 
-PART = "Measure"
-ORDER = 115
-SUMMARY = "Choose the kind of device and the calibration that reach an error."
-EXAMPLES = (
-    "tumbleline choose --range 4g --temperature -40..85 --error 2mg --bandwidth 100",
-    "tumbleline choose --range 30g --error 5mg --device QA700,SF1500",
-)
+NEEDS = {
+    "range": Setting("4g", ""),
+    "error": Setting("2mg", ""),
+    "temperature": Setting("-40..85", ""),
+    "bandwidth": Setting("100", "", float),
+}
 
 
-def command(
-    span: Annotated[str, option("--range G", "Largest specific force, such as 4g.")],
-    error: Annotated[str, option("--error MG", "Error that is allowed (k = 2), such as 2mg.")],
-    temperature: Annotated[str, option("--temperature LOW..HIGH", "Temperatures of use, °C.")] = "25..25",
-    bandwidth: Annotated[
-        float, option("--bandwidth HZ", "Bandwidth of use, Hz: it sets noise and what must pass.")
-    ] = 10.0,
+def choose(
+    need: Annotated[
+        list[str],
+        argument(
+            "NEED…",
+            "range=4g (largest specific force), error=2mg (allowed, k = 2), temperature=-40..85 (of use, °C; 25 by default), "
+            "bandwidth=100 (of use, Hz; 10 by default: it sets noise and what must pass).",
+        ),
+    ],
     device: Annotated[str, option("--device A,B", "Presets to compare; all by default.")] = "",
     *,
     as_json: JsonOption = False,
@@ -32,8 +34,13 @@ def command(
     """
     from pipelines.planning.choice import choice, need_of
 
-    need = need_of(span, temperature, error, bandwidth)
-    document = choice(need, [name.strip() for name in device.split(",") if name.strip()])
+    given = settings(need, NEEDS, "plan choose", "")
+    if missing := [key for key in ("range", "error") if key not in given]:
+        raise WrongUse(
+            f"plan choose: {missing[0]} is not given, it is needed; add {missing[0]}={NEEDS[missing[0]].notation}"
+        )
+    asked = need_of(given["range"], given.get("temperature", "25..25"), given["error"], given.get("bandwidth", 10.0))
+    document = choice(asked, [name.strip() for name in device.split(",") if name.strip()])
     conclude(document, _print, as_json=as_json, passed=any(row["reaches"] for row in document["candidates"]))
 
 

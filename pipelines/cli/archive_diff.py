@@ -1,4 +1,4 @@
-"""``tumbleline diff``: differences between two runs, their size and their causes."""
+"""``tumbleline archive diff``: differences between two runs, their size and their causes."""
 
 from __future__ import annotations
 
@@ -14,15 +14,11 @@ from pipelines.cli.printing import STYLES, give, print_table, say, short
 if TYPE_CHECKING:
     from rich.text import Text
 
-PART = "Old data, new models"
-ORDER = 530
-SUMMARY = "Show the differences between two runs, their size and their causes."
-EXAMPLES = ("tumbleline diff latest RE-RUN", "tumbleline diff RUN-A RUN-B --all")
 
 SHOWN = 12
 
 
-def command(
+def diff(
     run_a: Annotated[str, argument("RUN_A", "Name of a run, the beginning of it, or 'latest'.")],
     run_b: Annotated[str, argument("RUN_B", "The run to compare with.")],
     archive: ArchiveOption = None,

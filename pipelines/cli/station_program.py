@@ -1,4 +1,4 @@
-"""``tumbleline program``: write the coefficients of a run into its devices, and verify them there."""
+"""``tumbleline station program``: write the coefficients of a run into its devices, and verify them there."""
 
 from __future__ import annotations
 
@@ -8,36 +8,40 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from pipelines.archive import Archive
-from pipelines.cli.options import ArchiveOption, JsonOption, RunArgument, StationOption, option
+from pipelines.cli.options import (
+    ArchiveOption,
+    JsonOption,
+    RunArgument,
+    Setting,
+    StationOption,
+    option,
+    set_option,
+    settings,
+)
+from pipelines.cli.options import yes as yes_or_no
 from pipelines.cli.printing import give, print_table, remark, say
 from schemas.errors import DONE, PART_FAILED, WrongUse, did_you_mean
 
 if TYPE_CHECKING:
     from pipelines.export import UnitCalibration
 
-PART = "Certificates, trace, audit"
-ORDER = 417
-SUMMARY = "Write coefficients into the memory of the devices, and verify them."
-EXAMPLES = (
-    "tumbleline program latest --units SN1,SN2",
-    "tumbleline program latest --station line-1.toml --form q24 --yes",
-)
 UNATTENDED = "program: standard input ended before an answer, a line is needed; give --yes to write without an operator"
 
 
-def command(
+SETTINGS = {
+    "tolerance": Setting("UG", "largest allowed error in the two poses, 3000 µg by default", float, 1.0),
+    "offset_registers": Setting("yes", "also write the offset registers of an ADXL355", yes_or_no),
+}
+
+
+def program(
     run: RunArgument = "latest",
     station: StationOption = None,
     units: Annotated[str, option("--units SN,…", "Write only these units; default: all that passed.")] = "",
-    form: Annotated[str, option("--form float32|q24", "Form of the coefficients.")] = "float32",
-    tolerance: Annotated[
-        float, option("--tolerance UG", "Largest allowed error in the two poses, µg.", min=1.0)
-    ] = 3000.0,
+    form: Annotated[str, option("--format float32|q24", "Form of the coefficients.")] = "float32",
+    setting: Annotated[list[str] | None, set_option(SETTINGS)] = None,
     archive: ArchiveOption = None,
     *,
-    offset_registers: Annotated[
-        bool, option("--offset-registers", "Also write the offset registers of an ADXL355.")
-    ] = False,
     yes: Annotated[bool, option("--yes -y", "Write without confirmation.")] = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -53,17 +57,22 @@ def command(
     from schemas.station import load_station
 
     if form not in ("float32", "q24"):
-        raise WrongUse(f"--form: found '{shown(form)}'; {did_you_mean(form, ('float32', 'q24'))}")
+        raise WrongUse(f"--format: found '{shown(form)}'; {did_you_mean(form, ('float32', 'q24'))}")
+    given = settings(setting, SETTINGS, "program")
     source = Archive(archive).run(run)
     chosen = chosen_units(source, [serial.strip() for serial in units.split(",") if serial.strip()])
     config = load_station(station) if station is not None else station_of(source)
     if not yes and not _agreed(source.id, config.name, chosen):
         say("nothing was written")
         raise typer.Exit(DONE)
-    outcomes, given = program_run(
-        source, chosen, config, Choice(form, offset_registers, tolerance), lambda text: remark(f"program: {text}")
+    outcomes, certificates = program_run(
+        source,
+        chosen,
+        config,
+        Choice(form, given.get("offset_registers", False), given.get("tolerance", 3000.0)),
+        lambda text: remark(f"program: {text}"),
     )
-    result = document(source, outcomes, given)
+    result = document(source, outcomes, certificates)
     give(result, _print, as_json=as_json)
     raise typer.Exit(PART_FAILED if any(one.outcome != "proved" for one in outcomes) else DONE)
 

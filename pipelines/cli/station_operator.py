@@ -1,4 +1,4 @@
-"""``tumbleline operator``: answers the questions of waiting runs, at any terminal that reaches their orchestrator."""
+"""``tumbleline station operator``: answers the questions of waiting runs, at any terminal that reaches their orchestrator."""
 
 import os
 from typing import TYPE_CHECKING, Annotated, Any
@@ -7,32 +7,29 @@ from pipelines.archive import Archive
 from pipelines.cli.options import ArchiveOption, JsonOption, argument, option
 from pipelines.cli.printing import give, print_table, say
 from schemas.errors import WrongUse
+from schemas.foreign import shown
 
 if TYPE_CHECKING:
     from pipelines.chain.attendance import Answer
 
-PART = "Measure"
-ORDER = 140
-SUMMARY = "Answer the questions of runs that wait for an operator."
-EXAMPLES = ("tumbleline operator", "tumbleline operator line-six --go")
 
-
-def command(
+def operator(
     run: Annotated[str, argument("[FLOW-RUN]", "The run to answer: the beginning of its name or id.")] = "",
+    answered: Annotated[
+        str, option("--answer go|stop", "go: the run continues; stop: the same 'tumbleline run' continues it later.")
+    ] = "",
     archive: ArchiveOption = None,
     *,
-    go: Annotated[bool, option("--go", "Confirm: the run continues.")] = False,
-    stop: Annotated[bool, option("--stop", "Stop the run; the same 'tumbleline run' continues it later.")] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Show the runs that wait for the operator and their questions; answer with --go or --stop."""
-    if go and stop:
-        raise WrongUse("operator: --go and --stop are both given, one is needed; leave one out")
+    """Show the runs that wait for the operator and their questions; answer with --answer."""
+    if answered not in {"", "go", "stop"}:
+        raise WrongUse(f"operator: --answer {shown(answered)}, go or stop is needed; correct it")
     _reach(archive)
     from pipelines.flows.operator import answer, waiting
 
     matches = [one for one in waiting() if one.name.startswith(run) or one.id.startswith(run)]
-    reply: Answer | None = "go" if go else "stop" if stop else None
+    reply: Answer | None = "go" if answered == "go" else "stop" if answered else None
     if reply is not None:
         if len(matches) != 1:
             names = ", ".join(one.name for one in matches) or "none"

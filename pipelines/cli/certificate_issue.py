@@ -1,31 +1,37 @@
-"""``tumbleline certify``: certificates with a period of validity for the units of a run that passed."""
+"""``tumbleline certificate issue``: certificates with a period of validity for the units of a run that passed."""
 
+import re
+from functools import partial
 from typing import Annotated, Any
 
 from inertial.counts import number_of
 from pipelines.archive import Archive, Run
-from pipelines.cli.options import ArchiveOption, JsonOption, RunArgument, option
+from pipelines.cli.next_commands import archive_words, command_line
+from pipelines.cli.options import (
+    ArchiveOption,
+    JsonOption,
+    ReasonOption,
+    RunArgument,
+    SinceOption,
+    TrustOption,
+    option,
+)
 from pipelines.cli.printing import conclude, error_console, print_table, remark, say
 from schemas.errors import ArchiveUnusable
 
-PART = "Certificates, trace, audit"
-ORDER = 410
-SUMMARY = "Certify the units of a run that passed, for a period of validity."
-EXAMPLES = ("tumbleline certify latest --months 12", "tumbleline certify latest --units SN1")
+MONTHS = re.compile(r"(\d{1,3}) ?m")  # as a value of --until
 
 
-def command(
+def issue(
     run: RunArgument = "latest",
     units: Annotated[str, option("--units SN,…", "Certify only these units; default: all that passed.")] = "",
-    start: Annotated[str, option("--from DATE", "First day of validity, UTC; default: today.")] = "",
-    until: Annotated[str, option("--until DATE", "The day after the last day of validity.")] = "",
-    months: Annotated[
-        int, option("--months", "Validity without --until, months; 0: as long as the limits allow.", min=0, max=120)
-    ] = 0,
-    reason: Annotated[str, option("--reason", "Reason, written into the certificate's entry of the ledger.")] = "",
-    key: Annotated[
-        list[str] | None, option("--key FILE|HEX", "Another public key that is accepted for the signatures of the run.")
-    ] = None,
+    since: SinceOption = "",
+    until: Annotated[
+        str,
+        option("--until DATE|12m", "The day after the last one of validity, or months; as long as the limits allow."),
+    ] = "",
+    reason: ReasonOption = "",
+    trust: TrustOption = None,
     archive: ArchiveOption = None,
     *,
     supersede: Annotated[bool, option("--supersede", "Also end calibrations that begin later and overlap.")] = False,
@@ -46,17 +52,19 @@ def command(
     serials = tuple(serial.strip() for serial in units.split(",")) if units else ()
     source = store.run(run)
     _print_run(source)
-    done = certify(Ledger(store), source, serials, start, until, months=months, reason=reason, supersede=supersede,
-        keys=public_keys() | (public_keys(key) if key else {}),
+    months = MONTHS.fullmatch(until)
+    done = certify(
+        Ledger(store), source, serials, since, "" if months else until, months=int(months[1]) if months else 0, reason=reason,
+        supersede=supersede, keys=public_keys() | (public_keys(trust) if trust else {}),
     )  # fmt: skip
     try:
         with error_console().status("drawing the report"):
             renew_report(source)
     except ArchiveUnusable as problem:  # the certificates are written; the old report may show other coefficients
-        remark(f"certify: the report was not made again: {problem}")
+        remark(f"certificate issue: the report was not made again: {problem}")
     certified = [{"certificate": e.certificate, **e.document(), "was_there": e in done.there} for e in done.events]
     document = {"run": source.id, "certified": certified, "left_out": done.left_out}
-    conclude(document, _print, as_json=as_json, passed=not done.left_out)
+    conclude(document, partial(_print, archive), as_json=as_json, passed=not done.left_out)
 
 
 def _print_run(run: Run) -> None:
@@ -67,10 +75,10 @@ def _print_run(run: Run) -> None:
     named = ", ".join(units) if len(units) <= 6 else f"{units[0]} … {units[-1]}"
     counted = number_of(len(units), "unit")
     for line in (f"run {run.id}, measured on {measured_on(run)}, {counted}: {named}", *library_remarks(run)):
-        remark(f"certify: {line}")
+        remark(f"certificate issue: {line}")
 
 
-def _print(document: dict[str, Any]) -> None:
+def _print(archive: str | None, document: dict[str, Any]) -> None:
     lines = [
         [e["certificate"], e["grade"], e["from"], e["until"], "already certified" if e["was_there"] else e["action"],
          ", ".join(f"/{number}" for number in e["ends"])]
@@ -79,7 +87,8 @@ def _print(document: dict[str, Any]) -> None:
     if lines:
         print_table(["certificate", "grade", "from", "until", "entry", "ends"], lines, title=f"run {document['run']}")
         say(
-            f"The documents: tumbleline certificate {document['run']} --laboratory FILE (docs/how-to/issue-a-certificate.md)",
+            f"The documents: {command_line('certificate', 'write', document['run'], *archive_words(archive))} --laboratory FILE "
+            "(docs/how-to/issue-a-certificate.md)",
             style="dim",
         )
     for serial, why in document["left_out"].items():

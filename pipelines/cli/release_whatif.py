@@ -1,4 +1,4 @@
-"""``tumbleline whatif``: the effect of a model on the lots of the archive, before its release to the line."""
+"""``tumbleline release whatif``: the effect of a model on the lots of the archive, before its release to the line."""
 
 from pathlib import Path
 from typing import Annotated, Any
@@ -10,15 +10,10 @@ from pipelines.cli.inputs import distribution
 from pipelines.cli.options import argument
 from pipelines.cli.printing import conclude, error_console, print_table, say, short
 
-PART = "Old data, new models"
-ORDER = 540
-SUMMARY = "Show the effect of a model on the archive's lots before it is released."
-EXAMPLES = ("tumbleline whatif model.toml", "tumbleline whatif model.toml device:adxl355")
-
 SHOWN = 12
 
 
-def command(
+def whatif(
     model: Annotated[Path, argument("MODEL", "A model file.")],
     selection: Annotated[
         list[str] | None, argument("[SELECTION…]", "Runs as for 'tumbleline rerun'; default: all.")
@@ -40,7 +35,7 @@ def command(
     from pipelines.rerun.selection import selected
     from pipelines.rerun.whatif import BETTER, evaluated
 
-    change = change_from_options("", model, limits, effect_file, where="whatif")
+    change = change_from_options("", model, limits, effect_file, where="release whatif")
     store = Archive(archive)
     runs = [entry.id for entry in selected(store, selection or ["all"])]
     distribute, count = distribution(store, runs, dask, workers)

@@ -1,4 +1,4 @@
-"""``tumbleline keys``: the keys and names that recipes, limits, stations, --fault and demo accept."""
+"""``tumbleline plan keys``: the keys and names that recipes, limits, stations, --fault and demo accept."""
 
 from collections.abc import Callable
 from typing import Annotated
@@ -7,13 +7,8 @@ from pipelines.cli.options import JsonOption, argument
 from pipelines.cli.printing import give, print_table, say
 from schemas.errors import WrongUse, did_you_mean
 
-PART = "Measure"
-ORDER = 190
-SUMMARY = "List keys of recipes, limits and stations, faults, hidden effects and names of files."
-EXAMPLES = ("tumbleline keys recipe", "tumbleline keys fault --json")
 
-
-def command(
+def keys(
     subject: Annotated[
         str, argument("[SUBJECT]", "recipe, limits, station, fault, demo or names; all in short by default.")
     ] = "",
@@ -25,7 +20,7 @@ def command(
     The same lists are on the page docs/reference/keys.md.
     """
     if subject and subject not in SUBJECTS:
-        raise WrongUse(f"keys: no list is called '{subject}'; {did_you_mean(subject, SUBJECTS)}")
+        raise WrongUse(f"plan keys: no list is called '{subject}'; {did_you_mean(subject, SUBJECTS)}")
     subjects = [{"subject": name, "meaning": text} for name, (text, _) in SUBJECTS.items()]
     rows = SUBJECTS[subject][1]() if subject else subjects
     give({"subject": subject, "rows": rows}, lambda _: _print(rows), as_json=as_json)
@@ -39,7 +34,7 @@ def _print(rows: list[dict[str, str]]) -> None:
         lines = [[row[head], _text(row, head)] for row in of_table]
         print_table([head, "meaning"], lines, f"[{table}]" if table else "")
     if rows and "subject" in rows[0]:
-        say("tumbleline keys SUBJECT shows a list")
+        say("tumbleline plan keys SUBJECT shows a list")
 
 
 def _text(row: dict[str, str], head: str) -> str:
@@ -110,7 +105,7 @@ SUBJECTS: dict[str, tuple[str, Callable[[], list[dict[str, str]]]]] = {
     "limits": ("keys of a limits file", _keys("limits")),
     "station": ("keys of a station file", _keys("station")),
     "fault": ("kinds of --fault KIND:KEY=VALUE, with their keys", _faults),
-    "demo": ("hidden effects of 'tumbleline demo --effect NAME'", _hidden),
+    "demo": ("hidden effects of 'tumbleline demo NAME'", _hidden),
     "names": ("recipes, limits, stations, profiles and presets, built in and of your own", _names),
 }
 """The lists by subject: description and rows."""

@@ -1,13 +1,15 @@
-"""``tumbleline allan``: Allan deviation of a file or a run, and the noise terms that it needs; or another statistic of it."""
+"""``tumbleline noise``: Allan deviation of a record with the noise terms that it needs, and its power spectral density."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from math import isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from pipelines.archive import Archive
 from pipelines.cli import options
+from pipelines.cli.groups import group
 from pipelines.cli.options import option
 from pipelines.cli.printing import error_console, give, print_table, publish, say, short
 from schemas.errors import WrongUse, did_you_mean
@@ -17,8 +19,22 @@ if TYPE_CHECKING:
 
 PART = "Results"
 ORDER = 370
-SUMMARY = "Compute the Allan deviation of a record and its noise terms, with intervals."
-EXAMPLES = ("tumbleline allan rest.csv --rate 100 --plot allan.png", "tumbleline allan latest --statistic hadamard")
+SUMMARY = "Compute the noise of a record: Allan deviation and its terms, or power spectral density."
+EXAMPLES = (
+    "tumbleline noise allan rest.csv --rate 100 --output allan.png",
+    "tumbleline noise psd rest.csv --rate 100 --output psd.png",
+)
+EXAMPLES_OF = {
+    "allan": (
+        "tumbleline noise allan rest.csv --rate 100 --output allan.png",
+        "tumbleline noise allan latest --statistic hadamard",
+    ),
+    "psd": (
+        "tumbleline noise psd rest.csv --rate 100",
+        "tumbleline noise psd rest.csv --rate 100 --output psd.png --output psd.html",
+    ),
+}
+"""Of the subcommands."""
 
 SPACINGS = ("octave", "decade")
 STATISTICS = ("allan", "modified", "hadamard", "total", "time", "tie", "mtie")
@@ -27,13 +43,18 @@ NAVIGATION = ("velocity_random_walk_m_s_rth", "q_n_m2_s4_Hz", "q_b_m2_s4")
 SHOWN_S = (60.0, 3600.0)
 
 
-def command(
+KINDS = {"picture": options.PICTURES, "page": options.PAGES}
+NoiseOutputOption = Annotated[
+    list[Path] | None,
+    option("--output -o FILE", "Picture (.png, .svg, .pdf) or page with tables (.html); may be repeated."),
+]
+
+
+def allan(
     source: options.SeriesArgument,
-    columns: options.SeriesColumnsOption = "",
-    time: options.TimeColumnOption = "",
-    time_unit: options.TimeUnitOption = "s",
+    columns: options.MapOption = None,
+    unit_of: options.UnitOfOption = None,
     rate: options.RateOption = None,
-    unit: options.SeriesUnitOption = "",
     spacing: Annotated[
         str, option("--spacing octave|decade", "Averaging times: 1, 2, 4 … or 1, 2, 5, 10 … samples.")
     ] = "octave",
@@ -46,8 +67,7 @@ def command(
         ),
     ] = STATISTICS[0],
     stretch: options.StretchOption = None,
-    plot: options.PlotOption = None,
-    page: options.PageOption = None,
+    output: NoiseOutputOption = None,
     archive: options.ArchiveOption = None,
     *,
     as_json: options.JsonOption = False,
@@ -62,6 +82,7 @@ def command(
     """
     from pipelines.chain.noise_documents import allan_document, allan_of_run, statistic_of_run
 
+    files = options.outputs(output, KINDS, "noise allan")
     if spacing not in SPACINGS:
         raise WrongUse(f"--spacing: found '{spacing[:40]}', octave or decade is needed; correct it")
     if statistic not in STATISTICS:
@@ -69,7 +90,7 @@ def command(
             f"--statistic: found '{statistic[:40]}', one of {', '.join(STATISTICS)} is needed; "
             f"{did_you_mean(statistic[:40], STATISTICS)}"
         )
-    series = even_series(source, columns, (time, time_unit, rate), unit, archive, stretch)
+    series = even_series(source, columns or (), ",".join(unit_of or ()), rate, archive, stretch)
     with error_console().status("averaging"):
         if series is not None:
             document = allan_document(series, spacing, statistic)
@@ -77,7 +98,7 @@ def command(
             document = allan_of_run(Archive(archive).run(source))
         else:
             document = statistic_of_run(Archive(archive).run(source), spacing, statistic)
-    write_pictures(document, plot, page)
+    _draw(document, files)
     give(document, _print, as_json=as_json)
 
 
@@ -136,40 +157,93 @@ def _print_curves(document: dict[str, Any]) -> None:
     print_table(["channel", "τ\ns", f"{name}\n{unit}", f"interval, {level} %\n{unit}"], lines)
 
 
+def psd(
+    source: options.SeriesArgument,
+    columns: options.MapOption = None,
+    unit_of: options.UnitOfOption = None,
+    rate: options.RateOption = None,
+    segment: Annotated[
+        int | None, option("--segment N", "Samples of a segment; an eighth of the record by default.")
+    ] = None,
+    stretch: options.StretchOption = None,
+    output: NoiseOutputOption = None,
+    archive: options.ArchiveOption = None,
+    *,
+    as_json: options.JsonOption = False,
+) -> None:
+    """Compute the one-sided power spectral density by Welch's method, and σ(τ) from it beside that of the samples.
+
+    σ²(τ) = 2·∫ S(f)·sin⁴(πfτ)/(πfτ)² df (IEEE Std 952). Where the two differ, the record holds lines, jumps or a drift.
+    """
+    from pipelines.chain.noise_documents import psd_document
+
+    files = options.outputs(output, KINDS, "noise psd")
+    series = even_series(source, columns or (), ",".join(unit_of or ()), rate, archive, stretch)
+    if series is None:
+        raise WrongUse(
+            f"psd: run {source} was captured, a file or an import is needed; export its samples, or see 'tumbleline noise allan'"
+        )
+    with error_console().status("averaging"):
+        document = psd_document(series, segment)
+    _draw(document, files)
+    give(document, _print_psd, as_json=as_json)
+
+
+def _print_psd(document: dict[str, Any]) -> None:
+    say(
+        f"{document['source']}: {document['samples']} samples at {short(document['rate_hz'], 5)} Hz, segments of "
+        f"{document['segment']} samples, resolution {short(document['rate_hz'] / document['segment'])} Hz"
+    )
+    unit = document["unit"] or "unit"
+    lines = [[row["channel"], short(row["median_amplitude"], 4)] for row in document["spectra"]]
+    print_table(["channel", f"median noise density\n{unit}/√Hz, one-sided"], lines)
+    lines = [
+        [row["channel"], short(tau), short(derived, 4), short(direct, 4)]
+        for row in document["spectra"]
+        for tau, derived, direct in zip(row["tau_s"], row["deviation_from_density"], row["deviation"], strict=True)
+    ]
+    print_table(["channel", "τ\ns", f"σ from the density\n{unit}", f"σ of the samples\n{unit}"], lines)
+
+
 def even_series(
-    source: str, columns: str, clock: tuple[str, str, float | None], unit: str, archive: str | None, stretch: int | None
+    source: str, columns: Sequence[str], unit_of: str, rate: float | None, archive: str | None, stretch: int | None
 ) -> EvenSeries | None:
     """The samples of a file or an import; None for a captured run, which has figures of its own.
 
-    clock : column and unit of the time, and rate in Hz, as they were given
+    columns, unit_of : as they were given; rate in Hz
 
     Raises WrongUse: an option of files was given for a run.
     """
     from pipelines.importers.files import is_file
+    from pipelines.importers.mapping import pairs
     from pipelines.importers.series import series_of_file, series_of_run
 
-    time, time_unit, rate = clock
     if is_file(source):
-        named = [name.strip() for name in columns.split(",") if name.strip()]
+        time, named = options.mapped_outputs(columns)
+        units = pairs(unit_of, "--unit-of")
+        if more := sorted(units.keys() - {"output", "time"}):
+            raise WrongUse(f"--unit-of: found '{more[0]}', output or time is needed; correct it")
         with error_console().status(f"reading {Path(source).name}"):
-            return series_of_file(Path(source), named, time=time, time_unit=time_unit, rate_hz=rate, unit=unit)
-    if columns or time or rate is not None or unit:
-        raise WrongUse(
-            f"{source}: --columns, --time, --rate and --unit are for files, and there is no such file; correct one"
-        )
+            return series_of_file(
+                Path(source), named, time=time, time_unit=units.get("time", "s"), rate_hz=rate, unit=units.get("output", "")
+            )  # fmt: skip
+    if columns or rate is not None or unit_of:
+        raise WrongUse(f"{source}: --map, --rate and --unit-of are for files, and there is no such file; correct one")
     run = Archive(archive).run(source)
     return None if run.about.get("capture") else series_of_run(run, stretch)
 
 
-def write_pictures(document: dict[str, Any], plot: Path | None, page: Path | None) -> None:
-    """Draw a document of ``allan`` or ``psd`` as a picture, and as a page with its tables."""
-    if plot is None and page is None:
+def _draw(document: dict[str, Any], files: Mapping[str, Path]) -> None:
+    """Draw a document as a picture, and as a page with its tables, where they are asked for."""
+    if not files:
         return
-    from pipelines.drawing.picture import picture, refuse_ending
+    from pipelines.drawing.picture import picture
     from pipelines.report.noise_page import noise_chart, noise_page
 
-    if plot is not None:
-        refuse_ending(plot, "--plot")
-        publish(plot, picture(noise_chart(document), plot.suffix.lower()), "plot")
-    if page is not None:
-        publish(page, noise_page(document), "page")
+    if "picture" in files:
+        publish(files["picture"], picture(noise_chart(document), files["picture"].suffix.lower()), "plot")
+    if "page" in files:
+        publish(files["page"], noise_page(document), "page")
+
+
+app = group(SUMMARY, {"allan": allan, "psd": psd})

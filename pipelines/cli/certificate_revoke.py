@@ -1,29 +1,21 @@
-"""``tumbleline revoke``: end the validity of a unit's calibration, with the reason."""
+"""``tumbleline certificate revoke``: end the validity of a unit's calibration, with the reason."""
 
 from typing import Annotated
 
 from pipelines.archive import Archive, Run
-from pipelines.cli.options import ArchiveOption, JsonOption, argument, option
+from pipelines.cli.options import ArchiveOption, JsonOption, ReasonOption, argument, option
 from pipelines.cli.printing import give
 
-PART = "Certificates, trace, audit"
-ORDER = 420
-SUMMARY = "Revoke the calibration of a unit, with the reason."
-EXAMPLES = (
-    "tumbleline revoke SN1 --reason 'fell to the floor'",
-    "tumbleline revoke SN1 --certificate 2 --reason 'reference out of date'",
-)
 
-
-def command(
+def revoke(
     serial: Annotated[str, argument("SERIAL", "The unit.")],
-    reason: Annotated[str, option("--reason", "Reason, for the users of the calibration.")] = "",
-    day: Annotated[
-        str, option("--from DATE", "First day without validity; default: the first day of the calibration.")
-    ] = "",
     certificate: Annotated[
-        int, option("--certificate", "Number after the serial; default: all that are valid today or later.", min=0)
+        int, argument("[NUMBER]", "Number behind the serial, as in SN1/2; default: all that are valid today or later.")
     ] = 0,
+    reason: ReasonOption = "",
+    since: Annotated[
+        str, option("--since DATE", "First day without validity; default: the first day of the calibration.")
+    ] = "",
     archive: ArchiveOption = None,
     *,
     as_json: JsonOption = False,
@@ -35,7 +27,7 @@ def command(
 
     store = Archive(archive)
     ledger = Ledger(store)
-    event = ledger.revoke(serial, reason, day=day_of(day, "--from") if day else "", certificate=certificate)
+    event = ledger.revoke(serial, reason, day=day_of(since, "--since") if since else "", certificate=certificate)
     ended = [f"{serial}/{number}" for number in event.ends]
     for run in dict.fromkeys(one.run for one in ledger.calibrations(serial) if one.certificate in ended):
         renew_report(Run(store, run))

@@ -1,4 +1,4 @@
-"""``tumbleline monitor``: whether the line is healthy, its numbers for Prometheus, and alerts to a web hook."""
+"""``tumbleline station monitor``: whether the line is healthy, its numbers for Prometheus, and alerts to a web hook."""
 
 from __future__ import annotations
 
@@ -12,38 +12,41 @@ from pipelines.archive import Archive
 from pipelines.cli.options import ArchiveOption, JsonOption, option
 from pipelines.cli.printing import conclude, print_text, say
 from schemas.errors import WrongUse
+from schemas.foreign import shown
 
 if TYPE_CHECKING:
     from pipelines.monitoring.alerts import Poster
     from pipelines.monitoring.snapshot import Monitor
 
-PART = "Measure"
-ORDER = 166
-SUMMARY = "Monitor the line: health, numbers for Prometheus, alerts to a web hook."
-EXAMPLES = (
-    "tumbleline monitor --queue line-1",
-    "tumbleline monitor --serve --port 9464 --webhook https://alerts.example/hook --audits audits",
-)
 
-PORT = 9464
+PROMETHEUS = "prometheus"
 
 
-def command(
+def monitor(
     archive: ArchiveOption = None,
     queue: Annotated[
         list[str] | None, option("--queue NAME", "A queue that must have a worker online; may be repeated.")
     ] = None,
-    days: Annotated[int, option("--days", "Number of days whose runs are counted.", min=1, max=3650)] = 30,
+    days: Annotated[int, option("--last N", "Number of days before now whose runs are counted.", min=1, max=3650)] = 30,
     free_gb: Annotated[float, option("--free-gb GB", "Free space that the archive needs.", min=0.0)] = 1.0,
-    webhook: Annotated[str, option("--webhook ADDRESS", "Post alerts to this address, with --serve.")] = "",
+    webhook: Annotated[str, option("--webhook ADDRESS", "Post alerts to this address, with --port.")] = "",
     audits: Annotated[
         Path | None, option("--audits DIR", "Folder of audit documents whose findings are alerts too.")
     ] = None,
-    host: Annotated[str, option("--host ADDRESS", "Address to listen on, with --serve.")] = "127.0.0.1",
-    port: Annotated[int, option("--port", "Port, with --serve; 0: a free one.", min=0, max=65535)] = PORT,
+    host: Annotated[str, option("--host ADDRESS", "Address to listen on, with --port.")] = "127.0.0.1",
+    port: Annotated[
+        int | None,
+        option(
+            "--port",
+            "Serve /metrics, /healthz and /livez here until stopped, as 9464; 0: a free port.",
+            min=0,
+            max=65535,
+        ),
+    ] = None,
+    form: Annotated[
+        str, option("--format prometheus", "Print the numbers in the format of Prometheus, and exit.")
+    ] = "",
     *,
-    metrics: Annotated[bool, option("--metrics", "Print the numbers in the format of Prometheus, and exit.")] = False,
-    serve: Annotated[bool, option("--serve", "Serve /metrics, /healthz and /livez until stopped.")] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Report whether the line is healthy; exit status 1 if it is not.
@@ -55,17 +58,19 @@ def command(
     from pipelines.monitoring.snapshot import Monitor
 
     address = webhook or os.environ.get("TUMBLELINE_WEBHOOK", "")
-    if webhook and not serve:
-        raise WrongUse("monitor: --webhook posts while the service runs, --serve is needed; give it too")
-    monitor = Monitor(Archive(archive), days, free_gb, tuple(queue or ()))
-    if serve:
+    if webhook and port is None:
+        raise WrongUse("monitor: --webhook posts while the service runs, --port is needed; give it too")
+    if form not in {"", PROMETHEUS}:
+        raise WrongUse(f"monitor: --format {shown(form)}, {PROMETHEUS} is needed; correct it, or leave it out")
+    watched = Monitor(Archive(archive), days, free_gb, tuple(queue or ()))
+    if port is not None:
         from pipelines.monitoring.alerts import Poster
         from stations.safety.folder import state_folder
 
-        _serve(monitor, host, port, Poster(address, state_folder()) if address else None, audits)
+        _serve(watched, host, port, Poster(address, state_folder()) if address else None, audits)
         return
-    snapshot = monitor.snapshot()
-    if metrics:
+    snapshot = watched.snapshot()
+    if form:
         print_text(text(snapshot).decode())
         return
     document = snapshot.document()
