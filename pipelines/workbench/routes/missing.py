@@ -9,6 +9,7 @@ from pipelines.diagnosis.inputs import use_written_formulas
 from pipelines.diagnosis.sections import worded
 from pipelines.drawing import Chart
 from pipelines.report.diagnosis_pictures import evolution_chart, pose_chart, quantity_chart, slot_chart
+from pipelines.report.effect_view import effect_chart
 from pipelines.report.run_pictures import samples_chart
 from pipelines.workbench.pages import (
     RequestBody,
@@ -119,6 +120,12 @@ def _chart(bench: Workbench, state: MissingPage, name: str) -> Chart | None:
     if name == "ladder":
         rows = bench.done("ladder", state)
         return None if rows is None else evolution_chart(rows)
+    if name.startswith("effect-"):
+        diagnosed = _diagnosed(bench, state)
+        views = {f"effect-{k}": view for k, view in enumerate(diagnosed.views)} if diagnosed is not None else {}
+        if name not in views or diagnosed is None or diagnosed.table is None:
+            raise no_figure(name)
+        return effect_chart(views[name], diagnosed.table.pick)
     if name not in {"sphere", "drivers", "slots"}:
         raise no_figure(name)
     diagnosed = _diagnosed(bench, state)
