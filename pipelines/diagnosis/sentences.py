@@ -218,11 +218,7 @@ def not_listed(document: dict[str, Any]) -> str:
     part = len({row["effect"] for row in document.get("unseen_in_part", ())})
     counts = (("cannot show", len(document["unseen"])), ("shows only in part", part))
     told = [f"{what} {number_of(count, 'effect')}" for what, count in counts if count]
-    return (
-        f"This plan {' and '.join(told)}; --all lists them, what the residual follows, and the dwells that decide"
-        if told
-        else ""
-    )
+    return f"This plan {' and '.join(told)}" if told else ""
 
 
 def unexplained_text(document: dict[str, Any]) -> str:

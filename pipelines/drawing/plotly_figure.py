@@ -16,9 +16,10 @@ from pipelines.drawing.ticks import log_ticks
 MANY = 4000
 """Points from which WebGL draws faster than SVG."""
 DAY_MS = 86_400_000.0
-GAP_X, GAP_PX = 0.078, 74.0
+GAP_X, GAP_PX = 0.078, 92.0
 SPHERE_GAP_X, SPHERE_GAP_PX = 0.012, 26.0
 DECADES = 100.0  # a logarithmic axis that spans more has a label at each decade
+ENTRY_PX = 22  # room for an entry of the legend
 NOTE_PX = 22  # room for the line below
 MOST_NAMES = 40  # names along the width of a figure
 NARROW_D = 20.0  # closer dates get a margin
@@ -47,7 +48,11 @@ def plotly_figure(chart: Chart, *, webgl: bool = True) -> dict[str, Any]:
                 data[-1]["type"] = "scatter"
             shown.add(trace.name)
     figure = {"data": data, "layout": _layout(chart), "config": CONFIG}
-    return figure if chart.columns == 1 else figure | {"narrow": _layout(replace(chart, columns=1))}
+    if chart.columns == 1:
+        return figure
+    narrow = _layout(replace(chart, columns=1))
+    narrow["height"] += ENTRY_PX * sum(one["showlegend"] for one in data)  # the legend has one entry a line there
+    return figure | {"narrow": narrow}
 
 
 def _layout(chart: Chart) -> dict[str, Any]:

@@ -70,7 +70,7 @@ def _pictures(diagnosis: Diagnosis, units: tuple[str, ...]) -> dict[str, Any]:
         "unit": left.unit,
         "several": len(units) > 1,
         "added": left.before is not left.after,
-        "effects": [figure_of(effect_chart(view)) for view in effect_views(diagnosis, units)],
+        "effects": [(view.title, figure_of(effect_chart(view))) for view in effect_views(diagnosis, units)],
         "noise": figure_of(noise_chart(left, MICRO * diagnosis.floor)),
         "maps": figure_of(pose_chart(left.unit, left.axes, force, models)) if poses >= FEWEST_POSES else "",
         "drivers": figure_of(driver_chart(left, drivers, lot.state.temperature)) if drivers else "",

@@ -210,7 +210,7 @@ def slot_chart(table: ResidualTable) -> Chart | None:
 LADDER: tuple[tuple[str, str, Role, Symbol], ...] = (
     ("fitted_ug", "fitted to this run", "before", "circle"),
     ("heldout_ug", "dwells left out", "ink", "square"),
-    ("fresh_ug", "fresh run, coefficients unchanged", "after", "diamond"),
+    ("fresh_ug", "fresh run, not fitted", "after", "diamond"),
 )
 ASIDE = (-0.03, 0.0, 0.03)  # equal errors would cover each other
 
@@ -236,7 +236,7 @@ def evolution_chart(rows: list[dict[str, Any]], name: str = "") -> Chart:
             traces.append(Trace(label, at, shown, role=role, symbol=symbol, size=9.0, texts=texts))
     ends = np.array([-0.4, len(rows) - 0.6])
     if rows and rows[-1]["floor_ug"] is not None:
-        traces.append(level(ends, float(rows[-1]["floor_ug"]), "good", "noise assumed by the last fit"))
+        traces.append(level(ends, float(rows[-1]["floor_ug"]), "good", "noise of the last fit"))
     top = 1.15 * max((float(np.max(trace.y)) for trace in traces), default=1.0)
     for k, row in enumerate(rows):
         if row.get("confirmed") is False:

@@ -267,7 +267,7 @@ def effect_chart(view: EffectView, pick: Callable[[int, int], str] | None = None
     x, noise = view.x[view.shown], BOTH_SIDES * view.floor
     plots: list[Plot] = []
     for name, residual in view.sides:
-        traces = [between(x, -noise, noise, "noise of the measurement, ± 2σ"), level(x, 0.0, dashed=False)]
+        traces = [between(x, -noise, noise, "noise, ± 2σ"), level(x, 0.0, dashed=False)]
         if name == "before":
             traces += _fan(view)
         role = "before" if name == "before" else "after"
