@@ -37,20 +37,23 @@ function answered(address) {
 export async function draw(place) {
   if (place.dataset.busy === place.dataset.figure) return;
   place.dataset.busy = place.dataset.figure;
-  place.classList.add("waiting");
+  place.classList.toggle("waiting", !place.dataset.drawn);
   try {
     const [library, answer] = await Promise.all([plotly(), answered(place.dataset.figure)]);
     const content = await answer.json();
     if (!answer.ok) throw new Error(content.problem || "the figure was not made");
     if (!place.isConnected) return;
+    if (!place.dataset.drawn) place.replaceChildren();
     place.figure = content;
     await paint(place, library);
   } catch (problem) {
+    if (place.dataset.drawn) return;  // what was drawn before stays
     place.replaceChildren(Object.assign(document.createElement("p"), { className: "note", textContent: problem.message }));
     place.style.minHeight = "0";
   } finally {
     place.classList.remove("waiting");
     delete place.dataset.busy;
+    if (place.dataset.renew && place.isConnected) setTimeout(() => draw(place), 1000 * Number(place.dataset.renew));
   }
 }
 
