@@ -20,7 +20,7 @@ from pipelines.report.residuals import DriverValues, added, axes_of, recorded_qu
 from pipelines.report.smooth_curve import band
 from schemas.units import MICRO
 
-FOLLOWED = 0.9
+FOLLOWED = 0.8
 """Least part of an effect's contribution that is a function of a quantity, for the effect to be drawn against that quantity."""
 FINE = 0.01  # of a range: nearer values are the same one
 FEW = 8

@@ -27,15 +27,26 @@ class ReasonGroup:
 
 def grouped_reasons(rows: Iterable[Mapping[str, Any]]) -> list[ReasonGroup]:
     """The reasons of units with ``unit``, ``outcome`` and ``reasons``; what concerns most units first."""
-    groups: dict[str, ReasonGroup] = {}
+    kinds: dict[str, list[tuple[str, str, str]]] = {}
     for row in rows:
         text = str(row["reasons"] or "")
         # a refusal is one text, with its remedy behind a semicolon
-        for reason in [text] if row["outcome"] == "refused" else text.split("; "):
-            if reason:
-                plain = plain_reason(reason)
-                found = _VALUE.match(plain)
-                told = plain if found is None else f"{found['before'].rstrip(' ,:')}, {found['limit']}"
-                group = groups.setdefault(_NUMBER.sub("#", told), ReasonGroup(told))
-                group.units.append((str(row["unit"]), "" if found is None else found["value"]))
-    return sorted(groups.values(), key=lambda group: -len(group.units))
+        for reason in filter(None, [text] if row["outcome"] == "refused" else text.split("; ")):
+            plain = plain_reason(reason)
+            found = _VALUE.match(plain)
+            told = plain if found is None else f"{found['before'].rstrip(' ,:')}, {found['limit']}"
+            kinds.setdefault(_NUMBER.sub("#", told), []).append(
+                (str(row["unit"]), told, found["value"] if found else "")
+            )
+    groups = [_group(members) for members in kinds.values()]
+    return sorted(groups, key=lambda group: -len(group.units))
+
+
+def _group(members: list[tuple[str, str, str]]) -> ReasonGroup:
+    """Reasons that differ in numbers alone: those in which they differ stand with the units."""
+    numbers = [_NUMBER.findall(told) for _, told, _ in members]
+    differ = [len(set(column)) > 1 for column in zip(*numbers, strict=True)]
+    open_, first = iter(differ), members[0][1]
+    text = _NUMBER.sub(lambda number: "…" if next(open_) else number[0], first)
+    own = [", ".join(value for value, apart in zip(row, differ, strict=True) if apart) for row in numbers]
+    return ReasonGroup(text, [(unit, value or other) for (unit, _, value), other in zip(members, own, strict=True)])

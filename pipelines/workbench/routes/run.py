@@ -14,6 +14,7 @@ from pipelines.report.reasons import grouped_reasons
 from pipelines.stages.judge import verdict_of
 from pipelines.tables.frames import rows_of
 from pipelines.workbench.pages import Workbench, asked, page, run_table, saved_as, table_csv
+from pipelines.workbench.routes.units import newest_question
 from pipelines.workbench.state import MissingPage, RunPage, StationPage
 from schemas.errors import TumblelineError, WrongUse
 
@@ -51,7 +52,7 @@ def run(request: Request) -> Response:
         certificates=certificates, events=events, judged=_judged(bench, stored.id, tables),
         groups=grouped_reasons(grades), outcomes=Counter(str(row["outcome"]) for row in grades),
         other=_other(bench, state, problems), station=StationPage(run=stored.id), heads=HEADS,
-        others=[one.id for one in bench.archive.runs()[::-1] if one.id != stored.id][:MOST_OTHERS],
+        others=[name for name, _ in bench.index.ask(newest_question(MOST_OTHERS)).rows if name != stored.id],
         live=stored.records is not None and "history" not in tables,
     )  # fmt: skip
 

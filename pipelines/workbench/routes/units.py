@@ -1,5 +1,7 @@
 """Search of units and runs."""
 
+from itertools import islice
+
 from fastapi import APIRouter, Request
 from starlette.responses import Response
 
@@ -10,7 +12,8 @@ from pipelines.workbench.state import ROWS, UnitsPage
 router = APIRouter()
 HEADING, ORDER, ADDRESS = "Units", 10, "/units"
 EVERYTHING = 1_000_000
-NEWEST = 12
+NEWEST, MOST_LOOKED = 12, 500
+"""Runs that are shown, and that are looked at for those of a state."""
 
 
 @router.get("/units")
@@ -22,7 +25,10 @@ def units(request: Request) -> Response:
     newest = bench.index.ask(newest_question(NEWEST)).rows
     infos = [info_of(bench.archive.run(str(name))) for name, _ in newest]
     if state.runs:
-        infos = [one for one in bench.archive.runs()[::-1] if is_of(one, state.runs)][:NEWEST]
+        every = (
+            info_of(bench.archive.run(str(name))) for name, _ in bench.index.ask(newest_question(MOST_LOOKED)).rows
+        )
+        infos = list(islice((one for one in every if one is not None and is_of(one, state.runs)), NEWEST))
     return page(
         request, "units.html", state, problems, rows=rows, counts=counts, total=sum(counts.values()), per_page=ROWS,
         runs=[one for one in infos if one is not None], run_count=newest[0][1] if newest else 0,
