@@ -206,7 +206,7 @@ def _budgets(c: CertificateContent) -> dict[str, Any]:
             for row in _folded(one.rows)
         ]
     heads = ["result and its contributions", "type", "distribution", "u", "share of u²", "source, or coverage"]
-    table = _table("", heads, rows, [2, "auto", "auto", "auto", "auto", 3], [3, 4])
+    table = _table("", heads, rows, [3, "auto", "auto", "auto", "auto", 3], [3, 4])
     return {"title": "Uncertainty budgets", "tables": [table]} if rows else {}
 
 
