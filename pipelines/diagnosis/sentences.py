@@ -13,7 +13,7 @@ BAD_DWELL = "bad_dwell"
 NAMED_DWELLS = 5
 """Number of dwells named in a sentence."""
 
-NOT_BY_P = "this p allows slow noise of any size: a cause that explains the residual far better decides"
+NOT_BY_P = "by this p slow noise could explain it, but a definite cause explains it far better"
 """Said where a model whose residual slow noise could be is not adequate."""
 
 UNEXPLAINED = "Significant, but of unknown cause"
@@ -60,7 +60,8 @@ def plain_verdict(judged: Mapping[str, Any]) -> str:
     if judged["adequate"]:
         return f"ADEQUATE: {_figures(judged)}"
     small = f"; {SMALL_MISFIT}" if is_small(judged) else ""
-    return f"NOT ADEQUATE: {_figures(judged)}{small}{f'; {NOT_BY_P}' if judged['p_value'] > ADEQUATE_ABOVE else ''}"
+    by_cause = f"; {NOT_BY_P}" if judged["p_value"] > ADEQUATE_ABOVE and not judged["reason"] else ""
+    return f"NOT ADEQUATE: {_figures(judged)}{small}{by_cause}"
 
 
 def _figures(judged: Mapping[str, Any]) -> str:
