@@ -9,6 +9,7 @@ from typing import Any
 
 from pipelines.archive import Archive, Run
 from pipelines.cli.printing import say
+from pipelines.diagnosis.sentences import UNSEEN
 
 PROGRAM = "tumbleline"
 MEASURE_AGAIN = (
@@ -128,7 +129,8 @@ def print_next_of_diagnosis(document: dict[str, Any], find: FindData, model: Pat
     find : gives the data; called only where there is something to do: to look for a fresh run takes a second
     model : the model file that was judged; None for a list of effects
     """
-    decides = any(row.get("measurable", True) for row in document["next_measurements"])
+    steps = (row for row in document["next_measurements"] if row.get("measurable", True))
+    decides = any(not row["why"].startswith(UNSEEN) for row in steps)
     if not (document["recommended"] or document["offer"] or decides):
         return
     data = find()

@@ -16,6 +16,9 @@ NAMED_DWELLS = 5
 NOT_BY_P = "by this p slow noise could explain it, but a definite cause explains it far better"
 """Said where a model whose residual slow noise could be is not adequate."""
 
+UNSEEN = "not seen so far: "
+"""Beginning of the purpose of steps that show effects which the plan so far cannot show."""
+
 UNEXPLAINED = "Significant, but of unknown cause"
 
 
@@ -254,8 +257,12 @@ def cost_to_decide(document: dict[str, Any]) -> list[str]:
         if not own[0].get("measurable", True) or "minutes" not in own[0]:
             lines.append(f"To decide: {why}")
             continue
-        steps = sum(int(row.get("repeats", 1)) for row in own)
-        lines.append(f"To decide: {number_of(steps, 'step')} for {brings(own[0])}")
+        steps = number_of(sum(int(row.get("repeats", 1)) for row in own), "step")
+        if why.startswith(UNSEEN):
+            names, minutes = why.removeprefix(UNSEEN), short(own[0]["minutes"])
+            lines.append(f"To see {names}, too: {steps}, {minutes} min of station time")
+        else:
+            lines.append(f"To decide: {steps} for {brings(own[0])}")
     return lines
 
 

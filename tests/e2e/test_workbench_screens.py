@@ -143,6 +143,10 @@ def test_story_the_first_picture_of_a_diagnosis_shows_what_is_missing_and_that_i
                 (s) => document.querySelector(s).getBoundingClientRect().top)"""
         )
         assert order == sorted(order)
+        until(
+            lambda: one.page.evaluate("() => Boolean(document.querySelector('[data-name=effect-0]')?._fullLayout)"),
+            "it is drawn",
+        )
         drawn = one.page.evaluate(
             """() => { const l = document.querySelector("[data-name=effect-0]")._fullLayout;
                 return [l.xaxis.title.text, l.xaxis2.domain[0]]; }"""
@@ -160,8 +164,10 @@ def test_story_the_first_picture_of_a_diagnosis_shows_what_is_missing_and_that_i
 
 
 @pytest.mark.slow
-def test_story_a_bell_calls_the_operator_and_the_running_lot_is_drawn(bench: Served, browser: Any) -> None:
-    with tab(browser, bench.address) as one:
+def test_story_a_bell_calls_the_operator_and_the_running_lot_is_drawn(tmp_path: Path, browser: Any) -> None:
+    (tmp_path / "bench").mkdir()
+    recipe_file(tmp_path / "bench")
+    with served(tmp_path / "archive", tmp_path / "bench") as server, tab(browser, server.address) as one:
         one.open("/operator")
         one.press("[data-bell]")
         assert one.page.evaluate("() => document.body.dataset.rung") == "1"  # so that one hears how it sounds

@@ -11,7 +11,7 @@ from starlette.responses import JSONResponse, Response
 
 from pipelines.jobs.job import Request as LotRequest
 from pipelines.workbench.pages import RequestBody, asked, figure, no_figure, page, workbench_of
-from pipelines.workbench.routes.station import chart_of_run
+from pipelines.workbench.routes.station import chart_of_run, nothing_yet
 from pipelines.workbench.services import lots, requests
 from pipelines.workbench.settings import WorkbenchSettings
 from pipelines.workbench.state import OperatorPage
@@ -117,9 +117,7 @@ def drawn(request: Request, name: str, ending: str) -> Response:
     run = lots.state_of(lots.place_of(bench.settings, state.lot)).run
     if name != "station":
         raise no_figure(name)
-    if not run:
-        raise WrongUse(f"lot {state.lot}: its run has not begun; the picture comes with the first record")
-    return figure(chart_of_run(bench, run), ending, f"{state.lot}-station")
+    return figure(chart_of_run(bench, run) if run else nothing_yet(), ending, f"{state.lot}-station")
 
 
 @router.post("/operator/scan")

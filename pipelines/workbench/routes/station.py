@@ -7,7 +7,7 @@ from fastapi import APIRouter, Request
 from starlette.responses import Response
 
 from pipelines.commissioning.frames import timeline
-from pipelines.drawing import Chart
+from pipelines.drawing import Chart, Plot, PlotAxis
 from pipelines.report.run_pictures import station_chart
 from pipelines.tables.frames import rows_of
 from pipelines.workbench.pages import Workbench, asked, figure, no_figure, page, run_table
@@ -73,19 +73,19 @@ def drawn(request: Request, name: str, ending: str) -> Response:
     return figure(chart_of_run(bench, state.run), ending, f"{state.run}-station")
 
 
-def chart_of_run(bench: Workbench, run: str) -> Chart:
-    """Temperatures and angles of a run, as far as it is measured.
+def nothing_yet() -> Chart:
+    """The picture of a run before its first record."""
+    axes = PlotAxis("station time / h"), PlotAxis("temperature / °C")
+    return Chart("Temperatures and angles", (Plot("no record is finished yet", *axes, ()),), height=560)
 
-    Raises
-    ------
-    WrongUse
-        No record of it is finished yet, or it was imported.
-    """
+
+def chart_of_run(bench: Workbench, run: str) -> Chart:
+    """Temperatures and angles of a run, as far as it is measured; no lines before the first record."""
     stored = bench.archive.run(run)
     if set(stored.tables()) >= NEEDED:
         return station_chart(*(run_table(bench, run, table) for table in ("history", "readings", "events")))
     records = stored.records
     if records is None or not records.finished():
-        raise WrongUse(f"run {stored.id}: no record is finished yet; the picture comes with the first one")
+        return nothing_yet()
     events = pd.DataFrame(records.events.documents(), columns=["kind", "time_s", "reason"])
     return station_chart(records.gathered("history"), records.gathered("readings"), events)
