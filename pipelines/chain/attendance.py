@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol
 from inertial.counts import number_of
 from pipelines.archive import Run
 from pipelines.jobs.seating import disagreements
+from pipelines.report.templates import plain_reason
 from pipelines.tables.frames import rows_of
 from schemas.errors import OperatorNeeded
 
@@ -93,7 +94,7 @@ class Attendance:
 def _result(row: dict[str, Any]) -> str:
     """The result of a unit: pass with its grade, or the reasons of fail or refusal."""
     grade = f", grade {row['grade']}" if row["outcome"] == "pass" and row["grade"] else ""
-    why = f": {row['reasons']}" if row["outcome"] != "pass" and row["reasons"] else ""
+    why = f": {plain_reason(row['reasons'])}" if row["outcome"] != "pass" and row["reasons"] else ""
     return f"{row['outcome']}{grade}{why}"
 
 

@@ -10,6 +10,7 @@ from inertial.counts import number_of
 from pipelines.archive import Archive
 from pipelines.cli.options import ArchiveOption, JsonOption, argument, option
 from pipelines.cli.printing import STYLES, give, print_table, say, short
+from pipelines.report.templates import plain_reason
 
 if TYPE_CHECKING:
     from rich.text import Text
@@ -71,7 +72,7 @@ def _styled(outcome: str, grade: str) -> Text:
 
 def _reason(row: dict[str, Any]) -> str:
     """The reasons that only one of the runs gives."""
-    before, after = (set(filter(None, text.split("; "))) for text in row["reasons"])
+    before, after = (set(filter(None, plain_reason(text).split("; "))) for text in row["reasons"])
     gone, new = (sorted(one.split(":")[0] for one in part) for part in (before - after, after - before))
     changes = [f"now {name}" for name in new] + [f"no longer {name}" for name in gone if name not in new]
     return "; ".join(changes)

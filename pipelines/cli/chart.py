@@ -1,10 +1,10 @@
-"""Line charts over time in a terminal, drawn with braille dots (2 × 4 dots in each character)."""
+"""Line charts in a terminal, drawn with braille dots (2 × 4 dots in each character), and points as marks."""
 
 from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -18,17 +18,31 @@ MARGIN = 9  # characters for the labels on the left
 
 @dataclass(frozen=True)
 class Line:
-    """One line: name, colour and points (time in s, value); a value that is not finite makes a gap."""
+    """One line: name, colour and points (time in s or another quantity, value); a value that is not finite makes a gap.
+
+    mark : character of each point, which are then not joined; empty for a line
+    """
 
     name: str
     style: str
     points: Sequence[tuple[float, float]]
+    mark: str = ""
 
 
-def chart(title: str, lines: Sequence[Line], width: int, height: int, span: tuple[float, float]) -> Text:
+def chart(
+    title: str,
+    lines: Sequence[Line],
+    width: int,
+    height: int,
+    span: tuple[float, float],
+    *,
+    bounds: tuple[float, float] | None = None,
+    label: Callable[[float], str] | None = None,
+) -> Text:
     """The chart as text of ``height`` rows and about ``width`` columns, with values on the left and times below.
 
     span : first and last time of the chart, s
+    bounds : of the values; those that hold all where None · label : of a time; hours, minutes and seconds where None
     """
     from rich.text import Text
 
@@ -36,23 +50,23 @@ def chart(title: str, lines: Sequence[Line], width: int, height: int, span: tupl
     values = [v for points in shown for _, v in points]
     text = Text(f"{title}   ")
     for line in lines:
-        text.append(f"━ {line.name}  ", style=line.style)
+        text.append(f"{line.mark or '━'} {line.name}  " if line.name else "", style=line.style)
     text.append("\n")
     if not values:
         return text.append("no data yet\n")
     room = 0.05 * (max(values) - min(values)) or 0.5  # the ends of the axis always differ
-    low, high = min(values) - room, max(values) + room
+    low, high = bounds or (min(values) - room, max(values) + room)
     columns = max(10, width - MARGIN - 2)
     cells = _drawn(lines, shown, (columns, height), span, (low, high))
     labels = _labels(low, high, height)
     for row in range(height):
-        label = f"{labels[row]:>{MARGIN - 1}} " if row % 2 == 0 else " " * MARGIN
-        text.append(f"{label}│", style="dim")
+        left = f"{labels[row]:>{MARGIN - 1}} " if row % 2 == 0 else " " * MARGIN
+        text.append(f"{left}│", style="dim")
         for column in range(columns):
-            mask, style = cells.get((row, column), (0, ""))
-            text.append(chr(BLANK + mask) if mask else " ", style=style)
+            mask, style = cells.get((row, column), (" ", ""))
+            text.append(chr(BLANK + mask) if isinstance(mask, int) else mask, style=style)
         text.append("\n")
-    return text.append(_times(span, columns), style="dim")
+    return text.append(_times(span, columns, label or clock), style="dim")
 
 
 def _labels(low: float, high: float, height: int) -> list[str]:
@@ -72,10 +86,10 @@ def _drawn(
     size: tuple[int, int],
     span: tuple[float, float],
     bounds: tuple[float, float],
-) -> dict[tuple[int, int], tuple[int, str]]:
-    """Dots and colour of every cell that a line passes through; the line drawn last gives the colour."""
+) -> dict[tuple[int, int], tuple[int | str, str]]:
+    """Dots or mark, and colour, of every cell that a line passes through; the line drawn last gives the colour."""
     columns, rows = size
-    cells: dict[tuple[int, int], tuple[int, str]] = {}
+    cells: dict[tuple[int, int], tuple[int | str, str]] = {}
     for line, points in zip(lines, shown, strict=True):
         dots = [
             (
@@ -84,9 +98,11 @@ def _drawn(
             )
             for t, v in points
         ]
-        for x, y in _joined(dots):
+        for x, y in dots if line.mark else _joined(dots):
             cell = (y // 4, x // 2)
-            cells[cell] = (cells.get(cell, (0, ""))[0] | DOTS[y % 4][x % 2], line.style)
+            before = cells.get(cell, (0, ""))[0]
+            mask = (before if isinstance(before, int) else 0) | DOTS[y % 4][x % 2]
+            cells[cell] = (line.mark or mask, line.style)
     return cells
 
 
@@ -99,9 +115,9 @@ def _joined(dots: Sequence[tuple[int, int]]) -> list[tuple[int, int]]:
     return joined
 
 
-def _times(span: tuple[float, float], columns: int) -> str:
-    first, last = clock(span[0]), clock(span[1])
-    middle = clock((span[0] + span[1]) / 2.0)
+def _times(span: tuple[float, float], columns: int, label: Callable[[float], str]) -> str:
+    first, last = label(span[0]), label(span[1])
+    middle = label((span[0] + span[1]) / 2.0)
     line = first.ljust(columns)
     at = max(0, columns // 2 - len(middle) // 2)
     line = line[:at] + middle + line[at + len(middle) :]

@@ -188,11 +188,12 @@ class _Game:
 
         self._step("2. What is missing?", _command("diagnose", self.folder, self.hidden.model))
         source = str(self.folder / "dwells.parquet")
-        document, report = diagnosed(self.lot.dwells, self.lot.history, self.model, source, with_report=True)
+        made, report = diagnosed(self.lot.dwells, self.lot.history, self.model, source, with_report=True)
+        document = made.document
         document["history"] = str(self.folder / "history.parquet")
         publish(self.folder / "report.html", report, "report")
         if not self.quiet:  # without commands: the next step of the game adds the effect
-            print_diagnosis(document, data=None, model=self.folder / "model.toml")
+            print_diagnosis(document, made=made, data=None, model=self.folder / "model.toml")
         return document
 
     def _extend(self, recommended: list[str]) -> list[str]:

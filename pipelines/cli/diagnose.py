@@ -16,6 +16,7 @@ from schemas.errors import WrongUse
 if TYPE_CHECKING:
     import pandas as pd
 
+    from pipelines.diagnosis.diagnose import Examination
     from schemas.recipe import Recipe
 
 PART = "Is the model good enough, and what is missing?"
@@ -69,9 +70,10 @@ def command(
     table, left_out = without_dwells(table, leave_out)
     beside = temperatures or (file_beside(dwells, "history") if is_file(dwells) else "")
     kept_name = dwells if is_file(dwells) else Archive(archive).run(dwells).id  # what 'latest' means changes
-    document, report_text = diagnosed(
+    made, report_text = diagnosed(
         table, history, judged, kept_name, with_report=report is not None, left_out=left_out
     )
+    document = made.document
     document["history"] = beside or None
     if report is not None:
         publish(report, report_text, "report")
@@ -83,7 +85,8 @@ def command(
     from pipelines.cli.text.diagnosis_text import print_diagnosis
 
     given = Given(archive, leave_out=leave_out, effect_files=effect_file or (), formulas=formula or ())
-    show = partial(print_diagnosis, data=partial(judged_data, dwells, beside, given), model=model, brief=not show_all)
+    find = partial(judged_data, dwells, beside, given)
+    show = partial(print_diagnosis, made=made, data=find, model=model, brief=not show_all)
     conclude(document, show, as_json=as_json, passed=bool(document["adequate"]))
 
 
@@ -96,18 +99,18 @@ def diagnosed(
     with_report: bool,
     coefficients: list[dict[str, Any]] | None = None,
     left_out: Sequence[str] = (),
-) -> tuple[dict[str, Any], str]:
-    """The document of a diagnosis, and its report on request, with the coefficients of a fit if they are given."""
+) -> tuple[Examination, str]:
+    """A diagnosis, and its report on request, with the coefficients of a fit if they are given."""
     with error_console().status("looking for missing effects"):
         from pipelines.diagnosis.diagnose import examination  # loads the search for effects: after the first line
 
         made = examination(table, history, judged, left_out)
     if not with_report:
-        return made.document, ""
+        return made, ""
     with error_console().status("drawing the report"):
         from pipelines.report.diagnosis import render_diagnosis
 
-        return made.document, render_diagnosis(made.document, made.measured, made.diagnosis, source, coefficients)
+        return made, render_diagnosis(made, source, coefficients)
 
 
 def measured_recipe(dwells: str, recipe: str, archive: str | None) -> Recipe:

@@ -8,6 +8,7 @@ from pipelines.archive import Archive, Run
 from pipelines.cli import options
 from pipelines.cli.printing import conclude, error_console, remark, say
 from pipelines.cli.text.verdict_text import print_verdict_of_fit
+from pipelines.report.templates import plain_reason
 from schemas.errors import WrongUse
 from schemas.foreign import shown
 
@@ -95,6 +96,6 @@ def _print_imported(document: dict[str, Any]) -> None:
     for line in document["lines"]:
         say(f"  {line}")
     for unit in document["units"]:
-        reasons = f" ({unit['reasons']})" if unit["reasons"] else ""
+        reasons = f" ({plain_reason(unit['reasons'])})" if unit["reasons"] else ""
         say(f"  {unit['unit']}: {unit['outcome']}, grade {unit['grade']}{reasons}")
     print_verdict_of_fit(document["adequate"], "this model does not describe these data")

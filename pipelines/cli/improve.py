@@ -17,6 +17,8 @@ from schemas.errors import WrongUse
 if TYPE_CHECKING:
     import pandas as pd
 
+    from pipelines.diagnosis.diagnose import Examination
+
 
 PART = "Start here"
 ORDER = 20
@@ -98,7 +100,7 @@ def command(
     beside = temperatures or (file_beside(data, "history") if is_file(data) else "")
     may_measure = True if yes and measure is None else measure
     brief = recording is not None and not show_all
-    attendant = _Terminal(data, model, archive, quiet=as_json or brief, measure=may_measure)
+    attendant = _Terminal(data, model, archive, quiet=as_json or brief, measure=may_measure, show_all=show_all)
     improvement = Improvement(data, tables, model, target, beside, who, fresh, attendant)
     document = improvement.run(judged, list(names_in(choose)), yes=yes)
     given = Given(archive, fresh, fresh_temperatures, leave_out, effect_file or ())
@@ -115,12 +117,14 @@ class _Terminal(Attendant):
     """Shows an improvement at the terminal and asks its questions there.
 
     quiet : no diagnosis is printed · measure : whether the station measures a fresh run; None: it is asked
+    show_all : a diagnosis is printed with its long tables
     """
 
     def __init__(
-        self, data: str, model: Path | None, archive: str | None, *, quiet: bool, measure: bool | None
+        self, data: str, model: Path | None, archive: str | None, *, quiet: bool, measure: bool | None, show_all: bool
     ) -> None:
         self._data, self._model, self._archive, self._quiet, self._measure = data, model, archive, quiet, measure
+        self._all = show_all
 
     def working(self, what: str) -> AbstractContextManager[Any]:
         """A line that stands while something is computed."""
@@ -131,17 +135,17 @@ class _Terminal(Attendant):
         if not self._quiet:
             say(f"\nDiagnosis with {', '.join(added)}", style="bold cyan")
 
-    def diagnosed(self, document: dict[str, Any], *, first: bool) -> None:
-        """Prints a diagnosis with all its tables the first time, as its verdict alone later."""
+    def diagnosed(self, made: Examination, *, first: bool) -> None:
+        """Prints a diagnosis with its picture the first time, as its verdict alone later."""
         from pipelines.cli.text.diagnosis_text import print_diagnosis
         from pipelines.cli.text.verdict_text import print_verdict
 
         if self._quiet:
             return
         if first:
-            print_diagnosis(document, data=None, model=self._model)
+            print_diagnosis(made.document, made=made, data=None, model=self._model, brief=not self._all)
         else:
-            print_verdict(document)
+            print_verdict(made.document)
 
     def agrees(self, effect: str, others: list[str], target: Path) -> bool:
         """The answer of the operator, who is told what these data do not separate from the effect."""

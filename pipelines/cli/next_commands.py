@@ -11,6 +11,7 @@ from typing import Any
 
 from pipelines.archive import Archive, Run
 from pipelines.cli.printing import say
+from pipelines.diagnosis.sentences import UNSEEN
 
 PROGRAM = "tumbleline"
 MEASURE_AGAIN = (
@@ -156,28 +157,53 @@ def print_next(lines: Sequence[str]) -> None:
             say(f"  {line}")
 
 
-def print_extension(document: dict[str, Any], find: FindData, model: Path | None) -> None:
-    """Print the commands that add the recommended effects of a diagnosis and judge them.
+def print_next_of_diagnosis(document: dict[str, Any], find: FindData, model: Path | None) -> None:
+    """Print the commands after a diagnosis: the recipe that decides, and the effects that are added, or the formula to judge.
 
-    find : gives the data; called only where there is something to add: to look for a fresh run takes a second
+    find : gives the data; called only where there is something to do: to look for a fresh run takes a second
     model : the model file that was judged; None for a list of effects
     """
-    if not document["recommended"]:
+    steps = (row for row in document["next_measurements"] if row.get("measurable", True))
+    decides = any(not row["why"].startswith(UNSEEN) for row in steps)
+    if not (document["recommended"] or document["offer"] or decides):
         return
     data = find()
+    lines: list[str] = []
+    if decides and data.refusal is not None:  # dwells of a file do not state the recipe that they were measured with
+        own = ["--model", str(model)] if model else ["--effects", ",".join(document["effects"])]
+        lines.append(command_line("diagnose", data.source, *own, *data.options, "--output", free_name("next")))
+    elif decides:
+        say("To write these steps as a recipe, add --output FILE.toml --recipe RECIPE, the recipe of these dwells.", "dim")
+    if document["recommended"]:
+        lines += _extension(document, data, model)
+    elif offer := document["offer"]:  # judges the model with the formula, without a model file
+        words = ["--effects", ",".join([*document["effects"], offer["id"]])]
+        words += ["--formula", f"{offer['id']}={'; '.join(offer['columns'])}", *data.given.written, *data.options]
+        lines.append(command_line("diagnose", data.source, *words))
+    print_next(lines)
+
+
+def print_extension(document: dict[str, Any], find: FindData, model: Path | None) -> None:
+    """Print the commands that add the recommended effects of a diagnosis and judge them; see :func:`print_next_of_diagnosis`."""
+    if document["recommended"]:
+        print_next(_extension(document, find(), model))
+
+
+def _extension(document: dict[str, Any], data: JudgedData, model: Path | None) -> list[str]:
+    """The commands that add the recommended effects; what they lack is printed before them."""
     file = model or free_name()
     new = not (model and model.exists())
     if data.refusal is not None and (why := data.refusal([*document["effects"], *document["recommended"]])):
         say(why, "yellow")
-    print_next(extension(file, document["recommended"], document["effects"], data, new=new))
     if not data.fresh:
         its_own = " and its temperatures with --fresh-temperatures" if data.history else ""
         say(MEASURE_AGAIN.format(history=its_own), "dim")
+    return extension(file, document["recommended"], document["effects"], data, new=new)
 
 
-def free_name() -> str:
-    """A name for a new model file; an existing file belongs to another model."""
-    names = ("model.toml", *(f"model-{k}.toml" for k in range(2, 1000)))
+def free_name(stem: str = "model") -> str:
+    """A name for a new file; an existing one belongs to another model or recipe."""
+    names = (f"{stem}.toml", *(f"{stem}-{k}.toml" for k in range(2, 1000)))
     return next(name for name in names if not Path(name).exists())
 
 

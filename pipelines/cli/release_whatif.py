@@ -9,6 +9,7 @@ from pipelines.cli import options
 from pipelines.cli.inputs import distribution
 from pipelines.cli.options import argument
 from pipelines.cli.printing import conclude, error_console, print_table, say, short
+from pipelines.report.templates import plain_reason
 
 SHOWN = 12
 
@@ -55,7 +56,7 @@ def _print(document: dict[str, Any]) -> None:
         if rows:
             say(f"{number_of(len(rows), 'unit')}: {outcome}")
             for row in rows[:SHOWN]:
-                say(f"  {row['unit']} in {row['run']}: {row['reasons']}", style="dim")
+                say(f"  {row['unit']} in {row['run']}: {plain_reason(row['reasons'])}", style="dim")
     for row in document["failed"]:
         say(f"  {row['run']}: {row['error']}", style="bold red")
     style = {"better": "bold green", "worse": "bold red"}.get(document["verdict"], "bold")

@@ -6,6 +6,7 @@ from inertial.counts import number_of
 from pipelines.archive import Run
 from pipelines.capture.interruptions import Interruptions, interruptions
 from pipelines.cli.printing import STYLES, print_table, say, short
+from pipelines.report.reasons import grouped_reasons
 from pipelines.tables.frames import rows_of
 from pipelines.tables.json_values import json_value
 
@@ -83,9 +84,8 @@ def print_summary(document: dict[str, Any]) -> None:
         say(" · ".join(LEGEND[name] for name, _ in shown if name in LEGEND), style="dim")
         if any(name == "velocity_random_walk_ug_rtHz" for name, _ in shown):
             say(NOISE_LEGEND, style="dim")
-    for unit in document["units"]:
-        if unit["reasons"]:
-            say(f"  {unit['unit']}: {unit['reasons']}")
+    for group in grouped_reasons(document["units"]):
+        say(f"  {group.sentence}")
     say(f"  decided by {document['rule']}", style="dim")
     if any(unit.get("basis") != "budget" for unit in document["units"]):
         say(f"  {NOISE_ONLY}", style="dim")

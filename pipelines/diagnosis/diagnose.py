@@ -205,6 +205,12 @@ class Examination:
     measured: Measured
     diagnosis: Diagnosis | None
 
+    @property
+    def sound(self) -> tuple[str, ...]:
+        """The units without a data fault, in the order of the diagnosis."""
+        faulty = {unit for fault in self.document["blocked_by"] for unit in fault["units"]}
+        return tuple(unit for unit in self.measured.units if unit not in faulty)
+
 
 def examination(
     table: pd.DataFrame,

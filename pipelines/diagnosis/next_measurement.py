@@ -15,6 +15,7 @@ from inertial.criticism.diagnosis import Diagnosis
 from inertial.errors import MissingInput
 from inertial.next_measurement.proposals import Circumstances, Proposal, proposal, sighting, twins
 from inertial.planning.sequences import SequenceStep
+from pipelines.diagnosis.sentences import UNSEEN
 from schemas.poses import Pose, SoakPart
 from schemas.recipe import Recipe
 from schemas.toml_files import explain
@@ -97,7 +98,7 @@ def rows_of(suggestion: Proposal) -> list[dict[str, Any]]:
     """Rows of one proposal: consecutive equal steps are one row with their number."""
     rows: list[dict[str, Any]] = []
     before: dict[str, Any] | None = None
-    about = " | ".join(suggestion.pair) or f"not seen so far: {', '.join(suggestion.ids)}"
+    about = " | ".join(suggestion.pair) or f"{UNSEEN}{', '.join(suggestion.ids)}"
     for step in suggestion.steps:
         row = {
             "outer_deg": _degrees(step.outer),

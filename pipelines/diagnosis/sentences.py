@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from inertial.counts import degrees_of_freedom
+from inertial.counts import degrees_of_freedom, number_of
 from inertial.criticism.evidence import FEW_DOF
 from inertial.decisions import ADEQUATE_ABOVE
 from inertial.uncertainty.rounding import chance, equal, short
@@ -12,6 +12,12 @@ from pipelines.tables.sound_lot import SMALL_MISFIT, is_small
 BAD_DWELL = "bad_dwell"
 NAMED_DWELLS = 5
 """Number of dwells named in a sentence."""
+
+NOT_BY_P = "by this p slow noise could explain it, but a definite cause explains it far better"
+"""Said where a model whose residual slow noise could be is not adequate."""
+
+UNSEEN = "not seen so far: "
+"""Beginning of the purpose of steps that show effects which the plan so far cannot show."""
 
 UNEXPLAINED = "Significant, but of unknown cause"
 
@@ -56,7 +62,9 @@ def plain_verdict(judged: Mapping[str, Any]) -> str:
         return f"CANNOT BE JUDGED: {judged['reason']}"
     if judged["adequate"]:
         return f"ADEQUATE: {_figures(judged)}"
-    return f"NOT ADEQUATE: {_figures(judged)}{f'; {SMALL_MISFIT}' if is_small(judged) else ''}"
+    small = f"; {SMALL_MISFIT}" if is_small(judged) else ""
+    by_cause = f"; {NOT_BY_P}" if judged["p_value"] > ADEQUATE_ABOVE and not judged["reason"] else ""
+    return f"NOT ADEQUATE: {_figures(judged)}{small}{by_cause}"
 
 
 def _figures(judged: Mapping[str, Any]) -> str:
@@ -209,6 +217,14 @@ def why_recommended(document: dict[str, Any]) -> list[str]:
     return lines
 
 
+def not_listed(document: dict[str, Any]) -> str:
+    """How many effects this plan cannot show, or only in part; empty where it shows all."""
+    part = len({row["effect"] for row in document.get("unseen_in_part", ())})
+    counts = (("cannot show", len(document["unseen"])), ("shows only in part", part))
+    told = [f"{what} {number_of(count, 'effect')}" for what, count in counts if count]
+    return f"This plan {' and '.join(told)}" if told else ""
+
+
 def unexplained_text(document: dict[str, Any]) -> str:
     """What the residual follows without an effect of the catalogue that explains it; empty where there is nothing."""
     unexplained = document["unexplained"]
@@ -218,14 +234,36 @@ def unexplained_text(document: dict[str, Any]) -> str:
     return f"{unexplained['text']}{shape} (p {equal(unexplained['p_value'])})."
 
 
-def not_separated(document: dict[str, Any]) -> str:
-    """The classes of which one effect of several is recommended; empty where there are none."""
-    added = set(document["recommended"])
-    several = [g["effects"] for g in document["classes"] if len(g["effects"]) > 1 and added & set(g["effects"])]
-    if not several:
-        return ""
-    alternatives = "; ".join(" or ".join(effects) for effects in several)
-    return f"These data do not separate: {alternatives}. The added effect is one of its class."
+def why_first(document: dict[str, Any]) -> list[str]:
+    """Why one effect of a class is proposed and not another one; empty where no class has several."""
+    lines: list[str] = []
+    for group in document["classes"]:
+        first = next((name for name in group["effects"] if name in document["recommended"]), None)
+        others = [name for name in group["effects"] if name != first]
+        if first is not None and others:
+            lines.append(
+                f"{first} is proposed before {' and '.join(others)}: these data do not separate them, and it is the simplest of "
+                "those that explain the residual best."
+            )
+    return lines
+
+
+def cost_to_decide(document: dict[str, Any]) -> list[str]:
+    """What the next measurement costs and brings, one line for each purpose; or what would separate a class in place of it."""
+    lines: list[str] = []
+    rows = document["next_measurements"]
+    for why in dict.fromkeys(row["why"] for row in rows):
+        own = [row for row in rows if row["why"] == why]
+        if not own[0].get("measurable", True) or "minutes" not in own[0]:
+            lines.append(f"To decide: {why}")
+            continue
+        steps = number_of(sum(int(row.get("repeats", 1)) for row in own), "step")
+        if why.startswith(UNSEEN):
+            names, minutes = why.removeprefix(UNSEEN), short(own[0]["minutes"])
+            lines.append(f"To see {names}, too: {steps}, {minutes} min of station time")
+        else:
+            lines.append(f"To decide: {steps} for {brings(own[0])}")
+    return lines
 
 
 def brings(row: dict[str, Any]) -> str:

@@ -22,8 +22,8 @@ ROLES: dict[Role, str] = {
     "fourth": "#cc79a7",
     "norm": "#0072b2",
     "accent": "#0072b2",
-    "before": "#d55e00",
-    "after": "#0072b2",
+    "before": "#8a6400",
+    "after": "#7a3fb0",
     "muted": "#9aa3ad",
     "limit": "#b3261e",
     "good": "#1b7f3b",
@@ -34,8 +34,9 @@ ROLES: dict[Role, str] = {
 SEVERAL: tuple[Role, ...] = ("x", "y", "z", "fourth", "ink", "muted")
 """Roles of series that are no axes, in order."""
 
-DIVERGING = ((0.0, "#2166ac"), (0.25, "#67a9cf"), (0.5, "#efefef"), (0.75, "#ef8a62"), (1.0, "#b2182b"))
-SEQUENTIAL = ((0.0, "#2b4b8f"), (0.25, "#5a6f96"), (0.5, "#8b8f86"), (0.75, "#c6b45d"), (1.0, "#fde333"))
+DIVERGING = ((0.0, "#2f7bc4"), (0.25, "#74a9d8"), (0.5, "#b9bfc6"), (0.75, "#e58a6f"), (1.0, "#d0382f"))
+SEQUENTIAL = ((0.0, "#4a63b8"), (0.25, "#667ba8"), (0.5, "#8b8f86"), (0.75, "#b3a052"), (1.0, "#cfa91a"))
+"""Colours of values, none of which is near that of a white or of a dark page."""
 
 
 @dataclass(frozen=True)

@@ -140,7 +140,7 @@ def _density(trace: Trace, place: Place, scale: ColourScale | None) -> str:
     level = np.ceil(4.0 * np.log10(1.0 + counts) / np.log10(1.0 + counts.max())).astype(int)
     wide, tall = (float(np.ptp(v)) / max(v.size - 1, 1) for v in (trace.x, trace.y))
     parts: list[str] = []
-    for number, colour in enumerate(("#dfe3e7", "#c3c9cf", "#a7afb7", "#8a939c"), start=1):
+    for number, colour in enumerate(("#cdd4db", "#b9c0c7", "#a7afb7", "#8a939c"), start=1):
         rows, columns = np.nonzero(level == number)
         left, right = (place.x(trace.x[columns] + sign * 0.5 * wide) for sign in (-1.0, 1.0))
         low, high = (place.y(trace.y[rows] + sign * 0.5 * tall) for sign in (-1.0, 1.0))

@@ -13,6 +13,11 @@ export function themed(value, style) {
   return value;
 }
 
+// below this width plots stand one under the other
+const NARROW = matchMedia("(max-width: 600px)");
+export const arranged = (figure) => (NARROW.matches && figure.narrow) || figure.layout;
+export const rearranged = (draw) => NARROW.addEventListener("change", draw);
+
 export function dressed(layout, style) {
   const grid = style.getPropertyValue("--grid").trim(), text = style.getPropertyValue("--text").trim();
   const out = { ...themed(layout, style), paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", uirevision: "kept",

@@ -4,6 +4,7 @@ Colours are names of roles (``role:before``) that the page replaces by those of 
 """
 
 import base64
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,9 +16,10 @@ from pipelines.drawing.ticks import log_ticks
 MANY = 4000
 """Points from which WebGL draws faster than SVG."""
 DAY_MS = 86_400_000.0
-GAP_X, GAP_PX = 0.078, 74.0
+GAP_X, GAP_PX = 0.078, 92.0
 SPHERE_GAP_X, SPHERE_GAP_PX = 0.012, 26.0
 DECADES = 100.0  # a logarithmic axis that spans more has a label at each decade
+ENTRY_PX = 22  # room for an entry of the legend
 NOTE_PX = 22  # room for the line below
 MOST_NAMES = 40  # names along the width of a figure
 NARROW_D = 20.0  # closer dates get a margin
@@ -33,11 +35,27 @@ CONFIG = {
 
 
 def plotly_figure(chart: Chart, *, webgl: bool = True) -> dict[str, Any]:
-    """Data, layout and configuration of a figure; colours by role.
+    """Data, layout and configuration of a figure, and its layout with one plot below the other; colours by role.
 
     webgl : whether many points are drawn by WebGL, which the small bundle of reports cannot do
     """
     data: list[dict[str, Any]] = []
+    shown: set[str] = set()
+    for number, plot in enumerate(chart.plots):
+        for trace in plot.traces:
+            data.append(_trace(trace, _axis_names(number), shown, dates=plot.x.dates))
+            if not webgl and data[-1]["type"] == "scattergl":
+                data[-1]["type"] = "scatter"
+            shown.add(trace.name)
+    figure = {"data": data, "layout": _layout(chart), "config": CONFIG}
+    if chart.columns == 1:
+        return figure
+    narrow = _layout(replace(chart, columns=1))
+    narrow["height"] += ENTRY_PX * sum(one["showlegend"] for one in data)  # the legend has one entry a line there
+    return figure | {"narrow": narrow}
+
+
+def _layout(chart: Chart) -> dict[str, Any]:
     above = 1.0 + 30.0 / (chart.height * chart.rows)
     layout: dict[str, Any] = {
         "height": chart.height * chart.rows + 40,
@@ -49,14 +67,7 @@ def plotly_figure(chart: Chart, *, webgl: bool = True) -> dict[str, Any]:
         "barmode": "group",
         "meta": {"title": _safe(chart.title)},
     }
-    shown: set[str] = set()
     for number, plot in enumerate(chart.plots):
-        names = _axis_names(number)
-        for trace in plot.traces:
-            data.append(_trace(trace, names, shown, dates=plot.x.dates))
-            if not webgl and data[-1]["type"] == "scattergl":
-                data[-1]["type"] = "scatter"
-            shown.add(trace.name)
         _place(layout, plot, number, chart)
     if chart.scale is not None:
         layout["coloraxis"] = _colour_axis(chart.scale)
@@ -72,7 +83,7 @@ def plotly_figure(chart: Chart, *, webgl: bool = True) -> dict[str, Any]:
             "text": _safe(chart.note), "x": 0, "y": 0, "xref": "paper", "yref": "paper", "xanchor": "left",
             "yanchor": "top", "showarrow": False, "yshift": -below,
         })  # fmt: skip
-    return {"data": data, "layout": layout, "config": CONFIG}
+    return layout
 
 
 def _axis_names(number: int) -> tuple[str, str]:
@@ -195,8 +206,6 @@ def _points(trace: Trace, colour: str) -> dict[str, Any]:
 
 def _colour_axis(scale: ColourScale) -> dict[str, Any]:
     colours = [list(one) for one in (DIVERGING if scale.diverging else SEQUENTIAL)]
-    if scale.diverging:
-        colours[len(colours) // 2][1] = "role:middle"  # zero has the colour of the page
     title = {"text": _safe(scale.label), "side": "right", "font": {"size": 13}}
     return {
         "cmin": scale.low, "cmax": scale.high, "colorscale": colours,

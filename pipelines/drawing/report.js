@@ -15,8 +15,8 @@ function plotly() {
 async function draw(figure) {
   const place = figure.querySelector(".live");
   if (!place.figure) place.figure = JSON.parse(figure.querySelector("script").textContent);
-  const drawing = await plotly(), style = getComputedStyle(document.documentElement), { data, layout, config } = place.figure;
-  await drawing.react(place, themed(data, style), dressed(layout, style), config);
+  const drawing = await plotly(), style = getComputedStyle(document.documentElement), { data, config } = place.figure;
+  await drawing.react(place, themed(data, style), dressed(arranged(place.figure), style), config);
   figure.classList.add("drawn");
 }
 
@@ -26,7 +26,7 @@ if (window.DecompressionStream && window.IntersectionObserver) {
     for (const one of entries) if (one.isIntersecting) { seen.unobserve(one.target); draw(one.target).catch(() => {}); }
   }, { rootMargin: "200px" });
   for (const figure of document.querySelectorAll(".figure")) if (figure.querySelector("script")) seen.observe(figure);
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
-    for (const figure of document.querySelectorAll(".figure.drawn")) draw(figure).catch(() => {});
-  });
+  const again = () => { for (const figure of document.querySelectorAll(".figure.drawn")) draw(figure).catch(() => {}); };
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", again);
+  rearranged(again);
 }

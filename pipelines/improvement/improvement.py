@@ -16,6 +16,7 @@ from schemas.errors import WrongUse, did_you_mean
 if TYPE_CHECKING:
     import pandas as pd
 
+    from pipelines.diagnosis.diagnose import Examination
     from pipelines.jobs.model_files import ModelFile, ModelStep, Version
 
 
@@ -39,7 +40,7 @@ class Attendant:
     def begins_again(self, added: list[str]) -> None:
         """Is told that the model with some more effects is diagnosed next."""
 
-    def diagnosed(self, document: dict[str, Any], *, first: bool) -> None:
+    def diagnosed(self, made: Examination, *, first: bool) -> None:
         """Sees a diagnosis: of the model that is judged, or of the last version."""
 
     def agrees(self, effect: str, others: list[str], target: Path) -> bool:
@@ -140,10 +141,10 @@ class Improvement:
         with self.attendant.working("looking for missing effects"):
             from pipelines.diagnosis.diagnose import examination  # loads the search for effects: after the first line
 
-            document = examination(self.tables.dwells, self.tables.history, effects).document
-        document["history"] = self.used_history or None
-        self.attendant.diagnosed(document, first=first)
-        return document
+            made = examination(self.tables.dwells, self.tables.history, effects)
+        made.document["history"] = self.used_history or None
+        self.attendant.diagnosed(made, first=first)
+        return made.document
 
     def _choices(self, diagnosis: dict[str, Any], named: list[str], *, yes: bool) -> list[dict[str, Any]]:
         """For each class with a recommended effect: the effect, those that these data do not separate from it, and the answer.

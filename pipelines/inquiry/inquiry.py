@@ -233,12 +233,14 @@ class Inquiry:
         key = stage_key("inquiry", inputs, parameters, code)
         if run.has_report(key):
             return
+        from pipelines.diagnosis.diagnose import Examination
         from pipelines.report.diagnosis import render_diagnosis
 
         diagnosis = {key: value for key, value in joint.document.items() if key not in {"breakers", "offer"}}
         content = {"runs": list(self.lineage.ids), "effects": list(self.effects), "diagnosis": diagnosis}
         files.publish(run.path / FILE, files.json_bytes({**content, "round": self.rounds[-1]}))
-        html = render_diagnosis(joint.document, joint.measured, joint.diagnosis, " + ".join(self.lineage.ids))
+        made = Examination(joint.document, joint.measured, joint.diagnosis)
+        html = render_diagnosis(made, " + ".join(self.lineage.ids))
         run.save_report(key, html, {"inputs": inputs, "parameters": parameters, "code": code})
 
     def document(self, joint: JointDiagnosis, ending: Ending) -> dict[str, Any]:

@@ -7,45 +7,38 @@ import numpy as np
 from inertial import effects
 from inertial.criticism.diagnosis import Diagnosis
 from inertial.data_errors.handling import named as handled
+from pipelines.diagnosis.diagnose import Examination
 from pipelines.diagnosis.sections import worded
-from pipelines.report.diagnosis_pictures import driver_chart, model_chart, pose_chart
+from pipelines.report.diagnosis_pictures import driver_chart, noise_chart, pose_chart
+from pipelines.report.effect_view import effect_chart, effect_views
 from pipelines.report.interactive import figure_of, interactive
 from pipelines.report.numbers import significant
 from pipelines.report.residual_table import LEAST_LOG10_P, ladder_of
 from pipelines.report.residuals import bands_without_zero, drivers_shown, lot_residuals
 from pipelines.report.templates import template
-from pipelines.tables.dwells import Measured
 from schemas.units import MICRO
 
 FEWEST_POSES = 4  # fewer make no map
 
 
-def render_diagnosis(
-    document: dict[str, Any],
-    measurement: Measured,
-    diagnosis: Diagnosis | None,
-    source: str,
-    coefficients: list[dict[str, Any]] | None = None,
-) -> str:
+def render_diagnosis(made: Examination, source: str, coefficients: list[dict[str, Any]] | None = None) -> str:
     """The report as one HTML text that needs no other file.
 
     Parameters
     ----------
-    document : the diagnosis for programs, with its extras
-    measurement, diagnosis : the readings and their diagnosis; None if every unit has a data fault
+    made : the diagnosis, its readings and its document
     source : name of the dwells
     coefficients : rows of the fit's table, to be shown with it; none where None
     """
-    faulty = {unit for fault in document["blocked_by"] for unit in fault["units"]}
-    sound = tuple(unit for unit in measurement.units if unit not in faulty)
+    document, diagnosis = made.document, made.diagnosis
     page = template("diagnosis.html").render(
         source=source,
         document=document,
         coefficients=coefficients or [],
-        units=len(measurement.units),
+        units=len(made.measured.units),
         **worded(document),
         members=[_members(group, document) for group in document["classes"]],
-        pictures=None if diagnosis is None else _pictures(diagnosis, sound),
+        pictures=None if diagnosis is None else _pictures(diagnosis, made.sound),
         ladder=[] if diagnosis is None else _ladder(diagnosis),
         number=significant,
     )
@@ -77,7 +70,8 @@ def _pictures(diagnosis: Diagnosis, units: tuple[str, ...]) -> dict[str, Any]:
         "unit": left.unit,
         "several": len(units) > 1,
         "added": left.before is not left.after,
-        "model": figure_of(model_chart(left, lot.state, lot.output, MICRO * diagnosis.floor)),
+        "effects": [(view.title, figure_of(effect_chart(view))) for view in effect_views(diagnosis, units)],
+        "noise": figure_of(noise_chart(left, MICRO * diagnosis.floor)),
         "maps": figure_of(pose_chart(left.unit, left.axes, force, models)) if poses >= FEWEST_POSES else "",
         "drivers": figure_of(driver_chart(left, drivers, lot.state.temperature)) if drivers else "",
     }

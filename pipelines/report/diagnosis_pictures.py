@@ -7,7 +7,6 @@ import numpy as np
 from scipy import stats
 
 from inertial.arrays import Array, Flags, Index
-from inertial.state import State
 from pipelines.drawing import Chart, Plot, PlotAxis, Trace
 from pipelines.drawing.chart import Role, Symbol, between, density, level, shortened, symmetric
 from pipelines.drawing.mollweide import project, sphere
@@ -20,7 +19,7 @@ TURNS: tuple[tuple[int, Symbol, str], ...] = (
     (-1, "triangle-down", "cooling"),
     (0, "circle", "first soak"),
 )
-TURN_ROLES: dict[int, Role] = {1: "before", -1: "after", 0: "ink"}
+TURN_ROLES: dict[int, Role] = {1: "limit", -1: "accent", 0: "ink"}
 MOST_POINTS = 600
 SYMBOLS: dict[str, Symbol] = {"before": "diamond", "after": "square"}
 RESIDUAL = "residual / µg"
@@ -28,13 +27,9 @@ CLOSE = 60  # poses from which dots are smaller
 FEW = 12  # units up to which all points are shown
 
 
-def model_chart(left: LotResiduals, state: State, output: Array, floor_ug: float) -> Chart:
-    """Output against force, measured against explained deviation, and residuals against a normal distribution."""
-    plots = [_response(left, state, output)]
-    if len(left.models) > 1:
-        plots.append(_departure(left, left.before - left.after))
-    plots.append(_quantiles(left, floor_ug))
-    return Chart("Model and measurement", tuple(plots), len(plots), height=350)
+def noise_chart(left: LotResiduals, floor_ug: float) -> Chart:
+    """Ordered residuals against a normal distribution."""
+    return Chart("Residuals and noise", (_quantiles(left, floor_ug),), height=330)
 
 
 def _guide(end: float) -> Trace:
@@ -46,41 +41,6 @@ def _named(axis: str) -> str:
     return axis if axis == "norm" else f"axis {axis}"
 
 
-def _response(left: LotResiduals, state: State, output: Array) -> Plot:
-    own = output[left.shown]
-    if left.axes == ("norm",):
-        error = 1e6 * (np.linalg.norm(own, axis=-1) - 1.0)
-        points = Trace("corrected output", np.arange(error.size, dtype=float), error, size=4.0, legend=False)
-        return Plot(
-            f"{left.unit}: corrected output", PlotAxis("dwell"), PlotAxis("norm of the output less 1 g / µg"), (points,)
-        )
-    traces = [
-        Trace(_named(name), state.force[left.shown, :, axis], own[:, axis], role=cast("Role", name), size=4.0)
-        for axis, name in enumerate(left.axes)
-    ]
-    return Plot(
-        f"{left.unit}: output",
-        PlotAxis("specific force along the axis / g"),
-        PlotAxis("output over its scale / g"),
-        (_guide(1.0), *traces),
-    )
-
-
-def _departure(left: LotResiduals, explained: Array) -> Plot:
-    largest = 1.05 * float(np.nanmax(np.abs(left.before)))
-    traces: list[Trace] = []
-    for axis, name in enumerate(left.axes):
-        x, y = explained[:, axis].ravel(), left.before[:, axis].ravel()
-        step = max(1, x.size // MOST_POINTS)
-        traces.append(Trace(_named(name), x[::step], y[::step], role=cast("Role", name), size=3.0))
-    return Plot(
-        "all units: measured and explained",
-        PlotAxis("contribution of the added effects / µg"),
-        PlotAxis("residual of the judged model / µg"),
-        (_guide(largest), *traces),
-    )
-
-
 def _quantiles(left: LotResiduals, floor_ug: float) -> Plot:
     """Ordered residuals over the noise floor against the normal distribution; the line is pure noise."""
     several = len(left.models) > 1
@@ -90,7 +50,7 @@ def _quantiles(left: LotResiduals, floor_ug: float) -> Plot:
         step = max(1, ordered.size // MOST_POINTS)
         normal = stats.norm.ppf((np.arange(ordered.size) + 0.5) / ordered.size)
         name = label if several else "residuals"
-        role, symbol = cast("Role", label), SYMBOLS[label]  # the colours are also those of two axes
+        role, symbol = cast("Role", label), SYMBOLS[label]
         traces.append(Trace(name, normal[::step], ordered[::step], role=role, symbol=symbol, size=3.0, legend=several))
     across, along = PlotAxis("quantile of pure noise"), PlotAxis("residual over the floor")
     return Plot("all units: residuals and noise", across, along, tuple(traces))
@@ -250,7 +210,7 @@ def slot_chart(table: ResidualTable) -> Chart | None:
 LADDER: tuple[tuple[str, str, Role, Symbol], ...] = (
     ("fitted_ug", "fitted to this run", "before", "circle"),
     ("heldout_ug", "dwells left out", "ink", "square"),
-    ("fresh_ug", "fresh run, coefficients unchanged", "after", "diamond"),
+    ("fresh_ug", "fresh run, not fitted", "after", "diamond"),
 )
 ASIDE = (-0.03, 0.0, 0.03)  # equal errors would cover each other
 
@@ -276,7 +236,7 @@ def evolution_chart(rows: list[dict[str, Any]], name: str = "") -> Chart:
             traces.append(Trace(label, at, shown, role=role, symbol=symbol, size=9.0, texts=texts))
     ends = np.array([-0.4, len(rows) - 0.6])
     if rows and rows[-1]["floor_ug"] is not None:
-        traces.append(level(ends, float(rows[-1]["floor_ug"]), "good", "noise assumed by the last fit"))
+        traces.append(level(ends, float(rows[-1]["floor_ug"]), "good", "noise of the last fit"))
     top = 1.15 * max((float(np.max(trace.y)) for trace in traces), default=1.0)
     for k, row in enumerate(rows):
         if row.get("confirmed") is False:

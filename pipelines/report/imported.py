@@ -102,7 +102,7 @@ def make_imported_report(run: Run) -> bool:
         past = run.table("history") if "history" in run.tables() else None
         made = examination(fitted_dwells(run.table("dwells")), past, effects)
         rows = rows_of(run.table("coefficients"))
-        text = render_diagnosis(made.document, made.measured, made.diagnosis, f"run {run.id}", rows)
+        text = render_diagnosis(made, f"run {run.id}", rows)
         return text.replace("</body>", f"{decisions(run)}</body>")
 
     return keep_report(run, "report of an import", [*names, *judged], {"effects": effects}, certificates_of(run), page)

@@ -61,7 +61,7 @@ def scripts_hash() -> str:
 def _script() -> str:
     folder = files("pipelines.drawing")
     parts = ((folder / name).read_text(encoding="utf-8") for name in ("paint.js", "report.js"))
-    return "(() => {\n" + "".join(parts).replace("export function", "function") + "})();"
+    return "(() => {\n" + "".join(parts).replace("export ", "") + "})();"
 
 
 @cache

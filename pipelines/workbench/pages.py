@@ -252,9 +252,14 @@ def _environment() -> Environment:
         lambda name: (_TEMPLATES.get(name) or files("pipelines.workbench") / "templates" / name).read_text("utf-8")
     )
     made = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    own: dict[str, Any] = {"short": short, "plain_reason": plain_reason, "tuple_of": tuple}
+    own: dict[str, Any] = {"short": short, "plain_reason": plain_reason, "tuple_of": tuple, "first_of": first_of}
     made.filters.update(own, without_nothing=without_nothing)
     return made
+
+
+def first_of(values: list[Any], count: int) -> list[Any]:
+    """The first of several values."""
+    return values[:count]
 
 
 def short(text: object, most: int = 28) -> str:

@@ -113,6 +113,7 @@ class UnitsPage(PageState):
     since: Day = ""
     until: Day = ""
     order: Literal["measured", "unit", "outcome", "station"] = "measured"
+    runs: Literal["", "unfinished", "finished", "all passed", "not all passed", "adequate", "not adequate"] = ""
     page: Annotated[int, Field(ge=1, le=100_000)] = 1
 
     def arguments(self) -> list[str]:
@@ -143,14 +144,18 @@ class UnitsPage(PageState):
 
 
 class RunPage(PageState):
-    """A run: its units against their limits."""
+    """A run: its units against their limits.
+
+    beside : another run, whose figures stand beside
+    """
 
     PATH: ClassVar[str] = "/run"
     run: Text = "latest"
+    beside: Text = ""
 
     def arguments(self) -> list[str]:
-        """The run's summary."""
-        return ["show", self.run]
+        """The run's summary, or the differences between the two."""
+        return ["diff", self.run, self.beside] if self.beside else ["show", self.run]
 
 
 Against = Literal["force", "unit_C", "time", "pose"]
@@ -268,6 +273,7 @@ class PlanPage(PageState):
     """A recipe: visible effects and station time.
 
     pose : poses at other angles than in the recipe, ``NAME=OUTER,INNER`` · edit : the pose whose angles are in the form
+    search : part of the effects' names or texts · only : whether the effects that are seen are left out
     """
 
     PATH: ClassVar[str] = "/plan"
@@ -275,6 +281,8 @@ class PlanPage(PageState):
     effects: Texts = ()
     pose: Texts = ()
     edit: Text = ""
+    search: Text = ""
+    only: Literal["", "unseen"] = ""
 
     def arguments(self) -> list[str]:
         """The plan."""

@@ -81,10 +81,13 @@ def test_diagnose_names_what_is_missing_in_text_document_and_report(cubic: Path,
     lot, report = (cubic / "dwells.parquet", "--temperatures", cubic / "history.parquet"), tmp_path / "report.html"
     printed = text_of("diagnose", *lot, status=1)
     for part in (
-        "NOT ADEQUATE", "third_order (K3)", "Effects that this plan cannot show",
+        "NOT ADEQUATE", "against what third_order depends on", "third_order (K3)", "This plan cannot show", "Next:",
         "tumbleline extend model.toml third_order --effects bias,scale,misalignment",
     ):  # fmt: skip
         assert part in printed
+        printed = printed[printed.index(part) :]  # in this order: verdict, picture, class, and the next command last
+    assert len(printed.splitlines()) <= 3
+    assert "Effects that this plan cannot show" in text_of("diagnose", *lot, "--all", status=1)
     document = document_of("diagnose", *lot, "--output", report, status=1)
     assert document["recommended"] == ["third_order"]
     assert set(document["breakers"]) == set(document["unseen"])

@@ -34,7 +34,7 @@ ELSEWHERE = {
 }
 """Where the lines of a module are run that prints them after minutes only, or after several commands."""
 
-PRINTING = {"command_line", "print_next", "print_extension", "removal"}
+PRINTING = {"command_line", "print_next", "print_extension", "print_next_of_diagnosis", "removal"}
 """Functions that make or print a command to give next."""
 
 

@@ -186,25 +186,28 @@ def _folded(rows: tuple[Contribution, ...]) -> list[Contribution]:
 
 
 def _budgets(c: CertificateContent) -> dict[str, Any]:
-    tables = []
+    """The budgets of all results in one table: each result, then its contributions."""
+    rows: list[list[str]] = []
     for one in c.budgets:
-        rows = [
+        u, whole, coverage = significant(one.u, 2), "", ""
+        if one.k is not None and one.expanded is not None:
+            u, whole = significant(one.u), "100 %"
+            coverage = f"k = {one.k:.2f}, U = {significant(one.expanded, 2)} {one.unit}"
+        rows.append([one.quantity, "", "", f"{u} {one.unit}", whole, coverage])
+        rows += [
             [
-                row.name.replace("_", " "),
+                f"– {row.name.replace('_', ' ')}",
                 row.type,
                 row.distribution,
-                significant(row.u),
+                f"{significant(row.u)} {row.unit}",
                 f"{100.0 * row.share:.1f} %",
                 row.source,
             ]
             for row in _folded(one.rows)
         ]
-        head = f"{one.quantity}: {significant(one.u, 2) if one.k is None else f'u = {significant(one.u)}'} {one.unit}"
-        if one.k is not None and one.expanded is not None:
-            head += f", k = {one.k:.2f}, U = {significant(one.expanded, 2)} {one.unit}"
-        heads = ["contribution", "type", "distribution", f"u, {one.unit}", "share of u²", "source"]
-        tables.append(_table(head, heads, rows, [2, "auto", "auto", "auto", "auto", 3], [3, 4]))
-    return {"title": "Uncertainty budgets", "tables": tables} if tables else {}
+    heads = ["result and its contributions", "type", "distribution", "u", "share of u²", "source, or coverage"]
+    table = _table("", heads, rows, [3, "auto", "auto", "auto", "auto", 3], [3, 4])
+    return {"title": "Uncertainty budgets", "tables": [table]} if rows else {}
 
 
 def _coefficients(c: CertificateContent) -> dict[str, Any]:

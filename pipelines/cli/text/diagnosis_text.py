@@ -1,52 +1,83 @@
-"""A diagnosis for people: the verdict in a sentence, then data faults, drivers, classes, the next command, hidden effects."""
+"""A diagnosis for people: verdict, picture, classes of missing effects, cost to decide, and the next command last."""
+
+from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
-from pipelines.cli.next_commands import FindData, command_line, print_extension, print_next
+from pipelines.cli.next_commands import FindData, print_next_of_diagnosis
 from pipelines.cli.printing import console, print_table, say, warn
 from pipelines.cli.text.verdict_text import print_verdict
 from pipelines.diagnosis import sections, sentences
 from pipelines.diagnosis.sections import Section
 
+if TYPE_CHECKING:
+    from pipelines.diagnosis.diagnose import Examination
 
-def print_diagnosis(document: dict[str, Any], *, data: FindData | None, model: Path | None, brief: bool = True) -> None:
-    """Print a diagnosis.
 
+def print_diagnosis(
+    document: dict[str, Any],
+    *,
+    made: Examination | None = None,
+    data: FindData | None,
+    model: Path | None,
+    brief: bool = True,
+) -> None:
+    """Print a diagnosis on one screen: verdict, picture, missing effects, what it costs to decide, and the next command last.
+
+    made : draws the picture; None: there is none
     data : gives the data as they were named on the command line, where commands to give next are printed; None: none are printed
     model : the model file as it was given there
-    brief : one sentence counts the effects of quantities that were not recorded
+    brief : without the long tables; a sentence counts what they list
     """
     print_verdict(document)
-    _dim(sentences.evidence_text(document))
+    if not brief:
+        _dim(sentences.evidence_text(document))
     if sentences.few_dwells(document):
         _dim(sentences.undetected(document))
-    print_findings(document)
-    _unexplained(document, data, model)
-    if data is not None and document["recommended"]:
-        print_extension(document, data, model)
-        _dim(sentences.not_separated(document))
-    if document["unseen"]:
-        say()
-    print_section(sections.unseen(document, brief=brief))
-    for section in (sections.unseen_in_part, sections.hidden_by_noise):
-        print_section(section(document))
-    print_next_measurement(document["next_measurements"])
+    print_section(sections.faults(document))
+    _picture(made)
+    print_findings(document, brief=brief)
+    _unexplained(document, model)
+    if brief:
+        for text in sentences.cost_to_decide(document):
+            say(text)
+        told = sentences.not_listed(document)
+        _dim(f"{told + '; ' if told else ''}--all lists effects, drivers and the dwells that decide")
+    else:
+        for section in (sections.unseen, sections.unseen_in_part, sections.hidden_by_noise):
+            print_section(section(document))
+        print_next_measurement(document["next_measurements"])
+    if data is not None:
+        print_next_of_diagnosis(document, data, model)
 
 
-def print_findings(document: dict[str, Any]) -> None:
-    """Print data faults, the drivers that the residual follows, the classes of missing effects, and the dwells that decide."""
-    for section in (sections.faults, sections.drivers, sections.missing):
-        print_section(section(document))
-    for text in sentences.why_recommended(document):
+def _picture(made: Examination | None) -> None:
+    if made is not None and made.diagnosis is not None:
+        from pipelines.cli.text.effect_text import print_view
+        from pipelines.report.effect_view import effect_views
+
+        print_view(effect_views(made.diagnosis, made.sound)[0])
+
+
+def print_findings(document: dict[str, Any], *, brief: bool = False) -> None:
+    """Print the drivers that the residual follows, the classes of missing effects, and the dwells that decide.
+
+    brief : the classes alone, and why the first effect of each is proposed
+    """
+    if not brief:
+        print_section(sections.drivers(document))
+    print_section(sections.missing(document))
+    for text in (*sentences.why_first(document), *sentences.why_recommended(document)):
         say(text)
     if text := sentences.without_single_dwells(document):
         say(text)
     _dim(sentences.tails_left_out(document))
-    for text in sentences.influences(document):
-        _dim(text)
+    if not brief:
+        for text in sentences.influences(document):
+            _dim(text)
     warn(document.get("warnings", ()))
 
 
@@ -69,15 +100,10 @@ def _dim(text: str) -> None:
         say(text, style="dim")
 
 
-def _unexplained(document: dict[str, Any], data: FindData | None, model: Path | None) -> None:
+def _unexplained(document: dict[str, Any], model: Path | None) -> None:
     if not document["unexplained"]:
         return
-    say(f"\n{sentences.UNEXPLAINED}: {sentences.unexplained_text(document)}")
+    say(f"{sentences.UNEXPLAINED}: {sentences.unexplained_text(document)}")
     if offer := document["offer"]:
         say(f"Formula for {model or 'a model file'}, to be refined:\n")
         say(offer["toml"])
-        if data is not None:  # the command that judges the model with it, without a model file
-            found, effects = data(), ",".join([*document["effects"], offer["id"]])
-            formula = f"{offer['id']}={'; '.join(offer['columns'])}"
-            words = ("--effects", effects, *found.given.written, "--formula", formula)
-            print_next([command_line("diagnose", found.source, *words, *found.options)])

@@ -9,6 +9,7 @@ from inertial.counts import number_of
 from pipelines.cli.next_commands import command_line, print_next
 from pipelines.cli.printing import print_table, remark, say, short
 from pipelines.planning.documents import worst_axes
+from pipelines.report.templates import plain_reason
 from schemas.decisions import LARGEST_ERROR
 
 RAISED = 3.0  # factor by which 1/f and random walk must raise a floor to be listed
@@ -188,7 +189,7 @@ def print_reach(reach: dict[str, Any] | None) -> None:
         say("references: assumed values, which allow no certificate")
     for name, rules in reach["not_stated"].items():
         say(f"not stated: {name} (dominates {rules})")
-    for line in (*reach["remarks"], *(f"cannot be met: {one}" for one in reach["unreachable"])):
+    for line in (*reach["remarks"], *(f"cannot be met: {plain_reason(one)}" for one in reach["unreachable"])):
         say(line)
 
 

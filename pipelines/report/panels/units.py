@@ -4,6 +4,7 @@ from typing import Any
 
 from pipelines.report.context import ReportContext, UnitContext
 from pipelines.report.numbers import significant
+from pipelines.report.reasons import grouped_reasons
 from pipelines.report.templates import fill
 from pipelines.tables.frames import rows_of
 
@@ -28,9 +29,9 @@ TEMPLATE = """\
 {% for name in figures %}
 <td class="n">{{ unit["values"].get(name, "") }}</td>
 {% endfor %}</tr>
-{% if unit.reasons %}<tr><td></td><td colspan="9"><ul class="reasons">{% for reason in unit.reasons %}<li>{{ reason }}</li>{% endfor %}</ul></td></tr>{% endif %}
 {% endfor %}
 </table>
+{% if groups %}<ul class="reasons">{% for group in groups %}<li>{{ group.sentence }}</li>{% endfor %}</ul>{% endif %}
 <p class="note">Decided by {{ rule }}. fit: residual of the model on the poses it was fitted to. verification: largest error of the corrected
 specific force (of the magnitude of three axes, along the axes of fewer) on poses that the fit has not used, mean over the dwells of a pose. N and B: noise of the worst
 axis, an upper limit where the record does not identify the term.</p>
@@ -39,7 +40,10 @@ axis, an upper limit where the record does not identify the term.</p>
 
 def render(report: ReportContext) -> str:
     """One line per unit, by slot."""
-    return fill(TEMPLATE, units=[_line(unit) for unit in report.units], figures=FIGURES, rule=report.rule)
+    groups = grouped_reasons(rows_of(report.tables["grades"].sort_values("slot")))
+    return fill(
+        TEMPLATE, units=[_line(unit) for unit in report.units], groups=groups, figures=FIGURES, rule=report.rule
+    )
 
 
 def _line(unit: UnitContext) -> dict[str, Any]:
@@ -49,6 +53,5 @@ def _line(unit: UnitContext) -> dict[str, Any]:
         "slot": unit.slot,
         "outcome": unit.outcome,
         "grade": unit.grade,
-        "reasons": unit.reasons,
         "values": {figure["figure"]: significant(figure["value"]) for figure in figures},
     }

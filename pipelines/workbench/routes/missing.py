@@ -9,6 +9,8 @@ from pipelines.diagnosis.inputs import use_written_formulas
 from pipelines.diagnosis.sections import worded
 from pipelines.drawing import Chart
 from pipelines.report.diagnosis_pictures import evolution_chart, pose_chart, quantity_chart, slot_chart
+from pipelines.report.effect_view import effect_chart
+from pipelines.report.residual_table import ResidualTable
 from pipelines.report.run_pictures import samples_chart
 from pipelines.workbench.pages import (
     RequestBody,
@@ -119,13 +121,19 @@ def _chart(bench: Workbench, state: MissingPage, name: str) -> Chart | None:
     if name == "ladder":
         rows = bench.done("ladder", state)
         return None if rows is None else evolution_chart(rows)
-    if name not in {"sphere", "drivers", "slots"}:
-        raise no_figure(name)
     diagnosed = _diagnosed(bench, state)
-    if diagnosed is None or diagnosed.table is None:
-        return None
-    table, before = diagnosed.table, diagnosed.before
-    unit = table.place_of(state.unit)
+    return (
+        None if diagnosed is None or diagnosed.table is None else _of_residuals(diagnosed, diagnosed.table, state, name)
+    )
+
+
+def _of_residuals(diagnosed: Diagnosed, table: ResidualTable, state: MissingPage, name: str) -> Chart | None:
+    views = {f"effect-{k}": view for k, view in enumerate(diagnosed.views)}
+    if name not in {"sphere", "drivers", "slots", *views}:
+        raise no_figure(name)
+    before, unit = diagnosed.before, table.place_of(state.unit)
+    if name in views:
+        return effect_chart(views[name], table.pick)
     if name == "slots":
         return slot_chart(table)
     if name == "drivers":

@@ -1,20 +1,24 @@
 """Lots on the station: slots as tiles, scan of serials, answers to questions, results before unloading."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from fastapi import APIRouter, Request
 from starlette.exceptions import HTTPException
 from starlette.responses import JSONResponse, Response
 
 from pipelines.jobs.job import Request as LotRequest
-from pipelines.workbench.pages import RequestBody, asked, page, workbench_of
+from pipelines.workbench.pages import RequestBody, asked, figure, no_figure, page, workbench_of
+from pipelines.workbench.routes.station import chart_of_run, nothing_yet
 from pipelines.workbench.services import lots, requests
 from pipelines.workbench.settings import WorkbenchSettings
 from pipelines.workbench.state import OperatorPage
 from schemas.errors import WrongUse, did_you_mean
+from schemas.serials import refuse_unusable_serials
 from schemas.station import BUILT_IN, load_station
+from stations.plant.faults.catalogue import fault_rows
 
 
 @dataclass(frozen=True)
@@ -102,7 +106,39 @@ def operator(request: Request) -> Response:
         request, "operator.html", state, problems, lot=shown, lots=here, remedies=REMEDIES, station=station,
         busy={one.name: next((lot.phase for lot in newest if lot.station == one.address and not lot.ended), "") for one in known},
         stations=known, recipes=requests.recipes(bench.settings), slots=station.slots,
+        faults=fault_rows() if station.simulated else [], live=OperatorPage(lot=shown.id) if shown else None,
     )  # fmt: skip
+
+
+@router.get("/operator/figure/{name}.{ending}")
+def drawn(request: Request, name: str, ending: str) -> Response:
+    """Temperatures and angles of a lot so far."""
+    bench, state, _ = asked(request, OperatorPage)
+    run = lots.state_of(lots.place_of(bench.settings, state.lot)).run
+    if name != "station":
+        raise no_figure(name)
+    return figure(chart_of_run(bench, run) if run else nothing_yet(), ending, f"{state.lot}-station")
+
+
+@router.post("/operator/scan")
+def scanned(request: Request, body: RequestBody) -> JSONResponse:
+    """Whether a serial can be in a slot beside those scanned before; refused with the reason where it cannot."""
+    bench = workbench_of(request)
+    station = station_named(stations_of(bench.settings), str(body.get("station", "")))
+    slot = _slot(str(body.get("slot", "")), station.slots)
+    seated = _seated(body, station)
+    serial = seated.get(slot, "")
+    if serial:
+        refuse_unusable_serials([serial], f"slot {slot}", "scan the unit again", WrongUse)
+    twice = [other for other, name in seated.items() if name == serial and other != slot]
+    if twice and serial:
+        raise WrongUse(
+            f"slot {slot}: serial '{serial}' is in slot {twice[0]} already, each unit has one; scan another unit"
+        )
+    for other in lots.lots(bench.settings):
+        if not other.ended and serial in other.units:
+            raise WrongUse(f"slot {slot}: serial '{serial}' is measured in lot {other.id}; scan another unit")
+    return JSONResponse({"done": ""})
 
 
 @router.post("/operator/start")
@@ -114,11 +150,7 @@ def start(request: Request, body: RequestBody) -> JSONResponse:
     if recipe not in known:
         raise WrongUse(f"lot: no recipe is called '{recipe[:60]}'; {did_you_mean(recipe, known)}")
     station = station_named(stations_of(bench.settings), str(body.get("station", "")))
-    filled = {
-        _slot(key.removeprefix("slot-"), station.slots): serial
-        for key, value in body.items()
-        if key.startswith("slot-") and (serial := str(value).strip())
-    }
+    filled = _seated(body, station)
     if not filled:
         raise WrongUse("lot: no serial number was scanned, one at least is needed; scan a unit into its slot")
     faults = str(body.get("fault", "")).split()
@@ -149,6 +181,15 @@ def act(request: Request, name: str, action: str) -> JSONResponse:
         raise HTTPException(404)
     lot = actions[action](workbench_of(request).settings, name)
     return JSONResponse({"address": OperatorPage(lot=lot.id).address()})
+
+
+def _seated(body: Mapping[str, Any], station: StationOfPage) -> dict[int, str]:
+    """The serials of the form by slot; empty slots are left out."""
+    return {
+        _slot(key.removeprefix("slot-"), station.slots): serial
+        for key, value in body.items()
+        if key.startswith("slot-") and (serial := str(value).strip())
+    }
 
 
 def _count(text: str, digits: int) -> int:

@@ -1,7 +1,9 @@
 """The plan of a recipe: poses, temperatures, visible effects, hidden effects, and station time; poses can be moved."""
 
 import re
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from fastapi import APIRouter, Request
@@ -106,10 +108,18 @@ def plan(request: Request) -> Response:
     bench, state, problems = asked(request, PlanPage)
     planned, job = bench.work("plan", state, problems)
     poses = [] if planned is None else planned["poses"]
+    rows = [] if planned is None else sorted(planned["document"]["effects"], key=lambda row: row["left"])
+    chosen = next((one for one in poses if one["name"] == state.edit), next(iter(poses), None))
     return page(
         request, "plan.html", state, problems, planned=planned, job=job, recipes=requests.recipes(bench.settings),
-        scientific=scientific, chosen=next((one for one in poses if one["name"] == state.edit), next(iter(poses), None)),
+        scientific=scientific, listed=[row for row in rows if _is_listed(row, state)], chosen=chosen,
     )  # fmt: skip
+
+
+def _is_listed(row: Mapping[str, Any], state: PlanPage) -> bool:
+    """Whether the page's search finds an effect."""
+    text = " ".join(str(row.get(key) or "") for key in ("effect", "why", "breaker", "alias")).lower()
+    return state.search.lower() in text and not (state.only and row["seen"])
 
 
 @router.get("/plan/figure/{name}.{ending}")

@@ -1,15 +1,21 @@
 """A run: its units, each with its result and figures."""
 
+from collections import Counter
 from collections.abc import Sequence
+from typing import Any
 
 from fastapi import APIRouter, Request
 from starlette.responses import Response
 
 from pipelines.certificates.ledger import stated
+from pipelines.diagnosis.sentences import plain_verdict
+from pipelines.diagnosis.sentences import verdict as sentence
+from pipelines.report.reasons import grouped_reasons
 from pipelines.stages.judge import verdict_of
 from pipelines.tables.frames import rows_of
 from pipelines.workbench.pages import Workbench, asked, page, run_table, saved_as, table_csv
-from pipelines.workbench.state import MissingPage, RunPage
+from pipelines.workbench.routes.units import newest_question
+from pipelines.workbench.state import MissingPage, RunPage, StationPage
 from schemas.errors import TumblelineError, WrongUse
 
 router = APIRouter()
@@ -20,6 +26,9 @@ SHOWN = (
     "velocity_random_walk_ug_rtHz",
     "bias_instability_ug",
 )
+HEADS = ("fit residual, rms, µg", "verification error, µg", "error, rms, µg", "N, µg/√Hz", "B, µg")
+"""Heads of the columns of these figures."""
+MOST_OTHERS = 50
 
 
 @router.get("/run")
@@ -30,10 +39,7 @@ def run(request: Request) -> Response:
     state = state.model_copy(update={"run": stored.id})
     tables, about = stored.tables(), stored.about
     grades = rows_of(run_table(bench, stored.id, "grades").sort_values("slot")) if "grades" in tables else []
-    figures = run_table(bench, stored.id, "figures") if "figures" in tables else None
-    cells: dict[str, dict[str, float]] = {}
-    for row in [] if figures is None else rows_of(figures[figures["figure"].isin(SHOWN)]):
-        cells.setdefault(str(row["unit"]), {})[str(row["figure"])] = float(row["value"])
+    cells = _cells(bench, stored.id, tables)
     try:
         ledger = stated(stored, [str(row["unit"]) for row in grades])
         certificates = {unit: one.sentence() for unit, one in ledger.items()}
@@ -44,16 +50,49 @@ def run(request: Request) -> Response:
     return page(
         request, "run.html", state, problems, run=stored, about=about, grades=grades, cells=cells, shown=SHOWN, tables=tables,
         certificates=certificates, events=events, judged=_judged(bench, stored.id, tables),
+        groups=grouped_reasons(grades), outcomes=Counter(str(row["outcome"]) for row in grades),
+        other=_other(bench, state, problems), station=StationPage(run=stored.id), heads=HEADS,
+        others=[name for name, _ in bench.index.ask(newest_question(MOST_OTHERS)).rows if name != stored.id],
+        live=stored.records is not None and "history" not in tables,
     )  # fmt: skip
 
 
+def _cells(bench: Workbench, run: str, tables: Sequence[str]) -> dict[str, dict[str, float]]:
+    """The figures of the page by unit."""
+    cells: dict[str, dict[str, float]] = {}
+    if "figures" in tables:
+        figures = run_table(bench, run, "figures")
+        for row in rows_of(figures[figures["figure"].isin(SHOWN)]):
+            cells.setdefault(str(row["unit"]), {})[str(row["figure"])] = float(row["value"])
+    return cells
+
+
+def _other(bench: Workbench, state: RunPage, problems: list[str]) -> dict[str, Any] | None:
+    """The run that stands beside: its id, figures, results and verdict."""
+    if not state.beside:
+        return None
+    try:
+        stored = bench.archive.run(state.beside)
+    except TumblelineError as problem:
+        problems.append(str(problem))
+        return None
+    tables = stored.tables()
+    grades = rows_of(run_table(bench, stored.id, "grades")) if "grades" in tables else []
+    return {
+        "id": stored.id,
+        "cells": _cells(bench, stored.id, tables),
+        "outcomes": {str(row["unit"]): str(row["outcome"]) for row in grades},
+        "judged": _judged(bench, stored.id, tables),
+    }
+
+
 def _judged(bench: Workbench, run: str, tables: Sequence[str]) -> tuple[bool | None, str]:
-    """Whether the model is adequate, and why it cannot be judged: of the archive, else of a diagnosis since the server began."""
+    """Whether the model is adequate, and the verdict as a sentence: of the archive, else of a diagnosis."""
     verdict = verdict_of(run_table(bench, run, "verdict")) if "verdict" in tables else None
     if verdict is not None:
-        return verdict["adequate"], verdict["reason"] or ""
+        return verdict["adequate"], plain_verdict(verdict)
     diagnosed, _ = bench.work("diagnose", MissingPage(source=run), [])
-    return (None, "") if diagnosed is None else (diagnosed.document["adequate"], diagnosed.document["reason"] or "")
+    return (None, "") if diagnosed is None else (diagnosed.document["adequate"], sentence(diagnosed.document))
 
 
 @router.get("/run/table/{name}.csv")

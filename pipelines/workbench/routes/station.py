@@ -2,10 +2,12 @@
 
 from pathlib import Path
 
+import pandas as pd
 from fastapi import APIRouter, Request
 from starlette.responses import Response
 
 from pipelines.commissioning.frames import timeline
+from pipelines.drawing import Chart, Plot, PlotAxis
 from pipelines.report.run_pictures import station_chart
 from pipelines.tables.frames import rows_of
 from pipelines.workbench.pages import Workbench, asked, figure, no_figure, page, run_table
@@ -68,5 +70,22 @@ def drawn(request: Request, name: str, ending: str) -> Response:
         return figure(timeline(read_frames(path)), ending, path.stem)
     if name != "station":
         raise no_figure(name)
-    history, readings, events = (run_table(bench, state.run, table) for table in ("history", "readings", "events"))
-    return figure(station_chart(history, readings, events), ending, f"{state.run}-station")
+    return figure(chart_of_run(bench, state.run), ending, f"{state.run}-station")
+
+
+def nothing_yet() -> Chart:
+    """The picture of a run before its first record."""
+    axes = PlotAxis("station time / h"), PlotAxis("temperature / °C")
+    return Chart("Temperatures and angles", (Plot("no record is finished yet", *axes, ()),), height=560)
+
+
+def chart_of_run(bench: Workbench, run: str) -> Chart:
+    """Temperatures and angles of a run, as far as it is measured; no lines before the first record."""
+    stored = bench.archive.run(run)
+    if set(stored.tables()) >= NEEDED:
+        return station_chart(*(run_table(bench, run, table) for table in ("history", "readings", "events")))
+    records = stored.records
+    if records is None or not records.finished():
+        return nothing_yet()
+    events = pd.DataFrame(records.events.documents(), columns=["kind", "time_s", "reason"])
+    return station_chart(records.gathered("history"), records.gathered("readings"), events)

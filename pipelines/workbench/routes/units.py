@@ -1,16 +1,19 @@
 """Search of units and runs."""
 
+from itertools import islice
+
 from fastapi import APIRouter, Request
 from starlette.responses import Response
 
-from pipelines.archive.listing import info_of
+from pipelines.archive.listing import RunInfo, info_of
 from pipelines.workbench.pages import asked, page, table_csv
 from pipelines.workbench.state import ROWS, UnitsPage
 
 router = APIRouter()
 HEADING, ORDER, ADDRESS = "Units", 10, "/units"
 EVERYTHING = 1_000_000
-NEWEST = 12
+NEWEST, MOST_LOOKED = 12, 500
+"""Runs that are shown, and that are looked at for those of a state."""
 
 
 @router.get("/units")
@@ -21,6 +24,11 @@ def units(request: Request) -> Response:
     counts = {str(name): int(count) for name, count in bench.index.ask(yield_question(state)).rows}
     newest = bench.index.ask(newest_question(NEWEST)).rows
     infos = [info_of(bench.archive.run(str(name))) for name, _ in newest]
+    if state.runs:
+        every = (
+            info_of(bench.archive.run(str(name))) for name, _ in bench.index.ask(newest_question(MOST_LOOKED)).rows
+        )
+        infos = list(islice((one for one in every if one is not None and is_of(one, state.runs)), NEWEST))
     return page(
         request, "units.html", state, problems, rows=rows, counts=counts, total=sum(counts.values()), per_page=ROWS,
         runs=[one for one in infos if one is not None], run_count=newest[0][1] if newest else 0,
@@ -32,6 +40,13 @@ def table(request: Request) -> Response:
     """All units of the search."""
     bench, state, _ = asked(request, UnitsPage)
     return table_csv(bench.index.ask(state.model_copy(update={"page": 1}).question(EVERYTHING)).documents(), "units")
+
+
+def is_of(run: RunInfo, kind: str) -> bool:
+    """Whether a run is of a kind of the search."""
+    passed = None if run.graded is None else run.passed == run.graded
+    kinds = {"unfinished": not run.finished, "finished": run.finished, "all passed": passed is True}
+    return kinds.get(kind, passed is False if kind == "not all passed" else run.verdict == kind)
 
 
 def yield_question(page: UnitsPage) -> str:

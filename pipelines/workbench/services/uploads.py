@@ -35,7 +35,8 @@ KEPT_LOOKS = 32
 WAIT_S = 120.0
 LARGEST = 400_000_000
 NAME = re.compile(r"[^A-Za-z0-9._ -]+")
-ENDINGS = (".csv", ".tsv", ".txt", ".dat", ".parquet", ".mat", ".npy", ".csv.gz", ".tsv.gz", ".txt.gz", ".parquet.gz")
+PACKED = (".csv", ".tsv", ".txt", ".parquet")
+ENDINGS = (*PACKED, ".dat", ".mat", ".npy", ".h5", ".hdf5", ".xlsx", ".ods", *(f"{one}.gz" for one in PACKED))
 MOST_ROWS = 8
 MOST_LOOKED = 200_000
 """Rows in which columns are recognised: an hour of 50 Hz."""

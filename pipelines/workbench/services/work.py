@@ -2,7 +2,7 @@
 
 import traceback
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from pipelines.audit.finding import AuditFinding
 from pipelines.drawing import Chart
+from pipelines.report.effect_view import EffectView
 from pipelines.report.residual_table import ResidualTable
 from schemas.errors import TumblelineError, WrongUse
 from schemas.installed import not_installed
@@ -26,6 +27,7 @@ class Diagnosed:
     """A diagnosis for its page.
 
     before : residuals of the model before the last step, µg, as in ``table``; None if there is none
+    views : the residual against the quantity of each missing effect; of the whole residual where none is missing
     names : quantities for formulas, with their meaning
     """
 
@@ -34,6 +36,7 @@ class Diagnosed:
     ladder: list[dict[str, Any]]
     before: NDArray[np.float64] | None
     names: dict[str, str]
+    views: list[EffectView] = field(default_factory=list[EffectView])
 
 
 def done_in_process(kind: str, request: Mapping[str, Any], report_progress: ReportProgress) -> tuple[str, Any]:
@@ -72,6 +75,7 @@ def diagnose(request: Mapping[str, Any], report_progress: ReportProgress) -> Dia
     report_progress(0, steps, "reading the dwells")
     from inertial.quantities import formula_names
     from pipelines.diagnosis.diagnose import default_model, examination
+    from pipelines.report.effect_view import effect_views
     from pipelines.report.residual_table import ladder_of, residual_table, residuals_with
     from pipelines.tables.condense import condense
     from pipelines.tables.dwell_table import covariates
@@ -81,12 +85,12 @@ def diagnose(request: Mapping[str, Any], report_progress: ReportProgress) -> Dia
     model = [*(judged or default_model(dwells)), *added]
     report_progress(1, steps, "searching for missing effects")
     made = examination(dwells, history, model, request["without"])
-    faulty = {unit for fault in made.document["blocked_by"] for unit in fault["units"]}
-    units = tuple(unit for unit in made.measured.units if unit not in faulty)
+    units, views = made.sound, list[EffectView]()
     table, ladder, before = None, [], None
     if made.diagnosis is not None:
         report_progress(2, steps, "computing the residuals")
         table, ladder = residual_table(made.measured, made.diagnosis, units), ladder_of(made.diagnosis)
+        views = effect_views(made.diagnosis, units, added[-1] if added else "")
         if added:
             report_progress(3, steps, "fitting the model before the last step")
             before = residuals_with(condense(dwells), history, model[:-1], units)
@@ -94,7 +98,7 @@ def diagnose(request: Mapping[str, Any], report_progress: ReportProgress) -> Dia
     known = {name: one for name, one in formula_names().items() if getattr(state, one[0]) is not None}
     names = {name: meaning for name, (_, _, meaning) in known.items() if not meaning.startswith("the same")}
     names |= dict.fromkeys(covariates(dwells), "recorded column")
-    return Diagnosed(made.document, table, ladder, before, names)
+    return Diagnosed(made.document, table, ladder, before, names, views)
 
 
 def ladder(request: Mapping[str, Any], report_progress: ReportProgress) -> list[dict[str, Any]]:

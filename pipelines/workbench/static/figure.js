@@ -1,5 +1,5 @@
 // Figures: fetched when they come into sight, drawn in the colours of the theme, a click on a point changes the address.
-import { dressed, themed } from "./paint.js";
+import { arranged, dressed, rearranged, themed } from "./paint.js";
 
 const PLOTLY = "plotly-strict-4.1.1.min.js";
 let library = null;
@@ -37,33 +37,62 @@ function answered(address) {
 export async function draw(place) {
   if (place.dataset.busy === place.dataset.figure) return;
   place.dataset.busy = place.dataset.figure;
-  place.classList.add("waiting");
+  place.classList.toggle("waiting", !place.dataset.drawn);
   try {
     const [library, answer] = await Promise.all([plotly(), answered(place.dataset.figure)]);
     const content = await answer.json();
     if (!answer.ok) throw new Error(content.problem || "the figure was not made");
     if (!place.isConnected) return;
+    if (!place.dataset.drawn) place.replaceChildren();
     place.figure = content;
     await paint(place, library);
   } catch (problem) {
+    if (place.dataset.drawn) return;  // what was drawn before stays
     place.replaceChildren(Object.assign(document.createElement("p"), { className: "note", textContent: problem.message }));
     place.style.minHeight = "0";
   } finally {
     place.classList.remove("waiting");
     delete place.dataset.busy;
+    if (place.dataset.renew && place.isConnected) setTimeout(() => draw(place), 1000 * Number(place.dataset.renew));
   }
 }
 
 async function paint(place, library) {
-  const style = getComputedStyle(document.documentElement), { data, layout, config } = place.figure;
-  await library.react(place, themed(data, style), dressed(layout, style), config);
+  const style = getComputedStyle(document.documentElement), { data, config } = place.figure;
+  await library.react(place, themed(data, style), dressed(arranged(place.figure), style), config);
   place.dataset.drawn = place.dataset.figure;
   if (place.dataset.drag && !place.dataset.listens) dragged(place);
+  if (place.tabIndex < 0) byKeyboard(place, library);
   if (!place.dataset.pick || place.dataset.listens) return;
   place.dataset.listens = "yes";
   place.on("plotly_click", (event) => {
     const chosen = event.points.map((point) => point.customdata).find((one) => typeof one === "string");
     if (chosen) place.dispatchEvent(new CustomEvent("pick", { bubbles: true, detail: { name: place.dataset.pick, value: chosen, part: place.dataset.swapPart } }));
+  });
+}
+
+// Arrow keys go from point to point in the order of their places, Enter chooses the one that is pointed at.
+function byKeyboard(place, library) {
+  let at = -1;
+  place.tabIndex = 0;
+  const heard = Object.assign(document.createElement("span"), { className: "hidden" });
+  heard.setAttribute("role", "status");
+  place.after(heard);
+  const points = () => place._fullData.flatMap((trace, curveNumber) => (trace.mode ?? "").includes("markers") && trace.visible === true
+    ? Array.from(trace.x, (x, pointNumber) => ({ curveNumber, pointNumber, x, y: trace.y[pointNumber], trace })) : [])
+    .filter((one) => Number.isFinite(Number(one.y))).sort((a, b) => a.trace.xaxis.localeCompare(b.trace.xaxis) || a.x - b.x);
+  place.addEventListener("keydown", (event) => {
+    const step = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
+    if (event.target !== place || (!step && event.key !== "Enter")) return;
+    const all = points();
+    if (!all.length) return;
+    event.preventDefault();
+    if (step) at = (at + step + all.length) % all.length;
+    const one = all[Math.max(at, 0)], name = [one.trace.customdata?.[one.pointNumber]].find((text) => typeof text === "string");
+    if (step) {
+      library.Fx.hover(place, [{ curveNumber: one.curveNumber, pointNumber: one.pointNumber }], [one.trace.xaxis + one.trace.yaxis]);
+      heard.textContent = one.trace.text?.[one.pointNumber] ?? `${one.trace.name}: ${Number(one.x).toPrecision(4)}, ${Number(one.y).toPrecision(4)}`;
+    } else if (name && place.dataset.pick) place.dispatchEvent(new CustomEvent("pick", { bubbles: true, detail: { name: place.dataset.pick, value: name, part: place.dataset.swapPart } }));
   });
 }
 
@@ -122,6 +151,7 @@ export function forget(root) {
   for (const place of root.querySelectorAll("[data-drawn]")) window.Plotly.purge(place);
 }
 
+rearranged(repaint);
 export async function repaint() {
   if (!library) return;
   const loaded = await library;

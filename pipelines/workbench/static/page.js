@@ -79,6 +79,7 @@ function arrived() {
     if (["waiting", "running"].includes(place.dataset.jobState)) look(place.dataset.job);  // it may have ended while the page came
   }
   document.querySelector("[data-scan-field]")?.focus();
+  bell();
   document.body.dataset.ready = location.pathname + location.search;
 }
 
@@ -173,6 +174,10 @@ document.addEventListener("click", async (event) => {
     await navigator.clipboard?.writeText(dataset.copy);
     one.textContent = "Copied";
     setTimeout(() => { one.textContent = "Copy"; }, 1500);
+  } else if ("bell" in dataset) {
+    localStorage.setItem(BELL, localStorage.getItem(BELL) === "on" ? "off" : "on");
+    bell();
+    if (localStorage.getItem(BELL) === "on") ring();
   } else if ("jobStart" in dataset) begin(one.closest("[data-job-kind]"), true);
   else if ("jobStop" in dataset) change(`/jobs/${encodeURIComponent(one.closest("[data-job-kind]").dataset.job)}/stop`).then(jobChanged).catch(() => {});
   else if ("act" in dataset) act(one);
@@ -240,9 +245,49 @@ document.addEventListener("keydown", (event) => {
   if (event.key === "Enter" && field.matches("[data-drop]")) field.querySelector("[data-file]").click();
   if (event.key !== "Enter" || !field.matches("[data-scan-field]")) return;
   event.preventDefault();  // a scanner ends each serial number with Enter
-  const fields = [...document.querySelectorAll("[data-scan-field]")], next = fields[fields.indexOf(field) + 1];
-  if (next) next.focus(); else field.form.querySelector("button").focus();
+  checkScan(field);
 });
+
+async function checkScan(field) {
+  const fields = [...document.querySelectorAll("[data-scan-field]")], note = field.parentElement.querySelector("[role=alert]");
+  try {
+    await change("/operator/scan", { ...Object.fromEntries(new FormData(field.form)), slot: field.name.slice(5) });
+    say(note, "");
+    field.removeAttribute("aria-invalid");
+    (fields[fields.indexOf(field) + 1] ?? field.form.querySelector("button")).focus();
+  } catch (problem) {
+    say(note, problem.message);
+    field.setAttribute("aria-invalid", "true");
+    field.focus();
+    field.select();
+  }
+}
+
+// --- the bell ----------------------------------------------------------------------------------------------------------
+const BELL = "tumbleline-bell";
+let sound = null, rung = "";
+
+function bell() {
+  const on = localStorage.getItem(BELL) === "on", turn = document.querySelector("[data-turn]")?.dataset.turn ?? "";
+  for (const button of document.querySelectorAll("[data-bell]")) { button.setAttribute("aria-pressed", String(on)); button.textContent = on ? "Bell on" : "Bell off"; }
+  document.title = document.title.replace(/^Your turn · /, "");
+  if (turn) document.title = `Your turn · ${document.title}`;
+  if (turn && turn !== rung && on) ring();
+  rung = turn;
+}
+
+function ring() {
+  sound ??= new AudioContext();
+  for (const [at, pitch] of [[0, 880], [0.25, 660], [0.5, 880]]) {
+    const tone = sound.createOscillator(), loud = sound.createGain(), begin = sound.currentTime + at;
+    tone.frequency.value = pitch;
+    loud.gain.setValueAtTime(0.3, begin);
+    loud.gain.exponentialRampToValueAtTime(0.001, begin + 0.22);
+    tone.connect(loud).connect(sound.destination);
+    tone.start(begin); tone.stop(begin + 0.23);
+  }
+  document.body.dataset.rung = String(Number(document.body.dataset.rung ?? 0) + 1);
+}
 
 document.addEventListener("pick", (event) => {
   const address = new URL(location.href);

@@ -51,7 +51,7 @@ def test_dwells_that_carry_a_verdict_stand_in_text_document_and_page(tmp_path, c
         assert without["p_value"] < 1e-6
     first = group["influence"][0]
     share = f"({100.0 * first['share']:.0f} %)"
-    print_diagnosis(document, data=None, model=None)
+    print_diagnosis(document, data=None, model=None, brief=False)
     text = " ".join(capsys.readouterr().out.split())
     assert (
         f"dwells with the largest influence on {' or '.join(group['effects'])}: {first['unit']} dwell {first['dwell']} {share}"

@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 
 from pipelines.drawing import Chart, ColourScale, Plot, PlotAxis, Trace, csv_text, plotly_figure, svg_text
-from pipelines.drawing.chart import density
+from pipelines.drawing.chart import DIVERGING, ROLES, SEQUENTIAL, density
 from pipelines.drawing.mollweide import project, sphere
 from pipelines.drawing.picture import picture
 
@@ -99,3 +99,35 @@ def test_samples_are_a_line_unless_one_beside_a_gap_would_be_hidden(
     assert [trace.style for plot in chart.plots for trace in plot.traces] == [style] * 3
     shown = chart.plots[0].traces[0].y
     assert np.allclose(shown, values[:, 0] - np.nanmean(values[:, 0]), equal_nan=True)
+
+
+def contrast(one: str, other: str) -> float:
+    """Contrast of two colours (WCAG 2.2)."""
+    light = []
+    for text in (one, other):
+        parts = [int(text[k : k + 2], 16) / 255.0 for k in (1, 3, 5)]
+        linear = [v / 12.92 if v <= 0.04045 else ((v + 0.055) / 1.055) ** 2.4 for v in parts]
+        light.append(0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2])
+    return (max(light) + 0.05) / (min(light) + 0.05)
+
+
+@pytest.mark.parametrize("scale", [DIVERGING, SEQUENTIAL], ids=["diverging", "sequential"])
+def test_no_colour_of_a_scale_is_that_of_a_light_or_a_dark_page(scale: tuple[tuple[float, str], ...]) -> None:
+    for _, colour in scale:
+        for page in ("#ffffff", "#f4f6f8", "#22252a", "#1a2026"):
+            assert contrast(colour, page) > 1.6, (colour, page)
+
+
+def test_one_colour_of_a_legend_means_one_thing() -> None:
+    apart = ("x", "y", "z", "fourth", "before", "after", "muted", "ink", "good")
+    assert len({ROLES[role] for role in apart}) == len(apart)
+
+
+def test_plots_stand_one_under_the_other_in_the_layout_of_narrow_screens() -> None:
+    figure = plotly_figure(chart())
+    wide, narrow = figure["layout"], figure["narrow"]
+    assert wide["xaxis"]["domain"][1] < wide["xaxis2"]["domain"][0]
+    assert narrow["xaxis"]["domain"] == narrow["xaxis2"]["domain"] == [0.0, 1.0]
+    assert narrow["yaxis"]["domain"][0] > narrow["yaxis2"]["domain"][1]
+    assert narrow["height"] > wide["height"] + chart().height
+    assert "narrow" not in plotly_figure(replace(chart(), columns=1))

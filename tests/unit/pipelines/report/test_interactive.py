@@ -176,7 +176,7 @@ def test_all_marks_are_drawn_and_missing_values_are_left_out() -> None:
     text = svg_text(Chart("c", (Plot("a", PlotAxis("x"), PlotAxis("y"), traces), sphere("b", (colours,))), 2, scale))
     assert "nan" not in text
     assert "&lt;+x&gt;" in text
-    for colour in ("#2166ac", "#b2182b", "#999999"):  # both ends, and a missing value
+    for colour in ("#2f7bc4", "#d0382f", "#999999"):  # both ends, and a missing value
         assert f'stroke="{colour}"' in text
     assert "mean / µg" in text
 

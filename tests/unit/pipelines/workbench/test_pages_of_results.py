@@ -73,9 +73,9 @@ def test_a_discovery_is_on_the_page_with_its_levels(tmp_path: Path, monkeypatch:
 @pytest.mark.parametrize(
     ("verdict", "reason", "shown"),
     [
-        ("adequate", "", ">adequate</span>"),
-        ("not adequate", "", ">not adequate</span>"),
-        ("not judged", "too few dwells", "adequacy not judged: too few dwells"),
+        ("adequate", "", 'verdict good">ADEQUATE: '),
+        ("not adequate", "", 'verdict bad">NOT ADEQUATE: '),
+        ("not judged", "too few dwells", 'verdict open">CANNOT BE JUDGED: too few dwells'),
     ],
 )
 def test_the_page_of_a_run_has_the_verdict_of_its_archive(

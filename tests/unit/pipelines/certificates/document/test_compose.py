@@ -1,6 +1,7 @@
 """The certificate that is handed out: what ISO/IEC 17025 lists is on it, what must not be said is not, its XML is valid."""
 
 import html
+import itertools
 import json
 import re
 import shutil
@@ -375,7 +376,10 @@ def test_a_probability_of_false_acceptance_is_never_0_and_rows_of_nothing_are_on
     none = c.model_copy(update={"conformity": tuple(one.model_copy(update={"pfa": 0.0}) for one in c.conformity)})
     assert "probability of false acceptance < 1e-4" in html.unescape(dcc(none).decode())
     parts = {part.get("title"): part for part in page_content(c)["parts"]}
-    for table in parts["Uncertainty budgets"]["tables"]:
-        assert sum(row[4] == "0.0 %" for row in table["rows"]) <= 1
+    (table,) = parts["Uncertainty budgets"]["tables"]  # all results in one, each followed by its contributions
+    begins = [k for k, row in enumerate(table["rows"]) if not row[0].startswith("– ")]
+    assert [table["rows"][k][0] for k in begins] == [one.quantity for one in c.budgets]
+    for start, end in itertools.pairwise([*begins, len(table["rows"])]):
+        assert sum(row[4] == "0.0 %" for row in table["rows"][start:end]) <= 1
     names = {row[0] for row in parts["Results"]["tables"][0]["rows"]}
     assert "error of the norm of gravity, verification (largest of the poses)" in names
