@@ -97,8 +97,7 @@ class ModelDiagnosis(JudgedModel):
         drivers = [] if made is None or made.diagnosis is None else drivers_shown(made.diagnosis)
         if made is None or made.diagnosis is None or not drivers:
             raise WrongUse("plot: no residual to be shown against a recorded quantity; see .document")
-        faulty = {unit for fault in self.document["blocked_by"] for unit in fault["units"]}
-        left = lot_residuals(made.diagnosis, tuple(unit for unit in made.measured.units if unit not in faulty))
+        left = lot_residuals(made.diagnosis, made.sound)
         return Picture(driver_chart(left, drivers, made.diagnosis.problem.lot.state.temperature))
 
     def report(self, path: str | Path) -> Path:
@@ -109,7 +108,7 @@ class ModelDiagnosis(JudgedModel):
 
         if self._made is None:
             raise WrongUse("report: this diagnosis was kept as a document alone; diagnose the recording again")
-        text = render_diagnosis(self.document, self._made.measured, self._made.diagnosis, self.source)
+        text = render_diagnosis(self._made, self.source)
         files.publish(Path(path), text.encode(), "report", files.ELSEWHERE)
         return Path(path)
 

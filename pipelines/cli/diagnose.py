@@ -70,9 +70,7 @@ def command(
     table, left_out = without_dwells(table, leave_out)
     beside = temperatures or (file_beside(dwells, "history") if is_file(dwells) else "")
     kept_name = dwells if is_file(dwells) else Archive(archive).run(dwells).id  # what 'latest' means changes
-    made, report_text = diagnosed(
-        table, history, judged, kept_name, with_report=report is not None, left_out=left_out
-    )
+    made, report_text = diagnosed(table, history, judged, kept_name, with_report=report is not None, left_out=left_out)
     document = made.document
     document["history"] = beside or None
     if report is not None:

@@ -173,7 +173,10 @@ def print_next_of_diagnosis(document: dict[str, Any], find: FindData, model: Pat
         own = ["--model", str(model)] if model else ["--effects", ",".join(document["effects"])]
         lines.append(command_line("diagnose", data.source, *own, *data.options, "--output", free_name("next")))
     elif decides:
-        say("To write these steps as a recipe, add --output FILE.toml --recipe RECIPE, the recipe of these dwells.", "dim")
+        say(
+            "To write these steps as a recipe, add --output FILE.toml --recipe RECIPE, the recipe of these dwells.",
+            "dim",
+        )
     if document["recommended"]:
         lines += _extension(document, data, model)
     elif offer := document["offer"]:  # judges the model with the formula, without a model file
