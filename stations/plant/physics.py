@@ -13,6 +13,7 @@ from stations.plant.fixture import Fixture
 from stations.plant.hidden import Block, HiddenEffect
 from stations.plant.noise import UnitNoise
 from stations.plant.table import Axis, turn
+from stations.plant.turning import TurningForce
 
 Array = NDArray[np.float64]
 
@@ -33,6 +34,7 @@ class Physics:
         noise: UnitNoise,
         hidden: Sequence[HiddenEffect],
         gravity: float,
+        turning: TurningForce,
     ) -> None:
         self._outer, self._inner = axes
         self._fixture = fixture
@@ -42,6 +44,7 @@ class Physics:
         self._noise = noise
         self._hidden = list(hidden)
         self._sampled_until = 0.0
+        self._turning = turning
         self._up = np.array([0.0, 0.0, gravity])
         self.orthogonality = 0.0  # rad, of the table's axes
         for effect in self._hidden:
@@ -83,7 +86,9 @@ class Physics:
         """Counts (n, s, 3) at the next instants ``time`` (n,), s."""
         shaking = self._fixture.vibration.at(time)
         swing = math.sqrt(2.0) * shaking * np.sin(2.0 * math.pi * VIBRATION_HZ * time)
-        felt = self._dynamics.respond(self.force(time) + swing[:, None, None] * VIBRATION_ALONG)
+        moved = self._turning.force(time, self._up)
+        moved = rotate(self._rotations, moved) if isinstance(moved, np.ndarray) else moved
+        felt = self._dynamics.respond(self.force(time) + moved + swing[:, None, None] * VIBRATION_ALONG)
         temperature = self._fixture.temperature.at(time)
         out = self.devices.output(felt, temperature)
         humidity = self._fixture.humidity(time) if self._hidden else time

@@ -29,6 +29,7 @@ from stations.plant.noise import UnitNoise
 from stations.plant.physics import Physics, Sampler
 from stations.plant.preset import Preset, load_preset
 from stations.plant.table import Axis
+from stations.plant.turning import TurningForce
 from stations.profile_files import load_profile
 
 Array = NDArray[np.float64]
@@ -92,6 +93,7 @@ class World:
             UnitNoise(self.preset, noise),
             effects,
             gravity,
+            TurningForce(self.outer, self.inner, sim.turning, self.slots),
         )
         self.physics.orthogonality = 0.0 if self.station_errors is None else self.station_errors.orthogonality
         self.flash = [Flash() for _ in self.serials]  # by unit, in any slot
