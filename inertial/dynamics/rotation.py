@@ -1,4 +1,4 @@
-"""A device turned at a constant rate in gravity: bias, scale, misalignment and effects, delay of the encoder, place of the masses.
+"""A device turned at a constant rate in gravity: bias, scale, misalignment and effects, delay of the encoder, place of masses.
 
 The output of axis i is bᵢ + Σⱼ Mᵢⱼ·fⱼ and the terms of effects, with the force f at the angle of the encoder's reading turned on
 by rate times delay, and the acceleration of the place r in the fixture, α×r + ω×(ω×r). All axes are fitted together: the delay
@@ -87,10 +87,12 @@ class RotationData:
 
     @cached_property
     def _noise(self) -> list[tuple[Array, Array, float, float]]:
-        """For each axis: root of the covariance of its outputs, whitened free columns, sum of squares beside these, Student's ν."""
+        """For each axis: root of the covariance of its outputs, whitened free columns, squares beside these, Student's ν."""
         rest = len(self.points.time) - self._free.shape[1]
         if rest < FEWEST_NOISE:
-            raise NotIdentified(f"rotation: {rest} points beside the waves of a turn, {FEWEST_NOISE} are needed; raise bins")
+            raise NotIdentified(
+                f"rotation: {rest} points beside the waves of a turn, {FEWEST_NOISE} are needed; raise bins"
+            )
         out: list[tuple[Array, Array, float, float]] = []
         for k in range(self.output.shape[1]):
             known = np.diag(self.white[:, k] ** 2)
@@ -112,7 +114,7 @@ class RotationData:
 
     @cached_property
     def noise_scale(self) -> tuple[float, float, int]:
-        """Variance of whitened outputs by waves beside the fitted ones, the sum of squares there, and the free columns' number."""
+        """Variance of whitened outputs by waves beside the fitted ones, the squares there, and the number of free columns."""
         rest = len(self._noise) * (len(self.points.time) - self._free.shape[1])
         total = sum(one[2] for one in self._noise)
         return total / rest, total, len(self._noise) * self._free.shape[1]
@@ -158,7 +160,7 @@ class RotationModel:
         return np.einsum("ij,njm->nim", self._matrix, force)
 
     def _base_columns(self) -> tuple[list[str], Array]:
-        at, letters, count = self._at, self.data.letters, len(self.data.letters)
+        at, count = self._at, len(self.data.letters)
         force, slope = mean(at.force), mean(at.slope)
         made = [self._each_axis("bias", np.ones((len(force), count)))]
         for j, axis in enumerate("xyz"):
@@ -223,7 +225,9 @@ class RotationModel:
         size = np.linalg.norm(rows, axis=0)
         base = rows[:, : len(self._base[0])] / size[: len(self._base[0])]
         if np.any(size == 0.0) or np.linalg.matrix_rank(base, tol=1e-6) < base.shape[1]:
-            raise NotIdentified("rotation: the turns do not tell bias, scale, misalignment and delay apart; turn another plane too")
+            raise NotIdentified(
+                "rotation: the turns do not tell bias, scale, misalignment and delay apart; turn another plane too"
+            )
         left, singular, right = np.linalg.svd(rows / size, full_matrices=False)
         kept = singular > 1e-6 * singular[0]
         value = (right[kept].T @ ((left[:, kept].T @ target) / singular[kept])) / size
@@ -249,6 +253,13 @@ class RotationModel:
         """What the model begins with: the delays."""
         begun = {"delay_outer": self._delay[0], "delay_inner": self._delay[1]}
         return np.array([begun.get(name, 0.0) for name in names])
+
+    def part_of_effects(self, fit: RotationFit) -> Array:
+        """What the effects of a fit add to the outputs, (n, axes), g."""
+        parts = [self._of(name) for name in fit.effects]
+        value = dict(zip(fit.names, fit.value.tolist(), strict=True))
+        zero = np.zeros_like(self.data.output)
+        return sum((columns @ np.array([value[name] for name in names]) for names, columns, _ in parts), zero)
 
     def left_out(self, effects: Sequence[str]) -> float:
         """Rms weighted residual of whitened outputs that are left out, every fifth in turn."""

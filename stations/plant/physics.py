@@ -12,7 +12,7 @@ from stations.plant.dynamics import Dynamics
 from stations.plant.fixture import Fixture
 from stations.plant.hidden import Block, HiddenEffect
 from stations.plant.noise import UnitNoise
-from stations.plant.table import Axis, turn
+from stations.plant.table import turn
 from stations.plant.turning import TurningForce
 
 Array = NDArray[np.float64]
@@ -26,7 +26,7 @@ class Physics:
 
     def __init__(
         self,
-        axes: tuple[Axis, Axis],
+        turning: TurningForce,
         fixture: Fixture,
         rotations: Array,
         devices: PlantDevices,
@@ -34,9 +34,8 @@ class Physics:
         noise: UnitNoise,
         hidden: Sequence[HiddenEffect],
         gravity: float,
-        turning: TurningForce,
     ) -> None:
-        self._outer, self._inner = axes
+        self._outer, self._inner = turning.outer, turning.inner
         self._fixture = fixture
         self._rotations = rotations
         self.devices = devices

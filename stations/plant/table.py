@@ -74,7 +74,7 @@ class Axis:
     """One axis: a servo with its encoder, and what may be wrong with it.
 
     ``zero_deg`` is by how much the encoder is off, ``play_deg`` how far the shaft may lag behind it, ``stuck_at`` what a stuck
-    encoder says; ``homed`` is the drive's own belief. ``ripple`` are waves of the angle while it turns (orders per turn, degrees),
+    encoder says; ``homed`` is the drive's own belief. ``ripple`` are waves of the angle while it turns (orders a turn, degrees),
     ``late_s`` the age of an encoder reading and its standard deviation.
     """
 

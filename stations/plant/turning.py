@@ -29,7 +29,7 @@ class TurningForce:
     """The force of a table whose axes turn, beyond that of the same angles at rest."""
 
     def __init__(self, outer: Axis, inner: Axis, turning: Turning, slots: Sequence[int]) -> None:
-        self._outer, self._inner = outer, inner
+        self.outer, self.inner = outer, inner
         self._places = places(turning, slots)
         self._wobble = 1e-6 * turning.wobble_urad
         for axis in (outer, inner):
@@ -38,7 +38,7 @@ class TurningForce:
 
     def force(self, time: Array, up: Array) -> Array | float:
         """In the fixture, (n, s, 3) in g, at instants (n,) s; ``up`` (3,) in g. Zero while both axes stand."""
-        if not (self._outer.turns(time) or self._inner.turns(time)):
+        if not (self.outer.turns(time) or self.inner.turns(time)):
             return 0.0
         before, at, after = (self._where(time + step) for step in (-NEAR_S, 0.0, NEAR_S))
         acceleration = (before - 2.0 * at + after) / (NEAR_S**2 * STANDARD_GRAVITY_M_S2)
@@ -46,7 +46,7 @@ class TurningForce:
         return _back(felt, *(a[:, None] for a in self._angles(time)))
 
     def _angles(self, time: Array) -> tuple[Array, Array]:
-        return np.deg2rad(self._outer.shaft(time)), np.deg2rad(self._inner.shaft(time))
+        return np.deg2rad(self.outer.shaft(time)), np.deg2rad(self.inner.shaft(time))
 
     def _where(self, time: Array) -> Array:
         """Places (n, s, 3) in the laboratory, m: first turned about z by the inner axis, then about x by the outer one."""
@@ -56,12 +56,12 @@ class TurningForce:
         return np.stack([x, np.cos(outer) * y - np.sin(outer) * z, np.sin(outer) * y + np.cos(outer) * z], axis=-1)
 
     def _leaning(self, time: Array, up: Array) -> Array:
-        """Change (n, 3) of the vertical, g in the laboratory, because the turning axis leans by a vector that goes round twice."""
+        """Change (n, 3) of the vertical, g in the laboratory, by the lean of the turning axis, which goes round twice."""
         outer, inner = self._angles(time)
         zero = np.zeros_like(time)
-        own = self._wobble * self._outer.move.share(time)
+        own = self._wobble * self.outer.move.share(time)
         lean = np.stack([zero, own * np.cos(2.0 * outer), own * np.sin(2.0 * outer)], axis=-1)
-        own = self._wobble * self._inner.move.share(time)
+        own = self._wobble * self.inner.move.share(time)
         a, b = own * np.cos(2.0 * inner), own * np.sin(2.0 * inner)
         lean += np.stack([a, np.cos(outer) * b, np.sin(outer) * b], axis=-1)
         return np.cross(lean, up)

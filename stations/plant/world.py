@@ -85,7 +85,7 @@ class World:
         turn_on = [stream(sim.seed, lot.seed, lot.repeat, serial, "turn-on") for serial in self.serials]
         gravity = sim.local_gravity_m_s2 / STANDARD_GRAVITY_M_S2
         self.physics = Physics(
-            (self.outer, self.inner),
+            TurningForce(self.outer, self.inner, sim.turning, self.slots),
             self.fixture,
             np.stack([t.slot_rotation for t in self._truths]),
             PlantDevices(self.preset, self._truths, turn_on, self._supplies.drift),
@@ -93,7 +93,6 @@ class World:
             UnitNoise(self.preset, noise),
             effects,
             gravity,
-            TurningForce(self.outer, self.inner, sim.turning, self.slots),
         )
         self.physics.orthogonality = 0.0 if self.station_errors is None else self.station_errors.orthogonality
         self.flash = [Flash() for _ in self.serials]  # by unit, in any slot
