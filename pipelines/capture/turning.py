@@ -15,6 +15,8 @@ from stations.devices.table import GRACE_S, PATIENCE, TiltTable
 
 POLL_S = 0.05  # between readings of the encoder: at 30 °/s every 1.5°, which shows ripple of up to 100 waves a turn
 
+NEAR_DEG = 0.1
+
 
 @dataclass
 class Turning:
@@ -35,13 +37,14 @@ class Turning:
         for turn in self.turns:
             yield from self._read(turn, longest_s, self._after(turn.stand_s))
             expected = self.table.turn(turn.axis, turn.to_deg, turn.rate_deg_s)
-            late, due = self._after(PATIENCE * expected + GRACE_S), self._after(expected)
+            late = self._after(PATIENCE * expected + GRACE_S)
 
-            def ended(turn: Turn = turn, late: Callable[[], bool] = late, due: Callable[[], bool] = due) -> bool:
+            def ended(turn: Turn = turn, late: Callable[[], bool] = late) -> bool:
                 if late():
                     text = f"table: {turn.axis} axis not at {turn.to_deg:g} deg in time; check drive and load"
                     raise StationTimeout(text)
-                return due() and self.table.turned(turn.axis, turn.to_deg)
+                near = abs(self.readings[-1][1] - turn.to_deg) < NEAR_DEG  # only then is the drive asked besides
+                return near and self.table.turned(turn.axis, turn.to_deg)
 
             yield from self._read(turn, longest_s, ended)
         yield from self._read(self.turns[-1], longest_s, self._after(self.turns[-1].stand_s))

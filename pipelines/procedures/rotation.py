@@ -67,7 +67,9 @@ class Rotation(InG, Evaluated):
         made: list[ProcedureStep] = []
         for plane in part.planes:
             axis, other = AT_REST[plane]
-            end = part.end_deg
+            end = (
+                part.end_deg if axis == "inner" else -part.end_deg
+            )  # of which the outer axis has less way between planes
             turns = tuple(
                 Turn(axis, to, rate, part.stand_s)
                 for rate in part.rates_deg_s
@@ -75,7 +77,9 @@ class Rotation(InG, Evaluated):
                 for to in (end, -end)
             )
             pose = Pose(name=plane, **{f"{axis}_deg": -end, f"{'inner' if axis == 'outer' else 'outer'}_deg": other})
-            lasting = sum(2.0 * end / turn.rate_deg_s + turn.stand_s + SETTLING_S for turn in turns) + part.stand_s
+            lasting = (
+                sum(2.0 * part.end_deg / turn.rate_deg_s + turn.stand_s + SETTLING_S for turn in turns) + part.stand_s
+            )
             made.append(ProcedureStep(plane, pose, part.temperature_C, lasting_s=lasting, turns=turns))
         return made
 
