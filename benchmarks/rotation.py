@@ -52,21 +52,19 @@ TERMS = ("bias", "scale", "misalignment")
 
 @dataclass
 class Late(HiddenEffect):
-    """Axis x is behind by a first-order lag."""
+    """Axis x is late by a time that is short against the turn: the force of before, by its last change."""
 
-    tau_s: float = 0.02
-    _state: Array | None = field(default=None, init=False)
-    _time: float = field(default=-1.0, init=False)
+    delay_s: float = 1e-3
+    _last: Array | None = field(default=None, init=False)
 
     def output(self, force: Array, block: Any) -> Array:
-        """The lagged force minus the force, on x."""
+        """The late force minus the force, on x."""
+        own = force[..., 0]
+        before = np.concatenate([own[:1] if self._last is None else self._last, own[:-1]])
+        self._last = own[-1:].copy()
         out = np.zeros_like(force)
-        for k, (now, own) in enumerate(zip(block.time, force[..., 0], strict=True)):
-            fresh = self._state is None or now - self._time > 1.0
-            last = own if fresh or self._state is None else self._state
-            self._state = own + (last - own) * float(np.exp(-(now - self._time) / self.tau_s)) if not fresh else own
-            self._time = float(now)
-            out[k, :, 0] = self._state - own
+        step = float(np.median(np.diff(block.time))) if len(block.time) > 1 else 0.01
+        out[..., 0] = -self.delay_s / step * (own - before)
         return out
 
 
@@ -214,7 +212,7 @@ def hidden_worlds() -> dict[str, tuple[dict[str, Any], list[HiddenEffect], list[
         "second_order": ({}, [Bent(quadratic=size)], ["third_order"], ""),
         "third_order": ({}, [CubicTransfer(hardening=2.0 * size, spread=0.1)], ["second_order"], ""),
         "cross_quadratic": ({}, [PendulousMass(compliance=size, spread=0.1)], both, ""),
-        "lag_of_axes": ({}, [Late(tau_s=2e-3)], both, ""),
+        "lag_of_axes": ({}, [Late()], both, ""),
         "bias_drift": ({}, [Bent(drift=1e-5)], both, ""),
     }
 

@@ -78,11 +78,10 @@ class RotationData:
     def _free(self) -> Array:
         """Columns (n, k) that may take any value and are no noise: waves of each sweep, and each point at rest."""
         p, columns = self.points, list[Array]()
+        angle, orders = Nodes.of(p).angle, range(HARMONICS + 1)
+        waves = [mean(wave(order * angle)) for order in orders for wave in (np.cos, np.sin) if order or wave is np.cos]
         for sweep in np.unique(p.sweep[p.turning]):
-            own = (p.sweep == sweep).astype(float)
-            orders = np.arange(HARMONICS + 1)
-            both = [wave(order * p.angle) for order in orders for wave in (np.cos, np.sin) if order or wave is np.cos]
-            columns += [own * wave for wave in both]
+            columns += [np.where(p.sweep == sweep, wave, 0.0) for wave in waves]
         return np.column_stack([*columns, *np.eye(len(p.time))[~p.turning]])
 
     @cached_property
