@@ -21,7 +21,7 @@ from inertial.dynamics.wander import wander
 from inertial.errors import NotIdentified
 from inertial.noise.flicker import flicker_kernel
 
-HARMONICS = 4  # waves a turn that are no noise: every effect is among them
+HARMONICS = 5  # waves a turn that are no noise: every effect has some of them that bias, matrix, K2 and K3 do not have
 PASSES = 3  # of the delay, by which the angles are turned on, and of the matrix, which the place acts through
 PLACE_M = 0.5  # standard deviation of the place of a proof mass before the test: less than the table is large
 FEWEST_NOISE = 20  # degrees of freedom of the noise
@@ -34,7 +34,7 @@ class RotationFit:
     Names are ``bias_x``, ``matrix_xy`` (output x, force y; g/g), ``delay_outer`` and ``delay_inner`` in s where the axis turns,
     ``place_x`` in m of the fixture, ``second_order_x`` and so on for each axis, ``level_0`` for effects of the table.
 
-    chi_square, dof : of what the model leaves in waves of up to four a turn, and at rest, by the noise of all other waves
+    chi_square, dof : of what the model leaves in waves of up to five a turn, and at rest, by the noise of all other waves
     residuals : (n, axes), g
     """
 
