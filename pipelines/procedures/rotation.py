@@ -44,7 +44,7 @@ class Rotation(InG, Evaluated):
     order = 32
     states = (
         "bias, scale, misalignment, K2 and K3 within 1 g of all axes, delay of the encoder against the samples, radius of the "
-        "proof masses, missing effects; in a fifth of the time of static poses"
+        "proof masses, missing effects"
     )
     source = "Gaitan and Geist, Measurement 189 (2022) 110528; IEEE Std 1293; reference by gravity, ISO 16063-16"
     part = RotationPart
