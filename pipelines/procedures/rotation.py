@@ -239,8 +239,8 @@ def _drive(part: RotationPart, rows: pd.DataFrame) -> Texts:
     departure = turning.groupby("sweep")["rate_deg_s"].agg(lambda r: float((r / r.mean() - 1.0).std())).max()
     angle = np.sqrt((turning[[f"angle_{k}_deg" for k in range(6)]].to_numpy(dtype=float) ** 2).sum(axis=1).max())
     open_urad = MICRO * np.radians(angle)
-    text = f"rate steady to {100.0 * departure:.2g} % rms within ten degrees; readings leave {open_urad:.2g} µrad of the angle open"
-    return [("drive", f"{text} (k = 1) at most, which every uncertainty holds")]
+    text = f"rate steady to {100.0 * departure:.2g} % rms over ten degrees; readings leave {open_urad:.2g} µrad of the angle"
+    return [("drive", f"{text} open (k = 1) at most, which every uncertainty holds")]
 
 
 def _open(part: RotationPart) -> Texts:

@@ -1,4 +1,4 @@
-"""A device turned in gravity: what is put in comes out, delay by both directions, honest uncertainties, effects by their names."""
+"""A device turned in gravity: what is put in comes out, delay by both directions, honest uncertainties, effects by name."""
 
 from dataclasses import replace
 
@@ -31,19 +31,21 @@ def rotations(planes=PLANES, rates=(RATE,)) -> Rotations:
     for plane in planes:
         inner_turns, other = PLANES[plane]
 
-        def add(angle: float, span: float, rate: float, number: int) -> None:
+        def add(
+            angle: float, span: float, rate: float, now: float, number: int, inner_turns=inner_turns, other=other
+        ) -> None:
             outer, inner = (other, angle) if inner_turns else (angle, other)
             rows.append((outer, inner, inner_turns, span, rate, 0.0, now, number))
 
         for rate in rates:
             for sign in (1.0, -1.0):
-                add(-sign * 1.1 * np.pi, 0.0, 0.0, -1)
+                add(-sign * 1.1 * np.pi, 0.0, 0.0, now, -1)
                 now += 2.0
                 for k in range(BINS):
-                    add(sign * (2.0 * np.pi * (k + 0.5) / BINS - np.pi), 2.0 * np.pi / BINS, sign * rate, sweep)
+                    add(sign * (2.0 * np.pi * (k + 0.5) / BINS - np.pi), 2.0 * np.pi / BINS, sign * rate, now, sweep)
                     now += 2.0 * np.pi / BINS / rate
                 sweep += 1
-        add(-1.1 * np.pi, 0.0, 0.0, -1)
+        add(-1.1 * np.pi, 0.0, 0.0, now, -1)
         now += 10.0
     outer, inner, turned, span, rate, acceleration, time, number = np.array(rows, dtype=float).T
     uncertain = np.zeros((len(time), 6))

@@ -1,4 +1,4 @@
-"""The procedure of a rotation: keys, tables that cannot turn, a lot on the simulated station, a pause, and what is drawn and told."""
+"""The procedure of a rotation: keys, tables that cannot turn, a simulated lot, a pause, and what is drawn and told."""
 
 from typing import Any
 
@@ -70,7 +70,11 @@ def test_a_lot_gives_what_the_simulated_units_are(measured) -> None:
         }
         for name, values in truth.items():
             one = figures[name]
-            own = values["xyz".index(one.axis[0])] if values.ndim == 1 else values[tuple("xyz".index(a) for a in one.axis)]
+            own = (
+                values["xyz".index(one.axis[0])]
+                if values.ndim == 1
+                else values[tuple("xyz".index(a) for a in one.axis)]
+            )
             assert one.identified
             assert abs(one.value - own) < 4.0 * one.uncertainty, name
         assert abs(figures["rotation_radius_mm"].value - 1e3 * radius) < 4.0 * figures["rotation_radius_mm"].uncertainty
@@ -115,7 +119,9 @@ def test_a_door_that_opens_during_a_turn_costs_time_and_no_data(measured) -> Non
     for unit in LOT.units:
         new, old = ({one.figure: one for one in made.figures[unit.serial]} for made in (outcome, measured[1]))
         far = abs(new["rotation_misalignment_mrad"].value) - abs(old["rotation_misalignment_mrad"].value)
-        assert abs(far) < 5.0 * (new["rotation_misalignment_mrad"].uncertainty + old["rotation_misalignment_mrad"].uncertainty)
+        assert abs(far) < 5.0 * (
+            new["rotation_misalignment_mrad"].uncertainty + old["rotation_misalignment_mrad"].uncertainty
+        )
 
 
 WRONG: dict[str, dict[str, Any]] = {
