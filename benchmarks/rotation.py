@@ -120,9 +120,8 @@ def by_poses(device: str, station: StationConfig, lot: Lot) -> tuple[Array, Arra
     value, error = lot_fit.fit.coefficients, lot_fit.fit.standard_errors
     order = [[0, *(1 + (np.arange(3) - axis) % 3)] for axis in range(3)]  # own axis first, then the next ones
     pick = np.array(order)
-    return *(np.take_along_axis(v, pick[None], axis=-1).reshape(len(value), -1) for v in (value, error)), minutes(
-        readings
-    )
+    value, error = (np.take_along_axis(v, pick[None], axis=-1).reshape(len(value), -1) for v in (value, error))
+    return value, error, minutes(readings)
 
 
 def points_of(

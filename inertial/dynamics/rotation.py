@@ -96,7 +96,7 @@ class RotationData:
         for k in range(self.output.shape[1]):
             known = np.diag(self.white[:, k] ** 2)
             found = wander(self._free, self.output[:, k], known, self._kernel)
-            root = np.linalg.cholesky(known + found.variance * self._kernel)
+            root = np.asarray(np.linalg.cholesky(known + found.variance * self._kernel), dtype=np.float64)
             free, own = (solve_triangular(root, part, lower=True) for part in (self._free, self.output[:, k]))
             left = own - free @ np.linalg.lstsq(free, own, rcond=None)[0]
             # how well the noise is known: white noise by many samples, wander by the waves beside the fitted ones

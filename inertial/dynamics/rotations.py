@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from inertial.arrays import Array
+from inertial.arrays import Array, Flags
 from inertial.frames import to_fixture
 
 STANDARD_GRAVITY = 9.80665
@@ -35,9 +35,9 @@ class Rotations:
     uncertain: Array
 
     @property
-    def turning(self) -> Array:
+    def turning(self) -> Flags:
         """Whether the table turns, (n,)."""
-        return self.sweep >= 0
+        return np.asarray(self.sweep >= 0, dtype=np.bool_)
 
     @property
     def angle(self) -> Array:

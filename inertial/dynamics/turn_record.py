@@ -71,6 +71,14 @@ def _rows(since: Array, line: Array, orders: Sequence[int]) -> Array:
     return np.column_stack([np.ones_like(since), since, *waves])
 
 
+def _solved(since: Array, angle: Array, line: Array, orders: Sequence[int]) -> tuple[Array, Array]:
+    """Rows and coefficients; the phases of the waves follow the line that is found beside them."""
+    for _ in range(2):
+        line = np.asarray(np.linalg.lstsq(_rows(since, line, orders), angle, rcond=None)[0][:2], dtype=np.float64)
+    rows = _rows(since, line, orders)
+    return rows, np.asarray(np.linalg.lstsq(rows, angle, rcond=None)[0], dtype=np.float64)
+
+
 def fit_sweep(time: Array, angle: Array, begin_rad: float, end_rad: float) -> Sweep:
     """The sweep through readings (n,), s and rad, of whole turns from one angle to another.
 
@@ -87,25 +95,23 @@ def fit_sweep(time: Array, angle: Array, begin_rad: float, end_rad: float) -> Sw
         raise NotIdentified(f"rotation: {text}; turn more slowly")
     middle = float(time.mean())
     since = time - middle
-    line = np.polynomial.polynomial.polyfit(since, angle, 1)
+    line = np.asarray(np.polynomial.polynomial.polyfit(since, angle, 1), dtype=np.float64)
     highest = int(0.4 * len(time) / max(1.0, turns))
-    orders = list(LOW_ORDERS)
+    orders: list[int] = list(LOW_ORDERS)
     while True:
-        for _ in range(3):  # the line is that beside the waves, whose phases follow it
-            rows = _rows(since, line, orders)
-            value = np.linalg.lstsq(rows, angle, rcond=None)[0]
-            line = value[:2]
+        rows, value = _solved(since, angle, line, orders)
+        line = value[:2]
         rest = angle - rows @ value
         variance = max(float(rest @ rest) / (len(time) - rows.shape[1]), 1e-18)
-        others = np.array([k for k in range(1, highest + 1) if k not in orders])
+        others = [k for k in range(1, highest + 1) if k not in orders]
         turn = line[0] + line[1] * since
         size = np.abs(np.exp(-1j * np.outer(others, turn)) @ rest) ** 2 / (len(time) * variance)
         best = int(np.argmax(size))
         if len(others) * np.exp(-size[best]) > WAVE_P or len(orders) == len(LOW_ORDERS) + MOST_WAVES:
             break
-        orders.append(int(others[best]))
+        orders.append(others[best])
     covariance = variance * np.linalg.inv(rows.T @ rows)
-    at = [middle + (edge - value[0]) / value[1] for edge in (begin_rad, end_rad)]
+    at = [float(middle + (edge - value[0]) / value[1]) for edge in (begin_rad, end_rad)]
     return Sweep(middle, value, tuple(orders), covariance, float(np.sqrt(variance)), *at)
 
 
@@ -134,6 +140,6 @@ def parts_of(time: Array, angle: Array, ends: Sequence[float], turns: int, stand
             first = far[0]
         if not near.size:
             raise NotIdentified(f"rotation: the encoder does not show {np.degrees(end):g}°, where the axis stood")
-        last = time[near[-1]] - LEAVING_S
+        last = float(time[near[-1]]) - LEAVING_S
         still.append((last - stand_s + LEAVING_S, last, float(np.mean(angle[near]))))
     return sweeps, np.array(still)

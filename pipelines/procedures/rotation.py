@@ -1,10 +1,11 @@
 """Constant-rate rotation in gravity: all coefficients within 1 g from a few turns, against the encoder of the table."""
 
 from itertools import groupby
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 import pandas as pd
+from threadpoolctl import threadpool_limits
 
 from inertial.dynamics.rotation import RotationFit
 from inertial.dynamics.rotation_diagnosis import RotationDiagnosis, diagnose_rotation
@@ -83,7 +84,7 @@ class Rotation(InG, Evaluated):
             made.append(ProcedureStep(plane, pose, part.temperature_C, lasting_s=lasting, turns=turns))
         return made
 
-    def check(self, part: RotationPart, recipe: Recipe, station: StationConfig) -> None:
+    def check(self, part: Any, recipe: Recipe, station: StationConfig) -> None:
         """Refuse a table that cannot turn so far or so fast, and one whose encoder's delay is not stated."""
         super().check(part, recipe, station)
         for axis in sorted({AT_REST[plane][0] for plane in part.planes}):
@@ -138,7 +139,8 @@ class Rotation(InG, Evaluated):
     def of_unit(self, part: RotationPart, unit: str, rows: pd.DataFrame, device: Device) -> UnitOutcome:
         """Figures of all axes, the coefficients in words, the drive, and the diagnosis."""
         data = data_of(rows)
-        diagnosis = diagnose_rotation(data, part.effects)
+        with threadpool_limits(1):  # matrices of some hundred rows: threads wait for each other longer than they compute
+            diagnosis = diagnose_rotation(data, part.effects)
         fit, letters = diagnosis.fit, data.letters
         figures = [
             worst([_figure("rotation_bias_ug", a, fit.of(f"bias_{a}"), MICRO) for a in letters]),
@@ -167,13 +169,14 @@ class Rotation(InG, Evaluated):
         if points.groupby("axis")["value"].nunique(dropna=True).min() < len(points) / 10:
             return None  # constant or clipped
         data = data_of(points)
-        model = data.model
-        fit = model.fit([name for name in part.effects if model.seen(name)])
+        with threadpool_limits(1):
+            model = data.model
+            fit = model.fit([name for name in part.effects if model.seen(name)])
         curve = model.part_of_effects(fit)
         plots: list[Plot] = []
         for plane in part.planes:
             rows = points[points["axis"] == data.letters[0]].sort_values("time_s")
-            own = (rows["series"] == plane).to_numpy() & data.points.turning
+            own = (rows["series"] == plane).to_numpy(dtype=bool) & data.points.turning
             angle = np.degrees(data.points.angle[own])
             order = np.argsort(angle)
             traces = [level(np.array([-180.0, 180.0]), 0.0)]

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 from pydantic import Field, model_validator
 
-from inertial.arrays import Array
+from inertial.arrays import Array, Places
 from inertial.dynamics.rotation import RotationData
 from inertial.dynamics.rotation_diagnosis import DEFAULT
 from inertial.dynamics.rotation_effects import EFFECTS
@@ -42,7 +42,7 @@ class RotationPart(NominalScale):
         default_factory=lambda: [24.0]
     )
     planes: Annotated[list[Plane], Field(min_length=2, max_length=3)] = Field(
-        default_factory=lambda: list[Plane](AT_REST)
+        default_factory=lambda: list[Plane](["xy", "yz", "xz"])
     )
     turns: Annotated[int, Field(ge=1, le=20)] = 1
     times: Annotated[int, Field(ge=1, le=20)] = 1
@@ -78,7 +78,7 @@ def points_of_record(
     """
     readings = record.samples[REFERENCE]
     ends = np.radians([_angle(record, 0), *(turn.to_deg for turn in record.step.turns)])
-    sweeps, still = parts_of(readings.time, np.radians(readings.output[:, 0]), ends, part.turns, part.stand_s)
+    sweeps, still = parts_of(readings.time, np.radians(readings.output[:, 0]), ends.tolist(), part.turns, part.stand_s)
     for one in units:
         yield from _points(part, number, one, sweeps, still, device)
 
@@ -101,7 +101,9 @@ def _points(
     spread = _white([output[(time >= s.begin) & (time < s.end)] for s in sweeps])
     rows: list[dict[str, Any]] = []
 
-    def add(where: Array, angle: Array, span: float, motion: tuple[float, float], sweep: int, uncertain: Array) -> None:
+    def add(
+        where: Places, angle: Array, span: float, motion: tuple[float, float], sweep: int, uncertain: Array
+    ) -> None:
         own = float(np.degrees(angle.mean()))
         common = (other, own, 1.0) if turned else (own, other, 0.0)
         steady = np.degrees([span, *motion]).tolist()
@@ -166,9 +168,9 @@ def data_of(rows: pd.DataFrame) -> RotationData:
     def of(*names: str) -> Array:
         return by_axis[0][list(names)].to_numpy(dtype=float)
 
-    outer, inner, turned, span, rate, acceleration = of(*COMMON).T
-    points = Rotations(
-        *np.radians([outer, inner]), turned, *np.radians([span, rate, acceleration]),
-        of("time_s")[:, 0], of("sweep")[:, 0].astype(int), np.radians(of(*UNCERTAIN)),
-    )  # fmt: skip
+    common = dict(zip(COMMON, of(*COMMON).T, strict=True))
+    turned, sweep = common.pop("turned"), of("sweep")[:, 0].astype(int)
+    outer, inner, span, rate, acceleration = (np.radians(column) for column in common.values())
+    uncertain = np.radians(of(*UNCERTAIN))
+    points = Rotations(outer, inner, turned, span, rate, acceleration, of("time_s")[:, 0], sweep, uncertain)
     return RotationData(points, values, np.maximum(errors, 1e-12), tuple(letters))

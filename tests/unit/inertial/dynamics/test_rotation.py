@@ -1,5 +1,6 @@
 """A device turned in gravity: what is put in comes out, delay by both directions, honest uncertainties, effects by name."""
 
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -25,27 +26,31 @@ K2, K3, PLACE, DELAY = (
 )
 
 
-def rotations(planes=PLANES, rates=(RATE,)) -> Rotations:
+def rotations(planes: Iterable[str] = PLANES, rates: Sequence[float] = (RATE,)) -> Rotations:
     """Each plane forward and back, at rest between."""
     rows, now, sweep = [], 0.0, 0
     for plane in planes:
-        inner_turns, other = PLANES[plane]
 
-        def add(
-            angle: float, span: float, rate: float, now: float, number: int, inner_turns=inner_turns, other=other
-        ) -> None:
-            outer, inner = (other, angle) if inner_turns else (angle, other)
-            rows.append((outer, inner, inner_turns, span, rate, 0.0, now, number))
+        def add(angle: float, span: float, rate: float, now: float, number: int, own: tuple[bool, float]) -> None:
+            outer, inner = (own[1], angle) if own[0] else (angle, own[1])
+            rows.append((outer, inner, own[0], span, rate, 0.0, now, number))
 
         for rate in rates:
             for sign in (1.0, -1.0):
-                add(-sign * 1.1 * np.pi, 0.0, 0.0, now, -1)
+                add(-sign * 1.1 * np.pi, 0.0, 0.0, now, -1, PLANES[plane])
                 now += 2.0
                 for k in range(BINS):
-                    add(sign * (2.0 * np.pi * (k + 0.5) / BINS - np.pi), 2.0 * np.pi / BINS, sign * rate, now, sweep)
+                    add(
+                        sign * (2.0 * np.pi * (k + 0.5) / BINS - np.pi),
+                        2.0 * np.pi / BINS,
+                        sign * rate,
+                        now,
+                        sweep,
+                        PLANES[plane],
+                    )
                     now += 2.0 * np.pi / BINS / rate
                 sweep += 1
-        add(-1.1 * np.pi, 0.0, 0.0, now, -1)
+        add(-1.1 * np.pi, 0.0, 0.0, now, -1, PLANES[plane])
         now += 10.0
     outer, inner, turned, span, rate, acceleration, time, number = np.array(rows, dtype=float).T
     uncertain = np.zeros((len(time), 6))
@@ -191,7 +196,7 @@ def readings(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
 
 def test_a_record_of_turns_gives_rate_ripple_and_standing_times() -> None:
     time, angle = readings(np.random.default_rng(9))
-    sweeps, still = parts_of(time, angle, np.radians([-200.0, 200.0, -200.0]), 1, 1.0)
+    sweeps, still = parts_of(time, angle, np.radians([-200.0, 200.0, -200.0]).tolist(), 1, 1.0)
     assert [np.degrees(one.rate) for one in sweeps] == pytest.approx([24.0, -24.0], abs=5e-3)
     assert all({1, 2, 30} <= set(one.orders) for one in sweeps)
     assert np.degrees(sweeps[0].scatter) == pytest.approx(24.0 * 5e-4, rel=0.25)

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from each import each
-from small_station import MemorySink, captured, lot_of, short_recipe, station_of
+from small_station import MemorySink, captured, lot_of, quiet_progress, short_recipe, station_of
 
 from pipelines.capture.capture import capture
 from pipelines.procedures import PROCEDURES, parts_of, refuse_unusable
@@ -16,6 +16,7 @@ from pipelines.schedule.steps import steps
 from schemas.errors import RecipeInvalid
 from schemas.event import MemoryLog
 from schemas.recipe import Recipe
+from schemas.simulation import Turning
 from schemas.station import StationConfig, load_station
 from schemas.station_devices import Devices
 from stations.opening import open_station
@@ -23,8 +24,9 @@ from stations.plant.plant import Plant
 from stations.plant.turning import places
 
 SCALE = 256000.0  # of an ADXL355, LSB per g
-ROTATION = PROCEDURES["rotation"]
+ROTATION: Any = PROCEDURES["rotation"]
 LOT = lot_of(2)
+Measured = tuple[pd.DataFrame, Outcome, MemorySink]
 
 
 def recipe_of(**keys: Any) -> Recipe:
@@ -40,20 +42,19 @@ def evaluated(recipe: Recipe, sink: MemorySink) -> tuple[pd.DataFrame, Outcome]:
         if step.order is not None
     ]
     device: Device = nominal_device(readings)
-    procedure: Any = ROTATION
     part = parts_of(recipe)[0]
-    points = procedure.reduce(part, records, device)
-    return points, procedure.evaluate(part, points, device)
+    points = ROTATION.reduce(part, records, device)
+    return points, ROTATION.evaluate(part, points, device)
 
 
 @pytest.fixture(scope="module")
-def measured() -> tuple[pd.DataFrame, Outcome, MemorySink]:
+def measured() -> Measured:
     recipe = recipe_of()
     sink = captured(recipe, LOT)
     return *evaluated(recipe, sink), sink
 
 
-def test_a_lot_gives_what_the_simulated_units_are(measured) -> None:
+def test_a_lot_gives_what_the_simulated_units_are(measured: Measured) -> None:
     _, outcome, _ = measured
     plant = Plant(load_station(), LOT)
     for k, unit in enumerate(plant.serials):
@@ -61,7 +62,7 @@ def test_a_lot_gives_what_the_simulated_units_are(measured) -> None:
         figures = {one.figure: one for one in outcome.figures[unit]}
         assert len(figures) == len(ROTATION.figures)
         off = true.matrix / np.diag(true.matrix)[:, None]
-        radius = float(np.hypot(*places(load_station().simulation.turning, [k])[0, :2]))
+        radius = float(np.hypot(*places(Turning(), [k])[0, :2]))
         truth = {
             "rotation_scale_ppm": 1e6 * (np.diag(true.matrix) - 1.0),
             "rotation_misalignment_mrad": 1e3 * off,
@@ -87,7 +88,7 @@ def test_a_lot_gives_what_the_simulated_units_are(measured) -> None:
         assert "rate steady" in told["drive"]
 
 
-def test_the_points_are_few_and_drawn(measured) -> None:
+def test_the_points_are_few_and_drawn(measured: Measured) -> None:
     points, _, sink = measured
     own = points[points["unit"] == LOT.units[0].serial]
     assert len(own) == 3 * 3 * (2 * 36 + 3)
@@ -98,7 +99,7 @@ def test_the_points_are_few_and_drawn(measured) -> None:
     assert ROTATION.chart(parts_of(recipe_of())[0], still) is None
 
 
-def test_a_unit_without_an_output_that_changes_says_why(measured) -> None:
+def test_a_unit_without_an_output_that_changes_says_why(measured: Measured) -> None:
     points, _, sink = measured
     part, device = parts_of(recipe_of())[0], nominal_device(sink.all(1))
     for value, reason in ((0.0, "constant; check the unit"), (np.nan, "end of its range")):
@@ -108,12 +109,12 @@ def test_a_unit_without_an_output_that_changes_says_why(measured) -> None:
         assert reason in notes.pop()
 
 
-def test_a_door_that_opens_during_a_turn_costs_time_and_no_data(measured) -> None:
+def test_a_door_that_opens_during_a_turn_costs_time_and_no_data(measured: Measured) -> None:
     recipe = recipe_of(planes=["xy", "yz"])
     config = station_of(faults=[{"kind": "door", "at_s": 920.0, "for_s": 60.0}])
     sink, events = MemorySink(), MemoryLog()
     with open_station(config, LOT) as station:
-        capture(station, recipe, LOT, sink, progress=lambda *_: None, events=events)
+        capture(station, recipe, LOT, sink, progress=quiet_progress, events=events)
     assert [e.kind for e in events.recorded() if e.kind in {"spoilt", "resumed"}] == ["spoilt", "resumed"]
     _, outcome = evaluated(recipe, sink)
     for unit in LOT.units:
