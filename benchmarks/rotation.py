@@ -216,8 +216,8 @@ def hidden_worlds() -> dict[str, tuple[dict[str, Any], list[HiddenEffect], list[
     }
 
 
-def judge(runs: int, seed: int, *, nothing: bool) -> None:
-    """How often the class named first holds the hidden effect, and what is named where nothing is hidden."""
+def judge(runs: int, seed: int, *, nothing: bool) -> int:
+    """In how many runs the class named first holds the hidden effect, or nothing is named where nothing is hidden."""
     worlds = {"nothing": ({}, [], ["second_order", "third_order"], "")} if nothing else hidden_worlds()
     right = count = 0
     for number in range(runs):
@@ -248,6 +248,7 @@ def judge(runs: int, seed: int, *, nothing: bool) -> None:
             flush=True,
         )
     print(f"{'nothing named' if nothing else 'in the class named first'}: {right} of {count}")
+    return right
 
 
 def main() -> None:

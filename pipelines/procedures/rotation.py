@@ -139,7 +139,9 @@ class Rotation(InG, Evaluated):
     def of_unit(self, part: RotationPart, unit: str, rows: pd.DataFrame, device: Device) -> UnitOutcome:
         """Figures of all axes, the coefficients in words, the drive, and the diagnosis."""
         data = data_of(rows)
-        with threadpool_limits(1):  # matrices of some hundred rows: threads wait for each other longer than they compute
+        with threadpool_limits(
+            1
+        ):  # matrices of some hundred rows: threads wait for each other longer than they compute
             diagnosis = diagnose_rotation(data, part.effects)
         fit, letters = diagnosis.fit, data.letters
         figures = [

@@ -8,6 +8,7 @@ import pytest
 from each import each
 from small_station import MemorySink, captured, lot_of, quiet_progress, short_recipe, station_of
 
+from benchmarks.rotation import judge
 from pipelines.capture.capture import capture
 from pipelines.procedures import PROCEDURES, parts_of, refuse_unusable
 from pipelines.procedures.figures import Outcome
@@ -168,3 +169,8 @@ def test_what_a_table_cannot_do_is_refused_before_anything_moves(message: str) -
     station, keys = REFUSED[message]
     with pytest.raises(RecipeInvalid, match=message):
         refuse_unusable(recipe_of(**keys), station)
+
+
+@pytest.mark.slow
+def test_mechanisms_hidden_in_table_and_device_are_named_first() -> None:
+    assert judge(100, 7000, nothing=False) >= 95
