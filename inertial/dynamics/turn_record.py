@@ -60,10 +60,6 @@ class Sweep:
         root = np.linalg.cholesky(self.covariance[:kept, :kept])
         return _rows(time - self.middle, self.value[:2], LOW_ORDERS) @ root
 
-    def unsteadiness(self) -> float:
-        """Rms departure of the angle from a constant rate, rad."""
-        return float(np.sqrt(0.5 * np.sum(self.value[2:] ** 2)))
-
 
 def _rows(since: Array, line: Array, orders: Sequence[int]) -> Array:
     turn = line[0] + line[1] * since

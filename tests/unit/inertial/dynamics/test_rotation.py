@@ -151,7 +151,7 @@ def test_uncertainties_hold_in_coloured_noise() -> None:
     assert binom.ppf(1e-4, total, 0.93) / total <= held / total
 
 
-@pytest.mark.parametrize("effect", sorted(set(EFFECTS) - {"second_order", "third_order", "sample_clock"}))
+@pytest.mark.parametrize("effect", sorted(set(EFFECTS) - {"second_order", "third_order"}))
 def test_a_term_that_the_model_lacks_is_named_in_its_class(effect: str) -> None:
     """The term itself at a size well above the noise; mechanisms of the plant are in benchmarks/rotation.py."""
     points = rotations()
@@ -218,3 +218,14 @@ def test_a_later_table_is_farther_along_its_turn() -> None:
     moved = points.later(np.array([0.01, 0.0]))
     assert moved.outer - points.outer == pytest.approx(0.01 * points.rate)
     assert moved.inner == pytest.approx(points.inner)
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_a_device_with_fewer_axes_is_measured_too(count: int) -> None:
+    points, rng = rotations(), np.random.default_rng(12)
+    output = true_output(points)[:, :count] + WHITE * rng.standard_normal((points.time.size, count))
+    made = diagnose_rotation(RotationData(points, output, np.full(output.shape, WHITE), tuple("xyz"[:count])))
+    assert made.adequate
+    for name, true in TRUTH.items():
+        if name in made.fit.names:
+            assert abs(made.fit.of(name)[0] - true) < 4.0 * made.fit.of(name)[1], name
