@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 from threadpoolctl import threadpool_limits
 
-from inertial.dynamics.rotation import RotationFit
+from inertial.dynamics.rotation import PLACE_M, RotationFit
 from inertial.dynamics.rotation_diagnosis import RotationDiagnosis, diagnose_rotation
 from inertial.dynamics.rotation_effects import EFFECTS
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Role, Trace, level
@@ -211,7 +211,15 @@ def _effect(figure: str, effect: str, fit: RotationFit, axis: str) -> FigureValu
     return _figure(figure, axis, fit.of(f"{effect}_{axis}"), MICRO)
 
 
+def _felt(fit: RotationFit) -> list[str]:
+    """Directions in which the test shows the place of the proof masses, not only what is possible."""
+    return [a for a in "xyz" if fit.of(f"place_{a}")[1] < 0.5 * PLACE_M]
+
+
 def _radius(fit: RotationFit) -> FigureValue:
+    if not {"x", "y"} <= set(_felt(fit)):
+        note = "the axes of the device do not feel the pull towards the inner axis; measure with outputs x and y"
+        return FigureValue.not_determined("rotation_radius_mm", "*", note)
     x, y = (fit.of(f"place_{a}")[0] for a in "xy")
     size = float(np.hypot(x, y))
     error = fit.of_function({"place_x": x / size, "place_y": y / size})
@@ -234,7 +242,7 @@ def _coefficients(fit: RotationFit, letters: tuple[str, ...]) -> Texts:
                 one = EFFECTS[effect]
                 parts.append(f"{effect} {stated(fit.of(f'{effect}_{a}'), one.factor)} {one.unit}")
         out.append((f"coefficients of axis {a}", f"{'; '.join(parts)} (k = 2)"))
-    place = ", ".join(f"{a} {stated(fit.of(f'place_{a}'), MILLI)} mm" for a in "xyz")
+    place = ", ".join(f"{a} {stated(fit.of(f'place_{a}'), MILLI)} mm" for a in _felt(fit))
     return [*out, ("place of the proof masses in the fixture", f"{place} (k = 2)")]
 
 
