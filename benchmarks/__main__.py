@@ -46,6 +46,7 @@ SHORT: dict[str, str] = {
     "procedure_pulls": "shock turn_on --units 4",
     "procedure_equipment": "--units 4",
     "procedures": "naming 10",
+    "rotation": "hidden --runs 5",
     "sweep_parameters": "12 1",
     "shock_and_spin": "centrifuge 9",
     "discovery": "names --archives 6",

@@ -8,6 +8,7 @@ from typing import Any
 
 from docs.generated_page import cell, write_or_check
 from inertial.dynamics.centrifuge_effects import EFFECTS as CENTRIFUGE_EFFECTS
+from inertial.dynamics.rotation_effects import EFFECTS as ROTATION_EFFECTS
 from inertial.dynamics.shock_effects import EFFECTS as SHOCK_EFFECTS
 from inertial.dynamics.transfer_effects import EFFECTS
 from pipelines.procedures import PROCEDURES, Procedure
@@ -63,6 +64,7 @@ the points do not separate."""
         ("transfer function", "factor", EFFECTS),
         ("shock comparison", "term", SHOCK_EFFECTS),
         ("centrifuge test", "term", CENTRIFUGE_EFFECTS),
+        ("rotation", "term", ROTATION_EFFECTS),
     ):
         lines += [f"## Effects on a {title}", "", *([model, ""] if what == "factor" else [])]
         lines += [f"| effect | {what} | meaning | measurement that separates it from others |", "|---|---|---|---|"]

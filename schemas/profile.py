@@ -140,11 +140,19 @@ class Fifo(Strict):
     registers: Annotated[int, Field(ge=1, le=ADDRESSES)]
 
 
+class Encoder(Strict):
+    """How old a reading of an axis' encoder is when its request is half answered, and by how much that differs; ms (k = 1)."""
+
+    latency_ms: Annotated[Number, Field(ge=0.0, le=1000.0)]
+    jitter_ms: Annotated[Number, Field(gt=0.0, le=100.0)]
+
+
 class Profile(Strict):
     """A device's register map, or its lines of text.
 
     ``adapter`` names what its commands mean; ``links`` what carries them, the device's own way first. ``motion`` holds the limits
-    of an exciter, ``stated`` the largest values of a station's file (:meth:`limited`).
+    of an exciter, ``encoder`` how late that of an axis is read (none: a turn of it is no measurement), ``stated`` the largest
+    values of a station's file (:meth:`limited`).
     """
 
     name: str
@@ -161,6 +169,7 @@ class Profile(Strict):
     groups: dict[str, list[str]] = Field(default_factory=dict[str, list[str]])
     fifo: Fifo | None = None
     motion: Motion | None = None
+    encoder: Encoder | None = None
     stated: dict[str, Number] = Field(default_factory=dict[str, float])
 
     @model_validator(mode="after")

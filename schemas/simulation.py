@@ -36,6 +36,24 @@ class ReferenceErrors(Strict):
     thermometer_slope_percent: NotNegative = 0.0
 
 
+class Turning(Strict):
+    """What the simulated table does while an axis turns, besides turning at the ordered rate.
+
+    cogging_deg, cogging_per_turn : ripple of the angle by the motor's poles; unbalance_deg : by the load, once a turn
+    wobble_urad : tilt of the axis in its bearings, twice a turn
+    radius_mm : of the circle of the slots about the inner axis
+    latency_ms, jitter_ms : age of an encoder reading when it is answered, and its standard deviation
+    """
+
+    cogging_deg: NotNegative = 0.002
+    cogging_per_turn: Annotated[int, Field(ge=1, le=1000)] = 50
+    unbalance_deg: NotNegative = 0.01
+    wobble_urad: NotNegative = 0.0
+    radius_mm: NotNegative = 40.0
+    latency_ms: NotNegative = 5.0
+    jitter_ms: NotNegative = 0.5
+
+
 class Simulation(Strict):
     """How the simulated station is made."""
 
@@ -52,10 +70,11 @@ class Simulation(Strict):
     hidden: list[Hidden] = Field(default_factory=list[Hidden])
     faults: list[FaultOrder] = Field(default_factory=list[FaultOrder])
     reference_errors: ReferenceErrors | None = None
+    turning: Turning = Field(default_factory=Turning)
 
     @model_serializer(mode="wrap")
     def _as_before(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
         """Without what is not stated: captures of earlier versions keep their names."""
         content = handler(self)
-        later = {"supply_drift", "supply_reading_ppm", "reference_errors"}
+        later = {"supply_drift", "supply_reading_ppm", "reference_errors", "turning"}
         return {name: value for name, value in content.items() if name not in later or name in self.model_fields_set}

@@ -9,6 +9,7 @@ import pandas as pd
 
 from pipelines.capture.record import Plausibility, Record, TemperatureLog, readings_row
 from pipelines.capture.supervision import Power, Supervisor, short_of_samples
+from pipelines.capture.turning import Turning
 from pipelines.procedures import procedure_of
 from pipelines.procedures.base import OnEquipment, SetsEquipment
 from pipelines.procedures.recorded import ProcedureStep
@@ -181,13 +182,16 @@ class Acquisition:
         if not step.settled:
             # observations at the ends of the spans alone would be late by half a span on average
             self.observe(step, record)
-        for _ in self._spans(record):
+        turning = Turning(station.table, station.clock, step.turns)
+        for _ in turning.spans(self._longest(record)) if step.turns else self._spans(record):
             self.observe(step, record)
             self.read_samples(record)
-            if duration * rate * len(self.slots) > LONG_ROWS and record.rows() >= PIECE_ROWS:
+            if not step.turns and duration * rate * len(self.slots) > LONG_ROWS and record.rows() >= PIECE_ROWS:
                 self.plausibility.refuse_outliers(record, self.answering)
                 self.sink.part(step.record, record.pieces, record.piece(self.answering))
         station.reader.stop()
+        if step.turns:
+            record.duration = duration = station.clock.now() - record.start
         self.read_samples(record)
         self.supervisor.require_steady_clocks(spoilt=True)
         for unit, problem in self.plausibility.unreachable_units(self.answering):
@@ -196,8 +200,10 @@ class Acquisition:
         overflow = {unit.slot for unit in self.answering if unit.serial in record.lossy}
         if reasons := short_of_samples(counts, overflow, duration, rate):
             raise Suspended(reasons, spoilt=True)
-        self.plausibility.refuse_outliers(record, self.answering)
         samples, readings = self.tables(record)
+        if step.turns:
+            return record, pd.concat([samples, turning.frame(record.number)]), readings
+        self.plausibility.refuse_outliers(record, self.answering)
         if step.kind in TUMBLED and step.settled:
             self.plausibility.refuse_contradiction(record.soak, samples, readings)
         return record, samples, readings
@@ -254,19 +260,24 @@ class Acquisition:
 
     def _spans(self, record: Record) -> Iterator[float]:
         """Waits through a record in spans, short enough for the slots' memories and for the history; gives the end of each, s."""
-        memory = min(identity.capacity for identity in self.identities.values()) / record.rate * FILL
-        longest = min(HISTORY_S, memory, record.duration / OBSERVATIONS)
+        longest = self._longest(record)
         count = int(np.ceil(record.duration / longest - 1e-9))
         for number in range(count):
             end = record.start + record.duration * (number + 1) / count
             self.station.clock.sleep(end - self.station.clock.now())
             yield end
 
+    def _longest(self, record: Record) -> float:
+        """Longest span of a record without a look, s: short enough for the slots' memories and for the history."""
+        memory = min(identity.capacity for identity in self.identities.values()) / record.rate * FILL
+        return min(HISTORY_S, memory, record.duration / OBSERVATIONS)
+
     def observe(self, step: Step, record: Record) -> None:
         """Adds an observation to the record; a failed condition spoils the record."""
         angles, air, instruments = self.look()
         target = step.temperature if step.settled else None
-        self.supervisor.check_during(step.pose, target, angles, air, instruments, self.slots)
+        pose = None if step.turns else step.pose
+        self.supervisor.check_during(pose, target, angles, air, instruments, self.slots)
         record.observe(angles, air, instruments)
 
     def look(self) -> tuple[tuple[float, float], float, Instruments]:

@@ -46,6 +46,8 @@ def check(station: Station, recipe: Recipe, plan: list[Step]) -> None:
             station.reader.require_switch()
         station.chamber.check(step.temperature)
         station.table.check(step.pose.outer_deg, step.pose.inner_deg)
+        for turn in step.turns:
+            station.table.axes[turn.axis].check(turn.to_deg)
         if step.rate_hz is not None and (step.order is None or not step.order.role or step.order.on_table):
             station.reader.check(step.rate_hz)
     station.reader.check(recipe.rate_hz)

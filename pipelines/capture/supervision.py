@@ -96,7 +96,7 @@ class Supervisor:
 
     def check_during(
         self,
-        pose: Pose,
+        pose: Pose | None,
         target: float | None,
         angles: tuple[float, float],
         air: float,
@@ -107,6 +107,7 @@ class Supervisor:
 
         Parameters
         ----------
+        pose : where the table stands; None while it turns
         target : required temperature of air and devices, °C; None for a record on the way to it
         """
         self.station.require()
@@ -114,7 +115,7 @@ class Supervisor:
         reasons = [
             *self.watched.instrument_reasons(look, slots),
             *([] if target is None else self.watched.thermal_reasons(target, air, look, slots)),
-            *self._table(pose, angles),
+            *([] if pose is None else self._table(pose, angles)),
         ]
         if reasons:
             raise Suspended(reasons, spoilt=True)

@@ -20,6 +20,16 @@ StepKind = Literal["dwell", "verification", "allan", "procedure"]
 
 
 @dataclass(frozen=True)
+class Turn:
+    """A turn of an axis of the table (``outer`` or ``inner``) to an angle at a rate, after ``stand_s`` s at rest."""
+
+    axis: str
+    to_deg: float
+    rate_deg_s: float
+    stand_s: float
+
+
+@dataclass(frozen=True)
 class ProcedureStep:
     """One record of a procedure.
 
@@ -33,6 +43,7 @@ class ProcedureStep:
     role : equipment of the station that performs it; empty for a record on the tilt table
     on_table : the equipment of the role is set first, then the record is taken on the tilt table
     setting : what the equipment is set to, by name with unit
+    turns : of the table during the record, one after the other, from the pose on
     """
 
     name: str
@@ -48,6 +59,7 @@ class ProcedureStep:
     role: str = ""
     on_table: bool = False
     setting: Mapping[str, float] = field(default_factory=dict[str, float])
+    turns: tuple[Turn, ...] = ()
 
 
 def at_rest(name: str) -> Pose:

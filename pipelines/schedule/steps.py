@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from pipelines.procedures import PROCEDURES, Part, ProcedureStep, parts_of
+from pipelines.procedures.recorded import Turn
 from schemas.poses import Pose
 from schemas.recipe import Recipe
 
@@ -36,6 +37,11 @@ class Step:
     lasting_s: float | None = None
     rate_hz: float | None = None
     order: ProcedureStep | None = None
+
+    @property
+    def turns(self) -> tuple[Turn, ...]:
+        """What the table turns during the record."""
+        return self.order.turns if self.order is not None else ()
 
     def lasts(self, recipe: Recipe) -> float:
         """Duration of the record, s."""

@@ -86,6 +86,14 @@ class TableAxis(ABC):
                 self._order_once(target)
         return distance / limits.speed_deg_s + 2.0 * math.sqrt(distance / limits.acceleration_deg_s2)
 
+    def turn(self, target: float, rate_deg_s: float) -> float:
+        """Starts a move to ``target`` degrees at a rate of its own, °/s, and returns its expected duration, s."""
+        kept, self._limits = self._limits, self._limits.model_copy(update={"speed_deg_s": rate_deg_s})
+        try:
+            return self.start(target)
+        finally:
+            self._limits = kept
+
     def _order_once(self, target: float) -> None:
         try:
             self.order(target)
@@ -203,6 +211,22 @@ class TiltTable:
         self._inner.confirm(inner_deg)
         for axis in self.axes.values():
             axis.done()
+
+    def turn(self, name: str, target: float, rate_deg_s: float) -> float:
+        """Starts a turn of one axis from rest and returns its expected duration, s; the other axis stands."""
+        self._rest()
+        self.axes[name].done()  # a turn to where the last one went is a turn of its own
+        return self.axes[name].turn(target, rate_deg_s)
+
+    def turned(self, name: str, target: float) -> bool:
+        """Whether a turn has ended, confirmed by the encoder."""
+        axis = self.axes[name]
+        if not axis.arrived():
+            return False
+        self.still_since = self._clock.now()
+        axis.confirm(target)
+        axis.done()
+        return True
 
     def _rest(self) -> None:
         """Waits for axes that still move after an earlier command or process."""

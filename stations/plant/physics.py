@@ -12,7 +12,8 @@ from stations.plant.dynamics import Dynamics
 from stations.plant.fixture import Fixture
 from stations.plant.hidden import Block, HiddenEffect
 from stations.plant.noise import UnitNoise
-from stations.plant.table import Axis, turn
+from stations.plant.table import turn
+from stations.plant.turning import TurningForce
 
 Array = NDArray[np.float64]
 
@@ -25,7 +26,7 @@ class Physics:
 
     def __init__(
         self,
-        axes: tuple[Axis, Axis],
+        turning: TurningForce,
         fixture: Fixture,
         rotations: Array,
         devices: PlantDevices,
@@ -34,7 +35,7 @@ class Physics:
         hidden: Sequence[HiddenEffect],
         gravity: float,
     ) -> None:
-        self._outer, self._inner = axes
+        self._outer, self._inner = turning.outer, turning.inner
         self._fixture = fixture
         self._rotations = rotations
         self.devices = devices
@@ -42,6 +43,7 @@ class Physics:
         self._noise = noise
         self._hidden = list(hidden)
         self._sampled_until = 0.0
+        self._turning = turning
         self._up = np.array([0.0, 0.0, gravity])
         self.orthogonality = 0.0  # rad, of the table's axes
         for effect in self._hidden:
@@ -83,7 +85,9 @@ class Physics:
         """Counts (n, s, 3) at the next instants ``time`` (n,), s."""
         shaking = self._fixture.vibration.at(time)
         swing = math.sqrt(2.0) * shaking * np.sin(2.0 * math.pi * VIBRATION_HZ * time)
-        felt = self._dynamics.respond(self.force(time) + swing[:, None, None] * VIBRATION_ALONG)
+        moved = self._turning.force(time, self._up)
+        moved = rotate(self._rotations, moved) if isinstance(moved, np.ndarray) else moved
+        felt = self._dynamics.respond(self.force(time) + moved + swing[:, None, None] * VIBRATION_ALONG)
         temperature = self._fixture.temperature.at(time)
         out = self.devices.output(felt, temperature)
         humidity = self._fixture.humidity(time) if self._hidden else time

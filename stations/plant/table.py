@@ -48,6 +48,11 @@ class Move:
         """When the profile has reached the target; the axis rings on."""
         return self.start + self.duration
 
+    def share(self, time: Array) -> Array:
+        """Speed at ``time`` (n,) over the largest of the move."""
+        ramp, t = self._ramp, time - self.start
+        return np.clip(np.minimum(t, self.duration - t) / ramp, 0.0, 1.0) if ramp > 0.0 else np.zeros_like(t)
+
     def angle(self, time: Array) -> Array:
         """The angle at ``time`` (n,), degrees."""
         ramp, total = self._ramp, self.duration
@@ -69,7 +74,8 @@ class Axis:
     """One axis: a servo with its encoder, and what may be wrong with it.
 
     ``zero_deg`` is by how much the encoder is off, ``play_deg`` how far the shaft may lag behind it, ``stuck_at`` what a stuck
-    encoder says; ``homed`` is the drive's own belief.
+    encoder says; ``homed`` is the drive's own belief. ``ripple`` are waves of the angle while it turns (orders a turn, degrees),
+    ``late_s`` the age of an encoder reading and its standard deviation.
     """
 
     def __init__(self, seed: int, channel: int) -> None:
@@ -81,6 +87,8 @@ class Axis:
         self.zero_deg, self.play_deg = 0.0, 0.0
         self.stuck_at: float | None = None
         self.homed = True
+        self.ripple: tuple[tuple[int, float], ...] = ()
+        self.late_s = (0.0, 0.0)
         self._side = 1.0  # from where the last move came
         self._stalled = False
         self._held: tuple[float, float, float] | None = None  # target, speed and acceleration of a move that is held up
@@ -128,7 +136,14 @@ class Axis:
 
     def angle(self, time: Array) -> Array:
         """The shaft's angle as the encoder would see it without noise, degrees."""
-        return self.move.angle(time)
+        angle = self.move.angle(time)
+        for order, size in self.ripple:
+            angle = angle + size * self.move.share(time) * np.sin(np.radians(order * angle) + order)
+        return angle
+
+    def turns(self, time: Array) -> bool:
+        """Whether it moves, or rings, at any of ``time`` (n,)."""
+        return bool(time[-1] > self.move.start and time[0] < self.move.end + IN_POSITION_S)
 
     def shaft(self, time: Array) -> Array:
         """The shaft's true angle, degrees."""
@@ -147,8 +162,17 @@ class Axis:
         if self.stuck_at is not None:
             return self.stuck_at
         noise = ENCODER_NOISE_DEG * float(keyed_normal(self._seed, self._channel + 1, int(now * 1000), 1)[0])
-        angle = float(self.angle(np.array([now]))[0]) + noise
+        seen = now - self._age(now)
+        angle = float(self.angle(np.array([seen]))[0]) + noise
         return round(angle / ENCODER_STEP_DEG) * ENCODER_STEP_DEG
+
+    def _age(self, now: float) -> float:
+        """Age of a reading, s; one that stands still shows the same at any age."""
+        latency, jitter = self.late_s
+        if jitter == 0.0:
+            return latency
+        drawn = float(keyed_normal(self._seed, self._channel + 3, int(now * 1000), 1)[0])
+        return max(0.0, latency + jitter * drawn)
 
 
 def turn(up: Array, outer: Array, inner: Array, orthogonality: float = 0.0) -> Array:

@@ -29,6 +29,7 @@ from stations.plant.noise import UnitNoise
 from stations.plant.physics import Physics, Sampler
 from stations.plant.preset import Preset, load_preset
 from stations.plant.table import Axis
+from stations.plant.turning import TurningForce
 from stations.profile_files import load_profile
 
 Array = NDArray[np.float64]
@@ -84,7 +85,7 @@ class World:
         turn_on = [stream(sim.seed, lot.seed, lot.repeat, serial, "turn-on") for serial in self.serials]
         gravity = sim.local_gravity_m_s2 / STANDARD_GRAVITY_M_S2
         self.physics = Physics(
-            (self.outer, self.inner),
+            TurningForce(self.outer, self.inner, sim.turning, self.slots),
             self.fixture,
             np.stack([t.slot_rotation for t in self._truths]),
             PlantDevices(self.preset, self._truths, turn_on, self._supplies.drift),

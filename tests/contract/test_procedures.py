@@ -48,6 +48,7 @@ HOW_TO = Path(__file__).resolve().parents[2] / "docs" / "how-to" / "list-procedu
 SF1500 = 0.007  # V per g
 PARTS = {
     "tilt": "step_deg = 60.0\norders = 1",
+    "rotation": f"rates_deg_s = [30.0]\nscale = {SF1500}",
     "bias_stability": f"lasting_s = 1000.0\nrate_hz = 2.0\nscale = {SF1500}",
     "warm_up": f"band_ug = 3000.0\noff_s = 60.0\nlasting_s = 120.0\nscale = {SF1500}",
     "turn_on": f"cycles = 3\noff_s = 10.0\nwarm_up_s = 1.0\nwindow_s = 5.0\nscale = {SF1500}",
