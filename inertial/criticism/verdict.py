@@ -261,7 +261,11 @@ def _taken_for_noise(part: LotPart) -> tuple[Unexplained, CurveFit] | tuple[None
     """The driver of a curve that the model has as noise, and the curve; None if there is none."""
     suspected = part.suspected([])
     fit = curve_in_noise(part.base, suspected)
-    return (None, None) if fit is None else (unexplained_by(part.base, fit, len(suspected)), fit)
+    if fit is None:
+        return None, None
+    found = unexplained_by(part.base, fit, len(suspected))
+    # of few dwells for each unit the deviance falls by what a curve takes of their freedom, too
+    return (found, fit) if found.log_p < np.log(NAMED_BELOW) else (None, None)
 
 
 def _curve_in_place_of(

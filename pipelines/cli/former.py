@@ -3,6 +3,8 @@
 A word of the tables stands for itself; ``{}`` is the value of the option. An option whose new name is one word keeps its value
 where it is; one that is replaced by several, or by none, goes to the front, so that what is given besides has priority; a value
 that becomes an argument goes to the end; ``+--option text`` adds a text to the value of another option.
+
+``--history`` stays beyond that release: other programs are written against it.
 """
 
 from __future__ import annotations

@@ -13,9 +13,6 @@ BAD_DWELL = "bad_dwell"
 NAMED_DWELLS = 5
 """Number of dwells named in a sentence."""
 
-NOT_BY_P = "by this p slow noise could explain it, but a definite cause explains it far better"
-"""Said where a model whose residual slow noise could be is not adequate."""
-
 UNSEEN = "not seen so far: "
 """Beginning of the purpose of steps that show effects which the plan so far cannot show."""
 
@@ -63,8 +60,7 @@ def plain_verdict(judged: Mapping[str, Any]) -> str:
     if judged["adequate"]:
         return f"ADEQUATE: {_figures(judged)}"
     small = f"; {SMALL_MISFIT}" if is_small(judged) else ""
-    by_cause = f"; {NOT_BY_P}" if judged["p_value"] > ADEQUATE_ABOVE and not judged["reason"] else ""
-    return f"NOT ADEQUATE: {_figures(judged)}{small}{by_cause}"
+    return f"NOT ADEQUATE: {_figures(judged)}{small}"
 
 
 def _figures(judged: Mapping[str, Any]) -> str:
