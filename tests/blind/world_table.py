@@ -349,7 +349,11 @@ def rows_of_other_generators() -> Iterator[Row]:
     missed = "an offset of the encoder is named beside two poses that are off, in place of the slip"
     yield Row(Strange("encoder_slips", 20.0), 95_001, "encoder slips", physics=True, also=also, not_reached=missed)
     for world in (*map(Hand, ("warm_up", "temperature_curve", "lag", "cubic")), Hand("friction", rests=True)):
-        yield Row(world, 77, f"{world.effect} by hand", physics=True, also=changes.right_of(world.effect))
+        missed = (
+            "of the class the fifth order leads by more than 4, and is recommended" if world.effect == "cubic" else ""
+        )
+        also = changes.right_of(world.effect)
+        yield Row(world, 77, f"{world.effect} by hand", physics=True, also=also, not_reached=missed)
     # without a rest of the temperature friction and a lag are one class
     yield Row(Hand("friction"), 77, "friction without rests by hand", named=("thermal_hysteresis",), physics=True)
     warm = Recording(40, "white 280, B 30", warm_up=2000.0)
