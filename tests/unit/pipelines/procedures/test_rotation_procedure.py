@@ -172,5 +172,6 @@ def test_what_a_table_cannot_do_is_refused_before_anything_moves(message: str) -
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(3600)
 def test_mechanisms_hidden_in_table_and_device_are_named_first() -> None:
     assert judge(100, 7000, nothing=False) >= 95
