@@ -115,7 +115,7 @@ def _as_good(other: Verdict, verdict: Verdict, told: Sequence[Term]) -> bool:
     """Whether the same explains a lot as well without the errors of handling that were told beside it."""
     if other.handled or _bad(other) > _bad(verdict) or _causes(other) != _causes(verdict):
         return False
-    model = _with_free_states(other) if other.unexplained is None else other.unexplained.model
+    model = _as_found(other, verdict) if other.unexplained is None else other.unexplained.model
     if model is None:
         return False
     field = verdict.search.field
@@ -124,15 +124,15 @@ def _as_good(other: Verdict, verdict: Verdict, told: Sequence[Term]) -> bool:
     return not any(convincing(field, model, judge(field, model, term)) for term in told)
 
 
-def _with_free_states(verdict: Verdict) -> Model:
-    """The model with all effects, and what each remembers from before the first dwell free for every unit.
+def _as_found(other: Verdict, verdict: Verdict) -> Model:
+    """The model of a verdict with the effects as another one found them, and what each remembers from before the run free.
 
-    Devices that were not at rest leave something over in the first dwells. It takes many coefficients, and a pose that was wrong
-    there takes two.
+    As they were found: an effect that changes its place to that of an error, as a step does, has replaced the error and does not
+    refute it. Devices that were not at rest leave something over in the first dwells: for that they take many coefficients, and a
+    pose that was wrong there takes two.
     """
-    added = {t.key for t in verdict.result.added}
-    terms = [replace(t, rest=False) if t.key in added and t.memory else t for t in verdict.final.terms]
-    return Model(verdict.final.problem, terms, near=verdict.final.noise)
+    added = [replace(t, rest=False) if t.memory else t for t in verdict.result.added]
+    return Model(other.problem, [*other.base.terms, *added], near=other.final.noise)
 
 
 def _bad(verdict: Verdict) -> int:
