@@ -24,6 +24,13 @@ def known_options(command: object) -> set[str]:
     return {name for parameter in command.params for name in (*parameter.opts, *parameter.secondary_opts)} | {"--help"}
 
 
+def options_below(name: str) -> set[str]:
+    """Options of a command and of its subcommands."""
+    command = get_command(app).get_command(None, name)._load()
+    below = getattr(command, "commands", {}).values()
+    return known_options(command).union(*(known_options(one) for one in below))
+
+
 def unknown_options(line: str) -> set[str]:
     """The options of a line ``tumbleline …`` that its command does not have."""
     command, rest = command_of(shlex.split(line.replace("…", "X"))[1:])

@@ -8,32 +8,21 @@ from dataclasses import dataclass
 import numpy as np
 
 from inertial.arrays import Array
+from inertial.dynamics.missing_effects import NamedFit
+from inertial.dynamics.spectra import STANDARD_GRAVITY
 from inertial.errors import NotIdentified
 
-STANDARD_GRAVITY = 9.80665
 TERMS = ("bias", "scale", "second_order", "third_order", "arm_stretch_or_odd_quadratic", "mass_offset_or_asymmetry")
 
 
 @dataclass(frozen=True)
-class Polynomial:
+class Polynomial(NamedFit):
     """Coefficients of a centrifuge test in g of indicated acceleration, with their covariance.
 
     The indicated acceleration is the output over the sensitivity; terms are named in :data:`TERMS`. At one radius arm stretch
     and Koq·a|a| are one parameter of such a test, and so are the offset of the proof mass from the turning centre and a scale
     that differs by sign; :func:`fit_radii` separates them.
     """
-
-    names: tuple[str, ...]
-    value: Array
-    covariance: Array
-    residuals: Array
-    chi_square: float
-    dof: int
-
-    def of(self, name: str) -> tuple[float, float]:
-        """Value and standard uncertainty of a term."""
-        k = self.names.index(name)
-        return float(self.value[k]), float(np.sqrt(self.covariance[k, k]))
 
 
 def columns(acceleration: Array, names: tuple[str, ...]) -> Array:

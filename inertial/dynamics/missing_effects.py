@@ -6,6 +6,7 @@ from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 
+from inertial.arrays import Array
 from inertial.counts import degrees_of_freedom
 from inertial.distributions import chi2_tail
 from inertial.dynamics.effect_modules import DynamicEffect
@@ -35,6 +36,23 @@ class Fitted(Protocol):
     def dof(self) -> int:
         """Degrees of freedom."""
         ...
+
+
+@dataclass(frozen=True)
+class NamedFit:
+    """Coefficients by name, ``value`` (p,) with its covariance, and what they leave: residuals, χ² and degrees of freedom."""
+
+    names: tuple[str, ...]
+    value: Array
+    covariance: Array
+    residuals: Array
+    chi_square: float
+    dof: int
+
+    def of(self, name: str) -> tuple[float, float]:
+        """Value and standard uncertainty of a coefficient."""
+        k = self.names.index(name)
+        return float(self.value[k]), float(np.sqrt(self.covariance[k, k]))
 
 
 def p_value(fit: Fitted) -> float:

@@ -6,11 +6,11 @@ import numpy as np
 from scipy.signal import butter, lfilter, sosfiltfilt
 
 from inertial.arrays import Array
+from inertial.dynamics.spectra import STANDARD_GRAVITY
 from inertial.errors import NotIdentified
 
 TEN_PERCENT = 1.0 - 2.0 * float(np.arcsin(0.1)) / np.pi
 """0.936: part of a half sine's duration between its 10 % points."""
-STANDARD_GRAVITY = 9.80665  # m/s²
 TOP = 0.9  # of the largest sample: the part of the pulse through which the parabola is laid
 
 

@@ -14,7 +14,7 @@ from scipy.linalg import solve_triangular
 from scipy.stats import chi2, f, norm, t
 
 from inertial.arrays import Array
-from inertial.dynamics.missing_effects import ADEQUATE_P, FOLDS
+from inertial.dynamics.missing_effects import ADEQUATE_P, FOLDS, NamedFit
 from inertial.dynamics.rotation_effects import EFFECTS
 from inertial.dynamics.rotations import Nodes, Rotations, mean
 from inertial.dynamics.wander import wander
@@ -28,7 +28,7 @@ FEWEST_NOISE = 20  # degrees of freedom of the noise
 
 
 @dataclass(frozen=True)
-class RotationFit:
+class RotationFit(NamedFit):
     """Bias, matrix, delays, place and the effects of a model; ``names`` are those of the ``value`` (p,) with its covariance.
 
     Names are ``bias_x``, ``matrix_xy`` (output x, force y; g/g), ``delay_outer`` and ``delay_inner`` in s where the axis turns,
@@ -38,18 +38,7 @@ class RotationFit:
     residuals : (n, axes), g
     """
 
-    effects: tuple[str, ...]
-    names: tuple[str, ...]
-    value: Array
-    covariance: Array
-    residuals: Array
-    chi_square: float
-    dof: int
-
-    def of(self, name: str) -> tuple[float, float]:
-        """Value and standard uncertainty of a coefficient."""
-        k = self.names.index(name)
-        return float(self.value[k]), float(np.sqrt(self.covariance[k, k]))
+    effects: tuple[str, ...] = ()
 
     def of_function(self, slope: dict[str, float]) -> float:
         """Standard uncertainty of a function by its derivatives over coefficients."""
@@ -239,13 +228,13 @@ class RotationModel:
         wide = float(f.isf(ADEQUATE_P, dof, total) * dof / chi2.isf(ADEQUATE_P, dof))
         student = float(t.ppf(0.975, self.data.noise_dof) / norm.ppf(0.975))
         return RotationFit(
-            tuple(effects),
             tuple(names),
             value + self._offset(names),
             inverse * max(variance, 1.0) * student**2,
             self.data.output - columns @ value,
             max(squares, 0.0) / (variance * wide),
             dof,
+            tuple(effects),
         )
 
     def _offset(self, names: Sequence[str]) -> Array:

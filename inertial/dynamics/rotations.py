@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from inertial.arrays import Array, Flags
+from inertial.dynamics.spectra import STANDARD_GRAVITY
 from inertial.frames import to_fixture
 
-STANDARD_GRAVITY = 9.80665
 NODES = np.array([-np.sqrt(0.6), 0.0, np.sqrt(0.6)])
 SHARES = np.array([5.0, 8.0, 5.0]) / 18.0
 """Gauss–Legendre over the angles of a point: exact to 10⁻⁷ for waves of up to five a turn over 10°."""

@@ -14,7 +14,6 @@ from stations.devices.equipment import REFERENCE_SLOT
 from stations.devices.table import GRACE_S, PATIENCE, TiltTable
 
 POLL_S = 0.05  # between readings of the encoder: at 30 °/s every 1.5°, which shows ripple of up to 100 waves a turn
-
 NEAR_DEG = 0.1
 
 

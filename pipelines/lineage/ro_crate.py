@@ -23,7 +23,7 @@ def write_crate(archive: Archive, traced: Lineage, folder: Path) -> int:
     """Write a crate into a new folder; return the number of copied files."""
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise WrongUse(
-            f"lineage: {folder} exists and is not empty, a new or empty folder is needed for the crate; give another with --crate"
+            f"lineage: {folder} exists and is not empty, a new or empty one is needed for the crate; give it with --output"
         )
     contents = _contents(archive, traced.graph)
     for name in contents:
@@ -32,9 +32,9 @@ def write_crate(archive: Archive, traced: Lineage, folder: Path) -> int:
                 f"lineage: {name!r} is a path outside the crate's folder, a path inside it is needed; do not use this archive"
             )
     for name, data in contents.items():
-        files.publish(folder / name, data, "lineage", "give another folder with --crate")
+        files.publish(folder / name, data, "lineage", "give another folder with --output")
     document = json.dumps(crate_of(traced, contents), indent=1, ensure_ascii=False, sort_keys=True) + "\n"
-    files.publish(folder / METADATA, document.encode(), "lineage", "give another folder with --crate")
+    files.publish(folder / METADATA, document.encode(), "lineage", "give another folder with --output")
     return len(contents)
 
 

@@ -112,14 +112,15 @@ def _refusal(search: RecipeSearch) -> str:
     if requirement.discrimination is not None:
         needed = requirement.discrimination.chi_square
         reached = f"χ² {needed / near**2:.2g}, {needed:g} is needed"
-        return f"{start}discriminates between these effects: the best reaches {reached}; use {near:.1f} times the size (--size)"
+        enough = f"{near:.1f} times the size is enough (--set size=…)"
+        return f"{start}discriminates between these effects: the best reaches {reached}; {enough}"
     lower = lower_bound(search.recipe, search.against, requirement, ramp=search.ramp)
     if lower is None:
         bound = "; uninterrupted measurement for the textbook plan's time does not reach them either: wander limits the bias"
     else:
         bound = f"; uninterrupted measurement needs {100.0 * lower.share:.0f} % of the textbook plan's time, for {lower.effect}"
     nearest = f": the best has {near:.3f} times those" if math.isfinite(near) else ""
-    return f"{start}reaches the required errors{nearest}{bound}; allow larger errors (--factor, --wanted) or other temperatures"
+    return f"{start}reaches the required errors{nearest}{bound}; allow more by --set factor=… or --wanted, or other temperatures"
 
 
 class RecipeSearch:

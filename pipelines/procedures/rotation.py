@@ -68,9 +68,8 @@ class Rotation(InG, Evaluated):
         made: list[ProcedureStep] = []
         for plane in part.planes:
             axis, other = AT_REST[plane]
-            end = (
-                part.end_deg if axis == "inner" else -part.end_deg
-            )  # of which the outer axis has less way between planes
+            # of the two ends this is the one from which the outer axis has less way between planes
+            end = part.end_deg if axis == "inner" else -part.end_deg
             turns = tuple(
                 Turn(axis, to, rate, part.stand_s)
                 for rate in part.rates_deg_s
@@ -139,9 +138,8 @@ class Rotation(InG, Evaluated):
     def of_unit(self, part: RotationPart, unit: str, rows: pd.DataFrame, device: Device) -> UnitOutcome:
         """Figures of all axes, the coefficients in words, the drive, and the diagnosis."""
         data = data_of(rows)
-        with threadpool_limits(
-            1
-        ):  # matrices of some hundred rows: threads wait for each other longer than they compute
+        # matrices of some hundred rows: threads wait for each other longer than they compute
+        with threadpool_limits(1):
             diagnosis = diagnose_rotation(data, part.effects)
         fit, letters = diagnosis.fit, data.letters
         figures = [
@@ -252,8 +250,8 @@ def _drive(part: RotationPart, rows: pd.DataFrame) -> Texts:
     departure = turning.groupby("sweep")["rate_deg_s"].agg(lambda r: float((r / r.mean() - 1.0).std())).max()
     angle = np.sqrt((turning[[f"angle_{k}_deg" for k in range(6)]].to_numpy(dtype=float) ** 2).sum(axis=1).max())
     open_urad = MICRO * np.radians(angle)
-    text = f"rate steady to {100.0 * departure:.2g} % rms over ten degrees; readings leave {open_urad:.2g} µrad of the angle"
-    return [("drive", f"{text} open (k = 1) at most, which every uncertainty holds")]
+    text = f"rate steady to {100.0 * departure:.2g} % rms over 10°; the readings determine the angle to {open_urad:.2g} µrad"
+    return [("drive", f"{text} (k = 1) or better; every uncertainty includes this")]
 
 
 def _open(part: RotationPart) -> Texts:

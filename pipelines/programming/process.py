@@ -133,7 +133,7 @@ class Programmer:
             one.step_counts = one.memory.offset_step if self.choice.with_offsets else 0
             if self.choice.with_offsets and not one.step_counts:
                 raise WrongUse(
-                    f"program: unit {one.serial} has no offset registers, they are needed; leave --offset-registers out"
+                    f"program: unit {one.serial} has no offset registers, they are needed; leave --set offset_registers=yes out"
                 )
 
     def _each(

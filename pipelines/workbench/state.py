@@ -155,7 +155,7 @@ class RunPage(PageState):
 
     def arguments(self) -> list[str]:
         """The run's summary, or the differences between the two."""
-        return ["diff", self.run, self.beside] if self.beside else ["show", self.run]
+        return ["archive", "diff", self.run, self.beside] if self.beside else ["show", self.run]
 
 
 Against = Literal["force", "unit_C", "time", "pose"]

@@ -63,7 +63,7 @@ class ChamberOrders:
         towards = moved if goal > before else -moved
         verdict: Verdict = "held" if towards >= RESPONSE_K else "differs" if towards <= -AWAY_K else "not tried"
         found = f"air changed by {moved:+.2f} K in {self.watch_s:g} s"
-        remedy = "check that sensor, heating and cooling belong to this loop; --watch looks longer"
+        remedy = "check that sensor, heating and cooling belong to this loop; --set watch=S looks longer"
         self.orders.add("air follows the set point", verdict, found, f"towards {goal:g} °C", remedy)
         chamber.set_temperature(before)
         self.orders.add("takes the old set point again", "held", f"{chamber.set_point():g} °C", f"{before:g} °C")

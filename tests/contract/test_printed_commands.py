@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from each import each
-from typed_commands import unknown_options
+from typed_commands import options_below, unknown_options
 
 from pipelines.cli import COMMANDS
 from pipelines.cli.former import COMMANDS as FORMER
@@ -47,13 +47,14 @@ def quoted(text: str) -> list[str]:
 
 NAMES = "|".join(re.escape(name) for name in (*COMMANDS, *FORMER))
 SOURCES = {path: path.read_text(encoding="utf-8") for path in PRODUCT}
-FOUND = [
-    (path.relative_to(ROOT).as_posix(), line)
+MESSAGES = [
+    (path.relative_to(ROOT).as_posix(), text)
     for path, source in SOURCES.items()
-    if "tumbleline " in source  # the others need not be parsed: this is done by every process that collects the tests
+    if "tumbleline " in source
+    or " --" in source  # others need not be parsed: each process that collects the tests does it
     for text in texts(ast.parse(source))
-    for line in quoted(text)
 ]
+FOUND = [(place, line) for place, text in MESSAGES for line in quoted(text)]
 OF_PAGES = [
     (path.relative_to(ROOT).as_posix(), re.sub(r"{{.*?}}", "X", line))
     for path in TEMPLATES
@@ -81,3 +82,23 @@ def test_a_command_on_a_line_of_its_own_is_made_of_quoted_words() -> None:
         if re.match(rf" +tumbleline (?:{NAMES})\b", text)
     }
     assert raw == set()
+
+
+FOREIGN = {
+    "inertial/",  # its constants name the commands that print their characteristics
+    "pipelines/orchestrator/", "pipelines/flows/", "pipelines/drawing/", "pipelines/doctor/software.py",
+    "schemas/installed.py", "schemas/locks.py",
+}  # fmt: skip
+"""Rooms that name the options of other programs, or start these."""
+
+
+def test_an_option_in_a_message_is_one_of_a_command() -> None:
+    known = {name for line in sorted(COMMANDS) for name in options_below(line)} | {"--log", "--version", "--help"}
+    wrong = {
+        (place, word)
+        for place, text in MESSAGES
+        if not place.startswith(tuple(FOREIGN)) and not place.endswith("cli/former.py")
+        for word in re.findall(r"(?<![\w-])--[a-z][a-z-]*[a-z]", text)
+        if word not in known
+    }
+    assert wrong == set()

@@ -248,14 +248,14 @@ def _comparison(document: dict[str, Any]) -> list[str]:
     if worst is not None:
         meets = "meets the required errors" if worst <= 1.0 else f"has up to {worst:.2f} times the required errors"
         lines.append(
-            f"{name} {meets}." + ("" if worst <= 1.0 else f" For errors as in {name}, give --factor {worst:.2f}.")
+            f"{name} {meets}." + ("" if worst <= 1.0 else f" For errors as in {name}, give --set factor={worst:.2f}.")
         )
         if worst <= 1.0 and more > 0.0:
             lines.append(f"{name} is quicker and meets the requirement: keep it.")
     if document["worst"] > 1.0:
         lines.append(
             "No recipe was found that reaches the textbook plan's errors for every coefficient; the nearest has up to "
-            f"{document['worst']:.3f} times these errors. Allow larger errors with --factor, or fewer dwells with --verification."
+            f"{document['worst']:.3f} times these errors. Set a larger factor, or fewer verification dwells, with --set."
         )
     return lines
 
