@@ -166,18 +166,7 @@ def curve_in_noise(base: Model, field: Sequence[Driver]) -> CurveFit | None:
     paid = PER_COEFFICIENT * best.rank + PER_COLUMN * (best.model.local.shape[-1] - base.local.shape[-1])
     # of noise that units share all of them follow a curve by chance when one does
     ahead = (cost_of_model(base) - best.cost + paid) / shared_noise(best.model) - paid
-    held = base.problem.count - base.space.dof
-    ahead -= _of_few(base.problem.count, held + best.rank) - _of_few(base.problem.count, held)
     return best if ahead > decisions.CURVE_AHEAD else None
-
-
-def _of_few(count: int, coefficients: int) -> float:
-    """What a deviance falls by chance beyond its price where few measurements are left to many coefficients.
-
-    Hurvich and Tsai, Biometrika 76 (1989) 297: 2k(k + 1)/(n − k − 1).
-    """
-    left = count - coefficients - 1
-    return 2.0 * coefficients * (coefficients + 1.0) / left if left > 0 else float("inf")
 
 
 def unexplained_by(base: Model, fit: CurveFit, looks: int) -> Unexplained:

@@ -51,7 +51,16 @@ def cost_of_model(model: Model) -> float:
     rank = space.local_rank + space.shared_rank
     count = model.problem.covariance.count.astype(np.float64)
     deviance = space.logdet + deviance_of(space.squares, count)
-    return deviance + (PER_COEFFICIENT * (rank + nonlinear) + PER_COLUMN * columns)
+    price_of_all = PER_COEFFICIENT * (rank + nonlinear) + PER_COLUMN * columns
+    return deviance + price_of_all + of_few(model.problem.count, rank + nonlinear)
+
+
+def of_few(count: int, coefficients: int) -> float:
+    """What a deviance falls by chance beyond its price where few measurements are left to many coefficients.
+
+    Hurvich and Tsai, Biometrika 76 (1989) 297: 2k(k + 1)/(n − k − 1).
+    """
+    return 2.0 * coefficients * (coefficients + 1.0) / max(count - coefficients - 1, 1e-3)
 
 
 def freedom(term: Term) -> int:
