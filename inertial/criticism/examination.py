@@ -22,6 +22,7 @@ from inertial.decisions import CLASS_WIDTH, RISES
 from inertial.estimation.alternative import Handling, Misfit, soaks
 from inertial.estimation.candidate import blocks_of_units
 from inertial.estimation.comparison import fitted_residuals, rms, slope_of
+from inertial.estimation.force_noise import by_force
 from inertial.estimation.loudness import loudness_of
 from inertial.estimation.model import Model, refuse_without_freedom
 from inertial.estimation.penalty import cost_of_model
@@ -90,6 +91,9 @@ class ExaminedRun:
         loudness = loudness_of(self.model(), self.soak)
         if loudness is not None:
             self.lot = replace(self.lot, loudness=loudness)
+        louder = by_force(self.model(), self.soak)
+        if louder is not None:
+            self.lot = replace(self.lot, error=self.lot.error * louder)
 
     def was_found(self, term: Term) -> bool:
         """Whether a sudden change of the whole lot was found before."""

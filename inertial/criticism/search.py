@@ -176,7 +176,18 @@ def contest(field: Candidates, model: Model, barred: str = "", finalists: int = 
     for looked in scanned(field, [model.at(other) for other in others], leave):
         for term, _ in looked[:finalists]:
             chosen.setdefault(term.effect.id, term)
-    return ranked([judge_refined(field, model, term) for term in chosen.values()])
+    return ranked([_judged_as_far(field, model, term) for term in chosen.values()])
+
+
+def _judged_as_far(field: Candidates, model: Model, term: Term) -> Rival:
+    """A term added to a model, with refined nonlinear parameters where they can make it significant.
+
+    Of the cells of the grids no parameter moves the logarithm of the probability to more than :data:`decisions.WITHIN_A_CELL`
+    times that at its grid value: the refinement of what noise explains would take half of the time of a large lot.
+    """
+    first = judge(field, model, term)
+    hopeless = decisions.WITHIN_A_CELL * first.log_p + np.log(max(field.looks, 1)) > np.log(NAMED_BELOW)
+    return first if hopeless else judge_refined(field, model, term)
 
 
 def scanned(field: Candidates, spaces: Sequence[Space], leave: set[str]) -> list[list[tuple[Term, float]]]:
