@@ -113,7 +113,7 @@ Derived: a Bonferroni bound, so that a search of noise of known covariance repor
 """
 
 WITHIN_A_CELL = 3.0
-"""Factor on the logarithm of a probability that refined nonlinear parameters gain at the most over the grid value nearest to them.
+"""Factor on the logarithm of a probability that refined nonlinear parameters gain at the most over their values on the grid.
 
 In worlds with a hidden effect of the size of the noise and half of it 2.6 at the most (a ladder of converter steps), else 1.04.
 """

@@ -71,6 +71,7 @@ class ExaminedRun:
     barred : alternatives that only imitate a drift, and are not searched again
     drift : the last drift that had looked like them; then curves of every kind are suspected
     soak : (n,), number of the soak of each dwell, as measured
+    louder : (units, n, axes), by which the white noise of a dwell is larger than its axis', where it depends on the force
     """
 
     lot: Lot
@@ -81,6 +82,7 @@ class ExaminedRun:
     barred: set[str] = field(default_factory=set[str])
     drift: Unexplained | None = None
     soak: Places | None = None
+    louder: Array | None = None
     _made: tuple[list[object], Model] | None = None
 
     def estimate_loudness(self) -> None:
@@ -93,6 +95,7 @@ class ExaminedRun:
             self.lot = replace(self.lot, loudness=loudness)
         louder = by_force(self.model(), self.soak)
         if louder is not None:
+            self.louder = louder if self.louder is None else self.louder * louder
             self.lot = replace(self.lot, error=self.lot.error * louder)
 
     def was_found(self, term: Term) -> bool:

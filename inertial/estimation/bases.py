@@ -7,6 +7,9 @@ from inertial.arrays import Array, Places
 SEEN = 0.01
 """Share of a column, after the base model, below which it is not visible (noise of the drivers has this size)."""
 
+_LEFT = 1e-8
+"""Part of the sum of squares of a target that rounding leaves of it."""
+
 
 def eigen(gram: Array) -> tuple[Array, Array]:
     """Eigenvalues (..., p), ascending, and vectors (..., p, p) of symmetric matrices; up to two rows without a solver."""
@@ -75,11 +78,16 @@ def basis(columns: Array) -> tuple[Array, Places, float]:
     return q, keep.sum(axis=-1), determinant or 0.0
 
 
-def schur(gram: Array) -> float:
-    """Sum of squares of the first target after the others."""
-    if gram.shape[0] == 1:
+def schur(gram: Array, whole: Array | None = None) -> float:
+    """Sum of squares of the first target after the others.
+
+    whole : products of the targets of which these are left; a target of which rounding is left explains nothing
+    """
+    own = np.diag(gram)[1:]
+    seen = own > (0.0 if whole is None else _LEFT * np.diag(whole)[1:])
+    if not seen.any():
         return float(gram[0, 0])
-    size = np.sqrt(np.maximum(np.diag(gram)[1:], 1e-300))
-    inner = gram[1:, 1:] / np.outer(size, size)
-    cross = gram[1:, 0] / size
+    size = np.sqrt(own[seen])
+    inner = gram[1:, 1:][np.ix_(seen, seen)] / np.outer(size, size)
+    cross = gram[1:, 0][seen] / size
     return float(gram[0, 0] - cross @ np.linalg.lstsq(inner, cross, rcond=1e-8)[0])

@@ -247,7 +247,7 @@ class Space:
             by_block = np.einsum("bgr,bgr->bg", along[..., 0], along[..., 0])
             return Gain(by_block.sum(axis=0), rank, by_block)
         left = self.gram - np.einsum("bgrt,bgrs->gts", along, along)
-        drop = np.array([self.rss - schur(each) for each in left])
+        drop = np.array([self.rss - schur(each, self.gram) for each in left])
         return Gain(drop, rank, self._by_block(along, left))
 
     def _by_block(self, along: Array, left: Array) -> Array:

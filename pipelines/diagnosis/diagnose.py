@@ -143,6 +143,7 @@ def document(
         *undetermined_responses(measurement.state),
         *gaps(measurement, faults, left_out),
         *without_history(measurement, terms),
+        *result_rows.noise_along(diagnosis.run),
     ]
     error = error_of(diagnosis.rms, diagnosis.floor, diagnosis.log_p)
     adequate, reason, error = told(diagnosis.base, diagnosis.adequate, diagnosis.unjudged, error)

@@ -7,6 +7,7 @@ import numpy as np
 
 from inertial import effects as catalogue
 from inertial.criticism.diagnosis import Diagnosis, Named
+from inertial.criticism.examination import ExaminedRun
 from inertial.criticism.influence import CarriedEvidence
 from inertial.data_errors.removed_dwells import BadDwell
 from inertial.estimation.model import Model
@@ -16,6 +17,9 @@ from schemas.units import MICRO
 
 BAD_DWELL = "bad_dwell"
 """Id of a fault of a single dwell of one unit."""
+
+_ACROSS, _ALONG = 0.3, 0.9
+"""Forces along the axis, g, below and above which its noise is compared."""
 
 
 @dataclass(frozen=True)
@@ -224,6 +228,22 @@ def noise_of(model: Model) -> dict[str, Any]:
         "walk_share": float(noise.shares.walk),
         "noise_spread": float(np.max(noise.scale) / np.min(noise.scale)),
     }
+
+
+def noise_along(run: ExaminedRun) -> list[str]:
+    """A notice where the white noise depends on the force along the axis, with how much."""
+    if run.louder is None:
+        return []
+    force = np.broadcast_to(run.lot.state.force, (*run.louder.shape[:2], 3))[..., list(run.lot.state.axes)]
+    across, along = (run.louder[part] for part in (np.abs(force) < _ACROSS, np.abs(force) > _ALONG))
+    if not (across.size and along.size):
+        return []
+    ratio = float(np.sqrt(np.mean(along**2) / np.mean(across**2)))
+    where, cause = ("along", "the reference voltage") if ratio > 1.0 else ("across", "the table's repeatability")
+    times = max(ratio, 1.0 / max(ratio, 1e-9))
+    return [
+        f"white noise of a dwell is {times:.2g} times as large {where} gravity, and is weighed so; check {cause} and the floor"
+    ]
 
 
 def _plausible(size: float, typical: tuple[float, float]) -> bool:

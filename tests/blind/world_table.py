@@ -347,6 +347,9 @@ def rows_of_other_generators() -> Iterator[Row]:
     for seed in (420_004, 420_006):
         also = changes.linear_coefficients_are_named
         yield Row(Strange("null"), seed, "one temperature that wanders", physics=True, also=also)
+    for seed in (98_000_003, 98_000_007):
+        grows = Strange("grows_with_force")
+        yield Row(grows, seed, "noise along gravity", first=(), unexplained=frozenset(), fast=seed == 98_000_003)
     also = changes.may_be_of_the_station
     missed = "an offset of the encoder is named beside two poses that are off, in place of the slip"
     yield Row(Strange("encoder_slips", 20.0), 95_001, "encoder slips", physics=True, also=also, not_reached=missed)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from inertial.criticism.noise_draws import Directions
-from inertial.estimation.bases import SEEN
+from inertial.estimation.bases import SEEN, schur
 from inertial.estimation.candidate import Candidate, times_rows
 from inertial.estimation.covariance import Covariance
 from inertial.estimation.noise_shares import Noise, Shares
@@ -122,3 +122,10 @@ def test_drawn_noise_is_white_again_after_the_whitener(rng: np.random.Generator)
         again = whole.white_rows(rows[blocks].copy(), SHARES, blocks)
         again /= (whole.level * noise.scale)[blocks, None, None]
         np.testing.assert_allclose(again, np.swapaxes(expected, 1, 2)[blocks], rtol=1e-9, atol=1e-9)
+
+
+def test_a_shared_column_that_a_candidate_explains_completely_explains_nothing_more():
+    whole = np.array([[9.0, 3.0, 1.0], [3.0, 4.0, 0.0], [1.0, 0.0, 2.0]])
+    for rounding in (0.0, 1e-17, -1e-17):
+        left = np.array([[9.0, 1e-9, 1.0], [1e-9, rounding, 0.0], [1.0, 0.0, 2.0]])
+        assert schur(left, whole) == pytest.approx(9.0 - 0.5)

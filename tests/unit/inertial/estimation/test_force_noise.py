@@ -1,0 +1,54 @@
+"""Noise that grows with the force along the axis is told from equal noise, and from a curve of the transfer function."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from made_worlds import HIDDEN, NOISES, NULLS, Noise, World, run_of
+
+from inertial.criticism.examination import ExaminedRun
+from inertial.estimation.force_noise import by_force
+
+SEED = 5_700_400
+
+
+def noisier(run: ExaminedRun, power: float, ug: float) -> np.ndarray:
+    """White noise as strong as a power of the force is added to a run; standard deviation (units, n, 3) of all white noise."""
+    force = np.abs(np.broadcast_to(run.lot.state.force, run.lot.output.shape))
+    added = 1e-6 * ug * force**power
+    drawn = np.random.default_rng(SEED).standard_normal(force.shape)
+    run.lot = replace(run.lot, output=run.lot.output + added * drawn)
+    return np.sqrt(run.lot.error**2 + added**2)
+
+
+@pytest.mark.parametrize("power", [1.0, 2.0])
+def test_noise_that_grows_with_the_force_is_found_in_its_size(power):
+    run = run_of(World(noise=Noise(white=10.0, flicker=5.0)), SEED)
+    true = noisier(run, power, 40.0)
+    found = by_force(run.model())
+    assert found is not None
+    ratio = found / (true / np.sqrt(np.mean(true**2, axis=1, keepdims=True)))
+    assert np.all(np.abs(np.log(ratio[true > 0.5 * true.max()])) < 0.25)
+
+
+@pytest.mark.parametrize("name", ["B30", "K4", "white", "t3", "lengths", "units_spread", "axis_x3", "one_unit"])
+def test_equal_noise_is_not_found_to_grow(name):
+    assert [by_force(run_of(NULLS[name], SEED + seed).model()) for seed in range(3)] == [None] * 3
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["third_order_2", "cross_coupling_2", "adc_nonlinearity_5", "scale_temperature_quadratic_2", "aging_linear_2"],
+)
+def test_an_effect_is_no_noise(name):
+    assert by_force(run_of(HIDDEN[name], SEED).model()) is None
+
+
+def test_louder_soaks_are_no_louder_forces():
+    assert by_force(run_of(NOISES["hot_x4"], SEED).model()) is None
+
+
+def test_poses_without_a_repetition_tell_nothing():
+    run = run_of(World(soaks=(25.0,), noise=Noise(white=10.0, flicker=5.0)), SEED)
+    noisier(run, 2.0, 40.0)
+    assert by_force(run.model()) is None
