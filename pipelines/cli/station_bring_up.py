@@ -200,17 +200,12 @@ def replay(
 
     What was never asked while it was recorded is refused and named. Exit status 3: something new was asked.
     """
-    import signal
-    import threading
-
+    from pipelines.cli.terminal import stopped
     from pipelines.commissioning.frames import devices_of
     from stations.recordings.other_programs import read_recording
     from stations.recordings.replay_server import ReplayServer
 
-    recording, stop = read_recording(file), threading.Event()
-    for name in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(name, lambda *_: stop.set())
-    told = set[str]()
+    recording, stop, told = read_recording(file), stopped(), set[str]()
 
     def new(request: str) -> None:
         if request not in told:
