@@ -120,17 +120,18 @@ def test_the_page_measures_opens_the_door_kills_continues_and_certifies() -> Non
         assert tuple(words[: len(beginning)]) == beginning
         status, out, err = given(*words, columns=columns)
         assert status == 0, err
-        assert not same(out, printed), command
+        assert same(out, printed) == "", command
 
     command, printed = next(steps)
     with started(*command.split()[1:]) as station:
-        said = [station.stdout.readline() for _ in range(2)]
-        assert not same("".join(said), printed.replace("…", ""))
+        said = "".join(iter(station.stdout.readline, "\n"))
+        assert not same(said, printed.replace("…", ""))
         shown("station", "status")
         command, printed = next(steps)
         assert not printed
         with started(*command.split()[1:]) as run:
-            until(lambda: recorded() > 0, "a record")
+            until(lambda: recorded() > 0 or run.poll() is not None, "a record")
+            assert run.poll() is None, run.communicate()
             station.stdin.write(re.search(r"^ +(door:.*)$", pages.text(PAGE), re.MULTILINE)[1] + "\n")
             station.stdin.flush()
             until(lambda: "suspended" in given("station", "log")[1], "a pause")
