@@ -51,7 +51,7 @@ export async function go(address, { push = true, part = "", focus = false, renew
     for (const link of document.querySelectorAll(".bar nav a")) {
       if (link.pathname === location.pathname) link.setAttribute("aria-current", "page"); else link.removeAttribute("aria-current");
     }
-    if (push && !keep) window.scrollTo(0, 0);
+    if (push && !keep && !place?.submits) window.scrollTo(0, 0);
     if (place && (renews || place.submits)) regain(place); else if (focus) main().focus({ preventScroll: true });
   }
   arrived();
