@@ -8,6 +8,7 @@ playwright.
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 import tempfile
@@ -46,6 +47,7 @@ OF_A_LINE = {"audit": ("/audit", 1150), "discover": ("/discover", 1150)}
 
 def main() -> None:
     """Write all pictures."""
+    os.environ["LOGNAME"] = "operator"  # the author of runs and models
     with tempfile.TemporaryDirectory() as place, chromium() as browser:
         top = Path(place)
         demo = ("demo", "cubic_transfer", "--seed", "1", "--by-hand", "--folder", "bench")
@@ -74,6 +76,10 @@ def main() -> None:
                     of_page(one, f"workbench-{name}", tall)
                 one.open("/upload")
                 one.page.set_input_files("[data-file]", recording(top / "bench-7.csv"))
+                one.sees("[data-mapping]")
+                one.page.fill("input[name=serial]", "BENCH-7")
+                one.page.fill("input[name=gravity]", "9.81")
+                one.press("text=Apply")
                 one.sees("[data-dwells]")
                 of_page(one, "workbench-upload", 1150)
             with tab(browser, server.address, size=PHONE) as one:
