@@ -25,6 +25,8 @@ sys.path.insert(0, str(FOLDER.parents[1] / "tests"))
 
 from browser import Tab, chromium, served, tab, until  # noqa: E402
 
+from benchmarks.generated_archive import write_archive  # noqa: E402
+
 WIDTH, COLOURS = 1240, 128
 REPORTS = {"report": 1775, "diagnosis": 1500}
 PHONE = (390, 844)
@@ -41,7 +43,6 @@ PAGES = {
     "station": ("/station", 900), "two-models": (f"/two-models?{FILE}&added=third_order", 1000),
     "models": ("/models?model=line-1&evaluate=yes", 900),
 }  # fmt: skip
-OF_A_LINE = {"audit": ("/audit", 1150), "discover": ("/discover", 1150)}
 """Address and height of the pages, by the name of the picture behind ``workbench-``."""
 
 
@@ -85,11 +86,16 @@ def main() -> None:
             with tab(browser, server.address, size=PHONE) as one:
                 one.open(PAGES["before"][0].format(folder=top / "bench"))
                 of_page(one, "workbench-phone", PHONE[1] + 300)
-        (archive,) = (path.parent for path in (top / "line").rglob("runs"))
-        with served(archive, top / "bench") as server, tab(browser, server.address) as one:
-            for name, (address, tall) in OF_A_LINE.items():
-                one.open(address)
-                of_page(one, f"workbench-{name}", tall)
+        of_an_archive(browser, top / "line" / "archive", "discover")
+        write_archive(top / "factory", 16, years=2.0, seed=7, workers=1)
+        of_an_archive(browser, top / "factory", "audit")
+
+
+def of_an_archive(browser: Any, archive: Path, name: str) -> None:
+    """A page that looks at many lots, of an archive of its own."""
+    with served(archive, archive.parent / f"bench-{name}") as server, tab(browser, server.address) as one:
+        one.open(f"/{name}")
+        of_page(one, f"workbench-{name}", 1150)
 
 
 def recording(path: Path) -> str:

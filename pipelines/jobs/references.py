@@ -151,7 +151,7 @@ def unseen(judged: ReferencesDocument) -> str:
     none += [f"{LABELS[name]} (it looks like {IMITATED[name]})" for name in judged["not_seen"]]
     parts = [f"this run would show, with 90 % probability, {', '.join(told)}"] if told else []
     parts += [f"it cannot show: {', '.join(none)}"] if none else []
-    return "; ".join(parts)
+    return "; ".join(parts) or "it shows nothing of the table"
 
 
 def _from(one: SeenReference) -> str:
