@@ -77,14 +77,14 @@ def serve(
     port: int,
     speed: float,
     stop: Event,
-    ready: Callable[[str, int], None],
+    ready: Callable[[str, int], Callable[[Plant], None] | None],
     silence_s: float = 0.0,
 ) -> None:
     """Serves until ``stop`` is set; the time of the station advances at ``speed`` times wall time.
 
     Drives and reader have communication time-outs: they stop ``silence_s`` after the last request; 0 means never.
-    ``ready`` gets host and port once they listen; a device with a text protocol has the next port. Sampling starts
-    only on the command of a client.
+    ``ready`` gets host and port once they listen; a device with a text protocol has the next port. What it returns is called
+    with the plant at every tick. Sampling starts only on the command of a client.
     """
     if config.kind != "simulated":
         raise WrongUse(
@@ -97,12 +97,14 @@ def serve(
     silence = IdleStop(plant, config.devices, silence_s)
     with ExitStack() as stack:
         server = _listening(plant, host, port, stack)
-        ready(server.host, server.port)
+        each_tick = ready(server.host, server.port)
         clock, done = WallClock(), 0.0
         while not stop.wait(max(SHORTEST_TICK_S, min(TICK_S, TICK_S / speed))):
             now = clock.now()
             plant.advance(round((now - done) * speed * 1e6))
             silence.look(now)
+            if each_tick is not None:
+                each_tick(plant)
             done = now
 
 

@@ -25,7 +25,7 @@ PATIENCE_S = float(os.environ.get("TUMBLELINE_PATIENCE_S", "120"))
 READY = """() => Boolean(document.body.dataset.ready) && !document.querySelector('.work progress')
     && [...document.querySelectorAll('[data-figure]')].every((e) => {
         const r = e.getBoundingClientRect();
-        return !e.checkVisibility() || r.top > innerHeight + 150
+        return !e.checkVisibility() || r.top > innerHeight + 150 || r.bottom < -150
             || e.dataset.drawn === e.dataset.figure || e.querySelector('p.note'); })"""
 
 WAITING = """async () => JSON.stringify({state: document.readyState, ready: document.body.dataset.ready ?? null,

@@ -15,7 +15,7 @@ from pipelines.audit.parameters import unit_text
 from pipelines.audit.station_findings import of_stations
 from pipelines.audit.unit_findings import of_units
 from pipelines.report.numbers import significant
-from pipelines.stages.figures import FIGURES
+from pipelines.stages.figures import figure_label
 
 TELLING_EFFECT = 0.02  # smaller shares of the variance between groups are not relevant
 DIFFERENT_P = 1e-3
@@ -145,10 +145,9 @@ def _incapable(audit: Audit) -> Iterator[AuditFinding]:
     for able in audit.abilities:
         if able.ppk.low < audit.rules.ppk_least:
             limit = f"{able.limit:g}" if able.unit_text == "1" else f"{able.limit:g} {able.unit_text}"
-            label = FIGURES[able.figure].label if able.figure in FIGURES else able.figure.replace("_", " ")
             message = (
-                f"{able.device}: {label} has Ppk {able.ppk.value:.2f} ({able.ppk.low:.2f} to {able.ppk.high:.2f}) "
-                f"against {limit}, at least {audit.rules.ppk_least:g} is needed; "
+                f"{able.device}: {figure_label(able.figure)} has Ppk {able.ppk.value:.2f} "
+                f"({able.ppk.low:.2f} to {able.ppk.high:.2f}) against {limit}, at least {audit.rules.ppk_least:g} is needed; "
                 f"{100 * able.outside.value:.2g} % are outside: reduce the spread, or widen the limit"
             )
             interval = {"ppk": able.ppk.value, "low": able.ppk.low, "high": able.ppk.high}

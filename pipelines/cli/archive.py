@@ -47,7 +47,7 @@ def clean(
     only_look: Annotated[bool, option("--dry-run", "Show what would be removed, and change nothing.")] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Remove temporary files of killed writers and add finished runs to the chain; files in use are not touched."""
+    """Remove temporary files of killed processes, and add finished runs to the chain of hashes; files in use are not touched."""
     from pipelines.archive.cleaning import clean as cleaned
 
     store = Archive(archive)

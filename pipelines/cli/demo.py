@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 PART = "Start here"
 ORDER = 50
 SUMMARY = "Hide an effect in the simulated station, find it, add it and see the error fall."
-EXAMPLES = ("tumbleline demo", "tumbleline demo pendulous_mass --seed 11 --by-hand")
+EXAMPLES = ("tumbleline demo --station", "tumbleline demo pendulous_mass --seed 11 --by-hand")
 
 
 def command(
@@ -41,6 +41,9 @@ def command(
         ),
     ] = None,
     *,
+    station: Annotated[
+        bool, option("--station", "Serve a station on this machine to practise lots, faults and stops on.")
+    ] = False,
     yes: Annotated[bool, option("--yes -y", "Run without questions.")] = False,
     by_hand: Annotated[
         bool, option("--by-hand", "Only measure and write the files; continue with the commands yourself.")
@@ -52,6 +55,9 @@ def command(
     The same lot is measured twice; the second run is fresh data that no fit sees.
     """
     drawn = secrets.randbelow(100000) if seed is None else seed
+    if station:
+        _practise(folder, as_json=as_json)
+        return
     if lots is not None:
         _archive(folder, drawn, lots, as_json=as_json)
         return
@@ -90,6 +96,40 @@ def _archive(folder: Path, seed: int, lots: int, *, as_json: bool) -> None:
     with error_console().status("judging the archive night by night"):
         document = played(written, hidden, processors(), seed)
     give(document, print_discovery_demo, as_json=as_json)
+
+
+def _practise(folder: Path, *, as_json: bool) -> None:
+    """A station served faster than real time until Ctrl-C, its file in the folder, and faults from standard input."""
+    from pipelines.archive.files import ELSEWHERE, writing
+    from pipelines.cli.terminal import stopped
+    from pipelines.demo.practice import RECIPE, TypedFaults, free_port, practice_file, practice_lot
+    from schemas.station import load_station
+    from stations.serving import serve
+
+    file, lot = folder / "station.toml", practice_lot()
+
+    def ready(host: str, port: int) -> TypedFaults:
+        text, config = practice_file(port)
+        publish(file, text, "station")
+        speed, units = config.link.speed, [unit.serial for unit in lot.units]
+        if as_json:
+            print_json({"station": str(file), "host": host, "port": port, "speed": speed, "units": units})
+            return TypedFaults(remark)
+        say(
+            f"A simulated station answers Modbus TCP at {host}:{port}. Its clock runs {speed:g} times as fast as yours."
+        )
+        say(f"In its slots: {', '.join(units)}.")
+        say("\nIn a second terminal:", "bold")
+        say(f"  {command_line('station', 'status', '--station', str(file))}")
+        say(f"  {command_line('run', RECIPE, '--station', str(file))}")
+        say("\nHere, while the lot is measured, type a fault and press Enter; Ctrl-C ends the station:", "bold")
+        say("  door:for_s=60")
+        return TypedFaults(say)
+
+    with writing(folder, "demo", ELSEWHERE):
+        folder.mkdir(parents=True, exist_ok=True)
+    speed = practice_file()[1].link.speed
+    serve(load_station(), lot, host="127.0.0.1", port=free_port(), speed=speed, stop=stopped(), ready=ready)
 
 
 def _put_aside(model: Path) -> Path | None:

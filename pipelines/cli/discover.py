@@ -20,11 +20,17 @@ def command(
     archive: ArchiveOption = None,
     device: Annotated[str, option("--device KIND", "Kind of device; that of most runs by default.")] = "",
     since: Annotated[
-        str, option("--since DATE", "Only lots from this day on; the nightly evidence stays as it is.")
+        str, option("--since DATE", "Only lots from this day on; the stored evidence is not changed.")
     ] = "",
-    driver: Annotated[str, option("--driver a,b", "Only discoveries of these drivers, such as wafer,station.")] = "",
+    driver: Annotated[
+        str, option("--driver a,b", "Only effects that differ by these attributes, such as wafer,station.")
+    ] = "",
     explain: Annotated[
-        str, option("--explain ID", "One discovery with its levels, what carries it, and what to measure next.")
+        str,
+        option(
+            "--explain ID",
+            "One discovery: its size at each level, the lots that it rests on, and the next measurement.",
+        ),
     ] = "",
     model: Annotated[
         Path | None, option("--model FILE", "A model file: what is left with its effects in the model of every lot.")
@@ -39,17 +45,20 @@ def command(
     *,
     reach: Annotated[bool, option("--reach", "Print the smallest effects that this archive could have shown.")] = False,
     populations: Annotated[
-        bool, option("--populations", "Look for two populations in each coefficient, too: a second for each.")
+        bool, option("--populations", "Also test each coefficient for two populations; takes a second for each.")
     ] = False,
     looking_back: Annotated[
         bool,
-        option("--looking-back", "Judge all lots again with the attributes known now; the nightly evidence stays."),
+        option(
+            "--looking-back", "Judge all lots again with the attributes known now; the stored evidence is not changed."
+        ),
     ] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Pool the lots of an archive: effects that differ by wafer, station, slot, firmware or date, or that all lots have.
 
-    Evidence is valid every night. Exit status 1: there is a new discovery.
+    It may be repeated after every night's runs: the probability of a false discovery does not grow.
+    Exit status 1: there is a new discovery.
     """
     from pipelines.cli.text.discovery_text import print_discoveries, print_explained
     from pipelines.discovery.discover import Look, discovered, explained

@@ -23,7 +23,7 @@ def command(
 ) -> None:
     """Check the installation and its connections, with a remedy for each fault.
 
-    Nothing is moved, and no lease is needed. A file of 1 MiB is written to the archive and to the state folder, read back and
+    Nothing is moved. A file of 1 MiB is written to the archive and to the state folder, read back and
     removed. A station is checked only if --station names it. Exit 1: at least one fault; warnings leave it at 0.
     """
     from pipelines.doctor.examine import examine

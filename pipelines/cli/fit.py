@@ -32,7 +32,7 @@ def command(
     *,
     as_json: options.JsonOption = False,
 ) -> None:
-    """Fit a model to archived data again; the result is a new run on the same capture; the old run is kept.
+    """Fit a model to archived data again; the result is a new run on the same measurement; the old run is kept.
 
     An import is fitted with known poses or, without them, by the norm of gravity. Exit status 1: the model is not adequate, it
     cannot be judged, or a unit did not pass.

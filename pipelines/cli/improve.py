@@ -44,7 +44,8 @@ def command(
         Path | None, option("--output -o FILE", "Model file to write; --model or model.toml by default.")
     ] = None,
     choose: Annotated[
-        str, option("--effect a,b", "Effects to add, one per class of the diagnosis, without a question.")
+        str,
+        option("--effect a,b", "Effects to add without a question: one of each group that the data cannot separate."),
     ] = "",
     temperatures: options.TemperaturesOption = "",
     fresh: options.FreshOption = "",
@@ -55,7 +56,13 @@ def command(
     setting: Annotated[list[str] | None, options.set_option(GROUP)] = None,
     archive: options.ArchiveOption = None,
     *,
-    yes: Annotated[bool, option("--yes -y", "Answer yes; a class of several effects needs --effect.")] = False,
+    yes: Annotated[
+        bool,
+        option(
+            "--yes -y",
+            "Answer every question with yes; of effects that the data cannot separate, name one with --effect.",
+        ),
+    ] = False,
     measure: Annotated[
         bool | None,
         option(
@@ -68,8 +75,8 @@ def command(
 ) -> None:
     """Diagnose a model, ask which of the missing effects to add, write the model file, and judge the change by a fresh run.
 
-    A recording of another system is recognised, imported and fitted first; what was decided is printed as the command that
-    says the same. What leaves a doubt is refused with the command to complete.
+    A recording of another system is recognised, imported and fitted first; the import that was chosen is printed as a command.
+    Where a column or unit is not certain nothing is imported, and the command to complete is printed.
 
     One question per effect; effects that these data cannot separate are named in the question. Where DATA is a run and an effect
     was added, the fresh run is one of its archive, or the station measures it: one more question, or --measure. Exit status 0:

@@ -46,7 +46,7 @@ def command(
         bool | None,
         option(
             "--yes/--ask",
-            "Approval of extra station time: automatic, or ask, at the terminal or through a paused flow run.",
+            "Use extra station time without a question; default: ask.",
         ),
     ] = None,
     unseen: Annotated[
@@ -57,7 +57,7 @@ def command(
 ) -> None:
     """Measure a lot, diagnose it, and measure follow-ups that discriminate between the effects that may be missing.
 
-    It ends when every class of the diagnosis contains one effect, when the residuals are at the noise floor, or when the budget
+    It ends when each missing effect is separated from all others, when the residuals are at the noise floor, or when the budget
     is spent. An interrupted inquiry continues when the same command is given again. Exit status 0: the model is adequate or the
     effects are identified; 1: neither.
     """

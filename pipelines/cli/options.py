@@ -169,7 +169,9 @@ ArchiveOption = Annotated[
     option("--archive DIR", "Folder or address (s3://…) of the archive; TUMBLELINE_ARCHIVE or ./archive by default."),
 ]
 AllOption = Annotated[bool, option("--all", "Print the long tables, too.")]
-RecordOption = Annotated[Path | None, option("--record FILE", "Record every frame on the links into this new file.")]
+RecordOption = Annotated[
+    Path | None, option("--record FILE", "Record every message to and from the devices in this new file.")
+]
 READING = {
     "join": Setting("rows|columns", "join several files into one recording"),
     "group": Setting("NAME", "group of channels, if the file has several"),
@@ -180,7 +182,7 @@ RecipeArgument = Annotated[str, argument("[RECIPE]", "A recipe file or a built-i
 StationOption = Annotated[Path | None, option("--station FILE", "The station; the built-in simulated one by default.")]
 SeedOption = Annotated[int | None, option("--seed", "Seed of a simulated station.")]
 RepeatOption = Annotated[
-    int, option("--repeat", "Count of fresh measurements of the same lot: 1, 2, … measure it anew.", min=0)
+    int, option("--repeat", "Measure the same lot once more: 1 is the first repetition, 2 the second.", min=0)
 ]
 RunArgument = Annotated[str, argument("RUN", "A run's name, its beginning, or 'latest'.")]
 DwellsArgument = Annotated[str, argument("DWELLS", "A file in the exchange format, or a run of the archive.")]
@@ -188,7 +190,8 @@ EffectsOption = Annotated[
     str,
     option(
         "--effects a,b,c",
-        "The model as a list of effects; by default the run's own, for a file a plain or thermal one.",
+        "The model as a list of effects; default: that of the run; of a file bias, scale, misalignment, "
+        "and terms in temperature where it changes by more than 5 °C.",
     ),
 ]
 ModelOption = Annotated[Path | None, option("--model FILE", "The model as a model file.")]

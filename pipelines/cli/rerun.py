@@ -44,7 +44,7 @@ def command(
     report: Annotated[bool, option("--report", "Also make the report of every re-run.")] = False,
     as_json: options.JsonOption = False,
 ) -> None:
-    """Re-analyse archived runs with the present code, another model or other limits; only stages with a changed key are computed.
+    """Re-analyse archived runs with the present code, another model or other limits; only what a change affects is computed.
 
     Old runs are never overwritten: a changed result is a new run. After an interruption, give the same command again to continue.
     Exit status 1: a run could not be re-analysed, or with --check was not reproduced.

@@ -56,7 +56,7 @@ def command(
     replay: Annotated[
         Path | None, option("--replay FILE", "Answer from this recording of the same run; no station is opened.")
     ] = None,
-    direct: Annotated[bool, option("--direct", "Run the same chain without the orchestrator.")] = False,
+    direct: Annotated[bool, option("--direct", "Run without the Prefect server; the results are the same.")] = False,
     as_json: options.JsonOption = False,
 ) -> None:
     """Measure and calibrate a lot, from recipe to report: the main job.

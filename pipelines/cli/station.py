@@ -173,16 +173,12 @@ def serve(
     as_json: options.JsonOption = False,
 ) -> None:
     """Serve the simulated station over Modbus TCP until interrupted, for any Modbus client."""
-    import signal
-    import threading
-
+    from pipelines.cli.terminal import stopped
     from schemas.station import load_station
     from stations.serving import serve as run
     from stations.serving import served
 
-    config, stop = load_station(station), threading.Event()
-    signal.signal(signal.SIGTERM, lambda *_: stop.set())
-    signal.signal(signal.SIGINT, lambda *_: stop.set())
+    config = load_station(station)
 
     def ready(at: str, port_found: int) -> None:
         devices = served(config, list(range(units)))
@@ -196,7 +192,7 @@ def serve(
 
     silence_s = settings(setting, SERVING, "serve").get("silence", 30.0)
     lot = made_up(device, units, seed)
-    run(config, lot, host=host, port=port, speed=speed, stop=stop, ready=ready, silence_s=silence_s)
+    run(config, lot, host=host, port=port, speed=speed, stop=stopped(), ready=ready, silence_s=silence_s)
 
 
 def profiles(

@@ -36,12 +36,12 @@ def bring_up(
     device_id: Annotated[int, option("--device-id", "Unit id of the device; 0: look for it.", min=0, max=255)] = 0,
     out: Annotated[Path | None, option("--output -o DIR", "New folder for page, recording and profile.")] = None,
     setting: Annotated[list[str] | None, set_option(SECONDS)] = None,
-    who: Annotated[str, option("--who NAME", "Who does it, for the page.")] = "",
+    who: Annotated[str, option("--who NAME", "Name of the person, for the page.")] = "",
     *,
-    readings: Annotated[bool, option("--read-only", "No order is offered.")] = False,
+    readings: Annotated[bool, option("--read-only", "Only read: nothing is moved or set.")] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Connect one real device step by step, and say for every register and promise: held, differs, or not tried.
+    """Connect one real device step by step; report each register and behaviour of its profile as held, different or not tried.
 
     First it only reads: it looks for the device, its word order and its registers, and asks what the panel shows. Each order is
     given only after the word for it is typed. Whatever ends it, Ctrl-C and kill included, the device is left as it was found.
@@ -167,7 +167,7 @@ def frames(
 ) -> None:
     """Show a recording of a station's links: every request with its time, meaning and answer.
 
-    With --output FILE.py a recorded defect becomes a test: it holds the client to what it gets from the recorded device.
+    With --output FILE.py a recorded defect becomes a test: the test answers as the recorded device did.
     """
     from pipelines.commissioning.frames import as_test as text_of
     from pipelines.commissioning.frames import frames_document, frames_page
@@ -198,19 +198,14 @@ def replay(
 ) -> None:
     """Answer as the recorded devices did, over Modbus TCP, until interrupted: same values, delays, exceptions and silences.
 
-    What was never asked while it was recorded is refused and named. Exit status 3: something new was asked.
+    A request that the recording does not contain is refused and printed. Exit status 3: there was one.
     """
-    import signal
-    import threading
-
+    from pipelines.cli.terminal import stopped
     from pipelines.commissioning.frames import devices_of
     from stations.recordings.other_programs import read_recording
     from stations.recordings.replay_server import ReplayServer
 
-    recording, stop = read_recording(file), threading.Event()
-    for name in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(name, lambda *_: stop.set())
-    told = set[str]()
+    recording, stop, told = read_recording(file), stopped(), set[str]()
 
     def new(request: str) -> None:
         if request not in told:

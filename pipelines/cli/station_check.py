@@ -31,7 +31,7 @@ def check(
 ) -> None:
     """Test a station before a shift: registers, instruments, moves, noise of every slot, a check standard.
 
-    It leases the station as a run does and leaves it in the safe state. Exit status 3: a test failed.
+    No run can use the station meanwhile; the test leaves it in its safe state. Exit status 3: a test failed.
     """
     from schemas.station import load_station
     from stations.links.recorder import recorded

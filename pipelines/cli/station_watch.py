@@ -44,7 +44,7 @@ def status(
 
     Exit status 3: a part does not answer, or a run ended without the safe state.
 
-    Nothing is moved and no lease is needed: a run in progress is not disturbed.
+    Nothing is moved: a run in progress is not disturbed.
     """
     from schemas.station import load_station
     from stations.overview import looked_at

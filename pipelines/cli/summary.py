@@ -109,13 +109,14 @@ def print_result(document: dict[str, Any]) -> None:
 def _limited(document: dict[str, Any]) -> list[tuple[str, str]]:
     """Figures of procedures that have a limit, with their heads."""
     from pipelines.procedures import FIGURES
+    from pipelines.stages.figures import figure_label
 
     heads: dict[str, str] = {}
     for unit in document["units"]:
         for name, figure in unit["figures"].items():
             if name in FIGURES and figure["outcome"] != "no limit":
                 unit_text = "" if figure["unit_text"] == "1" else figure["unit_text"]
-                heads[name] = f"{name.replace('_', ' ')}\n{unit_text}"
+                heads[name] = f"{figure_label(name)}\n{unit_text}"
     return list(heads.items())
 
 

@@ -1,8 +1,10 @@
 """The operator at a terminal: questions on standard error, answers from standard input, one line each, typed or scanned."""
 
+import signal
 import sys
 from collections.abc import Callable
 from contextlib import AbstractContextManager
+from threading import Event
 
 from pipelines.chain.attendance import Answer, Prompt
 from pipelines.cli.printing import remark
@@ -12,6 +14,14 @@ from schemas.errors import WrongUse
 YES = frozenset({"", "y", "yes", "go", "ok"})
 STOP = frozenset({"stop", "s", "q", "quit", "no", "n"})
 TITLES = {"load": "Load", "confirm": "Seats", "trouble": "Fault", "unload": "Unload", "approve": "Approve"}
+
+
+def stopped() -> Event:
+    """The event that Ctrl-C, or SIGTERM, sets from now on: the end of a command that serves."""
+    stop = Event()
+    for name in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(name, lambda *_: stop.set())
+    return stop
 
 
 class Terminal:

@@ -263,4 +263,4 @@ def _fall_text(progress: dict[str, Any]) -> str:
         return "the error cannot be judged on dwells left out"
     beside = {"base": "the coefficients of the earlier model", "bias": "the bias of each unit"}
     again = beside.get(progress["estimated_again"] or "")
-    return fall_of(fall, progress["fall_u_ug"]) + (f" where {again} may change from day to day" if again else "")
+    return fall_of(fall, progress["fall_u_ug"]) + (f" with {again} fitted to the fresh run anew" if again else "")

@@ -196,7 +196,7 @@ def _points(trace: Trace, colour: str) -> dict[str, Any]:
     kind = "scattergl" if trace.x.size > MANY else "scatter"
     out: dict[str, Any] = {"type": kind, "mode": "markers", "marker": marker}
     if trace.error is not None:
-        out["error_y"] = {"type": "data", "array": packed(trace.error), "color": colour, "thickness": 1}
+        out["error_y"] = {"type": "data", "array": packed(trace.error), "color": colour, "thickness": 1, "width": 0}
     if trace.texts:
         out |= {"text": [_safe(text) for text in trace.texts], "hovertemplate": "%{text}<extra></extra>"}
     if trace.picks:

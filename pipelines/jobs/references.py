@@ -145,14 +145,15 @@ def _digits(value: float, count: int = 3) -> str:
 
 
 def unseen(judged: ReferencesDocument) -> str:
-    """From which size on the run would have told an error, and what it cannot show at any size."""
-    told = [f"{LABELS[one['entry']]} {_from(one)}" for one in judged["seen"]]
-    none = [f"{LABELS[name]} (as {IMITATED[name]})" for name in judged["not_seen"]]
-    text = f"told at 90 % from: {', '.join(told)}" if told else "nothing of the table is seen"
-    return f"{text}; not seen at any size: {', '.join(none)}" if none else text
+    """From which size on this run would show an error, and which errors it cannot show."""
+    told = [f"{LABELS[one['entry']]} {_from(one)}" for one in judged["seen"] if one["told_from"] is not None]
+    none = [LABELS[one["entry"]] for one in judged["seen"] if one["told_from"] is None]
+    none += [f"{LABELS[name]} (it looks like {IMITATED[name]})" for name in judged["not_seen"]]
+    parts = [f"this run would show, with 90 % probability, {', '.join(told)}"] if told else []
+    parts += [f"it cannot show: {', '.join(none)}"] if none else []
+    return "; ".join(parts) or "it shows nothing of the table"
 
 
 def _from(one: SeenReference) -> str:
     unit = UNITS.get(one["unit"], one["unit"])
-    size = "no size" if one["told_from"] is None else f"u {_digits(one['told_from'], 2)} {unit}"
-    return f"{size} (stated {_digits(one['stated'])})"
+    return f"from u = {_digits(one['told_from'] or 0.0, 2)} {unit} (stated {_digits(one['stated'])})"

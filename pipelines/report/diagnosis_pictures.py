@@ -137,6 +137,7 @@ def quantity_chart(
     quantity: str,
     unit: int,
     colour: Literal["axis", "direction", "slot"] = "axis",
+    names: tuple[str, str] = ("before", "after"),
 ) -> Chart:
     """Residuals of a lot against a recorded quantity; the previous model on the left if there is one, on one scale.
 
@@ -145,10 +146,11 @@ def quantity_chart(
     before : residuals of the previous model, as in the table
     unit : place of the unit that stands out
     colour : what colours tell of the points of that unit: the axis, or the way the temperature was reached
+    names : of the previous model and of this one
     """
     label, values = table.drivers[quantity]
     sides = (
-        [(table.residual, "the model judged")] if before is None else [(before, "before"), (table.residual, "after")]
+        [(table.residual, "the model judged")] if before is None else [(before, names[0]), (table.residual, names[1])]
     )
     largest = 1.06 * float(np.nanmax(np.abs(sides[0][0] if len(table.units) <= FEW else sides[0][0][unit])))
     across = PlotAxis(RESIDUAL, low=-largest, high=largest)

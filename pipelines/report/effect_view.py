@@ -127,7 +127,7 @@ def _view(
     fallen = np.nanmean(before**2, axis=2) - np.nanmean(after**2, axis=2)
     shown, axis = (int(k) for k in np.unravel_index(int(np.argmax(fallen)), fallen.shape))
     quantity = next(
-        (one for one in _quantities(problem, term, axis) if _followed(one.values[shown], adds[shown, axis]) > FOLLOWED),
+        (one for one in _quantities(problem, term, axis) if followed(one.values[shown], adds[shown, axis]) > FOLLOWED),
         DriverValues("", f"contribution of {term.effect.id} / µg", adds[:, axis]),
     )
     return EffectView(
@@ -227,7 +227,7 @@ def _product(one: DriverValues, other: DriverValues) -> str:
     return f"{names[0]}·{names[1]} / {units}"
 
 
-def _followed(x: Array, y: Array) -> float:
+def followed(x: Array, y: Array) -> float:
     """Part of the squares of values that equal and neighbouring values of ``x`` predict: 1 of a function of x without noise."""
     there = np.isfinite(x) & np.isfinite(y)
     x, y = x[there], y[there]

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 
 from pipelines.drawing.chart import Chart, ColourScale, Plot, PlotAxis, Role, Trace, level, measured_curve
+from pipelines.report.effect_view import BOTH_SIDES, followed
 from pipelines.report.smooth_curve import smooth
 from schemas.units import AXES, axes_among
 
@@ -22,7 +23,7 @@ AGAINST: dict[Against, str] = {
     "time": "station time / h",
     "pose": "pose",
 }
-COLUMNS = {"force": "force_g", "unit_C": "unit_C", "time": "time_s"}
+COLUMNS: dict[Against, str] = {"force": "force_g", "unit_C": "unit_C", "time": "time_s"}
 POSE_SHIFT = {"x": -0.2, "y": 0.0, "z": 0.2}
 
 
@@ -46,17 +47,6 @@ def model_chart(dwells: pd.DataFrame, residuals: pd.DataFrame) -> Chart:
     return Chart("Model and measurement", (*rows[0], *rows[1], *rows[2]), len(rows[0]), scale, height=250)
 
 
-def response_chart(unit: str, residuals: pd.DataFrame, dwells: pd.DataFrame) -> Chart:
-    """Measured output of a unit against specific force, axis by axis; a click on a point shows its dwell."""
-    plots: list[Plot] = []
-    for axis in (a for a in AXES if f"out_{a}" in dwells):
-        own = residuals[residuals["axis"] == axis].merge(dwells[["dwell", f"out_{axis}", "out_unit"]], on="dwell")
-        force, output = own["force_g"].to_numpy(float), own[f"out_{axis}"].to_numpy(float)
-        points = Trace("measured", force, output, role=cast("Role", axis), size=6.0, picks=_picks(unit, own))
-        plots.append(_response(axis, points, str(own["out_unit"].iloc[0]) if len(own) else ""))
-    return Chart("Output against specific force", tuple(plots), 3, height=280)
-
-
 def _response(axis: str, points: Trace, unit: str) -> Plot:
     """Measured output of an axis against specific force, with the straight line through it."""
     traces = [points]
@@ -67,10 +57,25 @@ def _response(axis: str, points: Trace, unit: str) -> Plot:
     return Plot(f"axis {axis}", PlotAxis(f"specific force on {axis} / g"), PlotAxis(f"output / {unit}"), tuple(traces))
 
 
+def follows_most(residuals: pd.DataFrame, dwells: pd.DataFrame) -> Against:
+    """What the residuals of a unit depend on most: force, temperature or time; the mean over its axes decides."""
+    timed = _timed(residuals, dwells)
+    axes = [own for _, own in timed.groupby("axis")]
+
+    def share(name: Against) -> float:
+        column = COLUMNS[name]
+        return sum(followed(own[column].to_numpy(float), own["residual_ug"].to_numpy(float)) for own in axes)
+
+    return max(COLUMNS, key=share)
+
+
+def _timed(residuals: pd.DataFrame, dwells: pd.DataFrame) -> pd.DataFrame:
+    return residuals.merge(dwells[["dwell", "time_s"]], on="dwell", how="left")
+
+
 def residual_chart(unit: str, residuals: pd.DataFrame, dwells: pd.DataFrame, against: Against) -> Chart:
-    """Residuals of a unit against force, temperature, time or pose; a click on one shows its dwell."""
-    timed = residuals.merge(dwells[["dwell", "time_s"]], on="dwell", how="left")
-    plot = _residuals("", timed, against, 7.0, unit)
+    """Residuals of a unit against force, temperature, time or pose, with what noise alone leaves; a click shows the dwell."""
+    plot = _residuals("", _timed(residuals, dwells), against, 7.0, unit)
     return Chart(f"Residuals against {AGAINST[against]}", (plot,), height=380)
 
 
@@ -86,7 +91,8 @@ def _residuals(title: str, residuals: pd.DataFrame, against: Against, size: floa
         else:
             x = own[COLUMNS[against]].to_numpy(float) / (3600.0 if against == "time" else 1.0)
         picks = _picks(unit, own) if unit else ()
-        traces.append(Trace(f"axis {axis}", x, y, role=role, size=size, texts=_told(own), picks=picks))
+        error = BOTH_SIDES * own["expected_ug"].to_numpy(float) if unit and "expected_ug" in own else None
+        traces.append(Trace(f"axis {axis}", x, y, role=role, size=size, texts=_told(own), picks=picks, error=error))
         traces += [] if against == "pose" else smooth(axis, x, y, role)
     zero = level(np.concatenate([trace.x for trace in traces]), 0.0, dashed=False)
     names = tuple(poses) if against == "pose" else ()

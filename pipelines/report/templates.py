@@ -10,14 +10,14 @@ from jinja2 import Environment, FunctionLoader, StrictUndefined, Template
 
 from inertial import effects
 from pipelines.report.interactive import scripts_hash
-from pipelines.stages.figures import FIGURES
+from pipelines.stages.figures import UNITS, figure_label
 
 
 @cache
 def _environment() -> Environment:
     loader = FunctionLoader(lambda part: (files("pipelines.report") / part).read_text(encoding="utf-8"))
     made = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    own: dict[str, Any] = {"plain_name": plain_name, "figure_name": figure_name}
+    own: dict[str, Any] = {"plain_name": plain_name, "figure_label": figure_label}
     made.globals.update(own)
     return made
 
@@ -28,11 +28,6 @@ def plain_name(effect_id: str) -> str:
         return ""
     text = (type(effects.get(effect_id)).__doc__ or "").strip().splitlines()[:1]
     return text[0].partition(":")[0].rstrip(".") if text else ""
-
-
-def figure_name(figure: str) -> str:
-    """What a figure of merit is, in a few words for readers of a page; empty for one of another version."""
-    return FIGURES[figure].label if figure in FIGURES else ""
 
 
 def template(name: str) -> Template:
@@ -65,8 +60,7 @@ def plain_reason(text: str) -> str:
 
 def _plain(part: str) -> str:
     begin = re.match(r"\w+", part)
-    known = FIGURES.get(begin.group()) if begin else None
-    if begin is None or known is None:
+    if begin is None or begin.group() not in UNITS:
         return part
-    rest = part[begin.end() :]
-    return f"{known.label[:1].upper()}{known.label[1:]}{'' if rest.startswith(':') else ':'}{rest}"
+    label, rest = figure_label(begin.group()), part[begin.end() :]
+    return f"{label[:1].upper()}{label[1:]}{'' if rest.startswith(':') else ':'}{rest}"

@@ -24,8 +24,8 @@ def diff(a: Run, b: Run) -> dict[str, Any]:
 
     Raises DataRejected: the runs have no unit in common, or nothing to compare.
     """
-    coefficients = _changed(_table(a, "coefficients"), _table(b, "coefficients"), COEFFICIENT, "standard_error")
-    figures = _changed(_standard(a), _standard(b), FIGURE, "standard_error")
+    coefficients = changed(_table(a, "coefficients"), _table(b, "coefficients"), COEFFICIENT, "standard_error")
+    figures = changed(_standard(a), _standard(b), FIGURE, "standard_error")
     before, after = _grades(a), _grades(b)
     if before.keys().isdisjoint(after):
         raise DataRejected(
@@ -69,7 +69,7 @@ def _standard(run: Run) -> pd.DataFrame:
     return figures.assign(standard_error=figures["uncertainty"].astype(float) / np.where(limited, factor, PLAIN_FACTOR))
 
 
-def _changed(a: pd.DataFrame, b: pd.DataFrame, key: list[str], error: str) -> pd.DataFrame:
+def changed(a: pd.DataFrame, b: pd.DataFrame, key: list[str], error: str) -> pd.DataFrame:
     """Rows whose value or uncertainty differs, and rows that only one of the tables has."""
     keep = [*key, "value", error, "unit_text"]
     both = a[keep].merge(b[keep], on=key, how="outer", suffixes=("_a", "_b"))

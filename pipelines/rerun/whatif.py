@@ -159,7 +159,7 @@ def _verdict(
     if ratio.size < FEWEST:
         return EQUAL, f"{sentence}; {count} cannot show that this is more than scatter, {FEWEST} are needed"
     if not _differs(ratio, LEVEL):
-        return EQUAL, f"{sentence}: no more than {count} scatter"
+        return EQUAL, f"{sentence}: the scatter of {count} explains as much"
     hurt: list[str] = []
     for row in rows:
         own = [one for one in lots if (one.entry.station, one.entry.device) == (row["station"], row["device"])]

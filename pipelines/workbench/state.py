@@ -158,16 +158,19 @@ class RunPage(PageState):
         return ["archive", "diff", self.run, self.beside] if self.beside else ["show", self.run]
 
 
-Against = Literal["force", "unit_C", "time", "pose"]
+Against = Literal["", "force", "unit_C", "time", "pose"]
 
 
 class UnitPage(PageState):
-    """A unit of a run: model and measurement."""
+    """A unit of a run.
+
+    against : what the residuals are drawn against; empty for what they depend on most, force where the model is adequate
+    """
 
     PATH: ClassVar[str] = "/unit"
     run: Text = "latest"
     unit: Text = ""
-    against: Against = "unit_C"
+    against: Against = ""
     dwell: Text = ""
     parameter: Text = "bias x"
 
@@ -213,6 +216,22 @@ class MissingPage(PageState):
         """The command line for the errors of the model in its present state."""
         words = self.arguments()[1:] + options({"--fresh": self.fresh})
         return shlex.join(["tumbleline", "compare", *words, "--archive", archive]) if self.source else ""
+
+
+class TwoModelsPage(PageState):
+    """Two models on the same dwells.
+
+    source : a run, or a file of the workbench's folder · first, second : names of model files; empty for the source's own model
+    added : effects that the second has besides
+    """
+
+    PATH: ClassVar[str] = "/two-models"
+    source: Text = "latest"
+    first: Text = ""
+    second: Text = ""
+    added: Texts = ()
+    unit: Text = ""
+    against: Text = ""
 
 
 class UploadPage(PageState):

@@ -159,6 +159,7 @@ ELSEWHERE = {
     "simulate --json": "e2e/test_correct.py",
     "demo --yes --json": "e2e/test_models.py",
     "demo --by-hand --json": "e2e/test_models.py",
+    "demo --station --json": "e2e/test_practice.py",
     "station serve --json": "e2e/test_station.py",
     "station bring-up --json": "e2e/test_bring_up.py",
     "station replay --json": "e2e/test_frame_recordings.py",

@@ -118,6 +118,7 @@ SLOW = [
 """Guides whose commands start processes of their own, or search for long."""
 
 ELSEWHERE = {
+    "practise-on-a-station": "tests/e2e/test_practice.py",
     "import-your-data": "tests/e2e/test_guides.py",
     "correct-a-recording": "tests/e2e/test_correct.py",
     "README": "tests/e2e/test_guides.py",

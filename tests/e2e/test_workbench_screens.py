@@ -15,6 +15,7 @@ PAGES = (
     "/run",
     "/unit",
     "/missing",
+    "/two-models",
     "/upload",
     "/operator",
     "/models",
@@ -54,14 +55,15 @@ def test_on_a_narrow_screen_nothing_is_cut_and_the_whole_menu_is_seen(bench: Ser
 
 def test_plots_beside_each_other_stand_one_under_the_other_on_a_narrow_screen(bench: Served, browser: Any) -> None:
     with tab(browser, bench.address, size=PHONE) as one:
-        one.open("/unit?run=latest&unit=A1")
-        one.page.locator("[data-name=response]").scroll_into_view_if_needed()
-        one.sees("[data-name=response][data-drawn]")
-        left, second, bottom, top = one.page.evaluate(DOMAINS, "response")
+        one.open("/two-models?source=latest&added=third_order")
+        one.sees("[data-changes]")  # all of its work is done
+        one.page.locator("[data-name=residuals]").scroll_into_view_if_needed()
+        one.sees("[data-name=residuals][data-drawn]")
+        left, second, bottom, top = one.page.evaluate(DOMAINS, "residuals")
         assert left == second == 0
         assert bottom > top
         one.page.set_viewport_size({"width": SCREEN[0], "height": SCREEN[1]})
-        until(lambda: one.page.evaluate(DOMAINS, "response")[1] > 0.2, "a wide screen has them beside each other")
+        until(lambda: one.page.evaluate(DOMAINS, "residuals")[1] > 0.2, "a wide screen has them beside each other")
 
 
 def test_dots_are_reached_and_chosen_by_keyboard(bench: Served, browser: Any) -> None:

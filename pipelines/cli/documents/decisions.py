@@ -236,6 +236,16 @@ class DemoDocument(TypedDict):
     folder: str
 
 
+class DemoStationDocument(TypedDict):
+    """``demo --station --json``: the station that is served, printed when it is ready."""
+
+    station: Annotated[str, "its file"]
+    host: str
+    port: int
+    speed: Annotated[float, "seconds of the station per second"]
+    units: Annotated[list[str], "serial numbers in its slots"]
+
+
 class DemoFilesDocument(TypedDict):
     """``demo --by-hand --json``: the files of the two runs."""
 

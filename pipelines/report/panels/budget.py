@@ -6,7 +6,8 @@ import pandas as pd
 from pipelines.report.budget_plots import shares_plot
 from pipelines.report.context import ReportContext
 from pipelines.report.numbers import significant
-from pipelines.report.templates import figure_name, fill
+from pipelines.report.templates import fill
+from pipelines.stages.figures import figure_label
 from pipelines.stages.uncertainty.tables import LABELS
 from pipelines.tables.frames import rows_of
 from schemas.uncertainty import NEEDED
@@ -93,7 +94,7 @@ def _risks(table: pd.DataFrame | None) -> list[dict[str, str]]:
         return []
     return [
         {
-            "title": figure_name(row["figure"]) or row["figure"],
+            "title": figure_label(row["figure"]),
             **{name: significant(row[name]) for name in ("limit", "accept", "mean", "process", "u")},
             **{name: _percent(row[name]) for name in ("pfa", "pfr")},
             "largest": _percent(row["largest_pfa"]),

@@ -18,7 +18,7 @@ TEMPLATE = """\
 <div class="verdict adequate">Not contradicted: what the residuals of the units have in common is explained by the stated table.</div>
 {% endif %}
 <table>
-<thead><tr><th>contribution</th><th>unit</th><th>stated u</th><th>found u</th><th>95 % interval</th><th>told at 90 % from</th></tr></thead>
+<thead><tr><th>contribution</th><th>unit</th><th>stated u</th><th>found u</th><th>95 % interval</th><th>would be seen from (90 %)</th></tr></thead>
 <tbody>
 {% for one in judged.seen %}
 <tr{% if one.worse %} class="fail"{% endif %}><td>{{ labels[one.entry] }}</td><td>{{ units.get(one.unit, one.unit) }}</td><td>{{ number(one.stated) }}</td>

@@ -6,7 +6,8 @@ import numpy as np
 
 from pipelines.report.context import UnitContext
 from pipelines.report.numbers import significant
-from pipelines.report.templates import figure_name, fill
+from pipelines.report.templates import fill
+from pipelines.stages.figures import figure_label
 from pipelines.tables.frames import rows_of
 
 ORDER = 20
@@ -36,7 +37,7 @@ def _line(row: dict[str, Any]) -> dict[str, Any]:
     else:  # both are empty without a limit
         limit, margin = significant(most), significant(most - abs(row["value"]))
     return {
-        "title": figure_name(row["figure"]) or row["figure"],
+        "title": figure_label(row["figure"]),
         "value": significant(row["value"]),
         "uncertainty": significant(row["uncertainty"], 2) if row["uncertainty"] > 0.0 else "",
         "limit": limit,

@@ -61,6 +61,17 @@ UNITS: Mapping[str, str] = {
 }
 """The unit of each figure, of the calibration or of a procedure, against which limits files are checked."""
 
+SPELT = str.maketrans({"µ": "u", "²": "2", "³": "3", "/": "_", "√": "rt"})
+
+
+def figure_label(name: str) -> str:
+    """What a figure is, in a few words; of one of a procedure, or of another version, the words of its key without the unit."""
+    if name in FIGURES:
+        return FIGURES[name].label
+    unit = UNITS.get(name, "").replace("%", "percent").translate(SPELT)
+    kept = name[: -len(unit) - 1] if name.lower().endswith(f"_{unit}".lower()) else name
+    return kept.replace("_", " ")
+
 
 def figures_of(tables: UnitTables) -> Iterator[Figure]:
     """Every figure that the tables of one unit yield, in the order of the table ``figures``."""

@@ -10,7 +10,7 @@ from starlette.responses import Response
 from inertial.uncertainty.rounding import chance
 from pipelines.audit.documents import AuditDocument
 from pipelines.audit.finding import WHO
-from pipelines.stages.figures import FIGURES
+from pipelines.stages.figures import figure_label
 from pipelines.workbench.pages import asked, figure, no_figure, page, table_csv
 from pipelines.workbench.state import AuditPage
 
@@ -40,7 +40,7 @@ def audit(request: Request) -> Response:
     return page(
         request, "audit.html", state, problems, empty=not bench.archive.run_ids(), audited=audited, job=job, who=WHO,
         most_due=DUE, most_findings=FINDINGS, compared=COMPARED, chance=chance,
-        labels={name: kind.label for name, kind in FIGURES.items()},
+        figure_label=figure_label,
     )  # fmt: skip
 
 

@@ -28,7 +28,7 @@ from pipelines.workbench.pages import (
 )
 from pipelines.workbench.services import models, requests, sources
 from pipelines.workbench.services.work import Diagnosed
-from pipelines.workbench.state import MissingPage
+from pipelines.workbench.state import MissingPage, TwoModelsPage
 from schemas.errors import TumblelineError, WrongUse
 
 router = APIRouter()
@@ -61,6 +61,7 @@ def missing(request: Request) -> Response:
         ladder_command=state.ladder_command(bench.settings.archive),
         unit=state.unit if table is None else table.units[table.place_of(state.unit)],
         against="" if diagnosed is None else _quantity(diagnosed, state), candidates=CANDIDATES, influence=INFLUENCE,
+        two_models=TwoModelsPage(),
         drivers=[] if table is None else [(name, label) for name, (label, _) in table.drivers.items()],
         is_file=any(one.is_file and one.name == state.source for one in chosen),
     )  # fmt: skip

@@ -13,7 +13,8 @@ from pipelines.drawing import Chart
 from pipelines.report import run_pictures
 from pipelines.report.numbers import axis_word, side_by_side, with_uncertainty
 from pipelines.report.unit_panels.budget import NAMES
-from pipelines.stages.figures import FIGURES
+from pipelines.stages.figures import figure_label
+from pipelines.stages.judge import verdict_of
 from pipelines.tables.frames import rows_of
 from pipelines.workbench.pages import (
     Workbench,
@@ -58,13 +59,15 @@ def unit(request: Request) -> Response:
     parameters = list(dict.fromkeys(_parameter(row) for row in history))
     if parameters and state.parameter not in parameters:
         state = state.model_copy(update={"parameter": parameters[0]})
+    if "residuals" in tables and grade is not None and grade["outcome"] != "refused":
+        state = state.model_copy(update={"against": _against(bench, state)})
     place = units.index(state.unit)
     return page(
         request, "unit.html", state, problems, run=run, grade=grade, own=own, tables=tables, units=units,
         before=units[place - 1] if place else "", after=units[place + 1] if place + 1 < len(units) else "",
         coefficients=side_by_side(own.get("coefficients", []), _expanded), parameters=parameters,
         coverage=float((run.about.get("limits") or {}).get("coverage_factor", COVERAGE)),
-        names=NAMES, axis_word=axis_word, labels={name: kind.label for name, kind in FIGURES.items()},
+        names=NAMES, axis_word=axis_word, figure_label=figure_label,
         certificates=Ledger(bench.archive).calibrations(state.unit)[-CERTIFICATES:][::-1],
     )  # fmt: skip
 
@@ -97,12 +100,21 @@ def _chart(bench: Workbench, state: UnitPage, name: str) -> Chart:
         return run_pictures.history_chart(rows, state.parameter, str(rows[0]["unit_text"]))
     if name == "allan":
         return Chart("Allan deviation", (run_pictures.allan_plot(_drawn(bench, state, "allan")),), height=340)
-    if name in {"residuals", "response"}:
+    if name == "residuals":
         residuals, dwells = _drawn(bench, state, "residuals"), _drawn(bench, state, "dwells")
-        if name == "response":
-            return run_pictures.response_chart(state.unit, residuals, dwells)
-        return run_pictures.residual_chart(state.unit, residuals, dwells, state.against)
+        return run_pictures.residual_chart(state.unit, residuals, dwells, _against(bench, state))
     raise no_figure(name)
+
+
+def _against(bench: Workbench, state: UnitPage) -> run_pictures.Against:
+    """What the residuals are drawn against: as the address says, else what they depend on most, if anything is missing."""
+    if state.against:
+        return state.against
+    tables = bench.archive.run(state.run).tables()
+    verdict = verdict_of(run_table(bench, state.run, "verdict")) if "verdict" in tables else None
+    if verdict is not None and verdict["adequate"]:
+        return "force"
+    return run_pictures.follows_most(_table(bench, state, "residuals"), _table(bench, state, "dwells"))
 
 
 def _table(bench: Workbench, state: UnitPage, name: str) -> pd.DataFrame:

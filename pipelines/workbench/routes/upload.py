@@ -1,14 +1,21 @@
 """A file of the user: interpretation of its columns, correction, import, and coefficients."""
 
+import math
+from collections.abc import Iterable, Mapping
+from functools import partial
+from typing import Any
+
 from fastapi import APIRouter, Request
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import JSONResponse, Response
 
 from pipelines.importers.mapping import OUTPUT_UNITS, TEMPERATURE_UNITS, TIME_UNITS
+from pipelines.report.numbers import with_uncertainty
 from pipelines.workbench.pages import asked, page, table_csv, workbench_of
 from pipelines.workbench.services import uploads
 from pipelines.workbench.state import UploadPage
 from schemas.errors import TumblelineError, WrongUse
+from schemas.units import AXES
 
 router = APIRouter()
 HEADING, ORDER, ADDRESS = "Upload", 30, "/upload"
@@ -33,8 +40,21 @@ def upload(request: Request) -> Response:
     return page(
         request, "upload.html", state, problems, reading=reading, job=job, done=done, there=[str(one) for one in there],
         meanings=MEANINGS, mapped=dict(pair.split("=", 1) for pair in state.columns if "=" in pair),
+        level=partial(_level, 0.0 if reading is None else _largest(reading.dwells)),
         outputs=list(OUTPUT_UNITS), times=[*TIME_UNITS, "samples"], temperatures=TEMPERATURE_UNITS,
     )  # fmt: skip
+
+
+def _largest(dwells: Iterable[Mapping[str, Any]]) -> float:
+    return max(
+        (abs(float(row[f"out_{axis}"])) for row in dwells for axis in AXES if math.isfinite(row[f"out_{axis}"])),
+        default=0.0,
+    )
+
+
+def _level(largest: float, value: float) -> str:
+    """The mean of a dwell to the sixth digit of the largest, so that those near zero stand in the same places."""
+    return with_uncertainty(float(value), 2e-5 * largest)[0]
 
 
 @router.put("/upload/file")

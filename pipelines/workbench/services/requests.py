@@ -6,9 +6,19 @@ from pathlib import Path
 from typing import Any
 
 from pipelines.importers.limited import in_reader
+from pipelines.jobs.model_files import read_model
 from pipelines.workbench.services import models, sources, uploads
 from pipelines.workbench.settings import WorkbenchSettings
-from pipelines.workbench.state import AuditPage, DiscoverPage, MissingPage, ModelsPage, PageState, PlanPage, UploadPage
+from pipelines.workbench.state import (
+    AuditPage,
+    DiscoverPage,
+    MissingPage,
+    ModelsPage,
+    PageState,
+    PlanPage,
+    TwoModelsPage,
+    UploadPage,
+)
 from schemas.errors import WrongUse, did_you_mean
 from schemas.foreign import is_file
 
@@ -45,6 +55,27 @@ def _judging(settings: WorkbenchSettings, page: MissingPage) -> dict[str, Any]:
         "archive": settings.archive, "source": name, "stamp": sources.stamp(settings, name), "effects": list(page.effects),
         "added": list(page.added), "without": list(page.without), "formula": list(page.formula),
     }  # fmt: skip
+
+
+def two_models(settings: WorkbenchSettings, page: TwoModelsPage) -> tuple[MissingPage, MissingPage]:
+    """Each model of the page as a diagnosis of the same dwells."""
+    return _of_model(settings, page.source, page.first, ()), _of_model(settings, page.source, page.second, page.added)
+
+
+def _of_model(settings: WorkbenchSettings, source: str, model: str, added: tuple[str, ...]) -> MissingPage:
+    if not model:
+        return settled(settings, MissingPage(source=source, added=added))
+    file = read_model(models.place_of(settings, model))
+    formulas = tuple(f"{one.id} = {'; '.join(one.columns)}" for one in file.formula)
+    return settled(
+        settings, MissingPage(source=source, effects=tuple(file.model.effects), added=added, formula=formulas)
+    )
+
+
+def coefficients(settings: WorkbenchSettings, page: TwoModelsPage) -> Request:
+    """The coefficients of two models on the same dwells."""
+    both = [_judging(settings, one) for one in two_models(settings, page)]
+    return f"coefficients of two models on {page.source}", {"both": both}
 
 
 def settled(settings: WorkbenchSettings, page: MissingPage) -> MissingPage:
@@ -142,6 +173,7 @@ KINDS: dict[str, tuple[type[PageState], Callable[[WorkbenchSettings, Any], Reque
     "plan": (PlanPage, plan),
     "audit": (AuditPage, audit),
     "discover": (DiscoverPage, discover),
+    "coefficients": (TwoModelsPage, coefficients),
     "whatif": (ModelsPage, what_if),
     "import": (UploadPage, bring_in),
 }

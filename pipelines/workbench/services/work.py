@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from pipelines.audit.finding import AuditFinding
@@ -99,6 +100,24 @@ def diagnose(request: Mapping[str, Any], report_progress: ReportProgress) -> Dia
     names = {name: meaning for name, (_, _, meaning) in known.items() if not meaning.startswith("the same")}
     names |= dict.fromkeys(covariates(dwells), "recorded column")
     return Diagnosed(made.document, table, ladder, before, names, views)
+
+
+def coefficients(request: Mapping[str, Any], report_progress: ReportProgress) -> list[dict[str, Any]]:
+    """The coefficients that differ between two models on the same dwells, as :func:`pipelines.rerun.diff.changed` has them."""
+    from pipelines.rerun.diff import COEFFICIENT, changed
+    from pipelines.stages.fit import fit_in_memory
+    from pipelines.tables.dwells import LotTables
+    from pipelines.tables.frames import rows_of
+
+    tables: list[pd.DataFrame] = []
+    for number, one in enumerate(request["both"]):
+        report_progress(number, len(request["both"]), "fitting")
+        dwells, history, judged = _inputs(one, "two models")
+        told = {"kind": "dwell", "out_unit": "g"}  # what a file that lacks them means
+        whole = dwells.assign(**{name: text for name, text in told.items() if name not in dwells})
+        fitted, _, _ = fit_in_memory(LotTables(whole, history), [*(judged or ()), *one["added"]])
+        tables.append(fitted["coefficients"])
+    return rows_of(changed(tables[0], tables[1], COEFFICIENT, "standard_error"))
 
 
 def ladder(request: Mapping[str, Any], report_progress: ReportProgress) -> list[dict[str, Any]]:
@@ -275,6 +294,7 @@ def bring_in(request: Mapping[str, Any], report_progress: ReportProgress) -> dic
 WORK: dict[str, Any] = {
     "diagnose": diagnose,
     "ladder": ladder,
+    "coefficients": coefficients,
     "plan": planned,
     "audit": audited,
     "discover": discovered,

@@ -71,7 +71,7 @@ async function paint(place, library) {
   });
 }
 
-// Arrow keys go from point to point in the order of their places, Enter chooses the one that is pointed at.
+// Arrow keys go from point to point in the order of their places, Enter chooses the one that is pointed at, Escape lets it go.
 function byKeyboard(place, library) {
   let at = -1;
   place.tabIndex = 0;
@@ -83,6 +83,7 @@ function byKeyboard(place, library) {
     .filter((one) => Number.isFinite(Number(one.y))).sort((a, b) => a.trace.xaxis.localeCompare(b.trace.xaxis) || a.x - b.x);
   place.addEventListener("keydown", (event) => {
     const step = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
+    if (event.key === "Escape") { library.Fx.unhover(place); heard.textContent = ""; }
     if (event.target !== place || (!step && event.key !== "Enter")) return;
     const all = points();
     if (!all.length) return;

@@ -35,8 +35,10 @@ export async function go(address, { push = true, part = "", focus = false, renew
   if (page.title) document.title = page.title;  // a part of a page has none
   const wanted = part ? [...document.querySelectorAll(`[data-swap="${CSS.escape(part)}"]`)] : [];
   const fresh = part ? [...page.querySelectorAll(`[data-swap="${CSS.escape(part)}"]`)] : [];
+  const place = held();
   if (part && wanted.length && wanted.length === fresh.length) {
     wanted.forEach((old, k) => { forget(old); old.replaceWith(document.adoptNode(fresh[k])); });
+    if (place && !document.contains(place.element)) regain(place);
     const line = page.querySelector(".command"), shown = main().querySelector(".command");
     if (line && shown) shown.replaceWith(document.adoptNode(line));
   } else {
@@ -49,10 +51,26 @@ export async function go(address, { push = true, part = "", focus = false, renew
     for (const link of document.querySelectorAll(".bar nav a")) {
       if (link.pathname === location.pathname) link.setAttribute("aria-current", "page"); else link.removeAttribute("aria-current");
     }
-    if (push && !keep) window.scrollTo(0, 0);
-    if (focus) main().focus({ preventScroll: true });
+    if (push && !keep && !place?.submits) window.scrollTo(0, 0);
+    if (place && (renews || place.submits)) regain(place); else if (focus) main().focus({ preventScroll: true });
   }
   arrived();
+}
+
+// The keyboard stays where it was: at the same field or button of the new content, at the question of a station, else at the top
+// of the content. Never at the answer itself: the Enter of a scanner would give it.
+function held() {
+  const element = document.activeElement;
+  if (!element || !main().contains(element) || element === main()) return null;
+  const names = ["name", "id", "data-act", "data-answer", "data-add", "data-name", "data-finding", "href"].filter((one) => element.hasAttribute(one));
+  const form = element.form?.dataset.get;
+  const selector = element.tagName.toLowerCase() + names.map((one) => `[${one}="${CSS.escape(element.getAttribute(one))}"]`).join("");
+  return { element, selector: names.length ? (form ? `form[data-get="${CSS.escape(form)}"] ${selector}` : selector) : "", submits: element.matches("[data-submit]") };
+}
+
+function regain({ selector }) {
+  const place = document.querySelector(".question") ?? ((selector && main().querySelector(selector)) || main());
+  place.focus({ preventScroll: place === main() });
 }
 
 // a page that comes anew by itself keeps what a person has entered in its fields
@@ -242,7 +260,7 @@ document.addEventListener("change", (event) => {
 
 document.addEventListener("keydown", (event) => {
   const field = event.target;
-  if (event.key === "Enter" && field.matches("[data-drop]")) field.querySelector("[data-file]").click();
+  if (["Enter", " "].includes(event.key) && field.matches("[data-drop]")) { event.preventDefault(); field.querySelector("[data-file]").click(); }
   if (event.key !== "Enter" || !field.matches("[data-scan-field]")) return;
   event.preventDefault();  // a scanner ends each serial number with Enter
   checkScan(field);

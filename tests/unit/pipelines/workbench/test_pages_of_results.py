@@ -4,22 +4,25 @@ import itertools
 import re
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 from asgi_client import AsgiClient
 from capture_double import small_run
+from lots import lot
 
 from benchmarks.generated_archive import write_archive
 from pipelines.archive import Archive, Run
 from pipelines.demo.archive_lots import Hidden, Line, write_lots
 from pipelines.discovery.attributes import add_attributes
 from pipelines.report.numbers import significant, with_uncertainty
+from pipelines.report.run_pictures import follows_most
 from pipelines.workbench.application import create_app
-from pipelines.workbench.services import requests
-from pipelines.workbench.services.jobs import Jobs
+from pipelines.workbench.services import models, requests
+from pipelines.workbench.services.jobs import Jobs, key_of
 from pipelines.workbench.services.work import done_in_process
 from pipelines.workbench.settings import WorkbenchSettings
-from pipelines.workbench.state import AuditPage, DiscoverPage
+from pipelines.workbench.state import AuditPage, DiscoverPage, TwoModelsPage
 
 TOKEN = "Zq8vXy3nR5tB7wK1mP4sD9"
 
@@ -108,3 +111,69 @@ def test_figures_and_coefficients_have_their_expanded_uncertainty_once(tmp_path:
     first = coefficients[coefficients["unit"] == "A1"].iloc[0]
     value, expanded = with_uncertainty(first["value"], 2.0 * first["standard_error"])
     assert f"{value}<br><small>± {expanded}</small>" in page
+
+
+def cubic_lot(folder: Path) -> WorkbenchSettings:
+    """A workbench whose one file of dwells has a cubic that its model lacks."""
+    (folder / "bench").mkdir()
+    dwells = lot(np.random.default_rng(5), units=2, temperatures=(25.0,), hidden=lambda force, *_: 2e-4 * force**3)
+    dwells.to_parquet(folder / "bench" / "cubic.parquet")
+    return WorkbenchSettings(archive=str(folder / "archive"), folder=folder / "bench", token=TOKEN)
+
+
+def test_two_models_stand_side_by_side_with_verdicts_residuals_on_one_scale_and_the_change_of_coefficients(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    settings = cubic_lot(tmp_path)
+    models.save(settings, "cubic", ["bias", "scale", "misalignment"], ["third_order"], (), "a test", "cubic.parquet")
+    client = AsgiClient(create_app(settings), "http://127.0.0.1:8321")
+    state = TwoModelsPage(source=str(settings.folder / "cubic.parquet"), second="cubic")
+    results: dict[str, object] = {}
+    monkeypatch.setattr(Jobs, "result", lambda _, kind, content: results.get(key_of(kind, content)))
+    assert 'data-job-kind="diagnose"' in client.get(state.address()).text
+    works = [("diagnose", requests.diagnosis(settings, one)[1]) for one in requests.two_models(settings, state)]
+    works.append(("coefficients", requests.coefficients(settings, state)[1]))
+    for kind, content in works:
+        end, results[key_of(kind, content)] = done_in_process(kind, content, lambda *_: None)
+        assert end == "done", results
+    text = client.get(state.address()).text
+    cells = re.findall(r'<td class="n">([^<]*)</td>', text)
+    first, second = (results[key_of(kind, content)].document["error"] for kind, content in works[:2])
+    assert first["rms_ug"] > 3.0 * second["rms_ug"]
+    assert cells[:4] == ["not adequate", "adequate", significant(first["rms_ug"]), significant(second["rms_ug"])]
+    assert "third_order" in cells
+    rows = results[key_of(*works[2])]
+    scale = next(row for row in rows if row["effect"] == "scale")
+    assert abs(scale["over_a"]) > 2.0  # what the cubic gave to the scale factor
+    assert client.get("/two-models/coefficients.csv?" + state.query()).text.count("\n") == len(rows) + 1
+    chart = client.get(state.figure("residuals")).json()
+    ranges = {str(chart["layout"][name]["range"]) for name in ("yaxis", "yaxis2")}
+    assert len(ranges) == 1
+    assert client.get(state.figure("nothing")).status_code == 422
+
+
+def test_residuals_are_drawn_against_what_they_depend_on_with_bars_of_the_noise(tmp_path: Path) -> None:
+    run = small_run(tmp_path)
+    settings = WorkbenchSettings(archive=str(run.archive.root), folder=tmp_path / "bench", token=TOKEN)
+    client = AsgiClient(create_app(settings), "http://127.0.0.1:8321")
+    adequate = bool((run.table("verdict")["verdict"] == "adequate").all())
+    page = client.get(f"/unit?run={run.id}&unit=A1").text
+    assert ('<option value="force" selected>' in page) == adequate
+    chart = client.get(f"/unit/figure/residuals.json?run={run.id}&unit=A1&against=time").json()
+    assert sum("error_y" in trace for trace in chart["data"]) == 3
+
+
+def test_residuals_follow_the_quantity_that_makes_them() -> None:
+    rng = np.random.default_rng(3)
+    dwells = pd.DataFrame({"dwell": np.arange(40), "time_s": 600.0 * np.arange(40)})
+    for name, values in (("force", np.sin(np.arange(40) * 2.0)), ("time", np.linspace(-1.0, 1.0, 40))):
+        residuals = pd.DataFrame(
+            {
+                "dwell": np.arange(40),
+                "axis": "x",
+                "force_g": np.sin(np.arange(40) * 2.0),
+                "unit_C": rng.normal(25.0, 1.0, 40),
+            }
+        )
+        residuals["residual_ug"] = 50.0 * values**3 + rng.normal(0.0, 1.0, 40)
+        assert follows_most(residuals, dwells) == name

@@ -1,0 +1,121 @@
+"""Two models on the same dwells: verdicts, residuals on one scale, and the coefficients that differ."""
+
+from typing import Any
+
+import numpy as np
+from fastapi import APIRouter, Request
+from starlette.responses import Response
+
+from inertial import effects
+from pipelines.drawing import Chart
+from pipelines.report.diagnosis_pictures import quantity_chart
+from pipelines.report.numbers import significant, with_uncertainty
+from pipelines.workbench.pages import Workbench, asked, figure, no_figure, page, table_csv
+from pipelines.workbench.services import models, requests, sources
+from pipelines.workbench.services.work import Diagnosed
+from pipelines.workbench.state import MissingPage, TwoModelsPage
+from schemas.errors import TumblelineError, WrongUse
+
+router = APIRouter()
+MOST = 60
+COVERAGE = 2.0
+NAMES = ("first model", "second model")
+
+
+@router.get("/two-models")
+def two_models(request: Request) -> Response:
+    """The page; it asks for one missing result after the other."""
+    bench, state, problems = asked(request, TwoModelsPage)
+    sides: tuple[MissingPage, ...] = ()
+    found: list[Diagnosed | None] = []
+    rows, waiting = None, None
+    try:
+        state = state.model_copy(update={"source": sources.resolve(bench.settings, state.source, "two models")})
+        sides = requests.two_models(bench.settings, state)
+        works = [("diagnose", side) for side in sides] + [("coefficients", state)]
+        results = [bench.work(kind, one, problems) for kind, one in works]
+        *found, rows = [result for result, _ in results]
+        waiting = next(
+            ((kind, one, job) for (kind, one), (result, job) in zip(works, results, strict=True) if result is None),
+            None,
+        )
+    except TumblelineError as problem:
+        problems.append(str(problem))
+    table = next((one.table for one in found if one is not None and one.table is not None), None)
+    return page(
+        request, "two_models.html", state, problems, sides=sides, found=found, effects=_lacking(sides), waiting=waiting,
+        names=NAMES,
+        rows=None if rows is None else [_worded(row) for row in _ordered(rows)[:MOST]], count=len(rows or ()),
+        sources=sources.sources(bench.settings), models=models.models(bench.settings), offered=_offered(state, found),
+        against=_quantity(state, found), drivers=[] if table is None else [(k, label) for k, (label, _) in table.drivers.items()],
+        units=() if table is None else table.units, unit="" if table is None else table.units[table.place_of(state.unit)],
+    )  # fmt: skip
+
+
+@router.get("/two-models/coefficients.csv")
+def coefficients(request: Request) -> Response:
+    """The coefficients that differ."""
+    bench, state, _ = asked(request, TwoModelsPage)
+    return table_csv(bench.finished("coefficients", state), "two-models")
+
+
+@router.get("/two-models/figure/{name}.{ending}")
+def drawn(request: Request, name: str, ending: str) -> Response:
+    """The residuals of both models on one scale."""
+    if name != "residuals":
+        raise no_figure(name)
+    bench, state, _ = asked(request, TwoModelsPage)
+    return figure(_chart(bench, state), ending, "two-models")
+
+
+def _chart(bench: Workbench, state: TwoModelsPage) -> Chart | None:
+    found: list[Any] = [bench.done("diagnose", side) for side in requests.two_models(bench.settings, state)]
+    first, second = (None if one is None else one.table for one in found)
+    if first is None or second is None:
+        return None
+    if first.units != second.units or first.residual.shape != second.residual.shape:
+        raise WrongUse(
+            "figure: the two models were judged on different units or dwells, the same are needed; "
+            "look at each on the page Missing effects"
+        )
+    quantity = _quantity(state, found)
+    return quantity_chart(second, first.residual, quantity, first.place_of(state.unit), names=NAMES)
+
+
+def _lacking(sides: tuple[MissingPage, ...]) -> list[str]:
+    """The effects of the catalogue that the second model lacks."""
+    return [name for name in effects.catalogue() if sides and name not in sides[-1].judged]
+
+
+def _ordered(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Coefficients of both models before those that only one has."""
+    return sorted(rows, key=lambda row: not np.isfinite(row["change"]))
+
+
+def _worded(row: dict[str, Any]) -> dict[str, Any]:
+    """A coefficient with its values, their U and the difference as texts; empty where a model does not have it."""
+    values = [(float(row[side]), COVERAGE * float(row[f"u_{side}"])) for side in ("a", "b")]
+    sides = [with_uncertainty(*one) if np.isfinite(one[0]) else ("", "") for one in values]
+    change = float(row["change"])
+    over = float(row["over_a"]) / COVERAGE
+    return row | {
+        "sides": sides,
+        "change": significant(change) if np.isfinite(change) else "",
+        "over": significant(over, 2) if np.isfinite(over) else "",
+    }
+
+
+def _quantity(state: TwoModelsPage, found: list[Diagnosed | None]) -> str:
+    """The quantity of the address, else the one on which the effect depends that the second has besides, else force."""
+    tables = [one.table for one in found[::-1] if one is not None and one.table is not None]
+    wanted = [state.against, *(one.first for one in tables)]
+    return next((name for name in wanted if tables and name in tables[0].drivers), "force")
+
+
+def _offered(state: TwoModelsPage, found: list[Diagnosed | None]) -> list[str]:
+    """The effects that the diagnosis of the first model names and the second lacks."""
+    if not found or found[0] is None:
+        return []
+    groups = [group for group in found[0].document["classes"] if group["scope"] != "data"]
+    named = [*found[0].document["recommended"], *(name for group in groups for name in group["effects"])]
+    return [name for name in dict.fromkeys(named) if name not in state.added]
