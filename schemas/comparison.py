@@ -52,4 +52,3 @@ class ExciterBand(Comparison):
         if self.from_hz >= self.to_hz:
             raise ValueError(f"from_hz: {self.from_hz:g} Hz is not below to_hz, {self.to_hz:g} Hz; correct one")
         return self
-

@@ -248,9 +248,7 @@ class Uncertainty(Strict):
         return {name: value for name, value in handler(self).items() if value is not None and value != []}
 
 
-OF_STATIC = tuple(
-    name for name in Uncertainty.model_fields if name not in {"grade_source", "exciter", "shock_machine"}
-)
+OF_STATIC = tuple(name for name in Uncertainty.model_fields if name not in {"grade_source", "exciter", "shock_machine"})
 """The entries of the static calibration."""
 NEEDED = {
     "gravity": "scale", "level": "bias and misalignment", "orthogonality": "bias and misalignment", "outer_offset": "bias of z",

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 from pipelines.archive import Run, files
 from pipelines.archive.locks import alone
 from pipelines.archive.signatures import public_keys
+from pipelines.certificates.comparisons import TABLES, Comparisons
 from pipelines.certificates.days import day_of, months_after, today
-from pipelines.certificates.entries import FOLDER, LedgerEntry
+from pipelines.certificates.entries import DYNAMIC, FOLDER, STATIC, LedgerEntry
 from pipelines.certificates.ledger import Ledger
 from pipelines.certificates.programmed import refuse_unproved, unproved
 from pipelines.certificates.refusals import allowed_months, refuse_period
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
 EVIDENCE = ("dwells", "coefficients", "covariance", "grades")
 
 
+NOTHING = "nothing that can be certified: its recipe has neither multi_position nor sweep, random_vibration, transverse or shock; add one"
 IMPORTED = "imported"
 """The station of a calibration whose measurements came from elsewhere."""
 
@@ -115,15 +117,18 @@ def _proposals(
     refuse_overdue(run)
     adequacy = refuse_inadequate(run)
     refuse_unstated(run)
+    static = not run.table("coefficients").empty
+    comparisons = Comparisons(run)
     if told := refuse_contradicted(run):
         adequacy += f"{'; ' if adequacy else ''}{told}"
     about, result = run.about, Certified()
-    evidence = tuple(sorted((name, files.sha256(run.path / f"{name}.json")) for name in EVIDENCE))
+    named = (*EVIDENCE, *(TABLES if comparisons.parts else ()))
+    evidence = tuple(sorted((name, files.sha256(run.path / f"{name}.json")) for name in named))
     station = (about.get("station") or {}).get("name", IMPORTED)
     shared: dict[str, Any] = {
         "device": about["lot"]["device"], "run": run.id, "start": first, "until": last, "station": station,
         "recipe": about["recipe"]["name"], "coefficients": run.manifest("coefficients")["sha256"], "reason": reason,
-        "evidence": evidence, "adequacy": adequacy,
+        "evidence": evidence,
         # the ledger has still to number and stamp the event
         "sequence": 0, "action": "certify", "ends": (), "who": "", "where": "", "when": "", "previous": "",
     }  # fmt: skip
@@ -138,15 +143,26 @@ def _proposals(
         if half:
             result.left_out[serial] = half
             continue
-        if row["outcome"] == "pass":
-            proposals.append(LedgerEntry(serial=serial, grade=str(row["grade"]), **shared))
-            continue
-        why = f"{row['outcome']}: {row['reasons']}"
-        if units:
+        why = "" if row["outcome"] == "pass" else f"{row['outcome']}: {row['reasons']}"
+        if why and units:
             raise WrongUse(
                 f"certify: unit {serial} of run {run.id} did not pass ({why}); only what passed is certified"
             )
-        result.left_out[serial] = why
+        compared = {} if why else comparisons.results(serial)
+        if not (why or static or compared):
+            why = "; ".join(comparisons.reasons(serial).values()) or NOTHING
+            if units:
+                raise WrongUse(f"certify: unit {serial} of run {run.id}: {why}")
+        if why:
+            result.left_out[serial] = why
+            continue
+        covers = " ".join(name for name, there in ((STATIC, static), (DYNAMIC, compared)) if there)
+        verdicts = "; ".join(filter(None, (adequacy, comparisons.verdicts(serial))))
+        proposals.append(
+            LedgerEntry(serial=serial, grade=str(row["grade"]), covers=covers, adequacy=verdicts, **shared)
+        )
+    if not (proposals or static) and not any(row["outcome"] != "pass" for row in grades.values()):
+        raise WrongUse(f"certify: run {run.id}: {next(iter(result.left_out.values()), NOTHING)}")
     return proposals, result
 
 

@@ -204,7 +204,13 @@ STAGES: tuple[Stage, ...] = (
     Stage(
         name="procedures",
         inputs=(RECORDS, "readings", "verdicts", "coefficients", "covariance", "noise"),
-        outputs=("procedure_points", "procedure_figures", "procedure_findings", "procedure_results", "procedure_curves"),
+        outputs=(
+            "procedure_points",
+            "procedure_figures",
+            "procedure_findings",
+            "procedure_results",
+            "procedure_curves",
+        ),
         parameters=_listed,
         call=_procedures,
     ),

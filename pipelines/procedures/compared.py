@@ -89,8 +89,8 @@ def by_share(value: float, names: Sequence[str] = SHARED) -> dict[str, float]:
 def response_results(part: Any, rows: pd.DataFrame, out_unit: str) -> list[ComparedResult]:
     """Magnitude and phase at every point of a transfer function, and the sensitivity at the reference frequency.
 
-    Motion across the axis acts by the transverse sensitivity of the unit, at most ``transverse_percent``: with both rectangular and
-    their angle uniform its standard uncertainty is that of the motion times the largest sensitivity over √6.
+    Motion across the axis acts by the transverse sensitivity of the unit, at most ``transverse_percent``: with both rectangular
+    and their angle uniform its standard uncertainty is that of the motion times the largest sensitivity over √6.
     """
     kept = rows[np.isfinite(rows["value"])]
     share = 1e-2 * part.transverse_percent / np.sqrt(6.0)

@@ -55,7 +55,8 @@ class ShockPart(NominalScale):
 
     ``effects`` is the model by which the waveforms of unit and reference are compared; the diagnosis names what is missing.
     ``waveform_percent`` is the standard uncertainty of a sample of that comparison, of the peak. Each record is free of the
-    pulse for ``before_ms``. ``transverse_percent`` is the largest transverse sensitivity of the device. In a recording made elsewhere both times are found where they are not stated.
+    pulse for ``before_ms``. ``transverse_percent`` is the largest transverse sensitivity of the device. In a recording made
+    elsewhere both times are found where they are not stated.
     """
 
     kind: Literal["shock"]

@@ -11,6 +11,7 @@ from pipelines.archive.locks import alone
 from pipelines.archive.signatures import public_keys
 from pipelines.certificates import Ledger
 from pipelines.certificates.days import today
+from pipelines.certificates.entries import STATIC
 from pipelines.certificates.measured import measured_on, measured_span
 from pipelines.certificates.programmed import TOP, add
 from pipelines.certificates.validity import Calibration
@@ -114,7 +115,7 @@ def _renewed(ledger: Ledger, run: Run, one: ProgrammingOutcome, day: str, until:
 def _refuse_older(ledger: Ledger, run: Run, serial: str, day: str) -> None:
     """Refuse coefficients that were not measured after those of another run that are certified for the unit today."""
     for one in ledger.calibrations(serial):
-        if one.run == run.id or not one.holds(day):
+        if one.run == run.id or not one.holds(day) or STATIC not in one.event.covers.split():
             continue
         other = Run(run.archive, one.run)
         theirs, ours = _measured_at(other), _measured_at(run)

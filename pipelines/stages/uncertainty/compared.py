@@ -8,7 +8,7 @@ import pandas as pd
 
 from inertial.uncertainty.degrees import coverage_factors, effective_degrees
 from pipelines.stages.uncertainty.budget_terms import BudgetTerms
-from pipelines.stages.uncertainty.tables import LABELS, NOISE, source_of
+from pipelines.stages.uncertainty.tables import LABELS, source_of
 from schemas.comparison import TERMS
 from schemas.stated import Entry
 
@@ -44,7 +44,12 @@ def compared_tables(results: pd.DataFrame, terms: BudgetTerms) -> dict[str, pd.D
     for row in results.to_dict("records"):
         if terms.stated is None or terms.stated.comparison(row["role"], row["setting"]) is None:
             continue
-        about = {"unit": row["unit"], "quantity": compared_quantity(row), "axis": row["axis"], "unit_text": row["unit_text"]}
+        about = {
+            "unit": row["unit"],
+            "quantity": compared_quantity(row),
+            "axis": row["axis"],
+            "unit_text": row["unit_text"],
+        }
         own = list(_contributions(row, terms))
         sums.append(about | _sum(row, own) | {"frame": terms.certificate.frame, "setting": row["setting"]})
         whole = sum(one["u"] ** 2 for one in own)
@@ -59,7 +64,7 @@ def _stated(row: Mapping[str, Any], terms: BudgetTerms) -> dict[str, Entry]:
 
 def _contributions(row: Mapping[str, Any], terms: BudgetTerms) -> Iterator[dict[str, Any]]:
     """The contributions to one result, without those that are exactly 0."""
-    yield _own(NOISE, float(row["u_noise"]), "A", float(row["dof"]), "the records of the procedure")
+    yield _own("record_noise", float(row["u_noise"]), "A", float(row["dof"]), "the records of the procedure")
     for name, source in OF_RECIPE.items():
         if row[f"u_{name}"] > 0.0:
             yield _own(name, float(row[f"u_{name}"]), "B", float("inf"), source)

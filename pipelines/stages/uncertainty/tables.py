@@ -47,6 +47,7 @@ LABELS = {
     "timing": "timing",
     "creep": "creep after a move",
     "vibration": "vibration",
+    "record_noise": "noise of the records",
     "repeatability": "repeatability of a point",
     "nominal_scale": "scale that the figure is compared with",
     "reference": "reference sensor",
