@@ -217,7 +217,7 @@ class Uncertainty(Strict):
     @property
     def every_entry(self) -> dict[str, Entry]:
         """The entries that are stated, those of comparisons as well, by the path of their key."""
-        compared = {f"exciter[{number}]": band for number, band in enumerate(self.exciter)}
+        compared: dict[str, Comparison] = {f"exciter[{number}]": band for number, band in enumerate(self.exciter)}
         if self.shock_machine is not None:
             compared["shock_machine"] = self.shock_machine
         own = {f"{path}.{name}": entry for path, one in compared.items() for name, entry in one.entries.items()}

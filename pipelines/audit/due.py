@@ -13,7 +13,6 @@ from pipelines.audit.drifts import MONTH_D, KindDrift
 from pipelines.audit.pairs import last_of_each
 from pipelines.audit.rules import Rules
 from pipelines.audit.unit_drifts import UnitDrift
-from pipelines.certificates.entries import DYNAMIC, STATIC
 from pipelines.certificates.ledger_index import histories_of
 from pipelines.certificates.validity import Calibration, calibrations_of
 
@@ -70,12 +69,9 @@ class Certificates:
 
     def _deciding(self, known: Sequence[Calibration]) -> tuple[Calibration | None, Calibration]:
         """The calibration that is due first: of a subject without a valid one the last, else the valid one that ends first."""
-        subjects = ([one for one in known if subject in one.event.covers.split()] for subject in (STATIC, DYNAMIC))
-        pairs = [
-            (held := next((one for one in own if one.holds(self.day)), None), held or own[-1])
-            for own in subjects
-            if own
-        ]
+        named = dict.fromkeys(subject for one in known for subject in one.event.covers.split())
+        subjects = ([one for one in known if subject in one.event.covers.split()] for subject in named)
+        pairs = [(held := next((one for one in own if one.holds(self.day)), None), held or own[-1]) for own in subjects]
         return next((pair for pair in pairs if pair[0] is None), min(pairs, key=lambda pair: pair[1].until))
 
     def _measured(self, run: str) -> str:

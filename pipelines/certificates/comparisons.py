@@ -1,6 +1,5 @@
 """Which results by comparison of a run can be certified: those of sweep, random vibration, transverse and shock; and why not."""
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -14,6 +13,7 @@ from pipelines.procedures.base import Compares
 from pipelines.stages.uncertainty.budget_terms import BudgetTerms, archived_terms
 from pipelines.stages.uncertainty.compared import missing_terms
 from pipelines.tables.frames import rows_of
+from schemas.comparison import TERMS
 from schemas.limits import ADEQUACY_P_MIN
 from schemas.recipe import Recipe
 from schemas.tables import ADEQUATE, NOT_JUDGED
@@ -70,7 +70,7 @@ class Comparisons:
         rows = self._tables[table].get(unit)
         return pd.DataFrame() if rows is None else rows[rows["number"] == number]
 
-    def _models(self, unit: str, number: int) -> list[Mapping[str, Any]]:
+    def _models(self, unit: str, number: int) -> list[dict[str, Any]]:
         rows = self._of("procedure_curves", unit, number)
         return rows_of(rows.drop_duplicates("axis")) if len(rows) else []
 
@@ -110,12 +110,12 @@ class Comparisons:
         )
         if stated is None or known is None or not limited:
             return ""
-        needed = 100.0 * float(np.hypot(*(known.entries[one].standard().u for one in ("reference", "drift"))))
+        needed = 100.0 * float(np.linalg.norm([known.entries[one].standard().u for one in ("reference", "drift")]))
         if needed <= stated * (1.0 + 1e-9):
             return ""
         return (
-            f"{name}: figures were decided with reference_percent {stated:g}, the station states {needed:.3g} % for the reference "
-            "sensor and its drift; state at least that in the recipe"
+            f"{name}: figures were decided with reference_percent {stated:g}, the station states {needed:.3g} % for its "
+            "reference sensor and drift; state at least that in the recipe"
         )
 
 
@@ -130,7 +130,8 @@ def _unstated(rows: pd.DataFrame, terms: BudgetTerms) -> str:
     role = str(rows["role"].iloc[0])
     settings = [at for every in missing.values() for at in every if np.isfinite(at)]
     where = f" at {min(settings):.4g} to {max(settings):.4g} Hz" if settings else ""
+    named = ", ".join(sorted(missing, key=TERMS.index))
     return (
-        f"not stated: {', '.join(missing)} of [uncertainty] {role}{where}, a certificate needs it (a 0 needs exact = true); add it "
-        "to the station's file and measure again"
+        f"not stated: {named} of [uncertainty] {role}{where}, a certificate needs it (a 0 needs exact = true); "
+        "add it to the station's file and measure again"
     )

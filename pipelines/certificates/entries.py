@@ -11,7 +11,7 @@ from pipelines.archive.store import Place
 from schemas.errors import ArchiveUnusable
 
 SCHEMA = 1
-STATIC, DYNAMIC = "static", "dynamic"
+STATIC = "static"
 Action = Literal["certify", "supersede", "revoke"]
 
 
@@ -30,8 +30,8 @@ class LedgerEntry:
     evidence : hashes of the manifests of the run that support the decision, by table.
     previous : hash of the file of the unit's previous event; empty for the first.
     adequacy : verdict on the run's model with its p, as it was certified; empty in events of earlier versions.
-    covers : ``static`` (coefficients), ``dynamic`` (results of exciter and shock machine), or both, with a blank between. A
-    calibration ends earlier ones that cover any of the same.
+    covers : ``static`` (coefficients) and the procedures whose results by comparison it has, with blanks between. A calibration
+    ends earlier ones that cover any of the same.
     """
 
     serial: str

@@ -1,7 +1,7 @@
 """Periods of validity of the calibrations of a unit: a pure function of its events in the order of writing.
 
 A new calibration ends those of the same subject that are valid on its first day, so that a unit never has two valid calibrations
-of one subject on one day: its coefficients, and what exciter and shock machine show.
+of one subject on one day: its coefficients, its sensitivity over frequency, shocks.
 """
 
 from collections.abc import Iterable, Sequence

@@ -128,7 +128,7 @@ def show_validity(archive: Archive, serial: str, at: str, known: str, *, as_json
     """Print the calibration that is valid on a day; return whether there is one."""
     from pipelines.certificates import Ledger
     from pipelines.certificates.days import day_of, today
-    from pipelines.certificates.entries import DYNAMIC
+    from pipelines.certificates.entries import STATIC
 
     day = day_of(at, "--at") if at else today()
     history = Ledger(archive).calibrations(serial, day_of(known, "--known") if known else "")
@@ -136,8 +136,9 @@ def show_validity(archive: Archive, serial: str, at: str, known: str, *, as_json
         raise WrongUse(
             f"show: unit {serial!r} has no calibration in archive {archive.root}; certify one with 'tumbleline certificate issue'"
         )
-    # of a unit with coefficients and with results of an exciter the coefficients are meant
-    valid = next((one for one in sorted(history, key=lambda one: one.event.covers == DYNAMIC) if one.holds(day)), None)
+    # of a unit that has coefficients, and results of an exciter, the coefficients are meant
+    first = sorted(history, key=lambda one: STATIC not in one.event.covers.split())
+    valid = next((one for one in first if one.holds(day)), None)
     if as_json:
         shown = None if valid is None else {**valid.document(), **_made(archive, valid)}
         print_json(

@@ -1,7 +1,7 @@
 """Results by comparison with a reference sensor, for the uncertainty budget; and the curve through a transfer function."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -9,6 +9,7 @@ import pandas as pd
 
 from inertial.arrays import Array
 from inertial.dynamics.transfer_diagnosis import TransferDiagnosis
+from pipelines.tables.frames import rows_of
 from schemas.comparison import TERMS
 from schemas.tables import ADEQUATE, NOT_ADEQUATE, NOT_JUDGED
 
@@ -96,10 +97,10 @@ def response_results(part: Any, rows: pd.DataFrame, out_unit: str) -> list[Compa
     share = 1e-2 * part.transverse_percent / np.sqrt(6.0)
     repeated, turned = 1e-2 * part.repeatability_percent, part.repeatability_deg
     results: list[ComparedResult] = []
-    for row in kept.to_dict("records"):
+    for row in rows_of(kept):
         value, across = float(row["value"]), share * 1e-2 * float(row["transverse_percent"])
         noise = without(float(row["uncertainty"]) / value, repeated, across)
-        about = {"axis": str(row["axis"]), "point": int(row["point"]), "setting": float(row["setting"])}
+        about: dict[str, Any] = {"axis": str(row["axis"]), "point": int(row["point"]), "setting": float(row["setting"])}
         size = {"noise": value * noise, "repeatability": value * repeated, "transverse": value * across}
         of_size = {**by_share(value), "transverse": value * share}
         results.append(ComparedResult("response_magnitude", unit=f"{out_unit}/g", value=value, u=size,
@@ -113,7 +114,7 @@ def response_results(part: Any, rows: pd.DataFrame, out_unit: str) -> list[Compa
     sizes = [one for one in results if one.quantity == "response_magnitude"]
     middle = getattr(part, "level_frequency_hz", MIDDLE_HZ)
     near = min(sizes, key=lambda one: (abs(np.log(one.setting / middle)), one.point))
-    return [ComparedResult(**{**vars(near), "quantity": "reference_sensitivity"}), *results]
+    return [replace(near, quantity="reference_sensitivity"), *results]
 
 
 def transfer_results(

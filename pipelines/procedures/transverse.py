@@ -124,7 +124,8 @@ class TransverseTest(InG, OnEquipment, Compares):
     ) -> tuple[list[ComparedResult], list[JudgedCurve]]:
         """The maximum, and its direction where it is significant; the sine as the model that they rest on."""
         fit, figure = fitted(rows), figures[FIGURE]
-        noise, at = 100.0 * fit.error, {"setting": part.frequency_hz, "dof": float(fit.dof) or float("inf")}
+        noise = 100.0 * fit.error
+        at: dict[str, Any] = {"setting": part.frequency_hz, "dof": float(fit.dof) or float("inf")}
         scale = without(figure.uncertainty, noise, 1e-2 * part.reference_percent * figure.value)
         terms = by_share(figure.value, ("reference", "drift", "amplitude"))
         own = {"noise": noise, "nominal_scale": scale}

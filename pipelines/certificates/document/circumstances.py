@@ -1,4 +1,4 @@
-"""What a certificate says of the circumstances of a calibration: standards, traceability, method, conditions, what is left out."""
+"""What a certificate says of the circumstances of a calibration: standards, traceability, method, conditions, omissions."""
 
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -7,8 +7,9 @@ from inertial.counts import number_of
 from pipelines.archive import Run
 from pipelines.certificates.document import content
 from pipelines.certificates.document.laboratory import LaboratoryFile
-from pipelines.certificates.entries import DYNAMIC, STATIC
+from pipelines.certificates.entries import STATIC
 from pipelines.certificates.stated_budget import StatedBudget
+from pipelines.procedures import PROCEDURES
 from pipelines.stages.uncertainty.contributions import left_out
 from pipelines.stages.uncertainty.tables import LABELS
 from schemas.reference import Reference
@@ -33,6 +34,7 @@ def source_words(text: str) -> str:
 
 
 def standard_of(one: Reference) -> content.ReferenceStandard:
+    """A standard of the station as a certificate names it."""
     accreditation = f" ({one.accreditation})" if one.accreditation else ""
     return content.ReferenceStandard(
         laboratory=one.laboratory + accreditation,
@@ -47,9 +49,10 @@ def entries_of(run: Run, covers: str) -> dict[str, bool]:
     """What the results rest on in [uncertainty], and whether it names a standard; of several bands all must."""
     terms = Uncertainty.model_validate(run.manifest("budget")["parameters"].get("uncertainty") or {})
     named: dict[str, bool] = {}
+    roles = {STATIC if kind == STATIC else PROCEDURES[kind].roles[0] for kind in covers.split()}
     for path, entry in terms.every_entry.items():
         role, _, term = path.partition(".")
-        if (DYNAMIC if term else STATIC) in covers.split():
+        if (role.partition("[")[0] if term else STATIC) in roles:
             name = f"{LABELS[term]} of the {role.partition('[')[0]}" if term else role
             named[name.replace("_", " ")] = named.get(name.replace("_", " "), True) and bool(entry.reference)
     return named
@@ -113,6 +116,7 @@ def _static_method(run: Run, recipe: dict[str, Any]) -> str:
 
 
 def conditions_of(run: Run, serial: str, recipe: dict[str, Any], *, static: bool) -> list[content.Condition]:
+    """Temperatures, supply and gravity of a unit's readings; of a static calibration those of its dwells."""
     table = run.table("dwells" if static else "readings")
     own, conditions = table[table["unit"] == serial], []
     for column, name, unit in (

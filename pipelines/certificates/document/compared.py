@@ -140,7 +140,7 @@ def _response(
                 phase_deg=float(phase["value"]),
                 phase_expanded=float(phase["expanded"]),
                 phase_k=float(phase["k"]),
-            )  # fmt: skip
+            )
         )
     first = next(row for row, _ in own if row["quantity"] == "response_magnitude")
     title = f"{PROCEDURES[part.kind].title}, axis {first['axis']}"

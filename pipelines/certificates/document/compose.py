@@ -59,9 +59,9 @@ UNCERTAINTY = (
 )
 FITTED = "It was evaluated by propagation through the fit (JCGM 100)."
 COMPARED = "It was evaluated from the contributions of the budgets (JCGM 100)."
-NOT_ADJUSTED: dict[str, str] = {
-    "earlier": "", "earlier_date": "", "text": "a comparison with a reference sensor adjusts nothing",
-}  # fmt: skip
+NOT_ADJUSTED = content.Adjustment(
+    earlier="", earlier_date="", text="a comparison with a reference sensor adjusts nothing"
+)
 FRAME_OF_COMPARISONS = "axes of the item, named beside each result"
 NORMS = ("JCGM 100:2008", "JCGM 106:2012")
 FRAMES = {
@@ -126,7 +126,7 @@ def compose(run: Run, calibration: Calibration, known: list[Calibration], who: L
         decision_rule="; ".join(dict.fromkeys(row["rule"] for row in budget.decisions)),
         limits=str((about.get("limits") or {}).get("name", "")),
         grade_statement=_grade_statement(budget, event.grade),
-        adjustment=adjustment(run, calibration, known) if static else content.Adjustment(**NOT_ADJUSTED),
+        adjustment=adjustment(run, calibration, known) if static else NOT_ADJUSTED,
         amendment=_amendment(calibration, known),
         interval=f"As agreed with the customer, the next calibration is due on {calibration.stated_until}."
         if budget.customer_agreed

@@ -231,7 +231,15 @@ def _measured(w: _Writer, parent: Any, c: CertificateContent) -> None:
             _reference(w, box, one)
     if c.conditions or c.adjustment.found_rms_ug is not None:
         _conditions(w, w.add(parent, "influenceConditions"), c)
-    results = w.add(parent, "results")
+    _results(w, w.add(parent, "results"), c)
+    meta = w.add(parent, "measurementMetaData")
+    for one in c.conformity:
+        _conformity(w, w.add(meta, "metaData"), one, c)
+    if not c.conformity:
+        w.text(w.add(meta, "metaData"), "declaration", "no statement of conformity is made")
+
+
+def _results(w: _Writer, results: Any, c: CertificateContent) -> None:
     for result in c.results:
         own = w.add(results, "result")
         w.text(own, "name", f"{result.quantity}, {result.axis}")
@@ -250,11 +258,6 @@ def _measured(w: _Writer, parent: Any, c: CertificateContent) -> None:
             quantity = w.add(box, "quantity")
             w.text(quantity, "name", f"{one.effect} {one.name} {one.axis}")
             w.real(quantity, one.value, one.unit)
-    meta = w.add(parent, "measurementMetaData")
-    for one in c.conformity:
-        _conformity(w, w.add(meta, "metaData"), one, c)
-    if not c.conformity:
-        w.text(w.add(meta, "metaData"), "declaration", "no statement of conformity is made")
 
 
 def _response(w: _Writer, parent: Any, one: Response) -> None:

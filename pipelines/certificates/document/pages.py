@@ -8,6 +8,7 @@ from pipelines.certificates.document.numbers import probability, rounded, signif
 
 SMALLEST_SHARE = 5e-4  # of a row of a budget: less is printed as 0.0 %
 
+OF_OUTPUT = " Of the corrected output the uncertainty alone is stated."
 PREVAILS = (
     "The same results are attached to this file as certificate.xml (Digital Calibration Certificate 3.0.0). The attached XML "
     "holds the results with all digits; where the two differ, this printed form prevails."
@@ -143,7 +144,7 @@ def _results(c: CertificateContent) -> dict[str, Any]:
     after = [
         c.uncertainty_note,
         *([c.left_out] if c.left_out else []),
-        f"Frame: {c.frame}. 1 g = 9.80665 m/s².{' Of the corrected output the uncertainty alone is stated.' if c.coefficients else ''}",
+        f"Frame: {c.frame}. 1 g = 9.80665 m/s².{OF_OUTPUT if c.coefficients else ''}",
     ]
     return {"title": "Results", "tables": [table], "after": after}  # fmt: skip
 

@@ -9,6 +9,7 @@ import pandas as pd
 from inertial.uncertainty.degrees import coverage_factors, effective_degrees
 from pipelines.stages.uncertainty.budget_terms import BudgetTerms
 from pipelines.stages.uncertainty.tables import LABELS, source_of
+from pipelines.tables.frames import rows_of
 from schemas.comparison import TERMS
 from schemas.stated import Entry
 
@@ -41,7 +42,7 @@ def compared_tables(results: pd.DataFrame, terms: BudgetTerms) -> dict[str, pd.D
     """
     parts: list[dict[str, Any]] = []
     sums: list[dict[str, Any]] = []
-    for row in results.to_dict("records"):
+    for row in rows_of(results):
         if terms.stated is None or terms.stated.comparison(row["role"], row["setting"]) is None:
             continue
         about = {
