@@ -43,7 +43,7 @@ def chosen_units(run: Run, serials: Sequence[str]) -> list[tuple[int, UnitCalibr
         raise WrongUse(
             f"program: unit {revoked[0].unit}: {revoked[0].certified}, a valid calibration is needed; measure the unit again"
         )
-    return [(slots[unit.unit], unit.with_every_axis) for unit in allowed]
+    return [(slots[unit.unit], unit) for unit in allowed]
 
 
 def _revoked(unit: UnitCalibration) -> bool:
@@ -70,6 +70,7 @@ def program_run(
     certified again, to the same day, when its memory is verified.
     """
     root, ledger, day = run.archive.root, Ledger(run.archive.root), today()
+    units = [(slot, unit.with_every_axis) for slot, unit in units]
     held: dict[str, Calibration | None] = {}
 
     def end_certificate(serial: str) -> int:
@@ -79,7 +80,7 @@ def program_run(
         return len(ledger.events(serial)) + 1 if held[serial] is not None else 0
 
     choice = replace(choice, date=int(datetime.now(UTC).strftime("%Y%m%d")))
-    with _station(run, config) as (station, saved), alone(root / TOP, wait=True):
+    with open_lot(run, config) as (station, saved), alone(root / TOP, wait=True):
         for _, unit in units:
             _refuse_older(ledger, run, unit.unit, day)
         recipe = Recipe.model_validate(run.about["recipe"])
@@ -148,7 +149,7 @@ def _held(ledger: Ledger, serial: str, run: str, day: str) -> Calibration | None
 
 
 @contextmanager
-def _station(run: Run, config: StationConfig) -> Generator[tuple[Any, Callable[[], None]]]:
+def open_lot(run: Run, config: StationConfig) -> Generator[tuple[Any, Callable[[], None]]]:
     """The station, and a function that saves the state of a simulated one, from which the next programming continues."""
     lot = Lot.model_validate(run.about["lot"])
     root = run.archive.root

@@ -278,3 +278,36 @@ def test_its_certificate_speaks_of_the_error_along_its_axis(measured, tmp_path: 
     assert "error of the corrected output, verification (largest of the poses)" in text
     assert "norm of gravity" not in text
     assert "|a|" not in text
+
+
+def pages_held(plant_memory: str) -> list[bytes]:
+    """The pages of a memory, from its hexadecimal text."""
+    memory = bytes.fromhex(plant_memory)
+    return [memory[start : start + 32] for start in range(0, len(memory), 32)]
+
+
+@pytest.mark.parametrize(("which", "letters"), [("three", "xyz"), ("one", "x")])
+def test_teds_of_every_axis_are_in_the_memory_of_the_device_and_stay_there(
+    measured: tuple[Path, dict[str, str]], tmp_path: Path, which: str, letters: str
+) -> None:
+    folder, runs = measured
+    shutil.copytree(folder / "archive", tmp_path / "archive")
+    sheet = "teds=manufacturer=17,model=4507,version=B5,mass_g=4.6,initials=QA,period_days=365"
+    words = ("--format", "teds", "--set", sheet, "--archive", tmp_path / "archive")
+    exported = given("export", runs[which], *words, "--output", tmp_path / "files")
+    assert exported[0] == 0, exported
+    done = document_of("station", "program", runs[which], *words, "--yes")
+    assert [one["outcome"] for one in done["teds"]] == ["proved"] * 3
+    for one in done["teds"]:
+        assert [page["axis"] for page in one["pages"]] == list(letters)
+        assert not any(bytes.fromhex(one["before"]))
+        for page in one["pages"]:
+            content = bytes.fromhex(page["content"])
+            assert content == (tmp_path / "files" / f"{one['unit']}-{page['axis']}.teds").read_bytes()
+            assert sum(content) % 256 == 0
+    # the memory keeps them: a second writing finds what the first left, and certificates stay as they are
+    again = document_of("station", "program", runs[which], *words, "--yes", "--units", "SF-02")
+    (one,) = again["teds"]
+    held = pages_held(one["before"])
+    assert held[: len(letters)] == [bytes.fromhex(page["content"]) for page in one["pages"]]
+    assert not any(b"".join(held[len(letters) :]))
