@@ -2,6 +2,8 @@
 
 import re
 import shlex
+import sys
+from itertools import pairwise
 
 from typer.main import get_command
 
@@ -38,6 +40,26 @@ def unknown_options(line: str) -> set[str]:
         word.partition("=")[0] for word in rest if word.startswith("-") and len(word) > 1 and not word[1].isdigit()
     }
     return options - known_options(command)
+
+
+def unknown_settings(line: str) -> set[str]:
+    """The keys of ``--set KEY=VALUE`` in a line that its command does not have."""
+    command, rest = command_of(shlex.split(line.replace("…", "X"))[1:])
+    keys = {words[1].partition("=")[0] for words in pairwise(rest) if words[0] == "--set"}
+    if not keys:
+        return set()
+    listed = " ".join(parameter.help or "" for parameter in command.params if "--set" in parameter.opts)
+    module = sys.modules[command.callback.__module__]
+    own = set().union(*(getattr(module, name, {}) for name in ("SETTINGS", "KEYS")))
+    return {key for key in keys - own if not key.isupper() and "." not in key and not re.search(rf"\b{key}\b", listed)}
+
+
+def code_spans(page: str) -> list[str]:
+    """The code of a page in Markdown: spans, in tables too, and the lines of blocks that begin with the program's name."""
+    blocks = re.findall(r"^```.*?\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
+    prose = re.sub(r"^```.*?^```$", "", page, flags=re.MULTILINE | re.DOTALL)
+    typed = re.findall(r"^ *\$? ?(tumbleline .*)$", re.sub(r"\\\n *", " ", "\n".join(blocks)), re.MULTILINE)
+    return [*re.findall(r"`([^`\n]+)`", prose), *re.findall(r"^    (tumbleline .*)$", prose, re.MULTILINE), *typed]
 
 
 def printed_commands(text: str) -> list[list[str]]:
