@@ -120,6 +120,12 @@ def test_its_certificate_and_its_memory_hold_one_axis(measured) -> None:
     assert "axes x; output[1] and output[2]: force along that axis in g" in exported
     programmed = document_of("station", "program", runs["one"], *archive, "--units", "SF-01", "--yes", "--json")
     assert [unit["outcome"] for unit in programmed["units"]] == ["proved"]
+    fixed = document_of(
+        "station", "program", runs["one"], *archive, "--units", "SF-02", "--format", "q24", "--yes", "--json"
+    )
+    assert [unit["outcome"] for unit in fixed["units"]] == ["proved"]
+    header = text_of("export", runs["one"], *archive, "--format", "c", "--set", "arithmetic=q24", "--units", "SF-03")
+    assert "output[1] and output[2]: force along that axis in g * 16777216, 0 where it is not known" in header
 
 
 def test_its_teds_state_the_sensitivity_of_one_axis(measured, tmp_path: Path) -> None:
