@@ -150,6 +150,35 @@ def test_its_teds_state_the_sensitivity_of_one_axis(measured, tmp_path: Path) ->
     assert "--set teds: found no manufacturer, model" in " ".join(err.split())
 
 
+def test_a_trajectory_along_its_axis_comes_back_through_simulate_and_correct(measured, tmp_path: Path) -> None:
+    folder, runs = measured
+    time = np.arange(500) / 50.0
+    force = np.column_stack([0.8 * np.sin(0.7 * time), np.zeros((time.size, 2))])
+    columns = {"time_s": time, **{f"force_{axis}": force[:, k] for k, axis in enumerate("xyz")}, "unit_C": 20.0 + time}
+    pd.DataFrame(columns).to_csv(tmp_path / "way.csv", index=False)
+    calibration, archive = f"{runs['one']}:SF-02", ("--archive", folder / "archive")
+    made = document_of(
+        "simulate", tmp_path / "way.csv", calibration, "--seed", "none", "--output", tmp_path / "raw.csv", *archive
+    )
+    assert list(made["error_at_25_C_ug"]) == ["x"]
+    raw = pd.read_csv(tmp_path / "raw.csv")
+    assert {"x", "force_x"} <= set(raw)
+    assert not {"y", "z"} & set(raw)
+    raw[["time_s", "x", "unit_C"]].to_csv(tmp_path / "output.csv", index=False)
+    done = document_of("correct", tmp_path / "output.csv", calibration, "--output", tmp_path / "done.csv", *archive)
+    assert list(done["u_ug"]) == ["x"]
+    corrected = pd.read_csv(tmp_path / "done.csv")
+    assert np.abs(corrected["force_x_g"] - force[:, 0]).max() < 1e-8
+    assert not {"force_y_g", "u_y_ug", "cov_xy_ug2"} & set(corrected)
+    noisy = document_of(
+        "simulate", tmp_path / "way.csv", calibration, "--seed", "1", "--output", tmp_path / "n.csv", *archive
+    )
+    assert {len(values) for values in noisy["noise"].values()} == {1}
+    status, _, told = given("correct", tmp_path / "output.csv", calibration, "--track", "at-rest", *archive)
+    assert status == UNUSABLE
+    assert "correct: --track needs three axes, and unit SF-02 has x alone" in " ".join(told.split())
+
+
 def test_its_plan_speaks_of_one_axis(measured) -> None:
     folder, _ = measured
     planned = document_of("plan", folder / "one.toml", "--output", folder / "plan.html", "--json")
@@ -233,17 +262,6 @@ def test_a_limit_of_angles_between_axes_is_refused_for_one(measured, tmp_path: P
     status, _, err = given("run", tmp_path / "one.toml", "--archive", tmp_path / "archive")
     assert status == UNUSABLE
     assert "orthogonality_mrad needs sensor_axes = 3" in " ".join(err.split())
-
-
-@pytest.mark.parametrize("command", ["simulate", "correct"])
-def test_a_command_that_needs_three_axes_names_itself(measured, command: str, tmp_path: Path) -> None:
-    folder, runs = measured
-    (tmp_path / "in.csv").write_text("time_s,x,y,z\n0,0,0,1\n0.01,0,0,1\n", encoding="utf-8")
-    words = (tmp_path / "in.csv", f"{runs['one']}:SF-01", "--archive", folder / "archive")
-    status, _, err = given(command, *words, "--output", tmp_path / "out.csv")
-    assert status == UNUSABLE
-    text = " ".join(err.split())
-    assert f"{command}: it needs three axes, and unit SF-01 has x alone" in text
 
 
 def test_its_waveforms_have_one_channel(measured, tmp_path: Path) -> None:
