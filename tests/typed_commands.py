@@ -3,17 +3,25 @@
 import re
 import shlex
 import sys
+from functools import cache
 from itertools import pairwise
+from typing import Any
 
 from typer.main import get_command
 
 from pipelines.cli import COMMANDS, app
 
 
+@cache
+def loaded(name: str) -> Any:
+    """A command with its options, made once: a page names it many times."""
+    return get_command(app).get_command(None, name)._load()
+
+
 def command_of(words: list[str]) -> tuple[object, list[str]]:
     """The command that the words name, and what is left of them."""
     assert words[0] in COMMANDS, f"no command is called {words[0]}"
-    command = get_command(app).get_command(None, words[0])._load()
+    command = loaded(words[0])
     rest = words[1:]
     while getattr(command, "commands", None) and rest and rest[0] in command.commands:
         command, rest = command.commands[rest[0]], rest[1:]
@@ -28,7 +36,7 @@ def known_options(command: object) -> set[str]:
 
 def options_below(name: str) -> set[str]:
     """Options of a command and of its subcommands."""
-    command = get_command(app).get_command(None, name)._load()
+    command = loaded(name)
     below = getattr(command, "commands", {}).values()
     return known_options(command).union(*(known_options(one) for one in below))
 
