@@ -15,10 +15,11 @@ from pipelines.cli import COMMANDS, app
 @cache
 def loaded(name: str) -> Any:
     """A command with its options, made once: a page names it many times."""
-    return get_command(app).get_command(None, name)._load()
+    group: Any = get_command(app)
+    return group.get_command(None, name)._load()
 
 
-def command_of(words: list[str]) -> tuple[object, list[str]]:
+def command_of(words: list[str]) -> tuple[Any, list[str]]:
     """The command that the words name, and what is left of them."""
     assert words[0] in COMMANDS, f"no command is called {words[0]}"
     command = loaded(words[0])
@@ -29,7 +30,7 @@ def command_of(words: list[str]) -> tuple[object, list[str]]:
     return (command.commands[usual] if usual else command), rest
 
 
-def known_options(command: object) -> set[str]:
+def known_options(command: Any) -> set[str]:
     """Options of a command as they are typed."""
     return {name for parameter in command.params for name in (*parameter.opts, *parameter.secondary_opts)} | {"--help"}
 

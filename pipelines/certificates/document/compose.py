@@ -23,6 +23,7 @@ from pipelines.certificates.entries import STATIC
 from pipelines.certificates.ledger import stated
 from pipelines.certificates.measured import measured_on, measured_span
 from pipelines.certificates.stated_budget import Row, StatedBudget, edge, stated_budget
+from pipelines.procedures import FIGURES as OF_PROCEDURES
 from pipelines.stages.figures import FIGURES
 from pipelines.stages.uncertainty.tables import LABELS, has_uncertainty
 from pipelines.tables.calibration import EVERY_AXIS
@@ -211,7 +212,8 @@ def _budget(row: Row, parts: list[Row], words: str) -> content.BudgetTable:
 
 
 def _conformity(row: Row, letters: str) -> content.Conformity:
-    label = FIGURES[row["figure"]].label if row["figure"] in FIGURES else row["figure"]
+    name = str(row["figure"])
+    label = FIGURES[name].label if name in FIGURES else OF_PROCEDURES[name].meaning if name in OF_PROCEDURES else name
     label = _of_axes(label, letters)
     least = isfinite(row.get("least", nan))
     return content.Conformity(
