@@ -150,7 +150,9 @@ def test_a_check_against_the_archive_accepts_it_and_a_changed_digit_is_found(cer
 
 def test_a_model_that_is_not_adequate_is_refused_with_what_it_lacks(certified: tuple[Path, str]) -> None:
     folder, _ = certified
-    message = refused("certificate", "issue", run_of(folder, "bare", "--units", "SF-1"), "--archive", folder / "archive")
+    message = refused(
+        "certificate", "issue", run_of(folder, "bare", "--units", "SF-1"), "--archive", folder / "archive"
+    )
     assert (
         "sweep: the model sensitivity + second_order + delay is NOT ADEQUATE (p < 0.001), it lacks two_pole" in message
     )
