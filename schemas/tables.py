@@ -239,6 +239,27 @@ TABLES: dict[str, Table] = {
     "procedure_findings": Table(
         {"unit": ANY_TEXT, "procedure": text(), "number": WHOLE, **each(text(), "subject", "text")}
     ),
+    # results by comparison: what records and recipe add to the uncertainty, and the sensitivity to each term of the comparison
+    "procedure_results": Table(
+        {
+            **each(text(), "unit", "procedure", "role", "quantity", "axis", "unit_text"),
+            **each(WHOLE, "number", "point"),
+            "value": NUMBER,
+            **each(GAPS, "setting", "dof"),
+        },
+        key=("number", "unit", "quantity", "axis", "point"),
+    ),
+    # the models that such results rest on, with the lower triangle of the covariance of the parameters
+    "procedure_curves": Table(
+        {
+            **each(text(), "unit", "procedure", "axis", "model"),
+            "verdict": text(*VERDICTS),
+            **each(ANY_TEXT, "reason", "name"),
+            **each(WHOLE, "number", "row", "column"),
+            **each(GAPS, "value", "p_value", "low_hz", "high_hz"),
+        },
+        key=("number", "unit", "axis", "row", "column"),
+    ),
     "figures": Table(
         {
             **each(text(), "unit", "figure"),

@@ -10,6 +10,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from schemas.bounds import Degrees, NotNegative, Number, Positive
+from schemas.comparison import Comparison, ExciterBand
 from schemas.stated import TO_SI, AngleEntry, Entry, RelativeEntry, Scope, StandardUncertainty, Stated
 from schemas.strict import Strict
 from schemas.units import STANDARD_GRAVITY_M_S2
@@ -185,6 +186,7 @@ class Uncertainty(Strict):
     """The table ``[uncertainty]``.
 
     grade_source : what the figures rest on; with ``assumed`` nothing is certified
+    exciter : by bands of frequency; shock_machine : of both kinds of equipment that compare with a reference sensor
     """
 
     grade_source: Literal["certificates", "data_sheet", "assumed"] = "assumed"
@@ -203,12 +205,30 @@ class Uncertainty(Strict):
     reader: Reader | None = None
     timing: Timing | None = None
     vibration: Vibration | None = None
+    exciter: Annotated[list[ExciterBand], Field(max_length=16)] = Field(default_factory=list[ExciterBand])
+    shock_machine: Comparison | None = None
 
     @property
     def entries(self) -> dict[str, Entry]:
-        """The entries that are stated, by name."""
-        entries = {name: getattr(self, name) for name in type(self).model_fields if name != "grade_source"}
+        """The entries of the static calibration that are stated, by name."""
+        entries = {name: getattr(self, name) for name in OF_STATIC}
         return {name: entry for name, entry in entries.items() if entry is not None}
+
+    @property
+    def every_entry(self) -> dict[str, Entry]:
+        """The entries that are stated, those of comparisons as well, by the path of their key."""
+        compared: dict[str, Comparison] = {f"exciter[{number}]": band for number, band in enumerate(self.exciter)}
+        if self.shock_machine is not None:
+            compared["shock_machine"] = self.shock_machine
+        own = {f"{path}.{name}": entry for path, one in compared.items() for name, entry in one.entries.items()}
+        return {**self.entries, **own}
+
+    def comparison(self, role: str, frequency_hz: float) -> Comparison | None:
+        """What is stated of the equipment of a role at a frequency; NaN: a result of no one frequency, the first statement."""
+        if role != "exciter":
+            return self.shock_machine if role == "shock_machine" else None
+        anywhere = math.isnan(frequency_hz)
+        return next((one for one in self.exciter if anywhere or one.from_hz <= frequency_hz <= one.to_hz), None)
 
     @property
     def not_stated(self) -> dict[str, str]:
@@ -225,9 +245,11 @@ class Uncertainty(Strict):
 
     @model_serializer(mode="wrap")
     def _only_stated(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        return {name: value for name, value in handler(self).items() if value is not None}
+        return {name: value for name, value in handler(self).items() if value is not None and value != []}
 
 
+OF_STATIC = tuple(name for name in Uncertainty.model_fields if name not in {"grade_source", "exciter", "shock_machine"})
+"""The entries of the static calibration."""
 NEEDED = {
     "gravity": "scale", "level": "bias and misalignment", "orthogonality": "bias and misalignment", "outer_offset": "bias of z",
     "inner_offset": "misalignment", "harmonics": "scale", "pose": "scatter of the poses", "seat": "misalignment",

@@ -44,7 +44,7 @@ def words_of(example: str, names: dict[str, str]) -> list[str]:
 
 def made_in(folder: Path) -> dict[str, str]:
     """Make the files and runs that the examples name in a folder, the working one; names of places and runs to replace."""
-    _line(folder)
+    line(folder)
     for recipe, repeat in (("line-six.toml", "0"), ("my.toml", "1"), ("my.toml", "0")):
         done = command(["run", recipe, "--station", "line-1.toml", "--direct", "--units", UNITS, "--repeat", repeat])
         assert done.returncode in {0, 1}, done.stderr
@@ -63,7 +63,8 @@ def made_in(folder: Path) -> dict[str, str]:
     }  # fmt: skip
 
 
-def _line(folder: Path) -> None:
+def line(folder: Path) -> None:
+    """The recipe `my.toml`, its station, serial numbers and a model."""
     text = (RECIPES / "line-six.toml").read_text(encoding="utf-8")
     for old, new in (
         ('name = "line-six"', 'name = "my"'),

@@ -61,12 +61,18 @@ class Certificates:
         if not known:
             return None
         entered = any(self._measured(one.run) == self._measured(run) for one in known)
-        held = next((one for one in known if one.holds(self.day)), None)
-        last = held or known[-1]
+        held, last = self._deciding(known)
         if held is None and last.state == "revoked":
             return CertificateState(last.certificate, "revoked", _end(last), entered)
         state = "valid" if held else "later" if last.start > self.day else "ended"
         return CertificateState(last.certificate, state, day_of(last.until), entered)
+
+    def _deciding(self, known: Sequence[Calibration]) -> tuple[Calibration | None, Calibration]:
+        """The calibration that is due first: of a subject without a valid one the last, else the valid one that ends first."""
+        named = dict.fromkeys(subject for one in known for subject in one.event.covers.split())
+        subjects = ([one for one in known if subject in one.event.covers.split()] for subject in named)
+        pairs = [(held := next((one for one in own if one.holds(self.day)), None), held or own[-1]) for own in subjects]
+        return next((pair for pair in pairs if pair[0] is None), min(pairs, key=lambda pair: pair[1].until))
 
     def _measured(self, run: str) -> str:
         """The capture of a run, or the run itself where it has none."""

@@ -27,6 +27,7 @@ LedgerEntryDocument = TypedDict(
             dict[str, str], "SHA-256 of the manifests of the run that support the decision, by table"
         ],
         "adequacy": Annotated[str, "verdict on the model with its p; empty in entries of earlier versions"],
+        "covers": Annotated[str, "static (coefficients) and procedures such as sweep or shock, with blanks between"],
         "schema": int,
     },
 )
@@ -81,6 +82,7 @@ class CertifiedCalibration(Validity):
     device: str
     state: Literal["valid", "superseded", "revoked"]
     run: str
+    covers: Annotated[str, "static (coefficients) and procedures such as sweep or shock, with blanks between"]
     grade: str
     station: str
     recipe: str

@@ -11,6 +11,7 @@ from pipelines.archive.store import Place
 from schemas.errors import ArchiveUnusable
 
 SCHEMA = 1
+STATIC = "static"
 Action = Literal["certify", "supersede", "revoke"]
 
 
@@ -29,6 +30,8 @@ class LedgerEntry:
     evidence : hashes of the manifests of the run that support the decision, by table.
     previous : hash of the file of the unit's previous event; empty for the first.
     adequacy : verdict on the run's model with its p, as it was certified; empty in events of earlier versions.
+    covers : ``static`` (coefficients) and the procedures whose results by comparison it has, with blanks between. A calibration
+    ends earlier ones that cover any of the same.
     """
 
     serial: str
@@ -50,6 +53,11 @@ class LedgerEntry:
     previous: str
     evidence: tuple[tuple[str, str], ...] = ()
     adequacy: str = ""
+    covers: str = STATIC
+
+    def ends_others_of(self, other: "LedgerEntry") -> bool:
+        """Whether it covers any of what another event covers."""
+        return bool(set(self.covers.split()) & set(other.covers.split()))
 
     @property
     def certificate(self) -> str:
@@ -78,7 +86,7 @@ def event_of(content: Mapping[str, Any], where: str) -> LedgerEntry:
         raise ArchiveUnusable(
             f"calibrations: {where} has schema {schema}, this version knows up to {SCHEMA}; use a newer version"
         )
-    known: dict[str, Any] = {"adequacy": ""}  # events of earlier versions have none
+    known: dict[str, Any] = {"adequacy": "", "covers": STATIC}  # events of earlier versions have none
     known |= {("start" if name == "from" else name): value for name, value in content.items()}
     missing = sorted(_NAMES - known.keys())
     if missing or known["action"] not in get_args(Action):

@@ -83,7 +83,8 @@ class Ledger:
             if any(_same(one, event) for one in known):
                 return None
             refuse_other_device(known, event)
-            ends = overlapped(known, event.start, event.until, supersede=supersede)
+            alike = [one for one in known if event.ends_others_of(one.event)]
+            ends = overlapped(alike, event.start, event.until, supersede=supersede)
             return replace(event, action="supersede" if ends else "certify", ends=ends)
 
         written = self._append(event.serial, decided)

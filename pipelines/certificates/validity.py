@@ -1,6 +1,7 @@
 """Periods of validity of the calibrations of a unit: a pure function of its events in the order of writing.
 
-A new calibration ends those that are valid on its first day, so that a unit never has two valid calibrations on one day.
+A new calibration ends those of the same subject that are valid on its first day, so that a unit never has two valid calibrations
+of one subject on one day: its coefficients, its sensitivity over frequency, shocks.
 """
 
 from collections.abc import Iterable, Sequence
@@ -104,6 +105,7 @@ class Calibration:
             "state": self.state,
             "stated_until": self.stated_until,
             "run": self.run,
+            "covers": event.covers,
             "grade": event.grade,
             "station": event.station,
             "recipe": event.recipe,

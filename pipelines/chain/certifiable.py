@@ -57,6 +57,8 @@ def refuse_meanwhile(ledger: Ledger, event: LedgerEntry, seen: int) -> None:
     """
     known = ledger.calibrations(event.serial)
     for one in known:
+        if not event.ends_others_of(one.event):
+            continue
         again = (one.run, one.start, one.until) == (event.run, event.start, event.until)
         if one.event.sequence > seen and not again and one.start < event.until and event.start < one.until:
             raise WrongUse(
@@ -157,7 +159,9 @@ def refuse_unstated(run: Run) -> None:
             f"certify: run {run.id} was imported without a statement of its references (noise only), a certificate needs the "
             "whole budget; import the recording again with --references FILE, a TOML with [uncertainty] as in a station's file"
         )
-    if terms is None or terms.stated is None or "basis" not in grades or set(grades["basis"]) != {BUDGET}:
+    compares = bool(run.about.get("capture")) and run.table("coefficients").empty  # each comparison says what it needs
+    based = "basis" in grades and set(grades["basis"]) == {BUDGET}
+    if terms is None or terms.stated is None or not (based or compares):
         raise WrongUse(
             f"certify: run {run.id} states no uncertainty of its references (noise only), a certificate needs the whole budget; "
             "add [uncertainty] to the station's file and measure again"
@@ -167,6 +171,8 @@ def refuse_unstated(run: Run) -> None:
             f'certify: run {run.id} rests on assumed uncertainties (grade_source = "assumed"), certificates or data sheets are '
             "needed; state where the figures of [uncertainty] come from and measure again"
         )
+    if compares:
+        return
     needed, again = _needed(run, terms)
     missing = {name: rules for name, rules in terms.stated.not_stated.items() if name.split()[0] in needed}
     if missing:

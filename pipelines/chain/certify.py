@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 from pipelines.archive import Run, files
 from pipelines.archive.locks import alone
 from pipelines.archive.signatures import public_keys
+from pipelines.certificates.comparisons import TABLES, Comparisons
 from pipelines.certificates.days import day_of, months_after, today
-from pipelines.certificates.entries import FOLDER, LedgerEntry
+from pipelines.certificates.entries import FOLDER, STATIC, LedgerEntry
 from pipelines.certificates.ledger import Ledger
 from pipelines.certificates.programmed import refuse_unproved, unproved
 from pipelines.certificates.refusals import allowed_months, refuse_period
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
 EVIDENCE = ("dwells", "coefficients", "covariance", "grades")
 
 
+NOTHING = "nothing to certify: its recipe has neither multi_position nor sweep, random_vibration, transverse or shock; add one"
 IMPORTED = "imported"
 """The station of a calibration whose measurements came from elsewhere."""
 
@@ -115,15 +117,18 @@ def _proposals(
     refuse_overdue(run)
     adequacy = refuse_inadequate(run)
     refuse_unstated(run)
+    static = not run.table("coefficients").empty
+    comparisons = Comparisons(run)
     if told := refuse_contradicted(run):
         adequacy += f"{'; ' if adequacy else ''}{told}"
     about, result = run.about, Certified()
-    evidence = tuple(sorted((name, files.sha256(run.path / f"{name}.json")) for name in EVIDENCE))
+    named = (*EVIDENCE, *(TABLES if comparisons.parts else ()))
+    evidence = tuple(sorted((name, files.sha256(run.path / f"{name}.json")) for name in named))
     station = (about.get("station") or {}).get("name", IMPORTED)
     shared: dict[str, Any] = {
         "device": about["lot"]["device"], "run": run.id, "start": first, "until": last, "station": station,
         "recipe": about["recipe"]["name"], "coefficients": run.manifest("coefficients")["sha256"], "reason": reason,
-        "evidence": evidence, "adequacy": adequacy,
+        "evidence": evidence,
         # the ledger has still to number and stamp the event
         "sequence": 0, "action": "certify", "ends": (), "who": "", "where": "", "when": "", "previous": "",
     }  # fmt: skip
@@ -131,23 +136,36 @@ def _proposals(
     for serial in units or tuple(grades):
         if serial not in grades:
             raise WrongUse(f"certify: no unit {serial!r} in run {run.id}; {did_you_mean(serial, grades)}")
-        row = grades[serial]
-        half = unproved(run.archive.root, serial)
-        if half and units:
-            refuse_unproved(run.archive.root, serial)
-        if half:
-            result.left_out[serial] = half
+        row, compared = grades[serial], comparisons.results(serial)
+        why = _why_not(run, serial, row, named=bool(units))
+        if not (why or static or compared):
+            why = "; ".join(comparisons.reasons(serial).values()) or NOTHING
+            if units:
+                raise WrongUse(f"certify: unit {serial} of run {run.id}: {why}")
+        if why:
+            result.left_out[serial] = why
             continue
-        if row["outcome"] == "pass":
-            proposals.append(LedgerEntry(serial=serial, grade=str(row["grade"]), **shared))
-            continue
-        why = f"{row['outcome']}: {row['reasons']}"
-        if units:
-            raise WrongUse(
-                f"certify: unit {serial} of run {run.id} did not pass ({why}); only what passed is certified"
-            )
-        result.left_out[serial] = why
+        kinds = [str(comparisons.parts[number].kind) for number in compared]
+        covers: list[str] = list(dict.fromkeys([STATIC, *kinds] if static else kinds))
+        verdicts = "; ".join(filter(None, (adequacy, comparisons.verdicts(serial))))
+        grade, words = str(row["grade"]), " ".join(covers)
+        proposals.append(LedgerEntry(serial=serial, grade=grade, covers=words, adequacy=verdicts, **shared))
+    if not (proposals or static) and not any(row["outcome"] != "pass" for row in grades.values()):
+        raise WrongUse(f"certify: run {run.id}: {next(iter(result.left_out.values()), NOTHING)}")
     return proposals, result
+
+
+def _why_not(run: Run, serial: str, row: Mapping[str, Any], *, named: bool) -> str:
+    """Why a unit is not certified by its grade or its memory, empty where it may be; one that is named is refused."""
+    half = unproved(run.archive.root, serial)
+    if half and named:
+        refuse_unproved(run.archive.root, serial)
+    if half or row["outcome"] == "pass":
+        return half
+    why = f"{row['outcome']}: {row['reasons']}"
+    if named:
+        raise WrongUse(f"certify: unit {serial} of run {run.id} did not pass ({why}); only what passed is certified")
+    return why
 
 
 def _grades(run: Run) -> Any:

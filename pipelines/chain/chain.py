@@ -120,7 +120,8 @@ _BUDGETED = ("dwells", "history", "coefficients", "covariance", "wander", "verif
 def _budget(job: Job, run: Run) -> Tables:
     lot = _lot(run)
     own = (run.table(name) for name in _BUDGETED[2:])
-    tables = BudgetTables(lot.dwells, lot.history, *own, lot=lot, calibration=None)
+    results = run.table("procedure_results")
+    tables = BudgetTables(lot.dwells, lot.history, *own, lot=lot, calibration=None, results=results)
     return budget(tables, job.terms)
 
 
@@ -201,18 +202,24 @@ STAGES: tuple[Stage, ...] = (
         call=lambda _, run: noise(static_record(*static_inputs(run))),
     ),
     Stage(
+        name="procedures",
+        inputs=(RECORDS, "readings", "verdicts", "coefficients", "covariance", "noise"),
+        outputs=(
+            "procedure_points",
+            "procedure_figures",
+            "procedure_findings",
+            "procedure_results",
+            "procedure_curves",
+        ),
+        parameters=_listed,
+        call=_procedures,
+    ),
+    Stage(
         name="budget",
-        inputs=_BUDGETED,
+        inputs=(*_BUDGETED, "procedure_results"),
         outputs=("budget", "uncertainties", "budget_covariance"),
         parameters=lambda job: job.terms.document(),
         call=_budget,
-    ),
-    Stage(
-        name="procedures",
-        inputs=(RECORDS, "readings", "verdicts", "coefficients", "covariance", "noise"),
-        outputs=("procedure_points", "procedure_figures", "procedure_findings"),
-        parameters=_listed,
-        call=_procedures,
     ),
     Stage(
         name="grade",

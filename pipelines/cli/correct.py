@@ -94,9 +94,9 @@ def command(
     store = Archive(archive)
     run = store.run(name)
     use_formulas_of(run)
-    fit = fit_of_unit(run, unit, "correct", **options.included(include))
+    fit = fit_of_unit(run, unit, **options.included(include))
     with error_console().status(f"reading {file.name}"):
-        recording = read_recording(file, named, time=time, rate_hz=rate)
+        recording = read_recording(file, named, time=time, rate_hz=rate, axes=fit.exported.axes)
     terms = archived_terms(run.about)
     if terms is not None and terms.follows is not None:
         recording = at_nominal_supply(recording, terms.follows)

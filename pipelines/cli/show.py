@@ -128,6 +128,7 @@ def show_validity(archive: Archive, serial: str, at: str, known: str, *, as_json
     """Print the calibration that is valid on a day; return whether there is one."""
     from pipelines.certificates import Ledger
     from pipelines.certificates.days import day_of, today
+    from pipelines.certificates.entries import STATIC
 
     day = day_of(at, "--at") if at else today()
     history = Ledger(archive).calibrations(serial, day_of(known, "--known") if known else "")
@@ -135,7 +136,9 @@ def show_validity(archive: Archive, serial: str, at: str, known: str, *, as_json
         raise WrongUse(
             f"show: unit {serial!r} has no calibration in archive {archive.root}; certify one with 'tumbleline certificate issue'"
         )
-    valid = next((one for one in history if one.holds(day)), None)
+    # of a unit that has coefficients, and results of an exciter, the coefficients are meant
+    first = sorted(history, key=lambda one: STATIC not in one.event.covers.split())
+    valid = next((one for one in first if one.holds(day)), None)
     if as_json:
         shown = None if valid is None else {**valid.document(), **_made(archive, valid)}
         print_json(
@@ -176,8 +179,10 @@ def _print(serial: str, day: str, valid: Calibration | None, history: list[Calib
         if made.get("made"):
             libraries = ", ".join(f"{name} {number}" for name, number in made["made"]["libraries"].items())
             say(f"  code     {made['made']['code'][:16]}… with {libraries}")
-    lines = [[one.certificate, one.start, one.until, one.state, one.run, _why(one)] for one in history]
-    print_table(["certificate", "from", "until", "state", "run", "reason"], lines)
+    lines = [
+        [one.certificate, one.event.covers, one.start, one.until, one.state, one.run, _why(one)] for one in history
+    ]
+    print_table(["certificate", "covers", "from", "until", "state", "run", "reason"], lines)
     rows = made.get("coefficients") or []
     if rows:
         from inertial.uncertainty.rounding import rounded

@@ -72,7 +72,7 @@ def command(
     name, _, unit = calibration.partition(":")
     run = Archive(archive).run(name)
     use_formulas_of(run)
-    fit = fit_of_unit(run, unit, "simulate", **options.included(include))
+    fit = fit_of_unit(run, unit, **options.included(include))
     with error_console().status(f"reading {file.name}"):
         recording = read_recording(file, FORCE_COLUMNS, time=time, rate_hz=rate)
     low_pass = None if bandwidth is None else _low_pass(bandwidth, rate_and_gaps(recording.time)[0])
@@ -96,7 +96,7 @@ def _print(document: SimulateDocument) -> None:
     for text in document["told"]:
         say(text)
     for name, values in document["noise"].items():
-        say(f"noise {name}: {', '.join(short(value) for value in values)} (x, y, z)")
+        say(f"noise {name}: {', '.join(short(value) for value in values)} ({', '.join(document['error_at_25_C_ug'])})")
     if not document["noise"]:
         say("without noise")
     if document["clipped"]:

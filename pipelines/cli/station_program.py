@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import typer
 
@@ -23,14 +23,18 @@ from pipelines.cli.printing import give, print_table, remark, say
 from schemas.errors import DONE, PART_FAILED, WrongUse, did_you_mean
 
 if TYPE_CHECKING:
+    from pipelines.archive import Run
     from pipelines.export import UnitCalibration
+    from schemas.station import StationConfig
 
 UNATTENDED = "program: standard input ended before an answer, a line is needed; give --yes to write without an operator"
 
 
+FORMS = ("float32", "q24", "teds")
 SETTINGS = {
     "tolerance": Setting("UG", "largest allowed error in the two poses, 3000 µg by default", float, 1.0),
     "offset_registers": Setting("yes", "also write the offset registers of an ADXL355", yes_or_no),
+    "teds": Setting("KEY=VALUE,…", "teds: as in export"),
 }
 
 
@@ -38,7 +42,12 @@ def program(
     run: RunArgument = "latest",
     station: StationOption = None,
     units: Annotated[str, option("--units SN,…", "Write only these units; default: all that passed.")] = "",
-    form: Annotated[str, option("--format float32|q24", "Form of the coefficients.")] = "float32",
+    form: Annotated[
+        str,
+        option(
+            "--format float32|q24|teds", "Form of the coefficients, or the data sheet of IEEE 1451.4 instead of them."
+        ),
+    ] = "float32",
     setting: Annotated[list[str] | None, set_option(SETTINGS)] = None,
     archive: ArchiveOption = None,
     *,
@@ -56,8 +65,8 @@ def program(
     from schemas.foreign import shown
     from schemas.station import load_station
 
-    if form not in ("float32", "q24"):
-        raise WrongUse(f"--format: found '{shown(form)}'; {did_you_mean(form, ('float32', 'q24'))}")
+    if form not in FORMS:
+        raise WrongUse(f"--format: found '{shown(form)}'; {did_you_mean(form, FORMS)}")
     given = settings(setting, SETTINGS, "program")
     source = Archive(archive).run(run)
     chosen = chosen_units(source, [serial.strip() for serial in units.split(",") if serial.strip()])
@@ -65,6 +74,8 @@ def program(
     if not yes and not _agreed(source.id, config.name, chosen):
         say("nothing was written")
         raise typer.Exit(DONE)
+    if form == "teds":
+        _write_teds(source, chosen, config, given.get("teds", ""), as_json=as_json)
     outcomes, certificates = program_run(
         source,
         chosen,
@@ -75,6 +86,28 @@ def program(
     result = document(source, outcomes, certificates)
     give(result, _print, as_json=as_json)
     raise typer.Exit(PART_FAILED if any(one.outcome != "proved" for one in outcomes) else DONE)
+
+
+def _write_teds(
+    source: Run, chosen: Sequence[tuple[int, UnitCalibration]], config: StationConfig, sheet: str, *, as_json: bool
+) -> NoReturn:
+    """Write a data sheet into the memory of each device; Exit status 1: a unit failed."""
+    from pipelines.certificates.measured import measured_on
+    from pipelines.export.teds import data_sheet
+    from pipelines.programming.teds import program_teds
+
+    stated = data_sheet(sheet, measured_on(source))
+    outcomes = program_teds(source, chosen, config, stated, lambda text: remark(f"program: {text}"))
+    give({"run": source.id, "teds": [one.document() for one in outcomes]}, _print_teds, as_json=as_json)
+    raise typer.Exit(PART_FAILED if any(one.outcome != "proved" for one in outcomes) else DONE)
+
+
+def _print_teds(result: dict[str, Any]) -> None:
+    rows = [[one["unit"], one["outcome"], ", ".join(page["axis"] for page in one["pages"])] for one in result["teds"]]
+    print_table(["unit", "outcome", "pages"], rows, title=f"run {result['run']}: TEDS")
+    for one in result["teds"]:
+        if one["outcome"] == "failed":
+            say(f"  {one['unit']} failed at '{one['step']}': {one['reason']}")
 
 
 def _agreed(run: str, station: str, chosen: Sequence[tuple[int, UnitCalibration]]) -> bool:

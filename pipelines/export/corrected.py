@@ -40,7 +40,7 @@ GAP = 3.0
 class FitOfUnit:
     """Coefficients of one unit.
 
-    coefficients : (3, p); covariance : (3p, 3p), x before y before z; budget : whether it includes the stated references
+    coefficients : (m, p); covariance : (mp, mp), x before y before z; budget : whether it includes the stated references
     curve : Allan deviation of its static record; None where there is none that noise terms explain
     """
 
@@ -85,7 +85,8 @@ class Tracking:
 class Corrected:
     """A corrected recording.
 
-    force : (n, 3), g; covariance : (n, 3, 3), g², of the calibration; with a track also of the bias and of noise
+    force : (n, 3), g, zero across the axes
+    covariance : (n, m, m), g², of the calibration; with a track also of the bias and of noise
     track : of the steps, and of the samples after the last whole step as one step without update
     at_limits : the same with the upper limits (95 %) of the terms that the static record does not identify; None where it goes on
     kept : what the next recording goes on with · white : (3,), g/√Hz, of the samples
@@ -105,13 +106,12 @@ class Corrected:
     white: Array | None = None
 
 
-def fit_of_unit(run: Run, unit: str, what: str, *, failed: bool, revoked: bool) -> FitOfUnit:
+def fit_of_unit(run: Run, unit: str, *, failed: bool, revoked: bool) -> FitOfUnit:
     """The fitted coefficients of one unit; as in an export, a unit that failed or was revoked is refused.
 
     Parameters
     ----------
     unit : may be empty where the run has one unit
-    what : the command that needs it, at the beginning of messages
     """
     missing = [name for name in ("coefficients", "covariance") if name not in run.tables()]
     if missing:
@@ -127,11 +127,10 @@ def fit_of_unit(run: Run, unit: str, what: str, *, failed: bool, revoked: bool) 
         )
     serial = unit or next(iter(calibration.units))
     exported = unit_calibrations(run, (serial,), failed=failed, revoked=revoked)[0]
-    refuse_fewer_axes([exported], f"{what}: it")
     u = calibration.units.index(serial)
     p = calibration.coefficients.shape[-1]
     covariance: Array = np.asarray(block_diag(*list(calibration.covariance[u])), dtype=np.float64)
-    budget = _budget(run, serial, 3 * p)
+    budget = _budget(run, serial, len(calibration.axes) * p)
     return FitOfUnit(
         run.id,
         exported,
@@ -184,6 +183,8 @@ def corrected(recording: CorrectableRecording, fit: FitOfUnit, tracking: Trackin
     low, high = fit.exported.temperatures
     outside = 0 if temperature is None else int(np.sum((temperature < low - 0.5) | (temperature > high + 0.5)))
     plain = Corrected(force, covariance, outside)
+    if tracking is not None:
+        refuse_fewer_axes([fit.exported], "correct: --track")
     return plain if tracking is None else _tracked(recording, fit, tracking, plain)
 
 
@@ -307,10 +308,11 @@ def _means(values: Array, per: int) -> Array:
 def table_of(recording: CorrectableRecording, done: Corrected) -> pd.DataFrame:
     """One row per sample: time, force in g, standard uncertainties and covariances, and the bias where it is tracked, in µg."""
     columns: dict[str, Array] = {"time_s": recording.time}
-    columns |= {f"force_{axis}_g": done.force[:, i] for i, axis in enumerate(AXES)}
+    axes = recording.state.axes
+    columns |= {f"force_{AXES[axis]}_g": done.force[:, axis] for axis in axes}
     sd = np.sqrt(np.maximum(np.diagonal(done.covariance, axis1=1, axis2=2), 0.0))
-    columns |= {f"u_{axis}_ug": MICRO * sd[:, i] for i, axis in enumerate(AXES)}
-    columns |= {f"cov_{AXES[i]}{AXES[j]}_ug2": MICRO**2 * done.covariance[:, i, j] for i, j in PAIRS}
+    columns |= {f"u_{AXES[axis]}_ug": MICRO * sd[:, k] for k, axis in enumerate(axes)}
+    columns |= {f"cov_{AXES[i]}{AXES[j]}_ug2": MICRO**2 * done.covariance[:, i, j] for i, j in PAIRS if j < len(axes)}
     if done.bias is not None and done.bias_covariance is not None and done.updated is not None:
         own = np.sqrt(np.diagonal(done.bias_covariance, axis1=1, axis2=2))
         columns |= {f"bias_{axis}_ug": MICRO * done.bias[:, i] for i, axis in enumerate(AXES)}

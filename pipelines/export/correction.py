@@ -116,4 +116,4 @@ def _deviation_ug(covariance: Array) -> Array:
 
 
 def _by_axis(values: Array) -> dict[str, float]:
-    return dict(zip(AXES, values.tolist(), strict=True))
+    return dict(zip(AXES, values.tolist(), strict=False))

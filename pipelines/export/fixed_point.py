@@ -1,6 +1,7 @@
 """Calibration in fixed point: a = M(x)·(u − β(x)), u the output over a nominal scale, x = θ/64 K, in units of 2⁻²⁴.
 
-M is a polynomial that was fitted over the measured temperatures alone: beyond them the coefficients of the nearest one hold.
+M is a polynomial that was fitted over the measured temperatures alone: beyond them the coefficients of the nearest one hold. An
+axis without an output has the force along it in g as its u: its row of M is that of the identity, and its β is 0.
 """
 
 from __future__ import annotations
@@ -9,9 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from inertial.arrays import Array, Index
+from inertial.arrays import Array, Flags, Index
 from pipelines.export.polynomials import ORDER, UnitCalibration
 from schemas.errors import WrongUse
+from schemas.units import AXES
 
 BITS = 24
 ONE = 1 << BITS
@@ -34,9 +36,16 @@ class FixedPoint:
     inverse: Index
     range_mC: tuple[int, int]
 
+    @property
+    def of_forces(self) -> Flags:
+        """Axes (3,) without an output: no bias, and the row of the identity at every temperature."""
+        plain = np.zeros_like(self.inverse)
+        plain[0] = ONE * np.eye(len(AXES), dtype=np.int64)
+        return ~np.any(self.bias, axis=0) & np.all(self.inverse == plain, axis=(0, 2))
+
     def correct(self, output: Array, temperature: float) -> Array:
         """Specific force (n, 3) in g of outputs (n, 3) in the unit of the output, digit by digit as the C code computes it."""
-        u = np.rint(output / self.scale * ONE).astype(np.int64)
+        u = np.rint(output / np.where(self.of_forces, 1.0, self.scale) * ONE).astype(np.int64)
         low, high = self.range_mC
         x = np.int64(_truncated((min(max(round(1000.0 * temperature), low), high) - 25000) * 32768, 125))
         d = u - _horner(self.bias, x)
@@ -51,17 +60,21 @@ def fixed_point(unit: UnitCalibration) -> FixedPoint:
     WrongUse
         A coefficient is beyond ±128.
     """
-    scale = float(np.mean(np.diag(unit.response[0])))
+    own = list(unit.axes)
+    whole = unit.with_every_axis
+    scale = float(np.mean(np.diag(whole.response[0])[own]))
+    per_axis = np.ones(len(AXES))
+    per_axis[own] = scale
     span = TEMPERATURE_SPAN_K ** np.arange(ORDER)
     low, high = unit.temperatures
     middle, half = 0.5 * (low + high) - 25.0, 0.5 * (high - low)
-    order = ORDER if half > 0.0 and np.any(unit.response[1:]) else 1
+    order = ORDER if half > 0.0 and np.any(whole.response[1:]) else 1
     theta = middle + half * np.cos(np.pi * (np.arange(_NODES) + 0.5) / _NODES)
-    response = np.einsum("tk,kij->tij", theta[:, None] ** np.arange(ORDER), unit.response) / scale
+    response = np.einsum("tk,kij->tij", theta[:, None] ** np.arange(ORDER), whole.response) / per_axis[:, None]
     inverse = np.zeros((ORDER, 9))
     powers = (theta[:, None] / TEMPERATURE_SPAN_K) ** np.arange(order)
     inverse[:order] = np.linalg.lstsq(powers, np.linalg.inv(response).reshape(_NODES, 9), rcond=None)[0]
-    values = np.rint(unit.bias / scale * span[:, None] * ONE), np.rint(inverse.reshape(ORDER, 3, 3) * ONE)
+    values = np.rint(whole.bias / per_axis * span[:, None] * ONE), np.rint(inverse.reshape(ORDER, 3, 3) * ONE)
     largest = max(float(np.max(np.abs(v))) for v in values)
     if not largest <= _LARGEST:
         raise WrongUse(
@@ -69,6 +82,9 @@ def fixed_point(unit: UnitCalibration) -> FixedPoint:
             "range; export with --set arithmetic=float"
         )
     bias, matrix = (v.astype(np.int64) for v in values)
+    for axis in set(range(len(AXES))) - set(own):
+        matrix[:, axis] = 0
+        matrix[0, axis, axis] = ONE
     return FixedPoint(scale, bias, matrix, thousandths(unit.temperatures))
 
 

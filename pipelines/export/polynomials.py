@@ -64,7 +64,7 @@ class UnitCalibration:
     @property
     def with_every_axis(self) -> UnitCalibration:
         """The calibration with three outputs: that of an axis without one is the force along it in g, 0 where it is not known."""
-        if len(self.axes) == len(AXES):
+        if self.bias.shape[-1] == len(AXES):
             return self
         own = list(self.axes)
         bias, response = np.zeros((ORDER, len(AXES))), np.zeros((ORDER, len(AXES), 3))

@@ -11,13 +11,15 @@ import numpy as np
 import pandas as pd
 
 from inertial.arrays import Array
+from inertial.counts import number_of
 from inertial.quantities import BY_COLUMN, FORCE_COLUMNS
-from inertial.state import State
+from inertial.state import ALL_AXES, State
 from pipelines.importers import files
 from pipelines.importers.values import as_numbers, finite_column
 from pipelines.stages.reduce import FollowedSupply
 from schemas.errors import DataRejected, WrongUse
 from schemas.foreign import shown
+from schemas.units import AXES
 
 TIME = "time_s"
 USUAL = (("x", "y", "z"), ("out_x", "out_y", "out_z"))
@@ -27,7 +29,7 @@ USUAL = (("x", "y", "z"), ("out_x", "out_y", "out_z"))
 class CorrectableRecording:
     """Samples in order of time.
 
-    time : (n,), s; output : (n, 3), output unit
+    time : (n,), s; output : (n, m), output unit
     state : conditions of the samples; its force is zero
     known : (n, 3), g, the true force; NaN where it is not known
     name : file name, for messages
@@ -41,13 +43,13 @@ class CorrectableRecording:
 
 
 def read_recording(
-    path: Path, columns: Sequence[str], *, time: str = "", rate_hz: float | None = None
+    path: Path, columns: Sequence[str], *, time: str = "", rate_hz: float | None = None, axes: Sequence[int] = ALL_AXES
 ) -> CorrectableRecording:
     """The recording of a file of samples.
 
     Parameters
     ----------
-    columns : of the output x, y, z; by default x, y, z or out_x, out_y, out_z
+    columns : of the output x, y, z, as far as ``axes`` go; by default x, y, z or out_x, out_y, out_z
     time : column of the time in s, ``time_s`` by default; rate_hz : instead of a column
 
     Raises
@@ -56,19 +58,28 @@ def read_recording(
         A column is missing, a value is not finite, or the time does not always increase.
     """
     table, _ = files.read(path)
-    return recording_of(table, path.name, columns, time=time, rate_hz=rate_hz)
+    return recording_of(table, path.name, columns, time=time, rate_hz=rate_hz, axes=axes)
 
 
 def recording_of(
-    table: pd.DataFrame, where: str, columns: Sequence[str] = (), *, time: str = "", rate_hz: float | None = None
+    table: pd.DataFrame,
+    where: str,
+    columns: Sequence[str] = (),
+    *,
+    time: str = "",
+    rate_hz: float | None = None,
+    axes: Sequence[int] = ALL_AXES,
 ) -> CorrectableRecording:
     """The recording of a table of samples, as :func:`read_recording` reads it; ``where``: its name, for messages."""
     there = list(table.columns)
-    chosen = list(columns) or next((list(names) for names in USUAL if set(names) <= set(there)), [])
-    if len(chosen) != 3:
+    letters = [AXES[axis] for axis in axes]
+    usual = ([names[axis] for axis in axes] for names in USUAL)
+    chosen = list(columns) or next((names for names in usual if set(names) <= set(there)), [])
+    if len(chosen) != len(letters):
+        needed = f"{number_of(len(letters), 'column')} of output ({', '.join(letters)})"
         raise WrongUse(
-            f"{where}: columns {', '.join(shown(name) for name in there[:8])}, three columns of output are needed; name "
-            "them with --map x=…,y=…,z=…"
+            f"{where}: columns {', '.join(shown(name) for name in there[:8])}, {needed} needed; name them with --map "
+            f"{','.join(f'{letter}=…' for letter in letters)}"
         )
     output = np.stack([finite_column(table, name, where) for name in chosen], axis=1)
     n = len(output)
@@ -83,7 +94,8 @@ def recording_of(
     known = np.full((n, 3), np.nan)
     if set(FORCE_COLUMNS) <= set(there):
         known = np.stack([as_numbers(table[name], where) for name in FORCE_COLUMNS], axis=1)
-    return CorrectableRecording(moments, output, _state(table, moments, {*chosen, time or TIME}, where), known, where)
+    state = replace(_state(table, moments, {*chosen, time or TIME}, where), axes=tuple(axes))
+    return CorrectableRecording(moments, output, state, known, where)
 
 
 def at_nominal_supply(recording: CorrectableRecording, follows: FollowedSupply) -> CorrectableRecording:

@@ -185,7 +185,7 @@ def bias_models(run: Run, serials: Sequence[str], step_s: float, turn_on_ug: flo
         )
     models: dict[str, BiasModel] = {}
     for serial in serials:
-        noise = terms_of_unit(fit_of_unit(run, serial, "export", failed=True, revoked=True))[0]
+        noise = terms_of_unit(fit_of_unit(run, serial, failed=True, revoked=True))[0]
         flicker = steps_flicker(step_s, 0.0)
         models[serial] = bias_model(noise.white, noise.instability, noise.walk, turn_on_ug / MICRO, flicker)
     return models

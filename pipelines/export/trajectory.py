@@ -31,7 +31,7 @@ ENDINGS = (".csv", ".parquet", ".mat", ".npy")
 
 @dataclass(frozen=True)
 class SimulatedOutput:
-    """Raw output (n, 3) in output units, the force (n, 3) in g that made it, and what was added.
+    """Raw output (n, m) in output units, the force (n, 3) in g that made it, and what was added.
 
     noise : terms by axis in µg, none where it is empty · clipped : samples at the end of the range · told : what was assumed
     """
@@ -75,7 +75,7 @@ def simulated(
     recording, told = with_temperature(recording)
     force = recording.output * UNITS[unit_of_force]
     felt = force if low_pass is None else low_pass.apply(force, low_pass.steady(force[0]))[0]
-    state = replace(recording.state, force=felt, memory={})
+    state = replace(recording.state, force=felt, axes=fit.exported.axes, memory={})
     output = predict(fit.effects, state, fit.coefficients, fit.nonlinear)
     added: dict[str, list[float]] = {}
     if seed is not None:
@@ -131,7 +131,7 @@ def drawn_bias(model: BiasModel, steps: Array, rng: np.random.Generator) -> Arra
 def table_of_output(made: SimulatedOutput) -> pd.DataFrame:
     """One row per sample: time, raw output, conditions, and the true force in g."""
     columns: dict[str, Any] = {"time_s": made.recording.time}
-    columns |= {axis: made.output[:, i] for i, axis in enumerate(AXES)}
+    columns |= dict(zip(AXES, made.output.T, strict=False))
     columns |= {"unit_C": made.recording.state.temperature}
     return pd.DataFrame(columns | {f"force_{axis}": made.force[:, i] for i, axis in enumerate(AXES)})
 
@@ -164,7 +164,10 @@ def simulation_document(
     made: SimulatedOutput, fit: FitOfUnit, low_pass: OutputFilter | None, seed: int | None, output: Path
 ) -> SimulateDocument:
     """What was simulated."""
-    error = np.linalg.solve(fit.exported.response[0], (made.output - fit.exported.bias[0]).T).T - made.force
+    own, whole = fit.exported, fit.exported.with_every_axis
+    output_of_all = made.force.copy()
+    output_of_all[:, list(own.axes)] = made.output
+    error = (np.linalg.solve(whole.response[0], (output_of_all - whole.bias[0]).T).T - made.force)[:, list(own.axes)]
     return {
         "file": made.recording.name,
         "run": fit.run,
@@ -175,7 +178,7 @@ def simulation_document(
         "seed": seed,
         "noise": made.noise,
         "clipped": made.clipped,
-        "error_at_25_C_ug": dict(zip(AXES, (MICRO * np.sqrt(np.mean(error**2, axis=0))).tolist(), strict=True)),
+        "error_at_25_C_ug": dict(zip(own.letters, (MICRO * np.sqrt(np.mean(error**2, axis=0))).tolist(), strict=True)),
         "told": list(made.told),
         "output": str(output),
     }

@@ -31,7 +31,7 @@ class UnitNoise:
 
     def remark(self, symbol: str) -> str:
         """Which axes have an upper limit in place of a value; empty where none has."""
-        limits = [axis for axis, known in zip(AXES, self.identified[symbol], strict=True) if not known]
+        limits = [axis for axis, known in zip(AXES, self.identified[symbol], strict=False) if not known]
         return f"upper limit (95 %), not identified: {', '.join(limits)}" if limits else ""
 
 
@@ -46,20 +46,17 @@ def noise_of_units(run: Run) -> dict[str, UnitNoise]:
     rows = {(str(r["unit"]), str(r["term"]), str(r["axis"])): r for r in rows_of(table)}
     noises: dict[str, UnitNoise] = {}
     for unit in dict.fromkeys(key[0] for key in rows):
-        own = {symbol: [rows.get((unit, symbol, axis), NO_AXIS) for axis in AXES] for symbol in TERMS}
+        axes = [axis for axis in AXES if any((unit, symbol, axis) in rows for symbol in TERMS)]
+        own = {symbol: [rows[unit, symbol, axis] for axis in axes] for symbol in TERMS}
         value = {s: np.array([float(r["value"] if r["identified"] else r["high"]) for r in own[s]]) for s in TERMS}
         identified = {s: np.array([bool(r["identified"]) for r in own[s]]) for s in TERMS}
         noises[unit] = UnitNoise(value, identified, float(rates.iloc[0]))
     return noises
 
 
-NO_AXIS = {"value": np.nan, "high": np.nan, "identified": True}
-"""Of a term of an axis without an output."""
-
-
 @dataclass(frozen=True)
 class UnitCurve:
-    """Allan deviation (3, t) of x, y and z in µg, at ``m`` (t,) samples, of ``n`` at ``rate_hz``."""
+    """Allan deviation (m, t) of the axes with an output in µg, at ``m`` (t,) samples, of ``n`` at ``rate_hz``."""
 
     deviation: Array
     m: Index
@@ -73,10 +70,10 @@ def curve_of_unit(run: Run, unit: str) -> UnitCurve | None:
         return None
     own = run.table("allan")
     own = own[own["unit"] == unit]
-    axes = [own[own["axis"] == axis] for axis in AXES]
+    axes = [rows for axis in AXES if len(rows := own[own["axis"] == axis])]
     readings = run.table("readings")
     readings = readings[(readings["kind"] == "allan") & (readings["unit"] == unit) & (readings["status"] == "ok")]
-    if readings.empty or len({len(rows) for rows in axes}) > 1 or axes[0].empty or own["fitted_ug"].isna().any():
+    if readings.empty or len({len(rows) for rows in axes}) != 1 or own["fitted_ug"].isna().any():
         return None
     tau = axes[0]["tau_s"].to_numpy(dtype=np.float64)
     rate = 1.0 / float(tau[0])  # of the means that the curve begins with

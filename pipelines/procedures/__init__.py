@@ -24,9 +24,11 @@ from pipelines.procedures.base import (
     Procedure,
     SetsEquipment,
 )
+from pipelines.procedures.compared import OF_RECORDS
 from pipelines.procedures.figures import Outcome
 from pipelines.procedures.recorded import ProcedureStep
 from pipelines.tables.frames import empty_table
+from schemas.comparison import TERMS
 from schemas.errors import RecipeInvalid, close_matches, did_you_mean
 from schemas.recipe import Recipe
 from schemas.station import StationConfig
@@ -195,6 +197,14 @@ EMPTY: dict[str, dict[str, str]] = {
         "whole": "number", "flags": "identified",
     },
     "procedure_findings": {"texts": "unit procedure subject text", "whole": "number"},
+    "procedure_results": {
+        "texts": "unit procedure role quantity axis unit_text", "whole": "number point",
+        "numbers": " ".join(("setting value dof", *(f"u_{name}" for name in OF_RECORDS), *(f"c_{name}" for name in TERMS))),
+    },
+    "procedure_curves": {
+        "texts": "unit procedure axis model verdict reason name", "whole": "number row column",
+        "numbers": "value p_value low_hz high_hz",
+    },
 }  # fmt: skip
 """Columns of the tables of the stage by their types, for tables without rows."""
 
@@ -216,7 +226,18 @@ def procedure_tables(results: Sequence[tuple[int, str, pd.DataFrame, Outcome]]) 
         for number, name, _, outcome in results
         for one in outcome.findings
     ]
-    made = (pd.concat(points, ignore_index=True) if points else points, pd.DataFrame(figures), pd.DataFrame(findings))
+    compared = [
+        {"unit": unit, "procedure": name, "number": number, "role": PROCEDURES[name].roles[0], **one.row()}
+        for number, name, _, outcome in results for unit, values in outcome.results.items() for one in values
+    ]  # fmt: skip
+    curves = [
+        {"unit": unit, "procedure": name, "number": number, **row}
+        for number, name, _, outcome in results for unit, own in outcome.curves.items() for one in own for row in one.rows()
+    ]  # fmt: skip
+    made = (
+        pd.concat(points, ignore_index=True) if points else points, pd.DataFrame(figures), pd.DataFrame(findings),
+        pd.DataFrame(compared), pd.DataFrame(curves),
+    )  # fmt: skip
     return {
         name: rows if isinstance(rows, pd.DataFrame) and len(rows) else empty_table(**columns)
         for (name, columns), rows in zip(EMPTY.items(), made, strict=True)

@@ -10,6 +10,7 @@ from pydantic import Field
 
 from inertial.errors import NotIdentified
 from pipelines.drawing.chart import Chart
+from pipelines.procedures.compared import ComparedResult, JudgedCurve
 from pipelines.procedures.figures import FigureSpec, FigureValue, Finding, Outcome, Texts, UnitOutcome
 from pipelines.procedures.recorded import Array, Device, ProcedureStep, Records, Taken, UnitRecord, point_table, taken
 from schemas.errors import RecipeInvalid, did_you_mean
@@ -36,7 +37,7 @@ class Procedure(ABC):
     """A test procedure. Each module of this package defines one as PROCEDURE.
 
     A subclass lists its steps. What else it can do is stated by the classes below that it inherits, each with abstract methods:
-    :class:`Evaluated`, :class:`InG`, :class:`OnEquipment`, :class:`SetsEquipment`, :class:`FromWaveforms`.
+    :class:`Evaluated`, :class:`InG`, :class:`OnEquipment`, :class:`SetsEquipment`, :class:`FromWaveforms`, :class:`Compares`.
 
     name : of the module, and ``kind`` in recipes · title : heading in the report · order : place in the reference
     roles : equipment that a station must have · source : standard, edition and part · states : its results in one line
@@ -87,6 +88,8 @@ class Evaluated(Procedure):
         """Figures and findings of every unit, from the points alone."""
         figures: dict[str, list[FigureValue]] = {}
         findings: list[Finding] = []
+        results: dict[str, list[ComparedResult]] = {}
+        curves: dict[str, list[JudgedCurve]] = {}
         for name, rows in points.groupby("unit", sort=False):
             unit = str(name)
             try:
@@ -95,8 +98,13 @@ class Evaluated(Procedure):
                 measured = rows["axis"].unique()
                 axis = str(measured[0]) if len(measured) == 1 else ""
                 figures[unit], texts = self.nothing(part, str(problem), axis), []
+            else:
+                if isinstance(self, Compares):
+                    values = {one.figure: one for one in figures[unit] if one.identified}
+                    results[unit], curves[unit] = self.compared(part, rows, values, device.out_unit)
             findings += [Finding(unit, *text) for text in texts]
-        return Outcome(figures, [*findings, *(Finding("", *text) for text in self.of_lot(part, points))])
+        findings += [Finding("", *text) for text in self.of_lot(part, points)]
+        return Outcome(figures, findings, results, curves)
 
     def nothing(self, part: Any, note: str, axis: str = "") -> list[FigureValue]:
         """Every figure without a value, with the reason; for no axis in particular the part's, or all."""
@@ -143,6 +151,19 @@ class SetsEquipment(Procedure):
     @abstractmethod
     def set_equipment(self, equipment: Any, step: ProcedureStep) -> Mapping[str, float]:
         """Set the equipment of the role; ``supply_ratio`` of the result is over the nominal supply."""
+
+
+class Compares(Evaluated):
+    """A procedure whose results are by comparison with a reference sensor: they have a budget, and can be certified.
+
+    The first of its roles names the comparison in ``[uncertainty]``.
+    """
+
+    @abstractmethod
+    def compared(
+        self, part: Any, rows: pd.DataFrame, figures: Mapping[str, FigureValue], out_unit: str
+    ) -> tuple[list[ComparedResult], list[JudgedCurve]]:
+        """The results of one unit from its points and its figures that are determined, and the models that they rest on."""
 
 
 class FromWaveforms(Evaluated):

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Self
 
 import numpy as np
@@ -12,6 +12,7 @@ from inertial.distributions import normal_upper
 from inertial.dynamics.missing_effects import Fitted, adequate, p_value
 from inertial.uncertainty.degrees import DeviationLaw
 from inertial.uncertainty.rounding import equal, rounded
+from pipelines.procedures.compared import ComparedResult, JudgedCurve
 
 TAIL = 0.025
 REACH_95 = float(normal_upper(TAIL))
@@ -77,10 +78,15 @@ class Finding:
 
 @dataclass(frozen=True)
 class Outcome:
-    """The results of a procedure for the units of a lot."""
+    """The results of a procedure for the units of a lot; by unit.
+
+    results, curves : of comparisons
+    """
 
     figures: Mapping[str, list[FigureValue]]
     findings: Sequence[Finding] = ()
+    results: Mapping[str, Sequence[ComparedResult]] = field(default_factory=dict[str, "Sequence[ComparedResult]"])
+    curves: Mapping[str, Sequence[JudgedCurve]] = field(default_factory=dict[str, "Sequence[JudgedCurve]"])
 
 
 def worst(values: Sequence[FigureValue]) -> FigureValue:

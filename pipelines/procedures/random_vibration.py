@@ -1,6 +1,6 @@
 """Random vibration by a profile: density of the reference, transfer function, and vibration rectification of the units."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
@@ -21,7 +21,8 @@ from inertial.dynamics.transfer_diagnosis import TransferDiagnosis
 from inertial.dynamics.transfer_effects import EFFECTS
 from inertial.errors import NotIdentified
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace
-from pipelines.procedures.base import Evaluated, InG, NominalScale, OnEquipment, refuse_unknown_effects, scale_of
+from pipelines.procedures.base import Compares, InG, NominalScale, OnEquipment, refuse_unknown_effects, scale_of
+from pipelines.procedures.compared import ComparedResult, JudgedCurve, by_share, transfer_results
 from pipelines.procedures.figures import FigureSpec, FigureValue, Texts, UnitOutcome, signed
 from pipelines.procedures.recorded import (
     REFERENCE,
@@ -53,7 +54,8 @@ class RandomVibrationPart(NominalScale):
     """Three levels or more, each with rest before and after in one recording; ``levels_g`` are overall g rms.
 
     ``effects`` is the model of the transfer function at the largest level. ``repeatability_percent`` and ``repeatability_deg``
-    are standard uncertainties of each of its points beside the noise.
+    are standard uncertainties of each of its points beside the noise; ``transverse_percent`` is the largest transverse
+    sensitivity of the device.
     """
 
     kind: Literal["random_vibration"]
@@ -66,6 +68,7 @@ class RandomVibrationPart(NominalScale):
     window_s: Positive = 10.0
     repeatability_percent: NotNegative = 0.1
     repeatability_deg: NotNegative = 0.06
+    transverse_percent: NotNegative = 0.3
     effects: Annotated[list[str], Field(min_length=1, max_length=6)] = Field(
         default_factory=lambda: ["second_order", "delay"]
     )
@@ -84,7 +87,7 @@ class RandomVibrationPart(NominalScale):
         return self
 
 
-class RandomVibration(InG, OnEquipment, Evaluated):
+class RandomVibration(InG, OnEquipment, Compares):
     """Gaussian vibration by a profile."""
 
     name = "random_vibration"
@@ -167,6 +170,22 @@ class RandomVibration(InG, OnEquipment, Evaluated):
             ("straightness", text),
             *texts,
         ]
+
+    def compared(
+        self, part: RandomVibrationPart, rows: pd.DataFrame, figures: Mapping[str, FigureValue], out_unit: str
+    ) -> tuple[list[ComparedResult], list[JudgedCurve]]:
+        """Rectification, whose level counts twice; the transfer function with its judged model where it is determined."""
+        slope = figures[self.figures[0].name]
+        first = ComparedResult("vibration_rectification", part.axis, "µg/g²", slope.value, {"noise": slope.uncertainty},
+                               by_share(2.0 * abs(slope.value)))  # fmt: skip
+        kept = rows[(rows["series"] == "response") & np.isfinite(rows["value"])]
+        if len(kept) < FEWEST_POINTS:
+            return [first], []
+        try:
+            results, curves = transfer_results(part, _diagnosis(part, kept), kept, out_unit)
+        except NotIdentified:
+            return [first], []
+        return [first, *results], curves
 
     def of_lot(self, part: RandomVibrationPart, points: pd.DataFrame) -> Texts:
         """Overall level and lines against their tolerances, with the confidence of a line."""

@@ -1,6 +1,6 @@
 """Half-sine shocks against a reference sensor: sensitivity, return, bias shift, shock response spectrum, survival."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal, Self, cast
 
 import numpy as np
@@ -14,7 +14,16 @@ from inertial.dynamics.stability import difference_error, error_of_mean, short_n
 from inertial.errors import NotIdentified
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Role, Trace
 from pipelines.procedures import shock_records
-from pipelines.procedures.base import FromWaveforms, InG, NominalScale, OnEquipment, refuse_unknown_effects, scale_of
+from pipelines.procedures.base import (
+    Compares,
+    FromWaveforms,
+    InG,
+    NominalScale,
+    OnEquipment,
+    refuse_unknown_effects,
+    scale_of,
+)
+from pipelines.procedures.compared import ComparedResult, JudgedCurve, by_share, without
 from pipelines.procedures.figures import FigureSpec, FigureValue, UnitOutcome, worst
 from pipelines.procedures.recorded import (
     REFERENCE,
@@ -46,7 +55,8 @@ class ShockPart(NominalScale):
 
     ``effects`` is the model by which the waveforms of unit and reference are compared; the diagnosis names what is missing.
     ``waveform_percent`` is the standard uncertainty of a sample of that comparison, of the peak. Each record is free of the
-    pulse for ``before_ms``. In a recording made elsewhere both times are found where they are not stated.
+    pulse for ``before_ms``. ``transverse_percent`` is the largest transverse sensitivity of the device. In a recording made
+    elsewhere both times are found where they are not stated.
     """
 
     kind: Literal["shock"]
@@ -60,6 +70,7 @@ class ShockPart(NominalScale):
     settle_s: Wait = 30.0
     temperature_C: Annotated[float, Field(ge=-100.0, le=200.0)] = 25.0
     reference_percent: NotNegative = 0.5
+    transverse_percent: NotNegative = 0.3
     waveform_percent: Annotated[Positive, Field(le=20.0)] = 0.1
     effects: Annotated[list[str], Field(max_length=6)] = Field(default_factory=lambda: list(DEFAULT))
 
@@ -69,7 +80,7 @@ class ShockPart(NominalScale):
         return self
 
 
-class ShockTest(InG, OnEquipment, FromWaveforms):
+class ShockTest(InG, OnEquipment, FromWaveforms, Compares):
     """Half-sine shocks with the bias before and after."""
 
     name = "shock"
@@ -185,6 +196,12 @@ class ShockTest(InG, OnEquipment, FromWaveforms):
         compared = shock_records.ratio_figures(part, ratio, good, apart)
         return [*compared, bias_shift(bias), *shock_records.pulse_figures(part.axis, pulse, ratio)], texts
 
+    def compared(
+        self, part: ShockPart, rows: pd.DataFrame, figures: Mapping[str, FigureValue], out_unit: str
+    ) -> tuple[list[ComparedResult], list[JudgedCurve]]:
+        """Sensitivity by comparison, and the figures that it bears out; none without a comparison."""
+        return compared_results(part, figures, int((rows["series"] == "ratio").sum())), []
+
     def chart(self, part: ShockPart, points: pd.DataFrame) -> Chart:
         """First shock of reference and unit, and their shock response spectra."""
         shown: dict[str, list[Trace]] = {"wave": [], "spectrum": []}
@@ -243,6 +260,44 @@ def bias_shift(bias: pd.DataFrame) -> FigureValue:
     if not shifts:
         return FigureValue.not_determined("shock_bias_shift_ug", "*", "no bias before or after")
     return worst(shifts)
+
+
+RELATIVE = ("shock_undershoot_percent", "shock_zero_shift_percent", "shock_duration_ms", "shock_return_ms")
+"""Figures that the scale of the unit does not enter."""
+UNIT_OF = {spec.name: spec.unit for spec in shock_records.OF_PULSE} | {"shock_undershoot_percent": "%"}
+
+
+def compared_results(part: ShockPart, figures: Mapping[str, FigureValue], shocks: int) -> list[ComparedResult]:
+    """The results of a comparison, for the budget; none without the sensitivity.
+
+    The bias shift is in µg by the scale that the figures rest on, which the comparison has measured: what it departs by counts.
+
+    Parameters
+    ----------
+    shocks : of the comparison
+    """
+    ratio = figures.get("shock_sensitivity_percent")
+    if ratio is None:
+        return []
+    dof = float(shocks - 1) if shocks > 1 else float("inf")
+    whole = 100.0 + ratio.value
+    terms = by_share(whole, ("reference", "drift", "amplitude", "mounting"))
+    terms["transverse"] = 1e-2 * part.transverse_percent / np.sqrt(6.0) * whole
+    noise = {"noise": without(ratio.uncertainty, part.reference_percent)}
+    results = [ComparedResult("shock_sensitivity", part.axis, "%", ratio.value, noise, terms, dof=dof)]
+    for name in RELATIVE:
+        one = figures.get(name)
+        if one is not None:
+            quantity = name.rpartition("_")[0]
+            results.append(
+                ComparedResult(quantity, one.axis, UNIT_OF[name], one.value, {"noise": one.uncertainty}, dof=dof)
+            )
+    shift = figures.get("shock_bias_shift_ug")
+    if shift is not None:
+        scale = 1e-2 * abs(shift.value) * float(np.hypot(ratio.value, ratio.uncertainty))
+        own = {"noise": shift.uncertainty, "nominal_scale": scale}
+        results.append(ComparedResult("shock_bias_shift", shift.axis, "µg", shift.value, own))
+    return results
 
 
 PROCEDURE = ShockTest()

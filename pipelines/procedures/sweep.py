@@ -1,6 +1,6 @@
 """Sine comparison: stepped sine on an exciter against a reference sensor; transfer function, its model and its diagnosis."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,8 +10,9 @@ from inertial.dynamics.sine_fit import fit_tone_and_frequency
 from inertial.dynamics.transfer_diagnosis import TransferDiagnosis
 from inertial.errors import NotIdentified
 from pipelines.drawing.chart import Chart
-from pipelines.procedures.base import FromWaveforms, OnEquipment
-from pipelines.procedures.figures import FigureSpec, UnitOutcome
+from pipelines.procedures.base import Compares, FromWaveforms, OnEquipment
+from pipelines.procedures.compared import ComparedResult, JudgedCurve, transfer_results
+from pipelines.procedures.figures import FigureSpec, FigureValue, UnitOutcome
 from pipelines.procedures.recorded import (
     REFERENCE,
     Device,
@@ -42,7 +43,7 @@ SINGLE_TONE = 0.7
 """Share of the power of a record that a stepped sine has in its largest tone; a sweep or random vibration has less."""
 
 
-class Sweep(OnEquipment, FromWaveforms):
+class Sweep(OnEquipment, FromWaveforms, Compares):
     """Stepped sine against a reference sensor."""
 
     name = "sweep"
@@ -145,6 +146,19 @@ class Sweep(OnEquipment, FromWaveforms):
         if band.identified:
             texts.append(("sampling", sampling_text(float(kept["rate_hz"].max()), band.value, part.bandwidth_order)))
         return figures, texts
+
+    def compared(
+        self, part: SweepPart, rows: pd.DataFrame, figures: Mapping[str, FigureValue], out_unit: str
+    ) -> tuple[list[ComparedResult], list[JudgedCurve]]:
+        """Magnitude and phase at every point, and the judged model through them."""
+        kept = rows[np.isfinite(rows["value"])]
+        if len(kept) < max(FEWEST_POINTS, 0.8 * len(rows)):
+            return [], []
+        try:
+            diagnosis = judged(part, kept)
+        except NotIdentified:
+            return [], []
+        return transfer_results(part, diagnosis, kept, out_unit)
 
     def chart(self, part: SweepPart, points: pd.DataFrame) -> Chart | None:
         """Magnitude with uncertainty, phase, coherence, and the residual of the model."""

@@ -1,6 +1,6 @@
 """Transverse sensitivity on an exciter: the units are turned about their sensitive axis in steps, and a sine is fitted."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
@@ -12,7 +12,8 @@ from inertial.dynamics.sine_fit import HARMONICS, fit_tone, fit_tone_and_frequen
 from inertial.dynamics.transverse import Z95, Transverse, fit_transverse, relative_phase
 from inertial.errors import NotIdentified
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace, level
-from pipelines.procedures.base import Evaluated, InG, NominalScale, OnEquipment, refuse_broken_turn, scale_of
+from pipelines.procedures.base import Compares, InG, NominalScale, OnEquipment, refuse_broken_turn, scale_of
+from pipelines.procedures.compared import ComparedResult, JudgedCurve, by_share, verdict_word, without
 from pipelines.procedures.figures import FigureSpec, FigureValue, UnitOutcome, verdict_of
 from pipelines.procedures.recorded import (
     REFERENCE,
@@ -58,7 +59,7 @@ class TransversePart(NominalScale):
         return self
 
 
-class TransverseTest(InG, OnEquipment, Evaluated):
+class TransverseTest(InG, OnEquipment, Compares):
     """The output of the sensitive axis under motion across it, over the angle of the unit about that axis."""
 
     name = "transverse"
@@ -117,6 +118,25 @@ class TransverseTest(InG, OnEquipment, Evaluated):
         low, high = value - Z95 * error, value + Z95 * error
         figure = FigureValue(FIGURE, part.axis, value, error, max(0.0, low) if fit.low > 0.0 else 0.0, high)
         return [figure], _texts(part, fit)
+
+    def compared(
+        self, part: TransversePart, rows: pd.DataFrame, figures: Mapping[str, FigureValue], out_unit: str
+    ) -> tuple[list[ComparedResult], list[JudgedCurve]]:
+        """The maximum, and its direction where it is significant; the sine as the model that they rest on."""
+        fit, figure = fitted(rows), figures[FIGURE]
+        noise = 100.0 * fit.error
+        at: dict[str, Any] = {"setting": part.frequency_hz, "dof": float(fit.dof) or float("inf")}
+        scale = without(figure.uncertainty, noise, 1e-2 * part.reference_percent * figure.value)
+        terms = by_share(figure.value, ("reference", "drift", "amplitude"))
+        own = {"noise": noise, "nominal_scale": scale}
+        results = [ComparedResult("transverse_sensitivity", part.axis, "%", figure.value, own, terms, **at)]
+        if fit.direction_error_deg < 180.0:
+            angle = {"noise": fit.direction_error_deg}
+            results.append(
+                ComparedResult("transverse_direction", part.axis, "°", fit.direction_deg % 360.0, angle, **at)
+            )
+        curve = JudgedCurve(part.axis, "sine over the angle", verdict_word(adequate(fit)), fit.p_value)
+        return results, [curve]
 
     def chart(self, part: TransversePart, points: pd.DataFrame) -> Chart:
         """Output over the angle with its uncertainty, the fitted sine, and the direction of the maximum."""

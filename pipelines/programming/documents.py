@@ -35,6 +35,32 @@ class ProgrammedUnitDocument(TypedDict):
     certificate: Annotated[str | None, "number of the renewed certificate; null: not certified"]
 
 
+class TedsPageDocument(TypedDict):
+    """A page of the memory of a device."""
+
+    axis: str
+    page: Annotated[int, "of 32 bytes, from 0"]
+    content: Annotated[str, "hexadecimal"]
+
+
+class TedsUnitDocument(TypedDict):
+    """What became of the TEDS of one device."""
+
+    unit: str
+    outcome: Literal["proved", "failed"]
+    step: Annotated[str, "the step that failed; empty if none did"]
+    reason: Annotated[str, "empty if no step failed"]
+    pages: list[TedsPageDocument]
+    before: Annotated[str, "the whole memory before the first write, hexadecimal"]
+
+
+class ProgramTedsDocument(TypedDict):
+    """``station program --format teds --json``: the devices whose TEDS were written."""
+
+    run: str
+    teds: list[TedsUnitDocument]
+
+
 class ProgramDocument(TypedDict):
     """``station program --json``: the devices whose memory was written."""
 

@@ -11,6 +11,7 @@ from pipelines.archive.locks import alone
 from pipelines.archive.signatures import public_keys
 from pipelines.certificates import Ledger
 from pipelines.certificates.days import today
+from pipelines.certificates.entries import STATIC
 from pipelines.certificates.measured import measured_on, measured_span
 from pipelines.certificates.programmed import TOP, add
 from pipelines.certificates.validity import Calibration
@@ -42,7 +43,7 @@ def chosen_units(run: Run, serials: Sequence[str]) -> list[tuple[int, UnitCalibr
         raise WrongUse(
             f"program: unit {revoked[0].unit}: {revoked[0].certified}, a valid calibration is needed; measure the unit again"
         )
-    return [(slots[unit.unit], unit.with_every_axis) for unit in allowed]
+    return [(slots[unit.unit], unit) for unit in allowed]
 
 
 def _revoked(unit: UnitCalibration) -> bool:
@@ -69,6 +70,7 @@ def program_run(
     certified again, to the same day, when its memory is verified.
     """
     root, ledger, day = run.archive.root, Ledger(run.archive.root), today()
+    units = [(slot, unit.with_every_axis) for slot, unit in units]
     held: dict[str, Calibration | None] = {}
 
     def end_certificate(serial: str) -> int:
@@ -78,7 +80,7 @@ def program_run(
         return len(ledger.events(serial)) + 1 if held[serial] is not None else 0
 
     choice = replace(choice, date=int(datetime.now(UTC).strftime("%Y%m%d")))
-    with _station(run, config) as (station, saved), alone(root / TOP, wait=True):
+    with open_lot(run, config) as (station, saved), alone(root / TOP, wait=True):
         for _, unit in units:
             _refuse_older(ledger, run, unit.unit, day)
         recipe = Recipe.model_validate(run.about["recipe"])
@@ -114,7 +116,7 @@ def _renewed(ledger: Ledger, run: Run, one: ProgrammingOutcome, day: str, until:
 def _refuse_older(ledger: Ledger, run: Run, serial: str, day: str) -> None:
     """Refuse coefficients that were not measured after those of another run that are certified for the unit today."""
     for one in ledger.calibrations(serial):
-        if one.run == run.id or not one.holds(day):
+        if one.run == run.id or not one.holds(day) or STATIC not in one.event.covers.split():
             continue
         other = Run(run.archive, one.run)
         theirs, ours = _measured_at(other), _measured_at(run)
@@ -147,7 +149,7 @@ def _held(ledger: Ledger, serial: str, run: str, day: str) -> Calibration | None
 
 
 @contextmanager
-def _station(run: Run, config: StationConfig) -> Generator[tuple[Any, Callable[[], None]]]:
+def open_lot(run: Run, config: StationConfig) -> Generator[tuple[Any, Callable[[], None]]]:
     """The station, and a function that saves the state of a simulated one, from which the next programming continues."""
     lot = Lot.model_validate(run.about["lot"])
     root = run.archive.root

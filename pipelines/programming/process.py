@@ -23,14 +23,13 @@ from pipelines.programming.outcome import (
     require_moved,
     write_offsets_again,
 )
+from pipelines.programming.supply import BOOT_S, power_cycle, require_safe
 from schemas.errors import OperatorNeeded, StationError, StationRefused, TumblelineError, WrongUse
 from schemas.recipe import Recipe
 from schemas.units import STANDARD_GRAVITY_M_S2
 from stations.devices.memory import COPIES
-from stations.safety.suspenders import require_released
 from stations.station import Station
 
-OFF_S, BOOT_S = 2.0, 1.0
 POSES = 2
 LARGEST_STEP = 2**15 - 1
 
@@ -104,13 +103,7 @@ class Programmer:
 
         Called before power and axes change, and after each dwell.
         """
-        self.station.require()
-        guarded = self.station.reader.guarded()
-        require_released(guarded)
-        if self.door_closed and guarded.door_open:
-            raise OperatorNeeded(
-                "station: the chamber's door is open, closed is needed; close it and repeat the command"
-            )
+        require_safe(self.station, self.door_closed)
 
     def _check(self, outcomes: Sequence[ProgrammingOutcome]) -> None:
         """Refuses, before anything is written, units and stations that cannot be verified."""
@@ -213,15 +206,8 @@ class Programmer:
             )
 
     def _power_cycle(self) -> None:
-        reader, clock = self.station.reader, self.station.clock
         self.report("power cycle")
-        self._require()
-        reader.switch("off")
-        try:
-            clock.sleep(OFF_S)
-        finally:
-            reader.switch("on")
-        clock.sleep(BOOT_S)
+        power_cycle(self.station, self.door_closed)
 
     def _after_power(self, one: ProgrammingOutcome) -> None:
         """Refuses a device whose new copy changed, or whose other copy has the larger sequence number."""

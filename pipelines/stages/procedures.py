@@ -74,7 +74,7 @@ def _analysed(
         there = {one.figure for one in values}
         missing = [spec for spec in procedure.figures if spec.name not in there]
         whole[unit] = values + [FigureValue.not_determined(spec.name, "*", why) for spec in missing]
-    return table, Outcome(whole, outcome.findings)
+    return table, replace(outcome, figures=whole)
 
 
 def _answered(readings: pd.DataFrame, record: int, accepted: list[str]) -> pd.DataFrame:

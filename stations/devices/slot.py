@@ -10,6 +10,7 @@ from stations.clock import Clock
 from stations.codec import OUTPUTS, SEQUENCE, WORDS_PER_SAMPLE, Packing, named, unpack_samples
 from stations.devices.memory import UnitMemory
 from stations.devices.registers import Registers
+from stations.devices.teds_memory import TedsMemory
 
 LONGEST_READ = 125  # registers in one request
 FEWEST_COUNTS, MOST_COUNTS = 100, 2**31  # in a full scale; a wrong word order gives values outside
@@ -59,6 +60,10 @@ class Slot:
     def memory(self, clock: Clock) -> UnitMemory:
         """The memory of the device in the slot."""
         return UnitMemory(self._registers, clock)
+
+    def teds(self) -> TedsMemory:
+        """The memory of the device for its TEDS."""
+        return TedsMemory(self._registers)
 
     def begin(self) -> None:
         """Sampling starts again: no sample has been read."""

@@ -11,6 +11,7 @@ from schemas.station_devices import Device, Devices
 from stations.codec import NotEncodable, Value
 from stations.plant import families
 from stations.plant.bank import Bank, Busy, Source, number
+from stations.plant.eeprom import Eeprom, bytes_of, words_of
 from stations.plant.flash import Flash
 from stations.plant.world import World
 from stations.profile_files import profile_of
@@ -143,6 +144,11 @@ class MemoryBank:
         """Its memory."""
         return self.world.flash[self.unit]
 
+    @property
+    def teds(self) -> Eeprom:
+        """Its memory on the signal line."""
+        return self.world.teds[self.unit]
+
     def sources(self) -> dict[str, Source]:
         """Values of the registers."""
         sources: dict[str, Source] = {
@@ -153,6 +159,12 @@ class MemoryBank:
             "endurance": lambda: self.flash.endurance,
             "offset_step": lambda: self.world.preset.offset_step,
             "offset": lambda: [float(step) for step in self.flash.offsets],
+            "teds_address": lambda: self.teds.address,
+            "teds_scratchpad": lambda: words_of(self.teds.row),
+            "teds_command": lambda: 0,
+            "teds_check": lambda: self.teds.check,
+            "teds_status": lambda: self.teds.status,
+            "teds_memory": lambda: words_of(bytes(self.teds.memory)),
         }
         for part in range(PARTS):
             sources[f"buffer_{part}"] = lambda part=part: _part(self.flash.buffer, part)
@@ -172,10 +184,21 @@ class MemoryBank:
                 if not self.world.preset.offset_step:
                     raise NotEncodable("offset: the device has no offset registers")
                 self.world.set_offsets(self.unit, [int(step) for step in value])
+            elif name.startswith("teds_"):
+                self._write_teds(name, value)
             elif name == "memory_command" and (command := int(number(values, name))):
                 if self.flash.state(self.world.now_us) == 1:
                     raise Busy("memory")
                 self.world.program_memory(self.unit, command - 1)
+
+    def _write_teds(self, name: str, value: Value) -> None:
+        """Address, row or command of the memory on the signal line."""
+        if name == "teds_address":
+            self.teds.address = int(number({name: value}, name))
+        elif name == "teds_scratchpad" and isinstance(value, list):
+            self.teds.row = bytes_of(value)
+        elif (code := int(number({name: value}, name))) and not self.teds.command(code):
+            raise NotEncodable(f"teds_command: {code} at byte {self.teds.address} is no command of the memory")
 
 
 def _part(words: list[int], part: int) -> list[float]:

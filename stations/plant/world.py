@@ -21,6 +21,7 @@ from schemas.units import STANDARD_GRAVITY_M_S2
 from stations.plant.bench import Bench
 from stations.plant.device import PlantDevices, Truth, draw_truth, keyed_normal, rotation, stream
 from stations.plant.dynamics import Dynamics
+from stations.plant.eeprom import Eeprom
 from stations.plant.fixture import Fixture, Moisture
 from stations.plant.flash import Flash
 from stations.plant.hidden import HiddenEffect, hidden_effect
@@ -96,6 +97,7 @@ class World:
         )
         self.physics.orthogonality = 0.0 if self.station_errors is None else self.station_errors.orthogonality
         self.flash = [Flash() for _ in self.serials]  # by unit, in any slot
+        self.teds = [Eeprom() for _ in self.serials]
         self.bench = Bench(self.preset, self._truths, self.physics.devices, gravity, sim.seed, lot.seed, self._key)
         fifo = load_profile(config.devices.slots.profile).fifo
         registers = fifo.registers if fifo is not None else 0
@@ -144,6 +146,7 @@ class World:
         if not on:
             for unit, flash in enumerate(self.flash):
                 flash.power_off(self.now_us)
+                self.teds[unit].power_off()
                 self.physics.devices.set_offsets(unit, flash.offsets)
         self.physics.power(on=on, now=self.now)
 

@@ -154,6 +154,7 @@ ELSEWHERE = {
     "verify FILE… --json": "unit/pipelines/certificates/document/test_file_check.py",
     "certificate issue --json": "contract/test_documents.py",
     "station program --json": "faults/test_programming.py",
+    "station program --format teds --json": "e2e/test_one_axis.py",
     "fit --json (an import)": "e2e/test_imported_recording.py",
     "plan choose --json": "unit/pipelines/planning/test_choice.py",
     "simulate --json": "e2e/test_correct.py",

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from each import each
-from typed_commands import options_below, unknown_options
+from typed_commands import code_spans, options_below, unknown_options, unknown_settings
 
 from pipelines.cli import COMMANDS
 from pipelines.cli.former import COMMANDS as FORMER
@@ -71,6 +71,39 @@ def test_a_command_in_a_message_exists_with_its_options(path: str) -> None:
     for line in (line for place, line in (*FOUND, *OF_PAGES) if place == path):
         closed = line if line.count('"') % 2 == 0 else line.replace('"', "")
         assert unknown_options(closed.replace("{", "").replace("}", "")) == set(), line
+
+
+DOCUMENTS = [
+    ROOT / "README.md",
+    ROOT / "CONTRIBUTING.md",
+    *sorted((ROOT / "docs").rglob("*.md")),
+    *(ROOT / "deploy").rglob("*.md"),
+]
+NOT_OURS = {
+    "docs/decisions/command-names.md",  # names former options
+    "deploy/README.md", "deploy/plant.md",  # options of docker
+}  # fmt: skip
+BY_EVERY_COMMAND = {"--log", "--version", "--help", "--show-completion"}
+
+
+def test_code_in_a_page_names_commands_options_and_settings_that_exist() -> None:
+    """In prose and tables as in blocks; a span may leave out the name of the program."""
+    known = set().union(*(options_below(name) for name in COMMANDS)) | BY_EVERY_COMMAND
+    wrong: set[tuple[str, str, str]] = set()
+    count = 0
+    for path in DOCUMENTS:
+        place = path.relative_to(ROOT).as_posix()
+        for code in code_spans(path.read_text(encoding="utf-8")):
+            line = re.sub(r"\s[#|>&].*$", "", code.strip())
+            if re.match(rf"(?:tumbleline )?(?:{'|'.join(COMMANDS)})(?: |$)", line):
+                count += 1
+                whole = line if line.startswith("tumbleline ") else f"tumbleline {line}"
+                wrong |= {(place, code, word) for word in unknown_options(whole) | unknown_settings(whole)}
+            elif line.startswith("--") and place not in NOT_OURS:
+                options = re.findall(r"(?<![\w-])--[a-z][a-z-]*[a-z]", line)
+                wrong |= {(place, code, word) for word in options if word not in known}
+    assert wrong == set()
+    assert count > 600
 
 
 def test_a_command_on_a_line_of_its_own_is_made_of_quoted_words() -> None:

@@ -120,6 +120,12 @@ def test_its_certificate_and_its_memory_hold_one_axis(measured) -> None:
     assert "axes x; output[1] and output[2]: force along that axis in g" in exported
     programmed = document_of("station", "program", runs["one"], *archive, "--units", "SF-01", "--yes", "--json")
     assert [unit["outcome"] for unit in programmed["units"]] == ["proved"]
+    fixed = document_of(
+        "station", "program", runs["one"], *archive, "--units", "SF-02", "--format", "q24", "--yes", "--json"
+    )
+    assert [unit["outcome"] for unit in fixed["units"]] == ["proved"]
+    header = text_of("export", runs["one"], *archive, "--format", "c", "--set", "arithmetic=q24", "--units", "SF-03")
+    assert "output[1] and output[2]: force along that axis in g * 16777216, 0 where it is not known" in header
 
 
 def test_its_teds_state_the_sensitivity_of_one_axis(measured, tmp_path: Path) -> None:
@@ -142,6 +148,35 @@ def test_its_teds_state_the_sensitivity_of_one_axis(measured, tmp_path: Path) ->
     status, _, err = given(*words[:-2])
     assert status == UNUSABLE
     assert "--set teds: found no manufacturer, model" in " ".join(err.split())
+
+
+def test_a_trajectory_along_its_axis_comes_back_through_simulate_and_correct(measured, tmp_path: Path) -> None:
+    folder, runs = measured
+    time = np.arange(500) / 50.0
+    force = np.column_stack([0.8 * np.sin(0.7 * time), np.zeros((time.size, 2))])
+    columns = {"time_s": time, **{f"force_{axis}": force[:, k] for k, axis in enumerate("xyz")}, "unit_C": 20.0 + time}
+    pd.DataFrame(columns).to_csv(tmp_path / "way.csv", index=False)
+    calibration, archive = f"{runs['one']}:SF-02", ("--archive", folder / "archive")
+    made = document_of(
+        "simulate", tmp_path / "way.csv", calibration, "--seed", "none", "--output", tmp_path / "raw.csv", *archive
+    )
+    assert list(made["error_at_25_C_ug"]) == ["x"]
+    raw = pd.read_csv(tmp_path / "raw.csv")
+    assert {"x", "force_x"} <= set(raw)
+    assert not {"y", "z"} & set(raw)
+    raw[["time_s", "x", "unit_C"]].to_csv(tmp_path / "output.csv", index=False)
+    done = document_of("correct", tmp_path / "output.csv", calibration, "--output", tmp_path / "done.csv", *archive)
+    assert list(done["u_ug"]) == ["x"]
+    corrected = pd.read_csv(tmp_path / "done.csv")
+    assert np.abs(corrected["force_x_g"] - force[:, 0]).max() < 1e-8
+    assert not {"force_y_g", "u_y_ug", "cov_xy_ug2"} & set(corrected)
+    noisy = document_of(
+        "simulate", tmp_path / "way.csv", calibration, "--seed", "1", "--output", tmp_path / "n.csv", *archive
+    )
+    assert {len(values) for values in noisy["noise"].values()} == {1}
+    status, _, told = given("correct", tmp_path / "output.csv", calibration, "--track", "at-rest", *archive)
+    assert status == UNUSABLE
+    assert "correct: --track needs three axes, and unit SF-02 has x alone" in " ".join(told.split())
 
 
 def test_its_plan_speaks_of_one_axis(measured) -> None:
@@ -229,17 +264,6 @@ def test_a_limit_of_angles_between_axes_is_refused_for_one(measured, tmp_path: P
     assert "orthogonality_mrad needs sensor_axes = 3" in " ".join(err.split())
 
 
-@pytest.mark.parametrize("command", ["simulate", "correct"])
-def test_a_command_that_needs_three_axes_names_itself(measured, command: str, tmp_path: Path) -> None:
-    folder, runs = measured
-    (tmp_path / "in.csv").write_text("time_s,x,y,z\n0,0,0,1\n0.01,0,0,1\n", encoding="utf-8")
-    words = (tmp_path / "in.csv", f"{runs['one']}:SF-01", "--archive", folder / "archive")
-    status, _, err = given(command, *words, "--output", tmp_path / "out.csv")
-    assert status == UNUSABLE
-    text = " ".join(err.split())
-    assert f"{command}: it needs three axes, and unit SF-01 has x alone" in text
-
-
 def test_its_waveforms_have_one_channel(measured, tmp_path: Path) -> None:
     folder, runs = measured
     archive = ("--archive", folder / "archive")
@@ -278,3 +302,36 @@ def test_its_certificate_speaks_of_the_error_along_its_axis(measured, tmp_path: 
     assert "error of the corrected output, verification (largest of the poses)" in text
     assert "norm of gravity" not in text
     assert "|a|" not in text
+
+
+def pages_held(plant_memory: str) -> list[bytes]:
+    """The pages of a memory, from its hexadecimal text."""
+    memory = bytes.fromhex(plant_memory)
+    return [memory[start : start + 32] for start in range(0, len(memory), 32)]
+
+
+@pytest.mark.parametrize(("which", "letters"), [("three", "xyz"), ("one", "x")])
+def test_teds_of_every_axis_are_in_the_memory_of_the_device_and_stay_there(
+    measured: tuple[Path, dict[str, str]], tmp_path: Path, which: str, letters: str
+) -> None:
+    folder, runs = measured
+    shutil.copytree(folder / "archive", tmp_path / "archive")
+    sheet = "teds=manufacturer=17,model=4507,version=B5,mass_g=4.6,initials=QA,period_days=365"
+    words = ("--format", "teds", "--set", sheet, "--archive", tmp_path / "archive")
+    exported = given("export", runs[which], *words, "--output", tmp_path / "files")
+    assert exported[0] == 0, exported
+    done = document_of("station", "program", runs[which], *words, "--yes")
+    assert [one["outcome"] for one in done["teds"]] == ["proved"] * 3
+    for one in done["teds"]:
+        assert [page["axis"] for page in one["pages"]] == list(letters)
+        assert not any(bytes.fromhex(one["before"]))
+        for page in one["pages"]:
+            content = bytes.fromhex(page["content"])
+            assert content == (tmp_path / "files" / f"{one['unit']}-{page['axis']}.teds").read_bytes()
+            assert sum(content) % 256 == 0
+    # the memory keeps them: a second writing finds what the first left, and certificates stay as they are
+    again = document_of("station", "program", runs[which], *words, "--yes", "--units", "SF-02")
+    (one,) = again["teds"]
+    held = pages_held(one["before"])
+    assert held[: len(letters)] == [bytes.fromhex(page["content"]) for page in one["pages"]]
+    assert not any(b"".join(held[len(letters) :]))

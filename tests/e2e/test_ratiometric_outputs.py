@@ -152,7 +152,7 @@ def lot(tmp_path_factory: pytest.TempPathFactory) -> SimpleNamespace:
     store = Archive(folder / "archive")
     job = Request(recipe=str(recipe), station=station, units=UNITS, seed=21).job(store)
     runner = Runner(job, store, lambda *_: None)
-    for stage in ("capture", "validate", "reduce", "fit", "verify", "noise", "budget", "procedures", "grade"):
+    for stage in ("capture", "validate", "reduce", "fit", "verify", "noise", "procedures", "budget", "grade"):
         runner.stage(stage)
     plant = make_plant(job.station, job.lot)
     truths = {unit: plant.truth(unit) for unit in UNITS}

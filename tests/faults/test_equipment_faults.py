@@ -47,7 +47,7 @@ def graded(folder: Path, recipe, figure: str, limit: float, *faults: FaultOrder)
     """A run of the recipe with one limit, up to its grades."""
     limits = limits_of({"name": "one", "figures": {figure: {"max": limit, "unit": UNITS[figure]}}}, UNITS)
     runner = Runner(Job(recipe, limits, lot(), with_faults(load_station(), list(faults))), Archive(folder / "archive"))
-    for stage in ("capture", "validate", "reduce", "fit", "verify", "noise", "budget", "procedures", "grade"):
+    for stage in ("capture", "validate", "reduce", "fit", "verify", "noise", "procedures", "budget", "grade"):
         runner.stage(stage)
     return runner.run
 

@@ -382,7 +382,7 @@ def test_a_certificate_that_comes_in_between_does_not_leave_a_number_that_the_de
     """Another process certifies the unit between the begin of the lock and the first write, and between proof and renewal."""
     ledger = Ledger(run.archive.root)
     certify(ledger, run, ["A1"])
-    real = job._station
+    real = job.open_lot
 
     def meanwhile(*words: object) -> object:
         ledger.revoke("A1", "by another process", day=today())
@@ -390,7 +390,7 @@ def test_a_certificate_that_comes_in_between_does_not_leave_a_number_that_the_de
         return real(*words)
 
     with monkeypatch.context() as patch:
-        patch.setattr(job, "_station", meanwhile)
+        patch.setattr(job, "open_lot", meanwhile)
         done, given = programmed(run, ("A1",))
     block = done["A1"].block
     assert given == {"A1": f"A1/{block.certificate}"} == {"A1": "A1/5"}

@@ -1,29 +1,35 @@
 """The content of a certificate from the run, its stated budget, the ledger and the laboratory's file."""
 
-from collections.abc import Sequence
 from math import isfinite, nan
-from typing import Any
 
-from inertial.counts import number_of
 from pipelines.archive import Run
 from pipelines.certificates import Calibration
 from pipelines.certificates.document import content
 from pipelines.certificates.document.as_found import adjustment
+from pipelines.certificates.document.circumstances import (
+    conditions_of,
+    entries_of,
+    left_out_words,
+    methods,
+    source_words,
+    standard_of,
+    traceability,
+)
+from pipelines.certificates.document.compared import compared_content
 from pipelines.certificates.document.content import CertificateContent, letters_of
 from pipelines.certificates.document.laboratory import LaboratoryFile
 from pipelines.certificates.document.numbers import probability, significant
+from pipelines.certificates.entries import STATIC
 from pipelines.certificates.ledger import stated
 from pipelines.certificates.measured import measured_on, measured_span
 from pipelines.certificates.stated_budget import Row, StatedBudget, edge, stated_budget
+from pipelines.procedures import FIGURES as OF_PROCEDURES
 from pipelines.stages.figures import FIGURES
-from pipelines.stages.uncertainty.contributions import left_out
 from pipelines.stages.uncertainty.tables import LABELS, has_uncertainty
 from pipelines.tables.calibration import EVERY_AXIS
 from pipelines.tables.frames import rows_of
 from schemas.decisions import BOUND, GRADES, LARGEST_ERROR, MEDIAN, exceedance
 from schemas.errors import ArchiveUnusable, WrongUse
-from schemas.reference import Reference
-from schemas.uncertainty import Uncertainty
 from schemas.units import AXES
 
 QUANTITIES = {
@@ -44,23 +50,20 @@ OF_FEWER_AXES = {
 """Words for the norm of gravity, of a device that has no three axes to measure it."""
 BUDGETS = ("bias", "scale", "output", "bias_error_period")
 """Quantities whose budget a certificate prints."""
-SOURCES = {
-    "[stability], ": "stability of the device, ",
-    "[stability]": "stability of the device",
-    "[uncertainty]": "uncertainties of the references",
-    "slot_rotation_mrad of the simulation": "simulation: rotation of the slots",
-    "slot_gradient_K of the simulation": "simulation: gradient in the slots",
-    "slot_lag_s of the simulation": "simulation: thermal lag of the slots",
-    "supply_reading_ppm of the simulation": "simulation: measurement of the supply",
-}
 DECLARATION = (
     "The results relate only to the item calibrated, in the condition in which it was received, and to the stated conditions. "
     "This certificate may be reproduced in full only, unless the laboratory has approved otherwise in writing."
 )
 UNCERTAINTY = (
     "The reported expanded uncertainty U is the standard uncertainty multiplied by the coverage factor k that is stated beside "
-    "it, for a coverage probability of about 95 %. It was evaluated by propagation through the fit (JCGM 100)."
+    "it, for a coverage probability of about 95 %. "
 )
+FITTED = "It was evaluated by propagation through the fit (JCGM 100)."
+COMPARED = "It was evaluated from the contributions of the budgets (JCGM 100)."
+NOT_ADJUSTED = content.Adjustment(
+    earlier="", earlier_date="", text="a comparison with a reference sensor adjusts nothing"
+)
+FRAME_OF_COMPARISONS = "axes of the item, named beside each result"
 NORMS = ("JCGM 100:2008", "JCGM 106:2012")
 FRAMES = {
     "intrinsic": "axes of the sensor; a rotation of the whole unit in its mount is not part of the result",
@@ -90,6 +93,10 @@ def compose(run: Run, calibration: Calibration, known: list[Calibration], who: L
     held = [row["name"] for row in own if (row["effect"], row["axis"]) == ("misalignment", EVERY_AXIS)]
     coefficients = [_coefficient(row) for row in own if row["effect"] != "misalignment" or row["axis"] != EVERY_AXIS]
     first, last = measured_span(run) or (measured_on(run), measured_on(run))
+    static = STATIC in event.covers.split()
+    compared = compared_content(run, serial, [row for row, _ in budget.quantities])
+    fitted = [(row, parts) for row, parts in budget.quantities if "." not in row["quantity"]]
+    words = compared.budgets | {name: QUANTITIES[name] for name in BUDGETS}
     return CertificateContent(
         number=calibration.certificate,
         issued=event.when[:10],
@@ -101,27 +108,33 @@ def compose(run: Run, calibration: Calibration, known: list[Calibration], who: L
         measured_to=last[:10],
         simulated=station.get("kind") == "simulated",
         who=who,
-        method=_method(run, recipe, who),
+        method=" ".join(methods(run, recipe, who, compared.methods, static=static)),
         norms=NORMS,
-        frame=FRAMES.get(budget.frame, budget.frame),
-        conditions=tuple(_conditions(run, serial, recipe)),
-        references=tuple(_reference(one) for one in budget.references),
-        traceability=_traceability(budget, {**(station.get("uncertainty") or {}), **(recipe.get("uncertainty") or {})}),
-        results=tuple(_result(row, coefficients) for row, _ in budget.quantities if row["quantity"] != LARGEST_ERROR),
-        budgets=tuple(_budget(row, parts) for row, parts in budget.quantities if row["quantity"] in BUDGETS),
+        frame=FRAMES.get(budget.frame, budget.frame) if static else FRAME_OF_COMPARISONS,
+        conditions=(*conditions_of(run, serial, recipe, static=static), *compared.conditions),
+        references=tuple(standard_of(one) for one in budget.references),
+        traceability=traceability(budget, entries_of(run, event.covers)),
+        results=(
+            *(_result(row, coefficients) for row, _ in fitted if row["quantity"] != LARGEST_ERROR),
+            *compared.results,
+        ),
+        responses=tuple(compared.responses),
+        budgets=tuple(
+            _budget(row, parts, words[row["quantity"]]) for row, parts in budget.quantities if row["quantity"] in words
+        ),
         coefficients=tuple(coefficients),
         conformity=tuple(_conformity(row, letters_of(coefficients)) for row in budget.decisions),
         decision_rule="; ".join(dict.fromkeys(row["rule"] for row in budget.decisions)),
         limits=str((about.get("limits") or {}).get("name", "")),
         grade_statement=_grade_statement(budget, event.grade),
-        adjustment=adjustment(run, calibration, known),
+        adjustment=adjustment(run, calibration, known) if static else NOT_ADJUSTED,
         amendment=_amendment(calibration, known),
         interval=f"As agreed with the customer, the next calibration is due on {calibration.stated_until}."
         if budget.customer_agreed
         else "",
         adequacy=event.adequacy,
-        left_out=_left_out(run, held),
-        uncertainty_note=UNCERTAINTY,
+        left_out=" ".join([*([left_out_words(run, held)] if static else []), *compared.left_out]).strip(),
+        uncertainty_note=UNCERTAINTY + (FITTED if static else COMPARED),
         declaration=DECLARATION,
         software=f"Tumbleline {(about.get('software') or {}).get('tumbleline', 'version not known')}",
         coefficients_sha256=event.coefficients,
@@ -177,11 +190,11 @@ def _result(row: Row, coefficients: list[content.Coefficient]) -> content.Result
     )
 
 
-def _budget(row: Row, parts: list[Row]) -> content.BudgetTable:
+def _budget(row: Row, parts: list[Row], words: str) -> content.BudgetTable:
     # contributions to the error over the period add up to the result, not to the result's own u
     deviation = not has_uncertainty(row)
     return content.BudgetTable(
-        quantity=f"{_quantity(row)}, {row['axis']}",
+        quantity=f"{words}, {row['axis']}",
         unit=row["unit_text"],
         u=row["value"] if deviation else row["u"],
         k=None if deviation else row["k"],
@@ -190,7 +203,7 @@ def _budget(row: Row, parts: list[Row]) -> content.BudgetTable:
             content.Contribution(
                 name=LABELS.get(one["contribution"], str(one["contribution"])),
                 unit=row["unit_text"],
-                source=_source(one["source"]),
+                source=source_words(one["source"]),
                 **{name: one[name] for name in ("type", "distribution", "u", "share")},
             )
             for one in sorted(parts, key=lambda one: -one["share"])
@@ -198,15 +211,9 @@ def _budget(row: Row, parts: list[Row]) -> content.BudgetTable:
     )
 
 
-def _source(text: str) -> str:
-    """The source of a contribution without the names of tables and keys in files."""
-    for table, words in SOURCES.items():
-        text = text.replace(table, words)
-    return text
-
-
 def _conformity(row: Row, letters: str) -> content.Conformity:
-    label = FIGURES[row["figure"]].label if row["figure"] in FIGURES else row["figure"]
+    name = str(row["figure"])
+    label = FIGURES[name].label if name in FIGURES else OF_PROCEDURES[name].meaning if name in OF_PROCEDURES else name
     label = _of_axes(label, letters)
     least = isfinite(row.get("least", nan))
     return content.Conformity(
@@ -229,84 +236,6 @@ def _grade_statement(budget: StatedBudget, grade: str) -> str:
         f"RMS error of the corrected output exceeds {GRADES[grade]:g} µg on any axis with a probability of {risk} (95 % bound of "
         f"the largest axis: {significant(quantiles[BOUND])} µg)."
     )
-
-
-def _reference(one: Reference) -> content.ReferenceStandard:
-    accreditation = f" ({one.accreditation})" if one.accreditation else ""
-    return content.ReferenceStandard(
-        laboratory=one.laboratory + accreditation,
-        date="" if one.date is None else one.date.isoformat(),
-        due=one.due.isoformat(),
-        uncertainty="" if one.U is None else f"U = {one.U:g} {one.unit or ''} (k = {one.k:g})",
-        **{name: getattr(one, name) for name in ("id", "what", "certificate", "sha256")},
-    )
-
-
-def _traceability(budget: StatedBudget, stated_entries: dict[str, Any]) -> str:
-    """What is traceable and what is not: an entry of the budget that names no standard is said to rest on its source."""
-    source = budget.grade_source.replace("_", " ")
-    if not budget.references:
-        return (
-            "No reference standard with a certificate is stated for this calibration; metrological traceability to the SI is not "
-            f"claimed. The uncertainties of the references are taken from: {source}."
-        )
-    own = {name: entry for name, entry in stated_entries.items() if isinstance(entry, dict)}
-    traced = sorted(name for name, entry in own.items() if entry.get("reference"))
-    rest = sorted(set(own) - set(traced))
-    text = (
-        "Traceable to the SI through the calibration certificates of the standards listed: "
-        f"{', '.join(traced).replace('_', ' ') or 'no contribution names one of them'}."
-    )
-    if not rest:
-        return text
-    named = ", ".join(rest).replace("_", " ")
-    return f"{text} Without a standard of their own, by the sources in the budgets ({source}): {named}."
-
-
-def _left_out(run: Run, held: Sequence[str]) -> str:
-    """The contributions that the statement of the references lacks: U counts them as zero; and what the poses do not show.
-
-    Parameters
-    ----------
-    held : directions in which the poses do not show the response across
-    """
-    terms = run.manifest("budget")["parameters"].get("uncertainty") or {}
-    names = left_out(Uncertainty.model_validate(terms))
-    named = ", ".join(LABELS.get(name, name) for name in names)
-    unstated = f"Not stated, and not contained in the uncertainties U: {named}." if names else ""
-    unseen = f"Not determined by the poses, and taken for zero: misalignment along {', '.join(held)}." if held else ""
-    return " ".join(filter(None, (unstated, unseen)))
-
-
-def _method(run: Run, recipe: dict[str, Any], who: LaboratoryFile) -> str:
-    dwells = run.table("dwells")
-    kinds = dwells["kind"].astype(str)
-    poses, kept = (dwells.loc[kinds == kind, "pose"].nunique() for kind in ("dwell", "verification"))
-    verified = f"; verification in {kept} other poses" if kept else "; no pose was kept for verification"
-    soaks = number_of(len(recipe.get("temperatures_C") or [0]), "temperature")
-    procedure = f"{who.method.procedure}. " if who.method.procedure else ""
-    return (
-        f"{procedure}Static multi-position calibration in the gravity of the Earth: {poses} poses at "
-        f"{soaks}, {recipe.get('dwell_s', 'unknown')} s per pose, recipe "
-        f"'{recipe.get('name', '')}'; least-squares fit of {', '.join(recipe.get('effects', ())).replace('_', ' ')}{verified}."
-    )
-
-
-def _conditions(run: Run, serial: str, recipe: dict[str, Any]) -> list[content.Condition]:
-    dwells = run.table("dwells")
-    own, conditions = dwells[dwells["unit"] == serial], []
-    for column, name, unit in (
-        ("unit_C", "temperature of the item", "°C"),
-        ("chamber_C", "temperature of the chamber", "°C"),
-        ("supply_V", "supply voltage", "V"),
-    ):
-        values = own[column].dropna() if column in own else []
-        if len(values):
-            conditions.append(content.Condition(name=name, low=float(min(values)), high=float(max(values)), unit=unit))
-    gravity = recipe.get("local_gravity_m_s2") or (run.about.get("mapping") or {}).get("local_gravity_m_s2")
-    if gravity:
-        conditions.append(content.Condition(name="local gravity", low=float(gravity), high=float(gravity), unit="m/s²"))
-    return conditions
 
 
 def _amendment(one: Calibration, known: list[Calibration]) -> content.Amendment:

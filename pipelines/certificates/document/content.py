@@ -126,6 +126,55 @@ class Amendment(Strict):
     replaced_by: str = ""
 
 
+class ResponsePoint(Strict):
+    """A point of a transfer function: amplitude and temperature at which it was measured, magnitude and phase with U and k."""
+
+    frequency_hz: float
+    level_g: float
+    temperature_C: float
+    magnitude: float
+    magnitude_expanded: float
+    magnitude_k: float
+    phase_deg: float
+    phase_expanded: float
+    phase_k: float
+
+
+class CurveParameter(Strict):
+    """A parameter of the curve, with its U."""
+
+    name: str
+    unit: str
+    value: float
+    expanded: float
+    k: float
+
+
+class Curve(Strict):
+    """The model through the points of a transfer function, and the band in which it holds.
+
+    covariance : of the parameters in their units, lower triangle row by row; what all points have in common is not in it
+    """
+
+    model: str
+    verdict: str
+    p_value: float
+    low_hz: float
+    high_hz: float
+    parameters: tuple[CurveParameter, ...]
+    covariance: tuple[float, ...]
+
+
+class Response(Strict):
+    """Sensitivity over frequency; unit : of the magnitude."""
+
+    title: str
+    axis: str
+    unit: str
+    points: tuple[ResponsePoint, ...]
+    curve: Curve | None
+
+
 class CertificateContent(Strict):
     """One certificate of one unit.
 
@@ -152,6 +201,7 @@ class CertificateContent(Strict):
     references: tuple[ReferenceStandard, ...]
     traceability: str
     results: tuple[Result, ...]
+    responses: tuple[Response, ...]
     budgets: tuple[BudgetTable, ...]
     coefficients: tuple[Coefficient, ...]
     conformity: tuple[Conformity, ...]

@@ -1,11 +1,11 @@
 """The certificate as XML, DCC 3.0.0 of the PTB (Digital Calibration Certificate) with D-SI 2.0.0, and its validation offline."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import cache
 from importlib.resources import files
 from typing import Any
 
-from pipelines.certificates.document.content import CertificateContent, Conformity, Result, letters_of
+from pipelines.certificates.document.content import CertificateContent, Conformity, Response, Result, letters_of
 from pipelines.certificates.document.numbers import least_of, si_unit
 from schemas.errors import TumblelineError
 from schemas.library import library
@@ -104,6 +104,26 @@ class _Writer:
         self.add(child, "content", text, lang="en")
         return child
 
+    def reals(self, parent: Any, name: str, unit: str, values: Sequence[tuple[float, float | None, float]]) -> None:
+        """A quantity that is a list of values with their own U and k; U is None of values that have none."""
+        quantity = self.add(parent, "quantity")
+        known = si_unit(unit)
+        self.text(quantity, "name", name if known is not None else f"{name} in {unit}")
+        factor, text = (1.0, r"\one") if known is None else (known.factor, known.text)
+        box = self.add(self.add(quantity, "list", space=SI), "realList", space=SI)
+        self.add(box, "listUnit", text, space=SI)
+        for value, expanded, k in values:
+            real = self.add(box, "real", space=SI)
+            self.add(real, "value", repr(value * factor), space=SI)
+            if expanded is not None:
+                self._expanded(real, expanded * factor, k)
+
+    def _expanded(self, parent: Any, expanded: float, k: float | None) -> None:
+        own = self.add(parent, "expandedUnc", space=SI)
+        self.add(own, "uncertainty", repr(expanded), space=SI)
+        self.add(own, "coverageFactor", repr(k), space=SI)
+        self.add(own, "coverageProbability", repr(COVERAGE), space=SI)
+
     def real(self, parent: Any, value: float, unit: str, label: str = "", result: Result | None = None) -> None:
         """A quantity in SI units with its expanded uncertainty; where its unit has none, a number with the unit in its label."""
         known = si_unit(unit)
@@ -114,10 +134,7 @@ class _Writer:
         self.add(real, "value", repr(float(value) * factor), space=SI)
         self.add(real, "unit", text, space=SI)
         if result is not None and result.value is not None and result.expanded is not None:
-            own = self.add(real, "expandedUnc", space=SI)
-            self.add(own, "uncertainty", repr(result.expanded * factor), space=SI)
-            self.add(own, "coverageFactor", repr(result.k), space=SI)
-            self.add(own, "coverageProbability", repr(COVERAGE), space=SI)
+            self._expanded(real, result.expanded * factor, result.k)
 
 
 def _administrative(w: _Writer, parent: Any, c: CertificateContent) -> None:
@@ -204,7 +221,7 @@ def _contact(w: _Writer, parent: Any, tag: str, name: str, email: str, address: 
 def _measured(w: _Writer, parent: Any, c: CertificateContent) -> None:
     w.text(parent, "name", f"Calibration of {c.who.item.description} {c.serial}")
     method = w.add(w.add(parent, "usedMethods"), "usedMethod")
-    w.text(method, "name", "Static multi-position calibration in gravity")
+    w.text(method, "name", "Static multi-position calibration in gravity" if c.coefficients else "Comparison")
     w.text(method, "description", c.method)
     for norm in c.norms:
         w.add(method, "norm", norm)
@@ -214,7 +231,15 @@ def _measured(w: _Writer, parent: Any, c: CertificateContent) -> None:
             _reference(w, box, one)
     if c.conditions or c.adjustment.found_rms_ug is not None:
         _conditions(w, w.add(parent, "influenceConditions"), c)
-    results = w.add(parent, "results")
+    _results(w, w.add(parent, "results"), c)
+    meta = w.add(parent, "measurementMetaData")
+    for one in c.conformity:
+        _conformity(w, w.add(meta, "metaData"), one, c)
+    if not c.conformity:
+        w.text(w.add(meta, "metaData"), "declaration", "no statement of conformity is made")
+
+
+def _results(w: _Writer, results: Any, c: CertificateContent) -> None:
     for result in c.results:
         own = w.add(results, "result")
         w.text(own, "name", f"{result.quantity}, {result.axis}")
@@ -223,18 +248,52 @@ def _measured(w: _Writer, parent: Any, c: CertificateContent) -> None:
         data = w.add(w.add(own, "data"), "quantity")
         shown = result.expanded if result.value is None else result.value
         w.real(data, shown or 0.0, result.unit, result=result)
-    own = w.add(results, "result")
-    w.text(own, "name", "coefficients of the fit, as archived; their uncertainty is in the results above")
+    for response in c.responses:
+        _response(w, results, response)
+    if c.coefficients:
+        own = w.add(results, "result")
+        w.text(own, "name", "coefficients of the fit, as archived; their uncertainty is in the results above")
+        box = w.add(w.add(own, "data"), "list")
+        for one in c.coefficients:
+            quantity = w.add(box, "quantity")
+            w.text(quantity, "name", f"{one.effect} {one.name} {one.axis}")
+            w.real(quantity, one.value, one.unit)
+
+
+def _response(w: _Writer, parent: Any, one: Response) -> None:
+    """Sensitivity over frequency as lists in the order of the points, and the curve through it."""
+    own = w.add(parent, "result")
+    w.text(own, "name", f"sensitivity over frequency, {one.title}")
     box = w.add(w.add(own, "data"), "list")
-    for one in c.coefficients:
-        quantity = w.add(box, "quantity")
-        w.text(quantity, "name", f"{one.effect} {one.name} {one.axis}")
-        w.real(quantity, one.value, one.unit)
-    meta = w.add(parent, "measurementMetaData")
-    for one in c.conformity:
-        _conformity(w, w.add(meta, "metaData"), one, c)
-    if not c.conformity:
-        w.text(w.add(meta, "metaData"), "declaration", "no statement of conformity is made")
+    points = one.points
+    for name, unit, values in (
+        ("frequency", "Hz", [(p.frequency_hz, None, 0.0) for p in points]),
+        ("amplitude of the motion", "g", [(p.level_g, None, 0.0) for p in points]),
+        ("temperature of the item", "°C", [(p.temperature_C, None, 0.0) for p in points]),
+        (
+            "magnitude of the sensitivity",
+            one.unit,
+            [(p.magnitude, p.magnitude_expanded, p.magnitude_k) for p in points],
+        ),
+        ("phase of the sensitivity", "°", [(p.phase_deg, p.phase_expanded, p.phase_k) for p in points]),
+    ):
+        w.reals(box, name, unit, values)
+    if (curve := one.curve) is None:
+        return
+    own = w.add(parent, "result")
+    w.text(own, "name", f"curve through the sensitivity over frequency, {one.title}")
+    text = f"{curve.model}, {curve.verdict}, p {curve.p_value:.3g}, from {curve.low_hz:g} to {curve.high_hz:g} Hz"
+    w.text(own, "description", text)
+    box = w.add(w.add(own, "data"), "list")
+    for p in curve.parameters:
+        w.reals(box, p.name.replace("_", " "), p.unit, [(p.value, p.expanded, p.k)])
+    units = [si_unit(p.unit) for p in curve.parameters]
+    factors = [1.0 if unit is None else unit.factor for unit in units]
+    pairs = [(k, j) for k in range(len(factors)) for j in range(k + 1)]
+    covariance = [
+        (value * factors[k] * factors[j], None, 0.0) for value, (k, j) in zip(curve.covariance, pairs, strict=True)
+    ]
+    w.reals(box, "covariance of the parameters in the units above, lower triangle row by row", "1", covariance)
 
 
 def _reference(w: _Writer, parent: Any, one: Any) -> None:

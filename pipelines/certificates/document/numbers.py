@@ -40,6 +40,7 @@ _FIXED = {
     "µrad": SIUnit(r"\micro\radian", 1.0), "mrad": SIUnit(r"\milli\radian", 1.0), "rad": SIUnit(r"\radian", 1.0),
     "µg/√Hz": SIUnit(_ACCELERATION + r"\hertz\tothe{-0.5}", 1e-6 * _G), "°C": SIUnit(r"\degreecelsius", 1.0),
     "V": SIUnit(r"\volt", 1.0), "s": SIUnit(r"\second", 1.0), "K": SIUnit(r"\kelvin", 1.0), "min": SIUnit(r"\second", 60.0),
+    "ms": SIUnit(r"\second", 1e-3), "Hz": SIUnit(r"\hertz", 1.0), "°": SIUnit(r"\degree", 1.0),
 }  # fmt: skip
 
 

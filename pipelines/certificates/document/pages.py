@@ -3,11 +3,12 @@
 import math
 from typing import Any
 
-from pipelines.certificates.document.content import Adjustment, CertificateContent, Contribution
+from pipelines.certificates.document.content import Adjustment, CertificateContent, Contribution, Response
 from pipelines.certificates.document.numbers import probability, rounded, significant, with_uncertainty
 
 SMALLEST_SHARE = 5e-4  # of a row of a budget: less is printed as 0.0 %
 
+OF_OUTPUT = " Of the corrected output the uncertainty alone is stated."
 PREVAILS = (
     "The same results are attached to this file as certificate.xml (Digital Calibration Certificate 3.0.0). The attached XML "
     "holds the results with all digits; where the two differ, this printed form prevails."
@@ -88,6 +89,7 @@ def _parts(c: CertificateContent) -> list[dict[str, Any]]:
         _references(c),
         _as_found(c.adjustment),
         _results(c),
+        *(_response(one) for one in c.responses),
         _conformity(c),
         _budgets(c),
         _coefficients(c),
@@ -142,9 +144,34 @@ def _results(c: CertificateContent) -> dict[str, Any]:
     after = [
         c.uncertainty_note,
         *([c.left_out] if c.left_out else []),
-        f"Frame: {c.frame}. 1 g = 9.80665 m/s². Of the corrected output the uncertainty alone is stated.",
+        f"Frame: {c.frame}. 1 g = 9.80665 m/s².{OF_OUTPUT if c.coefficients else ''}",
     ]
     return {"title": "Results", "tables": [table], "after": after}  # fmt: skip
+
+
+def _response(one: Response) -> dict[str, Any]:
+    """Sensitivity over frequency, and the curve through it."""
+    rows = [
+        [significant(p.frequency_hz, 5), significant(p.level_g), *with_uncertainty(p.magnitude, p.magnitude_expanded),
+         significant(100.0 * p.magnitude_expanded / p.magnitude, 2), *with_uncertainty(p.phase_deg, p.phase_expanded),
+         f"{max(p.magnitude_k, p.phase_k):.2f}"]
+        for p in one.points
+    ]  # fmt: skip
+    heads = ["Hz", "amplitude, g", f"sensitivity, {one.unit}", "U", "U, %", "phase, °", "U, °", "k"]
+    tables = [_table("", heads, rows, ["auto"] * 8, list(range(8)))]
+    after: list[str] = []
+    if (curve := one.curve) is not None:
+        rows = [
+            [p.name.replace("_", " "), *with_uncertainty(p.value, p.expanded), p.unit, f"{p.k:.2f}"]
+            for p in curve.parameters
+        ]
+        tables.append(_table("Curve", ["parameter", "value", "U", "unit", "k"], rows, [1, *["auto"] * 4], [1, 2, 4]))
+        after.append(
+            f"The curve {curve.model.replace('_', ' ')} is {curve.verdict} (p = {curve.p_value:.2g}) and holds from "
+            f"{significant(curve.low_hz)} to {significant(curve.high_hz)} Hz; the covariance of its parameters is in the "
+            "attached XML. Outside this band, and as properties of the item, its parameters are not certified."
+        )
+    return {"title": one.title, "tables": tables, "after": after}
 
 
 def _conformity(c: CertificateContent) -> dict[str, Any]:
@@ -160,8 +187,9 @@ def _conformity(c: CertificateContent) -> dict[str, Any]:
     table = _table("", heads, rows, [1, *["auto"] * 7], [1, 2, 3, 4, 7])
     passed = all(one.outcome == "pass" for one in c.conformity)
     verdict = "meets" if passed else "does not meet in every figure"
+    grade = "" if c.grade == "none" else f" (grade {c.grade})"
     before = [
-        f"The item {verdict} the specification '{c.limits}' (grade {c.grade}) in the figures listed.",
+        f"The item {verdict} the specification '{c.limits}'{grade} in the figures listed.",
         *([c.grade_statement] if c.grade_statement else []),
         f"Decision rule: {c.decision_rule}. PFA: specific probability of false acceptance (JCGM 106, 7.4).",
     ]
@@ -218,4 +246,4 @@ def _coefficients(c: CertificateContent) -> dict[str, Any]:
     heads = ["effect", "coefficient", "axis", "value", "standard uncertainty of noise", "unit"]
     table = _table("", heads, rows, [2, "auto", "auto", "auto", "auto", 1], [3, 4])
     text = "Coefficients of the fit. The stated uncertainty is that of the results above; noise alone is printed here."
-    return {"title": "Coefficients", "before": [text], "tables": [table]}
+    return {"title": "Coefficients", "before": [text], "tables": [table]} if rows else {}

@@ -31,8 +31,8 @@ def write(units: Sequence[UnitCalibration], run: str, settings: ExportSettings) 
     kind = settings.arithmetic
     fixed = kind == "q24"
     behind = bool(settings.firmware.low_pass or settings.firmware.bias)
-    if fixed or behind:
-        refuse_fewer_axes(units, "export: --set arithmetic=q24, --filter or track")
+    if behind:
+        refuse_fewer_axes(units, "export: --filter or track")
     real, suffix = ("float", "f") if kind == "float" else ("double", "")
     head, tail = _template("q24" if fixed else "real").split("@UNITS@\n")
     blocks = [_fixed_unit(unit) if fixed else _real_unit(unit, kind) for unit in units]
@@ -77,10 +77,10 @@ def _real_unit(unit: UnitCalibration, kind: str) -> str:
     )
 
 
-def _of_fewer_axes(unit: UnitCalibration) -> str:
-    """What a caller gives for the axes without an output; empty where there are none."""
+def _of_fewer_axes(unit: UnitCalibration, times: str = "") -> str:
+    """What a caller gives for the axes without an output, in g or so many times that; empty where there are none."""
     places = " and ".join(f"output[{k}]" for k in range(len(AXES)) if k not in unit.axes)
-    text = f"\n * axes {', '.join(unit.letters)}; {places}: force along that axis in g, 0 where it is not known"
+    text = f"\n * axes {', '.join(unit.letters)}; {places}: force along that axis in g{times}, 0 where it is not known"
     return text if places else ""
 
 
@@ -96,11 +96,11 @@ def _literal(exact: type[np.float32 | np.float64]) -> Callable[[Any], str]:
 
 
 def _fixed_unit(unit: UnitCalibration) -> str:
-    own = fixed_point(unit)
-    errors = f"at 1 g: {largest_error_ug(unit, own.correct):.3g} ug"
+    own, whole = fixed_point(unit), unit.with_every_axis
+    errors = f"at 1 g: {largest_error_ug(whole, own.correct):.3g} ug"
     if unit.full_scale is not None:
         full = unit.full_scale / own.scale
-        errors += f", at full scale ({full:.3g} g): {largest_error_ug(unit, own.correct, full):.3g} ug"
+        errors += f", at full scale ({full:.3g} g): {largest_error_ug(whole, own.correct, full):.3g} ug"
     factor = round(2.0**_COUNTS_BITS / own.scale) if unit.out_unit == "LSB" else 0
     low, high = own.range_mC
     crc = checksum(unit.unit, "i", [low, high, *own.bias.ravel(), *own.inverse.ravel()])
@@ -109,7 +109,7 @@ def _fixed_unit(unit: UnitCalibration) -> str:
     return (
         f"/* {comment(unit.unit)}: {comment(unit.certified)}\n"
         f" * largest error against the full calibration from {low / 1000:g} to {high / 1000:g} degrees Celsius, {errors};\n"
-        f" * beyond these temperatures the coefficients of the nearest one hold; {counts} */\n"
+        f" * beyond these temperatures the coefficients of the nearest one hold; {counts}{_of_fewer_axes(unit, f' * {ONE}')} */\n"
         f"static const tumbleline_calibration tumbleline_{_symbol(unit)} = {{\n"
         f'    "{unit.unit}", {low}, {high}, INT64_C({factor}),\n    {_braces(own.bias, str)},\n    {_braces(own.inverse, str)},\n'
         f"    0x{crc:08X}u\n}};\n"

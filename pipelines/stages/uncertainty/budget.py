@@ -14,6 +14,7 @@ from inertial.state import ALL_AXES
 from inertial.uncertainty.influences import MeasurementModel, sensitivity
 from inertial.uncertainty.propagation import fit_design, propagated
 from pipelines.stages.uncertainty.budget_terms import BudgetTables, BudgetTerms
+from pipelines.stages.uncertainty.compared import compared_tables
 from pipelines.stages.uncertainty.contributions import DwellConditions, influences, sources
 from pipelines.stages.uncertainty.measurands import LotBudget, VarianceParts
 from pipelines.stages.uncertainty.tables import empty, tables_of
@@ -28,10 +29,18 @@ def budget(tables: BudgetTables, terms: BudgetTerms) -> dict[str, pd.DataFrame]:
 
     ``budget`` has one row per unit, quantity and contribution, ``uncertainties`` one per unit and quantity: value, u of type A
     and B, effective degrees of freedom, k and U, and for verification the part that the station's own verification shows.
+    Results by comparison are quantities like the others; those of a frequency have it as ``setting``.
     """
-    if terms.stated is None or tables.coefficients.empty:
+    if terms.stated is None:
         return empty()
-    return tables_of(lot_budget(tables, terms), sources(terms.stated))
+    made = empty() if tables.coefficients.empty else tables_of(lot_budget(tables, terms), sources(terms.stated))
+    if tables.results is None or tables.results.empty:
+        return made
+    compared = {name: rows for name, rows in compared_tables(tables.results, terms).items() if len(rows)}
+    return made | {
+        name: rows if made[name].empty else pd.concat([made[name], rows], ignore_index=True)
+        for name, rows in compared.items()
+    }
 
 
 def lot_budget(tables: BudgetTables, terms: BudgetTerms) -> LotBudget:

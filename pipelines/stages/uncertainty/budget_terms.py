@@ -25,6 +25,7 @@ class BudgetTables:
     """The tables that a budget is computed from.
 
     lot, calibration : dwells with their history, and coefficients, where other stages have converted them already
+    results : of comparisons; None where the run has none
     """
 
     dwells: pd.DataFrame
@@ -37,6 +38,7 @@ class BudgetTables:
     noise: pd.DataFrame
     lot: LotTables | None = None
     calibration: Calibration | None = None
+    results: pd.DataFrame | None = None
 
     def arrays(self) -> LotArrays:
         """The dwells of fit and verification."""

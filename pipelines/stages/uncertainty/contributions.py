@@ -8,7 +8,7 @@ import numpy as np
 from inertial.arrays import Array, Index
 from inertial.state import State
 from inertial.uncertainty.influences import Errors, InputQuantity, Scattered, harmonic, theta
-from schemas.uncertainty import Entry, StandardUncertainty, Uncertainty
+from schemas.uncertainty import OF_STATIC, Entry, StandardUncertainty, Uncertainty
 from schemas.validity import Stability
 
 
@@ -79,11 +79,10 @@ def reads_own_temperature(stated: Uncertainty, stability: Stability | None) -> b
 def left_out(stated: Uncertainty) -> list[str]:
     """The contributions that a statement has no figure for, and does not call exact, by name."""
     names: list[str] = []
-    for name in type(stated).model_fields:
-        if name != "grade_source":
-            entry: Entry | None = getattr(stated, name)
-            parts = _PARTS.get(name, {"": name})
-            names += [label for part, label in parts.items() if entry is None or not entry.states(part)]
+    for name in OF_STATIC:
+        entry: Entry | None = getattr(stated, name)
+        parts = _PARTS.get(name, {"": name})
+        names += [label for part, label in parts.items() if entry is None or not entry.states(part)]
     return names
 
 

@@ -13,6 +13,7 @@ from pipelines.stages.uncertainty.budget_terms import BudgetTerms
 from pipelines.stages.uncertainty.contributions import UncertaintySource
 from pipelines.stages.uncertainty.measurands import BudgetQuantity, LotBudget, VarianceParts, quantities_of
 from pipelines.tables.frames import empty_table, picked
+from schemas.stated import Entry
 
 NOISE = "noise"
 BEYOND = {
@@ -46,6 +47,16 @@ LABELS = {
     "timing": "timing",
     "creep": "creep after a move",
     "vibration": "vibration",
+    "record_noise": "noise of the records",
+    "repeatability": "repeatability of a point",
+    "nominal_scale": "scale that the figure is compared with",
+    "reference": "reference sensor",
+    "drift": "drift of the reference sensor",
+    "amplitude": "ratio of the channels, noise of the amplitude",
+    "transverse": "transverse motion",
+    "distortion": "distortion of the motion",
+    "mounting": "mounting",
+    "phase": "phase between the channels",
     **BEYOND,
 }
 """Titles of the contributions in tables and pictures."""
@@ -183,8 +194,13 @@ def _referred(source: UncertaintySource, shares: Array) -> dict[str, Any]:
         "scope": entry.scope,
         "input_unit": stated.unit,
         "divisor": stated.divisor,
-        "source": f"reference {entry.reference}" if entry.reference else entry.origin,
+        "source": source_of(entry),
     }
+
+
+def source_of(entry: Entry) -> str:
+    """What an entry rests on: a reference standard, or its source."""
+    return f"reference {entry.reference}" if entry.reference else entry.origin
 
 
 def _share(u: Array) -> Array:

@@ -26,6 +26,7 @@ from pipelines.export import (
     export_text,
     unit_calibrations,
 )
+from pipelines.export.fixed_point import fixed_point
 from pipelines.export.polynomials import ORDER
 from pipelines.export.unit_noise import UnitNoise
 from pipelines.importers.readers import matlab as matlab_reader
@@ -251,6 +252,19 @@ def test_compiled_c_computes_the_calibration(arithmetic: str, call: str, within:
     assert np.max(np.abs(computed - wanted)) < within
     if arithmetic == "q24":
         assert np.max(np.abs(computed - wanted)) < 1.5e-6 * stated_ug(header) + 2e-7
+
+
+@pytest.mark.parametrize("axes", [(0,), (0, 1)])
+def test_fixed_point_of_fewer_axes_has_their_scale_and_takes_forces_for_the_others(axes: tuple[int, ...]) -> None:
+    c = unit(scale_t=1e-3, across=3e-3)
+    own = replace(c, bias=c.bias[:, list(axes)], response=c.response[:, list(axes)], axes=axes)
+    made, whole = fixed_point(own), own.with_every_axis
+    assert made.scale == pytest.approx(np.mean(np.diag(c.response[0])[list(axes)]))
+    assert made.of_forces.tolist() == [axis not in axes for axis in range(3)]
+    for f, t, y in readings(c, 200):
+        output = np.where(made.of_forces, f, y)[None]
+        temperature = float(np.clip(np.round(t, 3), *c.temperatures))
+        assert np.abs(made.correct(output, temperature) - whole.correct(output, temperature)).max() < 1e-6
 
 
 def test_compiled_fixed_point_beyond_its_temperatures_holds_the_nearest_one_and_says_so(tmp_path: Path) -> None:

@@ -22,6 +22,7 @@ from typer.testing import CliRunner, Result
 
 from pipelines.archive import Archive, Run
 from pipelines.certificates import Ledger
+from pipelines.certificates.document.circumstances import traceability
 from pipelines.certificates.document.compose import compose
 from pipelines.certificates.document.content import CertificateContent, Coefficient, ReferenceStandard
 from pipelines.certificates.document.dcc import DCC, SI, dcc, validate
@@ -347,15 +348,13 @@ def test_a_laboratory_file_with_a_slip_is_refused(laboratory: Path) -> None:
 
 
 def test_traceability_is_claimed_for_what_names_a_standard_only() -> None:
-    from pipelines.certificates.document.compose import _traceability
-
-    entries = {"grade_source": "certificates", "gravity": {"u_ppm": 1.0, "reference": "G-1"}, "seat": {"u_urad": 9.0}}
+    entries = {"gravity": True, "seat": False}
     own = {"frame": "fixture", "validity_months": 12, "customer_agreed": False, "quantities": (), "decisions": ()}
     standard = Reference(id="G-1", certificate="C-1", due=date(2027, 1, 1))
-    text = _traceability(StatedBudget(**own, references=(standard,), grade_source="certificates"), entries)
+    text = traceability(StatedBudget(**own, references=(standard,), grade_source="certificates"), entries)
     assert "of the standards listed: gravity." in text
     assert text.endswith("by the sources in the budgets (certificates): seat.")
-    assert "not claimed" in _traceability(StatedBudget(**own, references=(), grade_source="data_sheet"), entries)
+    assert "not claimed" in traceability(StatedBudget(**own, references=(), grade_source="data_sheet"), entries)
 
 
 def test_the_certificate_states_the_verdict_with_p_and_what_u_does_not_contain(

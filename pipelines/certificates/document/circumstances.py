@@ -1,0 +1,133 @@
+"""What a certificate says of the circumstances of a calibration: standards, traceability, method, conditions, omissions."""
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from inertial.counts import number_of
+from pipelines.archive import Run
+from pipelines.certificates.document import content
+from pipelines.certificates.document.laboratory import LaboratoryFile
+from pipelines.certificates.entries import STATIC
+from pipelines.certificates.stated_budget import StatedBudget
+from pipelines.procedures import PROCEDURES
+from pipelines.stages.uncertainty.contributions import left_out
+from pipelines.stages.uncertainty.tables import LABELS
+from schemas.reference import Reference
+from schemas.uncertainty import Uncertainty
+
+SOURCES = {
+    "[stability], ": "stability of the device, ",
+    "[stability]": "stability of the device",
+    "[uncertainty]": "uncertainties of the references",
+    "slot_rotation_mrad of the simulation": "simulation: rotation of the slots",
+    "slot_gradient_K of the simulation": "simulation: gradient in the slots",
+    "slot_lag_s of the simulation": "simulation: thermal lag of the slots",
+    "supply_reading_ppm of the simulation": "simulation: measurement of the supply",
+}
+
+
+def source_words(text: str) -> str:
+    """The source of a contribution without the names of tables and keys in files."""
+    for table, words in SOURCES.items():
+        text = text.replace(table, words)
+    return text
+
+
+def standard_of(one: Reference) -> content.ReferenceStandard:
+    """A standard of the station as a certificate names it."""
+    accreditation = f" ({one.accreditation})" if one.accreditation else ""
+    return content.ReferenceStandard(
+        laboratory=one.laboratory + accreditation,
+        date="" if one.date is None else one.date.isoformat(),
+        due=one.due.isoformat(),
+        uncertainty="" if one.U is None else f"U = {one.U:g} {one.unit or ''} (k = {one.k:g})",
+        **{name: getattr(one, name) for name in ("id", "what", "certificate", "sha256")},
+    )
+
+
+def entries_of(run: Run, covers: str) -> dict[str, bool]:
+    """What the results rest on in [uncertainty], and whether it names a standard; of several bands all must."""
+    terms = Uncertainty.model_validate(run.manifest("budget")["parameters"].get("uncertainty") or {})
+    named: dict[str, bool] = {}
+    roles = {STATIC if kind == STATIC else PROCEDURES[kind].roles[0] for kind in covers.split()}
+    for path, entry in terms.every_entry.items():
+        role, _, term = path.partition(".")
+        if (role.partition("[")[0] if term else STATIC) in roles:
+            name = f"{LABELS[term]} of the {role.partition('[')[0]}" if term else role
+            named[name.replace("_", " ")] = named.get(name.replace("_", " "), True) and bool(entry.reference)
+    return named
+
+
+def traceability(budget: StatedBudget, entries: dict[str, bool]) -> str:
+    """What is traceable and what is not: an entry of the budget that names no standard is said to rest on its source."""
+    source = budget.grade_source.replace("_", " ")
+    if not budget.references:
+        return (
+            "No reference standard with a certificate is stated for this calibration; metrological traceability to the SI is not "
+            f"claimed. The uncertainties of the references are taken from: {source}."
+        )
+    traced, rest = ([name for name in sorted(entries) if entries[name] is is_traced] for is_traced in (True, False))
+    text = (
+        "Traceable to the SI through the calibration certificates of the standards listed: "
+        f"{', '.join(traced) or 'no contribution names one of them'}."
+    )
+    if not rest:
+        return text
+    return f"{text} Without a standard of their own, by the sources in the budgets ({source}): {', '.join(rest)}."
+
+
+def left_out_words(run: Run, held: Sequence[str]) -> str:
+    """The contributions that the statement of the references lacks: U counts them as zero; and what the poses do not show.
+
+    Parameters
+    ----------
+    held : directions in which the poses do not show the response across
+    """
+    terms = run.manifest("budget")["parameters"].get("uncertainty") or {}
+    names = left_out(Uncertainty.model_validate(terms))
+    named = ", ".join(LABELS.get(name, name) for name in names)
+    unstated = f"Not stated, and not contained in the uncertainties U: {named}." if names else ""
+    unseen = f"Not determined by the poses, and taken for zero: misalignment along {', '.join(held)}." if held else ""
+    return " ".join(filter(None, (unstated, unseen)))
+
+
+def methods(
+    run: Run, recipe: dict[str, Any], who: LaboratoryFile, compared: Sequence[str], *, static: bool
+) -> Iterator[str]:
+    """The laboratory's procedure, the static calibration, and the comparisons."""
+    if who.method.procedure:
+        yield f"{who.method.procedure}."
+    if static:
+        yield _static_method(run, recipe)
+    yield from compared
+
+
+def _static_method(run: Run, recipe: dict[str, Any]) -> str:
+    dwells = run.table("dwells")
+    kinds = dwells["kind"].astype(str)
+    poses, kept = (dwells.loc[kinds == kind, "pose"].nunique() for kind in ("dwell", "verification"))
+    verified = f"; verification in {kept} other poses" if kept else "; no pose was kept for verification"
+    soaks = number_of(len(recipe.get("temperatures_C") or [0]), "temperature")
+    return (
+        f"Static multi-position calibration in the gravity of the Earth: {poses} poses at "
+        f"{soaks}, {recipe.get('dwell_s', 'unknown')} s per pose, recipe "
+        f"'{recipe.get('name', '')}'; least-squares fit of {', '.join(recipe.get('effects', ())).replace('_', ' ')}{verified}."
+    )
+
+
+def conditions_of(run: Run, serial: str, recipe: dict[str, Any], *, static: bool) -> list[content.Condition]:
+    """Temperatures, supply and gravity of a unit's readings; of a static calibration those of its dwells."""
+    table = run.table("dwells" if static else "readings")
+    own, conditions = table[table["unit"] == serial], []
+    for column, name, unit in (
+        ("unit_C", "temperature of the item", "°C"),
+        ("chamber_C", "temperature of the chamber", "°C"),
+        ("supply_V", "supply voltage", "V"),
+    ):
+        values = own[column].dropna() if column in own else []
+        if len(values):
+            conditions.append(content.Condition(name=name, low=float(min(values)), high=float(max(values)), unit=unit))
+    gravity = recipe.get("local_gravity_m_s2") or (run.about.get("mapping") or {}).get("local_gravity_m_s2")
+    if gravity and static:
+        conditions.append(content.Condition(name="local gravity", low=float(gravity), high=float(gravity), unit="m/s²"))
+    return conditions
