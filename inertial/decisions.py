@@ -291,3 +291,9 @@ STEPS_FOLLOW = 0.7
 of five times the noise of a sample in 24, 24, 0 of 24 (a share above one is never reached); steps of once and twice the noise,
 no steps and t3 tails in 0 of 96 at each value.
 """
+
+FOREIGN_UNIT, FOREIGN_LOT = 2e-3, 1e-2
+"""Probability, over all effects, below which a unit does not fit its family, and a lot widens its prior.
+
+`python benchmarks/priors.py --characteristic`: PENDING
+"""

@@ -235,7 +235,8 @@ class RecipeSearch:
         return self.reaching(context) if plan.ramp else context
 
     def _context(self, recipe: Recipe) -> PlanContext:
-        return plan_context(recipe, self.against.station, self.against.noise, slowest=self.timed.slowest)
+        noise, prior = self.against.noise, self.requirement.prior
+        return plan_context(recipe, self.against.station, noise, slowest=self.timed.slowest, prior=prior)
 
     def reaching(self, context: PlanContext) -> PlanContext:
         """A recipe on ramps that gets to both ends of the range: short moves after an exchange of poses also end a ramp sooner.

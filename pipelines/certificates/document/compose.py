@@ -20,6 +20,7 @@ from pipelines.stages.uncertainty.contributions import left_out
 from pipelines.stages.uncertainty.tables import LABELS, has_uncertainty
 from pipelines.tables.calibration import EVERY_AXIS
 from pipelines.tables.frames import rows_of
+from pipelines.tables.prior import prior_document, prior_sentence
 from schemas.decisions import BOUND, GRADES, LARGEST_ERROR, MEDIAN, exceedance
 from schemas.errors import ArchiveUnusable, WrongUse
 from schemas.reference import Reference
@@ -101,7 +102,7 @@ def compose(run: Run, calibration: Calibration, known: list[Calibration], who: L
         measured_to=last[:10],
         simulated=station.get("kind") == "simulated",
         who=who,
-        method=_method(run, recipe, who),
+        method=_method(run, serial, recipe, who),
         norms=NORMS,
         frame=FRAMES.get(budget.frame, budget.frame),
         conditions=tuple(_conditions(run, serial, recipe)),
@@ -278,7 +279,7 @@ def _left_out(run: Run, held: Sequence[str]) -> str:
     return " ".join(filter(None, (unstated, unseen)))
 
 
-def _method(run: Run, recipe: dict[str, Any], who: LaboratoryFile) -> str:
+def _method(run: Run, serial: str, recipe: dict[str, Any], who: LaboratoryFile) -> str:
     dwells = run.table("dwells")
     kinds = dwells["kind"].astype(str)
     poses, kept = (dwells.loc[kinds == kind, "pose"].nunique() for kind in ("dwell", "verification"))
@@ -289,7 +290,15 @@ def _method(run: Run, recipe: dict[str, Any], who: LaboratoryFile) -> str:
         f"{procedure}Static multi-position calibration in the gravity of the Earth: {poses} poses at "
         f"{soaks}, {recipe.get('dwell_s', 'unknown')} s per pose, recipe "
         f"'{recipe.get('name', '')}'; least-squares fit of {', '.join(recipe.get('effects', ())).replace('_', ' ')}{verified}."
+        f"{_prior(run, serial)}"
     )
+
+
+def _prior(run: Run, serial: str) -> str:
+    """What earlier calibrations add to those of a unit; empty without a prior."""
+    table = run.table("prior") if "prior" in run.tables() else None
+    prior = None if table is None else prior_document(table[table["unit"] == serial])
+    return "" if prior is None else f" Earlier calibrations: {prior_sentence(prior).replace('_', ' ')}."
 
 
 def _conditions(run: Run, serial: str, recipe: dict[str, Any]) -> list[content.Condition]:

@@ -24,6 +24,7 @@ MANY = 1e6
 class BudgetTables:
     """The tables that a budget is computed from.
 
+    prior : None for a fit without one
     lot, calibration : dwells with their history, and coefficients, where other stages have converted them already
     """
 
@@ -35,6 +36,7 @@ class BudgetTables:
     verification: pd.DataFrame
     verification_poses: pd.DataFrame
     noise: pd.DataFrame
+    prior: pd.DataFrame | None = None
     lot: LotTables | None = None
     calibration: Calibration | None = None
 
