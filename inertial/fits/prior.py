@@ -80,11 +80,10 @@ def judged(family: Family, effects: Sequence[str], coefficients: Array, covarian
     names = list(dict.fromkeys(effects))
     columns = {name: np.flatnonzero(np.array(effects, dtype=object) == name) for name in names}
     parts = [_Part(family, columns[name], apart, covariance) for name in names]
-    every = np.ones(len(apart), dtype=bool)
     alone = np.min([part.p_units(1.0, 1.0) for part in parts], axis=0) * len(parts)
     suspect = alone < FOREIGN_UNIT
-    # most of a lot that is unlike the family: the lot is, and its units are judged by one another
-    reference = ~suspect if 2 * suspect.sum() <= len(apart) else every
+    # most of a lot that is unlike the family: the lot is, and its units are judged by one another; a single unit has no others
+    reference = ~suspect if 2 * suspect.sum() <= len(apart) or len(apart) == 1 else np.ones_like(suspect)
     factors = [part.widening(reference, FOREIGN_LOT / (2 * len(parts))) for part in parts]
     p_unit = np.minimum(
         np.min([part.p_units(*f) for part, f in zip(parts, factors, strict=True)], axis=0) * len(parts), 1.0

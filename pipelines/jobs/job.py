@@ -191,7 +191,7 @@ class Request:
             return None
         beside = folder_of(self.recipe) / recipe.prior.full
         full = replace(self, recipe=str(beside) if beside.is_file() else recipe.prior.full).job(archive)
-        if full.recipe.prior is not None or full.recipe.device != recipe.device:
+        if full.recipe.prior is not None or full.recipe.device.lower() != recipe.device.lower():
             raise RecipeInvalid(
                 f"recipe {recipe.name}: key 'prior.full': {full.recipe.name} measures {full.recipe.device} "
                 f"{'with' if full.recipe.prior else 'without'} a prior, the same device without one is needed; name another",

@@ -42,7 +42,7 @@ def stored_family(recipe: Recipe, own: Archive, units: set[str], kind: str) -> S
     since = "" if recipe.prior.since is None else recipe.prior.since.isoformat()
     values, errors, lots, runs, seen = [], [], [], list[str](), set(units)
     for info in sorted(archive.runs(), key=lambda info: (info.started, info.id)):
-        if info.device != recipe.device or info.rerun_of or info.started < since or "fit" not in info.stages:
+        if info.device.lower() != recipe.device.lower() or info.rerun_of or info.started < since or "fit" not in info.stages:
             continue
         run = archive.run(info.id)
         about = run.about
