@@ -90,7 +90,7 @@ class Measured:
         for k in range(0, len(self.off), LOT):
             own = self.coefficients[k : k + LOT], self.covariance[k : k + LOT]
             priors.append(judged(family, self.effects, *own))
-            fits.append(combined(*own, family.mean, priors[-1].precision))
+            fits.append(combined(*own, priors[-1].mean, priors[-1].precision))
         names = ("coefficients", "covariance", "kept", "share")
         both = Combined(*(np.concatenate([getattr(fit, name) for fit in fits]) for name in names))
         return priors, both, both.coefficients - self.coefficients + self.off

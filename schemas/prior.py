@@ -22,6 +22,13 @@ class PriorTerms(Grown):
     full: Text = ""
 
 
+class StoredOwn(Strict):
+    """What a unit's own earlier calibrations say of it: mean (m, p) and covariance (m, p, p)."""
+
+    mean: list[list[float]]
+    covariance: list[list[list[float]]]
+
+
 class StoredFamily(Strict):
     """A family (:class:`inertial.population.family.Family`) with what it was made from: what a re-run reads.
 
@@ -37,3 +44,4 @@ class StoredFamily(Strict):
     units: int
     lots: int
     tails: list[list[float]]
+    own: dict[str, StoredOwn] = {}

@@ -200,7 +200,7 @@ TABLES: dict[str, Table] = {
             **_AXIS,
             **each(text(), "effect", "name"),
             **each(NUMBER, "mean", "standard_deviation", "share", "widened", "p_value"),
-            "fits": FLAG,
+            **each(FLAG, "fits", "own"),
             "units": WHOLE,
         },
         key=("unit", "axis", "effect", "name"),

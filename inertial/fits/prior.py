@@ -26,13 +26,15 @@ _WIDEST, _HALVINGS = 1e8, 60
 class Prior:
     """The prior of the units of a lot after its comparison with them.
 
-    covariance : (m, p, p), of a unit's coefficients about the family's mean, as widened
+    mean : (units, m, p), of the family, or of a unit's own earlier calibrations
+    covariance : (units, m, p, p), of the coefficients about it, as widened
     precision : (units, m, p, p), its inverse; zero for units that do not fit the family
     p_unit : (units,), probability that a unit of the family is as far from its prior in its furthest effect
     widened : per effect, factors (≥ 1) of the covariance within and between lots
     """
 
     family: Family
+    mean: Array
     covariance: Array
     precision: Array
     p_unit: Array
@@ -68,18 +70,32 @@ def combined(coefficients: Array, covariance: Array, mean: Array, precision: Arr
     return Combined(coefficients + step, both, np.eye(pull.shape[-1]) - pull, of_prior)
 
 
-def judged(family: Family, effects: Sequence[str], coefficients: Array, covariance: Array) -> Prior:
+def judged(
+    family: Family, effects: Sequence[str], coefficients: Array, covariance: Array, units: Sequence[str] = ()
+) -> Prior:
     """The prior of a lot, by its own estimates.
 
     Parameters
     ----------
+    units : serial numbers, by which units with earlier calibrations are known; none has any where empty
     effects : (p,), effect of every column
     coefficients : (units, m, p), of the fit without a prior; covariance : (units, m, p, p)
     """
-    apart = coefficients - family.mean
+    shape = covariance.shape
+    mean, within, between = (
+        np.array(np.broadcast_to(one, over))
+        for one, over in ((family.mean, shape[:-1]), (family.within, shape), (family.between, shape))
+    )
+    for k, unit in enumerate(units):
+        if unit in family.own:
+            (mean[k], within[k]), between[k] = family.own[unit], 0.0
+    apart = coefficients - mean
     names = list(dict.fromkeys(effects))
     columns = {name: np.flatnonzero(np.array(effects, dtype=object) == name) for name in names}
-    parts = [_Part(family, columns[name], apart, covariance) for name in names]
+    parts = [
+        _Part(columns[name], apart, covariance, within, between, float(family.tails[:, columns[name]].min()))
+        for name in names
+    ]
     alone = np.min([part.p_units(1.0, 1.0) for part in parts], axis=0) * len(parts)
     suspect = alone < FOREIGN_UNIT
     # most of a lot that is unlike the family: the lot is, and its units are judged by one another; a single unit has no others
@@ -89,25 +105,25 @@ def judged(family: Family, effects: Sequence[str], coefficients: Array, covarian
         np.min([part.p_units(*f) for part, f in zip(parts, factors, strict=True)], axis=0) * len(parts), 1.0
     )
     foreign = p_unit < FOREIGN_UNIT
-    within, between = np.ones((2, len(effects)))
+    wider = np.ones((2, len(effects)))
     for name, factor in zip(names, factors, strict=True):
-        within[columns[name]], between[columns[name]] = np.sqrt(factor)
-    whole = family.within * np.outer(within, within) + family.between * np.outer(between, between)
+        wider[:, columns[name]] = np.sqrt(factor)[:, None]
+    whole = within * np.outer(wider[0], wider[0]) + between * np.outer(wider[1], wider[1])
     precision = np.where(foreign[:, None, None, None], 0.0, np.linalg.inv(whole))
     widened = {name: factor for name, factor in zip(names, factors, strict=True) if max(factor) > 1.0}
-    return Prior(family, whole, precision, p_unit, widened)
+    return Prior(family, mean, whole, precision, p_unit, widened)
 
 
 class _Part:
     """The columns of one effect: how far units and lot are from the family, at factors of its covariances."""
 
-    def __init__(self, family: Family, columns: Places, apart: Array, covariance: Array) -> None:
-        cut = np.ix_(np.arange(len(family.mean)), columns, columns)
-        self.within, self.between = family.within[cut], family.between[cut]
-        self.error = covariance[(slice(None), *cut)]
-        self.apart = apart[..., columns]
+    def __init__(
+        self, columns: Places, apart: Array, covariance: Array, within: Array, between: Array, tails: float
+    ) -> None:
+        cut = (..., columns[:, None], columns)
+        self.error, self.within, self.between = covariance[cut], within[cut], between[cut]
+        self.apart, self.tails = apart[..., columns], tails
         self.dof = self.apart[0].size
-        self.tails = float(family.tails[:, columns].min())
         # heavy tails: the variance of a sum of squares is that of fewer degrees of freedom
         self.effective = 1.0 / (1.0 + 3.0 / (self.tails - 4.0))
 
@@ -128,7 +144,7 @@ class _Part:
 
     def _spread(self, units: Flags, within: float) -> tuple[float, Array, Array]:
         """χ² of the units about their mean; that mean (m, k), and its covariance (m, k, k) about the lot's."""
-        weight = np.linalg.inv(self.error[units] + within * self.within)
+        weight = np.linalg.inv(self.error[units] + within * self.within[units])
         error = np.linalg.inv(weight.sum(axis=0))
         middle = np.einsum("aij,uajk,uak->ai", error, weight, self.apart[units])
         left = self.apart[units] - middle
@@ -137,7 +153,7 @@ class _Part:
     def _middle(self, units: Flags, within: float, between: float) -> float:
         """χ² of the mean of the units."""
         _, middle, error = self._spread(units, within)
-        return float(_square(middle, error + between * self.between).sum())
+        return float(_square(middle, error + between * self.between[units].mean(axis=0)).sum())
 
 
 def _square(apart: Array, covariance: Array) -> Array:

@@ -6,7 +6,7 @@ unbounded variance (D. A. Harville, JASA 72 (1977) 320; N. M. Laird and J. H. Wa
 unit of a new lot is the empirical Bayes one, with the uncertainty of its own parameters.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.special import gammaln
@@ -17,6 +17,9 @@ from inertial.errors import NotIdentified
 
 SPARE = 4
 """Lots beyond the number of coefficients that a family needs: with fewer the variance of the prediction has no mean."""
+
+PAIRS = 12
+"""Pairs of calibrations of one unit from which its change is known."""
 
 _ROUNDS, _SETTLED = 2000, 1e-5
 _TAILS = (5.0, 6.0, 8.0, 10.0, 14.0, 20.0, 40.0, 1e6)
@@ -34,6 +37,7 @@ class Family:
     error : (m, p, p), covariance of the mean
     units, lots : numbers that it is known from
     tails : (m, p), degrees of freedom of Student's distribution that the tails of a coefficient are like
+    own : by serial number, mean (m, p) and covariance (m, p, p) of units with earlier calibrations of their own
     """
 
     mean: Array
@@ -43,6 +47,7 @@ class Family:
     units: int
     lots: int
     tails: Array
+    own: dict[str, tuple[Array, Array]] = field(default_factory=dict[str, tuple[Array, Array]])
 
     @property
     def within(self) -> Array:
@@ -104,6 +109,25 @@ def family_of(values: Array, covariance: Array, lot: Index) -> Family:
     tails = _tails((y - mean) / np.sqrt(spread))
     across = size[..., :, None] * size[..., None, :]
     return Family(mean * size, within * across, between * across, error * across, units, lots, tails)
+
+
+def change_of(apart: Array, covariance: Array) -> Array:
+    """Variances (m, p) of the change of a coefficient from one calibration of a unit to its next, with one standard error.
+
+    Parameters
+    ----------
+    apart : (n, m, p), differences of pairs of calibrations
+    covariance : (n, m, p, p), of the errors of both together
+
+    Raises
+    ------
+    NotIdentified
+        There are fewer than :data:`PAIRS` pairs.
+    """
+    if len(apart) < PAIRS:
+        raise NotIdentified(f"prior: {number_of(len(apart), 'pair')} of calibrations of one unit, {PAIRS} are needed")
+    square = apart**2 - np.diagonal(covariance, axis1=-2, axis2=-1)
+    return np.maximum(square.mean(axis=0), 0.0) + square.std(axis=0, ddof=1) / np.sqrt(len(square))
 
 
 def with_prior(covariance: Array, precision: Array) -> Array:

@@ -106,13 +106,14 @@ def _prior_rows(lot: LotArrays, fitted: NoisyFit) -> pd.DataFrame:
             "axis": picked(lot.letters, a),
             "effect": picked([effect for own in names for effect, _ in own], a * len(names[0]) + c),
             "name": picked([name for own in names for _, name in own], a * len(names[0]) + c),
-            "mean": prior.family.mean[a, c],
-            "standard_deviation": deviation[a, c],
+            "mean": prior.mean[u, a, c],
+            "standard_deviation": deviation[u, a, c],
             "share": fitted.of_prior.ravel(),
             "widened": np.sqrt(factors.max(axis=1))[c],
             "p_value": prior.p_unit[u],
             "fits": prior.fits[u],
             "units": np.full(u.size, prior.family.units),
+            "own": np.array([unit in prior.family.own for unit in lot.units])[u],
         }
     )
 
@@ -121,7 +122,7 @@ _PRIOR: dict[str, Any] = {
     "texts": "unit axis effect name",
     "numbers": "mean standard_deviation share widened p_value",
     "whole": "units",
-    "flags": "fits",
+    "flags": "fits own",
 }
 
 

@@ -75,7 +75,7 @@ def fitted_with_noise(lot: LotArrays, effects: Sequence[str], family: Family | N
         lot = replace(lot, state=better)
         plain = fit_lot(effects, lot.state, lot.output, error, nonlinear=values)
     known = lot.standard_error[:, used]
-    believed = None if family is None else _Belief(family, [effect for effect, _ in plain.names[0]])
+    believed = None if family is None else _Belief(family, [effect for effect, _ in plain.names[0]], lot.units)
     spare = int(plain.dof.sum()) - plain.shared.size
     if spare < FEWEST_TO_SPARE or np.any(plain.dof < 1) or not np.all(np.isfinite(known) & (known > 0.0)):
         return _by_birge(lot, plain, used, believed)
@@ -95,13 +95,13 @@ def fitted_with_noise(lot: LotArrays, effects: Sequence[str], family: Family | N
 class _Belief:
     """The prior of a lot, judged when its own estimates are known."""
 
-    def __init__(self, family: Family, effects: Sequence[str]) -> None:
-        self.family, self.effects = family, effects
+    def __init__(self, family: Family, effects: Sequence[str], units: Sequence[str]) -> None:
+        self.family, self.effects, self.units = family, effects, units
         self.prior: Prior | None = None
 
     def __call__(self, coefficients: Array, covariance: Array) -> Combined:
-        self.prior = judged(self.family, self.effects, coefficients, covariance)
-        return combined(coefficients, covariance, self.family.mean, self.prior.precision)
+        self.prior = judged(self.family, self.effects, coefficients, covariance, self.units)
+        return combined(coefficients, covariance, self.prior.mean, self.prior.precision)
 
 
 def _felt(lot: LotArrays, used: Flags) -> Array:

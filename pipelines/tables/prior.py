@@ -14,6 +14,7 @@ class PriorDocument(TypedDict):
     widened: Annotated[
         dict[str, float], "factor of its standard deviation where the lot differs from the family, by effect"
     ]
+    own: Annotated[list[str], "units whose own earlier calibrations count"]
     foreign: Annotated[
         dict[str, float], "units that do not fit the family and have no prior, with the probability of that"
     ]
@@ -30,6 +31,7 @@ def prior_document(table: pd.DataFrame) -> PriorDocument | None:
         "units": int(table["units"].iloc[0]),
         "shares": by_effect["share"].to_dict(),
         "widened": wide.to_dict(),
+        "own": table.loc[table["own"], "unit"].drop_duplicates().tolist(),
         "foreign": dict(zip(foreign["unit"], foreign["p_value"], strict=True)),
     }
 
@@ -41,6 +43,8 @@ def prior_sentence(prior: PriorDocument) -> str:
     """A prior in words, for summary and certificate."""
     told = [f"{100.0 * v:.0f} % of the variance of {name}" for name, v in prior["shares"].items() if v >= LEAST_TOLD]
     parts = [f"prior of {prior['units']} units: {', '.join(told) or 'below 1 % of every variance'}"]
+    if prior["own"]:
+        parts.append(f"own earlier calibrations of {', '.join(prior['own'])} count")
     if prior["widened"]:
         wide = ", ".join(f"{name} {factor:.1f} times" for name, factor in prior["widened"].items())
         parts.append(f"the lot differs from its family, the prior is widened: {wide}")

@@ -1,5 +1,7 @@
 """A prior in the fit: as one more observation; judged by the lot; in the predicted residuals."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from posed import posed
@@ -83,8 +85,8 @@ def test_a_lot_off_its_family_widens_the_prior_of_the_effect(rng: np.random.Gene
     assert prior.fits.all()
     assert list(prior.widened) == ["bias"]
     wide = np.sqrt(np.diagonal(prior.covariance, axis1=-2, axis2=-1))
-    assert np.all(wide[:, 0] > 5.0)
-    assert wide[:, 1:] == pytest.approx(np.sqrt(1.04), rel=0.01)
+    assert np.all(wide[..., 0] > 5.0)
+    assert wide[..., 1:] == pytest.approx(np.sqrt(1.04), rel=0.01)
 
 
 def test_units_that_spread_more_than_the_family_widen_it(rng: np.random.Generator) -> None:
@@ -138,3 +140,18 @@ def test_the_fit_of_a_lot_is_generalised_least_squares_with_the_prior_as_rows(rn
         np.testing.assert_allclose(found.predicted[0, axis], direct, rtol=1e-5, atol=1e-16)
     assert found.of_prior is not None
     assert np.all((found.of_prior > 0.0) & (found.of_prior < 1.0))
+
+
+def test_own_earlier_calibrations_take_the_place_of_the_family(rng: np.random.Generator) -> None:
+    """Units far from the family's mean are judged by themselves; one that changed meanwhile has no prior."""
+    values, covariance = estimates(rng, 4)
+    values[:2] += 30.0
+    values[2] -= 30.0
+    here = values + 0.1
+    here[2, :, 1] += 9.0
+    own = {f"U{k}": (here[k], 0.04 * np.broadcast_to(np.eye(P), (3, P, P))) for k in range(3)}
+    prior = judged(replace(family(), own=own), NAMES, values, covariance, ["U0", "U1", "U2", "U3"])
+    assert prior.fits.tolist() == [True, True, False, True]
+    np.testing.assert_array_equal(prior.mean[0], here[0])
+    np.testing.assert_array_equal(prior.mean[3], 0.0)
+    assert np.diagonal(prior.covariance[1], axis1=-2, axis2=-1) == pytest.approx(0.04, rel=0.01)

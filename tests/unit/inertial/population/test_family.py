@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from inertial.errors import NotIdentified
-from inertial.population.family import Family, family_of
+from inertial.population.family import Family, change_of, family_of
 
 P, AXES = 3, 2
 MEAN = np.array([5.0, -2.0, 0.3])
@@ -80,3 +80,13 @@ def test_too_few_lots_or_units_are_refused(lots: int, units: int) -> None:
         NotIdentified, match=f"prior: {lots * units} calibrations? in {lots} lots?, 3 coefficients need 7 lots"
     ):
         family_of(*calibrations(np.random.default_rng(1), lots, units))
+
+
+def test_the_change_of_units_is_found_without_the_errors_of_their_calibrations() -> None:
+    rng = np.random.default_rng(5)
+    apart = rng.standard_normal((400, AXES, P)) * np.sqrt([1.0 + 4.0, 1.0, 9.0])
+    change = change_of(apart, np.broadcast_to(np.diag([1.0, 1.0, 1.0]), (*apart.shape, P)))
+    np.testing.assert_allclose(change, [[4.0, 0.0, 8.0]] * AXES, atol=1.8)
+    assert np.all(change > 0.0)
+    with pytest.raises(NotIdentified, match="3 pairs of calibrations of one unit, 12 are needed"):
+        change_of(apart[:3], np.zeros((3, AXES, P, P)))

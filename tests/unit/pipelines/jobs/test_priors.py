@@ -11,6 +11,7 @@ from family_archive import LOTS, LSB, UNITS, family_archive
 from pipelines.archive import Archive
 from pipelines.jobs.priors import family, planned_precision, stored_family
 from pipelines.jobs.recipes import load_recipe
+from pipelines.tables.calibration import column_names
 from schemas.errors import RecipeInvalid
 from schemas.prior import PriorTerms, StoredFamily
 from schemas.recipe import Recipe
@@ -43,6 +44,27 @@ def test_units_of_the_lot_are_left_out(recipe: Recipe, archive: Archive) -> None
     stored = stored_family(recipe, archive, {"E00-0", "E05-3"}, "simulated")
     assert stored is not None
     assert stored.units == LOTS * UNITS - 2
+
+
+def test_units_that_were_calibrated_before_have_a_prior_of_their_own(
+    recipe: Recipe, archive: Archive, tmp_path: Path
+) -> None:
+    family_archive(Path(str(archive.root)), recipe_file(tmp_path, *BRIEF), SPREAD, name="again")
+    found = family(stored_family(recipe, archive, {"E03-1", "new"}, "simulated"))
+    assert found is not None
+    assert list(found.own) == ["E03-1"]
+    mean, covariance = found.own["E03-1"]
+    first = np.random.default_rng([7, 3]).standard_normal((UNITS, 3, 4))[1]
+    middle = np.array([[effect == "scale" for effect, _ in axis] for axis in column_names(recipe.effects)])
+    np.testing.assert_allclose(mean, LSB * (middle + SPREAD * first), atol=3.0)
+    assert np.all(np.sqrt(np.diagonal(covariance, axis1=-2, axis2=-1)) < 0.02 * LSB * SPREAD)
+    of_family, of_units = (
+        planned_precision(one, str(archive.root), "simulated")
+        for one in (recipe.model_copy(update={"units": []}), recipe.model_copy(update={"units": ["E03-1"]}))
+    )
+    assert of_family is not None
+    assert of_units is not None
+    assert np.all(np.diagonal(of_units, axis1=-2, axis2=-1) > 100.0 * np.diagonal(of_family, axis1=-2, axis2=-1))
 
 
 def test_a_recipe_without_a_prior_reads_nothing(recipe: Recipe, tmp_path: Path) -> None:
