@@ -3,8 +3,10 @@
 Units drawn from the physics of the plant are calibrated with the textbook plan, in lots of eight: the archive. Its family is the
 prior with which the quickest recipe on ramps is searched and fitted. The benchmark compares the RMS errors (estimate − truth) of
 further units with those of the textbook plan on the same units, the share of truths within U, units that do not fit their family,
-and lots whose prior is widened; in worlds where the family is normal, has heavy tails, or is a mixture, and where lots are off.
-The plant knows nothing of a prior: the spreads between units are those of the presets.
+and lots whose prior is widened; in worlds where the family is normal, has heavy tails, or is a mixture, where lots are off, and
+where units are calibrated again, their bias moved by a switch-on. The plant knows nothing of a prior: the spreads between units
+are those of the presets.
+`--characteristic` prints the decisions on drawn coefficients at half, at once and at twice their limits.
 """
 
 from __future__ import annotations
@@ -20,10 +22,11 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 import numpy as np
 
 from benchmarks.plans import Course, course_of, measured, truth_of, truths_of
+from inertial.fits import prior
 from inertial.fits.prior import Combined, Prior, combined, judged
 from inertial.fits.wander import fit_lot_with_wander
 from inertial.noise.dwells import DwellNoise
-from inertial.population.family import Family, family_of
+from inertial.population.family import Family, change_of, family_of
 from inertial.state import State
 from pipelines.jobs.model_files import STARTING_MODEL
 from pipelines.jobs.recipes import load_recipe
@@ -40,7 +43,11 @@ from stations.plant.preset import Preset, load_preset
 Array = np.ndarray
 LOT = 8
 LEVELS = (-10.0, 60.0)
-WORLDS = ("normal", "heavy tails", "mixture", "lots off")
+WORLDS = ("normal", "heavy tails", "mixture", "lots off", "again")
+PAIRS = 104
+"""Units of the archive that are calibrated twice where units come again."""
+RATE_HZ = 25.0
+"""Samples of a dwell, where no filter of the device would be aliased: the mean has the same noise as at the recipe's rate."""
 DOF_HEAVY, APART, OFF = 4.0, 0.9, 4.0
 """Degrees of freedom of the tails; half the distance of two populations and the distance of a lot, in spreads between units."""
 
@@ -65,11 +72,20 @@ def of_world(world: str, truths: list[Truth], preset: Preset, seed: int, *, earl
     return out
 
 
+def switched_on(truths: list[Truth], preset: Preset, seed: int) -> list[Truth]:
+    """The units after a switch-on, which moves the bias."""
+    size = 0.0 if preset.stability is None else 1e-6 * preset.stability.switch_on_ug
+    return [replace(t, bias_g=t.bias_g + size * stream(seed, t.serial, "on").standard_normal(3)) for t in truths]
+
+
 class Measured:
     """Units measured with a plan, fitted lot by lot: coefficients (units, m, p), their covariances and effects."""
 
     def __init__(self, course: Course, preset: Preset, truths: list[Truth], seed: int) -> None:
+        if preset.noise_bandwidth_hz == 0.0:
+            course = replace(course, rate=RATE_HZ)
         state, mean, error = measured(course, preset, truths, seed)
+        self.serials = [truth.serial for truth in truths]
         fits = []
         for k in range(0, len(truths), LOT):
             own = slice(k, k + LOT)
@@ -89,11 +105,26 @@ class Measured:
         priors, fits = [], []
         for k in range(0, len(self.off), LOT):
             own = self.coefficients[k : k + LOT], self.covariance[k : k + LOT]
-            priors.append(judged(family, self.effects, *own))
+            priors.append(judged(family, self.effects, *own, self.serials[k : k + LOT]))
             fits.append(combined(*own, priors[-1].mean, priors[-1].precision))
         names = ("coefficients", "covariance", "kept", "share")
         both = Combined(*(np.concatenate([getattr(fit, name) for fit in fits]) for name in names))
         return priors, both, both.coefficients - self.coefficients + self.off
+
+
+def with_own(family: Family, before: Measured, pairs: tuple[Measured, Measured]) -> Family:
+    """The family with what units calibrated before say of themselves, as a job makes it."""
+    first, second = pairs
+    change = change_of(second.coefficients - first.coefficients, second.covariance + first.covariance)
+    both = combined(before.coefficients, before.covariance, family.mean, family.precision)
+    wider = both.covariance + change[..., None] * np.eye(change.shape[-1])
+    own = zip(before.serials, zip(both.coefficients, wider, strict=True), strict=True)
+    return replace(family, own=dict(own))
+
+
+def precision_of(family: Family) -> Array:
+    """Precision of the units to be planned for, (m, p, p)."""
+    return np.linalg.inv(np.mean([c for _, c in family.own.values()], axis=0)) if family.own else family.precision
 
 
 def inside(off: Array, covariance: Array) -> Array:
@@ -107,8 +138,8 @@ def rms(off: Array, columns: list[int]) -> float:
 
 def print_world(world: str, before: Measured, after: Measured, family: Family) -> None:
     priors, both, off = after.together(family)
-    unlike = sum(int((~prior.fits).sum()) for prior in priors)
-    lots = sum(bool(prior.widened) for prior in priors)
+    unlike = sum(int((~own.fits).sum()) for own in priors)
+    lots = sum(bool(own.widened) for own in priors)
     print(f"  {world}: {unlike} of {len(off)} units do not fit their family, {lots} of {len(priors)} lots widened")
     covered, alone = inside(off, both.covariance), inside(after.off, after.covariance)
     for effect in dict.fromkeys(after.effects):
@@ -132,13 +163,25 @@ def compared(name: str, options: argparse.Namespace) -> None:
     against = plan_context(textbook(base, LEVELS), station, noise)
     long, plans = course_of(against), dict[str, PlanContext]()
     required = identified(against).errors * options.factor
+    required[:, 0] *= options.bias_factor
+    families = dict[str, Family]()
     for world in options.world or WORLDS:
         drawn = of_world(world, truths_of(preset, options.archive, seed + 1), preset, seed + 1, earlier=True)
-        family = Measured(long, preset, drawn, seed + 1).family()
         key = "normal" if world == "lots off" else world
+        units = of_world(world, truths_of(preset, options.units, seed), preset, seed, earlier=False)
+        if key not in families:
+            made = world == "again" and "normal" in families
+            families[key] = families["normal"] if made else Measured(long, preset, drawn, seed + 1).family()
+        family = families[key]
+        if world == "again":
+            twice = [switched_on(drawn[:PAIRS], preset, seed + k) for k in (3, 4)]
+            pairs = [Measured(long, preset, on, seed + k) for on, k in zip(twice, (3, 4), strict=True)]
+            before = Measured(long, preset, switched_on(units, preset, seed + 5), seed + 5)
+            family = with_own(family, before, (pairs[0], pairs[1]))
+            units = switched_on(units, preset, seed + 6)
         if key not in plans:
             requirement = Requirement(
-                required, seen_by(against, LEVELS), LEVELS, candidates(station), prior=family.precision
+                required, seen_by(against, LEVELS), LEVELS, candidates(station), prior=precision_of(family)
             )
             begun = time.perf_counter()
             plans[key] = best = optimise(base, against, requirement, lambda _: None, ramp=True).planned
@@ -150,10 +193,53 @@ def compared(name: str, options: argparse.Namespace) -> None:
                 f"bound {limit}; {best.state.time.size} dwells of {best.recipe.dwell_s:g} s; search {took:.0f} s",
                 flush=True,
             )
-        units = of_world(world, truths_of(preset, options.units, seed), preset, seed, earlier=False)
         print_world(
             world, Measured(long, preset, units, seed), Measured(course_of(plans[key]), preset, units, seed + 2), family
         )
+
+
+def characteristic(lots: int, seed: int) -> None:
+    """Decisions on lots of eight of a family of 500 units in 63 lots, of which some are off, at limits of half, one and two."""
+    p, unit, lot, error = 6, 1.0, 0.2, 0.5
+    effects = ["bias", "scale", "misalignment", "misalignment", "bias_temperature", "scale_temperature"]
+    kinds = {
+        "normal": (0.0, 0.0, 0.0),
+        "t5": (5.0, 0.0, 0.0),
+        "a unit off by 8": (0.0, 8.0, 0.0),
+        "lots off by 3": (0.0, 0.0, 3.0),
+    }
+    limits = prior.FOREIGN_UNIT, prior.FOREIGN_LOT
+    for kind, (tails, one, off) in kinds.items():
+        rng = np.random.default_rng(seed)
+
+        def drawn(count: int, tails: float = tails, rng: np.random.Generator = rng) -> tuple[Array, Array]:
+            own = (
+                rng.standard_t(tails, (count * LOT, 3, p)) * np.sqrt(0.6)
+                if tails
+                else rng.standard_normal((count * LOT, 3, p))
+            )
+            common = np.repeat(lot * rng.standard_normal((count, 3, p)), LOT, axis=0)
+            values = unit * own + common + error * rng.standard_normal(own.shape)
+            return values, np.broadcast_to(error**2 * np.eye(p), (*own.shape, p))
+
+        family = family_of(*drawn(63), np.repeat(np.arange(63), LOT))
+        values, covariance = drawn(lots)
+        values[..., 4] += off * np.repeat(rng.choice([-1.0, 1.0], lots), LOT)[:, None]
+        values[::LOT, 0, 4] += one
+        told: list[str] = []
+        for factor in (0.5, 1.0, 2.0):
+            prior.FOREIGN_UNIT, prior.FOREIGN_LOT = (factor * limit for limit in limits)
+            found = [
+                judged(family, effects, values[k : k + LOT], covariance[k : k + LOT])
+                for k in range(0, len(values), LOT)
+            ]
+            wrong = sum(int((~own.fits[1:] if one else ~own.fits).sum()) for own in found)
+            right = f"{sum(not own.fits[0] for own in found)} of {lots} that are off, " if one else ""
+            told.append(
+                f"{right}{wrong} of {len(values) - lots * bool(one)} others, {sum(bool(own.widened) for own in found)} lots"
+            )
+        prior.FOREIGN_UNIT, prior.FOREIGN_LOT = limits
+        print(f"{kind}: units that do not fit, lots widened of {lots}: {'; '.join(told)}")
 
 
 def main() -> None:
@@ -164,7 +250,12 @@ def main() -> None:
     parser.add_argument("--device", action="append", help="preset; all by default")
     parser.add_argument("--world", action="append", choices=WORLDS)
     parser.add_argument("--factor", type=float, default=1.04, help="required errors over those of the textbook plan")
+    parser.add_argument("--bias-factor", type=float, default=1.0, help="additional factor for the bias")
+    parser.add_argument("--characteristic", action="store_true", help="of the decisions, with as many lots as units")
     options = parser.parse_args()
+    if options.characteristic:
+        characteristic(options.units, options.seed)
+        return
     print(f"python benchmarks/priors.py --units {options.units} --archive {options.archive} --seed {options.seed}")
     for name in options.device or ("adxl355", "analogue", "sf1500", "qa700"):
         compared(name, options)
