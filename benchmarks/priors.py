@@ -85,11 +85,12 @@ class Measured:
         if preset.noise_bandwidth_hz == 0.0:
             course = replace(course, rate=RATE_HZ)
         state, mean, error = measured(course, preset, truths, seed)
+        heat = np.asarray(state.temperature)
         self.serials = [truth.serial for truth in truths]
         fits = []
         for k in range(0, len(truths), LOT):
             own = slice(k, k + LOT)
-            part = State(force=state.force[own], time=state.time[own], temperature=state.temperature[own])
+            part = State(force=state.force[own], time=state.time[own], temperature=heat[own])
             fits.append(fit_lot_with_wander(STARTING_MODEL, part, mean[own], error[own]).fit)
         self.coefficients = np.concatenate([fit.coefficients for fit in fits])
         self.covariance = np.concatenate([fit.covariance for fit in fits])

@@ -154,7 +154,7 @@ def _round(
     y: Array, c: Array, lot: Index, lots: int, within: Array, between: Array
 ) -> tuple[Array, Array, Array, Array]:
     """One step of EM: the next T and L, and the mean and its covariance at the present ones."""
-    own = np.linalg.inv(c + within)
+    own = np.asarray(np.linalg.inv(c + within), dtype=np.float64)
     total = _by_lot(own, lot, lots)
     spread = np.linalg.inv(total)
     middle = np.einsum("laij,laj->lai", spread, _by_lot(np.einsum("uaij,uaj->uai", own, y), lot, lots))

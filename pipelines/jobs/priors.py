@@ -160,8 +160,6 @@ def family(stored: StoredFamily | None) -> Family | None:
     """The family that a job keeps."""
     if stored is None:
         return None
-    numbers: dict[str, Any] = stored.model_dump(exclude={"effects", "runs", "own"})
     own = {unit: (np.array(one.mean), np.array(one.covariance)) for unit, one in stored.own.items()}
-    return Family(
-        **{name: np.array(value) if isinstance(value, list) else value for name, value in numbers.items()}, own=own
-    )
+    mean, unit, lot, error, tails = map(np.array, (stored.mean, stored.unit, stored.lot, stored.error, stored.tails))
+    return Family(mean, unit, lot, error, stored.units, stored.lots, tails, own)

@@ -71,11 +71,11 @@ class ArchivedJob(Job):
 
 def archived_job(run: Run, change: ModelChange) -> ArchivedJob:
     """The job of a captured run, with another model or other limits where they are given."""
-    about = run.about
+    about, keys = run.about, model_keys(change)
+    if keys:  # the prior of another model is none of this one
+        about["recipe"]["prior"] = None
+        about.pop("prior", None)
     try:
-        keys = model_keys(change)
-        if keys:  # the prior of another model is none of this one
-            about = {**about, "recipe": {**about["recipe"], "prior": None}, "prior": None}
         recipe = Recipe.model_validate({**about["recipe"], **keys})
         limits = change.limits or limits_of(about["limits"], UNITS)
         lot = Lot.model_validate(about["lot"])
@@ -84,8 +84,8 @@ def archived_job(run: Run, change: ModelChange) -> ArchivedJob:
     if change.limits is not None:
         recipe = recipe.model_copy(update={"limits": change.limits_name})
     station = StationConfig.model_construct(**about.get("station", {}))
-    own = {"captured": about["capture"], "run_document": without_provenance(about)}
-    job = ArchivedJob(recipe, limits, lot, station, prior=stored_in(about), **own)
+    prior, document = stored_in(about), without_provenance(about)
+    job = ArchivedJob(recipe, limits, lot, station, about["capture"], prior=prior, run_document=document)
     refuse_unknown_effects(recipe.effects, f"run {run.id}")
     refuse_limits_without_figures(limits, recipe)
     return job

@@ -5,6 +5,8 @@ from typing import Annotated
 import pandas as pd
 from typing_extensions import TypedDict
 
+from pipelines.tables.frames import rows_of
+
 
 class PriorDocument(TypedDict):
     """The prior of a lot, or of one of its units."""
@@ -24,16 +26,24 @@ def prior_document(table: pd.DataFrame) -> PriorDocument | None:
     """The prior of the rows of a table; None where there are none."""
     if table.empty:
         return None
-    by_effect = table.groupby("effect", sort=False)[["share", "widened"]].max()
-    wide = by_effect["widened"][by_effect["widened"] > 1.0]
-    foreign = table[~table["fits"]].drop_duplicates("unit")
-    return {
+    document: PriorDocument = {
         "units": int(table["units"].iloc[0]),
-        "shares": by_effect["share"].to_dict(),
-        "widened": wide.to_dict(),
-        "own": table.loc[table["own"], "unit"].drop_duplicates().tolist(),
-        "foreign": dict(zip(foreign["unit"], foreign["p_value"], strict=True)),
+        "shares": {},
+        "widened": {},
+        "own": [],
+        "foreign": {},
     }
+    shares = document["shares"]
+    for row in rows_of(table):
+        effect, unit = str(row["effect"]), str(row["unit"])
+        shares[effect] = max(shares.get(effect, 0.0), float(row["share"]))
+        if row["widened"] > 1.0:
+            document["widened"][effect] = float(row["widened"])
+        if row["own"] and unit not in document["own"]:
+            document["own"].append(unit)
+        if not row["fits"]:
+            document["foreign"][unit] = float(row["p_value"])
+    return document
 
 
 LEAST_TOLD = 0.01  # share of a prior in a variance

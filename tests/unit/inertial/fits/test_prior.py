@@ -44,11 +44,12 @@ def test_it_is_the_fit_of_the_observations_and_the_prior_together(rng: np.random
     columns, z = rng.standard_normal((9, P)), rng.standard_normal(9)
     known = rng.standard_normal((P, P))
     mean, prior = rng.standard_normal(P), known @ known.T + np.eye(P)
-    covariance = np.linalg.inv(columns.T @ columns)
+    covariance = np.asarray(np.linalg.inv(columns.T @ columns), dtype=np.float64)
     alone = covariance @ columns.T @ z
     root = np.linalg.cholesky(np.linalg.inv(prior)).T
     both, *_ = np.linalg.lstsq(np.vstack([columns, root]), np.concatenate([z, root @ mean]), rcond=None)
-    found = combined(alone, covariance, mean, np.linalg.inv(prior))
+    precision = np.asarray(np.linalg.inv(prior), dtype=np.float64)
+    found = combined(alone, covariance, mean, precision)
     np.testing.assert_allclose(found.coefficients, both, rtol=1e-9)
     np.testing.assert_allclose(found.covariance, np.linalg.inv(columns.T @ columns + root.T @ root), rtol=1e-9)
     of_prior = found.covariance @ root.T @ root @ found.covariance
