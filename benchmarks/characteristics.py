@@ -234,6 +234,7 @@ SAME = {
     "REFUTED": "CONFIRMED",
     "BLOCKS": "LEFT_OUT",
     "CLEAR_LEAD": "CLASS_WIDTH",
+    "FOREIGN_LOT": "FOREIGN_UNIT",
 }
 """Numbers that are measured with another."""
 
@@ -246,6 +247,7 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "LEFT_OUT": ("worlds", "loop"),
     "REMAINDER": ("remainders.py",),
     "JUMPS_RARE": ("worlds", "noises"),
+    "FOREIGN_UNIT": ("priors.py", "--characteristic"),
 }
 """Numbers with a command of their own."""
 

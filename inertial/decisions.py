@@ -297,3 +297,11 @@ STEPS_FOLLOW = 0.7
 of five times the noise of a sample in 24, 24, 0 of 24 (a share above one is never reached); steps of once and twice the noise,
 no steps and t3 tails in 0 of 96 at each value.
 """
+
+FOREIGN_UNIT, FOREIGN_LOT = 2e-3, 1e-2
+"""Probability, over all effects, below which a unit does not fit its family, and a lot widens its prior.
+
+`python benchmarks/priors.py --characteristic --units 200 --seed 77`, lots of eight, at half, at it, at twice as much: units of a
+normal family that do not fit it 1, 3, 5 of 1600, of one with t5 tails 2, 6, 11 of 1600; units off by eight spreads told in 200,
+200, 200 of 200; lots of a normal family that are widened 1, 4, 6 of 200, lots off by three spreads 200, 200, 200 of 200.
+"""

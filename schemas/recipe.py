@@ -28,6 +28,7 @@ from schemas.bounds import (
 )
 from schemas.fault import FaultOrder
 from schemas.poses import Pose, SoakPart
+from schemas.prior import PriorTerms
 from schemas.strict import Grown, Strict, refuse_repeated
 from schemas.uncertainty import Uncertainty
 from schemas.validity import CertificateTerms, Stability
@@ -53,12 +54,13 @@ class _Measurement(Grown):
     simulated station, to try what a recipe does then. ``verification_order``: at the end of each soak, or spread among the poses
     of the fit; it is part of the recipe because it moves the figure of verification. ``uncertainty`` states what the recipe's own
     fixture adds to the station's, ``stability`` what this kind of device does beyond a run, ``certificate`` what is certified.
+    ``prior`` names earlier calibrations of the device that count beside the measurement.
     ``procedures`` lists the test procedures of the lot in order; without it
     the lot goes through the multi-position test and the static record.
     """
 
     later: ClassVar[frozenset[str]] = frozenset(
-        {"sensor_axes", "verification_order", "uncertainty", "stability", "certificate", "procedures"}
+        {"sensor_axes", "verification_order", "uncertainty", "stability", "certificate", "procedures", "prior"}
     )
 
     name: Annotated[Name, Field(pattern=r"^[a-z0-9][a-z0-9._-]*$")]
@@ -87,6 +89,7 @@ class _Measurement(Grown):
     uncertainty: Uncertainty | None = None
     stability: Stability | None = None
     certificate: CertificateTerms | None = None
+    prior: PriorTerms | None = None
 
     @property
     def tumbles(self) -> bool:

@@ -193,6 +193,18 @@ TABLES: dict[str, Table] = {
         },
         key=("unit", "axis"),
     ),
+    # of the coefficients, from earlier calibrations of the family; no rows without one
+    "prior": Table(
+        {
+            **_UNIT,
+            **_AXIS,
+            **each(text(), "effect", "name"),
+            **each(NUMBER, "mean", "standard_deviation", "share", "widened", "p_value"),
+            **each(FLAG, "fits", "own"),
+            "units": WHOLE,
+        },
+        key=("unit", "axis", "effect", "name"),
+    ),
     "verification": Table(
         {**_UNIT, "dwell": WHOLE, "pose": text(), **each(NUMBER, "norm_g", "error_ug", "uncertainty_ug")},
         measured=("error_x_ug", "error_y_ug", "error_z_ug"),

@@ -7,7 +7,7 @@ coefficients, errors and residuals follow from it. A unit and axis that the mode
 part in the noise, and has its errors widened by its own lack of fit (Birge ratio; GUM type B).
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -19,6 +19,7 @@ from inertial.distributions import chi2_quantile, chi2_upper, normal_tail, stude
 from inertial.errors import NotIdentified
 from inertial.fits.generalised import SHARES, Series, Solved
 from inertial.fits.linear import LotFit, fit_lot
+from inertial.fits.prior import Combined
 from inertial.fits.wander_columns import LotColumns
 from inertial.noise.flicker import SLOWEST_FITTED, flicker_kernel
 from inertial.noise.measurands import walk_kernel
@@ -71,6 +72,8 @@ class WanderFit:
     """(..., 3, p, n): derivative of the coefficients by every output of the n fitted dwells."""
     widened: float
     """Factor of the errors of the coefficients where the noise is known from few degrees of freedom; one elsewhere."""
+    of_prior: Array | None = None
+    """(..., 3, p): share of the prior in the variance of every coefficient; None without a prior."""
 
     @property
     def flicker(self) -> float:
@@ -113,6 +116,7 @@ def fit_lot_with_wander(
     nonlinear: Values | None = None,
     used: Flags | None = None,
     plain: LotFit | None = None,
+    believed: Callable[[Array, Array], Combined] | None = None,
 ) -> WanderFit:
     """Generalised least-squares fit of a model to the dwells of a lot.
 
@@ -125,6 +129,7 @@ def fit_lot_with_wander(
     nonlinear : values of nonlinear parameters that were found on the same dwells; their errors enter those of the coefficients
     used : (n,), the dwells that are fitted; the others only have residuals. All where None
     plain : the fit of these dwells under white noise alone, where it is known
+    believed : combines coefficients (..., 3, p) and their covariance with a prior
 
     Raises
     ------
@@ -169,6 +174,14 @@ def fit_lot_with_wander(
         alone = Series(columns.local[..., there, :], shared[..., there, :0], apart, profile[there], cut)
         alone.sound = series.sound
         own = own * _widening(alone, solved.gain, own / level[..., None] ** 2)
+    of_prior = None
+    if believed is not None:
+        both = believed(theta, own)
+        inside = inside + np.einsum("...np,...p->...n", columns.local, both.coefficients - theta)
+        kept, back = both.kept, np.swapaxes(both.kept, -1, -2)
+        rest = (both.covariance - kept @ own @ back) / (known * wide[..., None]) ** 2
+        solved = replace(solved, gain=kept @ solved.gain, inverse=kept @ solved.inverse @ back + rest)
+        theta, own, of_prior = both.coefficients, both.covariance, both.share
     left = _ResidualCovariance(columns.local, shared, solved, covariance, there)
     weighted = replace(
         plain,
@@ -192,6 +205,7 @@ def fit_lot_with_wander(
         walk_shown=_shown(series, shares[1]),
         gain=np.broadcast_to(solved.gain, (*theta.shape, int(there.sum()))),
         widened=known,
+        of_prior=of_prior,
     )
 
 

@@ -10,6 +10,7 @@ from inertial.arrays import Array
 from inertial.effects import SensorEffect
 from inertial.errors import NotIdentified
 from inertial.noise.dwells import whitener
+from inertial.population.family import with_prior
 from inertial.state import State
 
 _SINGULAR = 1e-11  # smallest eigenvalue of a scaled normal matrix that determines all coefficients, as in a fit
@@ -29,7 +30,9 @@ class Expected:
     shared_errors: Array
 
 
-def expected_errors(effects: Sequence[str], state: State, covariance: Array, *, units: int = 1) -> Expected:
+def expected_errors(
+    effects: Sequence[str], state: State, covariance: Array, *, units: int = 1, prior: Array | None = None
+) -> Expected:
     """Standard errors of a generalised least-squares fit of a model to planned dwells.
 
     (Hᵀ·C⁻¹·H)⁻¹ per axis; parameters of the station, which all units share, after projection onto the complement of
@@ -41,6 +44,7 @@ def expected_errors(effects: Sequence[str], state: State, covariance: Array, *, 
     state : the planned dwells of one unit, (n,)
     covariance : (n, n), of the dwell means of one axis, g²
     units : number of units that share the station's parameters
+    prior : (3, p, p), precision of a prior of the coefficients, 1/g²
 
     Raises
     ------
@@ -60,6 +64,7 @@ def expected_errors(effects: Sequence[str], state: State, covariance: Array, *, 
         shared = np.sqrt(np.diagonal(square))
         across = inverse @ (np.swapaxes(h, -1, -2) @ s)
         inverse = inverse + across @ square @ np.swapaxes(across, -1, -2)
+    inverse = inverse if prior is None else with_prior(inverse, prior)
     return Expected(
         names=tuple(design.local_names(sensor, axis, values) for axis in state.axes),
         errors=np.sqrt(np.diagonal(inverse, axis1=-2, axis2=-1)),

@@ -35,7 +35,7 @@ CODE = {
     "validate": (*_SAMPLES, "inertial.pointing", "pipelines.stages.validate"),
     "reduce": (*_TABLES, "pipelines.stages.reduce"),
     "fit": (
-        *(*_ENGINE, "pipelines.stages.fit", "pipelines.stages.noisy_fit"),
+        *(*_ENGINE, "inertial.counts", "inertial.population", "pipelines.stages.fit", "pipelines.stages.noisy_fit"),
         "pipelines.stages.uncertainty.bias_measurands",
     ),
     "fit of norms": (

@@ -8,6 +8,7 @@ import pandas as pd
 
 from pipelines.archive import Records, Run
 from pipelines.jobs.job import Job
+from pipelines.jobs.priors import family
 from pipelines.stages.fit import fit_tables
 from pipelines.stages.grade import GradeEvidence, grade
 from pipelines.stages.judge import judge
@@ -114,7 +115,10 @@ def static_inputs(run: Run) -> tuple[Iterable[pd.DataFrame], *tuple[pd.DataFrame
     return _records(run).samples(static), readings, *tables
 
 
-_BUDGETED = ("dwells", "history", "coefficients", "covariance", "wander", "verification", "verification_poses", "noise")
+_BUDGETED = (
+    *("dwells", "history", "coefficients", "covariance", "wander", "verification", "verification_poses", "noise"),
+    "prior",
+)
 
 
 def _budget(job: Job, run: Run) -> Tables:
@@ -176,9 +180,9 @@ STAGES: tuple[Stage, ...] = (
     Stage(
         name="fit",
         inputs=("dwells", "history"),
-        outputs=("coefficients", "covariance", "residuals", "predictions", "wander"),
-        parameters=_model,
-        call=lambda job, run: fit_tables(_lot(run), job.recipe.effects),
+        outputs=("coefficients", "covariance", "residuals", "predictions", "wander", "prior"),
+        parameters=lambda job: _model(job) | ({} if job.prior is None else {"prior": job.prior.model_dump()}),
+        call=lambda job, run: fit_tables(_lot(run), job.recipe.effects, family(job.prior)),
     ),
     Stage(
         name="judge",

@@ -3,10 +3,13 @@
 That is going on after a crash and running an archive again, by one mechanism.
 """
 
+from __future__ import annotations
+
 import shutil
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -83,6 +86,16 @@ class Runner:
         """Every stage, in order, as it is done."""
         for name in ORDER:
             yield self.stage(name)
+
+    def full_plan(self) -> Runner | None:
+        """The full plan, from where the station stands, where a fitted unit does not fit its family; else None.
+
+        The whole lot goes through it: table and chamber need the same time for one unit.
+        """
+        if self.job.full is None or self.run.table("prior")["fits"].all():
+            return None
+        before = self.archive.capture(self.job.capture_id)
+        return Runner(self.job.full, self.archive, self.progress, partial(from_station, before=before))
 
     def abandon(self) -> None:
         """Remove the run of a re-fit that failed: its capture stays, and no run without results becomes the latest."""

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, get_args
 
+from inertial.arrays import Array
 from inertial.design import local_names, split
 from inertial.noise.dwells import DwellNoise
 from inertial.planning.pose_exchange import Criterion
@@ -148,11 +149,17 @@ TOLERANCE = 1.1
 
 
 def cheapest_recipe(
-    base: Recipe, name: str, station: StationConfig, noise: DwellNoise, options: OptimiseOptions
+    base: Recipe,
+    name: str,
+    station: StationConfig,
+    noise: DwellNoise,
+    options: OptimiseOptions,
+    prior: Array | None = None,
 ) -> tuple[Optimum, dict[str, Any]]:
     """The recipe with the least station time for the required errors, and the document about it.
 
     name : of the recipe to start from on the command line
+    prior : (m, p, p), precision of a prior of the coefficients, 1/g²
     """
     levels = levels_of(base, options.temperatures)
     against = plan_context(textbook(base, levels), station, noise)
@@ -161,7 +168,7 @@ def cheapest_recipe(
         if _discriminates(options)
         else _required_errors(options, base, against, levels)
     )
-    requirement = replace(requirement, verification=options.verification or verified_in(base))
+    requirement = replace(requirement, verification=options.verification or verified_in(base), prior=prior)
     errors_named = bool(options.required_errors) or options.factor != 1.0
     tolerance = 1.0 if errors_named else TOLERANCE
     with error_console().status("searching for the recipe with the least station time") as status:

@@ -100,6 +100,7 @@ def plan_recipe(
     equipment, and the figures that they determine.
     """
     from pipelines.jobs.moved_poses import moves_of, with_moved_poses
+    from pipelines.jobs.priors import planned_precision
     from pipelines.jobs.recipes import folder_of, load_limits
     from pipelines.jobs.releases import planned_recipe
     from pipelines.jobs.terms import planned_terms, refused_by_run
@@ -121,7 +122,9 @@ def plan_recipe(
     if not planned.tumbles and page is None and pictures is None:
         give(plan_of_procedures(planned, config, limits), print_procedures, as_json=as_json)
         return
-    context = plan_context(planned, config, noise_of(planned, device or planned.device, *_densities(noise)))
+    prior = planned_precision(planned, archive, config.kind)
+    noise_of_device = noise_of(planned, device or planned.device, *_densities(noise))
+    context = plan_context(planned, config, noise_of_device, prior=prior)
     document = plan(context, planned_terms(planned, config, limits), limits)
     if planned.procedures:
         document["procedures"] = procedure_rows(planned, config, limits)
@@ -176,6 +179,7 @@ def optimise(
     recipe with the least station time that discriminates between these effects.
     """
     from pipelines.cli.optimal import OptimiseOptions, cheapest_recipe, missing_limits, written
+    from pipelines.jobs.priors import planned_precision
     from pipelines.jobs.recipes import folder_of
     from pipelines.jobs.releases import planned_recipe
     from pipelines.planning.context import noise_of
@@ -192,7 +196,8 @@ def optimise(
     errors = [text for text in wanted or () if "=" in text]
     search = OptimiseOptions(see=",".join(see), required_errors=errors, criterion=kind, part=parts, **given)
     noise_of_device = noise_of(base, device or base.device, *_densities(noise))
-    optimum, document = cheapest_recipe(base, Path(recipe).name, config, noise_of_device, search)
+    prior = planned_precision(base, archive, config.kind)
+    optimum, document = cheapest_recipe(base, Path(recipe).name, config, noise_of_device, search, prior)
     target = file or Path(f"{optimum.planned.recipe.name}.toml")
     document["file"] = str(target)
     home = folder_of(recipe)

@@ -155,6 +155,10 @@ def measured(job: Job, store: Archive, request: Request | None, *, asks: bool) -
             report_stage(beside.capture(runner, lambda: runner.stage("capture")))
         for done in runner.all():
             report_stage(done)
+            if done.stage == "fit" and (full := runner.full_plan()) is not None:
+                remark(f"run: a unit does not fit its family; the lot goes on with the full plan, run {full.run.id}")
+                for other in full.all():
+                    report_stage(other)
             if beside is not None and done.stage == JUDGED:
                 beside.unload(runner.run)
         add_runs(store, [runner.run.id])

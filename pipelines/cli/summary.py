@@ -9,6 +9,7 @@ from pipelines.cli.printing import STYLES, print_table, say, short
 from pipelines.report.reasons import grouped_reasons
 from pipelines.tables.frames import rows_of
 from pipelines.tables.json_values import json_value
+from pipelines.tables.prior import prior_document, prior_sentence
 
 SHOWN = (
     ("residual_rms_ug", "fit\nµg"),
@@ -54,6 +55,7 @@ def summary(run: Run) -> dict[str, Any]:
         "failed": outcomes.count("fail"),
         "refused": outcomes.count("refused"),
         "yield": outcomes.count("pass") / len(units),
+        "prior": prior_document(run.table("prior")) if "prior" in run.tables() else None,
         "interruptions": interruptions(run),
         "report": str(run.report),
         "archive": str(run.archive.root),
@@ -91,6 +93,8 @@ def print_summary(document: dict[str, Any]) -> None:
         say(f"  {NOISE_ONLY}", style="dim")
     for line in _interrupted(document["interruptions"]):
         say(line)
+    if document["prior"] is not None:
+        say(prior_sentence(document["prior"]))
     total = len(document["units"])
     say(f"{document['passed']} of {total} passed, {document['failed']} failed, {document['refused']} refused")
     say(f"run     {document['run']}")

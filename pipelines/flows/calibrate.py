@@ -103,6 +103,9 @@ def calibrate_lot(  # noqa: PLR0913 - the parameters of a flow are the form on t
     report_stage(measure() if beside is None else beside.capture(runner, measure))
     for name in ORDER[1:]:
         report_stage(stage(name, runner))
+        if name == "fit" and (full := runner.full_plan()) is not None:
+            for other in ORDER:
+                report_stage(stage(other, full))
         if beside is not None and name == JUDGED:
             beside.unload(runner.run)
     add_runs(store, [runner.run.id])

@@ -1,5 +1,7 @@
 """A job: recipe, limits, lot and station together, and the names that follow from them."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
@@ -10,6 +12,7 @@ from inertial.errors import InertialError
 from pipelines.archive import Archive, Run
 from pipelines.archive.keys import digest
 from pipelines.jobs.model_files import model_keys, read_model, refuse_unknown_effects, use_formulas
+from pipelines.jobs.priors import stored_family, stored_in
 from pipelines.jobs.recipes import MAIN_JOB, folder_of, load_limits, load_recipe, lot_of, units_of
 from pipelines.jobs.terms import (
     budget_terms,
@@ -29,6 +32,7 @@ from schemas.fault import parse_fault
 from schemas.limits import Limits, limits_of
 from schemas.lot import Lot
 from schemas.own_files import Kind, contents
+from schemas.prior import StoredFamily
 from schemas.recipe import Recipe
 from schemas.station import StationConfig, load_station, with_faults
 from stations.profile_files import recorded_columns
@@ -47,6 +51,7 @@ ANALYSIS_KEYS = {
     "uncertainty",  # states what is known, and drives nothing; so do the next two
     "stability",
     "certificate",
+    "prior",
     "faults",  # they are the station's, which is in the capture's name
 }
 
@@ -62,6 +67,8 @@ class Job:
 
     ``captured`` names the capture of a lot that was measured before, by a version that may have named captures otherwise.
     ``parents`` are the runs whose measurements this one goes on with, on the same station from where it stands.
+    ``prior`` is the family of the devices where the recipe asks for a prior, as it was when the job was made; ``full`` the job
+    with the full plan, which goes on where a unit does not fit that family.
     """
 
     recipe: Recipe
@@ -70,6 +77,8 @@ class Job:
     station: StationConfig
     captured: str = ""
     parents: tuple[str, ...] = ()
+    prior: StoredFamily | None = None
+    full: Job | None = None
 
     def __post_init__(self) -> None:
         """Formulas of the model are effects wherever this job is worked on."""
@@ -119,6 +128,7 @@ class Job:
             "station": self.station.model_dump(mode="json"),
             "capture": self.capture_id,
             **({"parents": list(self.parents)} if self.parents else {}),
+            **({"prior": self.prior.model_dump()} if self.prior is not None else {}),
             **({"own_files": own} if not self.captured and (own := self.own_files) else {}),
         }
 
@@ -171,7 +181,23 @@ class Request:
         refuse_beyond_station(job.recipe, job.station)
         _refuse_inconsistent(job, recorded_columns(station.devices.reader))
         refuse_unreachable(job.recipe, job.station, job.limits)
-        return job
+        serials = {unit.serial for unit in lot.units}
+        family = stored_family(recipe, archive or Archive(), serials, station.kind)
+        return replace(job, prior=family, full=self._full(recipe, archive))
+
+    def _full(self, recipe: Recipe, archive: Archive | None) -> Job | None:
+        """The job of the full plan that ``[prior]`` of a recipe names; None where it names none."""
+        if recipe.prior is None or not recipe.prior.full:
+            return None
+        beside = folder_of(self.recipe) / recipe.prior.full
+        full = replace(self, recipe=str(beside) if beside.is_file() else recipe.prior.full).job(archive)
+        if full.recipe.prior is not None or full.recipe.device.lower() != recipe.device.lower():
+            raise RecipeInvalid(
+                f"recipe {recipe.name}: key 'prior.full': {full.recipe.name} measures {full.recipe.device} "
+                f"{'with' if full.recipe.prior else 'without'} a prior, the same device without one is needed; name another",
+                key="prior.full",
+            )
+        return full
 
     def _of_run(self, archive: Archive | None) -> Job:
         """The job of an archived run: its recipe, station and units, with this request's count of repeats."""
@@ -210,14 +236,16 @@ def job_of_run(run: Run, *, effects: Sequence[str] = (), model: Path | None = No
         recipe = recipe.model_copy(update=model_keys(read_model(model)))
     if effects or model is not None:
         use_formulas(recipe.formulas, f"run {run.id}")
-        recipe = recipe.model_copy(update={"effects": list(effects or recipe.effects)})
+        # the prior of another model is none of this one
+        recipe = recipe.model_copy(update={"effects": list(effects or recipe.effects), "prior": None})
         refuse_unknown_effects(recipe.effects, "fit")
     chosen = limits_of(about["limits"], UNITS)
     if limits:
         recipe = recipe.model_copy(update={"limits": limits})
         chosen = load_limits(recipe)
     station = StationConfig.model_validate(about["station"])
-    job = Job(recipe, chosen, Lot.model_validate(about["lot"]), station, captured=about["capture"])
+    prior = stored_in(about) if recipe.prior is not None else None
+    job = Job(recipe, chosen, Lot.model_validate(about["lot"]), station, captured=about["capture"], prior=prior)
     known = "readings" in run.tables()
     _refuse_inconsistent(job, covariates(run.table("readings")) if known else recorded_columns(station.devices.reader))
     return job

@@ -34,6 +34,7 @@ class PlanContext:
     activities : what the station does and when
     state : the planned dwells of the fit, (n,)
     covariance : (n, n), of the dwell means, g²
+    prior : (axes, p, p), precision of a prior of the model's coefficients, 1/g²; None without one
     """
 
     recipe: Recipe
@@ -42,6 +43,7 @@ class PlanContext:
     activities: list[Activity]
     state: State
     covariance: NDArray[np.float64]
+    prior: NDArray[np.float64] | None = None
 
     @property
     def minutes(self) -> float:
@@ -55,7 +57,14 @@ class PlanContext:
         return np.zeros(0) if self.state.temperature is None else self.state.temperature
 
 
-def plan_context(recipe: Recipe, station: StationConfig, noise: DwellNoise, *, slowest: float = 0.0) -> PlanContext:
+def plan_context(
+    recipe: Recipe,
+    station: StationConfig,
+    noise: DwellNoise,
+    *,
+    slowest: float = 0.0,
+    prior: NDArray[np.float64] | None = None,
+) -> PlanContext:
     """A recipe on a station with devices of this noise; ``slowest`` as in :func:`inertial.noise.dwells.dwell_covariance`.
 
     Raises RecipeInvalid: the recipe has no multi-position test, of whose dwells a plan is made.
@@ -69,7 +78,7 @@ def plan_context(recipe: Recipe, station: StationConfig, noise: DwellNoise, *, s
     whole = schedule(steps(recipe), station, recipe)
     state = state_of(whole, station, recipe, history=True)
     covariance = dwell_covariance(state.time, recipe.dwell_s, noise, slowest=slowest)
-    return PlanContext(recipe, station, noise, whole, state, covariance)
+    return PlanContext(recipe, station, noise, whole, state, covariance, prior)
 
 
 def shown_by_verification(

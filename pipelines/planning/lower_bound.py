@@ -138,7 +138,7 @@ class _BoundSearch:
         """The worst ratio to the required errors and its effect, of pieces of measurement at times and temperatures (n,)."""
         rows = self._rows(when, heat)[..., self.columns]
         covariance = dwell_covariance(when, piece_s, self.against.noise, slowest=self.slowest)
-        errors = self.requirement.ratio_to_required(normal_matrix(rows, covariance))
+        errors = self.requirement.ratio_to_required(normal_matrix(rows, covariance), self.columns)
         return float(errors.max()), self.names[self.columns[int(np.argmax(errors.max(axis=0)))]]
 
     def _rows(self, time: Array, heat: Array) -> Array:

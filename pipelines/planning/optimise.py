@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -91,6 +92,10 @@ def optimise(
     """
     search = RecipeSearch(recipe, against, requirement, ramp=ramp)
     best: PlanContext | None = None
+    if requirement.prior is not None:  # what is enough without a prior is enough with it
+        with suppress(RecipeInvalid):
+            without = replace(requirement, prior=None)
+            best = search.on_station(optimise(recipe, against, without, progress, ramp=ramp).planned.recipe)
     ranked = search.ranked()
     for number, (plan, _) in enumerate(ranked, start=1):
         soaks = ", ".join(f"{t:g}" for t in plan.order)
@@ -231,11 +236,13 @@ class RecipeSearch:
         slots, start = self.timed.slots(plan)
         choice = exchanged(slots, start, self.requirement.objective)
         choice = spanned(self.timed.force, choice, plan.fixed, self.recipe.span_min_g, self.recipe.sensor_axes)
-        context = self._context(self._recipe(plan, choice))
+        context = self.on_station(self._recipe(plan, choice))
         return self.reaching(context) if plan.ramp else context
 
-    def _context(self, recipe: Recipe) -> PlanContext:
-        return plan_context(recipe, self.against.station, self.against.noise, slowest=self.timed.slowest)
+    def on_station(self, recipe: Recipe) -> PlanContext:
+        """A recipe on the station of the search."""
+        noise, prior = self.against.noise, self.requirement.prior
+        return plan_context(recipe, self.against.station, noise, slowest=self.timed.slowest, prior=prior)
 
     def reaching(self, context: PlanContext) -> PlanContext:
         """A recipe on ramps that gets to both ends of the range: short moves after an exchange of poses also end a ramp sooner.
@@ -255,7 +262,7 @@ class RecipeSearch:
             soaks = list(context.recipe.soaks)
             more = own[leg][1 + added % (len(own[leg]) - 1)]  # a ramp begins and ends with the same pose
             soaks[leg] = soaks[leg].model_copy(update={"poses": [*(soaks[leg].poses or []), more]})
-            context = self._context(context.recipe.model_copy(update={"soaks": soaks}))
+            context = self.on_station(context.recipe.model_copy(update={"soaks": soaks}))
         return context
 
     def reached(self, context: PlanContext) -> Array:

@@ -24,7 +24,7 @@ def optimum_document(best: Optimum, base: Recipe, name: str) -> dict[str, Any]:
     document, by_errors = plan(best.planned), best.requirement.discrimination is None
     lower = lower_bound(base, best.against, best.requirement, ramp=True) if best.ramp and by_errors else None
     slowest = float(best.against.state.time[-1])  # the flicker model of the new recipe
-    own = plan_context(base, best.against.station, best.against.noise, slowest=slowest)
+    own = plan_context(base, best.against.station, best.against.noise, slowest=slowest, prior=best.requirement.prior)
     try:
         own_errors = identified(own).errors
     except NotIdentified:

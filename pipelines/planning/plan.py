@@ -132,7 +132,9 @@ def identified(context: PlanContext) -> Expected:
     """
     recipe = context.recipe
     try:
-        return expected_errors(recipe.effects, context.state, context.covariance, units=max(1, len(recipe.units)))
+        return expected_errors(
+            recipe.effects, context.state, context.covariance, units=max(1, len(recipe.units)), prior=context.prior
+        )
     except NotIdentified as problem:
         text = missing(context.state, recipe.effects) or str(problem)
         text = with_verification_hint(text, context.activities, context.station, recipe)

@@ -2,12 +2,13 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise, product
 
 import numpy as np
 
 from inertial import poses
-from inertial.arrays import Array
+from inertial.arrays import Array, Index
 from inertial.frames import force_from_angles
 from inertial.planning.discrimination import Discrimination
 from inertial.planning.pose_exchange import CRITERIA, Criterion, ratios
@@ -72,6 +73,7 @@ class Requirement:
     verification : repetitions of each verification pose in the whole run, distributed over the soaks
     effects : ids of the effects to which the columns of ``errors`` belong; the recipe's model where empty
     discrimination : rivals to discriminate between, in place of required errors
+    prior : (axes, p, p), precision of a prior of the coefficients, 1/g²; discrimination does not use it
     """
 
     errors: Array
@@ -83,15 +85,34 @@ class Requirement:
     verification: int = 1
     effects: tuple[str, ...] = ()
     discrimination: Discrimination | None = None
+    prior: Array | None = None
 
-    def ratio_to_required(self, matrix: Array) -> Array:
-        """Errors over the required ones, (..., axes, p), or per pair, of normal matrices (..., axes, p, p); met at ≤ 1."""
-        return ratios(matrix) if self.discrimination is None else self.discrimination.ratio_to_required(matrix)
+    def ratio_to_required(self, matrix: Array, columns: Index | None = None) -> Array:
+        """Errors over the required ones, (..., axes, p), or per pair, of normal matrices (..., axes, p, p); met at ≤ 1.
+
+        columns : of the coefficients in the matrices, the others being known; all where None
+        """
+        if self.discrimination is not None:
+            return self.discrimination.ratio_to_required(matrix)
+        return ratios(matrix + (self._known if columns is None else self._known[:, columns[:, None], columns]))
+
+    @cached_property
+    def _known(self) -> Array:
+        """Precision (axes, p, p) of the prior in units of the required errors; zero without one."""
+        axes, p = self.errors.shape
+        return (
+            np.zeros((axes, p, p))
+            if self.prior is None
+            else self.prior * self.errors[:, :, None] * self.errors[:, None, :]
+        )
 
     @property
     def objective(self) -> Callable[[Array], Array]:
         """The function of normal matrices that an exchange of poses minimises."""
-        return CRITERIA[self.criterion] if self.discrimination is None else self.discrimination.objective
+        if self.discrimination is not None:
+            return self.discrimination.objective
+        criterion, known = CRITERIA[self.criterion], self._known
+        return lambda matrix: criterion(matrix + known)
 
 
 def candidates(station: StationConfig, plan: str = "", count: int = CANDIDATES) -> Array:

@@ -13,6 +13,7 @@ from inertial.errors import InertialError
 from pipelines.archive import Archive, Run
 from pipelines.archive.buffered_run import BufferedRun
 from pipelines.jobs.model_change import ModelChange
+from pipelines.jobs.priors import family
 from pipelines.rerun.partition import Batch
 from pipelines.rerun.selection import SelectedRun, entry_of
 from pipelines.rerun.steps import archived_job
@@ -102,12 +103,12 @@ def _both(run: Run, change: ModelChange) -> tuple[Side, Side]:
     job = archived_job(run, change)
     old = {name: run.table(name, columns) for name, columns in OLD_TABLES.items()}
     lot = LotTables(run.table("dwells"), run.table("history"))
-    new, expected, own = fit_in_memory(lot, job.recipe.effects)
+    new, expected, own = fit_in_memory(lot, job.recipe.effects, family(job.prior))
     new |= verify_tables(lot, new["coefficients"], new["covariance"], expected, own)
     names = ("coefficients", "covariance", "verification", "verification_poses")
     # the noise is in µg already, and the response by which it was made so hardly depends on the model
     shared: dict[str, Any] = {**{name: new[name] for name in names}, "noise": old["noise"], "calibration": own}
-    tables = BudgetTables(lot.dwells, lot.history, wander=new["wander"], lot=lot, **shared)
+    tables = BudgetTables(lot.dwells, lot.history, wander=new["wander"], prior=new["prior"], lot=lot, **shared)
     stated = decision_budget(tables, job.terms)
     evidence = GradeEvidence(old["verdicts"], residuals=new["residuals"], budget=stated, **shared)
     new |= grade(evidence, job.limits, job.recipe.zero_output, figures=False)

@@ -17,6 +17,7 @@ from pipelines.importers.plane import axis_of_plane
 from pipelines.jobs.job import Job
 from pipelines.jobs.model_change import ModelChange
 from pipelines.jobs.model_files import refuse_unknown_effects, use_formulas
+from pipelines.jobs.priors import stored_in
 from pipelines.rerun.import_steps import (
     ImportedData,
     StageCall,
@@ -70,9 +71,12 @@ class ArchivedJob(Job):
 
 def archived_job(run: Run, change: ModelChange) -> ArchivedJob:
     """The job of a captured run, with another model or other limits where they are given."""
-    about = run.about
+    about, keys = run.about, model_keys(change)
+    if keys:  # the prior of another model is none of this one
+        about["recipe"]["prior"] = None
+        about.pop("prior", None)
     try:
-        recipe = Recipe.model_validate({**about["recipe"], **model_keys(change)})
+        recipe = Recipe.model_validate({**about["recipe"], **keys})
         limits = change.limits or limits_of(about["limits"], UNITS)
         lot = Lot.model_validate(about["lot"])
     except ValidationError as problem:
@@ -80,7 +84,8 @@ def archived_job(run: Run, change: ModelChange) -> ArchivedJob:
     if change.limits is not None:
         recipe = recipe.model_copy(update={"limits": change.limits_name})
     station = StationConfig.model_construct(**about.get("station", {}))
-    job = ArchivedJob(recipe, limits, lot, station, captured=about["capture"], run_document=without_provenance(about))
+    prior, document = stored_in(about), without_provenance(about)
+    job = ArchivedJob(recipe, limits, lot, station, about["capture"], prior=prior, run_document=document)
     refuse_unknown_effects(recipe.effects, f"run {run.id}")
     refuse_limits_without_figures(limits, recipe)
     return job

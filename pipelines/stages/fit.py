@@ -1,7 +1,7 @@
 """Fit of a model to the dwells of a lot: coefficients, covariance, residuals and the noise between dwells."""
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -9,6 +9,7 @@ import pandas as pd
 from inertial.arrays import Array
 from inertial.errors import InertialError
 from inertial.fits.wander import student
+from inertial.population.family import Family
 from pipelines.stages.noisy_fit import NoisyFit, fitted_with_noise
 from pipelines.stages.uncertainty.bias_measurands import COLUMNS, BiasNoise, bias_measurands
 from pipelines.tables.calibration import Calibration, calibration_of, coefficient_rows, covariance_rows, symmetric
@@ -20,27 +21,31 @@ from schemas.units import MICRO
 LONG_S = 3600.0  # shortest record whose walk is extrapolated over a day: it then grows by a factor of three at most
 
 
-def fit(dwells: pd.DataFrame, history: pd.DataFrame | None, effects: Sequence[str]) -> dict[str, pd.DataFrame]:
+def fit(
+    dwells: pd.DataFrame, history: pd.DataFrame | None, effects: Sequence[str], family: Family | None = None
+) -> dict[str, pd.DataFrame]:
     """Coefficients, covariance, residuals and noise of the recipe's effects for every unit of a lot.
 
     The white-noise error sd/√n of a dwell is a lower bound. Wander between dwells is estimated with the coefficients
     (method ``wander``); where there are too few dwells for that, the covariance is scaled by χ²/ν (method ``birge``: Birge
-    ratio squared). The table ``wander`` says which. Tables without rows come back where no unit was accepted.
+    ratio squared). The table ``wander`` says which; ``prior`` what the family of the devices adds. Tables without rows come back
+    where no unit was accepted.
 
     Parameters
     ----------
     dwells : of every kind; those for verification are not fitted; they only state earlier conditions
     history : temperatures between the dwells; None where there are none
+    family : of the devices; None for a fit without a prior
     """
-    return fit_tables(LotTables(dwells, history), effects)
+    return fit_tables(LotTables(dwells, history), effects, family)
 
 
-def fit_tables(tables: LotTables, effects: Sequence[str]) -> dict[str, pd.DataFrame]:
+def fit_tables(tables: LotTables, effects: Sequence[str], family: Family | None = None) -> dict[str, pd.DataFrame]:
     """:func:`fit` of tables that other stages read as well."""
     if not np.any(tables.dwells["kind"] == "dwell"):
         return _nothing()
     lot = tables.fitted_kinds
-    fitted = _fitted(lot, effects)
+    fitted = _fitted(lot, effects, family)
     return {**_rows(lot, fitted), "predictions": _prediction_rows(lot, fitted)}
 
 
@@ -56,20 +61,20 @@ class FittedLot(NamedTuple):
     calibration: Calibration | None
 
 
-def fit_in_memory(tables: LotTables, effects: Sequence[str]) -> FittedLot:
+def fit_in_memory(tables: LotTables, effects: Sequence[str], family: Family | None = None) -> FittedLot:
     """:func:`fit_tables` with what the stages after it read as arrays: the same numbers."""
     if not np.any(tables.dwells["kind"] == "dwell"):
         return FittedLot(_nothing(), np.zeros((0, 3, 0, 0)), None)
     lot = tables.fitted_kinds
-    fitted = _fitted(lot, effects)
+    fitted = _fitted(lot, effects, family)
     made = _rows(lot, fitted)
     values = symmetric(_predicted(fitted))
     return FittedLot(made, values, calibration_of(lot.units, fitted.fit, made["coefficients"], made["covariance"]))
 
 
-def _fitted(lot: LotArrays, effects: Sequence[str]) -> NoisyFit:
+def _fitted(lot: LotArrays, effects: Sequence[str], family: Family | None) -> NoisyFit:
     try:
-        return fitted_with_noise(lot, effects)
+        return fitted_with_noise(lot, effects, family)
     except InertialError as problem:
         raise DataRejected(str(problem)) from None
 
@@ -82,7 +87,43 @@ def _rows(lot: LotArrays, fitted: NoisyFit) -> dict[str, pd.DataFrame]:
         "covariance": covariance_rows(lot.units, fitted.fit.covariance, lot.letters),
         "residuals": _residual_rows(lot, fitted),
         "wander": _wander_rows(lot, fitted),
+        "prior": _prior_rows(lot, fitted),
     }
+
+
+def _prior_rows(lot: LotArrays, fitted: NoisyFit) -> pd.DataFrame:
+    """The prior of every coefficient, and its share in the variance; without rows where there is none."""
+    prior = fitted.prior
+    if prior is None or fitted.of_prior is None:
+        return empty_table(**_PRIOR)
+    names = fitted.fit.names
+    u, a, c = np.indices(fitted.of_prior.shape).reshape(3, -1)
+    deviation = np.sqrt(np.diagonal(prior.covariance, axis1=-2, axis2=-1))
+    factors = np.array([prior.widened.get(effect, (1.0, 1.0)) for effect, _ in names[0]])
+    return pd.DataFrame(
+        {
+            "unit": picked(lot.units, u),
+            "axis": picked(lot.letters, a),
+            "effect": picked([effect for own in names for effect, _ in own], a * len(names[0]) + c),
+            "name": picked([name for own in names for _, name in own], a * len(names[0]) + c),
+            "mean": prior.mean[u, a, c],
+            "standard_deviation": deviation[u, a, c],
+            "share": fitted.of_prior.ravel(),
+            "widened": np.sqrt(factors.max(axis=1))[c],
+            "p_value": prior.p_unit[u],
+            "fits": prior.fits[u],
+            "units": np.full(u.size, prior.family.units),
+            "own": np.array([unit in prior.family.own for unit in lot.units])[u],
+        }
+    )
+
+
+_PRIOR: dict[str, Any] = {
+    "texts": "unit axis effect name",
+    "numbers": "mean standard_deviation share widened p_value",
+    "whole": "units",
+    "flags": "fits own",
+}
 
 
 def _residual_rows(lot: LotArrays, fitted: NoisyFit) -> pd.DataFrame:
@@ -194,4 +235,5 @@ def _nothing() -> dict[str, pd.DataFrame]:
             numbers=" ".join(("white_ug flicker_ug walk_ug lack_of_fit", *COLUMNS)),
             whole="dof",
         ),
+        "prior": empty_table(**_PRIOR),
     }

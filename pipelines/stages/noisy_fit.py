@@ -12,7 +12,9 @@ from inertial.arrays import Array, Flags
 from inertial.estimation.problem import Lot, Problem
 from inertial.estimation.refinement import terms_of
 from inertial.fits.linear import LotFit, felt_force, fit_lot, of_every_axis, own_axes, pseudo_inverses
+from inertial.fits.prior import Combined, Prior, combined, judged
 from inertial.fits.wander import WanderFit, fit_lot_with_wander, student
+from inertial.population.family import Family
 from pipelines.tables.dwells import LotArrays
 from schemas.errors import DataRejected
 from schemas.units import STANDARD_GRAVITY_M_S2
@@ -37,6 +39,7 @@ class NoisyFit:
     lack_of_fit : (units, 3), variance over that of the noise, one where it is no larger
     per_g : (units, 3), output per g
     gain : (units, 3, p, n), derivative of the coefficients by every output of the n fitted dwells; known : factor of their errors
+    prior : of the lot; of_prior : (units, 3, p), its share in the variance of every coefficient; None without one
     """
 
     method: Literal["wander", "birge"]
@@ -53,10 +56,15 @@ class NoisyFit:
     gain: Array
     known: float = 1.0
     walk_shown: bool = False
+    prior: Prior | None = None
+    of_prior: Array | None = None
 
 
-def fitted_with_noise(lot: LotArrays, effects: Sequence[str]) -> NoisyFit:
-    """The fit of a lot: with the wander between its dwells, or by the Birge ratio where too few dwells show its kind."""
+def fitted_with_noise(lot: LotArrays, effects: Sequence[str], family: Family | None = None) -> NoisyFit:
+    """The fit of a lot: with the wander between its dwells, or by the Birge ratio where too few dwells show its kind.
+
+    family : of the lot's devices, whose coefficients are a prior of these
+    """
     used = lot.of_kind("dwell")
     lot = replace(lot, state=replace(lot.state, felt=_felt(lot, used), memory={}))
     values = profiled(lot, effects, used)
@@ -67,13 +75,33 @@ def fitted_with_noise(lot: LotArrays, effects: Sequence[str]) -> NoisyFit:
         lot = replace(lot, state=better)
         plain = fit_lot(effects, lot.state, lot.output, error, nonlinear=values)
     known = lot.standard_error[:, used]
+    believed = None if family is None else _Belief(family, [effect for effect, _ in plain.names[0]], lot.units)
     spare = int(plain.dof.sum()) - plain.shared.size
     if spare < FEWEST_TO_SPARE or np.any(plain.dof < 1) or not np.all(np.isfinite(known) & (known > 0.0)):
-        return _by_birge(lot, plain, used)
+        return _by_birge(lot, plain, used, believed)
     fitted = fit_lot_with_wander(
-        effects, lot.state, lot.output, lot.standard_error, nonlinear=values, used=used, plain=plain
+        effects,
+        lot.state,
+        lot.output,
+        lot.standard_error,
+        nonlinear=values,
+        used=used,
+        plain=plain,
+        believed=believed,
     )
-    return _by_wander(lot, fitted, used)
+    return replace(_by_wander(lot, fitted, used), prior=believed and believed.prior, of_prior=fitted.of_prior)
+
+
+class _Belief:
+    """The prior of a lot, judged when its own estimates are known."""
+
+    def __init__(self, family: Family, effects: Sequence[str], units: Sequence[str]) -> None:
+        self.family, self.effects, self.units = family, effects, units
+        self.prior: Prior | None = None
+
+    def __call__(self, coefficients: Array, covariance: Array) -> Combined:
+        self.prior = judged(self.family, self.effects, coefficients, covariance, self.units)
+        return combined(coefficients, covariance, self.prior.mean, self.prior.precision)
 
 
 def _felt(lot: LotArrays, used: Flags) -> Array:
@@ -104,13 +132,20 @@ def _by_wander(lot: LotArrays, fitted: WanderFit, used: Flags) -> NoisyFit:
     )
 
 
-def _by_birge(lot: LotArrays, plain: LotFit, used: Flags) -> NoisyFit:
+def _by_birge(lot: LotArrays, plain: LotFit, used: Flags, believed: _Belief | None) -> NoisyFit:
     """The plain fit with its covariance scaled, by Student's factor too; all its noise is taken to be white."""
     stretch = np.maximum(1.0, plain.chi2 / np.maximum(plain.dof, 1))  # χ²/ν, never below one
     noise = lot.standard_error * np.sqrt(stretch)[:, None, :]
     columns = design.local_columns(design.split(plain.effects)[0], lot.state, plain.nonlinear)
     known = np.where(stretch <= 1.0, 1.0, np.vectorize(student, otypes=[np.float64])(np.maximum(plain.dof, 1)))
     covariance = plain.covariance * (known**2 * stretch)[..., None, None]
+    of_prior = None
+    if believed is not None:
+        both = believed(plain.coefficients, covariance)
+        step = np.einsum("...np,...p->...n", columns, both.coefficients - plain.coefficients)
+        left = plain.residuals - np.swapaxes(step, -1, -2)
+        plain = replace(plain, coefficients=both.coefficients, residuals=left)
+        covariance, of_prior = both.covariance, both.share
     unseen = columns[..., ~used, :]
     model = np.einsum("...np,...pq,...mq->...nm", unseen, covariance, unseen)
     own = np.swapaxes(noise[:, ~used] ** 2, -1, -2)
@@ -127,6 +162,8 @@ def _by_birge(lot: LotArrays, plain: LotFit, used: Flags) -> NoisyFit:
         nonlinear_error={},
         per_g=_per_g(lot, plain),
         gain=np.zeros((*plain.coefficients.shape, int(used.sum()))),  # no wander that the coefficients could follow
+        prior=believed and believed.prior,
+        of_prior=of_prior,
     )
 
 

@@ -12,6 +12,7 @@ from pipelines.certificates.stated_budget import StatedBudget
 from pipelines.procedures import PROCEDURES
 from pipelines.stages.uncertainty.contributions import left_out
 from pipelines.stages.uncertainty.tables import LABELS
+from pipelines.tables.prior import prior_document, prior_sentence
 from schemas.reference import Reference
 from schemas.uncertainty import Uncertainty
 
@@ -92,13 +93,14 @@ def left_out_words(run: Run, held: Sequence[str]) -> str:
 
 
 def methods(
-    run: Run, recipe: dict[str, Any], who: LaboratoryFile, compared: Sequence[str], *, static: bool
+    run: Run, serial: str, recipe: dict[str, Any], who: LaboratoryFile, compared: Sequence[str], *, static: bool
 ) -> Iterator[str]:
     """The laboratory's procedure, the static calibration, and the comparisons."""
     if who.method.procedure:
         yield f"{who.method.procedure}."
     if static:
         yield _static_method(run, recipe)
+        yield from _of_earlier_calibrations(run, serial)
     yield from compared
 
 
@@ -113,6 +115,14 @@ def _static_method(run: Run, recipe: dict[str, Any]) -> str:
         f"{soaks}, {recipe.get('dwell_s', 'unknown')} s per pose, recipe "
         f"'{recipe.get('name', '')}'; least-squares fit of {', '.join(recipe.get('effects', ())).replace('_', ' ')}{verified}."
     )
+
+
+def _of_earlier_calibrations(run: Run, serial: str) -> Iterator[str]:
+    """What earlier calibrations add to those of a unit; nothing without a prior."""
+    table = run.table("prior") if "prior" in run.tables() else None
+    prior = None if table is None else prior_document(table[table["unit"] == serial])
+    if prior is not None:
+        yield f"Earlier calibrations: {prior_sentence(prior).replace('_', ' ')}."
 
 
 def conditions_of(run: Run, serial: str, recipe: dict[str, Any], *, static: bool) -> list[content.Condition]:

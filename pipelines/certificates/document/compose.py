@@ -108,7 +108,7 @@ def compose(run: Run, calibration: Calibration, known: list[Calibration], who: L
         measured_to=last[:10],
         simulated=station.get("kind") == "simulated",
         who=who,
-        method=" ".join(methods(run, recipe, who, compared.methods, static=static)),
+        method=" ".join(methods(run, serial, recipe, who, compared.methods, static=static)),
         norms=NORMS,
         frame=FRAMES.get(budget.frame, budget.frame) if static else FRAME_OF_COMPARISONS,
         conditions=(*conditions_of(run, serial, recipe, static=static), *compared.conditions),

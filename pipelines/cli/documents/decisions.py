@@ -8,6 +8,7 @@ from pipelines.archive import RunInfo
 from pipelines.capture.interruptions import Interruptions
 from pipelines.jobs.references import ReferencesDocument
 from pipelines.stages.judge import AdequacyDocument
+from pipelines.tables.prior import PriorDocument
 
 
 class FigureDocument(TypedDict):
@@ -57,6 +58,7 @@ RunDocument = TypedDict(
         "yield": Annotated[float, "passed / units"],
         "report": Annotated[str, "path of the HTML report"],
         "archive": str,
+        "prior": NotRequired[Annotated[PriorDocument | None, "null: no [prior] in the recipe"]],
         "interruptions": NotRequired[Annotated[Interruptions | None, "null: the archive has no record of them"]],
         "adequacy": NotRequired[Annotated[AdequacyDocument | None, "null: no multi-position test; not in `show`"]],
         "references": NotRequired[

@@ -24,6 +24,7 @@ MANY = 1e6
 class BudgetTables:
     """The tables that a budget is computed from.
 
+    prior : None for a fit without one
     lot, calibration : dwells with their history, and coefficients, where other stages have converted them already
     results : of comparisons; None where the run has none
     """
@@ -36,6 +37,7 @@ class BudgetTables:
     verification: pd.DataFrame
     verification_poses: pd.DataFrame
     noise: pd.DataFrame
+    prior: pd.DataFrame | None = None
     lot: LotTables | None = None
     calibration: Calibration | None = None
     results: pd.DataFrame | None = None

@@ -88,6 +88,7 @@ class BudgetQuantity:
         none
     extra : contributions beyond the run by name, (units,) each; dof_noise : (units,)
     axis_errors : of the error of an axis, where the error over the period is made of it
+    of_prior : (units,), share of a prior in the variance of the noise
     """
 
     name: str
@@ -101,6 +102,7 @@ class BudgetQuantity:
     unseen: Array | None = None
     extra: dict[str, Array] = field(default_factory=dict[str, "Array"])
     axis_errors: AxisErrors | None = None
+    of_prior: Array | None = None
 
 
 def quantities_of(own: LotBudget) -> Iterator[BudgetQuantity]:
@@ -132,6 +134,10 @@ def part_of(part: str, own: LotBudget, *, decisions: bool = False) -> Iterator[B
 def _coefficients(own: LotBudget) -> Iterator[BudgetQuantity]:
     calibration, scale = own.calibration, own.scale
     spread = np.sqrt(np.diagonal(calibration.covariance, axis1=-2, axis2=-1))
+    prior = own.tables.prior
+    shares = None
+    if prior is not None and len(prior):
+        shares = prior["share"].to_numpy(dtype=float).reshape(calibration.coefficients.shape)
     for effect, unit in EFFECTS.items():
         for axis, letter in enumerate(calibration.letters):
             for column in [k for k, (name, _) in enumerate(calibration.names[axis]) if name == effect]:
@@ -140,7 +146,8 @@ def _coefficients(own: LotBudget) -> Iterator[BudgetQuantity]:
                 value = factor * calibration.coefficients[:, axis, column]
                 parts = factor[:, None] * own.variances.fit.coefficients[:, axis, column, :]
                 noise, nominal = factor * spread[:, axis, column], MICRO if effect == "scale" else 0.0
-                yield BudgetQuantity(effect, along, unit, value - nominal, noise, parts, own.dof)
+                share = None if shares is None else shares[:, axis, column]
+                yield BudgetQuantity(effect, along, unit, value - nominal, noise, parts, own.dof, of_prior=share)
 
 
 def _angles(own: LotBudget) -> Iterator[BudgetQuantity]:

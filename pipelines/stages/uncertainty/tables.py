@@ -15,7 +15,7 @@ from pipelines.stages.uncertainty.measurands import BudgetQuantity, LotBudget, V
 from pipelines.tables.frames import empty_table, picked
 from schemas.stated import Entry
 
-NOISE = "noise"
+NOISE, PRIOR = "noise", "prior"
 BEYOND = {
     "run": "figure of the run",
     "budget": "references, as far as verification cannot show them",
@@ -27,6 +27,7 @@ BEYOND = {
 }
 LABELS = {
     NOISE: "noise of the dwells",
+    PRIOR: "prior of the family",
     "gravity": "local gravity",
     "level": "level of the base",
     "orthogonality": "orthogonality of the table's axes",
@@ -130,7 +131,7 @@ def combined(one: BudgetQuantity, places: Mapping[str, Places]) -> tuple[Array, 
     if one.extra:  # an expected RMS: its contributions make its value, its uncertainty is that of the RMS
         stated = np.zeros_like(noise)
     else:
-        _, *groups = _parts(one, places).values()
+        groups = [values for name, values in _parts(one, places).items() if name not in {NOISE, PRIOR}]
         stated = np.sqrt(_summed(np.stack(groups, axis=1) ** 2)) if groups else np.zeros_like(noise)
     return noise, stated, np.hypot(noise, stated)
 
@@ -147,7 +148,7 @@ def _contributions(
     stated, dof, sensitivity = u.copy(), np.full(u.shape, np.inf), np.full(u.shape, np.nan)
     about: dict[str, list[Any]] = {name: [] for name in SAME}
     for column, name in enumerate(own):
-        if name == NOISE or name in BEYOND:
+        if name in {NOISE, PRIOR} or name in BEYOND:
             row = _beyond(name, terms)
             if name in {NOISE, "run"}:
                 dof[:, column] = one.dof_noise
@@ -167,6 +168,8 @@ def _parts(one: BudgetQuantity, places: Mapping[str, Places]) -> dict[str, Array
     if one.extra:
         return {name: np.asarray(values, dtype=float) for name, values in one.extra.items()}
     out = {NOISE: np.asarray(one.noise, dtype=float)}
+    if one.of_prior is not None:
+        out |= {NOISE: out[NOISE] * np.sqrt(1.0 - one.of_prior), PRIOR: out[NOISE] * np.sqrt(one.of_prior)}
     for group, own in places.items():
         out[group] = np.sqrt(np.sum(np.ascontiguousarray(one.parts[:, own]) ** 2, axis=1))
     return out
@@ -177,9 +180,10 @@ SAME = ("visible", "type", "distribution", "scope", "input_unit", "divisor", "so
 
 def _beyond(name: str, terms: BudgetTerms) -> dict[str, Any]:
     """The source of the noise, or of a contribution beyond the run; its stated value is its uncertainty."""
-    kind = "A" if name in {NOISE, "run", "flicker", "random_walk"} else "B"
+    kind = "A" if name in {NOISE, PRIOR, "run", "flicker", "random_walk"} else "B"
     stability = f"[stability], {terms.stability.source}" if terms.stability else ""
     source = "the dwells of the run" if kind == "A" else stability
+    source = "earlier calibrations of the family" if name == PRIOR else source
     return {"visible": float("nan"), "type": kind, "distribution": "normal", "scope": "unit", "input_unit": "", "divisor": 1.0,
             "source": source if name != "budget" else "[uncertainty]"}  # fmt: skip
 

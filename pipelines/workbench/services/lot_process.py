@@ -90,6 +90,9 @@ def _measured(request: dict[str, Any], pages: Pages) -> None:
     beside.capture(runner, lambda: runner.stage("capture"))
     for done in runner.all():
         pages.put(phase="computing", note=done.stage, question=None)
+        if done.stage == "fit" and (full := runner.full_plan()) is not None:
+            for other in full.all():
+                pages.put(phase="computing", note=f"full plan: {other.stage}", question=None)
         if done.stage == JUDGED:
             grades = rows_of(runner.run.table("grades"))
             pages.put(results=[[int(row["slot"]), _result(row)] for row in grades])

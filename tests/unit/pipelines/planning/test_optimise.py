@@ -51,6 +51,31 @@ def test_only_axes_with_an_output_are_designed_for(timed: TimedDesign, axes: int
     assert lower_bound(recipe, against, requirement) is not None
 
 
+def test_a_prior_counts_as_information_in_every_part_of_the_search(timed: TimedDesign) -> None:
+    """One as precise as the required errors halves the variance that is needed; one of no precision changes nothing."""
+    against = plan_context(textbook(timed.recipe, (-10.0, 60.0)), STATION, NOISE)
+    errors = timed.requirement.errors
+    whole = np.stack([np.diag(1.0 / row**2) for row in errors])
+    design = PlanDesign((25.0, -10.0, 60.0, 25.0), (6,) * 4, 2.0)
+    bounds, found = [], []
+    for prior in (None, 0.0 * whole, whole):
+        requirement = replace(timed.requirement, prior=prior)
+        search = RecipeSearch(timed.recipe, against, requirement)
+        slots, choice = search.timed.slots(design)
+        context = plan_context(timed.recipe, STATION, NOISE, prior=prior)
+        lower = lower_bound(timed.recipe, against, requirement)
+        assert lower is not None
+        bounds.append(lower.share)
+        value = requirement.objective(slots.matrix(choice))
+        found.append((search.timed.ratio_and_seconds(design)[0], identified(context).errors, float(value)))
+    for one, other in zip(found[0], found[1], strict=True):
+        assert np.allclose(one, other)
+    assert np.all(found[2][0] < 1.0)
+    assert np.all(found[2][1] < np.minimum(errors, found[0][1]))
+    assert found[2][2] < found[0][2]
+    assert bounds[2] < bounds[1] == bounds[0]
+
+
 def test_no_soak_has_a_dwell_too_many(timed: TimedDesign) -> None:
     made, allowed = PlanDesign((25.0, -10.0, 60.0, 25.0), (), 2.0), np.full((3, 6), 1.4)
     design = fewest_dwells(timed, made, allowed)

@@ -1,0 +1,47 @@
+"""``[prior]`` of a recipe: earlier calibrations whose family is a prior of the coefficients, and the family as a run keeps it."""
+
+from datetime import date
+from typing import ClassVar
+
+from schemas.bounds import Text
+from schemas.strict import Grown, Strict
+
+
+class PriorTerms(Grown):
+    """Where a prior comes from.
+
+    archive : address of the archive with the earlier calibrations; empty: that of the run
+    since : first day of their runs
+    full : recipe with the full plan, which units that do not fit their family get while they are on the table
+    """
+
+    later: ClassVar[frozenset[str]] = frozenset({"archive", "since", "full"})
+
+    archive: Text = ""
+    since: date | None = None
+    full: Text = ""
+
+
+class StoredOwn(Strict):
+    """What a unit's own earlier calibrations say of it: mean (m, p) and covariance (m, p, p)."""
+
+    mean: list[list[float]]
+    covariance: list[list[list[float]]]
+
+
+class StoredFamily(Strict):
+    """A family (:class:`inertial.population.family.Family`) with what it was made from: what a re-run reads.
+
+    effects : of the p columns; runs : whose calibrations it is made of; the others as in the family
+    """
+
+    effects: list[str]
+    runs: list[str]
+    mean: list[list[float]]
+    unit: list[list[list[float]]]
+    lot: list[list[list[float]]]
+    error: list[list[list[float]]]
+    units: int
+    lots: int
+    tails: list[list[float]]
+    own: dict[str, StoredOwn] = {}

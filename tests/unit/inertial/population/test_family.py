@@ -1,0 +1,92 @@
+"""The family of calibrated units: its covariances come back without the errors of the calibrations; too few units are refused."""
+
+import numpy as np
+import pytest
+
+from inertial.errors import NotIdentified
+from inertial.population.family import Family, change_of, family_of
+
+P, AXES = 3, 2
+MEAN = np.array([5.0, -2.0, 0.3])
+WITHIN, BETWEEN, ERROR = np.diag([9.0, 4.0, 0.25]), np.diag([2.0, 0.0, 0.0]), np.diag([1.0, 4.0, 1.0])
+WITHIN[0, 1] = WITHIN[1, 0] = 3.0
+
+
+def calibrations(
+    rng: np.random.Generator, lots: int, units: int, tails: float = 0.0
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Estimates (units, m, p), their covariances, and lots; the tails of the units are Student's where given."""
+    lot = np.repeat(np.arange(lots), units)
+    roots = [np.linalg.cholesky(c + 1e-12 * np.eye(P)) for c in (WITHIN, BETWEEN, ERROR)]
+    shape = (lot.size, AXES, P)
+    own = rng.standard_t(tails, shape) * np.sqrt((tails - 2.0) / tails) if tails else rng.standard_normal(shape)
+    values = MEAN + own @ roots[0].T + rng.standard_normal(shape) @ roots[2].T
+    values = values + (rng.standard_normal((lots, AXES, P)) @ roots[1].T)[lot]
+    return values, np.broadcast_to(ERROR, (*shape, P)), lot
+
+
+@pytest.fixture(scope="module")
+def family() -> Family:
+    return family_of(*calibrations(np.random.default_rng(8), 150, 6))
+
+
+def test_the_errors_of_the_calibrations_are_not_in_the_spread_of_the_units(family: Family) -> None:
+    np.testing.assert_allclose(family.unit, np.stack([WITHIN] * AXES), rtol=0.25, atol=0.35)
+    assert np.all(np.abs(family.mean - MEAN) < 4.0 * np.sqrt(np.diagonal(family.error, axis1=-2, axis2=-1)))
+
+
+def test_a_spread_between_lots_is_told_from_one_inside_them(family: Family) -> None:
+    between = np.diagonal(family.lot, axis1=-2, axis2=-1)
+    assert between[:, 0] == pytest.approx(2.0, rel=0.5)
+    assert np.all(between[:, 1:] < [0.3, 0.1])
+
+
+def test_it_is_the_analysis_of_variance_where_all_errors_are_alike() -> None:
+    """Balanced lots: within + error is the mean square inside lots; (mean square of lots − that)/n is the part between them."""
+    values, error, lot = calibrations(np.random.default_rng(2), 60, 8)
+    family = family_of(values, error, lot)
+    groups = values.reshape(60, 8, AXES, P)
+    inside = np.sum((groups - groups.mean(axis=1, keepdims=True)) ** 2, axis=(0, 1)) / (60 * 7)
+    lots = 8 * np.var(groups.mean(axis=1), axis=0, ddof=1)
+    found = np.diagonal(family.unit, axis1=-2, axis2=-1) + np.diag(ERROR)
+    np.testing.assert_allclose(found[:, 0], inside[:, 0], rtol=0.01)
+    np.testing.assert_allclose(np.diagonal(family.lot, axis1=-2, axis2=-1)[:, 0], (lots - inside)[:, 0] / 8, rtol=0.05)
+
+
+def test_the_unit_of_the_output_does_not_matter() -> None:
+    values, error, lot = calibrations(np.random.default_rng(4), 20, 4)
+    one, other = family_of(values, error, lot), family_of(1e6 * values, 1e12 * error, lot)
+    np.testing.assert_allclose(other.unit, 1e12 * one.unit, rtol=1e-6)
+    np.testing.assert_allclose(other.precision, 1e-12 * one.precision, rtol=1e-6)
+
+
+def test_a_small_family_predicts_with_a_wider_covariance() -> None:
+    values, error, lot = calibrations(np.random.default_rng(4), 9, 4)
+    family = family_of(values, error, lot)
+    assert family.within == pytest.approx(27.0 / 23.0 * family.unit)
+    assert family.between == pytest.approx(8.0 / 4.0 * family.lot + family.error)
+
+
+@pytest.mark.parametrize(("tails", "least", "most"), [(0.0, 40.0, 1e6), (5.0, 5.0, 10.0)])
+def test_heavy_tails_are_seen(tails: float, least: float, most: float) -> None:
+    rng = np.random.default_rng(6)
+    family = family_of(*calibrations(rng, 100, 8, tails))
+    assert np.all((family.tails[:, 0] >= least) & (family.tails[:, 0] <= most))
+
+
+@pytest.mark.parametrize(("lots", "units"), [(6, 8), (20, 1), (0, 0)])
+def test_too_few_lots_or_units_are_refused(lots: int, units: int) -> None:
+    with pytest.raises(
+        NotIdentified, match=f"prior: {lots * units} calibrations? in {lots} lots?, 3 coefficients need 7 lots"
+    ):
+        family_of(*calibrations(np.random.default_rng(1), lots, units))
+
+
+def test_the_change_of_units_is_found_without_the_errors_of_their_calibrations() -> None:
+    rng = np.random.default_rng(5)
+    apart = rng.standard_normal((400, AXES, P)) * np.sqrt([1.0 + 4.0, 1.0, 9.0])
+    change = change_of(apart, np.broadcast_to(np.diag([1.0, 1.0, 1.0]), (*apart.shape, P)))
+    np.testing.assert_allclose(change, [[4.0, 0.0, 8.0]] * AXES, atol=1.8)
+    assert np.all(change > 0.0)
+    with pytest.raises(NotIdentified, match="3 pairs of calibrations of one unit, 12 are needed"):
+        change_of(apart[:3], np.zeros((3, AXES, P, P)))

@@ -1,0 +1,111 @@
+"""The family of a recipe's device, from an archive: which calibrations count, what is refused, and what a run keeps of it."""
+
+from datetime import date
+from pathlib import Path
+
+import numpy as np
+import pytest
+from capture_double import BRIEF, recipe_file
+from family_archive import LOTS, LSB, UNITS, family_archive
+
+from pipelines.archive import Archive
+from pipelines.jobs.priors import family, planned_precision, stored_family
+from pipelines.jobs.recipes import load_recipe
+from pipelines.tables.calibration import column_names
+from schemas.errors import RecipeInvalid
+from schemas.prior import PriorTerms, StoredFamily
+from schemas.recipe import Recipe
+
+SPREAD = 1e-3
+
+
+@pytest.fixture
+def recipe(tmp_path: Path) -> Recipe:
+    return load_recipe(recipe_file(tmp_path, *BRIEF)).model_copy(update={"prior": PriorTerms()})
+
+
+@pytest.fixture
+def archive(tmp_path: Path) -> Archive:
+    return family_archive(tmp_path / "archive", recipe_file(tmp_path, *BRIEF), SPREAD)
+
+
+def test_the_family_is_that_of_the_archive_and_a_run_keeps_it(recipe: Recipe, archive: Archive) -> None:
+    stored = stored_family(recipe, archive, set(), "simulated")
+    assert stored is not None
+    assert (stored.units, stored.lots, len(stored.runs)) == (LOTS * UNITS, LOTS, LOTS)
+    own = family(StoredFamily.model_validate_json(stored.model_dump_json()))
+    assert own is not None
+    spread = np.sqrt(np.diagonal(own.unit + own.lot, axis1=-2, axis2=-1))
+    assert spread == pytest.approx(LSB * SPREAD, rel=0.5)
+    np.testing.assert_allclose(own.mean, stored.mean)
+
+
+def test_units_of_the_lot_are_left_out(recipe: Recipe, archive: Archive) -> None:
+    stored = stored_family(recipe, archive, {"E00-0", "E05-3"}, "simulated")
+    assert stored is not None
+    assert stored.units == LOTS * UNITS - 2
+
+
+def test_units_that_were_calibrated_before_have_a_prior_of_their_own(
+    recipe: Recipe, archive: Archive, tmp_path: Path
+) -> None:
+    family_archive(Path(str(archive.root)), recipe_file(tmp_path, *BRIEF), SPREAD, name="again")
+    found = family(stored_family(recipe, archive, {"E03-1", "new"}, "simulated"))
+    assert found is not None
+    assert list(found.own) == ["E03-1"]
+    mean, covariance = found.own["E03-1"]
+    first = np.random.default_rng([7, 3]).standard_normal((UNITS, 3, 4))[1]
+    middle = np.array([[effect == "scale" for effect, _ in axis] for axis in column_names(recipe.effects)])
+    np.testing.assert_allclose(mean, LSB * (middle + SPREAD * first), atol=3.0)
+    assert np.all(np.sqrt(np.diagonal(covariance, axis1=-2, axis2=-1)) < 0.02 * LSB * SPREAD)
+    of_family, of_units = (
+        planned_precision(one, str(archive.root), "simulated")
+        for one in (recipe.model_copy(update={"units": []}), recipe.model_copy(update={"units": ["E03-1"]}))
+    )
+    assert of_family is not None
+    assert of_units is not None
+    assert np.all(np.diagonal(of_units, axis1=-2, axis2=-1) > 100.0 * np.diagonal(of_family, axis1=-2, axis2=-1))
+
+
+def test_a_recipe_without_a_prior_reads_nothing(recipe: Recipe, tmp_path: Path) -> None:
+    plain = recipe.model_copy(update={"prior": None})
+    assert stored_family(plain, Archive(tmp_path / "none"), set(), "simulated") is None
+
+
+def test_calibrations_that_say_nothing_of_the_family_do_not_count(
+    recipe: Recipe, archive: Archive, tmp_path: Path
+) -> None:
+    root, name = Path(str(archive.root)), recipe_file(tmp_path, *BRIEF)
+    family_archive(root, name, SPREAD, effects=["bias", "scale"], name="another-model")
+    family_archive(root, name, SPREAD, device="sf1500", name="another-device")
+    stored = stored_family(recipe, archive, set(), "simulated")
+    assert stored is not None
+    assert stored.units == LOTS * UNITS
+
+
+@pytest.mark.parametrize(
+    ("changes", "kind", "what"),
+    [
+        ({"device": "qa700"}, "simulated", "no calibration of qa700 with this model"),
+        ({}, "modbus", "no calibration of adxl355 with this model"),
+        ({"prior": PriorTerms(since=date(2999, 1, 1))}, "simulated", "no calibration"),
+    ],
+)
+def test_an_archive_without_a_family_is_refused(
+    recipe: Recipe, archive: Archive, changes: dict[str, object], kind: str, what: str
+) -> None:
+    with pytest.raises(RecipeInvalid, match=what):
+        stored_family(recipe.model_copy(update=changes), archive, set(), kind)
+
+
+def test_too_few_lots_are_refused(recipe: Recipe, tmp_path: Path) -> None:
+    small = family_archive(tmp_path / "small", recipe_file(tmp_path, *BRIEF), SPREAD, lots=4)
+    with pytest.raises(RecipeInvalid, match=r"16 calibrations in 4 lots, 4 coefficients need 8 lots"):
+        stored_family(recipe, small, set(), "simulated")
+
+
+def test_a_plan_has_the_precision_in_g(recipe: Recipe, archive: Archive) -> None:
+    precision = planned_precision(recipe, str(archive.root), "simulated")
+    assert precision is not None
+    # the predicted spread is wider than that of the calibrations
+    assert np.sqrt(np.diagonal(np.linalg.inv(precision), axis1=-2, axis2=-1)) == pytest.approx(SPREAD, rel=0.6)
