@@ -112,12 +112,6 @@ Derived: a Bonferroni bound, so that a search of noise of known covariance repor
 0.1: half of the bound, because the looks are correlated.
 """
 
-WITHIN_A_CELL = 3.0
-"""Factor on the logarithm of a probability that refined nonlinear parameters gain at the most over their values on the grid.
-
-In worlds with a hidden effect of the size of the noise and half of it 2.6 at the most (a ladder of converter steps), else 1.04.
-"""
-
 MATERIAL = 0.2
 """Share of the scatter between neighbouring dwells below which a significant finding is not reported: remainders of imperfect
 drivers.

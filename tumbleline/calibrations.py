@@ -83,7 +83,7 @@ class Calibration:
             table = table.assign(unit_C=temperature)
         rate = 1.0 if rate_hz is None and "time_s" not in table else rate_hz
         use_formulas_of(self.run)
-        one = fit_of_unit(self.run, unit, "correct", failed=True, revoked=False)
+        one = fit_of_unit(self.run, unit, failed=True, revoked=False)
         recording = recording_of(table, "samples", rate_hz=rate)
         return table_of(recording, corrected(recording, one, None))
 

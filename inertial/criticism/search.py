@@ -26,6 +26,7 @@ _MOST = 6  # largest number of effects of one search
 _AS_MUCH = 1.0  # score by which further columns of an effect must be better than its leading column
 _INEXACT = 0.01  # share of a wrong angle that the scale factors and misalignments of the devices leave of it
 _REFINED, _UNCHANGED = 3, 0.05  # turns of refinement, and the change of a nonlinear parameter that ends them
+_GAINED = 3.0  # factor on the logarithm of a probability that refinement gains at the most
 
 
 @dataclass(frozen=True)
@@ -182,11 +183,11 @@ def contest(field: Candidates, model: Model, barred: str = "", finalists: int = 
 def _judged_as_far(field: Candidates, model: Model, term: Term) -> Rival:
     """A term added to a model, with refined nonlinear parameters where they can make it significant.
 
-    Of the cells of the grids no parameter moves the logarithm of the probability to more than :data:`decisions.WITHIN_A_CELL`
-    times that at its grid value: the refinement of what noise explains would take half of the time of a large lot.
+    In lots with hidden effects refined parameters gained 2.6 times the logarithm of the probability at the most (a ladder of
+    converter steps), else 1.04 times. To refine what noise explains would take half of the time of a large lot.
     """
     first = judge(field, model, term)
-    hopeless = decisions.WITHIN_A_CELL * first.log_p + np.log(max(field.looks, 1)) > np.log(NAMED_BELOW)
+    hopeless = _GAINED * first.log_p + np.log(max(field.looks, 1)) > np.log(NAMED_BELOW)
     return first if hopeless else judge_refined(field, model, term)
 
 

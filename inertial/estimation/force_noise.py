@@ -6,8 +6,9 @@ were measured several times: a mean of each pose takes up what repeats with the 
 together at a dwell is taken off. Without repeated poses nothing can be told.
 """
 
+from itertools import combinations
+
 import numpy as np
-from scipy.optimize import nnls
 
 from inertial.arrays import Array, Places
 from inertial.decisions import LOUDER_BELOW
@@ -162,9 +163,22 @@ def _curve(along: Array, ratio: Array, at: Array) -> Array:
     """Variance at forces along the axis: a quadratic in their square, nowhere negative, by least squares."""
     basis, fitted, sizes = _quadratic(along.ravel()), np.ones(along.size), np.ones(3)
     for _ in range(_ROUNDS):  # the scatter of a square is its mean
-        sizes = nnls(basis / fitted[:, None], ratio.ravel() / fitted)[0]
+        sizes = _nonnegative(basis / fitted[:, None], ratio.ravel() / fitted)
         fitted = np.maximum(basis @ sizes, _LEAST)
     return np.maximum(_quadratic(at) @ sizes, _LEAST)
+
+
+def _nonnegative(columns: Array, target: Array) -> Array:
+    """Least-squares sizes (p,) of a few columns, none of them negative: the best of all subsets that have none."""
+    gram, along = columns.T @ columns, columns.T @ target
+    best, most = np.zeros(len(along)), 0.0
+    for size in range(1, len(along) + 1):
+        for held in map(list, combinations(range(len(along)), size)):
+            found = np.linalg.lstsq(gram[np.ix_(held, held)], along[held], rcond=None)[0]
+            if found.min() >= 0.0 and float(found @ along[held]) > most:
+                best, most = np.zeros(len(along)), float(found @ along[held])
+                best[held] = found
+    return best
 
 
 def _quadratic(along: Array) -> Array:
