@@ -28,6 +28,7 @@ SHORT: dict[str, str] = {
     "recovery": "--units 50",
     "throughput": "--rounds 5",
     "plans": "--units 50 --device adxl355",
+    "priors": "--units 24 --archive 100 --device adxl355 --world normal",
     "archive": "--lots 50 --lots 200",
     "compaction": "--lots 50",
     "refit": "--units 200",

@@ -226,11 +226,11 @@ def sent(line: Orchestrator, path: str, size: int, key: str, *, chunked: bool) -
 
 def resident_mb(line: Orchestrator) -> float:
     """Memory of the server."""
-    (found,) = [
-        int(path.parent.name)
-        for path in Path("/proc").glob("[0-9]*/cmdline")
-        if f"pipelines.orchestrator.server\0--port\0{line.port}\0".encode() in path.read_bytes()
-    ]
+    found = 0
+    for path in Path("/proc").glob("[0-9]*/cmdline"):
+        with suppress(FileNotFoundError, ProcessLookupError):  # it has ended
+            if f"pipelines.orchestrator.server\0--port\0{line.port}\0".encode() in path.read_bytes():
+                found = int(path.parent.name)
     text = Path(f"/proc/{found}/status").read_text()
     return int(re.search(r"VmHWM:\s+(\d+) kB", text)[1]) / 1e3
 

@@ -8,6 +8,7 @@ from pipelines.jobs.recipe_text import recipe_text
 from pipelines.jobs.recipes import resolved
 from schemas.fault import FaultOrder
 from schemas.poses import SoakPart
+from schemas.prior import PriorTerms
 from schemas.recipe import Recipe, RecipeFile
 from schemas.toml_files import parse_as
 from schemas.uncertainty import Uncertainty
@@ -62,6 +63,13 @@ CERTIFICATES = st.builds(
     validity_months=st.integers(1, 120),
     force_range_g=maybe(st.just((-2.0, 2.0))),
     frame=st.sampled_from(["fixture", "intrinsic"]),
+)
+
+PRIORS = st.builds(
+    PriorTerms,
+    archive=st.sampled_from(["", "../archive", "s3://lab/archive"]),
+    since=maybe(st.dates()),
+    full=st.sampled_from(["", "production"]),
 )
 
 PROCEDURES = st.fixed_dictionaries(
@@ -126,6 +134,7 @@ def recipe_files(draw):
         uncertainty=draw(maybe(STATED)),
         stability=draw(maybe(STABILITY)),
         certificate=draw(maybe(CERTIFICATES)),
+        prior=draw(maybe(PRIORS)),
         procedures=draw(st.lists(PROCEDURES, max_size=2)),
     )
 
