@@ -30,6 +30,8 @@ LOUDER_BELOW = 1e-4
 Derived: an F test of means over units and axes within each soak, by whose scatter the means are judged; equal soaks pass for
 different in one lot of ten thousand. `python benchmarks/characteristics.py --only LOUDER_BELOW --runs 10`: 0 of 70 lots with
 equal soaks have a noise for each soak, 10 of 10 whose fast noise grows by two between the soaks, and 10 of 10 by four.
+The same test tells whether noise depends on the force along the axis: it does in 0 of 24 lots of eight other noises, and in 0 of
+5 with a large effect (`tests/unit/inertial/estimation/test_force_noise.py`).
 """
 
 PRIOR_BETTER = 4.0

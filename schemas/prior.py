@@ -12,7 +12,7 @@ class PriorTerms(Grown):
 
     archive : address of the archive with the earlier calibrations; empty: that of the run
     since : first day of their runs
-    full : recipe with the full plan, which units that do not fit their family get while they are on the table
+    full : recipe with the full plan, which a lot goes on with where it, or one of its units, does not fit the family
     """
 
     later: ClassVar[frozenset[str]] = frozenset({"archive", "since", "full"})

@@ -11,10 +11,9 @@ from itertools import combinations
 import numpy as np
 
 from inertial.arrays import Array, Places
-from inertial.decisions import LOUDER_BELOW
-from inertial.distributions import f_tail
 from inertial.estimation.alternative import soaks
 from inertial.estimation.comparison import estimate
+from inertial.estimation.loudness import TOGETHER, differ, inner_mean
 from inertial.estimation.model import Model
 from inertial.estimation.noise_shares import LONGEST
 
@@ -29,9 +28,6 @@ _FEWEST = 6
 
 _LEFT = 0.25
 """Share of the dwells that poses and soaks must leave as degrees of freedom."""
-
-_TOGETHER = 4
-"""Units from which on their median at a dwell is what they do together."""
 
 _FAR = 9.0
 """Square over that of its class beyond which a dwell is bad, and counts as this."""
@@ -68,7 +64,7 @@ def by_force(model: Model, soak: Places | None = None) -> Array | None:
     if model.shared.shape[-1]:
         series = series - model.shared @ fitted.shared
     left = series - (series @ q) @ q.T
-    if np.count_nonzero(complete) >= _TOGETHER:
+    if np.count_nonzero(complete) >= TOGETHER:
         by_axis = left.reshape(units, problem.per_unit, n)
         left = (by_axis - np.median(by_axis[complete], axis=0)).reshape(left.shape)
     along = np.abs(np.swapaxes(force, 1, 2)[:, list(problem.axes)].reshape(problem.blocks, n))
@@ -79,7 +75,7 @@ def by_force(model: Model, soak: Places | None = None) -> Array | None:
     slow = _slow_left(model, projector) * scale
     alone[~whole] = alone[whole].mean()
     sizes = _by_class((left**2 / (alone @ projector**2 + slow))[whole], along[whole])
-    if sizes is None or not _differ(sizes):
+    if sizes is None or not differ(sizes):
         return None
     variance = np.ones_like(left)
     for _ in range(_ROUNDS):  # each dwell's residual holds noise of the others
@@ -131,23 +127,8 @@ def _by_class(ratio: Array, along: Array) -> Array | None:
     whole = [k for k in range(len(_EDGES) + 1) if np.all(np.sum(classes == k, axis=1) >= _FEWEST)]
     if len(whole) < 2 or len(ratio) < 2:
         return None
-    inner = np.stack([[_inner_mean(row[own == k]) for row, own in zip(ratio, classes, strict=True)] for k in whole])
-    return np.log(np.maximum(inner.T, 1e-300))
-
-
-def _inner_mean(squares: Array) -> float:
-    """Mean of the smaller three quarters of squares: no single bad dwell is in it."""
-    return float(np.sort(squares)[: (3 * squares.size) // 4].mean())
-
-
-def _differ(sizes: Array) -> bool:
-    """Whether classes (blocks, classes) differ, by an F test of their means over units and axes."""
-    blocks, classes = sizes.shape
-    each = sizes - sizes.mean(axis=1, keepdims=True)
-    between = blocks * float(np.sum(each.mean(axis=0) ** 2)) / (classes - 1)
-    dof = (blocks - 1) * (classes - 1)
-    inside = float(np.sum((each - each.mean(axis=0)) ** 2)) / dof
-    return float(f_tail(between / max(inside, 1e-12), classes - 1, dof)) < LOUDER_BELOW
+    inner = np.stack([inner_mean(np.where(classes == k, np.sqrt(ratio), np.nan)) for k in whole], axis=1)
+    return np.log(np.maximum(inner, 1e-300))
 
 
 def _capped(ratio: Array, along: Array) -> Array:

@@ -22,7 +22,7 @@ from inertial.estimation.noise_shares import LONGEST
 _LEFT = 0.25
 """Share of the dwells of a soak that the model of a soak must leave as degrees of freedom."""
 
-_TOGETHER = 4
+TOGETHER = 4
 """Units from which on their median at a dwell is what they do together."""
 
 _DRIFTS = 16
@@ -57,19 +57,23 @@ def loudness_of(model: Model, soak: Places | None = None) -> Array | None:
         series = series - model.shared @ fitted.shared
     ratios = np.stack([_of_soak(model, series, places) for places in members], axis=1)
     ratios = ratios[np.isfinite(ratios).all(axis=1)]
-    if len(ratios) < 2:
+    if len(ratios) < 2 or not differ(ratios):
         return None
-    each = ratios - ratios.mean(axis=1, keepdims=True)
-    by_soak = np.median(each, axis=0)
-    between = len(ratios) * float(np.sum(each.mean(axis=0) ** 2)) / (len(members) - 1)
-    dof = (len(ratios) - 1) * (len(members) - 1)
-    inside = float(np.sum((each - each.mean(axis=0)) ** 2)) / dof
-    if float(f_tail(between / max(inside, 1e-12), len(members) - 1, dof)) > LOUDER_BELOW:
-        return None
+    by_soak = np.median(ratios - ratios.mean(axis=1, keepdims=True), axis=0)
     loud = np.ones(problem.n)
     for places, value in zip(members, by_soak, strict=True):
         loud[places] = np.exp(0.5 * value)
     return loud / np.sqrt(np.mean(loud**2))
+
+
+def differ(sizes: Array) -> bool:
+    """Whether groups of dwells differ in scatter, from logarithms (blocks, groups): an F test of means over units and axes."""
+    blocks, groups = sizes.shape
+    each = sizes - sizes.mean(axis=1, keepdims=True)
+    between = blocks * float(np.sum(each.mean(axis=0) ** 2)) / (groups - 1)
+    dof = (blocks - 1) * (groups - 1)
+    inside = float(np.sum((each - each.mean(axis=0)) ** 2)) / dof
+    return float(f_tail(between / max(inside, 1e-12), groups - 1, dof)) < LOUDER_BELOW
 
 
 def _of_soak(model: Model, series: Array, places: Places) -> Array:
@@ -104,21 +108,21 @@ def _of_soak(model: Model, series: Array, places: Places) -> Array:
             noise = root @ drawn[: len(root)]
             noise -= q @ (q.T @ noise)
             size = float(covariance.level[block] * model.noise.scale[block])
-            known[like] = float(np.mean(np.log(_inner_mean(noise.T / size))))
+            known[like] = float(np.mean(np.log(inner_mean(noise.T / size))))
         expected[block] = known[like] + 2.0 * np.log(float(covariance.level[block] * model.noise.scale[block]))
     units = problem.blocks // problem.per_unit
-    if units >= _TOGETHER:
+    if units >= TOGETHER:
         by_axis = left.reshape(units, problem.per_unit, -1)
-        measured = np.isfinite(by_axis).sum(axis=0) >= _TOGETHER
+        measured = np.isfinite(by_axis).sum(axis=0) >= TOGETHER
         together = np.zeros(by_axis.shape[1:])
         together[measured] = np.nanmedian(by_axis[:, measured], axis=0)
         left = (by_axis - together).reshape(left.shape)
     with np.errstate(divide="ignore"):
-        ratio = np.log(_inner_mean(left)) - expected
+        ratio = np.log(inner_mean(left)) - expected
     return np.where(np.isfinite(left).sum(axis=1) >= _FEWEST, ratio, np.nan)
 
 
-def _inner_mean(left: Array) -> Array:
+def inner_mean(left: Array) -> Array:
     """Mean of the smaller three quarters of the squares of each row (..., n), NaN where missing: no single bad dwell is in it."""
     size = np.sort(np.where(np.isfinite(left), left, np.inf) ** 2, axis=-1)
     kept = np.maximum((3 * np.isfinite(left).sum(axis=-1)) // 4, 1)

@@ -88,11 +88,16 @@ class Runner:
             yield self.stage(name)
 
     def full_plan(self) -> Runner | None:
-        """The full plan, from where the station stands, where a fitted unit does not fit its family; else None.
+        """The full plan, from where the station stands, where a fitted unit or the lot does not fit the family; else None.
+
+        A plan that a prior has shortened misses its required errors where that prior is widened for the lot.
 
         The whole lot goes through it: table and chamber need the same time for one unit.
         """
-        if self.job.full is None or self.run.table("prior")["fits"].all():
+        if self.job.full is None:
+            return None
+        prior = self.run.table("prior")
+        if prior["fits"].all() and not (prior["widened"] > 1.0).any():
             return None
         before = self.archive.capture(self.job.capture_id)
         return Runner(self.job.full, self.archive, self.progress, partial(from_station, before=before))

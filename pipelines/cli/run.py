@@ -156,7 +156,7 @@ def measured(job: Job, store: Archive, request: Request | None, *, asks: bool) -
         for done in runner.all():
             report_stage(done)
             if done.stage == "fit" and (full := runner.full_plan()) is not None:
-                remark(f"run: a unit does not fit its family; the lot goes on with the full plan, run {full.run.id}")
+                remark(f"run: lot or unit does not fit the family; run {full.run.id} goes on with the full plan")
                 for other in full.all():
                     report_stage(other)
             if beside is not None and done.stage == JUDGED:

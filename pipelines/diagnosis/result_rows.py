@@ -239,11 +239,16 @@ def noise_along(run: ExaminedRun) -> list[str]:
     if not (across.size and along.size):
         return []
     ratio = float(np.sqrt(np.mean(along**2) / np.mean(across**2)))
-    where, cause = ("along", "the reference voltage") if ratio > 1.0 else ("across", "the table's repeatability")
+    along_gravity = ratio > 1.0
+    larger, smaller = ("along", "across") if along_gravity else ("across", "along")
+    cause = (
+        "the reference voltage and vibration of the floor" if along_gravity else "how well the table repeats its angles"
+    )
     times = max(ratio, 1.0 / max(ratio, 1e-9))
-    return [
-        f"white noise of a dwell is {times:.2g} times as large {where} gravity, and is weighed so; check {cause} and the floor"
-    ]
+    text = (
+        f"the white noise of a dwell is {times:.2g} times as large where the axis lies {larger} gravity as {smaller} it"
+    )
+    return [f"{text}; the dwells are weighted by it; check {cause}"]
 
 
 def _plausible(size: float, typical: tuple[float, float]) -> bool:

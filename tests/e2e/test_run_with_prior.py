@@ -51,6 +51,16 @@ def test_a_unit_that_does_not_fit_gets_the_full_plan(tmp_path: Path) -> None:
     assert sorted(names) == ["full", "quick"]
 
 
+@pytest.mark.usefixtures("no_next_measurement")
+def test_a_lot_whose_prior_is_widened_gets_the_full_plan(tmp_path: Path) -> None:
+    recipe, root = with_prior(tmp_path), tmp_path / "archive"
+    family_archive(root, recipe_file(tmp_path, *BRIEF), 1e-5)
+    found = document_of("run", recipe, "--archive", root, "--units", "U1,U2,U3")
+    assert found["prior"]["foreign"] == {}
+    assert found["prior"]["widened"]["bias"] > 10.0
+    assert {run.recipe for run in Archive(root).runs()} >= {"quick", "full"}
+
+
 def test_a_full_plan_with_a_prior_is_refused(tmp_path: Path) -> None:
     recipe, root = with_prior(tmp_path, 'full = "quick.toml"'), tmp_path / "archive"
     family_archive(root, recipe_file(tmp_path, *BRIEF), 1e-3)
