@@ -7,11 +7,18 @@ from typing import Self
 
 import numpy as np
 
+from inertial import frames
 from inertial.arrays import Array, Places
 from inertial.errors import MissingInput
 
 _REMEMBERED = 3_000_000
 """Largest number of values that a state remembers of operators with memory."""
+
+_WAYPOINTS = 48
+"""Points at which the force between two poses of the table is looked at."""
+
+_ON_THE_WAY = 0.01
+"""Largest difference, g, of the force of a dwell from that of its angles, where the way can be told from the angles."""
 
 ALL_AXES = (0, 1, 2)
 
@@ -124,6 +131,32 @@ class State:
     def force_step(self) -> Array:
         """Change of specific force at the move before each dwell, (..., n, 3), g; zero for the first dwell."""
         return np.diff(self.force, axis=-2, prepend=self.force[..., :1, :])
+
+    @cached_property
+    def way(self) -> Array | None:
+        """Extremes of force on the way to each dwell in the order in which they come, and the dwell's own, (..., n, 3, 3), g.
+
+        The last index but one counts them: two on the way, then the dwell. Both axes of the table are taken to turn at once and
+        straight from pose to pose. None where the angles of the table are not known, or do not give the force.
+        """
+        if self.outer is None or self.inner is None:
+            return None
+        turns, force = np.stack([self.outer, self.inner]), self.force
+        if self.batch and np.all(turns == turns[..., :1, :]) and np.all(force == force[..., :1, :, :]):
+            turns, force = turns[..., :1, :], force[..., :1, :, :]  # one table turns all alike
+        before = np.concatenate([turns[..., :1], turns[..., :-1]], axis=-1)
+        part = np.arange(1, _WAYPOINTS) / _WAYPOINTS
+        between = frames.force_from_angles(*(before[..., None] + (turns - before)[..., None] * part))
+        at_dwells = frames.force_from_angles(*turns)
+        # a unit may have directions of its own on the fixture, and gravity is not exactly 1 g
+        to_force = np.linalg.pinv(at_dwells, rcond=1e-6) @ force
+        if np.abs(at_dwells @ to_force - force).max() > _ON_THE_WAY:
+            return None
+        between = between @ to_force[..., None, :, :]
+        low, high = between.argmin(axis=-2), between.argmax(axis=-2)
+        extremes = np.stack([np.minimum(low, high), np.maximum(low, high)], axis=-2)
+        way = np.concatenate([np.take_along_axis(between, extremes, axis=-2), force[..., None, :]], axis=-2)
+        return np.broadcast_to(way, (*self.batch, *way.shape[-3:]))
 
     @property
     def batch(self) -> tuple[int, ...]:

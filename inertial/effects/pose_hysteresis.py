@@ -1,8 +1,13 @@
+from collections.abc import Callable
+
 import numpy as np
 
 from inertial import operators
 from inertial.effects.base import Array, Nonlinear, SensorEffect, stack
 from inertial.state import State
+
+UNTIL_MOVE, FROM_POSE, ON_THE_WAY = 0.0, 1.0, 2.0
+"""How long the side is kept: until the next move; from pose to pose; and changed on the way between two poses as well."""
 
 
 class PoseHysteresis(SensorEffect):
@@ -10,7 +15,9 @@ class PoseHysteresis(SensorEffect):
 
     id = "pose_hysteresis"
     symbol = "kP"
-    equation = "kP·h(fi), h the play operator of half width w; or kP·tanh(Δfi/w), where each move wipes the last"
+    equation = (
+        "kP·h(fi), h the play of half width w, from pose to pose or over the way; or kP·tanh(Δfi/w) until the next move"
+    )
     coefficients = ("kP",)
     source = "Visintin, Differential Models of Hysteresis; mechanism: friction or charging of the pickoff"
     typical_ug = (5.0, 1000.0)
@@ -20,16 +27,32 @@ class PoseHysteresis(SensorEffect):
     memory = True
     nonlinear = (
         Nonlinear("half_width", "g", 0.02, 1.0, "log", 6),
-        Nonlinear("kept", "1", 0.0, 1.0, choices=(0.0, 1.0)),
+        Nonlinear("kept", "1", 0.0, 2.0, choices=(UNTIL_MOVE, FROM_POSE, ON_THE_WAY)),
     )
 
     def columns(self, state: State, axis: int, *, half_width: float, kept: float, **nonlinear: float) -> Array:
-        if not kept:
+        if kept == UNTIL_MOVE:
             return stack(state, [np.tanh(state.force_step[..., axis] / half_width)])
-        inside = state.remember((self.id, axis, half_width), lambda: operators.play(state.force[..., axis], half_width))
+        inside = state.remember(
+            (self.id, axis, half_width, kept), lambda: _at_dwells(operators.play, state, axis, half_width, kept)
+        )
         return stack(state, [inside])
 
     def start_columns(self, state: State, axis: int, *, half_width: float, kept: float, **nonlinear: float) -> Array:
-        first = np.zeros(state.time.shape)
-        first[..., 0] = 1.0
-        return stack(state, [operators.play_memory(state.force[..., axis], half_width) if kept else first])
+        if kept == UNTIL_MOVE:
+            first = np.zeros(state.time.shape)
+            first[..., 0] = 1.0
+            return stack(state, [first])
+        return stack(state, [_at_dwells(operators.play_memory, state, axis, half_width, kept)])
+
+
+def _at_dwells(operator: Callable[[Array, float], Array], state: State, axis: int, width: float, kept: float) -> Array:
+    """An operator with memory over the force along an axis, from pose to pose or over the way between, at the dwells, (..., n).
+
+    Without a force before the first pose: what is dragged is at zero, as far as the width lets it (Visintin's initial state).
+    """
+    way = state.way if kept == ON_THE_WAY else None
+    course = state.force[..., None, axis] if way is None else way[..., axis]
+    signal = course.reshape(*course.shape[:-2], -1)
+    values = operator(np.concatenate([np.zeros_like(signal[..., :1]), signal], axis=-1), width)[..., 1:]
+    return values.reshape(course.shape)[..., -1]

@@ -1,0 +1,55 @@
+import numpy as np
+
+from inertial.arrays import Flags
+from inertial.estimation.alternative import Array, Handling, tilts
+from inertial.estimation.lot import Lot
+
+_LOADS = 20
+"""Largest number of loads of a side at which the coupling may give way."""
+
+
+class SlipsUnderLoad(Handling):
+    """A coupling of the outer axis that gives way where the load turns it hardest: these poses are off by one angle."""
+
+    id = "slips_under_load"
+    symbol = "εα(α)"
+    equation = "∂f/∂α·εα where ±sin α exceeds a load"
+    breaker = "tighten the coupling of the outer axis, and compare its angle with a level at both ends of its travel"
+    hides_behind = ("encoder_harmonic", "outer_encoder_offset")
+    fewest_units = 1
+
+    def places(self, lot: Lot) -> list[dict[str, float]]:
+        """Loads of either side between those of the poses, that less than half of the dwells exceed; none without angles."""
+        if lot.state.outer is None or lot.state.inner is None:
+            return []
+        places: list[dict[str, float]] = []
+        for side in (1.0, -1.0):
+            loads = np.unique(np.round(_load(lot, side), 3))
+            limits = 0.5 * (loads[1:] + loads[:-1])
+            beyond = np.array([np.mean(_load(lot, side) > limit) for limit in limits])
+            limits = limits[beyond < 0.5]
+            limits = limits[np.unique(np.linspace(0, limits.size - 1, min(limits.size, _LOADS)).astype(int))]
+            places += [{"side": side, "load": float(limit)} for limit in limits]
+        return places
+
+    def change(self, lot: Lot, slope: Array | None, **place: float) -> Array:
+        """What the angle adds in the poses beyond the load."""
+        return tilts(lot.state)[..., :1] * _beyond(lot, **place)[:, None, None]
+
+    def dwells(self, lot: Lot, **place: float) -> list[int]:
+        """Those of the poses beyond the load."""
+        return np.flatnonzero(_beyond(lot, **place)).tolist()
+
+    def describe(self, lot: Lot, size: Array, **place: float) -> str:
+        """The angle, and where it is off."""
+        where = f"{'' if place['side'] > 0.0 else '-'}sin(outer) exceeds {place['load']:.2f}"
+        return f"the outer angle is off by {np.degrees(size[0]):+.4f}° in the poses where {where}, for all units"
+
+
+def _load(lot: Lot, side: float) -> Array:
+    """Torque of a load that the outer axis turns about, as a share of the largest, (n,), on one side."""
+    return side * np.sin(lot.state.need("outer", SlipsUnderLoad.id).reshape(-1, lot.state.time.shape[-1])[0])
+
+
+def _beyond(lot: Lot, **place: float) -> Flags:
+    return _load(lot, place["side"]) > place["load"]
