@@ -18,7 +18,7 @@ class BaseTilts(StationEffect):
     breaker = "a level on the base while the chamber is heated"
     simplicity = 41
     memory = True
-    nonlinear = (Nonlinear("tau", "s", 10.0, 20000.0, "log", 6),)
+    nonlinear = (Nonlinear("tau", "s", 30.0, 20000.0, "log", 4),)
 
     def force_change(self, state: State, *, tau: float, **nonlinear: float) -> Array:
         return self._leans(state, late_theta(state, tau, self.id))

@@ -17,7 +17,7 @@ class FixtureBends(StationEffect):
     breaker = "the same units in other slots, turned by 90°: what turns with the fixture is not theirs"
     simplicity = 9
     memory = True
-    nonlinear = (Nonlinear("tau", "s", 10.0, 20000.0, "log", 6),)
+    nonlinear = (Nonlinear("tau", "s", 30.0, 20000.0, "log", 4),)
 
     def force_change(self, state: State, *, tau: float, **nonlinear: float) -> Array:
         return self._turns(state, late_theta(state, tau, self.id))
