@@ -65,7 +65,7 @@ def main() -> None:
 
 def _maker(world: World, seed: int) -> ArchiveMaker:
     if world.name not in _makers:
-        _makers[world.name] = ArchiveMaker(bank(world, BANK, seed))
+        _makers[world.name] = ArchiveMaker(bank(world, BANK, seed), world)
     return _makers[world.name]
 
 
@@ -113,7 +113,7 @@ def power(given: argparse.Namespace) -> None:
 def _power(part: tuple[World, int, int, Hidden]) -> float:
     world, seed, own, hidden = part
     count = 1200
-    first = _maker(world, seed).archive(own, count, hidden, Setting(), NEEDED).first
+    first = _maker(world, seed).archive(own, count, hidden, Setting(), NEEDED, until=hidden.driver).first
     found = [lots for name, lots in first.items() if name.split(",")[0] == hidden.driver]
     if not found:
         return float("inf")

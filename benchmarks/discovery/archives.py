@@ -1,6 +1,8 @@
-"""Long archives from a bank of scored lots: signs are drawn again, effects and errors of references are added to the scores.
+"""Long archives of scored lots, night by night.
 
-What is hidden has a size in floors of noise: rms of what the model leaves of it, over the noise of a dwell.
+Without anything hidden they come from a bank whose signs are drawn again, and errors of references are added to the scores. What
+is hidden is physics in lots of their own, each made and scored; its size is in floors of noise: rms of what an ordinary
+calibration leaves of it, over the noise of a dwell.
 """
 
 from __future__ import annotations
@@ -11,6 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.discovery.lots import Lots, World
 from inertial.discovery.evidence import Evidence, ScoredLot
 from inertial.discovery.scores import LotScores
 
@@ -55,21 +58,29 @@ class Result:
 class ArchiveMaker:
     """Archives from one bank."""
 
-    def __init__(self, lots: Sequence[LotScores]) -> None:
-        self.bank, self.columns = lots, lots[0].columns
+    def __init__(self, lots: Sequence[LotScores], world: World) -> None:
+        self.bank, self.columns, self._world = lots, lots[0].columns, world
         self.size = np.mean([one.size for one in lots], axis=0)
         self.floor = float(np.mean([one.floor for one in lots]))
         self.products = tuple(np.mean([getattr(one, name) for one in lots], axis=0) for name in ("lot", "inside"))
 
     def archive(
-        self, seed: int, count: int, hidden: Hidden, setting: Setting, needed: float, *, keep: bool = False
+        self,
+        seed: int,
+        count: int,
+        hidden: Hidden,
+        setting: Setting,
+        needed: float,
+        *,
+        keep: bool = False,
+        until: str = "",
     ) -> Result:
-        """An archive night by night."""
+        """An archive night by night, to its end or until a driver has been found."""
         rng = np.random.default_rng([seed, 4111])
         result = Result(Evidence(3 * len(self.columns)))
-        state = _State(rng, setting.stations)
+        state, own = _State(rng, setting.stations), Lots(self._world, seed)
         for number in range(count):
-            lot = self._lot(rng, state, number, count, hidden, setting)
+            lot = self._lot(rng, state, own, number, count, hidden, setting)
             result.evidence.add(lot)
             if keep:
                 result.lots.append(lot)
@@ -79,6 +90,8 @@ class ArchiveMaker:
                     result.alarms |= {(name, place) for place in places}
                     if places:
                         result.first.setdefault(name, number + 1)
+                if until and any(name.split(",")[0] == until for name in result.first):
+                    break
         return result
 
     @staticmethod
@@ -91,22 +104,31 @@ class ArchiveMaker:
         return [int(p) for p in np.flatnonzero(log_e > needed) if not held(state, Alarm(name, int(p), 0, 0, 0.0))]
 
     def _lot(
-        self, rng: np.random.Generator, state: _State, number: int, count: int, hidden: Hidden, setting: Setting
+        self,
+        rng: np.random.Generator,
+        state: _State,
+        own: Lots,
+        number: int,
+        count: int,
+        hidden: Hidden,
+        setting: Setting,
     ) -> ScoredLot:
-        one = self.bank[int(rng.integers(len(self.bank)))]
-        score = rng.choice([-1.0, 1.0]) * one.score
-        if setting.bad and rng.random() < setting.bad:
-            score = 20.0 * score
         station = int(rng.integers(setting.stations))
         wafers = rng.integers(0, 12, UNITS) + 12 * (number // 200)
         radius = rng.uniform(0.0, 1.0, UNITS)
         firmware = int(number >= count // 2)
-        size = state.sizes(hidden.driver, station, wafers, radius, firmware) * hidden.size
-        added = [(hidden.effect, size)] if hidden.driver else []
+        if hidden.driver:
+            size = state.sizes(hidden.driver, station, wafers, radius, firmware) * hidden.size
+            one = own.scored(hidden.effect, size)
+            score = one.score
+        else:
+            one = self.bank[int(rng.integers(len(self.bank)))]
+            score = rng.choice([-1.0, 1.0]) * one.score
+        if setting.bad and rng.random() < setting.bad:
+            score = 20.0 * score
         if setting.wander:
-            added.append(("third_order", np.tile(setting.wander * state.walked(station, setting.over), (UNITS, 1))))
-        for effect, own in added:
-            score = score + self._change(one, effect, own)
+            walked = np.tile(setting.wander * state.walked(station, setting.over), (UNITS, 1))
+            score = score + self._change(one, "third_order", walked)
         units = state.units(rng, number, setting.again)
         levels = {
             "slot": tuple(map(str, range(UNITS))),

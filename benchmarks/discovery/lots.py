@@ -8,15 +8,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
+from benchmarks.discovery.physics import added
 from inertial.discovery.scores import LotScores, scores_of
 from pipelines.demo.archive_lots import EFFECTS, WHITE_UG, Line
-from pipelines.tables.sound_lot import sound_lot
+from pipelines.tables.dwells import lot_of, measured
 
 Array = NDArray[np.float64]
-WANDER_UG = 36.0  # with the white noise a floor of about 37 µg
+WANDER_UG = 36.0
+FLOOR_UG = float(np.hypot(WHITE_UG, WANDER_UG))  # of a dwell
 
 
 @dataclass(frozen=True)
@@ -52,14 +55,39 @@ WORLDS = (
 
 def bank(world: World, count: int, seed: int) -> list[LotScores]:
     """Scores of lots of a world, with nothing hidden in them."""
-    line = Line(seed, hidden=None, rests=world.rests, wander=WANDER_UG)
-    rng = np.random.default_rng([seed, 977])
-    with threadpool_limits(1):
-        return [_scored(line, world, rng) for _ in range(count)]
+    lots = Lots(world, seed)
+    return [lots.scored() for _ in range(count)]
 
 
-def _scored(line: Line, world: World, rng: np.random.Generator) -> LotScores:
-    dwells, _ = line.lot("s")
+class Lots:
+    """Lots of a world, one after the other."""
+
+    def __init__(self, world: World, seed: int) -> None:
+        self._world, self._rng = world, np.random.default_rng([seed, 977])
+        self._line = Line(seed, hidden=None, rests=world.rests, wander=WANDER_UG)
+
+    def scored(self, effect: str = "", size: Array | None = None) -> LotScores:
+        """The scores of the next lot.
+
+        Parameters
+        ----------
+        effect : hidden in its devices · size : (units, 3), of it, in floors
+        """
+        dwells, _ = self._line.lot("s")
+        if size is not None:
+            _hide(dwells, effect, 1e-6 * FLOOR_UG * size)
+        with threadpool_limits(1):
+            return _scored(dwells, self._world, self._rng)
+
+
+def _hide(dwells: pd.DataFrame, effect: str, size: Array) -> None:
+    names, forces = ([f"{what}_{axis}" for axis in "xyz"] for what in ("out", "force"))
+    for (_, own), of_axes in zip(dwells.groupby("unit", sort=False), size, strict=True):
+        force, warm, time = (own[name].to_numpy(dtype=float) for name in (forces, "unit_C", "time_s"))
+        dwells.loc[own.index, names] += of_axes * added(effect, force, warm, time)
+
+
+def _scored(dwells: pd.DataFrame, world: World, rng: np.random.Generator) -> LotScores:
     names = [f"out_{axis}" for axis in "xyz"]
     units = dwells["unit"].unique()
     n = len(dwells) // len(units)
@@ -79,7 +107,4 @@ def _scored(line: Line, world: World, rng: np.random.Generator) -> LotScores:
         wrong = world.thermometer * rng.standard_normal(3)[np.repeat(np.arange(3), n // 3)]
         dwells["unit_C"] = dwells["unit_C"] + np.tile(wrong, len(units))
     dwells[names] = out.reshape(-1, 3)
-    _, _, lot = sound_lot(dwells, None, EFFECTS)
-    if lot is None:
-        raise RuntimeError("a lot of the benchmark has a fault in every unit")
-    return scores_of(lot, EFFECTS)
+    return scores_of(lot_of(measured(dwells, None)), EFFECTS)

@@ -125,8 +125,9 @@ def _scored(
     before, after = (np.diagonal(each, axis1=1, axis2=2) for each in (lots, less))
     told = after > LEAST_LEFT * before
     less = less * (told[:, :, None] & told[:, None, :])
-    scale = space.noise.scale * problem.covariance.level
-    rms = np.sqrt(np.diagonal(own, axis1=1, axis2=2) * scale[:, None] ** 2 / problem.n)
+    # every dwell with the same weight: what wander takes from the information of a column, it does not take from the output
+    plain = np.diagonal(model.even.products(Candidate(local[:, :, None], shared=False)).left[:, 0], axis1=1, axis2=2)
+    rms = np.sqrt(np.maximum(plain, 0.0) * visible[:, :k] * problem.covariance.white / problem.n)
     return LotScores(
         columns=names,
         station=station,

@@ -281,14 +281,14 @@ class Model:
     def explained(self, candidate: Candidate, floor: float) -> float:
         """RMS, g, of the part of a candidate that the model cannot absorb, less that of noise of RMS ``floor``."""
         covariance = self.problem.covariance
-        gain = self._even.gain(candidate)
+        gain = self.even.gain(candidate)
         if self.problem.y.size > LARGE:
-            del self._even
+            del self.even
         beyond = float(gain.drop[0]) * covariance.white - floor**2 * float(gain.rank[0])
         return float(np.sqrt(max(beyond, 0.0) / self.problem.count))
 
     @cached_property
-    def _even(self) -> Space:
+    def even(self) -> Space:
         """The space in which all blocks have equal weight: of the lot's white noise."""
         covariance = self.problem.covariance
         return self._space(Noise(Shares(), np.sqrt(covariance.white) / covariance.level))

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_limits
 
+from benchmarks.discovery.lots import FLOOR_UG, WORLDS, Lots
 from inertial import effects as catalogue
 from inertial.discovery.scores import LotScores, scores_of
 from inertial.effects.base import SensorEffect
@@ -88,3 +89,14 @@ def test_what_no_lot_can_tell_has_no_information() -> None:
     assert scores.lot[:, at, at] == pytest.approx(0.0, abs=1e-6 * scores.lot[0, names.index("third_order")].max())
     again = scores_of(lot_of(14), EFFECTS)
     assert again.score == pytest.approx(scores.score)
+
+
+def test_a_size_is_the_rms_that_an_effect_leaves_also_in_outputs_that_wander() -> None:
+    """White noise of 8 µg and a wander of 36 µg; springs that differ from unit to unit, which no error of the station does."""
+    size = 0.02 * np.tile([[1.0], [-1.0]], (4, 3))
+    without, sprung = Lots(WORLDS[0], 5).scored(), Lots(WORLDS[0], 5).scored("third_order", size)
+    k = sprung.columns.index(("third_order", 0))
+    with_it, before = ((one.score[:, :, k], one.own[:, :, k]) for one in (sprung, without))
+    coefficients = with_it[0] / with_it[1] - before[0] / before[1]
+    found = np.abs(coefficients) * sprung.size[:, k]
+    np.testing.assert_allclose(found, 1e-6 * FLOOR_UG * np.abs(size), rtol=0.15)
