@@ -14,6 +14,7 @@ from pipelines.cli.next_commands import Given, command_line, extension, judged_d
 from pipelines.cli.options import JsonOption, argument, option
 from pipelines.cli.printing import error_console, give, print_json, publish, remark, say
 from pipelines.cli.text.demo_text import print_ending
+from schemas.errors import WrongUse
 from schemas.progress import Progress
 
 if TYPE_CHECKING:
@@ -54,6 +55,8 @@ def command(
 
     The same lot is measured twice; the second run is fresh data that no fit sees.
     """
+    if effect != "random" and (station or lots is not None):
+        raise WrongUse(f"demo: '{effect}' is the effect of a game; --{'station' if station else 'lots'} takes no name")
     drawn = secrets.randbelow(100000) if seed is None else seed
     if station:
         _practise(folder, as_json=as_json)

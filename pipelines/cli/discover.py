@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Annotated
 
 from pipelines.archive import Archive
+from pipelines.cli.next_commands import archive_words
 from pipelines.cli.options import ArchiveOption, JsonOption, names_in, option
 from pipelines.cli.printing import conclude, give, publish
 from schemas.errors import WrongUse
@@ -90,4 +91,7 @@ def command(
     if explain:
         give(explained(document, explain), print_explained, as_json=as_json)
         return
-    conclude(document, partial(print_discoveries, reach=reach), as_json=as_json, passed=not document["new"])
+    given = {"--device": device, "--since": since, "--driver": driver, "--model": str(model or "")}
+    again = [*archive_words(archive), *(word for pair in given.items() if pair[1] for word in pair)]
+    show = partial(print_discoveries, again=again, reach=reach)
+    conclude(document, show, as_json=as_json, passed=not document["new"])

@@ -8,6 +8,7 @@ from each import each
 from in_process import document_of, given, refused, text_of
 
 from pipelines.archive import Archive
+from pipelines.cli.next_commands import command_line
 from pipelines.demo.archive_lots import Hidden, Line, write_lots
 from pipelines.discovery.lot_source import DiscoveryArchive
 from pipelines.discovery.nights import discovered_before
@@ -46,7 +47,7 @@ def test_a_discovery_is_new_once_and_is_explained(folder: Path, tmp_path: Path) 
     assert "http" not in html.replace("http://www.w3.org", "")
     text = text_of("discover", "--archive", archive)
     assert "differs by wafer" in text
-    assert "tumbleline discover --explain D1" in text
+    assert command_line("discover", "--archive", str(archive), "--explain", "D1") in text
     explained = document_of("discover", "--explain", "D1", "--archive", archive, status=0)
     assert explained["levels"][0]["units"] > 10
     assert "of the sensors" in text_of("discover", "--explain", "d1", "--archive", archive, status=0)
@@ -104,6 +105,7 @@ def test_what_cannot_be_judged_is_said(tmp_path: Path) -> None:
 
 
 def test_few_lots_are_told_and_a_full_folder_is_refused(tmp_path: Path, folder: Path) -> None:
+    assert "--lots takes no name" in refused("demo", "pendulous_mass", "--lots", "60")
     made = write_lots(tmp_path, Line(6), 3)
     status, out, err = given("discover", "--archive", made.folder)
     assert status == 0, err

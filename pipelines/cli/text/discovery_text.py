@@ -1,6 +1,9 @@
 """Discoveries for people: what differs by what, how large it is, why it is beyond chance, and what to do next."""
 
+from collections.abc import Sequence
+
 from inertial.counts import number_of
+from pipelines.cli.next_commands import command_line
 from pipelines.cli.printing import print_table, say, short
 from pipelines.discovery.documents import DiscoverDocument, DiscoveryRow
 from pipelines.discovery.figures_of_name import headline, scope_text
@@ -8,8 +11,11 @@ from pipelines.discovery.figures_of_name import headline, scope_text
 _SHOWN_HELD, _SHOWN_LEVELS, _SHOWN_OUT, _SHOWN_REACH = 3, 12, 3, 40
 
 
-def print_discoveries(document: DiscoverDocument, *, reach: bool = False) -> None:
-    """The screen of ``discover``; with ``reach`` also what the archive could have shown."""
+def print_discoveries(document: DiscoverDocument, again: Sequence[str] = (), *, reach: bool = False) -> None:
+    """The screen of ``discover``; with ``reach`` also what the archive could have shown.
+
+    again : options that the next command needs as well
+    """
     pooled, control = document["pooled"], document["error_control"]
     period = f", {pooled['from']} to {pooled['until']}" if pooled["from"] else ""
     say(
@@ -37,7 +43,7 @@ def print_discoveries(document: DiscoverDocument, *, reach: bool = False) -> Non
     for text in document["warnings"]:
         say(text, style="yellow")
     if document["discoveries"] and not document["looking_back"]:
-        say(f"\nNext\n  tumbleline discover --explain {document['discoveries'][0]['id']}")
+        say(f"\nNext\n  {command_line('discover', *again, '--explain', document['discoveries'][0]['id'])}")
     if reach:
         _reach(document)
 
