@@ -117,7 +117,7 @@ def fit_terms(curve: AllanCurve) -> NoiseTerms:
         raise ValueError(
             f"noise: channel {tuple(where[:-1].tolist())} has zero Allan deviation; a constant output says nothing"
         )
-    moments = sums(curve.n, tuple(curve.m.tolist()))
+    moments = sums(curve.n, tuple(curve.m.tolist())).averaged(curve.records)
     variances = (curve.deviation**2).reshape(-1, curve.m.size)
     rows = [profiles.fit_terms(variance, moments, float(chi2_quantile(CONFIDENCE, 1))) for variance in variances]
     lead = curve.deviation.shape[:-1]
