@@ -51,7 +51,8 @@ def density_curve(temperature: Array, value: Array, u: Array) -> DensityCurve | 
     coefficients = covariance @ rows.T @ (weight * np.log(value))
     dof = value.size - coefficients.size
     misfit = float(np.sum((weight * (np.log(value) - columns @ coefficients)) ** 2))
-    return DensityCurve(middle, coefficients, covariance * (max(1.0, misfit / dof) if dof > 0 else 1.0))
+    widened = max(1.0, misfit / dof) if dof > 0 else 1.0
+    return DensityCurve(middle, coefficients, np.asarray(widened * covariance, dtype=np.float64))
 
 
 def _columns(theta: Array, count: int) -> Array:

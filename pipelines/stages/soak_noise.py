@@ -17,14 +17,14 @@ from inertial.noise.terms import NoiseTerms, fit_terms
 from pipelines.stages.noise import FEWEST, limits_where_unexplained
 from pipelines.stages.static_record import COUNTED, Coarse, remark, without_digits
 from pipelines.tables.calibration import Calibration, read_calibration
-from pipelines.tables.frames import empty_table
+from pipelines.tables.frames import empty_table, rows_of
 from pipelines.tables.summaries import PROCEDURE, STATIC, by_record
 from schemas.units import MICRO
 
 APART_K = 5.0
 """Between the coldest and the hottest soak, from which on noise is compared; and the most that one soak may move."""
 NORMAL_95 = 1.959964
-GROWS, FALLS, DIFFERS, SAME = ("grows", "falls", "differs", "no change")
+GROWS, FALLS, DIFFERS, SAME = ("grows", "falls", "differs", "steady")
 UNIT = "µg/√Hz"
 
 
@@ -77,7 +77,7 @@ def _soaks(
 ) -> dict[tuple[str, int], _Soak]:
     """The sums of every unit and soak; a soak whose temperature moved is left out, and records of another length."""
     kept = readings[~readings["kind"].isin([STATIC, PROCEDURE]) & (readings["status"] == "ok")]
-    found = {(int(r.record), str(r.unit)): r for r in kept.itertuples()}
+    found = {(int(r["record"]), str(r["unit"])): r for r in rows_of(kept)}
     lengths = kept["n"].mode()
     soaks: dict[tuple[str, int], _Soak] = {}
     for record, tables in by_record(samples):
@@ -87,15 +87,15 @@ def _soaks(
             n, finite = len(own), bool(np.isfinite(output).all())
             if reading is None or n != lengths.iloc[0] or n < FEWEST or not finite:
                 continue
-            m, variance = variances(output, float(reading.rate_hz))
+            m, variance = variances(output, float(reading["rate_hz"]))
             soak = soaks.setdefault(
-                (str(unit), int(reading.soak)),
-                _Soak(m, n, float(reading.rate_hz), np.zeros_like(variance), np.full(len(output), np.inf)),
+                (str(unit), int(reading["soak"])),
+                _Soak(m, n, float(reading["rate_hz"]), np.zeros_like(variance), np.full(len(output), np.inf)),
             )
             soak.total += variance
             soak.step = np.fmin(soak.step, [_step(axis) for axis in output])
             soak.records += 1
-            soak.temperatures.append(float(reading.unit_C))
+            soak.temperatures.append(float(reading["unit_C"]))
     return {key: one for key, one in soaks.items() if np.ptp(one.temperatures) <= APART_K}
 
 
