@@ -186,9 +186,9 @@ class CentrifugeTest(InG, OnEquipment, RecordByRecord):
             )
         if bool((rows["spread"] <= 0.0).any()):
             raise NotIdentified("the output is constant; check the unit")
-        force, value, by_rate = numbers(rows, "setting", "value", "by_rate")
-        ratio = force / by_rate
-        if part.reference_radius_m is not None and not np.all((ratio > 0.5) & (ratio < 2.0)):
+        force, value = numbers(rows, "setting", "value")
+        ratio = force / numbers(rows, "by_rate")[0] if part.reference_radius_m is not None else np.ones(1)
+        if not np.all((ratio > 0.5) & (ratio < 2.0)):
             raise NotIdentified(
                 f"the reference sensor on the arm reads {100.0 * ratio.min():.3g} to {100.0 * ratio.max():.3g} % of rω²; check "
                 "its cable, and reference_radius_m"
