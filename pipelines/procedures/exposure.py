@@ -39,7 +39,6 @@ FACES = {
     "-x": (90.0, -90.0),
 }
 BEFORE, BETWEEN, AFTER = "before", "exposure", "after"
-HOUR_S = 3600.0
 Celsius = Annotated[float, Field(ge=-100.0, le=200.0)]
 
 
@@ -162,19 +161,22 @@ class Exposure(InG, RecordByRecord):
         return [worst(bias), worst(scale)], []
 
     def chart(self, part: ExposurePart, points: pd.DataFrame) -> Chart:
-        """Output of every record about that of its pose before the exposure, over time."""
+        """Output of every record about that of its pose before the exposure."""
         traces: list[Trace] = []
-        time = np.zeros(1)
+        number = np.ones(1)
         for axis in axes_among(points["axis"]):
             still, corrected = _corrected(points[points["axis"] == axis])
-            time = (still["setting"].to_numpy(dtype=float) - float(points["setting"].min())) / HOUR_S
+            number = np.arange(1.0, len(still) + 1.0)
             before = (still["series"] == BEFORE).to_numpy()
             own = np.column_stack([np.ones(len(still)), still[[f"force_{one}" for one in AXES]].to_numpy(dtype=float)])
             fitted = own @ np.linalg.lstsq(own[before], corrected[before], rcond=None)[0]
             error = still["uncertainty"].to_numpy(dtype=float)
-            traces.append(Trace(f"axis {axis}", time, corrected - fitted, role=axis, error=error))
-        axes = PlotAxis("time / h"), PlotAxis("output minus that before the exposure / µg")
-        return Chart(self.title, (Plot("", *axes, (*traces, level(time, 0.0))),))
+            traces.append(Trace(f"axis {axis}", number, corrected - fitted, role=axis, error=error))
+        axes = (
+            PlotAxis("record; the exposure lies in the middle"),
+            PlotAxis("output minus that before the exposure / µg"),
+        )
+        return Chart(self.title, (Plot("", *axes, (*traces, level(number, 0.0))),))
 
 
 def _corrected(rows: pd.DataFrame) -> tuple[pd.DataFrame, np.ndarray]:

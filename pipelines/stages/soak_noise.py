@@ -115,7 +115,7 @@ def _soak_rows(unit: str, soak: int, one: _Soak, calibration: Calibration) -> li
     curve = curve_of(mean[alive], one.m, one.n, one.rate_hz, one.records)
     # the Allan variance of neighbours is the variance of a sample by their differences
     digits = [Coarse(float(one.step[a] / scale[a]), float(mean[a, 0]), np.inf) for a in alive.tolist()]
-    terms = without_digits(limits_where_unexplained(curve, fit_terms(curve)), digits, one.rate_hz)
+    terms = without_digits(limits_where_unexplained(curve, fit_terms(curve, only="N")), digits, one.rate_hz)
     return [
         {
             "unit": unit,
