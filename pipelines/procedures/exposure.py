@@ -77,7 +77,7 @@ class Exposure(InG, RecordByRecord):
         FigureSpec(SCALE, "ppm", "relative change of the scale by the exposure, worst axis"),
     )
 
-    def check(self, part: ExposurePart, recipe: Recipe, station: StationConfig) -> None:
+    def check(self, part: Any, recipe: Recipe, station: StationConfig) -> None:
         """Refuse temperatures outside the limits of the station, and a recipe without a scale."""
         super().check(part, recipe, station)
         low, high = station.limits.temperature_C

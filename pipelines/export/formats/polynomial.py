@@ -56,7 +56,8 @@ def _fitted(c: UnitCalibration, letter: str) -> AxisPolynomial:
     output, force = (own[f"{name}_{letter}"].to_numpy(dtype=float)[:, None] for name in ("out", "force"))
     temperature = own["unit_C"].to_numpy(dtype=float) if "unit_C" in own else np.full(len(own), np.nan)
     varied = bool(np.isfinite(temperature).all()) and float(np.ptp(temperature)) > SPAN_K
-    levels = 1 + int(np.count_nonzero(np.diff(np.sort(force[:, 0])) > APART_G))
+    sorted_force = np.sort(force[:, 0])
+    levels = 1 + int(np.count_nonzero(sorted_force[1:] - sorted_force[:-1] > APART_G))
     degree = min(DEGREE, levels - 1)
     try:
         return fit_axis_polynomial(output, force, temperature=temperature if varied else None, degree=max(degree, 1))

@@ -1,5 +1,7 @@
 """The figures of a centrifuge are those of the axis that was radial."""
 
+from typing import Any
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -17,7 +19,7 @@ from pipelines.procedures.recorded import (
     at_rest,
 )
 
-CENTRIFUGE = PROCEDURES["centrifuge"]
+CENTRIFUGE: Any = PROCEDURES["centrifuge"]
 
 
 @pytest.mark.parametrize("axis", ["x", "z"])
