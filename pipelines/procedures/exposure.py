@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 
 from inertial.dynamics.exposure import exposure_shift
 from inertial.dynamics.stability import error_of_mean, short_noise
+from inertial.errors import NotIdentified
 from inertial.frames import force_from_angles
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace, level
 from pipelines.procedures.base import InG, NominalScale, RecordByRecord, scale_of
@@ -147,6 +148,10 @@ class Exposure(InG, RecordByRecord):
             still, corrected = _corrected(own)
             time = still["setting"].to_numpy(dtype=float)
             after = (still["series"] == AFTER).to_numpy()
+            if not after.any() or after.all():
+                raise NotIdentified(
+                    f"exposure: no records {BEFORE if after.any() else AFTER} it, both are needed; check the unit and its seat"
+                )
             found = exposure_shift(
                 still[[f"force_{one}" for one in AXES]].to_numpy(dtype=float),
                 corrected,
@@ -168,6 +173,8 @@ class Exposure(InG, RecordByRecord):
             still, corrected = _corrected(points[points["axis"] == axis])
             number = np.arange(1.0, len(still) + 1.0)
             before = (still["series"] == BEFORE).to_numpy()
+            if not before.any():
+                continue
             own = np.column_stack([np.ones(len(still)), still[[f"force_{one}" for one in AXES]].to_numpy(dtype=float)])
             fitted = own @ np.linalg.lstsq(own[before], corrected[before], rcond=None)[0]
             error = still["uncertainty"].to_numpy(dtype=float)
@@ -183,7 +190,7 @@ def _corrected(rows: pd.DataFrame) -> tuple[pd.DataFrame, np.ndarray]:
     """The records before and after of one axis, and their values (n,) at one temperature, by the change between the extremes."""
     still, ends = rows[rows["series"] != BETWEEN], rows[rows["series"] == BETWEEN]
     at, value = numbers(ends, "temperature", "value")
-    slope = float(np.polyfit(at, value, 1)[0])
+    slope = float(np.polyfit(at, value, 1)[0]) if at.size > 1 and np.ptp(at) > 1.0 else 0.0
     (temperature, output) = numbers(still, "temperature", "value")
     return still, output - slope * (temperature - temperature.mean())
 

@@ -3,12 +3,13 @@
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 from small_station import captured, lot_of, short_recipe, station_of
 
 from pipelines.procedures import PROCEDURES, parts_of, refuse_unusable
 from pipelines.procedures.figures import Outcome
-from pipelines.procedures.recorded import nominal_device, procedure_record
+from pipelines.procedures.recorded import Device, nominal_device, procedure_record
 from pipelines.schedule.steps import steps
 from schemas.errors import RecipeInvalid
 from schemas.recipe import Recipe
@@ -27,7 +28,7 @@ def recipe_of(**keys: Any) -> Recipe:
     return short_recipe().model_copy(update={"procedures": [part], "soak_min_s": 900.0})
 
 
-def outcome(config: StationConfig) -> Outcome:
+def measured(config: StationConfig) -> tuple[pd.DataFrame, Device]:
     recipe, lot = recipe_of(), lot_of(2)
     sink = captured(recipe, lot, config)
     readings = sink.all(1)
@@ -36,8 +37,12 @@ def outcome(config: StationConfig) -> Outcome:
         for k, step in enumerate(steps(recipe))
         if step.order is not None
     ]
-    device, part = nominal_device(readings), parts_of(recipe)[0]
-    points = EXPOSURE.reduce(part, records, device)
+    device = nominal_device(readings)
+    return EXPOSURE.reduce(parts_of(recipe)[0], records, device), device
+
+
+def outcome(points: pd.DataFrame, device: Device) -> Outcome:
+    part = parts_of(recipe_of())[0]
     assert EXPOSURE.chart(part, points).plots[0].traces
     made: Outcome = EXPOSURE.evaluate(part, points, device)
     return made
@@ -45,7 +50,7 @@ def outcome(config: StationConfig) -> Outcome:
 
 def test_play_in_the_package_is_a_shift_of_the_bias_and_of_no_scale() -> None:
     play = Hidden(kind="hysteresis_play", figures={"width": WIDTH_K, "gain": GAIN})
-    found = outcome(station_of(preset_overrides=CALM, hidden=[play.model_dump()]))
+    found = outcome(*measured(station_of(preset_overrides=CALM, hidden=[play.model_dump()])))
     for figures in found.figures.values():
         by_name = {one.figure: one for one in figures}
         bias, scale = by_name[BIAS], by_name[SCALE]
@@ -56,9 +61,16 @@ def test_play_in_the_package_is_a_shift_of_the_bias_and_of_no_scale() -> None:
 
 
 def test_a_device_that_keeps_nothing_has_no_shift_beyond_u() -> None:
-    for figures in outcome(station_of(preset_overrides=CALM)).figures.values():
+    points, device = measured(station_of(preset_overrides=CALM))
+    for figures in outcome(points, device).figures.values():
         assert all(abs(one.value) < 4.0 * one.uncertainty for one in figures)
         assert all(np.isfinite(one.uncertainty) for one in figures)
+    silent = points[(points["unit"] != "U001") | (points["series"] == "before")]
+    lost = outcome(silent, device).figures
+    assert all(one.identified for one in lost["U000"])
+    assert {one.note for one in lost["U001"]} == {
+        "exposure: no records after it, both are needed; check the unit and its seat"
+    }
 
 
 def test_temperatures_out_of_order_or_beyond_the_station_are_refused() -> None:
