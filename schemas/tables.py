@@ -229,6 +229,29 @@ TABLES: dict[str, Table] = {
         },
         key=("unit", "axis", "term"),
     ),
+    # white noise of the dwells of each soak, with its curve over temperature
+    "soak_noise": Table(
+        {
+            **_UNIT,
+            **_AXIS,
+            **each(WHOLE, "soak", "dwells"),
+            "temperature_C": NUMBER,
+            **each(GAPS, "value", "low", "high", "curve", "curve_u"),
+            "identified": FLAG,
+            **each(ANY_TEXT, "unit_text", "note"),
+        },
+        key=("unit", "axis", "soak"),
+    ),
+    "noise_temperature": Table(
+        {
+            **_UNIT,
+            **_AXIS,
+            **each(NUMBER, "cold_C", "hot_C", "ratio", "low", "high"),
+            "p_value": GAPS,
+            "verdict": text(),
+        },
+        key=("unit", "axis"),
+    ),
     "procedure_points": Table(
         {
             **each(text(), "unit", "procedure", "axis", "series"),

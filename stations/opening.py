@@ -9,7 +9,7 @@ from collections.abc import Generator, Sequence
 from contextlib import ExitStack, closing, contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from schemas.errors import RecipeInvalid, StationError
 from schemas.lot import Lot
@@ -153,8 +153,8 @@ def _assemble(
         clock = RecordedClock(clock, links.recorder)
     devices, limits = config.devices, config.limits
     axes = {
-        "outer": _axis(_registers("outer axis", "outer", devices.outer, links), limits.outer_deg, limits),
-        "inner": _axis(_registers("inner axis", "inner", devices.inner, links), limits.inner_deg, limits),
+        "outer": _axis("outer", _registers("outer axis", "outer", devices.outer, links), limits.outer_deg, limits),
+        "inner": _axis("inner", _registers("inner axis", "inner", devices.inner, links), limits.inner_deg, limits),
     }
     reader = _registers("reader", "reader", devices.reader, links)
     _, fastest = tighter((0.0, limits.rate_hz), reader.profile, "rate")
@@ -192,7 +192,9 @@ def _registers(name: str, place: str, device: Device, links: Links) -> Registers
     return Registers(name, links.registers(place), device.device_id, profile_of(device))
 
 
-def _axis(registers: Registers, bounds: tuple[float, float], limits: Limits) -> TableAxis:
+def _axis(
+    which: Literal["outer", "inner"], registers: Registers, bounds: tuple[float, float], limits: Limits
+) -> TableAxis:
     """An axis by its drive's family, that keeps within the drive's limits and the station's."""
     profile = registers.profile
     speed, acceleration = (
@@ -200,7 +202,7 @@ def _axis(registers: Registers, bounds: tuple[float, float], limits: Limits) -> 
         for name, wanted in (("speed", limits.speed_deg_s), ("acceleration", limits.acceleration_deg_s2))
     )
     kept = limits.model_copy(update={"speed_deg_s": speed, "acceleration_deg_s2": acceleration})
-    return adapter_of(profile, "axis", TableAxis)(registers, tighter(bounds, profile, "target"), kept)
+    return adapter_of(profile, "axis", TableAxis)(registers, tighter(bounds, profile, "target"), kept, which)
 
 
 def tighter(bounds: tuple[float, float], profile: Profile, name: str) -> tuple[float, float]:

@@ -16,9 +16,9 @@ from stations.profile_files import load_profile
 
 FAMILIES = (
     "oriental_az", "smc_lecp6", "iai_robo_cylinder", "watlow_f4t", "watlow_f4s", "binder_mb1", "binder_mb2", "eurotherm_3200",
-    "watlow_ez_zone", "espec_p300",
+    "watlow_ez_zone", "espec_p300", "universal_robots",
 )  # fmt: skip
-"""A profile of each of the nine families of drives and chambers; Binder has two register maps."""
+"""A profile of each of the ten families of drives, arms and chambers; Binder has two register maps."""
 QUICK = {"silence_s": 2.0, "watch_s": 0.3}
 
 

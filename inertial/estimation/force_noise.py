@@ -13,9 +13,10 @@ import numpy as np
 from inertial.arrays import Array, Places
 from inertial.estimation.alternative import soaks
 from inertial.estimation.comparison import estimate
-from inertial.estimation.loudness import TOGETHER, differ, inner_mean
+from inertial.estimation.loudness import TOGETHER, inner_mean
 from inertial.estimation.model import Model
 from inertial.estimation.noise_shares import LONGEST
+from inertial.estimation.scatter import differ
 
 _SAME_POSE = 0.01
 """Difference of the force, g, below which two dwells are in the same pose."""

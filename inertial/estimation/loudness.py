@@ -12,12 +12,11 @@ from itertools import combinations_with_replacement
 import numpy as np
 
 from inertial.arrays import Array, Places
-from inertial.decisions import LOUDER_BELOW
-from inertial.distributions import f_tail
 from inertial.estimation.alternative import soaks
 from inertial.estimation.comparison import estimate
 from inertial.estimation.model import Model
 from inertial.estimation.noise_shares import LONGEST
+from inertial.estimation.scatter import differ
 
 _LEFT = 0.25
 """Share of the dwells of a soak that the model of a soak must leave as degrees of freedom."""
@@ -64,16 +63,6 @@ def loudness_of(model: Model, soak: Places | None = None) -> Array | None:
     for places, value in zip(members, by_soak, strict=True):
         loud[places] = np.exp(0.5 * value)
     return loud / np.sqrt(np.mean(loud**2))
-
-
-def differ(sizes: Array) -> bool:
-    """Whether groups of dwells differ in scatter, from logarithms (blocks, groups): an F test of means over units and axes."""
-    blocks, groups = sizes.shape
-    each = sizes - sizes.mean(axis=1, keepdims=True)
-    between = blocks * float(np.sum(each.mean(axis=0) ** 2)) / (groups - 1)
-    dof = (blocks - 1) * (groups - 1)
-    inside = float(np.sum((each - each.mean(axis=0)) ** 2)) / dof
-    return float(f_tail(between / max(inside, 1e-12), groups - 1, dof)) < LOUDER_BELOW
 
 
 def _of_soak(model: Model, series: Array, places: Places) -> Array:

@@ -38,6 +38,8 @@ class AllanCurve:
     """Sampling rate, Hz."""
     m: Index
     """(t,) averaging times in samples."""
+    records: int = 1
+    """Independent records of n samples whose variances were averaged."""
 
 
 def overlapping(x: ArrayLike, rate_hz: float, m: Spacing | None = None) -> AllanCurve:
@@ -58,21 +60,31 @@ def overlapping(x: ArrayLike, rate_hz: float, m: Spacing | None = None) -> Allan
     ValueError
         Fewer samples than 8, a value that is not finite, a spacing outside 1..(n-1)/2.
     """
+    spacings, variance = variances(x, rate_hz, m)
+    return curve_of(variance, spacings, np.asarray(x).shape[-1], rate_hz)
+
+
+def variances(x: ArrayLike, rate_hz: float, m: Spacing | None = None) -> tuple[Index, Array]:
+    """Averaging times (t,) in samples and Allan variances (..., t) of records, as in :func:`overlapping`."""
     data = np.asarray(x, dtype=np.float64)
     spacings = _spacings(_checked(data, rate_hz), m)
-    variance = _variances(data, spacings)
-    n = data.shape[-1]
-    edf = mixture.degrees_of_freedom(variance, spacings, n)
+    return spacings, _variances(data, spacings)
+
+
+def curve_of(variance: Array, m: Index, n: int, rate_hz: float, records: int = 1) -> AllanCurve:
+    """The curve of Allan variances (..., t), each the mean of that of several independent records of ``n`` samples."""
+    edf = mixture.degrees_of_freedom(variance, m, n, records)
     tail = 0.5 * (1.0 - CONFIDENCE)
     return AllanCurve(
-        tau=spacings / rate_hz,
+        tau=m / rate_hz,
         deviation=np.sqrt(variance),
         edf=edf,
         low=np.sqrt(variance * edf / chi2_quantile(1.0 - tail, edf)),
         high=np.sqrt(variance * edf / chi2_quantile(tail, edf)),
         n=n,
         rate_hz=rate_hz,
-        m=spacings,
+        m=m,
+        records=records,
     )
 
 

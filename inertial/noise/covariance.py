@@ -10,7 +10,7 @@ record length and reused for every channel and iteration.
 Units: time in samples, so that a strength of 1 means tau = m. The functions of `terms` bring the rate in.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -56,6 +56,10 @@ class Sums:
     """(t, t, 4, 4): Cov[v1, v2] is the quadratic form of the strengths of `NOISES`."""
     ramp: Array
     """(t, t, 4): Cov[v1, v2] per strength and per squared ramp."""
+
+    def averaged(self, records: int) -> "Sums":
+        """The moments of the mean of the variances of independent records of this length."""
+        return replace(self, quadratic=self.quadratic / records, ramp=self.ramp / records)
 
     def covariance(self, strengths: Array, ramp: Array) -> Array:
         """Covariance of the Allan variances: strengths (..., 4) of `NOISES`, ramp (...) squared → (..., t, t)."""

@@ -40,9 +40,14 @@ def _basis(times: bytes) -> Array:
     return columns
 
 
-def degrees_of_freedom(variance: Array, m: Index, n: int) -> Array:
-    """Equivalent degrees of freedom 2 v^2 / Var[v], (..., t), under the mixture that fits each curve (..., t)."""
-    moments = sums(n, tuple(m.tolist()))
+def degrees_of_freedom(variance: Array, m: Index, n: int, records: int = 1) -> Array:
+    """Equivalent degrees of freedom 2 v^2 / Var[v], (..., t), under the mixture that fits each curve (..., t).
+
+    Parameters
+    ----------
+    records : records of ``n`` samples of which each variance is the mean
+    """
+    moments = sums(n, tuple(m.tolist())).averaged(records)
     flat = variance.reshape(-1, m.size)
     edf = np.stack([_one_edf(row, moments) for row in flat]) if flat.size else flat
     return edf.reshape(variance.shape)

@@ -38,12 +38,13 @@ class TermFit(NamedTuple):
     dof: float
 
 
-def fit_terms(variance: Array, moments: Sums, threshold: float) -> TermFit:
+def fit_terms(variance: Array, moments: Sums, threshold: float, only: str = "") -> TermFit:
     """Terms of one curve (t,), each identified only if its interval, with all other terms free, does not reach zero.
 
     Parameters
     ----------
     threshold : chi-square at the ends of the two-sided intervals
+    only : the term that has ends, where they are asked of one alone
     """
     curve = _Curve(variance, moments)
     n, k, r = (mixture.TERMS.index(symbol) for symbol in "NKR")
@@ -60,13 +61,13 @@ def fit_terms(variance: Array, moments: Sums, threshold: float) -> TermFit:
         allowed[min(doubtful, key=lambda j: worth[j])] = False
     task, strengths, best = mixture.settled(variance, moments, np.ones_like(kept), np.where(kept, reduced, 0.0))
     low, high = np.zeros(kept.size), np.zeros(kept.size)
-    for j in range(kept.size):
+    for j in [mixture.TERMS.index(only)] if only else range(kept.size):
         if kept[j]:
             low[j], high[j] = _profile(task, strengths, best, j, threshold)
             low[j] = low[j] if low[j] > 0.0 else curve.low_end(j, float(reduced[j]), threshold)
         else:
             high[j] = _profile(task, strengths, best, j, _ONE_SIDED_95)[1]
-    if not kept[k]:
+    if not kept[k] and only in {"", "K"}:
         high[k] = max(high[k], _walk_limit(variance, moments, np.where(kept, reduced, 0.0)))
     value = np.where(kept, reduced, np.nan)
     low = np.fmin(low, np.where(kept, reduced, 0.0))

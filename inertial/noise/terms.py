@@ -93,7 +93,7 @@ CONFIDENCE = 0.95
 """Two-sided, of the intervals of terms."""
 
 
-def fit_terms(curve: AllanCurve) -> NoiseTerms:
+def fit_terms(curve: AllanCurve, only: str = "") -> NoiseTerms:
     """Coefficients of each channel of `curve` by generalised least squares on the log-variance.
 
     The covariance of the estimates at all averaging times is that of the fitted mixture itself. A term that the curve
@@ -101,6 +101,10 @@ def fit_terms(curve: AllanCurve) -> NoiseTerms:
     covariance of the fitted mixture or with that of what would stand in for it. Intervals are profiles with all other terms
     free, so a coefficient that another could replace has a wide one; an interval that reached zero would not be one of an
     identified term.
+
+    Parameters
+    ----------
+    only : the one term whose interval is needed, to save the time of the others
 
     Raises
     ------
@@ -117,9 +121,9 @@ def fit_terms(curve: AllanCurve) -> NoiseTerms:
         raise ValueError(
             f"noise: channel {tuple(where[:-1].tolist())} has zero Allan deviation; a constant output says nothing"
         )
-    moments = sums(curve.n, tuple(curve.m.tolist()))
+    moments = sums(curve.n, tuple(curve.m.tolist())).averaged(curve.records)
     variances = (curve.deviation**2).reshape(-1, curve.m.size)
-    rows = [profiles.fit_terms(variance, moments, float(chi2_quantile(CONFIDENCE, 1))) for variance in variances]
+    rows = [profiles.fit_terms(variance, moments, float(chi2_quantile(CONFIDENCE, 1)), only) for variance in variances]
     lead = curve.deviation.shape[:-1]
     rate = curve.rate_hz
     scale = np.sqrt(np.array([1.0 / rate**2, 1.0 / rate, 1.0, rate, rate**2]))  # per unit strength in samples

@@ -57,6 +57,10 @@ CODE = {
         *("pipelines.stages.rms_error", "pipelines.stages.unknown_poses", "pipelines.stages.verify"),
     ),
     "noise": _NOISE,
+    "soak_noise": (
+        *(*_NOISE, "inertial.decisions", "inertial.estimation.scatter"),
+        "pipelines.stages.soak_noise",
+    ),
     "budget": _BUDGET,
     "budget of norms": (
         *(*_BUDGET, "inertial.data_errors", "inertial.decisions", "inertial.estimation"),

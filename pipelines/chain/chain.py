@@ -15,6 +15,7 @@ from pipelines.stages.judge import judge
 from pipelines.stages.noise import noise, static_record
 from pipelines.stages.procedures import procedures
 from pipelines.stages.reduce import reduce
+from pipelines.stages.soak_noise import soak_noise
 from pipelines.stages.uncertainty.budget import budget
 from pipelines.stages.uncertainty.budget_terms import BudgetTables
 from pipelines.stages.validate import validate
@@ -115,6 +116,14 @@ def static_inputs(run: Run) -> tuple[Iterable[pd.DataFrame], *tuple[pd.DataFrame
     return _records(run).samples(static), readings, *tables
 
 
+def _soak_noise(_: Job, run: Run) -> Tables:
+    readings, *tables = (run.table(name) for name in ("readings", "coefficients", "covariance"))
+    dwells = set(readings.loc[~readings["kind"].isin(["allan", PROCEDURE]), "record"])
+    # the samples are decoded only where there are soaks to compare
+    samples = _records(run).samples(dwells) if readings["soak"].max() > readings["soak"].min() else ()
+    return soak_noise(samples, readings, *tables)
+
+
 _BUDGETED = (
     *("dwells", "history", "coefficients", "covariance", "wander", "verification", "verification_poses", "noise"),
     "prior",
@@ -204,6 +213,13 @@ STAGES: tuple[Stage, ...] = (
         outputs=("allan", "noise"),
         parameters=lambda _: {},
         call=lambda _, run: noise(static_record(*static_inputs(run))),
+    ),
+    Stage(
+        name="soak_noise",
+        inputs=(RECORDS, "readings", "coefficients", "covariance"),
+        outputs=("soak_noise", "noise_temperature"),
+        parameters=lambda _: {},
+        call=_soak_noise,
     ),
     Stage(
         name="procedures",

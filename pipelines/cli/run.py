@@ -171,6 +171,7 @@ DOES = {
     "fit": "fitting the models",
     "verify": "comparing with the poses that no fit uses",
     "noise": "computing the Allan deviations",
+    "soak_noise": "comparing the noise of the soaks",
     "budget": "computing the uncertainties",
     "procedures": "evaluating the procedures",
     "grade": "deciding by the limits",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TypeAlias
 
 import numpy as np
@@ -39,6 +39,7 @@ class UnitCalibration:
     certificate : that the unit has for this run; None where it was not certified
     noise : terms of its static record; None without one
     full_scale : largest excursion of the output from 0 g, output unit; None where it is not recorded
+    dwells : that the calibration is made from, those of verification left out
     nominal : output per g that the data sheet of this kind of device states, by its preset; None where no preset is known
     """
 
@@ -55,6 +56,7 @@ class UnitCalibration:
     full_scale: float | None = None
     nominal: float | None = None
     axes: tuple[int, ...] = ALL_AXES
+    dwells: pd.DataFrame = field(default_factory=pd.DataFrame)
 
     @property
     def letters(self) -> tuple[str, ...]:
@@ -114,6 +116,7 @@ def unit_calibrations(
     out_unit = str(dwells["out_unit"].iloc[0])
     noise, full_scale, nominal = noise_of_units(run), _full_scales(run), _nominal(run, out_unit) if graded else None
     left_out = effects_left_out(calibration)
+    fitted = dwells[dwells["kind"] != "verification"] if "kind" in dwells else dwells
     calibrations: list[UnitCalibration] = []
     for unit in chosen:
         outcome, grade = grades.get(unit, (UNGRADED, "none"))
@@ -121,6 +124,7 @@ def unit_calibrations(
             UnitCalibration(
                 unit, outcome, grade, out_unit, *polynomials(calibration, unit), _temperatures(dwells, unit), left_out,
                 certificates.get(unit), noise.get(unit), full_scale.get(unit), nominal, calibration.axes,
+                fitted[fitted["unit"].astype(str) == unit],
             )
         )  # fmt: skip
     return calibrations

@@ -41,7 +41,9 @@ class CentrifugePart(NominalScale):
 
     ``effects`` is the model to be judged; the diagnosis names what is missing. ``radius_m`` is the nominal radius to the proof
     mass and ``radius_um`` its standard uncertainty: with one radius it is the sensitivity's, in full. ``point_ppm`` is the
-    standard uncertainty of a point's acceleration besides (rate, trend), of itself.
+    standard uncertainty of a point's acceleration besides (rate, trend), of itself. With ``reference_radius_m``, the radius to a
+    reference sensor on the arm, the acceleration is what this sensor reads, in the ratio of the radii; ``reference_ppm`` is its
+    standard uncertainty.
     """
 
     kind: Literal["centrifuge"]
@@ -53,6 +55,8 @@ class CentrifugePart(NominalScale):
     radius_m: Positive = 0.5
     radii_m: Annotated[list[Positive], Field(min_length=2, max_length=4)] | None = None
     radius_um: NotNegative = 20.0
+    reference_radius_m: Positive | None = None
+    reference_ppm: NotNegative = 2500.0
     point_ppm: NotNegative = 2.0
     record_s: Annotated[Positive, Field(le=600.0)] = 5.0
     full_scale_g: Positive = 30.0
@@ -64,6 +68,8 @@ class CentrifugePart(NominalScale):
         refuse_unknown_effects(self.effects, EFFECTS, "centrifuges")
         if self.radii_m is None:
             return self
+        if self.reference_radius_m is not None:
+            raise ValueError("reference_radius_m: for one radius, radii_m has several; leave one of them out")
         if "radius_m" in self.model_fields_set:
             raise ValueError("radius_m and radii_m are both given, one of them is needed; leave radius_m out")
         if min(b / a for a, b in pairwise(sorted(self.radii_m))) < CLOSEST:
@@ -150,18 +156,24 @@ class CentrifugeTest(InG, OnEquipment, RecordByRecord):
 
     def points(self, part: CentrifugePart, one: Taken, device: Device) -> Iterator[dict[str, Any]]:
         """Mean output in g over the acceleration by the measured rate."""
-        rate = np.radians(one.record.samples[REFERENCE].output[:, 0].mean())
-        radius = one.record.step.setting["radius_m"]
-        force = one.record.step.setting["direction"] * radius * rate**2 / 9.80665
+        read = one.record.samples[REFERENCE].output
+        rate = np.radians(read[:, 0].mean())
+        radius, way = (one.record.step.setting[name] for name in ("radius_m", "direction"))
+        by_rate = force = way * radius * rate**2 / 9.80665
+        common = 1e-6 * part.point_ppm * abs(force)
+        if part.reference_radius_m is not None:
+            ratio = way * radius / part.reference_radius_m
+            force, scatter = ratio * float(read[:, 1].mean()), float(read[:, 1].std(ddof=1)) / np.sqrt(len(read))
+            common = abs(ratio) * scatter
         axis = INPUT if len(one.own.letters) > INPUT else 0  # a device without z is mounted by its x
         raw = one.own.output[:, axis]
         output = raw / scale_of(part, device, one.unit)[axis]
         clipped = device.at_end(raw) > 0
-        error = float(np.hypot(output.std(ddof=1) / np.sqrt(output.size), 1e-6 * part.point_ppm * abs(force)))
+        error = float(np.hypot(output.std(ddof=1) / np.sqrt(output.size), common))
         yield {
             "unit": one.unit, "axis": one.own.letters[axis], "series": "output", "point": one.number, "setting": float(force),
             "value": np.nan if clipped else float(output.mean()), "uncertainty": error,
-            "spread": float(output.std(ddof=1)), "radius_m": radius,
+            "spread": float(output.std(ddof=1)), "radius_m": radius, "by_rate": float(by_rate),
         }  # fmt: skip
 
     def of_unit(self, part: CentrifugePart, unit: str, rows: pd.DataFrame, device: Device) -> UnitOutcome:
@@ -175,6 +187,12 @@ class CentrifugeTest(InG, OnEquipment, RecordByRecord):
         if bool((rows["spread"] <= 0.0).any()):
             raise NotIdentified("the output is constant; check the unit")
         force, value = numbers(rows, "setting", "value")
+        ratio = force / numbers(rows, "by_rate")[0] if part.reference_radius_m is not None else np.ones(1)
+        if not np.all((ratio > 0.5) & (ratio < 2.0)):
+            raise NotIdentified(
+                f"the reference sensor on the arm reads {100.0 * ratio.min():.3g} to {100.0 * ratio.max():.3g} % of rω²; check "
+                "its cable, and reference_radius_m"
+            )
         if float(np.corrcoef(force, value)[0, 1] ** 2) < 0.5:  # share of the variance that the acceleration explains
             raise NotIdentified("the output does not follow the acceleration; check cable and mounting")
         if part.radii_m:
@@ -182,8 +200,16 @@ class CentrifugeTest(InG, OnEquipment, RecordByRecord):
             figures, texts = figures_of_radii(radii, axis, part.full_scale_g), texts_of_radii(radii, part.radii)
         else:
             fit = fitted(part, rows)
-            figures = figures_of_radius(fit, axis, part.full_scale_g, part.radius_m, 1e-6 * part.radius_um)
+            of_sensor = 0.0 if part.reference_radius_m is None else part.reference_ppm * part.radius_m
+            radius_error = 1e-6 * float(np.hypot(part.radius_um, of_sensor))
+            figures = figures_of_radius(fit, axis, part.full_scale_g, part.radius_m, radius_error)
             texts = texts_of_radius(fit, part.radius_m, both=part.reversed)
+            if part.reference_radius_m is not None:
+                ends = f"{1e6 * (ratio.min() - 1.0):+.4g} to {1e6 * (ratio.max() - 1.0):+.4g} ppm"
+                texts = [
+                    *texts,
+                    ("reference sensor", f"reads {ends} beside rω²; U of its reading {2.0 * part.reference_ppm:g} ppm"),
+                ]
         return figures, [*texts, *diagnosis_text(judged(part, rows))]
 
     def chart(self, part: CentrifugePart, points: pd.DataFrame) -> Chart:

@@ -19,7 +19,7 @@ TABLES = (
     *("allan", "noise", "figures", "grades"),
 )
 OPTIONAL = (  # runs of earlier versions have none
-    *("wander", "budget", "uncertainties", "lot_risks"),
+    *("wander", "budget", "uncertainties", "lot_risks", "soak_noise", "noise_temperature"),
     *("procedure_points", "procedure_figures", "procedure_findings"),
 )
 

@@ -11,7 +11,7 @@ from pipelines.archive import Archive, Run, files, parquet
 from pipelines.archive.keys import libraries
 from pipelines.jobs.model_change import ModelChange
 from pipelines.rerun.rerun import has_static_record, raw_samples
-from pipelines.rerun.steps import RAW, StageCall, plan_of
+from pipelines.rerun.steps import FROM_SAMPLES, StageCall, plan_of
 from schemas import table_check, tables
 from schemas.errors import DataRejected
 
@@ -47,7 +47,9 @@ def check(archive: Archive, run_id: str) -> Reproduction:
         for step in plan.steps:
             if step.name == "import" or not there.issuperset(step.outputs):
                 continue
-            if not raw and (step.name in {"capture", *RAW[:2]} or (step.name == "noise" and has_static_record(run))):
+            if not raw and (
+                step.name in {"capture", *FROM_SAMPLES} or (step.name == "noise" and has_static_record(run))
+            ):
                 result.tables.update(dict.fromkeys(step.outputs, LEFT_OUT))
                 continue
             _changed(run, step, result.changed)

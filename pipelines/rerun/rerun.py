@@ -14,7 +14,7 @@ from pipelines.archive.provenance import provenance
 from pipelines.archive.run import START
 from pipelines.chain.chain import RECORDS
 from pipelines.jobs.model_change import ModelChange
-from pipelines.rerun.steps import RAW, Plan, StageCall, plan_of
+from pipelines.rerun.steps import FROM_SAMPLES, Plan, StageCall, plan_of
 from pipelines.tables.leave_out import Dwells
 from schemas.errors import DataRejected
 
@@ -124,7 +124,7 @@ def changes(old: Run, plan: Plan, *, raw: bool) -> list[dict[str, str]]:
             named = ", ".join(f"{unit}:{dwell}" for unit, dwell in step.parameters["left_out"])
             rows.append(_change(step.name, "dwells left out", "", named))
             continue
-        kept = step.name in {"capture", "import"} or (step.name in RAW[:2] and not raw)
+        kept = step.name in {"capture", "import"} or (step.name in FROM_SAMPLES and not raw)
         if kept or not there.issuperset(step.outputs):
             continue
         manifest = old.manifest(step.outputs[0])
@@ -167,7 +167,7 @@ class StageRunner:
 
     def do(self, step: StageCall) -> str:
         """What became of a stage; its outputs are in the new run now."""
-        if step.name == "import" or (step.name in {"capture", *RAW[:2]} and not self.raw):
+        if step.name == "import" or (step.name in {"capture", *FROM_SAMPLES} and not self.raw):
             return self._keep(step)
         inputs = {name: self._hash(name) for name in step.inputs}
         key = stage_key(step.name, inputs, step.parameters, step.code)

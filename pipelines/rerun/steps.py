@@ -103,7 +103,12 @@ def model_keys(change: ModelChange) -> dict[str, Any]:
 
 
 CAPTURED = ("readings", "history")
-RAW = ("validate", "reduce", "noise")  # stages that read the raw samples
+FROM_SAMPLES = (
+    "validate",
+    "reduce",
+    "soak_noise",
+)  # stages whose tables are kept where the raw samples are no longer there
+RAW = (*FROM_SAMPLES, "noise")  # stages that read the raw samples
 
 
 @dataclass(frozen=True)
@@ -134,7 +139,10 @@ def plan_of(run: Run, change: ModelChange, left_out: Dwells = ()) -> Plan:
 def _captured(run: Run, change: ModelChange) -> Plan:
     job = archived_job(run, change)
     steps = [_capture_step(run, job)]
+    whole = run.records is not None and run.records.is_complete()
     for stage in STAGES:
+        if stage.name == "soak_noise" and not whole and stage.outputs[0] not in run.tables():
+            continue  # a run of an earlier version whose samples are gone
         parameters, code, call = stage.parameters(job), code_hash(stage.name), partial(stage.call, job)
         steps.append(StageCall(stage.name, stage.inputs, stage.outputs, parameters, code, call))
     decisive = {key: value for key, value in job.about.items() if key != "station"}

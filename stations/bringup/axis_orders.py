@@ -76,7 +76,7 @@ class AxisOrders:
         if turned is None:
             return
         ratio, ordered = turned / (goal - start), f"{goal - start:g}°"
-        if abs(ratio - 1.0) > SCALE:
+        if abs(turned - (goal - start)) > max(SCALE * abs(goal - start), 2.0 * axis.resolution_deg):
             found = f"feedback_position changed by {turned:.4g}° for {ordered}"
             remedy = f"the scale of target or of feedback_position is wrong by {ratio:.4g}: compare both with the drive's display"
             self._block(what, found, ordered, remedy, "scales of target and position differ")
@@ -90,12 +90,19 @@ class AxisOrders:
         axis.start(goal)
         time.sleep(0.5)
         again = abs(axis.position() - before)
-        self.orders.judge("the same order again moves nothing", f"{again:.4f}°", "0°", good=again < STEADY_DEG)
+        self.orders.judge(
+            "the same order again moves nothing",
+            f"{again:.4f}°",
+            "0°",
+            good=again < max(STEADY_DEG, axis.resolution_deg),
+        )
         axis.done()
         back = self._moved(axis, start, goal)
         if back is not None:
             off = axis.position() - start
-            self.orders.judge("comes back", f"{off:+.4f}° off", "0°", good=abs(off) <= STEADY_DEG)
+            self.orders.judge(
+                "comes back", f"{off:+.4f}° off", "0°", good=abs(off) <= max(STEADY_DEG, axis.resolution_deg)
+            )
 
     def _seen(self, typed: str, turned: float) -> None:
         what = "turns as seen by a person"

@@ -196,7 +196,9 @@ def _order_of_words(target: Target, findings: Findings, probed: dict[str, list[i
                 words[register.name] = registers.raw(register.name)
     profile = target.profile
     if not any(depends_on_order(profile.register(name)) for name in words):
-        findings.add("reach", "word order", "not tried", "no register of two words can be read")
+        some = any(map(depends_on_order, profile.registers))
+        told = "no register of two words can be read" if some else "every value of the profile is in single words"
+        findings.add("reach", "word order", "not tried" if some else "held", told)
         return
     order, counted = best_order(profile, words)
     seen = ", ".join(f"{name}: {good} plausible, {bad} not" for name, (good, bad) in counted.items())

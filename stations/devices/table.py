@@ -6,7 +6,7 @@ The adapter of a drive family defines the meaning of its registers; this module 
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 from schemas.errors import LinkLost, OperatorNeeded, StationRefused, StationTimeout
 from schemas.station import Limits
@@ -29,14 +29,20 @@ class DriveState:
 
 
 class TableAxis(ABC):
-    """One axis behind a servo drive."""
+    """One axis behind a servo drive; ``which`` says which of the table's two."""
 
     needs: ClassVar[tuple[str, ...]] = ()
     coils: ClassVar[tuple[str, ...]] = ()  # that are on before commands are accepted: source of commands, servo
 
-    def __init__(self, registers: Registers, bounds: tuple[float, float], limits: Limits) -> None:
+    def __init__(
+        self,
+        registers: Registers,
+        bounds: tuple[float, float],
+        limits: Limits,
+        which: Literal["outer", "inner"] = "outer",
+    ) -> None:
         self._registers = registers
-        self.name = registers.name
+        self.name, self.which = registers.name, which
         self._low, self._high = bounds
         self._limits = limits
         self._target: float | None = None
@@ -114,7 +120,12 @@ class TableAxis(ABC):
         return abs(self.position() - target) <= self._tolerance()
 
     def _tolerance(self) -> float:
-        return self._limits.position_deg + self._registers.step("feedback_position") / 2.0
+        return self._limits.position_deg + self.resolution_deg / 2.0
+
+    @property
+    def resolution_deg(self) -> float:
+        """The smallest difference of two readings, degrees."""
+        return self._registers.step("feedback_position")
 
     def _require_ready(self) -> None:
         """Enables the drive; refuses one that is not ready, with the reason."""

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from stations.plant.device import REFERENCE_C
 from stations.plant.preset import Preset
 
 Array = NDArray[np.float64]
@@ -54,14 +55,18 @@ class UnitNoise:
         self._flicker = keep * self._flicker + self._sigma * np.sqrt(1.0 - keep**2) * z[..., :TERMS]
         self._walk = self._walk + self._walk_step * math.sqrt(gap) * z[..., TERMS]
 
-    def sample(self, n: int, rate: float) -> Array:
+    def sample(self, n: int, rate: float, temperature: Array | None = None) -> Array:
         """The next ``n`` samples at ``rate`` Hz, (n, units, 3), g.
 
-        White noise of the one-sided density n_d has the deviation n_d·sqrt(fs/2) per sample, or that of the output filter.
+        White noise of the one-sided density n_d has the deviation n_d·sqrt(fs/2) per sample, or that of the output filter; it
+        grows exponentially with ``temperature`` (n, units), °C, as leakage currents and their shot noise do.
         """
         slow = np.flatnonzero(self._tau * rate >= FASTEST)
         z = self._draw(n, 2 + (len(slow) if self._sigma > 0.0 else 0))
-        total = self._white(z[..., 0], rate)
+        white = z[..., 0]
+        if temperature is not None and self._preset.noise_temperature_per_K != 0.0:
+            white = white * np.exp(self._preset.noise_temperature_per_K * (temperature - REFERENCE_C))[..., None]
+        total = self._white(white, rate)
         if self._walk_step > 0.0:
             steps = self._walk_step / math.sqrt(rate) * z[..., 1]
             steps[0] += self._walk

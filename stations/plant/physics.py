@@ -94,7 +94,7 @@ class Physics:
         for effect, memory in zip(self._hidden, self._fixture.memory, strict=True):
             block = Block(time, time - self._on_since, shaking, temperature, memory.at(time), humidity)
             out = out + effect.output(felt, block)
-        counts = self.devices.counts(out + self._noise.sample(len(time), rate), time)
+        counts = self.devices.counts(out + self._noise.sample(len(time), rate, temperature), time)
         counts = counts if self._on else np.zeros_like(counts)
         self._sampled_until = float(time[-1])
         return self._with_the_dead(counts, time)

@@ -24,6 +24,7 @@ class Preset(Strict):
 
     bias_mean_g, bias_sd_g : of the bias of all axes, or of x, y and z
     noise_bandwidth_hz : of the output filter, one pole; 0 for none: then the converter's own filter ends at half the sample rate
+    noise_temperature_per_K : relative change of the white noise per kelvin, about 25 °C
     ratiometric : share of the supply's relative change that the output follows; true is 1
 
     offset_step : counts of the output per step of its offset registers; 0 for a device without them
@@ -42,6 +43,7 @@ class Preset(Strict):
     temperature_high_C: FiniteFloat
     noise_density_ug: NotNegative
     noise_bandwidth_hz: NotNegative = 0.0
+    noise_temperature_per_K: FiniteFloat = 0.0
     bias_instability_ug: NotNegative
     rate_random_walk_ug: NotNegative
     bandwidth_hz: Positive

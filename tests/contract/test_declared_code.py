@@ -22,6 +22,7 @@ STARTS = {
     "verify": "pipelines.stages.verify",
     "verify of norms": "pipelines.stages.unknown_poses.verify",
     "noise": "pipelines.stages.noise",
+    "soak_noise": "pipelines.stages.soak_noise",
     "budget": "pipelines.stages.uncertainty.budget",
     "budget of norms": "pipelines.stages.unknown_poses.budget",
     "procedures": "pipelines.stages.procedures pipelines.procedures",

@@ -1,8 +1,10 @@
 """Every export format that is found: it is named by the command and the guide, writes every unit, and says what it leaves out."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from each import each
 from typer.testing import CliRunner
@@ -23,7 +25,11 @@ def calibration(unit: str, left_out: tuple[str, ...] = ()) -> UnitCalibration:
     noise = UnitNoise(
         dict.fromkeys(TERMS, np.array([16.0, 17.0, 18.0])), dict.fromkeys(TERMS, np.array([True, True, False])), 100.0
     )
-    return UnitCalibration(unit, "pass", "industrial", "V", bias, response, (-10.0, 60.0), left_out, None, noise, 1.5)
+    force = np.vstack([level * np.eye(3)[k] for k in range(3) for level in (-1.0, -0.5, 0.5, 1.0)])
+    tables = (("force", force), ("out", force @ response[0].T + bias[0]))
+    dwells = pd.DataFrame({f"{name}_{axis}": one[:, k] for name, one in tables for k, axis in enumerate("xyz")})
+    made = UnitCalibration(unit, "pass", "industrial", "V", bias, response, (-10.0, 60.0), left_out, None, noise, 1.5)
+    return replace(made, dwells=dwells)
 
 
 SETTINGS = ExportSettings(

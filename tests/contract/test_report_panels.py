@@ -25,6 +25,7 @@ NOT_OF_OLD_RUNS = {  # the kept archive has no such columns, and states no uncer
     "pipelines.report.unit_panels.bias",
     "pipelines.report.unit_panels.budget",
     "pipelines.report.unit_panels.procedures",
+    "pipelines.report.unit_panels.soak_noise",
 }
 
 

@@ -18,6 +18,8 @@ HOLE_M = 20e-6  # standard deviation of a mounting's radius about its nominal on
 STANDING_DEG_S = 0.01
 ACCELERATION_DEG_S2 = 100.0
 RECORD_HZ = 200.0
+SENSOR_M = 0.4  # radius of the reference sensor on the arm
+SENSOR_NOISE = 2e-5  # of its acceleration, one sample
 IDLE_S = 900.0  # without a line for so long the machine stops by itself
 
 
@@ -132,6 +134,9 @@ class Centrifuge:
         rng = bench.stream_at(self._start_us, 9)
         reference = np.zeros((round(self._seconds * 10.0), 3))
         reference[:, 0] = self._to * (1.0 + 1e-6 * rng.standard_normal(len(reference)))
+        felt = (SENSOR_M + radius_error(bench, SENSOR_M)) * (1.0 + rig.arm_stretch * omega**2) * omega**2
+        read = felt / STANDARD_GRAVITY_M_S2 * (1.0 + rig.reference_error) * (1.0 + 2e-6 * float(wobble))
+        reference[:, 1] = read * (1.0 + SENSOR_NOISE * rng.standard_normal(len(reference)))
         return Waveforms(outputs, RECORD_HZ, reference, 10.0)
 
 

@@ -9,6 +9,7 @@ from itertools import product
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 import yaml
 from c_compiler import FIXED, REAL, compiled
@@ -319,3 +320,27 @@ def test_files_of_units_are_parted_and_never_share_a_name() -> None:
     names = [f"{axis}{part}" for axis, part in product("XYZ", ("OFF", "SCALE"))]
     text = export_text("px4", [one], "r", ids)
     assert all(f"CAL_ACC0_{name}" in text for name in names)
+
+
+def test_a_polynomial_of_each_axis_gives_the_force_back_and_has_no_more_powers_than_levels() -> None:
+    rng = np.random.default_rng(3)
+    names = [*(f"force_{axis}" for axis in "xyz"), *(f"out_{axis}" for axis in "xyz")]
+    for levels, powers in (((-1.0, -0.5, 0.0, 0.5, 1.0), 3), ((-1.0, 0.0, 1.0), 2)):
+        force = np.vstack([level * np.eye(3)[k] for k in range(3) for level in levels for _ in range(6)])
+        t = rng.uniform(-20.0, 60.0, len(force))
+        own = force - 2e-3 * force**2 + 1e-3 * force**3
+        output = NOMINAL * (0.01 + 1.003 * own + 5e-5 * (t - 25.0)[:, None])
+        dwells = pd.DataFrame(np.hstack([force, output]), columns=names).assign(unit_C=t)
+        own_unit = replace(unit(), dwells=dwells)
+        (content,) = export_files("polynomial", [own_unit], "run-1", ExportSettings()).values()
+        table = pd.read_csv(io.BytesIO(content))
+        assert table["axis"].tolist() == ["x", "y", "z"]
+        assert table[[f"c{k}" for k in range(4)]].notna().sum(axis=1).tolist() == [powers + 1] * 3
+        for row in table.to_dict("records"):
+            k = "xyz".index(row["axis"])
+            terms = [row[f"c{p}"] * output[:, k] ** p for p in range(powers + 1)]
+            back = np.sum(terms, axis=0) + row["kT"] * (t - row["T0_C"])
+            assert (
+                np.abs(back - force[:, k]).max() < 2e-4
+            )  # kT has no place for the product of temperature and nonlinearity
+            assert row["rms_ug"] == pytest.approx(1e6 * np.sqrt(np.mean((back - force[:, k]) ** 2)), rel=1e-3, abs=1e-3)

@@ -1,14 +1,25 @@
 """The figures of a centrifuge are those of the axis that was radial."""
 
+from typing import Any
+
 import numpy as np
 import pandas as pd
 import pytest
 from spun_centrifuge import spins, spun
 
 from pipelines.procedures import PROCEDURES
-from pipelines.procedures.recorded import Device
+from pipelines.procedures.figures import FigureValue
+from pipelines.procedures.recorded import (
+    REFERENCE,
+    Device,
+    ProcedureRecord,
+    ProcedureStep,
+    Taken,
+    UnitRecord,
+    at_rest,
+)
 
-CENTRIFUGE = PROCEDURES["centrifuge"]
+CENTRIFUGE: Any = PROCEDURES["centrifuge"]
 
 
 @pytest.mark.parametrize("axis", ["x", "z"])
@@ -29,3 +40,57 @@ def test_figures_have_the_axis_of_the_points(
     figures = CENTRIFUGE.evaluate(part, rows, Device({}, {}, 30.0, "g")).figures["A1"]
     assert len(figures) == len(CENTRIFUGE.figures)
     assert {one.axis for one in figures} == {axis}
+
+
+RADIUS_M, SENSOR_M = 0.5, 0.4
+SENSOR = {
+    "kind": "centrifuge",
+    "scale": 1.0,
+    "radius_m": RADIUS_M,
+    "reference_radius_m": SENSOR_M,
+    "full_scale_g": 30.0,
+}
+
+
+def turned(stretch: float, gain: float) -> list[Taken]:
+    """Records of a unit without errors on an arm that stretches, with a sensor of a gain of its own beside it."""
+    rng, taken = np.random.default_rng(7), list[Taken]()
+    for number, (way, force) in enumerate(
+        (way, force) for way in (1.0, -1.0) for force in (1.0, 5.0, 10.0, 20.0, 30.0)
+    ):
+        omega = np.sqrt(force * 9.80665 / RADIUS_M)
+        felt = force * (1.0 + stretch * omega**2)
+        read = np.zeros((50, 3))
+        read[:, 0] = np.degrees(omega)
+        read[:, 1] = felt * SENSOR_M / RADIUS_M * gain * (1.0 + 1e-5 * rng.standard_normal(50))
+        output = np.zeros((1000, 3))
+        output[:, 2] = way * felt + 1e-4 * rng.standard_normal(1000)
+        setting = {"radius_m": RADIUS_M, "direction": way}
+        step = ProcedureStep("spin", at_rest("spin"), 25.0, role="centrifuge", setting=setting)
+        reference = UnitRecord(np.arange(50) / 10.0, read)
+        record = ProcedureRecord(number, step, pd.DataFrame(), {REFERENCE: reference})
+        taken.append(Taken(number, record, "A1", {}, UnitRecord(np.arange(1000) / 200.0, output)))
+    return taken
+
+
+def of_sensor(stretch: float, gain: float, **keys: float) -> tuple[dict[str, FigureValue], list[str]]:
+    part, device = CENTRIFUGE.part.model_validate(SENSOR | keys), Device({}, {}, 50.0, "V")
+    rows = pd.DataFrame([row for one in turned(stretch, gain) for row in CENTRIFUGE.points(part, one, device)])
+    outcome = CENTRIFUGE.evaluate(part, rows, device)
+    return {one.figure: one for one in outcome.figures["A1"]}, [one.text for one in outcome.findings]
+
+
+def test_a_sensor_on_the_arm_takes_the_stretch_of_the_arm_with_it() -> None:
+    figures, texts = of_sensor(stretch=2e-7, gain=1.0)
+    third = figures["centrifuge_third_order_ug_g3"]
+    assert abs(third.value) < 4.0 * third.uncertainty
+    assert abs(figures["centrifuge_sensitivity_percent"].value) < 0.01
+    assert figures["centrifuge_sensitivity_percent"].uncertainty == pytest.approx(0.25, rel=0.01)
+    assert any(text.startswith("reads +") and "beside rω²" in text for text in texts)
+
+
+def test_the_error_of_the_sensor_is_that_of_the_sensitivity_and_one_that_is_off_is_told() -> None:
+    figures, _ = of_sensor(stretch=0.0, gain=1.002)
+    assert figures["centrifuge_sensitivity_percent"].value == pytest.approx(-0.2, abs=0.01)
+    dead, _ = of_sensor(stretch=0.0, gain=0.0)
+    assert "check its cable" in dead["centrifuge_linearity_percent"].note

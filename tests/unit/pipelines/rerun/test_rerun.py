@@ -80,7 +80,7 @@ def test_other_limits_only_grade_again(run: Run) -> None:
 def test_another_model_begins_at_the_fit_and_says_so(run: Run) -> None:
     outcome = again(run.archive, run.id, change_from_options(effects=LARGER))
     new = finished(run, outcome)
-    assert computed(outcome) == ["fit", "judge", "verify", "noise", "procedures", "budget", "grade"]
+    assert computed(outcome) == ["fit", "judge", "verify", "noise", "soak_noise", "procedures", "budget", "grade"]
     assert "third_order" in set(new.table("coefficients")["effect"])
     assert new.manifest("dwells")["taken_from"] == run.id
     assert outcome.because[0]["what"] == "model"

@@ -1,0 +1,72 @@
+"""What an exposure changed for good: the shift of bias and scale between the same poses before and after it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import norm, t
+
+from inertial.arrays import Array, Flags
+from inertial.dynamics.stability import ShortNoise, difference_variance
+from inertial.dynamics.wander import stated_error
+from inertial.errors import NotIdentified
+
+FEWEST_LEFT = 4
+"""Degrees of freedom that the repeated poses must leave."""
+
+
+@dataclass(frozen=True)
+class Shift:
+    """A change with its standard uncertainty, half of whose U (k = 2) has 95 %; in the unit of the output, or of output per g."""
+
+    value: float
+    u: float
+
+
+@dataclass(frozen=True)
+class ExposureShift:
+    """Change of bias and of the response along the axis; ``left`` (n,) is what the model of all records leaves."""
+
+    bias: Shift
+    scale: Shift
+    left: Array
+
+
+def exposure_shift(
+    force: Array, output: Array, after: Flags, axis: int, noise: ShortNoise, window_s: float, apart_s: float
+) -> ExposureShift:
+    """Least squares of a bias and a response to the three forces before, and of the change of each after an exposure.
+
+    Poses must come at least twice in each of the two groups: their scatter is the uncertainty of the means. Beside it the bias
+    has wandered by 1/f noise between the groups, which no scatter inside them shows.
+
+    Parameters
+    ----------
+    force, output, after : (n, 3) in g, (n,) and (n,) of the records
+    noise : of one record, unit of the output
+    window_s, apart_s : duration of a group, and between the middles of both
+
+    Raises
+    ------
+    NotIdentified
+        Too few records, or poses that do not tell bias from response.
+    """
+    own = np.column_stack([np.ones(len(force)), force])
+    rows = np.hstack([own, own * after[:, None]])
+    dof = len(rows) - rows.shape[1]
+    if dof < FEWEST_LEFT or np.linalg.matrix_rank(rows) < rows.shape[1]:
+        raise NotIdentified(
+            f"exposure: {len(rows)} records for {rows.shape[1]} unknowns, {rows.shape[1] + FEWEST_LEFT} in six poses are needed; "
+            "raise repeats"
+        )
+    inverse = np.linalg.inv(rows.T @ rows)
+    fitted = inverse @ rows.T @ output
+    left = output - rows @ fitted
+    spread = np.sqrt(float(left @ left) / dof * np.diagonal(inverse)) * float(t.ppf(0.975, dof) / norm.ppf(0.975))
+    slope = difference_variance(window_s, apart_s)
+    wandered = stated_error(noise.flicker * slope, slope, noise.flicker_error)
+    bias, scale = 4, 5 + axis
+    return ExposureShift(
+        Shift(float(fitted[bias]), float(np.hypot(spread[bias], wandered))),
+        Shift(float(fitted[scale]), float(spread[scale])),
+        left,
+    )

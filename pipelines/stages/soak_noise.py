@@ -1,0 +1,190 @@
+"""White noise of each soak from the samples of its dwells, and its curve over temperature."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from inertial.arrays import Array, Index
+from inertial.decisions import LOUDER_BELOW
+from inertial.estimation.scatter import difference_p
+from inertial.noise.allan import curve_of, variances
+from inertial.noise.over_temperature import density_curve
+from inertial.noise.resolution import step_of
+from inertial.noise.terms import NoiseTerms, fit_terms
+from pipelines.stages.noise import FEWEST, limits_where_unexplained
+from pipelines.stages.static_record import COUNTED, Coarse, remark, without_digits
+from pipelines.tables.calibration import Calibration, read_calibration
+from pipelines.tables.frames import empty_table, rows_of
+from pipelines.tables.summaries import PROCEDURE, STATIC, by_record
+from schemas.units import MICRO
+
+APART_K = 5.0
+"""Between the coldest and the hottest soak, from which on noise is compared; and the most that one soak may move."""
+NORMAL_95 = 1.959964
+GROWS, FALLS, DIFFERS, SAME = ("grows", "falls", "differs", "steady")
+UNIT = "µg/√Hz"
+
+
+@dataclass
+class _Soak:
+    """What the dwells of one soak have shown of one unit: sums over the records of equal length.
+
+    total : (axes, t), of Allan variances, output unit squared · step : (axes,), finest step between digits, 0 for fine ones
+    """
+
+    m: Index
+    n: int
+    rate_hz: float
+    total: Array
+    step: Array
+    records: int = 0
+    temperatures: list[float] = field(default_factory=list[float])
+
+
+def soak_noise(
+    samples: Iterable[pd.DataFrame],
+    readings: pd.DataFrame,
+    coefficients: pd.DataFrame,
+    covariance: pd.DataFrame,
+) -> dict[str, pd.DataFrame]:
+    """White noise N of every soak (table ``soak_noise``) and what it does over temperature (table ``noise_temperature``).
+
+    N is that of IEEE Std 952 in µg/√Hz, two-sided, with a 95 % interval: the term of the noise stage, of the mean of the Allan
+    variances of all dwells of the soak. ``curve`` is the fitted density, ``curve_u`` its standard uncertainty. p is the F test by
+    which the judge tells louder soaks, over the axes of all units. No rows where the soaks are not apart in temperature.
+    """
+    if coefficients.empty:
+        return _nothing()
+    calibration = read_calibration(coefficients, covariance)
+    soaks = _soaks(samples, readings, calibration)
+    rows = [row for (unit, soak), one in sorted(soaks.items()) for row in _soak_rows(unit, soak, one, calibration)]
+    table = pd.DataFrame(rows)
+    if not rows or np.ptp(table["temperature_C"].to_numpy(dtype=float)) < APART_K:
+        return _nothing()
+    table = table.sort_values(["unit", "axis", "soak"], ignore_index=True)
+    p = _difference(table)
+    table[["curve", "curve_u"]] = np.nan
+    changes = [_change(table, own, p) for _, own in table.groupby(["unit", "axis"], sort=False)]
+    known = [one for one in changes if one is not None]
+    return {"soak_noise": table, "noise_temperature": pd.DataFrame(known)} if known else _nothing()
+
+
+def _soaks(
+    samples: Iterable[pd.DataFrame], readings: pd.DataFrame, calibration: Calibration
+) -> dict[tuple[str, int], _Soak]:
+    """The sums of every unit and soak; a soak whose temperature moved is left out, and records of another length."""
+    kept = readings[~readings["kind"].isin([STATIC, PROCEDURE]) & (readings["status"] == "ok")]
+    found = {(int(r["record"]), str(r["unit"])): r for r in rows_of(kept)}
+    lengths = kept["n"].mode()
+    soaks: dict[tuple[str, int], _Soak] = {}
+    for record, tables in by_record(samples):
+        for unit, own in pd.concat(tables).groupby("unit", sort=False):
+            reading = found.get((record, str(unit)))
+            output = own[list(calibration.letters)].to_numpy(dtype=float).T
+            n, finite = len(own), bool(np.isfinite(output).all())
+            if reading is None or n != lengths.iloc[0] or n < FEWEST or not finite:
+                continue
+            m, variance = variances(output, float(reading["rate_hz"]))
+            soak = soaks.setdefault(
+                (str(unit), int(reading["soak"])),
+                _Soak(m, n, float(reading["rate_hz"]), np.zeros_like(variance), np.full(len(output), np.inf)),
+            )
+            soak.total += variance
+            soak.step = np.fmin(soak.step, [_step(axis) for axis in output])
+            soak.records += 1
+            soak.temperatures.append(float(reading["unit_C"]))
+    return {key: one for key, one in soaks.items() if np.ptp(one.temperatures) <= APART_K}
+
+
+def _step(values: Array) -> float:
+    different = np.unique(values)
+    return step_of(different) if different.size <= COUNTED else 0.0
+
+
+def _soak_rows(unit: str, soak: int, one: _Soak, calibration: Calibration) -> list[dict[str, Any]]:
+    if unit not in calibration.units:
+        return []
+    scale = np.abs(calibration.scale[calibration.units.index(unit)]) / MICRO
+    mean = one.total / one.records / scale[:, None] ** 2
+    alive = np.flatnonzero((mean > 0.0).all(axis=1))
+    if not alive.size:
+        return []
+    curve = curve_of(mean[alive], one.m, one.n, one.rate_hz, one.records)
+    # the Allan variance of neighbours is the variance of a sample by their differences
+    digits = [Coarse(float(one.step[a] / scale[a]), float(mean[a, 0]), np.inf) for a in alive.tolist()]
+    terms = without_digits(limits_where_unexplained(curve, fit_terms(curve, only="N")), digits, one.rate_hz)
+    return [
+        {
+            "unit": unit,
+            "axis": calibration.letters[axis],
+            "soak": soak,
+            "temperature_C": float(np.mean(one.temperatures)),
+            "dwells": one.records,
+            **_white(terms, place),
+            "unit_text": UNIT,
+            "note": remark(digits[place]),
+        }
+        for place, axis in enumerate(alive.tolist())
+    ]
+
+
+def _white(terms: NoiseTerms, place: int) -> dict[str, Any]:
+    n = terms.symbols.index("N")
+    value, low, high = (float(part[place, n]) for part in (terms.value, terms.low, terms.high))
+    return {"value": value, "low": low, "high": high, "identified": bool(np.isfinite(value))}
+
+
+def _difference(table: pd.DataFrame) -> float:
+    """Probability of the differences between soaks over the axes of all units; nan for fewer than two axes in all soaks."""
+    sizes = table.pivot_table(index=["unit", "axis"], columns="soak", values="value").dropna()
+    if len(sizes) < 2 or sizes.shape[1] < 2:
+        return float("nan")
+    return difference_p(2.0 * np.log(sizes.to_numpy(dtype=float)))
+
+
+def _change(table: pd.DataFrame, own: pd.DataFrame, p: float) -> dict[str, Any] | None:
+    """The change of one axis over temperature; its curve is written into the rows of the table."""
+    known = own[own["identified"]]
+    temperature, value = (known[name].to_numpy(dtype=float) for name in ("temperature_C", "value"))
+    u = (known["high"] - known["low"]).to_numpy(dtype=float) / (2.0 * NORMAL_95)
+    curve = density_curve(temperature, value, u) if len(known) > 1 and np.ptp(temperature) >= APART_K else None
+    if curve is None:
+        return None
+    table.loc[own.index, "curve"], table.loc[own.index, "curve_u"] = curve.at(
+        own["temperature_C"].to_numpy(dtype=float)
+    )
+    cold, hot = float(temperature.min()), float(temperature.max())
+    ratio, u_ratio = curve.ratio(cold, hot)
+    u_p = NORMAL_95 * u_ratio
+    return {
+        **{name: own[name].iloc[0] for name in ("unit", "axis")},
+        "cold_C": cold,
+        "hot_C": hot,
+        "ratio": ratio,
+        "low": ratio - u_p,
+        "high": ratio + u_p,
+        "p_value": p,
+        "verdict": verdict(ratio, u_p, p),
+    }
+
+
+def verdict(ratio: float, half: float, p: float) -> str:
+    """What noise does over temperature, by the probability of equal soaks and the ratio of the ends with its 95 % half width."""
+    if not p < LOUDER_BELOW:
+        return SAME
+    return GROWS if ratio - half > 1.0 else FALLS if ratio + half < 1.0 else DIFFERS
+
+
+def _nothing() -> dict[str, pd.DataFrame]:
+    return {
+        "soak_noise": empty_table(
+            texts="unit axis unit_text note",
+            numbers="temperature_C value low high curve curve_u",
+            whole="soak dwells",
+            flags="identified",
+        ),
+        "noise_temperature": empty_table(texts="unit axis verdict", numbers="cold_C hot_C ratio low high p_value"),
+    }

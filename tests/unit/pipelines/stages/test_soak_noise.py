@@ -1,0 +1,104 @@
+"""White noise of each soak and its change with temperature, from the samples of a simulated thermal run."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from pipelines.stages.soak_noise import DIFFERS, FALLS, GROWS, SAME, soak_noise, verdict
+from pipelines.tables.calibration import column_names
+
+LEVELS = (-40.0, 0.0, 40.0, 80.0)
+DENSITY = 20.0  # µg/√Hz, two-sided, at 25 °C
+RATE, N = 100.0, 400
+
+
+def run_of(
+    per_K: float, seed: int, units: int = 2, dwells: int = 6
+) -> tuple[list[pd.DataFrame], pd.DataFrame, pd.DataFrame, pd.DataFrame]:
+    """Samples, readings, coefficients and their covariance of units whose white noise grows by a share per kelvin."""
+    rng, scale = np.random.default_rng(seed), 2.0
+    samples, readings = [], []
+    for soak, level in enumerate(LEVELS):
+        sigma = 1e-6 * DENSITY * np.sqrt(RATE) * np.exp(per_K * (level - 25.0)) * scale
+        for k in range(dwells):
+            record = soak * dwells + k
+            parts = []
+            for u in range(units):
+                unit = f"U{u}"
+                output = rng.uniform(-1.0, 1.0, 3) + sigma * rng.standard_normal((N, 3))
+                parts.append(
+                    pd.DataFrame(
+                        {
+                            "record": record,
+                            "kind": "dwell",
+                            "unit": unit,
+                            "x": output[:, 0],
+                            "y": output[:, 1],
+                            "z": output[:, 2],
+                        }
+                    )
+                )
+                readings.append(
+                    {
+                        "unit": unit,
+                        "record": record,
+                        "kind": "dwell",
+                        "status": "ok",
+                        "soak": soak,
+                        "unit_C": level + 0.1 * u,
+                        "rate_hz": RATE,
+                        "n": N,
+                    }
+                )
+            samples.append(pd.concat(parts))
+    names = column_names(("bias", "scale"))
+    coefficients = pd.DataFrame(
+        [
+            {"unit": f"U{u}", "axis": axis, "effect": effect, "name": name, "value": value, "standard_error": 0.0}
+            for u in range(units)
+            for k, axis in enumerate("xyz")
+            for (effect, name), value in zip(names[k], (0.0, scale), strict=True)
+        ]
+    )
+    covariance = pd.DataFrame(
+        [
+            {"unit": f"U{u}", "axis": axis, "row": i, "column": j, "value": 0.0}
+            for u in range(units)
+            for axis in "xyz"
+            for i in range(2)
+            for j in range(i + 1)
+        ]
+    )
+    return samples, pd.DataFrame(readings), coefficients, covariance
+
+
+def test_noise_that_grows_is_told_with_its_ratio_on_every_axis() -> None:
+    tables = soak_noise(*run_of(0.006, seed=3))
+    change, soaks = tables["noise_temperature"], tables["soak_noise"]
+    true = np.exp(0.006 * 120.0)
+    assert change["verdict"].tolist() == [GROWS] * 6
+    assert np.all((change["low"] < true + 0.15) & (true - 0.15 < change["high"]))
+    assert change["ratio"].mean() == pytest.approx(true, rel=0.05)
+    assert change["p_value"].max() < 1e-6
+    at = soaks[soaks["soak"] == 1]
+    assert at["value"].mean() == pytest.approx(DENSITY * np.exp(-0.006 * 25.0), rel=0.05)
+    assert np.all(np.abs(soaks["curve"] / (DENSITY * np.exp(0.006 * (soaks["temperature_C"] - 25.0))) - 1.0) < 0.15)
+
+
+def test_noise_that_stays_is_told_to_stay() -> None:
+    named = [soak_noise(*run_of(0.0, seed=seed))["noise_temperature"]["verdict"].iloc[0] for seed in range(20, 28)]
+    assert named == [SAME] * 8
+
+
+def test_soaks_at_one_temperature_and_units_without_coefficients_have_no_rows() -> None:
+    samples, readings, coefficients, covariance = run_of(0.006, seed=4, units=1)
+    near = readings.assign(unit_C=25.0 + 0.5 * readings["soak"])
+    assert soak_noise(samples, near, coefficients, covariance)["noise_temperature"].empty
+    assert soak_noise(samples, readings, coefficients.iloc[:0], covariance.iloc[:0])["soak_noise"].empty
+
+
+def test_the_verdict_needs_both_the_test_and_the_ratio() -> None:
+    assert verdict(1.5, 0.1, 1e-9) == GROWS
+    assert verdict(0.5, 0.1, 1e-9) == FALLS
+    assert verdict(1.05, 0.1, 1e-9) == DIFFERS
+    assert verdict(1.5, 0.1, 1e-3) == verdict(1.5, 0.1, float("nan")) == SAME
