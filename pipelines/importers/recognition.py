@@ -179,6 +179,8 @@ def _open(guessed: Guesses, output: Array | None) -> list[str]:
 def _time(content: Content, guessed: Guesses) -> tuple[Array | None, list[str]]:
     """Seconds of every row, and missing options."""
     name = guessed.column("time")
+    if not name and content.interval_s is not None and not guessed.dwells:
+        return content.interval_s * np.arange(len(content.table), dtype=np.float64), []
     if not name:
         return None, [] if guessed.dwells else [_NO_CLOCK]
     column = content.table[name]

@@ -1,4 +1,4 @@
-"""Loggers that persons wear: CWA of Axivity, GT3X of ActiGraph, .bin of GENEActiv; acceleration with the temperature beside it."""
+"""Worn loggers: CWA of Axivity, GT3X of ActiGraph, .bin of GENEActiv; acceleration with the temperature beside it."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 
 from pipelines.importers.content import Content
+from pipelines.importers.limited_process import reserving
 from pipelines.importers.unpacking import refuse_larger
 from schemas.errors import DataRejected
 from schemas.foreign import foreign
@@ -21,6 +22,10 @@ NAME, TITLE, EXTRA, ORDER = "wearable", "CWA, GT3X and GENEActiv", "wearable", 2
 CWA, GENEACTIV, PACKED = b"MD\xfc\x03", b"Device Identity", b"PK\x03\x04"
 PARTS = (b"info.txt", b"log.bin")
 """Of a GT3X file, which is a zip archive."""
+RESERVED = 4_250_000_000
+"""Bytes of address space that the library reserves for every GT3X file, whatever it holds."""
+FROM_PARAMETERS = "device_feature_enabled"
+"""What the library tells of a GT3X file whose parameters it has read."""
 REMEDY = "download it again from the device, or export it as CSV with its maker's program"
 COLUMNS = {"acceleration": ("g", "acc"), "gyroscope": ("deg/s", "gyr")}
 
@@ -39,14 +44,19 @@ def read(name: str, data: bytes, group: str) -> Content:
     with tempfile.TemporaryDirectory() as folder:  # the library opens a file
         path = Path(folder) / "record"
         path.write_bytes(data)
-        with foreign(f"{name}: a record of a worn logger that cannot be read", REMEDY):
+        packed = data.startswith(PACKED)
+        with foreign(f"{name}: a record of a worn logger that cannot be read", REMEDY), reserving(RESERVED * packed):
             found = actfast.read(path)
     series: dict[str, dict[str, Any]] = found["timeseries"]
     own = next((one for one in series.values() if len(one.get("acceleration", ()))), None)
     if own is None:
         raise DataRejected(
             f"{name}: {found['format']}: no samples of acceleration were found, some are needed; "
-            "export it as CSV with its maker's program (packets of old ActiGraph firmware are not read)"
+            "export it as CSV with its maker's program (ActiGraph's packets ACTIVITY2 are not read)"
+        )
+    if packed and FROM_PARAMETERS not in found["metadata"]:  # the library would take a rate and a scale of its own
+        raise DataRejected(
+            f"{name}: {found['format']}: no packet of parameters, which state rate and scale; {REMEDY.partition(', or ')[2]}"
         )
     when = np.asarray(own["datetime"], dtype=np.int64)  # ns since 1970: no float holds them
     columns: dict[str, Any] = {"time": 1e-9 * (when - when[0])}
