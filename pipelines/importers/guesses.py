@@ -179,6 +179,7 @@ def _time(table: pd.DataFrame, numeric: dict[str, Array], guessed: dict[str, Gue
     uncounted = [name for name in growing if not triads.COUNT.search(name)]
     named = fine or [name for name in uncounted if _TIME.search(name)]
     even = [name for name in uncounted if not (_AXIS.search(name) or triads.is_row_number(numeric[name]))]
+    even = [name for name in even if np.mean(np.diff(numeric[name]) > 0.0) > 0.5]  # not two levels of something else
     if named:
         guessed[named[0]] = Guess("time", "its name, and it only increases")
     elif even:

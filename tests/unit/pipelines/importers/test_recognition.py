@@ -361,6 +361,28 @@ def test_a_record_that_never_rests_has_no_stops_and_a_noisy_one_at_rest_has(rng:
         assert any("are no rest" in text for text in made.remarks) is (stops == 0)
 
 
+def test_files_that_follow_one_another_are_positions_of_their_own(rng: Rng, tmp_path: Path) -> None:
+    """A file for each face, without a move at its ends."""
+    paths = []
+    for k, force in enumerate(np.vstack([np.eye(3), -np.eye(3)])):
+        columns = {"time [s]": np.arange(400) / 100.0}
+        named(columns, "ax[g] ay[g] az[g]", accelerations(rng, np.tile(force, (400, 1))))
+        paths.append(csv(tmp_path / f"face-{k}.csv", columns))
+    seen = recognise(paths, join="rows")
+    assert seen.stops is not None
+    assert seen.stops.found.spans == tuple((400 * k, 400 * (k + 1)) for k in range(6))
+    assert seen.import_command.endswith("--set join=rows")
+
+
+def test_two_levels_of_something_are_no_clock(rng: Rng, tmp_path: Path) -> None:
+    columns = {
+        "length": rng.uniform(30.0, 60.0, 8),
+        "frequency": rng.uniform(4.0, 100.0, 8),
+        "mode": np.repeat([1.0, 2.0], 4),
+    }
+    assert recognise([csv(tmp_path / "a.csv", columns)]).guessed.column("time") == ""
+
+
 IN_EXCHANGE_FORMAT = {
     "unit": "unit", "dwell": "dwell", "time": "time_s", "n": "n", "duration": "duration_s", "temperature": "unit_C",
     "slot": "slot", "outer": "outer_deg", "inner": "inner_deg", "since_move": "since_move_s", "since_power": "since_power_s",
