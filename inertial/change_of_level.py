@@ -15,6 +15,8 @@ _EXPLAINED = 0.9
 _CLEAR_STEP = 8.0
 """Steps between levels, in standard deviations of the noise: a ramp that is cut into levels has smaller ones."""
 _SHORTEST = 5
+_USUAL = 2 * _SHORTEST
+"""Samples in the usual piece of levels: pieces near the shortest are those of a motion."""
 _MOST = 2000
 
 
@@ -44,7 +46,7 @@ def neighbour_noise(x: ArrayLike) -> Array:
 
 
 def several_levels(x: ArrayLike) -> int:
-    """How many positions a stretch (n, k) seems to hold back to back; 1 where its scatter is that of its noise, or no levels."""
+    """How many positions a stretch (n, k) seems to hold back to back; 1 where it scatters as its noise or a motion does."""
     data = np.asarray(x, dtype=np.float64)
     if len(data) < 4 * _SHORTEST:
         return 1
@@ -52,7 +54,7 @@ def several_levels(x: ArrayLike) -> int:
     if not np.any(data.std(axis=0) > _MANY_TIMES * noise):
         return 1
     pieces = levels(data, None)
-    if len(pieces) < 2 or pieces.explained < _EXPLAINED:
+    if not 2 <= len(pieces) < min(_MOST, len(data) / _USUAL) or pieces.explained < _EXPLAINED:
         return 1
     means = np.stack([data[a:b].mean(axis=0) for a, b in zip(pieces.start, pieces.stop, strict=True)])
     steps = np.linalg.norm(np.diff(means, axis=0) / np.where(noise > 0.0, noise, 1.0), axis=1)

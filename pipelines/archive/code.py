@@ -73,6 +73,7 @@ CODE = {
         *("pipelines.stages.grade", "pipelines.stages.uncertainty"),
     ),
     "import": _READ,
+    "import with a fit": (*_READ, "pipelines.diagnosis", "pipelines.parallel", "pipelines.stages"),
     "import of waveforms": (*_PROCEDURES, "pipelines.archive", "pipelines.importers"),
     "import of a transfer function": _READ,
     "report": (*(*_DRAWN, "stations", "pipelines.capture", "pipelines.importers", "pipelines.jobs"),),

@@ -32,11 +32,14 @@ def verdict(document: dict[str, Any]) -> str:
     if document["adequate"] is not False:
         return f"{told}."
     spoilt = [class_text(group) for group in document["classes"] if group["scope"] == "data"]
+    single = document.get("leave_out") or {}
     named = [" or ".join(group["effects"]) for group in document["classes"] if group["scope"] != "data"]
     if spoilt:
         rest = f"; also missing: {', and '.join(named)}" if named else ""
         passes = not named and not document["unexplained"] and error["p_value"] >= ADEQUATE_ABOVE
-        without = f"{'the model is adequate' if passes else 'it is not adequate either'}: {figures}"
+        unknown = "adequate_without" in single and single["adequate_without"] is None
+        found = "is adequate" if passes else "is not adequate either"
+        without = f"the model {'cannot be judged' if passes and unknown else found}: {figures}"
         return f"NOT ADEQUATE: the run has faults of the data: {'; '.join(spoilt)}; without them {without}{rest}."
     if named:
         return f"{told}; missing: {', and '.join(named)}."

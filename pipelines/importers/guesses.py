@@ -21,7 +21,10 @@ _FINE = re.compile(r"sample_?time_?fine", re.IGNORECASE)
 FINE_HZ = 1e4
 _AXIS = re.compile(r"(?:^|[_ .])[xyz](?:$|[_ .])", re.IGNORECASE)
 _LETTER = re.compile(r"(?:^a?|acc|[_ .])([xyz])(?:$|[_ .\[(])", re.IGNORECASE)
-_SPREAD = re.compile(r"^(?:sd|std|sigma|s)[_ .]*(?:acc\w*?|a|out)?[_ .]*([xyz])$", re.IGNORECASE)
+_SPREAD = re.compile(
+    r"^(?:sd|std|sigma|s)[_ .]*(?:acc\w*?|a|out)?[_ .]*([xyz])$|^([xyz])[_ .]*(?:sd|std|sigma)(?:$|[_ .(\[])",
+    re.IGNORECASE,
+)
 _OF_SENSOR = re.compile(r"imu|acc|gyr|gtemp|sensor|die|chip|mpu|unit", re.IGNORECASE)
 _FASTEST_K_S = 2.0
 """Rate of temperature that no chamber reaches."""
@@ -116,7 +119,11 @@ def _named(table: pd.DataFrame, numeric: dict[str, Array], guessed: dict[str, Gu
 
 
 def _of_dwells(numeric: dict[str, Array], guessed: dict[str, Guess], inside: Flags) -> None:
-    """Note what is read so in a table of dwells alone: the number of samples, and the numbers of the dwells."""
+    """Note what is read so in a table of dwells alone: the number of samples, the force, and the numbers of the dwells."""
+    if not set(FORCE_COLUMNS) & {guess.meaning for guess in guessed.values()}:
+        acting = triads.references({name: one for name, one in numeric.items() if not guessed[name].meaning})
+        for force, name in zip(FORCE_COLUMNS, acting, strict=False):
+            guessed[name] = Guess(force, "its name, and its size is that of gravity")
     for name in named_columns.OF_DWELLS:
         if name in numeric and not guessed[name].meaning:
             guessed[name] = Guess(named_columns.MEANING_OF[name], "its name")
@@ -172,6 +179,7 @@ def _time(table: pd.DataFrame, numeric: dict[str, Array], guessed: dict[str, Gue
     uncounted = [name for name in growing if not triads.COUNT.search(name)]
     named = fine or [name for name in uncounted if _TIME.search(name)]
     even = [name for name in uncounted if not (_AXIS.search(name) or triads.is_row_number(numeric[name]))]
+    even = [name for name in even if np.mean(np.diff(numeric[name]) > 0.0) > 0.5]  # not two levels of something else
     if named:
         guessed[named[0]] = Guess("time", "its name, and it only increases")
     elif even:
@@ -251,7 +259,7 @@ def _others(content: Content, table: pd.DataFrame, numeric: dict[str, Array], gu
             continue
         spread = _SPREAD.match(name)
         if name in numeric and spread:
-            guessed[name] = Guess(f"sd_{spread[1].lower()}", "its name")
+            guessed[name] = Guess(f"sd_{(spread[1] or spread[2]).lower()}", "its name")
         elif name not in numeric and table[name].dtype.kind not in "fiu" and not _column(guessed, "dwell"):
             distinct = int(table[name].nunique())
             if 1 < distinct <= max(2, len(table) // 10):

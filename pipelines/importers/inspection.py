@@ -27,6 +27,7 @@ from pipelines.importers.stretches import Stops
 from schemas.errors import TumblelineError
 
 _MOST_INTERVALS = 2000
+_NO_REST = "no position at rest was found: an import keeps the record, without dwells"
 _REFERENCE = re.compile(r"(?:^|[^a-z])(?:ref\w*|input|drive|base|shaker|exciter|std)(?:[^a-z]|$)", re.IGNORECASE)
 _SLOWEST_HZ = 200.0
 """Least rate of a dynamic recording: slower ones are of a unit at rest or turned by hand."""
@@ -70,7 +71,7 @@ def _document(seen: Recognition, open_: list[str], command: str) -> InspectDocum
         "form": seen.source.form,
         "rows": len(content.table),
         "columns": _columns(content, guessed),
-        "remarks": list(content.remarks),
+        "remarks": [*content.remarks, *([_NO_REST] if seen.stops is not None and not len(seen.stops.found) else [])],
         "time_unit": guessed.time_unit.meaning,
         "time_reason": guessed.time_unit.reason,
         "output_unit": guessed.output.meaning,

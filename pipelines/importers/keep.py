@@ -145,4 +145,5 @@ def keep(
     tables |= {} if data.dwells is None else {"dwells": data.dwells}
     if judged is not None and judged.coefficients:
         tables |= {"coefficients": pd.DataFrame(judged.coefficients)} | judged.tables
-    return keep_tables("import", source.sha256, parameters, about, tables, archive)
+    kind = "import" if judged is None else "import with a fit"
+    return keep_tables(kind, source.sha256, parameters, about, tables, archive)

@@ -16,8 +16,8 @@ import struct
 import sys
 import threading
 import traceback
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Generator
+from contextlib import contextmanager, suppress
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -131,6 +131,22 @@ def _limit(memory: int, seconds: int) -> None:
     ):
         hard = resource.getrlimit(kind)[1]
         resource.setrlimit(kind, (value if hard == resource.RLIM_INFINITY else min(value, hard), hard))
+
+
+@contextmanager
+def reserving(size: int) -> Generator[None]:
+    """More address space for a library that reserves so many bytes and uses few; nothing where no reading is limited."""
+    limits = resource.getrlimit(resource.RLIMIT_AS) if is_reader() else (resource.RLIM_INFINITY,) * 2
+    if limits[0] == resource.RLIM_INFINITY:
+        yield
+        return
+    soft, hard = limits
+    wider = soft + size
+    resource.setrlimit(resource.RLIMIT_AS, (wider if hard == resource.RLIM_INFINITY else min(wider, hard), hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, limits)
 
 
 def _pages(column: int) -> int:

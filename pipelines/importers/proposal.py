@@ -90,7 +90,7 @@ def columns_and_units(content: Content, guessed: guesses.Guesses, path: Path) ->
     if guessed.dwells:
         keys["rows"] = "dwells"
     elif not time:
-        keys["rate_hz"] = "HZ"
+        keys["rate_hz"] = "HZ" if content.interval_s is None else 1.0 / content.interval_s
     elif guessed.time_unit.meaning == "samples":
         keys["rate_hz"] = guesses.FINE_HZ
     return keys

@@ -25,7 +25,7 @@ class Recognition:
     """A recording as it is recognised.
 
     source : the files · time, output : (n,) s and (n, 3) of the rows with all numbers; None where there are none
-    labels : of these rows, where a column marks the dwells
+    labels : of these rows, where a column marks the dwells · joints : numbers of these rows before which another file begins
     gaps : in time · stops : None where no record was searched · faults : of the samples · open : what the file does not state
     keys : of the mapping, with words in capitals for what is open · is_exchange : a table of dwells, read as it is
     """
@@ -44,6 +44,7 @@ class Recognition:
     open: tuple[str, ...] = ()
     keys: dict[str, Any] | None = None
     labels: tuple[str, ...] | None = None
+    joints: tuple[int, ...] = ()
 
     @property
     def import_command(self) -> str:
@@ -61,9 +62,9 @@ class Recognition:
             labels = self.content.table[named].astype(str).tolist() if whole else own
             return self._proposal(self.keys, self.output, labels)
         time = np.arange(len(self.output)) / ASSUMED_HZ if self.time is None else self.time
-        stops = self.stops or _stops(self.output, time)
+        stops = self.stops or _stops(self.output, time, self.joints)
         if self.labels is not None and stops is not None:
-            found, every = stretches.labelled(self.labels, _edges(time), stops.found)
+            found, every = stretches.labelled(self.labels, _edges(time, self.joints), stops.found)
             proposal = self._of_stretches(self.keys, found, time)
             if every or proposal.fit == "faces":  # named faces leave the other labels out
                 return proposal
@@ -98,17 +99,28 @@ _NO_CLOCK = "the rate of the samples: no column of time was recognised and the f
 def recognise(paths: Sequence[Path], *, join: str = "", group: str = "") -> Recognition:
     """The recording of one or several files, which are joined as :func:`pipelines.importers.sources.read` does."""
     first, source = files.read_content(paths[0], group)
-    content = first
+    content, breaks = first, ()
     if len(paths) > 1:
         time_name = guesses.guesses(first).column("time")
-        content, source, _ = sources.read(paths, join=join, time=time_name, group=group)
-    return of_content(content, source, paths, {"join": join} if join else {}, {"group": group} if group else {})
+        content, source, breaks = sources.read(paths, join=join, time=time_name, group=group)
+    stated = ({"join": join} if join else {}, {"group": group} if group else {})
+    return of_content(content, source, paths, *stated, breaks=breaks)
 
 
 def of_content(
-    content: Content, source: files.SourceFile, paths: Sequence[Path], *stated: dict[str, Any]
+    content: Content,
+    source: files.SourceFile,
+    paths: Sequence[Path],
+    *stated: dict[str, Any],
+    breaks: Sequence[int] = (),
 ) -> Recognition:
-    """The recording of a file that was read; ``stated``: keys of the mapping that the user gave."""
+    """The recording of a file that was read.
+
+    Parameters
+    ----------
+    stated : keys of the mapping that the user gave
+    breaks : rows before which another file begins
+    """
     if len(paths) == 1 and is_exchange(content.table.columns):
         guessed = guesses.guesses_of_dwells(content.table)
         return Recognition(tuple(paths), content, source, guessed, is_exchange=True)
@@ -123,7 +135,8 @@ def of_content(
     steps = np.diff(own) if own is not None else np.zeros(0)
     gaps = int(np.count_nonzero(steps > gap_limit(steps)))
     faults = sample_faults.look(kept) if kept is not None and len(kept) > 3 and not guessed.dwells else None
-    stops = _stops(kept, own) if kept is not None and own is not None and not guessed.dwells else None
+    joints = tuple(np.searchsorted(np.flatnonzero(whole), breaks).tolist())
+    stops = _stops(kept, own, joints) if kept is not None and own is not None and not guessed.dwells else None
     named = guessed.column("dwell")
     labels = None
     if named and kept is not None and not guessed.dwells:
@@ -137,7 +150,8 @@ def of_content(
     keys |= {"faulty": "leave-out"} if faults else {}
     open_ += _open(guessed, kept)
     return Recognition(
-        tuple(paths), content, source, guessed, False, own, kept, gaps, _rate(own), stops, faults, tuple(open_), keys, labels
+        tuple(paths), content, source, guessed, False, own, kept, gaps, _rate(own), stops, faults, tuple(open_), keys, labels,
+        joints,
     )  # fmt: skip
 
 
@@ -179,6 +193,8 @@ def _open(guessed: Guesses, output: Array | None) -> list[str]:
 def _time(content: Content, guessed: Guesses) -> tuple[Array | None, list[str]]:
     """Seconds of every row, and missing options."""
     name = guessed.column("time")
+    if not name and content.interval_s is not None and not guessed.dwells:
+        return content.interval_s * np.arange(len(content.table), dtype=np.float64), []
     if not name:
         return None, [] if guessed.dwells else [_NO_CLOCK]
     column = content.table[name]
@@ -226,18 +242,18 @@ def _output(content: Content, guessed: Guesses) -> Array | None:
     return np.column_stack([measurable(values.as_numbers(content.table[name], name)) for name in names])
 
 
-def _stops(output: Array, time: Array) -> stretches.Stops | None:
+def _stops(output: Array, time: Array, joints: Sequence[int] = ()) -> stretches.Stops | None:
     """The stops of a record; None of a few samples, or of a clock that does not advance."""
     steps = np.diff(time)
     if len(output) < 3 or np.any(steps < 0.0) or not np.any(steps > 0.0):
         return None
-    return stretches.found_stops(output, time, _edges(time))
+    return stretches.found_stops(output, time, _edges(time, joints))
 
 
-def _edges(time: Array) -> list[int]:
-    """The samples before which time has a gap, with the first and one past the last."""
+def _edges(time: Array, joints: Sequence[int] = ()) -> list[int]:
+    """The samples before which time has a gap or another file begins, with the first and one past the last."""
     steps = np.diff(time)
-    return [0, *(np.flatnonzero(steps > gap_limit(steps)) + 1).tolist(), len(time)]
+    return sorted({0, *(np.flatnonzero(steps > gap_limit(steps)) + 1).tolist(), *joints, len(time)})
 
 
 def _handling(stops: stretches.Stops, time: Array) -> str:

@@ -12,6 +12,7 @@ from inertial import change_of_level, static_intervals
 from inertial.arrays import Array
 from pipelines.importers.mapping import Mapping
 from schemas.errors import DataRejected, did_you_mean
+from schemas.units import AXES
 
 WINDOWS_S = (1.0, 0.5, 0.25)
 """Windows of the search for stops, s: a hand rests for a second or more, in a hurry for less."""
@@ -21,6 +22,9 @@ _SHIFTED = 0.2
 """Share of the stops in which a hand may have shifted the sensor."""
 HANDLED = 4.0
 """Scatter of a block over that of most, above which the sensor is held by a hand."""
+MOTION, BEYOND_NOISE = 0.05, 1.5
+"""Scatter of a stretch over the size of its mean, and over the noise of neighbouring samples, above which it is motion: a sensor
+that turns by 0.05 rad has a mean 1.3 mg short of gravity. White noise has a ratio of 1, a hand in motion 1.5 and more."""
 _NEARLY = 0.9
 _ENOUGH = 6
 """Stops from which a longer window is preferred: the faces of a cube."""
@@ -100,7 +104,7 @@ def stretches(
         intervals = _without_handled_ends(intervals, output, time) if mapping.face else intervals
     else:
         how = _SearchOptions(mapping.window_s or 1.0, mapping.shortest_s or 1.0, mapping.threshold)
-        intervals = _searched(output, time, edges, how)
+        intervals = _at_rest(_searched(output, time, edges, how), output)
         intervals = _of_one_position(intervals, output, time, edges, where)
     return _named(intervals, mapping, where)
 
@@ -131,7 +135,7 @@ def found_stops(output: Array, time: Array, edges: Sequence[int]) -> Stops:
 
 
 def _stops(output: Array, time: Array, edges: Sequence[int], how: _SearchOptions) -> Stops:
-    found = _searched(output, time, edges, how)
+    found = _at_rest(_searched(output, time, edges, how), output)
     several = tuple(k for k, (a, b) in enumerate(found.spans) if change_of_level.several_levels(output[a:b]) > 1)
     return Stops(how.window_s, found, several, how.threshold)
 
@@ -219,6 +223,24 @@ def _searched(output: Array, time: Array, edges: Sequence[int], how: _SearchOpti
         )
         spans += zip((piece.start + a).tolist(), (piece.stop + a).tolist(), strict=True)
     return Stretches(tuple(spans), tuple(f"dwell {k}" for k in range(len(spans))))
+
+
+def _at_rest(intervals: Stretches, output: Array) -> Stretches:
+    """The stretches of three axes without those that are motion throughout, as in a record without rest; a remark on these."""
+    if output.shape[1] < len(AXES):
+        return intervals
+    kept = [k for k, (a, b) in enumerate(intervals.spans) if not _is_motion(output[a:b])]
+    if len(kept) == len(intervals):
+        return intervals
+    remark = f"{len(intervals) - len(kept)} of {len(intervals)} stretches are no rest and were left out: more scatter than noise"
+    return replace(intervals.only(kept), remarks=(*intervals.remarks, remark))
+
+
+def _is_motion(x: Array) -> bool:
+    scatter = float(np.linalg.norm(x.std(axis=0)))
+    noise = float(np.linalg.norm(change_of_level.neighbour_noise(x)))
+    moving = scatter > max(MOTION * float(np.linalg.norm(x.mean(axis=0))), BEYOND_NOISE * noise)
+    return moving and change_of_level.several_levels(x) == 1  # several positions back to back are told as such
 
 
 def _has_windows(samples: int, window_s: float, rate: float) -> bool:

@@ -17,7 +17,11 @@ from inertial.static_intervals import moving_variance
 from pipelines.importers import unit_check
 from pipelines.importers.stated_units import TEMPERATURE, output_unit
 
-REFERENCE = re.compile(r"^(?:force|ref|true|applied|expected|nominal|g)(?:[_ ]?in)?(?:[_ .].*)?$", re.IGNORECASE)
+REFERENCE = re.compile(
+    r"^(?:(?:force|ref|true|applied|expected|nominal|g)(?:[_ ]?in)?(?:[_ .].*)?"
+    r"|[xyz?][_ .](?:force|ref|reference|true|applied|expected|nominal)(?:[_ .(\[].*)?)$",
+    re.IGNORECASE,
+)
 """Names of what a sensor should read; never an output."""
 OTHER = re.compile(
     r"gyr|rot|omega|rate|angvel|mag|quat|angle|roll|pitch|yaw|euler|tilt|^sd|std|var|err|lux|uv|press|baro|hum|volt|batt|"
@@ -210,6 +214,16 @@ def _places(parts: Array, size: float) -> Array:
     cells = np.unique(np.rint((parts - parts.min(axis=0)) / size), axis=0, return_inverse=True)[1].ravel()
     count = np.bincount(cells)
     return np.stack([np.bincount(cells, weights=parts[:, k]) / count for k in range(3)], axis=1)
+
+
+def references(columns: Mapping[str, Array]) -> tuple[str, ...]:
+    """The three columns with the force that acts on x, y, z, in g: called a reference, and of the size of gravity in each row."""
+    for stem, names in _lettered([*columns]):
+        if REFERENCE.match(stem):
+            size = np.linalg.norm(np.column_stack([columns[name] for name in names]), axis=1)
+            if np.all(np.abs(size - 1.0) < _CLOSE):
+                return names
+    return ()
 
 
 def _shows_gravity(sphere: Sphere, columns: Mapping[str, Array], names: Sequence[str]) -> bool:

@@ -38,6 +38,8 @@ from schemas.units import AXES
 ACCELERATION = {"g": 1.0, "m/s^2": 1.0 / 9.80665, "m/s²": 1.0 / 9.80665, "m/s2": 1.0 / 9.80665, "mg": 1e-3}
 VOLT = {"V": 1.0, "mV": 1e-3}
 TIMES = {**TIME_UNITS, "µs": 1e-6}
+CHANNELS = ("time", *AXES, "reference", *(f"reference_{axis}" for axis in AXES))
+"""What a column of a recording can be: one output and one reference for each axis at most."""
 UNEVEN = 0.01
 """Part of a sample interval by which a time may depart from an even grid."""
 
@@ -73,6 +75,11 @@ def import_waveforms(
     DataRejected
         A file has no sample interval, no unit, or samples that cannot be used.
     """
+    for meaning in layout.columns:
+        if meaning not in CHANNELS:
+            raise WrongUse(
+                f"import: --map {shown(meaning)}=…: no channel of a recording; {did_you_mean(meaning, CHANNELS)}"
+            )
     one, own, content, full_scale = _part(procedure, part)
     records: list[ProcedureRecord] = []
     recordings = [_recording(path, layout, own, one) for path in paths]

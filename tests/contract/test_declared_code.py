@@ -28,6 +28,7 @@ STARTS = {
     "procedures": "pipelines.stages.procedures pipelines.procedures",
     "grade": "pipelines.stages.grade pipelines.stages.figures",
     "import": "pipelines.importers",
+    "import with a fit": "pipelines.importers pipelines.diagnosis.imported_norms",
     "import of waveforms": "pipelines.importers.waveforms pipelines.procedures",
     "import of a transfer function": "pipelines.importers.transfer",
     "report": "pipelines.report.context pipelines.report.interactive pipelines.report.panel pipelines.report.panels "

@@ -16,7 +16,7 @@ import test_readers as samples
 
 pytestmark = pytest.mark.usefixtures("no_next_measurement")
 
-NEW = ("spreadsheet", "ulog", "dataflash", "mcap", "rosbag", "mdf4", "miniseed")
+NEW = ("spreadsheet", "ulog", "dataflash", "mcap", "rosbag", "mdf4", "miniseed", "rosbag2", "wearable")
 FACES = 9.81 * np.array([[0, 0, 1], [0, 0, -1], [1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]])
 IMU = """\
 std_msgs/Header header

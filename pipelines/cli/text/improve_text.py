@@ -92,6 +92,8 @@ def next_lines(
 
 HEIGHT, WIDTH = 7, 100
 MOST_REMARKS = 4
+_POSED = {"force_x", "outer"}
+"""Columns of a reference: the outputs of its poses are no drift."""
 STYLES = ("cyan", "green", "magenta")
 
 
@@ -132,7 +134,9 @@ def next_of_recording(document: dict[str, Any], given: Given, model: Sequence[st
         without = replace(given, leave_out=",".join(dict.fromkeys([*filter(None, [given.leave_out]), *left])))
         own = [*model, *replace(data, given=without).options, *data.again, *kept]
         return [command_line("improve", run, *own)]
-    if judged["adequate"] and document["recording"]["fit"]:
+    if document["recording"]["fit"] is None and judged["adequate"] is not False:
+        return [command_line("fit", run, "--effects", ",".join(document["effects"]), *words)]
+    if judged["adequate"]:
         return [command_line("export", run, "--format", "csv", *words)]
     return [command_line("diagnose", run, "--all", *model, *data.options)]
 
@@ -149,9 +153,9 @@ def _recognised(one: dict[str, Any]) -> None:
 
 
 def _picture(one: dict[str, Any]) -> None:
-    """The residual of the norm by dwell, or the drift of the outputs where no norm was fitted."""
+    """The residual of the norm by dwell, or the drift of the outputs of one pose."""
     rows = one["dwell_list"]
-    if len(rows) < 3 or one["fit"] == "faces":
+    if len(rows) < 3 or one["fit"] == "faces" or _POSED & set(one["columns"]):
         return
     times = [0.5 * (row["start_s"] + row["end_s"]) for row in rows]
     if rows[0]["residual_ug"] is not None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pipelines.importers.content import Content
-from pipelines.importers.readers import spreadsheet
+from pipelines.importers.readers import spreadsheet, wearable
 from schemas.errors import DataRejected
 
 NAME, TITLE, EXTRA, ORDER = "zip", "zip archive (refused)", "", 30
@@ -12,7 +12,7 @@ MAGIC = b"PK\x03\x04"
 
 def recognised(data: bytes) -> bool:
     """Whether the file begins as a zip archive does."""
-    return data.startswith(MAGIC) and not spreadsheet.recognised(data)
+    return data.startswith(MAGIC) and not (spreadsheet.recognised(data) or wearable.recognised(data))
 
 
 def read(name: str, data: bytes, group: str) -> Content:

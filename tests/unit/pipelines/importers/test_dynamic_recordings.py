@@ -9,7 +9,7 @@ from scipy import signal
 
 from pipelines.importers.inspection import inspect
 from pipelines.importers.waveforms import RecordingLayout, import_waveforms
-from schemas.errors import DataRejected
+from schemas.errors import DataRejected, WrongUse
 
 RATE_HZ = 10_000.0
 COLUMNS = {"time": "time [s]", "reference": "ref [m/s^2]", "z": "out [V]"}
@@ -92,6 +92,13 @@ def test_a_sensor_alone_has_its_pulse_and_no_sensitivity(tmp_path, rng):
     figures = {one["figure"]: one for one in document["figures"]}
     assert figures["shock_peak_g"]["value"] == pytest.approx(480.0, rel=0.015)
     assert "without a reference" in figures["shock_sensitivity_percent"]["note"]
+
+
+def test_a_channel_that_no_test_reads_is_refused_and_not_passed_over(tmp_path, rng):
+    path = shock_file(tmp_path / "one.csv", rng, reference=False)
+    layout = RecordingLayout({"time": "t [s]", "z": "dut [g]", "reference_w": "dut [g]"}, {})
+    with pytest.raises(WrongUse, match=r"--map reference_w=…: no channel of a recording; did you mean reference_"):
+        import_waveforms([path], "shock", None, "S1", layout, str(tmp_path / "archive"))
 
 
 def test_a_stated_duration_that_is_not_that_of_the_pulse_is_refused(tmp_path, rng):

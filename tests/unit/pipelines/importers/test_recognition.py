@@ -14,8 +14,10 @@ import pandas as pd
 import pytest
 from each import each
 from hand import G, Hand, sensed
+from scipy import signal
 from scipy.io import savemat
 
+from pipelines.importers.inspection import inspect
 from pipelines.importers.mapping import build
 from pipelines.importers.recognition import Recognition, recognise
 from pipelines.importers.record import imported
@@ -156,7 +158,17 @@ def volts_beside_force(rng: Rng, at: Path) -> Path:
     return csv(at / "a.csv", columns)
 
 
+def references_beside_means(rng: Rng, at: Path) -> Path:
+    """Six faces: what each axis should read, its mean, its standard deviation, axis after axis."""
+    true, columns = np.vstack([np.eye(3), -np.eye(3)]), {}
+    means = accelerations(rng, true)
+    for k, axis in enumerate("xyz"):
+        columns |= {f"{axis}_true (g)": true[:, k], f"{axis}_mean (g)": means[:, k], f"{axis}_std": np.full(6, 0.003)}
+    return csv(at / "a.csv", columns)
+
+
 RIGHT = {
+    references_beside_means: ("x_mean (g) y_mean (g) z_mean (g)", "g", "", True),
     logger_of_imu: ("ax ay az", "LSB", "us", False),
     board_without_header: ("2 3 4", "m/s^2", "s", False),
     positions_without_header: ("1 2 3", "LSB", "", True),
@@ -295,6 +307,80 @@ def test_a_clock_that_writes_in_bursts_is_one_record_and_a_pause_is_a_gap(rng: R
     assert burst.rate_hz == pytest.approx(8.0 / 0.0135, rel=0.01)
     assert burst.guessed.column("temperature") == "gtemp"
     assert recognise([logger_of_imu(rng, tmp_path)]).gaps == 1
+
+
+def test_the_reference_and_the_spread_of_a_table_of_means_are_recognised_by_their_names(
+    rng: Rng, tmp_path: Path
+) -> None:
+    seen = recognise([references_beside_means(rng, tmp_path)])
+    assert seen.keys is not None
+    expected = {f"force_{axis}": f"{axis}_true (g)" for axis in "xyz"} | {f"sd_{axis}": f"{axis}_std" for axis in "xyz"}
+    assert expected.items() <= seen.keys["columns"].items()
+    proposal = seen.for_fit()
+    assert proposal is not None
+    assert proposal.fit == ""  # the poses are known: it is fitted as a run is
+
+
+@each([("-- at 30 Hz  Filter Normal --", 30.0), ("Sampling rate: 12.5 Hz", 12.5), ("Sampling frequency [Hz];50", 50.0),
+       ("Low pass 42 Hz", None), ("sampled at 30 Hz\nsampled at 60 Hz", None)])  # fmt: skip
+def test_the_rate_that_stands_above_a_table_without_a_clock_is_taken(told, rng: Rng, tmp_path: Path) -> None:
+    text, rate = told
+    hand, columns = Hand(rng, rate=30.0), {}
+    named(columns, "ax ay az", accelerations(rng, hand.force))
+    path = csv(tmp_path / "a.csv", columns)
+    path.write_text(f"{text}\nSerial number A1\n{path.read_text('utf-8')}", encoding="utf-8")
+    seen = recognise([path])
+    assert seen.rate_hz == (None if rate is None else pytest.approx(rate))
+    assert bool(seen.open) is (rate is None)
+    assert ("--rate HZ" if rate is None else f"--rate {rate:g} ") in f"{seen.import_command} "
+
+
+def test_a_record_that_never_rests_has_no_stops_and_a_noisy_one_at_rest_has(rng: Rng, tmp_path: Path) -> None:
+    """A hand that trembles by ten degrees and turns over; and a wide range with a noise of a third of g."""
+    time = np.arange(0.0, 70.0, 0.03)
+    slow = np.cumsum(rng.normal(size=(len(time), 2)), axis=0)
+    slow = 0.15 * (slow - signal.savgol_filter(slow, 101, 1, axis=0))
+    tilt = np.pi * (time // 12.0)[:, None] / 3.0 + slow
+    force = np.column_stack(
+        [np.sin(tilt[:, 0]), np.cos(tilt[:, 0]) * np.sin(tilt[:, 1]), np.cos(tilt[:, 0]) * np.cos(tilt[:, 1])]
+    )
+    for name, output, stops in (
+        ("moving", force, 0),
+        ("noisy", [0.0, 0.0, 1.0] + 0.3 * rng.normal(size=force.shape), 1),
+    ):
+        columns = {"time [s]": time}
+        named(columns, "ax[g] ay[g] az[g]", output + 0.002 * rng.normal(size=force.shape))
+        seen = recognise([csv(tmp_path / f"{name}.csv", columns)])
+        assert seen.stops is not None
+        assert len(seen.stops.found) == stops
+        told = inspect([tmp_path / f"{name}.csv"]).document["remarks"]
+        assert any("no position at rest" in text for text in told) is (stops == 0)
+        assert seen.keys is not None
+        made = imported(pd.DataFrame(columns), build(seen.keys, name), name)
+        assert (0 if made.dwells is None else len(made.dwells)) == stops
+        assert any("are no rest" in text for text in made.remarks) is (stops == 0)
+
+
+def test_files_that_follow_one_another_are_positions_of_their_own(rng: Rng, tmp_path: Path) -> None:
+    """A file for each face, without a move at its ends."""
+    paths = []
+    for k, force in enumerate(np.vstack([np.eye(3), -np.eye(3)])):
+        columns = {"time [s]": np.arange(400) / 100.0}
+        named(columns, "ax[g] ay[g] az[g]", accelerations(rng, np.tile(force, (400, 1))))
+        paths.append(csv(tmp_path / f"face-{k}.csv", columns))
+    seen = recognise(paths, join="rows")
+    assert seen.stops is not None
+    assert seen.stops.found.spans == tuple((400 * k, 400 * (k + 1)) for k in range(6))
+    assert seen.import_command.endswith("--set join=rows")
+
+
+def test_two_levels_of_something_are_no_clock(rng: Rng, tmp_path: Path) -> None:
+    columns = {
+        "length": rng.uniform(30.0, 60.0, 8),
+        "frequency": rng.uniform(4.0, 100.0, 8),
+        "mode": np.repeat([1.0, 2.0], 4),
+    }
+    assert recognise([csv(tmp_path / "a.csv", columns)]).guessed.column("time") == ""
 
 
 IN_EXCHANGE_FORMAT = {
