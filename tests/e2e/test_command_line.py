@@ -195,6 +195,7 @@ def bash(script: str, home: Path, *words: str) -> subprocess.CompletedProcess[st
     return subprocess.run(command, check=False, timeout=300, **pipes)
 
 
+@pytest.mark.slow
 @each(["run m", "plan optimise production --wanted third"])
 def test_the_tab_key_offers_in_a_real_bash(words: str, completing: Path) -> None:
     script = str(completing / ".bash_completions" / "tumbleline.sh")

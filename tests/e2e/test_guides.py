@@ -92,10 +92,6 @@ class Guide:
 
 
 GUIDES = [
-    Guide(
-        "docs/tutorial/find-a-missing-effect.md", close=0.05,
-        files=(("game/report.html", "<th>scope</th>"), ("game/history.png", "")),
-    ),
     Guide("docs/tutorial/from-a-spreadsheet.md", positions, close=0.05, files=(("positions.html", "<svg"),)),
     Guide("docs/how-to/audit.md", factory),
     Guide("docs/how-to/audit-a-laboratory.md", line, files=(("audit.html", "<svg"),)),
@@ -111,10 +107,14 @@ GUIDES = [
 ]  # fmt: skip
 
 SLOW = [
+    Guide(
+        "docs/tutorial/find-a-missing-effect.md", close=0.05,
+        files=(("game/report.html", "<th>scope</th>"), ("game/history.png", "")),
+    ),
     Guide("docs/how-to/add-your-own-effect.md", glue),  # an effect of a file: tests/e2e/test_diagnosis.py
     Guide("docs/how-to/run-an-archive-again.md", old_runs),
     Guide("docs/how-to/release-a-model.md", old_runs),
-]
+]  # fmt: skip
 """Guides whose commands start processes of their own, or search for long."""
 
 ELSEWHERE = {
@@ -123,6 +123,7 @@ ELSEWHERE = {
     "correct-a-recording": "tests/e2e/test_correct.py",
     "README": "tests/e2e/test_guides.py",
     "add-your-own-effect": "tests/e2e/test_guides.py",
+    "find-a-missing-effect": "tests/e2e/test_guides.py",
     "issue-a-certificate": "tests/e2e/test_guides.py",
     "program-the-device": "tests/faults/test_programming.py",
 }

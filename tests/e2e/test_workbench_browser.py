@@ -149,6 +149,7 @@ def test_a_moved_pose_changes_the_floors_as_the_command_says_and_the_recipe_is_w
         assert one.errors == [] == one.outside
 
 
+@pytest.mark.slow
 def test_a_click_on_a_residual_shows_the_samples_of_its_dwell(bench: Served, browser: Any) -> None:
     run = next(path.name for path in (bench.archive / "runs").iterdir() if path.name.startswith("small-"))
     with tab(browser, bench.address) as one:
@@ -180,6 +181,7 @@ def test_a_browser_without_the_token_may_look_and_not_compute(bench: Served, bro
         until(lambda: "has read access only" in one.page.inner_text("main"), "the page says why nothing begins")
 
 
+@pytest.mark.slow
 def test_a_server_that_is_killed_is_said_and_the_page_goes_on(bench: Served, browser: Any) -> None:
     with tab(browser, bench.address) as one:
         one.open("/units")

@@ -41,6 +41,7 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
         yield one
 
 
+@pytest.mark.slow
 def test_on_a_narrow_screen_nothing_is_cut_and_the_whole_menu_is_seen(bench: Served, browser: Any) -> None:
     with tab(browser, bench.address, size=PHONE) as one:
         for path in PAGES:
@@ -53,6 +54,7 @@ def test_on_a_narrow_screen_nothing_is_cut_and_the_whole_menu_is_seen(bench: Ser
         assert one.errors == []
 
 
+@pytest.mark.slow
 def test_plots_beside_each_other_stand_one_under_the_other_on_a_narrow_screen(bench: Served, browser: Any) -> None:
     with tab(browser, bench.address, size=PHONE) as one:
         one.open("/two-models?source=latest&added=third_order")

@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from long_suites import mostly_slow
 
 from pipelines.diagnosis.diagnose import examination
 from pipelines.procedures.figures import probability, signed, with_uncertainty
@@ -47,7 +48,11 @@ def test_numbers_have_the_digits_of_their_uncertainty_a_sign_and_no_negative_zer
 
 @pytest.mark.usefixtures("no_next_measurement")
 @pytest.mark.parametrize(
-    ("effect", "first"), [("cubic_transfer", "force"), ("encoder_harmonic", "outer_deg"), ("warm_up", "since_power_s")]
+    ("effect", "first"),
+    mostly_slow(
+        [("cubic_transfer", "force"), ("encoder_harmonic", "outer_deg"), ("warm_up", "since_power_s")],
+        ("cubic_transfer", "force"),
+    ),
 )
 def test_the_first_picture_is_the_quantity_of_the_missing_effect(effect: str, first: str) -> None:
     lot = example(effect, seed=5)
