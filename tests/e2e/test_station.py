@@ -172,6 +172,7 @@ def station_seconds(readings: pd.DataFrame) -> float:
     return float((readings["start_s"] + readings["duration_s"]).max())
 
 
+@pytest.mark.slow
 def test_a_full_fixture_takes_hardly_longer_than_one_unit() -> None:
     alone = station_seconds(on_a_fixture(16, 1).all(1))
     for slots, units in ((16, 16), (32, 32)):
