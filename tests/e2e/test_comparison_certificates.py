@@ -158,6 +158,7 @@ def test_a_model_that_is_not_adequate_is_refused_with_what_it_lacks(certified: t
     )
 
 
+@pytest.mark.slow
 def test_terms_that_the_station_does_not_state_are_refused_by_name(certified: tuple[Path, str]) -> None:
     folder, _ = certified
     own = Path("stations/simulated.toml").read_text("utf-8").replace('name = "simulated"', 'name = "own"')

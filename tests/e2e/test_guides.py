@@ -14,6 +14,7 @@ import pytest
 from capture_double import finished_run, small_run
 from demonstrations import demonstrations_measured_once
 from in_process import given
+from long_suites import mostly_slow
 
 from benchmarks.generated_archive import write_archive
 
@@ -177,7 +178,7 @@ def test_every_page_that_shows_an_output_is_compared_by_a_test() -> None:
 IMPORTS = pages.examples("docs/how-to/import-your-data.md")
 
 
-@pytest.mark.parametrize(("line", "printed"), IMPORTS, ids=range(len(IMPORTS)))
+@pytest.mark.parametrize(("line", "printed"), mostly_slow(IMPORTS, *IMPORTS[:4], *IMPORTS[5:]), ids=range(len(IMPORTS)))
 def test_an_example_of_imports_prints_what_the_guide_says(
     line: str, printed: str, shared_data: Path, home: Path
 ) -> None:

@@ -207,7 +207,8 @@ class Opened:
         return self.page.evaluate(SHOWN)
 
 
-@pytest.mark.parametrize("theme", mostly_slow(["light", "dark"], "light"))
+@pytest.mark.slow
+@pytest.mark.parametrize("theme", ["light", "dark"])
 def test_figures_are_drawn_on_a_screen_and_pictures_are_printed(browser: Any, report: Path, theme: str) -> None:
     one = Opened(browser, report, color_scheme=theme)
     until(

@@ -68,6 +68,7 @@ def test_plots_beside_each_other_stand_one_under_the_other_on_a_narrow_screen(be
         until(lambda: one.page.evaluate(DOMAINS, "residuals")[1] > 0.2, "a wide screen has them beside each other")
 
 
+@pytest.mark.slow
 def test_dots_are_reached_and_chosen_by_keyboard(bench: Served, browser: Any) -> None:
     with tab(browser, bench.address, size=SCREEN) as one:
         one.open("/unit?run=latest&unit=A1&against=force")
@@ -85,6 +86,7 @@ def test_dots_are_reached_and_chosen_by_keyboard(bench: Served, browser: Any) ->
         assert one.errors == []
 
 
+@pytest.mark.slow
 def test_a_run_tells_verdict_results_and_reasons_before_its_tables(bench: Served, browser: Any) -> None:
     with tab(browser, bench.address, size=SCREEN) as one:
         one.open("/run")
@@ -98,6 +100,7 @@ def test_a_run_tells_verdict_results_and_reasons_before_its_tables(bench: Served
         until(lambda: "2 of 3" in one.page.inner_text("main"), "the run with a refused unit is listed")
 
 
+@pytest.mark.slow
 def test_a_serial_is_checked_when_it_is_scanned_and_the_slot_keeps_the_focus(bench: Served, browser: Any) -> None:
     with tab(browser, bench.address) as one:
         one.open("/operator")

@@ -82,13 +82,13 @@ SPOILT = {
     "transverse": ("missed_trigger", "clipped_reference", "level_not_reached"),
     "random_vibration": ("missed_trigger", "clipped_reference", "level_not_reached"),
 }
-"""Equipment and how its recordings are spoilt: every kind with the sweep, every equipment with one kind; the others are slow."""
+"""Equipment and how its recordings are spoilt: every equipment with one kind; the others are slow."""
 
 
 @pytest.mark.parametrize(
     ("name", "kind"),
     [
-        pytest.param(name, kind, marks=() if name == "sweep" or kind == kinds[0] else pytest.mark.slow)
+        pytest.param(name, kind, marks=() if kind == kinds[0] else pytest.mark.slow)
         for name, kinds in SPOILT.items()
         for kind in kinds
     ],

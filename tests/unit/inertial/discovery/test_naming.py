@@ -4,6 +4,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from long_suites import mostly_slow
 
 from benchmarks.discovery.archives import ArchiveMaker, Hidden, Setting
 from benchmarks.discovery.lots import WORLDS, bank
@@ -25,11 +26,12 @@ def pool() -> Pool:
 HIDDEN = [
     ("third_order", "wafer"),
     ("cross_coupling", "slot"),
-    *(pytest.param(*one, marks=pytest.mark.slow) for one in (("second_order", "radius"), ("scale_asymmetry", "mean"))),
+    ("second_order", "radius"),
+    ("scale_asymmetry", "mean"),
 ]
 
 
-@pytest.mark.parametrize(("effect", "driver"), HIDDEN)
+@pytest.mark.parametrize(("effect", "driver"), mostly_slow(HIDDEN, ("cross_coupling", "slot")))
 def test_effect_and_driver_are_named_and_nothing_else(effect: str, driver: str) -> None:
     result = maker().archive(31, 400, Hidden(effect, driver, 0.05), Setting(), NEEDED, keep=True)
     columns = maker().columns

@@ -153,6 +153,7 @@ def test_few_data_widen_the_uncertainty_by_students_t() -> None:
     assert stated_error(1.0, 0.0, 0.0, np.sqrt(1.0 / 10.0)) == pytest.approx(2.5706 / 1.95996, rel=1e-4)
 
 
+@pytest.mark.slow
 def test_the_difference_of_two_short_windows_is_held_by_its_uncertainty(rng: np.random.Generator) -> None:
     runs = 400
     record = flicker(rng, runs, 240)
