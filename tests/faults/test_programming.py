@@ -15,7 +15,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from capture_double import small_job, small_run
-from long_suites import mostly_slow
 from programmed_lot import keep_state, lot_run, plant_of, programmed
 from root_process import ROOT
 from typer.testing import CliRunner
@@ -359,10 +358,10 @@ def test_a_calibration_that_ended_for_another_reason_does_not_come_back() -> Non
 
 @pytest.mark.parametrize(
     "change",
-    mostly_slow(
-        [("temperatures_C = [0.0, 50.0]", "temperatures_C = [0.0, 51.0]"), ('"small"', '"later"')],
+    [
+        pytest.param(("temperatures_C = [0.0, 50.0]", "temperatures_C = [0.0, 51.0]"), marks=pytest.mark.slow),
         ('"small"', '"later"'),
-    ),
+    ],
     ids=["measured later", "the same data again"],
 )
 def test_an_older_run_is_not_written_over_a_newer_certified_one(run: Run, change: tuple[str, str]) -> None:
