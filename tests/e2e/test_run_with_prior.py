@@ -9,8 +9,6 @@ from in_process import document_of, refused, text_of
 
 from pipelines.archive import Archive
 
-PRIOR = 'limits = "', '[prior]\nfull = "full.toml"'
-
 
 def with_prior(folder: Path, prior: str = 'full = "full.toml"') -> str:
     """The brief recipe with a prior, beside the same one without it."""
