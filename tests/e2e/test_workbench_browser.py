@@ -13,6 +13,7 @@ import pytest
 from browser import Served, Tab, served, tab, until
 from capture_double import recipe_file, small_run
 from in_process import document_of, text_of
+from long_suites import mostly_slow
 
 from pipelines.jobs.recipes import load_recipe
 
@@ -20,6 +21,9 @@ SCRIPT = "<img src=x onerror=window.ran=1>"
 PAGES = (
     "/units", "/run?run=latest", "/unit?run=latest", "/missing", "/upload", "/operator", "/models", "/plan", "/station", "/audit",
 )  # fmt: skip
+
+
+LOOKS: dict[str, dict[str, Any]] = {"screen": {}, "dark tablet": {"dark": True, "size": (820, 1180)}}
 
 
 @pytest.fixture(scope="module")
@@ -40,11 +44,15 @@ def pictures(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_every_page_is_drawn_reaches_nothing_outside_and_can_be_read_by_everybody(bench: Served, browser: Any) -> None:
-    with tab(browser, bench.address) as one:
+@pytest.mark.parametrize("look", mostly_slow(LOOKS, "screen"))
+def test_every_page_is_drawn_reaches_nothing_outside_and_can_be_read_by_everybody(
+    bench: Served, browser: Any, look: str
+) -> None:
+    with tab(browser, bench.address, **LOOKS[look]) as one:
         for path in PAGES:
             one.open(path)
             assert one.findings() == [], path
+            assert one.page.evaluate("() => document.documentElement.scrollWidth - innerWidth") <= 0, path
         assert one.outside == []
         assert one.errors == []
 
