@@ -1,10 +1,9 @@
 """Whether the tests notice changes of the product: `python -m benchmarks.mutations --places 60 --seed 1`.
 
 The product is changed at drawn places (a sign, a comparison, a constant, a removed statement), one at a time, in a work tree of
-its own, and the fast tests of the mirror folder of its module are run, or those that
-import it where there is none. `--results FILE` keeps what became of each place;
-`--revision REV` takes the tests of another revision and tries at each place of that file the test first that failed there, so
-that two suites are compared on the same places.
+its own, and the fast tests of the mirror folder of its module are run, or those that import it where there is none. A result
+file (`--results`) keeps what became of each place; `--revision REV` takes the tests of another revision, and tries at each place
+of the file the test first that failed there, so that two suites are compared on the same places.
 """
 
 from __future__ import annotations
