@@ -1,23 +1,25 @@
 """Whether the tests notice changes of the product: `python -m benchmarks.mutations --places 60 --seed 1`.
 
 The product is changed at drawn places (a sign, a comparison, a constant, a removed statement), one at a time, in a work tree of
-its own, and the fast tests of the mirror folder of its module are run, or those that import it where there is none. A result
-file (`--results`) keeps what became of each place; `--revision REV` takes the tests of another revision, and tries at each place
-of the file the test first that failed there, so that two suites are compared on the same places.
+its own, and the fast tests of the mirror folder of its module are run, or those that import it where there is none. With
+`--before REV` the places are drawn where the tests of that revision differ from those of HEAD, and both suites are tried at each:
+first the test files that differ, then, for a suite that has not noticed the change by them, the files that both have.
 """
 
 from __future__ import annotations
 
 import argparse
 import ast
-import json
 import random
 import re
 import shutil
 import subprocess
 import sys
 import tempfile
+from collections import Counter
 from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
 
@@ -75,83 +77,112 @@ def places_in(path: str, source: str) -> Iterator[Place]:
             yield place(node, "pass")
 
 
-def drawn(count: int, seed: int) -> list[Place]:
-    """So many places, each module with the weight of its number of places."""
+def drawn(seed: int) -> list[Place]:
+    """Every place in an order of its own for each seed."""
     paths = sorted(path for room in ROOMS for path in (ROOT / room).rglob("*.py"))
     every = [
         one for path in paths for one in places_in(path.relative_to(ROOT).as_posix(), path.read_text(encoding="utf-8"))
     ]
-    return random.Random(seed).sample(every, count)
+    random.Random(seed).shuffle(every)
+    return every
 
 
-def tests_of(tree: Path, path: str) -> list[str]:
-    """The mirror folder of a module; without one, the test files that import it, else those that import its package."""
-    mirror = tree / "tests" / "unit" / Path(path).parent
-    if mirror.is_dir():
-        return [str(mirror)]
-    texts = {str(file): file.read_text(encoding="utf-8") for file in sorted((tree / "tests").rglob("test_*.py"))}
+def tests_of(tree: Path, path: str) -> set[str]:
+    """The test files of the mirror folder of a module; without one those that import it, else those that import its package."""
+    tests = tree / "tests"
+    if (mirror := tests / "unit" / Path(path).parent).is_dir():
+        return {one.relative_to(tree).as_posix() for one in mirror.rglob("test_*.py")}
+    texts = {one.relative_to(tree).as_posix(): one.read_text(encoding="utf-8") for one in tests.rglob("test_*.py")}
     package, _, stem = path.removesuffix(".py").removesuffix("/__init__").replace("/", ".").rpartition(".")
     of_module = rf"from {package}.{stem} import|import {package}.{stem}\b|from {package} import .*\b{stem}\b"
     for pattern in (of_module, rf"from {package}[. ]"):
-        if found := [file for file, text in texts.items() if re.search(rf"^\s*(?:{pattern})", text, re.MULTILINE)]:
+        if found := {file for file, text in texts.items() if re.search(rf"^\s*(?:{pattern})", text, re.MULTILINE)}:
             return found
-    return []
+    return set()
 
 
-def failing(tree: Path, place: Place, first: str | None, limit_s: float) -> str | None:
+def failing(tree: Path, place: Place, tests: set[str], limit_s: float) -> str | None:
     """The test that notices the change, or None, or why that is not known."""
+    if not tests:
+        return None
     path = tree / place.path
     sound = path.read_bytes()
     path.write_bytes(sound[: place.start] + place.text.encode() + sound[place.end :])
     call = [sys.executable, "-m", "pytest", "-x", "-q", "--no-header", "-p", "no:randomly", "-m", "not slow", "--tb=no"]
     try:
-        for tests in filter(None, ([first] if first else [], tests_of(tree, place.path))):
-            done = subprocess.run(
-                [*call, *tests], cwd=tree, capture_output=True, text=True, timeout=limit_s, check=False
-            )
-            if found := re.search(r"^(?:FAILED|ERROR) (\S+)", done.stdout, re.MULTILINE):
-                return found[1]
-            if done.returncode not in {0, 4, 5}:  # a test that is no more, or no test at all
-                return NOT_STARTED
+        done = subprocess.run(
+            [*call, *sorted(tests)], cwd=tree, capture_output=True, text=True, timeout=limit_s, check=False
+        )
     except subprocess.TimeoutExpired:
         return NOT_ENDED
     finally:
         path.write_bytes(sound)
-    return None
+    if found := re.search(r"^(?:FAILED|ERROR) (\S+)", done.stdout, re.MULTILINE):
+        return found[1]
+    return None if done.returncode in {0, 5} else NOT_STARTED  # 5: all of these tests are slow
+
+
+class Suite(NamedTuple):
+    """The tests of a revision, in a work tree with the product of this one."""
+
+    name: str
+    tree: Path
+
+
+@contextmanager
+def suite(revision: str) -> Iterator[Suite]:
+    """A work tree that is gone afterwards."""
+    with tempfile.TemporaryDirectory(prefix="mutations-") as top:
+        tree = Path(top) / "tree"
+        subprocess.run(["git", "worktree", "add", "--detach", "-q", tree, revision], cwd=ROOT, check=True)
+        try:
+            for room in ROOMS:
+                shutil.rmtree(tree / room)
+                shutil.copytree(ROOT / room, tree / room)
+            yield Suite(revision, tree)
+        finally:
+            subprocess.run(["git", "worktree", "remove", "--force", tree], cwd=ROOT, check=True)
+
+
+def differing(suites: list[Suite], tests: list[set[str]]) -> set[str]:
+    """Test files that are not the same in all suites; none where there is one suite."""
+    every = set().union(*tests)
+    kept = [{file: (one.tree / file).read_bytes() for file in own} for one, own in zip(suites, tests, strict=True)]
+    return {file for file in every if any(own.get(file) != kept[0].get(file) for own in kept)}
+
+
+def tried(suites: list[Suite], place: Place, limit_s: float) -> list[str | None] | None:
+    """What each suite makes of a change; None where the suites have the same tests of the module, or none."""
+    tests = [tests_of(one.tree, place.path) for one in suites]
+    apart = differing(suites, tests)
+    if not any(tests) or (len(suites) > 1 and not apart):
+        return None
+    found = [failing(one.tree, place, own & apart, limit_s) for one, own in zip(suites, tests, strict=True)]
+    if None in found:
+        shared = failing(suites[0].tree, place, tests[0] - apart, limit_s)
+        found = [shared if one is None else one for one in found]
+    return found
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--places", type=int, default=20)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument(
-        "--revision", default="HEAD", help="whose tests are run; the product is that of the working tree"
-    )
-    parser.add_argument(
-        "--results", type=Path, help="a file of an earlier call, which gets the results of this revision"
-    )
+    parser.add_argument("--before", help="a revision whose tests are compared with those of HEAD")
     parser.add_argument("--limit", type=float, default=600.0, help="seconds for the tests of one place")
     given = parser.parse_args()
-    kept = json.loads(given.results.read_text(encoding="utf-8")) if given.results and given.results.exists() else {}
-    first = {name: test for suite in kept.values() for name, test in suite.items() if test and "::" in test}
-    found: dict[str, str | None] = {}
-    with tempfile.TemporaryDirectory(prefix="mutations-") as top:
-        tree = Path(top) / "tree"
-        subprocess.run(["git", "worktree", "add", "--detach", "-q", tree, given.revision], cwd=ROOT, check=True)
-        try:
-            for room in ROOMS:
-                shutil.rmtree(tree / room)
-                shutil.copytree(ROOT / room, tree / room)
-            for place in drawn(given.places, given.seed):
-                found[place.name] = failing(tree, place, first.get(place.name), given.limit)
-                print(f"{found[place.name] or 'NOT NOTICED'}  <- {place.name}", flush=True)
-        finally:
-            subprocess.run(["git", "worktree", "remove", "--force", tree], cwd=ROOT, check=True)
-    known = {name: test for name, test in found.items() if test != NOT_ENDED}
-    noticed = sum(test is not None for test in known.values())
-    print(f"{given.revision}: {noticed} of {len(known)} changes noticed")
-    if given.results:
-        given.results.write_text(json.dumps(kept | {given.revision: found}, indent=1), encoding="utf-8")
+    noticed, known = Counter[str](), 0
+    with ExitStack() as within:
+        suites = [within.enter_context(suite(one)) for one in filter(None, (given.before, "HEAD"))]
+        compared = ((place, tried(suites, place, given.limit)) for place in drawn(given.seed))
+        for place, found in islice(((place, found) for place, found in compared if found is not None), given.places):
+            for one, test in zip(suites, found, strict=True):
+                print(f"{one.name}: {test or 'NOT NOTICED'}  <- {place.name}", flush=True)
+            if NOT_ENDED not in found:
+                known += 1
+                noticed.update(one.name for one, test in zip(suites, found, strict=True) if test)
+    for one in suites:
+        print(f"{one.name}: {noticed[one.name]} of {known} changes noticed")
     return 0
 
 
