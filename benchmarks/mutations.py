@@ -19,6 +19,7 @@ import tempfile
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
+from functools import cache
 from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
@@ -87,12 +88,21 @@ def drawn(seed: int) -> list[Place]:
     return every
 
 
+@cache
+def texts_of(tree: Path) -> dict[str, str]:
+    """The test files of a work tree."""
+    return {
+        one.relative_to(tree).as_posix(): one.read_text(encoding="utf-8") for one in (tree / "tests").rglob("test_*.py")
+    }
+
+
+@cache
 def tests_of(tree: Path, path: str) -> set[str]:
     """The test files of the mirror folder of a module; without one those that import it, else those that import its package."""
-    tests = tree / "tests"
-    if (mirror := tests / "unit" / Path(path).parent).is_dir():
-        return {one.relative_to(tree).as_posix() for one in mirror.rglob("test_*.py")}
-    texts = {one.relative_to(tree).as_posix(): one.read_text(encoding="utf-8") for one in tests.rglob("test_*.py")}
+    mirror = f"tests/unit/{Path(path).parent.as_posix()}/"
+    if own := {file for file in texts_of(tree) if file.startswith(mirror)}:
+        return own
+    texts = texts_of(tree)
     package, _, stem = path.removesuffix(".py").removesuffix("/__init__").replace("/", ".").rpartition(".")
     of_module = rf"from {package}.{stem} import|import {package}.{stem}\b|from {package} import .*\b{stem}\b"
     for pattern in (of_module, rf"from {package}[. ]"):
@@ -147,7 +157,7 @@ def suite(revision: str) -> Iterator[Suite]:
 def differing(suites: list[Suite], tests: list[set[str]]) -> set[str]:
     """Test files that are not the same in all suites; none where there is one suite."""
     every = set().union(*tests)
-    kept = [{file: (one.tree / file).read_bytes() for file in own} for one, own in zip(suites, tests, strict=True)]
+    kept = [{file: texts_of(one.tree)[file] for file in own} for one, own in zip(suites, tests, strict=True)]
     return {file for file in every if any(own.get(file) != kept[0].get(file) for own in kept)}
 
 
