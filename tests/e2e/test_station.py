@@ -183,6 +183,7 @@ def test_a_full_fixture_takes_hardly_longer_than_one_unit() -> None:
         assert station_seconds(readings) <= 1.05 * alone
 
 
+@pytest.mark.slow
 def test_units_that_fail_never_hold_up_the_others() -> None:
     faults = (
         "silent:serial=U003:at_s=900", "dead:serial=U007", "garbage:serial=U011:at_s=1200",
