@@ -20,9 +20,6 @@ from pipelines.cli import COMMANDS
 
 KEPT = ROOT / "tests" / "archives" / "v1.tar.xz"
 BY_HEAD = {head_of(kind): kind for kind in documents()}
-MODEL = (
-    "bias,scale,misalignment,bias_temperature,scale_temperature,bias_temperature_quadratic,scale_temperature_quadratic"
-)
 IMPORTED = ["--map", "x=x,y=y,z=z", "--unit-of", "output=g", "--rate", "100", "--units", "S1", "--set", "face=+z"]
 IMPORTED += ["--set", "block_s=5", "--set", "local_gravity_m_s2=9.81"]
 CORRECTED = ["--rate", "100", "--track", "0,0,1", "--set", "turn_on=100"]
