@@ -161,14 +161,14 @@ def differing(suites: list[Suite], tests: list[set[str]]) -> set[str]:
     return {file for file in every if any(own.get(file) != kept[0].get(file) for own in kept)}
 
 
-def tried(suites: list[Suite], place: Place, limit_s: float) -> list[str | None] | None:
+def tried(suites: list[Suite], place: Place, limit_s: float, *, whole: bool) -> list[str | None] | None:
     """What each suite makes of a change; None where the suites have the same tests of the module, or none."""
     tests = [tests_of(one.tree, place.path) for one in suites]
     apart = differing(suites, tests)
     if not any(tests) or (len(suites) > 1 and not apart):
         return None
     found = [failing(one.tree, place, own & apart, limit_s) for one, own in zip(suites, tests, strict=True)]
-    if None in found:
+    if None in found and whole:
         shared = failing(suites[0].tree, place, tests[0] - apart, limit_s)
         found = [shared if one is None else one for one in found]
     return found
@@ -179,12 +179,15 @@ def main() -> int:
     parser.add_argument("--places", type=int, default=20)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--before", help="a revision whose tests are compared with those of HEAD")
+    parser.add_argument("--differing", action="store_true", help="run the test files that differ alone")
     parser.add_argument("--limit", type=float, default=600.0, help="seconds for the tests of one place")
     given = parser.parse_args()
     noticed, known = Counter[str](), 0
     with ExitStack() as within:
         suites = [within.enter_context(suite(one)) for one in filter(None, (given.before, "HEAD"))]
-        compared = ((place, tried(suites, place, given.limit)) for place in drawn(given.seed))
+        compared = (
+            (place, tried(suites, place, given.limit, whole=not given.differing)) for place in drawn(given.seed)
+        )
         for place, found in islice(((place, found) for place, found in compared if found is not None), given.places):
             for one, test in zip(suites, found, strict=True):
                 print(f"{one.name}: {test or 'NOT NOTICED'}  <- {place.name}", flush=True)
