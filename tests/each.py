@@ -11,17 +11,19 @@ Value = TypeVar("Value")
 
 
 def each(
-    values: Iterable[Value], named: Callable[[Value], str] = str
+    values: Iterable[Value] | Callable[[], Iterable[Value]], named: Callable[[Value], str] = str
 ) -> Callable[[Callable[..., None]], Callable[..., None]]:
     """Calls a check with every value as its first argument, and fails with the list of what is wrong.
 
     Further arguments are fixtures. Every value has a folder of its own in ``tmp_path`` and patches of its own. A value that
-    the check skips is passed over; if all are skipped, so is the test.
+    the check skips is passed over; if all are skipped, so is the test. Values that take long to find are a function, called
+    by the test: each process that collects the tests would find them else.
     """
-    listed = list(values)
+    fixed = None if callable(values) else list(values)
 
     def made(check: Callable[..., None]) -> Callable[..., None]:
         def test(**fixtures: Any) -> None:
+            listed = fixed if fixed is not None else list(values())  # pyright: ignore[reportCallIssue]
             wrong, errors, skipped = list[str](), list[BaseException](), list[BaseException]()
             for number, value in enumerate(listed):
                 try:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 import numpy as np
 import pandas as pd
 import pytest
+from long_suites import mostly_slow
 from made_worlds import BASE, Noise, World, force_of, make
 
 from benchmarks.truth import Spec, make_run
@@ -50,10 +51,11 @@ CONFIRMED = [  # units, g by which they come up elsewhere, hidden effect, seed, 
     (1, 300.0, CURVE, 63_103, True),
     *(pytest.param(n, 300.0, CURVE, seed, True, marks=pytest.mark.slow) for n, seed in ((1, 63_107), (8, 63_102))),
     *(
-        (4, turn_on, effect, SEED + 5, True)
+        pytest.param(4, turn_on, effect, SEED + 5, True, marks=pytest.mark.slow)
         for effect, turn_on in (("cross_coupling", 300.0), ("second_order", 300.0), (CURVE, 0.0))
     ),
-    *((4, 0.0, effect, SEED + 6, False) for effect in ("third_order", "cross_coupling")),
+    (4, 0.0, "third_order", SEED + 6, False),
+    pytest.param(4, 0.0, "cross_coupling", SEED + 6, False, marks=pytest.mark.slow),
 ]
 
 
@@ -65,7 +67,12 @@ def test_effects_that_are_there_are_confirmed(units, turn_on, effect, seed, fres
     assert not fresh or evidence["part"] == pytest.approx(1.0, abs=4.0 * evidence["part_u"])
 
 
-@pytest.mark.parametrize("effect", ["bias_temperature_quadratic", "aging_log", "thermal_hysteresis", "step_change"])
+@pytest.mark.parametrize(
+    "effect",
+    mostly_slow(
+        ["bias_temperature_quadratic", "aging_log", "thermal_hysteresis", "step_change"], "aging_log", "step_change"
+    ),
+)
 def test_slow_effects_that_are_not_there_are_not_confirmed(effect):
     world = World(units=2, noise=Noise(walk=4.0))
     assert progress(world, effect, SEED)["confirmed"] is not True
@@ -118,8 +125,10 @@ def spoilt(units: int, spoil: Callable[[pd.DataFrame], None], effect: str, *, fr
         (1, slipped, "cross_coupling", "no clear fall"),
         (4, exchanged, "misalignment_temperature", "left out"),
         (4, exchanged, "scale_temperature_quadratic", "fault|names"),
-        (4, misread, "scale_temperature_quadratic", "names soak_thermometer"),
-        (4, warming, "scale_temperature_quadratic", "names|not adequate"),
+        *(
+            pytest.param(4, spoil, "scale_temperature_quadratic", reason, marks=pytest.mark.slow)
+            for spoil, reason in ((misread, "names soak_thermometer"), (warming, "names|not adequate"))
+        ),
     ],
 )
 def test_dwells_left_out_of_one_run_do_not_confirm_what_imitates_its_fault(units, spoil, effect, reason):

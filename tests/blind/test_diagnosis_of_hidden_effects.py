@@ -1,6 +1,7 @@
 """Hidden effects, found from the measurements alone: a small suite on every run of the tests, a large one in `make test-slow`."""
 
 import pytest
+from long_suites import mostly_slow
 
 from benchmarks.score import Score, score, table, text
 from benchmarks.truth import Run, case
@@ -57,7 +58,7 @@ def figures(deal: dict[str, int]) -> tuple[dict[str, float], list[Score]]:
     return {row["figure"]: row["value"] for row in rows}, scores
 
 
-@pytest.mark.parametrize("deal", SMALL)
+@pytest.mark.parametrize("deal", mostly_slow(SMALL, "lot8_size2", "null_white", "faults"))
 def test_names_what_hides_and_nothing_where_nothing_hides(deal: str) -> None:
     shares, scores = figures({deal: 1})
     assert [(s.scenario, s.truth, s.named) for s in scores if s.exact is False] == []

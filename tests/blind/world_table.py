@@ -222,7 +222,7 @@ def rows_of_steps() -> Iterator[Row]:
         )  # fmt: skip
     yield Row(
         world, OWN_NOISE + 2, "pose missed after a step", named=("step_change",), physics=True,
-        also=changes.pose_missed_at_the_step, change=changes.jumping_and_turned, fast=True,
+        also=changes.pose_missed_at_the_step, change=changes.jumping_and_turned,
     )  # fmt: skip
     for dwell, seed in ((37, 4), (37, 5), (44, 3), (44, 4), (44, 5)):
         # without the dwells before it every instant between their neighbours is as good: it had stood there and kept them bad
@@ -246,7 +246,7 @@ def rows_of_what_is_left_over() -> Iterator[Row]:
     for index, effect in ((199, "pose_hysteresis"), (32, "creep_after_move")):
         yield Row(
             Case("lot8_size1", index), 77_002, f"{effect} from before the run", first=(effect,), physics=True,
-            recommended=(effect,), unexplained=frozenset(), fast=index == 199,
+            recommended=(effect,), unexplained=frozenset(),
         )  # fmt: skip
     # of eight dwells a curve takes so much of the freedom that the deviance falls: six of ten such lots were not adequate by it
     few = World(units=3, poses=8, soaks=(25.0,), noise=Noise(flicker=300.0))
@@ -301,7 +301,7 @@ def rows_of_physics() -> Iterator[Row]:
     for index, seed, driver in ((5, 771, "time_s"), (12, 771, "time_s"), (11, 771, "since_move_s")):
         yield Row(
             Case("withheld", index), seed, f"{driver} in the noise", first=(), adequate=(False,),
-            unexplained=frozenset({driver}), fast=index == 5,
+            unexplained=frozenset({driver}),
         )  # fmt: skip
     # a fault is no less told for an effect outside the catalogue; the second had ended with an IndexError
     for fault, seed in (("unit_moved", 930_004), ("wrong_pose", 930_008)):
@@ -310,7 +310,7 @@ def rows_of_physics() -> Iterator[Row]:
     for name in ("misalignment_and_moved", "misalignment_and_slip"):
         yield Row(
             HIDDEN[name], SEED, name, named=("misalignment_temperature",), told="names", physics=True,
-            recommended=("misalignment_temperature",), also=changes.left_out_dwells_judge, fast=name == "misalignment_and_slip",
+            recommended=("misalignment_temperature",), also=changes.left_out_dwells_judge,
         )  # fmt: skip
     world = World(units=3, hidden=(("cross_coupling", 2.0),))
     yield Row(
@@ -325,7 +325,7 @@ def rows_of_physics() -> Iterator[Row]:
     for name in OUTSIDE:
         yield Row(
             World(hidden=((name, 2.0),)), POSES + 1, f"outside {name}", adequate=(False,), unexplained=HEAT,
-            also=changes.noise_beside_the_dependence, fast=name == "fixture_bends",
+            also=changes.noise_beside_the_dependence,
         )  # fmt: skip
     for name in ("fixture_bends", "axes_bend_with_heat", "cubic_with_heat"):
         # axes and transfer curves that follow the temperature show in no bias; an excess of them had counted as noise

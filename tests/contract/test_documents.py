@@ -20,17 +20,12 @@ from pipelines.cli import COMMANDS
 
 KEPT = ROOT / "tests" / "archives" / "v1.tar.xz"
 BY_HEAD = {head_of(kind): kind for kind in documents()}
-MODEL = (
-    "bias,scale,misalignment,bias_temperature,scale_temperature,bias_temperature_quadratic,scale_temperature_quadratic"
-)
 IMPORTED = ["--map", "x=x,y=y,z=z", "--unit-of", "output=g", "--rate", "100", "--units", "S1", "--set", "face=+z"]
 IMPORTED += ["--set", "block_s=5", "--set", "local_gravity_m_s2=9.81"]
 CORRECTED = ["--rate", "100", "--track", "0,0,1", "--set", "turn_on=100"]
 CASES = {
     "plan --json": ["plan"],
     "station status --json": ["station", "status"],
-    "diagnose --json": ["diagnose", "latest", "--effects", MODEL],
-    "improve --json": ["improve", "latest", "--effects", MODEL, "--output", "{folder}/new.toml", "--yes"],
     "compare --json": ["compare", "latest", "--fresh", "latest"],
     "history --json": ["history", "{folder}/model.toml", "--dwells", "latest"],
     "list --json": ["list"],
@@ -144,6 +139,8 @@ def test_a_command_prints_the_document_of_its_type(head: str, kept: Path, tmp_pa
 
 
 ELSEWHERE = {
+    "diagnose --json": "e2e/test_diagnosis.py",
+    "improve --json": "e2e/test_models.py",
     "run --json (several fillings)": "e2e/test_operator.py",
     "show RUN --json (no grades)": "e2e/test_inquiry.py",
     "investigate --json": "e2e/test_inquiry.py",

@@ -6,6 +6,7 @@ What is printed under "Next" is run in ``tests/e2e/test_next_lines.py``.
 import ast
 import re
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 from each import each
@@ -46,29 +47,39 @@ def quoted(text: str) -> list[str]:
 
 
 NAMES = "|".join(re.escape(name) for name in (*COMMANDS, *FORMER))
-SOURCES = {path: path.read_text(encoding="utf-8") for path in PRODUCT}
-MESSAGES = [
-    (path.relative_to(ROOT).as_posix(), text)
-    for path, source in SOURCES.items()
-    if "tumbleline " in source
-    or " --" in source  # others need not be parsed: each process that collects the tests does it
-    for text in texts(ast.parse(source))
-]
-FOUND = [(place, line) for place, text in MESSAGES for line in quoted(text)]
-OF_PAGES = [
-    (path.relative_to(ROOT).as_posix(), re.sub(r"{{.*?}}", "X", line))
-    for path in TEMPLATES
-    for line in re.findall(rf"<code>(tumbleline (?:{NAMES})\b[^<]*)</code>", path.read_text(encoding="utf-8"))
-]
+
+
+@cache
+def messages() -> list[tuple[str, str]]:
+    """Module and text of every message of the product that can name a command or an option."""
+    sources = {path: path.read_text(encoding="utf-8") for path in PRODUCT}
+    return [
+        (path.relative_to(ROOT).as_posix(), text)
+        for path, source in sources.items()
+        if "tumbleline " in source or " --" in source
+        for text in texts(ast.parse(source))
+    ]
+
+
+@cache
+def commands() -> dict[str, list[str]]:
+    """The commands that a module or a page names, by its path."""
+    named: dict[str, list[str]] = {}
+    for place, text in messages():
+        named.setdefault(place, []).extend(quoted(text))
+    for path in TEMPLATES:
+        lines = re.findall(rf"<code>(tumbleline (?:{NAMES})\b[^<]*)</code>", path.read_text(encoding="utf-8"))
+        named[path.relative_to(ROOT).as_posix()] = [re.sub(r"{{.*?}}", "X", line) for line in lines]
+    return {place: lines for place, lines in named.items() if lines}
 
 
 def test_messages_name_commands() -> None:
-    assert len(FOUND) > 80
+    assert sum(len(lines) for place, lines in commands().items() if place.endswith(".py")) > 80
 
 
-@each(sorted({path for path, _ in (*FOUND, *OF_PAGES)}))
+@each(lambda: sorted(commands()))
 def test_a_command_in_a_message_exists_with_its_options(path: str) -> None:
-    for line in (line for place, line in (*FOUND, *OF_PAGES) if place == path):
+    for line in commands()[path]:
         closed = line if line.count('"') % 2 == 0 else line.replace('"', "")
         assert unknown_options(closed.replace("{", "").replace("}", "")) == set(), line
 
@@ -129,7 +140,7 @@ def test_an_option_in_a_message_is_one_of_a_command() -> None:
     known = {name for line in sorted(COMMANDS) for name in options_below(line)} | {"--log", "--version", "--help"}
     wrong = {
         (place, word)
-        for place, text in MESSAGES
+        for place, text in messages()
         if not place.startswith(tuple(FOREIGN)) and not place.endswith("cli/former.py")
         for word in re.findall(r"(?<![\w-])--[a-z][a-z-]*[a-z]", text)
         if word not in known

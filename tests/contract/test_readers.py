@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from each import each
+from long_suites import mostly_slow
 from made_package import made_package
 from root_process import ROOT
 from scipy.io import savemat, wavfile
@@ -321,23 +322,23 @@ def test_a_matlab_file_with_a_bad_checksum_is_refused_with_a_remedy(tmp_path: Pa
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize("share", mostly_slow([0.4, 0.97], 0.4))
 @each([*SAMPLES, *FROM_ELSEWHERE])
 def test_a_file_that_ends_too_early_is_refused_in_one_line_or_read_as_far_as_it_goes(
-    name: str, tmp_path: Path, request
+    name: str, share: float, tmp_path: Path, request
 ) -> None:
     path = tmp_path / "short"
     group = sample(name, path, request)
     data = path.read_bytes()
-    for share in (0.4, 0.97):
-        path.write_bytes(data[: int(share * len(data))])
-        message, rows = "short", 1
-        try:
-            rows = len(files.read_content(path, group)[0].table)
-        except (DataRejected, WrongUse) as problem:
-            message = str(problem)
-        assert message.startswith("short")
-        assert "\n" not in message
-        assert 0 < rows <= 60_000
+    path.write_bytes(data[: int(share * len(data))])
+    message, rows = "short", 1
+    try:
+        rows = len(files.read_content(path, group)[0].table)
+    except (DataRejected, WrongUse) as problem:
+        message = str(problem)
+    assert message.startswith("short")
+    assert "\n" not in message
+    assert 0 < rows <= 60_000
 
 
 READER = """

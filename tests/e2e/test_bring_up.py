@@ -15,6 +15,7 @@ import pytest
 from brought_up import FAMILIES, Middle, Scripted, brought_up, id_of, served_device, verdicts
 from each import each
 from in_process import given
+from long_suites import mostly_slow
 from modbus_devices import VALUES, libmodbus_server, pymodbus_server, words_of
 
 from pipelines.commissioning.conformance import document_of, read_conformance
@@ -37,10 +38,7 @@ def _own_state(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
 
 
-@pytest.mark.parametrize(
-    "name",
-    [pytest.param(one, marks=() if one in {"oriental_az", "watlow_f4t"} else pytest.mark.slow) for one in FAMILIES],
-)
+@pytest.mark.parametrize("name", mostly_slow(FAMILIES, "watlow_f4t"))
 def test_the_simulated_device_of_every_family_passes(name, tmp_path):
     """A whole bring-up with every consent, recorded, finds no difference and leaves the device as it was."""
     profile = load_profile(name)
@@ -216,16 +214,14 @@ def test_a_device_that_answers_late_is_read_and_said_to_be_slow():
 STEPS = {"oriental_az": ("MOVE", "STOP", "LINK"), "watlow_f4t": ("SET", "OFF", "LINK")}
 
 
-FIRST = (("cut", "oriental_az", "MOVE"), ("reboots", "watlow_f4t", "SET"), ("killed", "oriental_az", "LINK"))
-FIRST += (("killed", "watlow_f4t", "SET"),)
+FIRST = (("cut", "oriental_az", "MOVE"), ("killed", "watlow_f4t", "SET"))
 """What happens in which step; the other steps are slow."""
 
 
 def in_steps(*kinds):
     """Every kind of trouble in every step of a device."""
     cases = [(what, name, word) for what in kinds for name, words in STEPS.items() for word in words]
-    marked = [pytest.param(*case, marks=() if case in FIRST else pytest.mark.slow) for case in cases]
-    return pytest.mark.parametrize(("what", "name", "word"), marked)
+    return pytest.mark.parametrize(("what", "name", "word"), mostly_slow(cases, *set(FIRST) & set(cases)))
 
 
 @in_steps("cut", "reboots")
@@ -422,14 +418,19 @@ def test_an_emergency_stop_that_a_person_holds_is_seen():
         points = {p.what: p for p in found.findings.points}
         assert points["reports its emergency stop"].verdict == "held"
         assert "emergency stop" in points["reports its emergency stop"].found
-        plant.emergency_stop = False
+
+
+@pytest.mark.slow
+def test_an_emergency_stop_without_a_servo_is_not_tried_and_one_without_effect_differs():
+    with served_device("smc_lecp6") as (port, _):
         unable = brought_up("smc_lecp6", port, Scripted("PRESSED"))
         assert verdicts(unable)["reports its emergency stop"] == "not tried"  # the servo is off: it is never ready
         ignored = brought_up("smc_lecp6", port, Scripted("MOVE", "PRESSED"))
         assert verdicts(ignored)["reports its emergency stop"] == "differs"
 
 
-@pytest.mark.parametrize("name", ["oriental_az", pytest.param("watlow_f4t", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["oriental_az", "watlow_f4t"])
 def test_ctrl_c_leaves_the_device_as_it_was_and_a_page_that_says_so(name, tmp_path):
     axis = load_profile(name).kind == "axis"
     with served_device(name, silence_s=0.0) as (port, plant):

@@ -60,14 +60,6 @@ def test_every_statistic_of_the_static_record_of_a_run_is_made_from_its_samples(
     assert document_of(*words, "--statistic", "mtie")["deviation_unit"] == "m/s"
 
 
-def test_fit_with_other_effects_is_a_run_beside_the_old_one(archive: Path) -> None:
-    where = ("--archive", archive)
-    before = len(document_of("list", *where)["runs"])
-    effects = "bias,scale,misalignment,second_order"
-    assert "second_order" in document_of("fit", "small", "--effects", effects, *where)["effects"]
-    assert len(document_of("list", *where)["runs"]) == before + 1
-
-
 @pytest.fixture
 def listed(tmp_path: Path) -> Archive:
     """A kept archive of an older version, with one run more that computes its only run again, and one that has just begun."""
@@ -195,6 +187,7 @@ def bash(script: str, home: Path, *words: str) -> subprocess.CompletedProcess[st
     return subprocess.run(command, check=False, timeout=300, **pipes)
 
 
+@pytest.mark.slow
 @each(["run m", "plan optimise production --wanted third"])
 def test_the_tab_key_offers_in_a_real_bash(words: str, completing: Path) -> None:
     script = str(completing / ".bash_completions" / "tumbleline.sh")

@@ -158,6 +158,7 @@ def test_a_model_that_is_not_adequate_is_refused_with_what_it_lacks(certified: t
     )
 
 
+@pytest.mark.slow
 def test_terms_that_the_station_does_not_state_are_refused_by_name(certified: tuple[Path, str]) -> None:
     folder, _ = certified
     own = Path("stations/simulated.toml").read_text("utf-8").replace('name = "simulated"', 'name = "own"')
@@ -176,6 +177,7 @@ def test_terms_that_the_station_does_not_state_are_refused_by_name(certified: tu
     assert "not stated: reference, drift" in refused("certificate", "issue", run, "--archive", folder / "archive")
 
 
+@pytest.mark.slow
 def test_shock_and_transverse_are_certified_beside_the_sweep_and_a_new_one_ends_its_own_kind(
     certified: tuple[Path, str],
 ) -> None:

@@ -167,9 +167,8 @@ OF_NO_CATALOGUE = {
 
 
 @pytest.mark.usefixtures("no_next_measurement")
-@pytest.mark.parametrize(
-    "name", [pytest.param(one, marks=[] if one == "fixture_bends" else [pytest.mark.slow]) for one in OF_NO_CATALOGUE]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("name", OF_NO_CATALOGUE)
 def test_the_suggested_formula_explains_what_no_effect_does(tmp_path: Path, name: str, capsys) -> None:
     assert set(OF_NO_CATALOGUE) == set(OUTSIDE)
     made = make(World(hidden=((name, 3.0),)), 6_400_002)

@@ -4,12 +4,13 @@ import json
 from pathlib import Path
 
 import pytest
+from demonstrations import wafer_line
 from each import each
 from in_process import document_of, given, refused, text_of
 
 from pipelines.archive import Archive
 from pipelines.cli.next_commands import command_line
-from pipelines.demo.archive_lots import Hidden, Line, write_lots
+from pipelines.demo.archive_lots import Line, write_lots
 from pipelines.discovery.lot_source import DiscoveryArchive
 from pipelines.discovery.nights import discovered_before
 
@@ -18,7 +19,7 @@ from pipelines.discovery.nights import discovered_before
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A line whose archive hides a softening spring in one wafer, with the wafers as attributes; it was looked at once."""
     place = tmp_path_factory.mktemp("line")
-    made = write_lots(place, Line(9, hidden=Hidden("W02", -60e-6), wafers=4), 44)
+    made = wafer_line(place)
     text_of("attributes", "add", made.units, "--archive", made.folder)
     (row,) = document_of("discover", "--archive", made.folder, "--workers", "1")["new"]
     assert row == "D1"

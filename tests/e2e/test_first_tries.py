@@ -175,6 +175,7 @@ def test_a_port_in_use_is_refused_before_an_address_is_printed() -> None:
             assert done.stderr.count("\n") == 1, done.stderr
 
 
+@pytest.mark.slow
 def test_ctrl_c_with_an_open_page_ends_the_workbench_in_one_line(tmp_path: Path) -> None:
     words = [sys.executable, "-m", "pipelines.cli", "workbench", str(tmp_path / "archive"), "--port", "0"]
     kept = {**os.environ, "TUMBLELINE_WORKBENCH_TOKEN": "0123456789abcdef" * 2, "PYTHONPATH": str(ROOT)}

@@ -79,6 +79,7 @@ def test_a_replayed_run_gives_the_same_tables_bit_for_bit(recorded_run, tmp_path
     assert re.search(r"replay: .* continues with", departed.stderr), departed.stderr
 
 
+@pytest.mark.slow
 def test_a_run_with_faults_of_the_wire_is_replayed_with_them(tmp_path):
     recipe, frames = recipe_file(tmp_path, *QUICK), tmp_path / "run.jsonl"
     faults = ["--fault", "time_out:at_s=37.5", "--fault", "silent:device=reader:at_s=60:for_s=3"]

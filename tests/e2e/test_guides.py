@@ -14,6 +14,7 @@ import pytest
 from capture_double import finished_run, small_run
 from demonstrations import demonstrations_measured_once
 from in_process import given
+from long_suites import mostly_slow
 
 from benchmarks.generated_archive import write_archive
 
@@ -92,10 +93,6 @@ class Guide:
 
 
 GUIDES = [
-    Guide(
-        "docs/tutorial/find-a-missing-effect.md", close=0.05,
-        files=(("game/report.html", "<th>scope</th>"), ("game/history.png", "")),
-    ),
     Guide("docs/tutorial/from-a-spreadsheet.md", positions, close=0.05, files=(("positions.html", "<svg"),)),
     Guide("docs/how-to/audit.md", factory),
     Guide("docs/how-to/audit-a-laboratory.md", line, files=(("audit.html", "<svg"),)),
@@ -111,10 +108,14 @@ GUIDES = [
 ]  # fmt: skip
 
 SLOW = [
+    Guide(
+        "docs/tutorial/find-a-missing-effect.md", close=0.05,
+        files=(("game/report.html", "<th>scope</th>"), ("game/history.png", "")),
+    ),
     Guide("docs/how-to/add-your-own-effect.md", glue),  # an effect of a file: tests/e2e/test_diagnosis.py
     Guide("docs/how-to/run-an-archive-again.md", old_runs),
     Guide("docs/how-to/release-a-model.md", old_runs),
-]
+]  # fmt: skip
 """Guides whose commands start processes of their own, or search for long."""
 
 ELSEWHERE = {
@@ -123,6 +124,7 @@ ELSEWHERE = {
     "correct-a-recording": "tests/e2e/test_correct.py",
     "README": "tests/e2e/test_guides.py",
     "add-your-own-effect": "tests/e2e/test_guides.py",
+    "find-a-missing-effect": "tests/e2e/test_guides.py",
     "issue-a-certificate": "tests/e2e/test_guides.py",
     "program-the-device": "tests/faults/test_programming.py",
 }
@@ -176,7 +178,7 @@ def test_every_page_that_shows_an_output_is_compared_by_a_test() -> None:
 IMPORTS = pages.examples("docs/how-to/import-your-data.md")
 
 
-@pytest.mark.parametrize(("line", "printed"), IMPORTS, ids=range(len(IMPORTS)))
+@pytest.mark.parametrize(("line", "printed"), mostly_slow(IMPORTS, *IMPORTS[:4], *IMPORTS[5:]), ids=range(len(IMPORTS)))
 def test_an_example_of_imports_prints_what_the_guide_says(
     line: str, printed: str, shared_data: Path, home: Path
 ) -> None:

@@ -8,6 +8,7 @@ import pandas as pd
 import pytest
 from in_process import document_of, given, text_of
 from laboratory import laboratory_file
+from long_suites import mostly_slow
 
 from pipelines.archive import Archive
 from schemas.errors import UNUSABLE
@@ -310,7 +311,7 @@ def pages_held(plant_memory: str) -> list[bytes]:
     return [memory[start : start + 32] for start in range(0, len(memory), 32)]
 
 
-@pytest.mark.parametrize(("which", "letters"), [("three", "xyz"), ("one", "x")])
+@pytest.mark.parametrize(("which", "letters"), mostly_slow([("three", "xyz"), ("one", "x")], ("one", "x")))
 def test_teds_of_every_axis_are_in_the_memory_of_the_device_and_stay_there(
     measured: tuple[Path, dict[str, str]], tmp_path: Path, which: str, letters: str
 ) -> None:

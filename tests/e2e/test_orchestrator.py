@@ -261,6 +261,7 @@ def test_idle_connections_do_not_shut_the_line_out(line: Orchestrator) -> None:
         assert len(closed) >= len(idle) - 1.25 * MOST
 
 
+@pytest.mark.slow
 def test_a_server_without_a_key_or_on_a_port_in_use_does_not_start(line: Orchestrator) -> None:
     bare = {key: value for key, value in os.environ.items() if not key.endswith("AUTH_STRING")}
     taken = f"orchestrator: port {line.port} of 127.0.0.1 cannot be used (Address already in use)"

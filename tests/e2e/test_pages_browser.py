@@ -12,6 +12,7 @@ import pytest
 from browser import until
 from capture_double import recipe_file, small_run
 from in_process import text_of
+from long_suites import mostly_slow
 
 from inertial import poses
 from inertial.frames import force_from_angles
@@ -93,7 +94,7 @@ def one_soak(folder: Path) -> Path:
     return path
 
 
-@pytest.mark.parametrize("name", ["report", "plan", "audit", "diagnosis"])
+@pytest.mark.parametrize("name", mostly_slow(["report", "plan", "audit", "diagnosis"], "report", "plan"))
 def test_nothing_is_clipped_and_all_text_can_be_read_light_and_dark(
     browser: Any, pages: dict[str, Path], name: str
 ) -> None:
@@ -149,7 +150,7 @@ def test_a_failed_unit_says_why_and_is_before_the_others(run: Run) -> None:
     assert re.search(r"Why it failed</h3>\s*<ul[^>]*><li>scale over temperature 900 ppm/K", html)
 
 
-@pytest.mark.parametrize("name", ["plan", "audit", "diagnosis"])
+@pytest.mark.parametrize("name", mostly_slow(["plan", "audit", "diagnosis"], "plan"))
 def test_a_page_fits_a4(browser: Any, pages: dict[str, Path], name: str, tmp_path: Path) -> None:
     page = browser.new_page(viewport={"width": 710, "height": 1000})  # the printed width of A4 in CSS pixels
     page.emulate_media(media="print")
@@ -206,6 +207,7 @@ class Opened:
         return self.page.evaluate(SHOWN)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("theme", ["light", "dark"])
 def test_figures_are_drawn_on_a_screen_and_pictures_are_printed(browser: Any, report: Path, theme: str) -> None:
     one = Opened(browser, report, color_scheme=theme)

@@ -306,6 +306,7 @@ def test_what_cannot_be_asked_is_told_in_one_message(options: str, tmp_path: Pat
     assert not target.exists()
 
 
+@pytest.mark.slow
 def test_effects_that_may_be_mistaken_are_told_apart_by_the_cheapest_recipe(tmp_path: Path) -> None:
     rivals, target = ("third_order", "odd_quadratic"), tmp_path / "found.toml"
     options = ("--criterion", f"t:{','.join(rivals)}", "--effects", PLAIN, "--set", "size=400")

@@ -62,6 +62,7 @@ def coefficients(archive: Path):
 DOOR = ("--fault", "door:at_s=200:for_s=60")
 
 
+@pytest.mark.slow
 def test_a_station_measures_on_ramps_through_an_open_door(tmp_path):
     on_ramps(DOOR, tmp_path)
 

@@ -9,8 +9,6 @@ from in_process import document_of, refused, text_of
 
 from pipelines.archive import Archive
 
-PRIOR = 'limits = "', '[prior]\nfull = "full.toml"'
-
 
 def with_prior(folder: Path, prior: str = 'full = "full.toml"') -> str:
     """The brief recipe with a prior, beside the same one without it."""
@@ -25,7 +23,7 @@ def test_a_lot_of_the_family_is_fitted_with_its_prior(tmp_path: Path) -> None:
     """The family's spread is that of the preset; a station's own error of the bias is far below it, so its share is small."""
     recipe, root = with_prior(tmp_path), tmp_path / "archive"
     family_archive(root, recipe_file(tmp_path, *BRIEF), 5e-3)
-    found = document_of("run", recipe, "--archive", root, "--units", "U1,U2,U3")
+    found = document_of("run", recipe, "--direct", "--archive", root, "--units", "U1,U2,U3")
     assert found["prior"]["units"] == LOTS * UNITS
     assert found["prior"]["foreign"] == {}
     run = Archive(root).run(found["run"])
@@ -45,13 +43,13 @@ def test_a_lot_of_the_family_is_fitted_with_its_prior(tmp_path: Path) -> None:
 def test_a_unit_that_does_not_fit_gets_the_full_plan(tmp_path: Path) -> None:
     recipe, root = with_prior(tmp_path), tmp_path / "archive"
     family_archive(root, recipe_file(tmp_path, *BRIEF), 1e-5)
-    told = text_of("run", recipe, "--archive", root, "--units", "U1")
+    told = text_of("run", recipe, "--direct", "--archive", root, "--units", "U1")
     assert "U1 does not fit its family (p = " in told
     names = [run.recipe for run in Archive(root).runs() if run.recipe in {"quick", "full"}]
     assert sorted(names) == ["full", "quick"]
 
 
-@pytest.mark.usefixtures("no_next_measurement")
+@pytest.mark.slow  # by the orchestrator
 def test_a_lot_whose_prior_is_widened_gets_the_full_plan(tmp_path: Path) -> None:
     recipe, root = with_prior(tmp_path), tmp_path / "archive"
     family_archive(root, recipe_file(tmp_path, *BRIEF), 1e-5)
@@ -70,5 +68,5 @@ def test_a_full_plan_with_a_prior_is_refused(tmp_path: Path) -> None:
         Path(recipe).read_text(encoding="utf-8").replace("quick.toml", "full.toml"), encoding="utf-8"
     )
     assert "key 'prior.full': full measures adxl355 with a prior" in refused(
-        "run", recipe, "--archive", root, "--units", "U1"
+        "run", recipe, "--direct", "--archive", root, "--units", "U1"
     )

@@ -172,6 +172,7 @@ def station_seconds(readings: pd.DataFrame) -> float:
     return float((readings["start_s"] + readings["duration_s"]).max())
 
 
+@pytest.mark.slow
 def test_a_full_fixture_takes_hardly_longer_than_one_unit() -> None:
     alone = station_seconds(on_a_fixture(16, 1).all(1))
     for slots, units in ((16, 16), (32, 32)):
@@ -182,6 +183,7 @@ def test_a_full_fixture_takes_hardly_longer_than_one_unit() -> None:
         assert station_seconds(readings) <= 1.05 * alone
 
 
+@pytest.mark.slow
 def test_units_that_fail_never_hold_up_the_others() -> None:
     faults = (
         "silent:serial=U003:at_s=900", "dead:serial=U007", "garbage:serial=U011:at_s=1200",

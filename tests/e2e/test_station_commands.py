@@ -141,6 +141,7 @@ def test_control_limits_are_those_of_an_individuals_chart():
     assert control_limits(flow[:7], 8) is None
 
 
+@pytest.mark.slow
 def test_check_drives_hardware_under_a_lease_and_leaves_it_safe(tmp_path):
     with served(lot_of(2)) as port:
         quick = {"limits": {"speed_deg_s": 90.0}, "self_test": {"sample_s": 1.0, "settle_s": 0.2}}

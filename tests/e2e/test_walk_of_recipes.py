@@ -56,7 +56,7 @@ def test_there_is_something_to_walk() -> None:
     assert set(QUICK) < set(map(named, PROCEDURES))
 
 
-QUICK = ("tilt", "turn_on")
+QUICK = ("tilt",)
 """Procedures of the fast part; on simulated units each is measured by ``tests/contract/test_procedures.py``."""
 
 

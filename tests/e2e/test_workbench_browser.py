@@ -13,6 +13,7 @@ import pytest
 from browser import Served, Tab, served, tab, until
 from capture_double import recipe_file, small_run
 from in_process import document_of, text_of
+from long_suites import mostly_slow
 
 from pipelines.jobs.recipes import load_recipe
 
@@ -20,6 +21,9 @@ SCRIPT = "<img src=x onerror=window.ran=1>"
 PAGES = (
     "/units", "/run?run=latest", "/unit?run=latest", "/missing", "/upload", "/operator", "/models", "/plan", "/station", "/audit",
 )  # fmt: skip
+
+
+LOOKS: dict[str, dict[str, Any]] = {"screen": {}, "dark tablet": {"dark": True, "size": (820, 1180)}}
 
 
 @pytest.fixture(scope="module")
@@ -40,11 +44,15 @@ def pictures(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_every_page_is_drawn_reaches_nothing_outside_and_can_be_read_by_everybody(bench: Served, browser: Any) -> None:
-    with tab(browser, bench.address) as one:
+@pytest.mark.parametrize("look", mostly_slow(LOOKS, "screen"))
+def test_every_page_is_drawn_reaches_nothing_outside_and_can_be_read_by_everybody(
+    bench: Served, browser: Any, look: str
+) -> None:
+    with tab(browser, bench.address, **LOOKS[look]) as one:
         for path in PAGES:
             one.open(path)
             assert one.findings() == [], path
+            assert one.page.evaluate("() => document.documentElement.scrollWidth - innerWidth") <= 0, path
         assert one.outside == []
         assert one.errors == []
 
@@ -149,6 +157,7 @@ def test_a_moved_pose_changes_the_floors_as_the_command_says_and_the_recipe_is_w
         assert one.errors == [] == one.outside
 
 
+@pytest.mark.slow
 def test_a_click_on_a_residual_shows_the_samples_of_its_dwell(bench: Served, browser: Any) -> None:
     run = next(path.name for path in (bench.archive / "runs").iterdir() if path.name.startswith("small-"))
     with tab(browser, bench.address) as one:
@@ -180,6 +189,7 @@ def test_a_browser_without_the_token_may_look_and_not_compute(bench: Served, bro
         until(lambda: "has read access only" in one.page.inner_text("main"), "the page says why nothing begins")
 
 
+@pytest.mark.slow
 def test_a_server_that_is_killed_is_said_and_the_page_goes_on(bench: Served, browser: Any) -> None:
     with tab(browser, bench.address) as one:
         one.open("/units")

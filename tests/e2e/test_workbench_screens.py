@@ -41,6 +41,7 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
         yield one
 
 
+@pytest.mark.slow
 def test_on_a_narrow_screen_nothing_is_cut_and_the_whole_menu_is_seen(bench: Served, browser: Any) -> None:
     with tab(browser, bench.address, size=PHONE) as one:
         for path in PAGES:
@@ -53,6 +54,7 @@ def test_on_a_narrow_screen_nothing_is_cut_and_the_whole_menu_is_seen(bench: Ser
         assert one.errors == []
 
 
+@pytest.mark.slow
 def test_plots_beside_each_other_stand_one_under_the_other_on_a_narrow_screen(bench: Served, browser: Any) -> None:
     with tab(browser, bench.address, size=PHONE) as one:
         one.open("/two-models?source=latest&added=third_order")
@@ -66,6 +68,7 @@ def test_plots_beside_each_other_stand_one_under_the_other_on_a_narrow_screen(be
         until(lambda: one.page.evaluate(DOMAINS, "residuals")[1] > 0.2, "a wide screen has them beside each other")
 
 
+@pytest.mark.slow
 def test_dots_are_reached_and_chosen_by_keyboard(bench: Served, browser: Any) -> None:
     with tab(browser, bench.address, size=SCREEN) as one:
         one.open("/unit?run=latest&unit=A1&against=force")
@@ -83,6 +86,7 @@ def test_dots_are_reached_and_chosen_by_keyboard(bench: Served, browser: Any) ->
         assert one.errors == []
 
 
+@pytest.mark.slow
 def test_a_run_tells_verdict_results_and_reasons_before_its_tables(bench: Served, browser: Any) -> None:
     with tab(browser, bench.address, size=SCREEN) as one:
         one.open("/run")
@@ -96,6 +100,7 @@ def test_a_run_tells_verdict_results_and_reasons_before_its_tables(bench: Served
         until(lambda: "2 of 3" in one.page.inner_text("main"), "the run with a refused unit is listed")
 
 
+@pytest.mark.slow
 def test_a_serial_is_checked_when_it_is_scanned_and_the_slot_keeps_the_focus(bench: Served, browser: Any) -> None:
     with tab(browser, bench.address) as one:
         one.open("/operator")

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 from browser import ROOT, Tab, served, tab, until
-from capture_double import recipe_file, small_run
+from capture_double import recipe_file
 from served_station import FAST, modbus_station, short_recipe_file, station_file
 from served_station import served as served_station
 from small_station import lot_of
@@ -64,24 +64,6 @@ def test_the_demonstration_from_its_measurement_to_the_error_falling(
         assert one.outside == [] == one.errors
 
 
-def test_every_page_can_be_read_in_the_dark_theme_on_a_tablet(tmp_path: Path, browser: Any) -> None:
-    """The light theme on a screen: tests/e2e/test_workbench_browser.py."""
-    small_run(tmp_path)
-    size = (820, 1180)
-    pages = ("/units", "/run", "/unit", "/missing?source=latest", "/upload", "/operator", "/plan", "/station", "/audit")
-    with (
-        served(tmp_path / "archive", tmp_path / "bench") as server,
-        tab(browser, server.address, dark=True, size=size) as one,
-    ):
-        for number, path in enumerate(pages):
-            one.open(path)
-            assert one.findings() == [], path
-            wide = one.page.evaluate("() => document.documentElement.scrollWidth - innerWidth")
-            assert wide <= 0, f"{path} is {wide} px wider than the screen"
-            one.shot(tmp_path, f"page-{number}", width=size[0], height=size[1])
-        assert one.outside == [] == one.errors
-
-
 def begun(one: Tab, recipe: str | Path, *serials: str, fault: str = "") -> None:
     """A lot that is started on the page of the operator, and asks for its units."""
     one.page.select_option("select[name=recipe]", str(recipe))
@@ -129,24 +111,6 @@ def test_a_lot_with_an_open_door_is_measured_from_two_browsers(tmp_path: Path, b
         two.open("/operator")
         assert "door" in two.page.inner_text("main")
         assert two.page.locator(".tile").count() >= 3
-
-
-def test_a_lot_without_a_fault_ends_with_its_results_before_unloading(tmp_path: Path, browser: Any) -> None:
-    folder = tmp_path / "bench"
-    folder.mkdir()
-    recipe = recipe_file(folder)
-    with served(tmp_path / "archive", folder) as server, tab(browser, server.address) as one:
-        one.open("/operator")
-        begun(one, recipe, "A1", "A2")
-        one.press("[data-answer='go']")
-        until(lambda: "remove the units" in one.page.inner_text("main"), "the results are there before unloading")
-        assert one.page.locator(".tile.pass, .tile.fail, .tile.refused").count() == 2
-        one.shot(tmp_path, "unload")
-        one.press("[data-answer='go']")
-        one.sees("[data-phase='done']")
-        one.press("text=Open the run")
-        until(lambda: one.page.locator("h1").inner_text().startswith("small-"), "the run is shown")
-        assert one.outside == [] == one.errors
 
 
 def test_a_station_like_hardware_is_paused_safely_and_goes_on_beside_a_second_station(

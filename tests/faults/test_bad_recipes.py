@@ -8,8 +8,8 @@ from root_process import ROOT
 
 from pipelines.archive import files as archive_files
 from pipelines.jobs.recipes import load_recipe
-from pipelines.jobs.seating import Seating, read_seating, scan
-from schemas.errors import ArchiveUnusable, RecipeInvalid, WrongUse
+from pipelines.jobs.seating import Seating, scan
+from schemas.errors import ArchiveUnusable, RecipeInvalid
 from schemas.model import ModelFile
 from schemas.toml_files import parse_as, parse_toml
 
@@ -62,47 +62,6 @@ def test_nesting_and_long_integers_end_in_one_message_everywhere(tmp_path: Path)
 def test_a_mark_at_the_beginning_of_a_file_is_read_over(tmp_path: Path) -> None:
     (tmp_path / "r.toml").write_bytes(b"\xef\xbb\xbf" + RECIPE.read_bytes())
     assert load_recipe(str(tmp_path / "r.toml")).name == "production"
-
-
-@each(
-    [
-        b"\xef\xbb\xbfslot;serial\r\n0;A1\r\n\r\n2;B2\r\n;\r\n",
-        b"\xef\xbb\xbfslot,serial\n0,A1\n2,B2\n",
-        b"slot\tserial\n0\tA1\n2\tB2",
-    ]
-)
-def test_slot_maps_of_excel_are_read(content: bytes, tmp_path: Path) -> None:
-    (tmp_path / "m.csv").write_bytes(content)
-    assert read_seating(str(tmp_path / "m.csv")) == Seating(("A1", "B2"), (0, 2))
-
-
-@each(
-    [
-        ("slot,serial\n0,A1\n1\n", "row 2: 1 cells"),
-        ("slot,serial\n0,A1\n1;B2\n", "row 2: 1 cells"),
-        ("slot,serial\n0,A1\n1,B2,C3\n", "row 2: 3 cells"),
-        ("slot,serial\n0,A1\n1,A1\n", "serial A1 is there twice"),
-        ("slot,serial\n0,..\n", "serial '..' is not usable"),
-        ("slot,serial\n0,=cmd|x\n", r"serial '=cmd\|x' is not usable"),
-        ("slot,serial\n0,АВ\n", r"U\+0410"),
-        ("slot,serial\n٣,A1\n", "slot '٣', a whole number"),
-        (f"slot,serial\n{'9' * 5000},A1\n", "a whole number from 0 on"),
-        (f"slot,serial\n0,{'x' * 200000}\n", "not a table of text|too long"),
-    ],
-    lambda row: row[1],
-)
-def test_slot_maps_lose_no_row_and_take_no_nonsense(row: tuple[str, str], tmp_path: Path) -> None:
-    content, words = row
-    (tmp_path / "m.csv").write_text(content, encoding="utf-8")
-    with pytest.raises(WrongUse, match=words) as refused:
-        read_seating(str(tmp_path / "m.csv"))
-    assert len(str(refused.value)) < 400
-
-
-def test_a_slot_map_in_toml_has_texts(tmp_path: Path) -> None:
-    (tmp_path / "m.toml").write_text("[slots]\n0 = true\n")
-    with pytest.raises(WrongUse, match="slot 0: found True, a serial number in quotes is needed"):
-        read_seating(str(tmp_path / "m.toml"))
 
 
 def test_each_scan_is_checked_when_it_is_scanned() -> None:

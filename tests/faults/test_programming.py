@@ -358,7 +358,10 @@ def test_a_calibration_that_ended_for_another_reason_does_not_come_back() -> Non
 
 @pytest.mark.parametrize(
     "change",
-    [("temperatures_C = [0.0, 50.0]", "temperatures_C = [0.0, 51.0]"), ('"small"', '"later"')],
+    [
+        pytest.param(("temperatures_C = [0.0, 50.0]", "temperatures_C = [0.0, 51.0]"), marks=pytest.mark.slow),
+        ('"small"', '"later"'),
+    ],
     ids=["measured later", "the same data again"],
 )
 def test_an_older_run_is_not_written_over_a_newer_certified_one(run: Run, change: tuple[str, str]) -> None:

@@ -5,7 +5,6 @@ import threading
 import pytest
 from each import each
 from plant_wires import tcp_link
-from pydantic import ValidationError
 from root_process import ROOT
 from small_server import answering
 from small_station import MemorySink, lot_of, quiet_progress, short_recipe, station_of
@@ -97,22 +96,6 @@ def test_a_port_that_is_taken_is_refused():
     plant = make_plant(load_station(), lot_of(1))
     with PlantServer(plant) as server, pytest.raises(StationRefused, match="free port"):
         PlantServer(make_plant(load_station(), lot_of(1)), port=server.port).__enter__()
-
-
-@each(
-    [
-        ({"kind": "dead"}, "correct the fault"),
-        ({"kind": "door", "serial": "U000"}, "correct the fault"),
-        ({"kind": "mute", "serial": "U000", "device": "reader"}, "correct the fault"),
-        ({"kind": "sillent", "serial": "U001"}, "silent"),
-        ({"kind": "vibration", "figures": {"rms": 0.1}}, "rms_g"),
-        ({"kind": "dead", "serial": "U0O1"}, "U001"),
-    ]
-)
-def test_a_fault_that_does_not_say_what_is_meant_or_has_a_typo_is_refused(row):
-    fault, needed = row
-    with pytest.raises((ValidationError, RecipeInvalid), match=needed):
-        make_plant(station_of(faults=[fault]), lot_of())
 
 
 def test_hardware_is_not_served():

@@ -97,7 +97,8 @@ LINES = {
 """A line that a file has again and again, and how many megabytes of it; all but the first are of the slow suite."""
 
 
-@pytest.mark.parametrize("name", [pytest.param(k, marks=() if k == "commas" else pytest.mark.slow) for k in LINES])
+@pytest.mark.slow
+@pytest.mark.parametrize("name", LINES)
 def test_twenty_looks_at_once_take_less_than_a_gigabyte(settings: WorkbenchSettings, name: str) -> None:
     line, megabytes = LINES[name]
     content, packed = line * (megabytes * MB // len(line)), name.endswith("packed")

@@ -52,6 +52,7 @@ def test_a_killed_run_leaves_its_station_safe_and_free():
             assert {h.run for h, _ in holders(folder.state_folder(), config).values()} == {"the next"}
 
 
+@pytest.mark.slow
 def test_a_run_that_stands_still_is_taken_for_dead_and_may_not_go_on():
     with served() as port:
         config = modbus_station(port, limits=SLOW)

@@ -19,7 +19,6 @@ FEW = settings(
 SOME = settings(FEW, max_examples=25)
 TEXTS = st.text(st.characters(exclude_categories=["Cs"]), max_size=12)
 NAMES = st.from_regex(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,10}", fullmatch=True)
-ROUNDED = st.floats(-1e6, 1e6).map(lambda value: round(value, 6))
 DOCUMENTS = st.dictionaries(
     TEXTS,
     st.recursive(

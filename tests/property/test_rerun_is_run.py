@@ -33,6 +33,7 @@ def hashes(run: Run) -> dict[str, str]:
     return {name: run.manifest(name)["sha256"] for name in run.tables()}
 
 
+@pytest.mark.slow
 @FEWER
 @given(first=MODELS, then=MODELS)
 def test_a_way_round_does_not_matter(

@@ -11,6 +11,7 @@ import pytest
 from generated import FEW
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
+from long_suites import mostly_slow
 from lots import Physics, lot
 
 from pipelines.diagnosis.diagnose import diagnose
@@ -105,7 +106,7 @@ def outputs_in_another_unit(frame: pd.DataFrame, data: st.DataObject) -> pd.Data
     return frame.assign(**scaled, out_unit=unit)
 
 
-@pytest.mark.parametrize("world", WORLDS)
+@pytest.mark.parametrize("world", mostly_slow(WORLDS, "nothing hidden", "a cubic"))
 @pytest.mark.parametrize(
     "change", [written_otherwise, axes_turned, outputs_in_another_unit], ids=lambda change: change.__name__
 )

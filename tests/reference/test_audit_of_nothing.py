@@ -3,6 +3,7 @@
 import independent_noise as made
 import numpy as np
 import pytest
+from long_suites import mostly_slow
 
 from inertial.population.change_points import change_points
 from inertial.population.control_charts import alarms, baseline, false_alarms, signals
@@ -104,7 +105,7 @@ TOLERANCE = np.repeat([1500.0, 1000.0, 1.0, 1.0, 60.0, 60.0], 3)
 
 
 @pytest.mark.parametrize(("slope", "walk"), [(0.25, 0.0), (0.0, 0.3), (0.15, 0.2)], ids=["slope", "walk", "both"])
-@pytest.mark.parametrize("times", [2, 4])
+@pytest.mark.parametrize("times", mostly_slow([2, 4], 2))
 def test_units_are_in_tolerance_when_their_reliability_ends(rng, slope, walk, times):
     """Units that come back once a year: in every parameter by itself, or taken for mounting, two in five had left it by then."""
     units, seating = 300, 0.05
@@ -142,7 +143,7 @@ def test_units_that_stand_still_agree_in_nineteen_of_twenty(rng, stated):
 
 
 @pytest.mark.parametrize("units", [8, 60])
-@pytest.mark.parametrize("kind", ["white", "correlated", "flicker"])
+@pytest.mark.parametrize("kind", mostly_slow(["white", "correlated", "flicker"], "correlated"))
 def test_second_calibrations_agree_in_nineteen_of_twenty(rng, kind, units):
     """Units without drift whose stated uncertainty is a fifth of their scatter: 10 to 25 % disagreed before."""
     beyond = []
@@ -238,7 +239,7 @@ def test_large_lots_stand_out_no_more_than_small_ones(rng, differing):
     assert odd_lots <= 1
 
 
-@pytest.mark.parametrize(("n", "counted"), [(60, 20), (200, 160)])
+@pytest.mark.parametrize(("n", "counted"), mostly_slow([(60, 20), (200, 160)], (60, 20)))
 def test_charts_in_control_are_found_out_of_it_as_rarely_as_is_said(rng, n, counted):
     """By mean and variance of the number of alarms a p-value of 6·10⁻⁴, that of eighteen charts, came up 16 times as often."""
     chance, which = false_alarms(n, 40, counted), np.arange(n) >= n - counted
@@ -258,7 +259,7 @@ def test_a_number_of_alarms_is_the_less_likely_the_larger():
     assert p_values[-1] > 0.0
 
 
-@pytest.mark.parametrize("n", [8, 16, 60])
+@pytest.mark.parametrize("n", mostly_slow([8, 16, 60], 8))
 def test_short_series_change_their_level_no_oftener_than_is_said(rng, n):
     """With σ from a few differences and the normal tail a p-value of 10⁻⁴ came up 30 times as often in eight points."""
     changes = [change_points(values, 1e-2) for values in rng.standard_normal((2000, n))]

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from each import each
+from long_suites import mostly_slow
 from lots import lot
 from scipy import stats
 
@@ -78,7 +79,7 @@ except SystemExit as left:
 """
 
 
-@each(["noise allan", "noise psd", "diagnose"])
+@pytest.mark.parametrize("command", mostly_slow(["noise allan", "noise psd", "diagnose"], "noise psd", "diagnose"))
 def test_commands_load_no_library_that_they_do_not_need(command: str, tmp_path: Path) -> None:
     path, options, idle = (
         tmp_path / "given.csv",

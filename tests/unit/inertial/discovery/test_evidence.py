@@ -57,9 +57,10 @@ def added(lot: ScoredLot, size: np.ndarray) -> ScoredLot:
     return replace(lot, score=score)
 
 
-def test_archives_without_anything_hidden_stay_silent() -> None:
-    loud = [seed for seed in range(40) if max(largest(evidence_of(lots(seed, 200))).values()) > NEEDED]
-    assert len(loud) <= 5  # 5 % are allowed, of 40 six or more come with 1 %
+@pytest.mark.parametrize(("archives", "most"), [(6, 2), pytest.param(40, 5, marks=pytest.mark.slow)])
+def test_archives_without_anything_hidden_stay_silent(archives: int, most: int) -> None:
+    loud = [seed for seed in range(archives) if max(largest(evidence_of(lots(seed, 200))).values()) > NEEDED]
+    assert len(loud) <= most  # 5 % are allowed; more than this come with 1 %
 
 
 def test_one_lot_multiplies_the_evidence_by_1_65_at_most(rng: np.random.Generator) -> None:

@@ -4,6 +4,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from long_suites import mostly_slow
 
 from benchmarks.discovery.archives import ArchiveMaker, Hidden, Result, Setting
 from benchmarks.discovery.lots import WORLDS, bank
@@ -24,10 +25,9 @@ def pool() -> Pool:
 
 HIDDEN = [
     ("third_order", "wafer"),
-    *(
-        pytest.param(*one, marks=pytest.mark.slow)
-        for one in (("cross_coupling", "slot"), ("second_order", "radius"), ("scale_asymmetry", "mean"))
-    ),
+    ("cross_coupling", "slot"),
+    ("second_order", "radius"),
+    ("scale_asymmetry", "mean"),
 ]
 
 
@@ -37,7 +37,7 @@ def archive(effect: str, driver: str) -> Result:
     return maker().archive(31, 60, Hidden(effect, driver, 0.3), Setting(), NEEDED, keep=True)
 
 
-@pytest.mark.parametrize(("effect", "driver"), HIDDEN)
+@pytest.mark.parametrize(("effect", "driver"), mostly_slow(HIDDEN, ("third_order", "wafer")))
 def test_effect_and_driver_are_named_and_nothing_else(effect: str, driver: str) -> None:
     result = archive(effect, driver)
     columns = maker().columns

@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from long_suites import mostly_slow
 
 from inertial.discovery.populations import two_populations
 
@@ -18,7 +19,7 @@ ONE: dict[str, Callable[[np.random.Generator, int], np.ndarray]] = {
 }
 
 
-@pytest.mark.parametrize("law", ONE)
+@pytest.mark.parametrize("law", mostly_slow(ONE, "normal"))
 def test_one_population_is_not_taken_for_two(law: str) -> None:
     for seed in (1, 2):
         found = two_populations(ONE[law](np.random.default_rng(seed), 2000), np.random.default_rng(seed))

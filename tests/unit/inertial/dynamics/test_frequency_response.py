@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from long_suites import mostly_slow
 from scipy import signal
 
 from inertial.dynamics.frequency_response import clock_departure, frequency_response
@@ -32,7 +33,7 @@ def recorded(kind, damping, noise, rng, seconds=5.0):
 
 
 @pytest.mark.parametrize("kind", ["random", "sweep"])
-@pytest.mark.parametrize("damping", [0.6, 0.05])
+@pytest.mark.parametrize("damping", mostly_slow([0.6, 0.05], 0.05))
 def test_intervals_cover_the_response(kind, damping):
     rng, inside, deviations = np.random.default_rng(240_861), [], []
     for _ in range(12):

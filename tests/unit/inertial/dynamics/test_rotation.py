@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from long_suites import mostly_slow
 from scipy.stats import binom
 
 from inertial.dynamics.rotation import RotationData
@@ -151,7 +152,9 @@ def test_uncertainties_hold_in_coloured_noise() -> None:
     assert binom.ppf(1e-4, total, 0.93) / total <= held / total
 
 
-@pytest.mark.parametrize("effect", sorted(set(EFFECTS) - {"second_order", "third_order"}))
+@pytest.mark.parametrize(
+    "effect", mostly_slow(sorted(set(EFFECTS) - {"second_order", "third_order"}), "odd_quadratic", "asymmetry")
+)
 def test_a_term_that_the_model_lacks_is_named_in_its_class(effect: str) -> None:
     """The term itself at a size well above the noise; mechanisms of the plant are in benchmarks/rotation.py."""
     points = rotations()

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from long_suites import mostly_slow
 from scipy.integrate import quad
 from scipy.stats import binom, chi2
 
@@ -67,7 +68,10 @@ def expected(white: float, density: np.ndarray, walk: float) -> tuple[float, flo
 
 @pytest.mark.parametrize(
     ("white", "flicker", "walk"),
-    [(10.0, 0.0, 0.0), (10.0, 5.0, 0.0), (3.0, 50.0, 0.0), (10.0, 5.0, 1.0), (10.0, 0.0, 5.0)],
+    mostly_slow(
+        [(10.0, 0.0, 0.0), (10.0, 5.0, 0.0), (3.0, 50.0, 0.0), (10.0, 5.0, 1.0), (10.0, 0.0, 5.0)],
+        *[(10.0, 0.0, 0.0), (10.0, 5.0, 1.0)],
+    ),
 )
 @pytest.mark.parametrize("shown", ["by the hour alone", "by a static record"])
 def test_the_intervals_of_an_hour_hold_the_process(white, flicker, walk, shown, rng):
@@ -149,6 +153,7 @@ def test_few_data_widen_the_uncertainty_by_students_t() -> None:
     assert stated_error(1.0, 0.0, 0.0, np.sqrt(1.0 / 10.0)) == pytest.approx(2.5706 / 1.95996, rel=1e-4)
 
 
+@pytest.mark.slow
 def test_the_difference_of_two_short_windows_is_held_by_its_uncertainty(rng: np.random.Generator) -> None:
     runs = 400
     record = flicker(rng, runs, 240)
@@ -167,27 +172,24 @@ def test_the_difference_of_two_short_windows_is_held_by_its_uncertainty(rng: np.
     assert share_of_95(np.abs(pulls) < 1.96)
 
 
-def test_a_warm_up_in_noise_is_neither_late_nor_more_certain_than_it_is(rng: np.random.Generator) -> None:
+@pytest.mark.parametrize("size", mostly_slow([10.0, 30.0, 80.0], 30.0))
+def test_a_warm_up_in_noise_is_neither_late_nor_more_certain_than_it_is(size: float, rng: np.random.Generator) -> None:
     time = np.asarray(np.arange(1200) + 0.5, dtype=np.float64)
     clean, true = 1e4 * np.exp(-time / 120.0), 120.0 * np.log(10.0)
     runs = 300
-    for size in (
-        10.0,
-        30.0,
-        80.0,
-    ):  # 80 is a sixth of the band in the level: there the pulls are skew, the interval is not
-        pulls, held, refused = [], [], 0
-        for own in flicker(rng, runs, 1200):
-            try:
-                entry = entered(time, clean + size * own, band=1000.0, window_s=10.0)
-            except NotIdentified:
-                refused += 1
-                continue
-            pulls.append((entry.value - true) / entry.error)
-            held.append(entry.low <= true <= entry.high)
-        assert refused <= (0.02 * runs if size > 50.0 else 0.0)  # an entry that noise leaves open
-        assert size > 50.0 or (abs(np.mean(pulls)) < 2.6 / np.sqrt(runs) and spread_of_one(pulls))
-        assert share_of_95(held)
+    # 80 is a sixth of the band in the level: there the pulls are skew, the interval is not
+    pulls, held, refused = [], [], 0
+    for own in flicker(rng, runs, 1200):
+        try:
+            entry = entered(time, clean + size * own, band=1000.0, window_s=10.0)
+        except NotIdentified:
+            refused += 1
+            continue
+        pulls.append((entry.value - true) / entry.error)
+        held.append(entry.low <= true <= entry.high)
+    assert refused <= (0.02 * runs if size > 50.0 else 0.0)  # an entry that noise leaves open
+    assert size > 50.0 or (abs(np.mean(pulls)) < 2.6 / np.sqrt(runs) and spread_of_one(pulls))
+    assert share_of_95(held)
     exact = entered(time, clean + 1e-3 * flicker(rng, 1, 1200)[0], band=1000.0, window_s=10.0)
     assert exact.value == pytest.approx(true, abs=0.6)
     with pytest.raises(NotIdentified):

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from long_suites import mostly_slow
 from scipy import signal
 
 from inertial.dynamics.spectra import transfer
@@ -35,7 +36,7 @@ def test_what_a_sweep_can_know(top: float, known: tuple, fitted: tuple) -> None:
         assert fit.of("damping")[1] == pytest.approx(expected[1], rel=0.2, abs=2e-4)
 
 
-@pytest.mark.parametrize("kind", ["two_pole", "moving_average", "one_pole"])
+@pytest.mark.parametrize("kind", mostly_slow(["two_pole", "moving_average", "one_pole"], "one_pole"))
 def test_a_hidden_low_pass_is_named_and_the_error_falls(kind: str, rng: np.random.Generator) -> None:
     f = np.geomspace(5.0, 5000.0, 45)
     h = -transfer(f, 2300.0, 0.62) * np.exp(-2j * np.pi * f * 2e-5)
@@ -52,9 +53,12 @@ def test_a_hidden_low_pass_is_named_and_the_error_falls(kind: str, rng: np.rando
     assert diagnosis.where[0].high_hz == pytest.approx(5000.0)
 
 
-def test_nothing_is_named_where_nothing_is_missing_and_few_points_cannot_be_judged(rng: np.random.Generator) -> None:
+@pytest.mark.parametrize("sweeps", mostly_slow([1, 5], 1))
+def test_nothing_is_named_where_nothing_is_missing_and_few_points_cannot_be_judged(
+    sweeps: int, rng: np.random.Generator
+) -> None:
     f = np.geomspace(5.0, 4000.0, 40)
-    for _ in range(5):
+    for _ in range(sweeps):
         diagnosis = diagnose_transfer(
             points(f, -transfer(f, 2500.0, 0.7) * np.exp(-2j * np.pi * f * 3e-5), 2e-3, 2e-3, rng)
         )
@@ -66,7 +70,7 @@ def test_nothing_is_named_where_nothing_is_missing_and_few_points_cannot_be_judg
     assert "sweep more frequencies" in diagnosis.reason
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", mostly_slow([1, 2], 2))
 def test_mass_and_low_pass_are_not_exchanged_and_nothing_else_is_named(seed: int) -> None:
     """The exchanged solution is another minimum of the fit; from there further effects seem to be missing."""
     rng = np.random.default_rng(seed)
@@ -102,6 +106,7 @@ def test_a_sweep_to_1_khz_states_no_natural_frequency_of_a_mass_behind_a_low_pas
     assert max(diagnosis.next_hz) > 1000.0
 
 
+@pytest.mark.slow
 def test_with_the_frequencies_that_are_proposed_the_natural_frequency_is_stated(rng: np.random.Generator) -> None:
     f = 5.0 * 2.0 ** (np.arange(64) / 6.0)
     natural = diagnose_transfer(points(f, filtered(f, 1581.0), 1e-3, 1e-3, rng)).parameter("natural_hz")

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from long_suites import mostly_slow
 from made_worlds import BASE, NOISES, NULLS, Noise, World, make, problem_in, run_of
 
 from inertial import effects as catalogue
@@ -99,12 +100,14 @@ def test_noise_that_grows_with_temperature_is_known_for_each_soak() -> None:
     assert np.mean(loud**2) == pytest.approx(1.0)
 
 
-@pytest.mark.parametrize("name", ["B30", "K4", "t3", "lengths", "units_spread", "one_unit", "B300"])
+@pytest.mark.parametrize(
+    "name", mostly_slow(["B30", "K4", "t3", "lengths", "units_spread", "one_unit", "B300"], "B30", "t3")
+)
 def test_soaks_of_equal_noise_are_not_told_apart(name: str) -> None:
     assert [loudness_of(run_of(NULLS[name], SEED_OF_SHARES + seed).model()) for seed in range(2)] == [None] * 2
 
 
-@pytest.mark.parametrize("name", ["B30", "white", "B300"])
+@pytest.mark.parametrize("name", mostly_slow(["B30", "white", "B300"], "B30"))
 def test_the_scatter_of_a_few_dwells_is_on_average_as_large_as_that_of_many(name: str) -> None:
     """The logarithm of a scatter with few degrees of freedom lies far below that of its mean."""
     soaks = [np.arange(9), np.arange(9, 17), np.arange(17, 57)]

@@ -4,6 +4,7 @@ import made_noise as generate
 import numpy as np
 import pandas as pd
 import pytest
+from long_suites import mostly_slow
 from lots import dwell_rows
 from scipy.integrate import quad
 
@@ -55,10 +56,11 @@ def lot(seed: int, wander: float, white: float = 1e-5) -> pd.DataFrame:
     return pd.concat(rows, ignore_index=True)
 
 
+@pytest.mark.parametrize("seeds", mostly_slow([1, 2], 1))
 @pytest.mark.parametrize("wander", [0.0, 2e-5])
-def test_fit_and_diagnosis_find_the_same_noise(wander: float) -> None:
+def test_fit_and_diagnosis_find_the_same_noise(wander: float, seeds: int) -> None:
     """What each expects a right model to leave, µg: within a tenth of one another and of what is left indeed."""
-    for seed in (11, 12):
+    for seed in range(11, 11 + seeds):
         dwells = lot(seed, wander)
         residuals = fit(dwells, dwells.iloc[:0], MODEL)["residuals"]
         fitted, left = (float(np.sqrt(np.mean(residuals[name] ** 2))) for name in ("expected_ug", "residual_ug"))

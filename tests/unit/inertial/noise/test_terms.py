@@ -4,6 +4,7 @@ import independent_noise as made
 import made_noise as generate
 import numpy as np
 import pytest
+from long_suites import mostly_slow
 
 from inertial.noise.allan import overlapping
 from inertial.noise.terms import FLICKER_FLOOR, fit_terms, model_deviation
@@ -36,7 +37,7 @@ MADE = {  # truth, the density of white noise beside it, and how it is made
 }
 
 
-@pytest.mark.parametrize("symbol", MADE)
+@pytest.mark.parametrize("symbol", mostly_slow(MADE, "B", "R"))
 def test_each_coefficient_comes_back_inside_its_interval(symbol: str) -> None:
     rng, shape, (truth, white, made_of) = np.random.default_rng(7), (20, 30_000), MADE[symbol]
     x = generate.white(rng, shape, white, RATE) + made_of(rng, shape, truth)
@@ -90,6 +91,7 @@ def test_a_curve_that_no_mixture_explains_gives_ceilings_only(rng: np.random.Gen
 PER_S, SAMPLES = 10.0, 12_000
 
 
+@pytest.mark.slow
 def test_a_walk_makes_no_ramp_and_no_interval_of_an_identified_term_reaches_zero() -> None:
     rng = np.random.default_rng(7_310_001)
     x = np.concatenate(

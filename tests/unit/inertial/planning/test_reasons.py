@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from each import each
+from long_suites import mostly_slow
 from posed import posed
 
 from inertial import effects, poses
@@ -58,7 +59,9 @@ def test_soaks_in_one_direction_a_quantity_that_was_not_recorded_and_one_axis_al
     assert "β in 90° steps" in reason(state, "cross_coupling", PLAIN, axis=0)
 
 
-@pytest.mark.parametrize("plan", ["six", "twelve", "orthogonal24", "eighteen", "twenty_six", "fibonacci24"])
+@pytest.mark.parametrize(
+    "plan", mostly_slow(["six", "twelve", "orthogonal24", "eighteen", "twenty_six", "fibonacci24"], "six", "twenty_six")
+)
 @pytest.mark.parametrize("temperatures", [(25.0,), (0.0, 25.0, 50.0), (25.0, 60.0, -20.0, 26.0)])
 def test_every_effect_that_a_plan_does_not_see_has_a_reason_and_a_cure(plan, temperatures):
     state = planned(plan, temperatures)

@@ -6,6 +6,7 @@ Shares of 4000 series a case: `python benchmarks/noise_verdicts.py series`.
 import independent_noise as made
 import numpy as np
 import pytest
+from long_suites import mostly_slow
 
 from inertial.population.capability import cpk, shape_of
 from inertial.population.change_points import change_points, noise_of
@@ -38,7 +39,7 @@ def test_innovations_keep_the_level_and_lose_the_memory() -> None:
     assert innovations(values, 0.0) is values
 
 
-@pytest.mark.parametrize(("memory", "dof"), KINDS, ids=NAMES)
+@pytest.mark.parametrize(("memory", "dof"), mostly_slow(KINDS, KINDS[0]), ids=NAMES)
 def test_a_check_standard_in_control_is_found_out_of_it_as_seldom_as_is_said(memory: float, dof: float | None) -> None:
     first, n = 20, 40
     series = made.autoregressive(np.random.default_rng(20_261_127), 100, n, memory, dof=dof)

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from capture_double import CaptureDouble, small_job
+from long_suites import mostly_slow
 from small_station import MemorySink, lot_of, quiet_progress, short_recipe
 
 from inertial.noise.allan import overlapping
@@ -99,7 +100,11 @@ def cut(tables: list[pd.DataFrame], cuts: int) -> Iterator[pd.DataFrame]:
 
 
 @pytest.mark.parametrize(
-    ("fault", "cuts"), [*((f, 7) for f in ("", "stuck", "nan", "infinity", "clipped", "short", "overflow")), ("", 2)]
+    ("fault", "cuts"),
+    mostly_slow(
+        [*((f, 7) for f in ("", "stuck", "nan", "infinity", "clipped", "short", "overflow")), ("", 2)],
+        *[("", 7), ("stuck", 7), ("nan", 7), ("short", 7)],
+    ),
 )
 def test_pieces_are_judged_as_the_whole_is(tmp_path: Path, fault: str, cuts: int) -> None:
     samples, readings = lot_in_memory(tmp_path, {"A2": fault} if fault else {})

@@ -318,6 +318,7 @@ def test_a_p_that_one_good_lot_in_twenty_has_is_certified_unless_the_limits_ask_
     assert Ledger(run.archive).events("A1")[0].adequacy == event.adequacy
 
 
+@pytest.mark.slow
 def test_a_lot_with_an_effect_that_its_model_lacks_is_not_certified(tmp_path: Path) -> None:
     """By its own verdict: temperature terms left out of a run over 50 K."""
     (tmp_path / "half.toml").write_text(LIMITS, encoding="utf-8")

@@ -13,15 +13,12 @@ from inertial.counts import size_text
 from inertial.planning.ranges import UnseenRange
 from pipelines.cli import app, flowing
 from pipelines.diagnosis.confirmation import fall_of
-from pipelines.importers.exchange import read_dwells
 from pipelines.jobs.recipes import load_recipe
 from pipelines.report.unit_panels.budget import without_nothing
-from schemas.errors import DataRejected, RecipeInvalid
+from schemas.errors import RecipeInvalid
 from schemas.key_list import keys_of
-from schemas.recipe import FaultOrder
 from schemas.station import StationConfig, load_station
 from schemas.toml_files import PATTERNS
-from stations.plant.faults.catalogue import build_fault
 
 
 def refused(words: list[str], folder: Path, monkeypatch: pytest.MonkeyPatch) -> str:
@@ -52,13 +49,7 @@ def test_what_cannot_be_is_refused_with_what_is_needed(tmp_path: Path, monkeypat
         RecipeInvalid, match=r"found 'my recipe'.* a to z, digits and . _ - are needed, a letter or digit first"
     ):
         load_recipe(recipe_file(tmp_path, ('"small"', '"my recipe"'), name="name.toml"))
-    with pytest.raises(RecipeInvalid, match="fault door: no figure 'at'; did you mean at_s"):
-        build_fault(FaultOrder(kind="door", figures={"at": 600.0}), ["A1"])
     dwells = tmp_path / "dwells.csv"
-    dwells.write_text("unit,dwell,time_s,volt_x\nA,1,0.0,1.0\n", encoding="utf-8")
-    with pytest.raises(DataRejected, match="columns out_x, out_y, out_z are missing") as end:
-        read_dwells(dwells)
-    assert str(end.value).count("known:") <= 1
     dwells.write_text(DWELL + "A1,0,0,0,0,1,0.01,oops,1.01,40\nA1,1,60,0,0,-1,0.01,0.02,-1.01,41\n", encoding="utf-8")
     said = refused(["inspect", str(dwells)], tmp_path, monkeypatch)
     assert "column out_y: found oops, a finite number is needed" in said

@@ -148,7 +148,7 @@ def test_a_fault_blocks_its_unit_and_no_other_also_where_units_lack_dwells(name,
     assert diagnosis["recommended"] == []
 
 
-@each(range(8))
+@each(range(3))
 def test_clean_lots_raise_no_alarm(seed):
     rng = np.random.default_rng(seed)
     assert diagnose(lots.lot(rng, plan="six" if seed % 2 else "fibonacci", units=1 + seed % 3))["blocked_by"] == []

@@ -18,23 +18,26 @@ from pipelines.discovery.lot_source import DiscoveryArchive
 from pipelines.discovery.nights import brought_up
 from pipelines.discovery.score_store import ScoreStore
 
-LOTS = 64
+LOTS, FEW = 64, 6
 
 
-@pytest.fixture(scope="module")
-def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def scored(folder: Path, lots: int) -> Archive:
     """An archive of a line with a hard spring in one wafer, scored."""
-    folder = tmp_path_factory.mktemp("line")
-    made = write_lots(folder, Line(5, hidden=Hidden("W03", 40e-6), wafers=6), LOTS)
+    made = write_lots(folder, Line(5, hidden=Hidden("W03", 40e-6), wafers=6), lots)
     archive = Archive(str(made.folder))
     add_attributes(archive, pd.read_csv(made.units, dtype=str), "serial", "units.csv")
     DiscoveryArchive(archive).score(1)
-    return made.folder
+    return archive
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> Archive:
+    return scored(tmp_path_factory.mktemp("line"), LOTS)
 
 
 @pytest.fixture
-def archive(written: Path, tmp_path: Path) -> Archive:
-    shutil.copytree(written, tmp_path / "archive")
+def archive(written: Archive, tmp_path: Path) -> Archive:
+    shutil.copytree(str(written.root), tmp_path / "archive")
     return Archive(str(tmp_path / "archive"))
 
 
@@ -95,7 +98,8 @@ def test_a_state_that_is_gone_or_edited_is_made_again(archive: Archive, caplog: 
         assert "was edited" in caplog.text
 
 
-def test_scores_that_were_edited_are_made_again(archive: Archive, caplog: pytest.LogCaptureFixture) -> None:
+def test_scores_that_were_edited_are_made_again(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    archive = scored(tmp_path, FEW)
     (file,) = (Path(str(archive.root)) / "discovery" / "scores").iterdir()
     data = bytearray(file.read_bytes())
     data[-100] ^= 255
@@ -104,8 +108,8 @@ def test_scores_that_were_edited_are_made_again(archive: Archive, caplog: pytest
     with caplog.at_level(logging.WARNING):
         assert source.pooled() == []
     assert "was edited" in caplog.text
-    assert source.score(1) == LOTS
-    assert len(DiscoveryArchive(archive).pooled()) == LOTS
+    assert source.score(1) == FEW
+    assert len(DiscoveryArchive(archive).pooled()) == FEW
 
 
 def test_a_revoked_run_is_taken_out_from_that_night_on(archive: Archive) -> None:
@@ -171,16 +175,15 @@ def test_two_populations_in_a_coefficient_are_told_with_their_means(
     assert row["detail"]["means"][0] == pytest.approx(5.0, abs=0.5)
 
 
-def test_a_damaged_run_is_told_and_pooled_once_it_is_restored(
-    archive: Archive, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_a_damaged_run_is_told_and_pooled_once_it_is_restored(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    archive = scored(tmp_path, FEW)
     shutil.rmtree(Path(str(archive.root)) / "discovery")
     table = next((Path(str(archive.root)) / "runs").iterdir()) / "dwells.parquet"
     sound = table.read_bytes()
     table.write_bytes(sound[:-50])
     source = DiscoveryArchive(archive)
     with caplog.at_level(logging.WARNING):
-        assert source.score(1) == LOTS - 1
+        assert source.score(1) == FEW - 1
     assert table.parent.name in caplog.text
     table.write_bytes(sound)
     assert DiscoveryArchive(archive).score(1) == 1

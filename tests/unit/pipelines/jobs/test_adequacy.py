@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from capture_double import small_run
+from long_suites import mostly_slow
 from lots import lot
 from typer.testing import CliRunner
 
@@ -73,7 +74,11 @@ CASES = [(_plain, True), (_hidden, False), (_knocked, False), (_few, None), (_sw
 
 
 @pytest.mark.usefixtures("no_next_measurement")
-@pytest.mark.parametrize(("made", "adequate"), CASES, ids=lambda value: getattr(value, "__name__", str(value)))
+@pytest.mark.parametrize(
+    ("made", "adequate"),
+    mostly_slow(CASES, *CASES[:2], *CASES[3:5]),
+    ids=lambda value: getattr(value, "__name__", str(value)),
+)
 def test_it_is_the_verdict_of_diagnose_in_every_figure(made, adequate) -> None:
     table = made()
     effects = MODEL if made is not _few else MODEL[:3]

@@ -68,6 +68,7 @@ def test_distortion_of_the_exciter_is_not_noise_of_a_point_of_a_sweep(rng: np.ra
     assert np.all((low < squares) & (squares < high)), squares
 
 
+@pytest.mark.slow
 def test_the_sensitivity_over_the_supply_has_the_wander_from_face_to_face() -> None:
     """A device whose flicker is the largest part of the noise, both faces at once for each of five voltages."""
     units, rate, dwell, move = 70, 50.0, 10.0, 6.0

@@ -110,6 +110,7 @@ def test_a_unit_without_an_output_that_changes_says_why(measured: Measured) -> N
         assert reason in notes.pop()
 
 
+@pytest.mark.slow
 def test_a_door_that_opens_during_a_turn_costs_time_and_no_data(measured: Measured) -> None:
     recipe = recipe_of(planes=["xy", "yz"])
     config = station_of(faults=[{"kind": "door", "at_s": 920.0, "for_s": 60.0}])

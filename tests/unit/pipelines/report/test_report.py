@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from benchmarks.truth import Spec, make_run
 from pipelines.diagnosis.diagnose import examination
 from pipelines.procedures.figures import probability, signed, with_uncertainty
 from pipelines.report.context import UnitContext
@@ -13,7 +14,6 @@ from pipelines.report.residual_table import residual_table
 from pipelines.report.residuals import drivers_shown
 from pipelines.report.templates import plain_reason
 from pipelines.stages.figures import FIGURES
-from tumbleline import example
 
 
 def test_a_figure_has_its_label_and_other_reasons_stay() -> None:
@@ -45,13 +45,12 @@ def test_numbers_have_the_digits_of_their_uncertainty_a_sign_and_no_negative_zer
     assert [probability(p) for p in (0.68, 3.2e-12, 0.0)] == ["p = 0.68", "p < 0.001", "p < 0.001"]
 
 
-@pytest.mark.usefixtures("no_next_measurement")
 @pytest.mark.parametrize(
-    ("effect", "first"), [("cubic_transfer", "force"), ("encoder_harmonic", "outer_deg"), ("warm_up", "since_power_s")]
+    ("effect", "first"), [("third_order", "force"), ("encoder_harmonic", "outer_deg"), ("aging_log", "since_power_s")]
 )
 def test_the_first_picture_is_the_quantity_of_the_missing_effect(effect: str, first: str) -> None:
-    lot = example(effect, seed=5)
-    made = examination(lot.run.dwells, lot.run.history, lot.model)
+    lot = make_run(Spec(effects=(effect,), sizes=(4.0,), units=3), 5)
+    made = examination(lot.dwells, lot.history, lot.sealed.spec.base)
     assert made.diagnosis is not None
     assert drivers_shown(made.diagnosis)[0].name == first
     table = residual_table(made.measured, made.diagnosis, made.measured.units)

@@ -11,6 +11,7 @@ import pandas as pd
 import pytest
 from capture_double import CaptureDouble, measured_run, small_job, small_run
 from each import each
+from long_suites import mostly_slow
 
 from pipelines.archive import Archive, Run, code_hash
 from pipelines.archive.buffered_run import BufferedRun
@@ -107,7 +108,10 @@ def test_a_rerun_gives_the_bytes_of_a_first_run_with_that_model(run: Run, tmp_pa
     assert outcome.new == first.id
 
 
-@pytest.mark.parametrize("trouble", [KeyboardInterrupt(), DataRejected("verify: no pose"), ValueError("a defect")])
+TROUBLE = (KeyboardInterrupt(), DataRejected("verify: no pose"), ValueError("a defect"))
+
+
+@pytest.mark.parametrize("trouble", mostly_slow(TROUBLE, TROUBLE[0]))
 def test_a_rerun_that_fails_or_is_stopped_leaves_nothing(
     run: Run, monkeypatch: pytest.MonkeyPatch, trouble: BaseException
 ) -> None:

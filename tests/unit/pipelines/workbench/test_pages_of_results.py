@@ -9,11 +9,11 @@ import pandas as pd
 import pytest
 from asgi_client import AsgiClient
 from capture_double import small_run
+from demonstrations import wafer_line
 from lots import lot
 
 from benchmarks.generated_archive import write_archive
 from pipelines.archive import Archive, Run
-from pipelines.demo.archive_lots import Hidden, Line, write_lots
 from pipelines.discovery.attributes import add_attributes
 from pipelines.report.numbers import significant, with_uncertainty
 from pipelines.report.run_pictures import follows_most
@@ -51,7 +51,7 @@ def test_a_figure_of_too_few_lots_for_a_cpk_is_on_the_page_and_in_the_table(
 
 
 def test_a_discovery_is_on_the_page_with_its_levels(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    made = write_lots(tmp_path, Line(9, hidden=Hidden("W02", -60e-6), wafers=4), 44)
+    made = wafer_line(tmp_path)
     add_attributes(Archive(str(made.folder)), pd.read_csv(made.units, dtype=str), "serial", "units.csv")
     settings = WorkbenchSettings(archive=str(made.folder), folder=tmp_path / "bench", token=TOKEN)
     client = AsgiClient(create_app(settings), "http://127.0.0.1:8321")
