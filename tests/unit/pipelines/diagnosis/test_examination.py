@@ -4,6 +4,7 @@ import lots
 import numpy as np
 import pytest
 from each import each
+from long_suites import mostly_slow
 
 from inertial.data_errors.faults.quantised import lattice_step
 from pipelines.diagnosis.diagnose import diagnose, examination
@@ -148,7 +149,7 @@ def test_a_fault_blocks_its_unit_and_no_other_also_where_units_lack_dwells(name,
     assert diagnosis["recommended"] == []
 
 
-@each(range(3))
+@pytest.mark.parametrize("seed", mostly_slow(range(8), 0, 1, 2))
 def test_clean_lots_raise_no_alarm(seed):
     rng = np.random.default_rng(seed)
     assert diagnose(lots.lot(rng, plan="six" if seed % 2 else "fibonacci", units=1 + seed % 3))["blocked_by"] == []
