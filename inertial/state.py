@@ -17,7 +17,7 @@ _REMEMBERED = 3_000_000
 _WAYPOINTS = 48
 """Points at which the force between two poses of the table is looked at."""
 
-_ON_THE_WAY = 0.01
+_ANGLES_AGREE = 0.01
 """Largest difference, g, of the force of a dwell from that of its angles, where the way can be told from the angles."""
 
 ALL_AXES = (0, 1, 2)
@@ -147,12 +147,10 @@ class State:
         before = np.concatenate([turns[..., :1], turns[..., :-1]], axis=-1)
         part = np.arange(1, _WAYPOINTS) / _WAYPOINTS
         between = frames.force_from_angles(*(before[..., None] + (turns - before)[..., None] * part))
-        at_dwells = frames.force_from_angles(*turns)
-        # a unit may have directions of its own on the fixture, and gravity is not exactly 1 g
-        to_force = np.linalg.pinv(at_dwells, rcond=1e-6) @ force
-        if np.abs(at_dwells @ to_force - force).max() > _ON_THE_WAY:
+        rotation = _rotation(frames.force_from_angles(*turns), force)
+        if rotation is None:
             return None
-        between = between @ to_force[..., None, :, :]
+        between = between @ rotation[..., None, :, :]
         low, high = between.argmin(axis=-2), between.argmax(axis=-2)
         extremes = np.stack([np.minimum(low, high), np.maximum(low, high)], axis=-2)
         way = np.concatenate([np.take_along_axis(between, extremes, axis=-2), force[..., None, :]], axis=-2)
@@ -194,6 +192,23 @@ class State:
                 changed[item.name] = History(value.time, value.temperature[index])
         changed["memory"] = {}
         return replace(self, **changed)
+
+
+def _rotation(table: Array, force: Array) -> Array | None:
+    """Rotations (..., 3, 3) of forces (..., n, 3) in a table's frame to those that are known; None where they do not agree.
+
+    A unit may have directions of its own on the fixture; of poses in one line they are known only if they are the table's.
+    """
+    if not np.isfinite(table).all():
+        return None
+    if np.abs(table - force).max() < _ANGLES_AGREE:
+        return np.broadcast_to(np.eye(3), (*force.shape[:-2], 3, 3))
+    u, size, v = np.linalg.svd(np.swapaxes(table, -1, -2) @ force)
+    if np.any(size[..., 1] < _ANGLES_AGREE * size[..., 0]):
+        return None
+    u[..., :, 2] *= np.linalg.det(u @ v)[..., None]
+    rotation = u @ v
+    return rotation if np.abs(table @ rotation - force).max() < _ANGLES_AGREE else None
 
 
 def _slope(time: Array, values: Array) -> Array:

@@ -1,5 +1,6 @@
 """Lots dwell by dwell in several worlds of noise and of references, scored once each by the product's engine.
 
+No lot has a fault of the data, and none is searched for.
 The physics and the noise are written here and in :mod:`pipelines.demo.archive_lots`; neither knows a column of a fit.
 """
 

@@ -6,7 +6,7 @@ from inertial.state import State
 
 
 class BaseTilts(StationEffect):
-    """Base of the station that leans as it follows the temperature, at once or late: up = (δ1T·θ', δ2T·θ', 1)."""
+    """Base of the station that leans as it follows the temperature late: up = (δ1T·θ', δ2T·θ', 1)."""
 
     id = "base_tilts"
     symbol = "δ1T, δ2T"

@@ -1,4 +1,5 @@
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -7,7 +8,7 @@ from inertial.effects.base import Array, Nonlinear, SensorEffect, stack
 from inertial.state import State
 
 UNTIL_MOVE, FROM_POSE, ON_THE_WAY = 0.0, 1.0, 2.0
-"""How long the side is kept: until the next move; from pose to pose; and changed on the way between two poses as well."""
+"""What changes the side that is kept: every move wipes it; only the force of a pose; the force on the way between poses too."""
 
 
 class PoseHysteresis(SensorEffect):
@@ -29,6 +30,10 @@ class PoseHysteresis(SensorEffect):
         Nonlinear("half_width", "g", 0.02, 1.0, "log", 6),
         Nonlinear("kept", "1", 0.0, 2.0, choices=(UNTIL_MOVE, FROM_POSE, ON_THE_WAY)),
     )
+
+    def parameters(self, state: State) -> tuple[Nonlinear, ...]:
+        width, kept = self.nonlinear
+        return self.nonlinear if state.way is not None else (width, replace(kept, choices=(UNTIL_MOVE, FROM_POSE)))
 
     def columns(self, state: State, axis: int, *, half_width: float, kept: float, **nonlinear: float) -> Array:
         if kept == UNTIL_MOVE:

@@ -1,7 +1,7 @@
 import numpy as np
 
 from inertial.arrays import Flags
-from inertial.estimation.alternative import Array, Handling, tilts
+from inertial.estimation.alternative import Array, Handling, common, tilts
 from inertial.estimation.lot import Lot
 
 _LOADS = 20
@@ -19,8 +19,11 @@ class SlipsUnderLoad(Handling):
     fewest_units = 1
 
     def places(self, lot: Lot) -> list[dict[str, float]]:
-        """Loads of either side between those of the poses, that less than half of the dwells exceed; none without angles."""
-        if lot.state.outer is None or lot.state.inner is None:
+        """Loads of either side between those of the poses, that less than half of the dwells exceed.
+
+        None where the angles are not known, or not the same for all units.
+        """
+        if lot.state.outer is None or lot.state.inner is None or len(common(lot.state.outer)) > 1:
             return []
         places: list[dict[str, float]] = []
         for side in (1.0, -1.0):

@@ -58,3 +58,24 @@ def test_units_of_a_table_have_its_way_and_units_turned_by_hand_have_none() -> N
         assert state.way is None
         from_pose = PoseHysteresis().columns(state, 0, half_width=WIDTH, kept=FROM_POSE)
         np.testing.assert_array_equal(PoseHysteresis().columns(state, 0, half_width=WIDTH, kept=ON_THE_WAY), from_pose)
+
+
+def test_poses_in_a_plane_have_the_way_that_the_table_takes_out_of_it() -> None:
+    outer, inner = np.deg2rad([[0.0, 90.0, 180.0, 90.0], [0.0, 90.0, 0.0, -90.0]])
+    force = frames.force_from_angles(outer, inner)
+    turned = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    for own in (np.eye(3), turned):
+        way = State(force=force @ own.T, time=np.arange(4.0), outer=outer, inner=inner).way
+        assert way is not None
+        assert np.abs(way @ own)[..., 1].max() == pytest.approx(0.5, abs=0.01)  # at (45, 45) degrees
+
+
+def test_poses_in_one_line_tell_no_way_of_a_unit_with_directions_of_its_own() -> None:
+    outer = np.array([0.0, np.pi, 0.0])
+    force = frames.force_from_angles(outer, np.zeros(3))
+    known = State(force=force, time=np.arange(3.0), outer=outer, inner=np.zeros(3))
+    assert known.way is not None
+    assert np.abs(known.way[..., 1]).max() == pytest.approx(1.0)
+    turned = State(force=np.roll(force, 1, axis=1), time=np.arange(3.0), outer=outer, inner=np.zeros(3))
+    assert turned.way is None
+    assert PoseHysteresis().parameters(turned)[1].choices == (0.0, 1.0)
