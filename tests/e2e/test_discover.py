@@ -7,9 +7,9 @@ import pytest
 from demonstrations import wafer_line
 from each import each
 from in_process import document_of, given, refused, text_of
+from typed_commands import printed_commands
 
 from pipelines.archive import Archive
-from pipelines.cli.next_commands import command_line
 from pipelines.demo.archive_lots import Line, write_lots
 from pipelines.discovery.lot_source import DiscoveryArchive
 from pipelines.discovery.nights import discovered_before
@@ -46,9 +46,11 @@ def test_a_discovery_is_new_once_and_is_explained(folder: Path, tmp_path: Path) 
     assert "third_order" in html
     assert "<svg" in html
     assert "http" not in html.replace("http://www.w3.org", "")
-    text = text_of("discover", "--archive", archive)
+    _, text, _ = given("discover", "--archive", archive)
     assert "differs by wafer" in text
-    assert command_line("discover", "--archive", str(archive), "--explain", "D1") in text
+    (line,) = printed_commands(text)
+    assert line == ["discover", "--archive", str(archive), "--explain", "D1"]
+    assert given(*line)[0] == 0
     explained = document_of("discover", "--explain", "D1", "--archive", archive, status=0)
     assert explained["levels"][0]["units"] > 10
     assert "of the sensors" in text_of("discover", "--explain", "d1", "--archive", archive, status=0)

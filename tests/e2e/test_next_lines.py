@@ -23,6 +23,7 @@ from pipelines.cli.history import removal
 
 HERE = "tests/e2e/test_next_lines.py::"
 ELSEWHERE = {
+    "discovery_text": "tests/e2e/test_discover.py::test_a_discovery_is_new_once_and_is_explained",
     "demo_text": "tests/e2e/test_discover.py::test_the_demonstration_for_people_ends_with_a_command_that_runs",
     "diagnosis_text": HERE + "test_files_beside_the_dwells_are_found_and_stand_in_the_printed_lines",
     "diagnose": HERE + "test_the_lines_after_a_diagnosis_of_a_run_measure_it_again_and_judge_by_it",

@@ -16,7 +16,7 @@ from stations.profile_files import load_profile, profile_names
 
 CHAMBERS = [n for n in profile_names() if load_profile(n).kind == "chamber" and "rtu" in load_profile(n).links]
 PATIENCE_S = 10.0
-DRIVES = [n for n in profile_names() if load_profile(n).kind == "axis"]
+DRIVES = [n for n in profile_names() if load_profile(n).kind == "axis" and "rtu" in load_profile(n).links]
 
 
 def hardware(config: StationConfig, patience: dict[str, object] | None = None, **carried: object) -> StationConfig:

@@ -120,7 +120,15 @@ def calibrations(draw: st.DrawFn, unit: str) -> UnitCalibration:
     noise = UnitNoise(
         dict.fromkeys(TERMS, rng.uniform(5.0, 50.0, 3)), dict.fromkeys(TERMS, np.ones(3, dtype=bool)), 100.0
     )
-    return UnitCalibration(unit, "pass", "industrial", "V", bias, response, (-10.0, 60.0), (), None, noise, 1.5)
+    force = np.vstack([np.eye(3), -np.eye(3)])
+    out = bias[0] + force @ response[0].T
+    dwells = pd.DataFrame(
+        np.hstack([force, out]), columns=[f"{what}_{axis}" for what in ("force", "out") for axis in "xyz"]
+    )
+    temperatures = (-10.0, 60.0)
+    return UnitCalibration(
+        unit, "pass", "industrial", "V", bias, response, temperatures, (), None, noise, 1.5, dwells=dwells
+    )
 
 
 SETTINGS = ExportSettings(

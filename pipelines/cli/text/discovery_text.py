@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from inertial.counts import number_of
-from pipelines.cli.next_commands import command_line
+from pipelines.cli.next_commands import command_line, print_next
 from pipelines.cli.printing import print_table, say, short
 from pipelines.discovery.documents import DiscoverDocument, DiscoveryRow
 from pipelines.discovery.figures_of_name import headline, scope_text
@@ -43,7 +43,7 @@ def print_discoveries(document: DiscoverDocument, again: Sequence[str] = (), *, 
     for text in document["warnings"]:
         say(text, style="yellow")
     if document["discoveries"] and not document["looking_back"]:
-        say(f"\nNext\n  {command_line('discover', *again, '--explain', document['discoveries'][0]['id'])}")
+        print_next([command_line("discover", *again, "--explain", document["discoveries"][0]["id"])])
     if reach:
         _reach(document)
 
