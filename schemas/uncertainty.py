@@ -36,7 +36,7 @@ class Harmonics(AngleEntry):
 
 
 class PoseEntry(AngleEntry):
-    """Repeatability of a pose, of each axis at each approach."""
+    """Error of a pose, of each axis: drawn anew at each approach; with scope ``station`` or ``run`` once for each pose."""
 
     scope: Scope = "pose"
     seen_in_residuals: bool = False

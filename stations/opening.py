@@ -198,7 +198,7 @@ def _axis(
     """An axis by its drive's family, that keeps within the drive's limits and the station's."""
     profile = registers.profile
     speed, acceleration = (
-        tighter((0.0, wanted), profile, name)[1]
+        tighter((0.0, wanted), profile, name if profile.has(name) else f"{which}_{name}")[1]
         for name, wanted in (("speed", limits.speed_deg_s), ("acceleration", limits.acceleration_deg_s2))
     )
     kept = limits.model_copy(update={"speed_deg_s": speed, "acceleration_deg_s2": acceleration})

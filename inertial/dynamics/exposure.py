@@ -12,6 +12,8 @@ from inertial.errors import NotIdentified
 
 FEWEST_LEFT = 4
 """Degrees of freedom that the repeated poses must leave."""
+APART_K = 1.0
+"""Between the temperature of the test and others that show the change with temperature."""
 
 
 @dataclass(frozen=True)
@@ -29,6 +31,45 @@ class ExposureShift:
     bias: Shift
     scale: Shift
     left: Array
+
+
+@dataclass(frozen=True)
+class TemperatureSlope:
+    """Change of bias and of the response to the three forces with temperature, (4,), and its standard error, per K."""
+
+    value: Array
+    u: Array
+
+
+def temperature_slope(force: Array, output: Array, temperature: Array, at_C: float) -> TemperatureSlope:
+    """Slope at a temperature of a bias and a response to the three forces that are of second order in temperature.
+
+    The error is that of the least squares, whose scatter holds what is not of second order, and hysteresis.
+
+    Parameters
+    ----------
+    force, output, temperature : (n, 3) in g, (n,) and (n,), °C, of records in six poses at three temperatures or more
+    at_C : the temperature of the slope
+
+    Raises
+    ------
+    NotIdentified
+        A temperature is missing, or the records do not tell the slope of the bias from that of the response.
+    """
+    if not np.isfinite([at_C, *temperature]).all():
+        raise NotIdentified("the unit's temperature is not recorded")
+    own, theta = np.column_stack([np.ones(len(force)), force]), temperature - at_C
+    groups = theta < -APART_K, np.abs(theta) <= APART_K, theta > APART_K
+    rows = np.hstack([own * theta[:, None] ** power for power in range(3)])
+    dof = len(rows) - rows.shape[1]
+    if dof < FEWEST_LEFT or any(np.linalg.matrix_rank(own[group]) < own.shape[1] for group in groups):
+        raise NotIdentified(
+            f"six poses are needed at the temperature of the test ({at_C:.3g} °C), and more than {APART_K:g} K below and above it"
+        )
+    inverse = np.linalg.inv(rows.T @ rows)
+    fitted = inverse @ rows.T @ output
+    left = output - rows @ fitted
+    return TemperatureSlope(fitted[4:8], np.sqrt(float(left @ left) / dof * np.diagonal(inverse))[4:8])
 
 
 def exposure_shift(

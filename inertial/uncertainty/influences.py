@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from inertial.arrays import Array
+from inertial.arrays import Array, Places
 from inertial.correction import predict
 from inertial.design import Values, of_axes
 from inertial.frames import rotation_x, rotation_z
@@ -19,6 +19,10 @@ from inertial.state import T_REFERENCE, State
 STEP = 1e-6
 """Of the central differences: rad, or relative."""
 STEP_K = 1e-3
+SAME_AT_EVERY_VISIT = ("station", "run")
+"""Scopes of a scattered error that repeats of a pose do not average."""
+APART_DEG = 0.25
+"""Between angles of different poses; readings of one pose differ by less than the tolerance of a station's position."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +75,10 @@ class InputQuantity:
 
 @dataclass(frozen=True)
 class Scattered:
-    """An error of the angles that is drawn anew at every dwell: standard uncertainties of outer and inner angle, rad."""
+    """An error of the angles of single poses: standard uncertainties of outer and inner angle, rad.
+
+    scope : ``station`` or ``run`` where it is the same at every visit of a pose; otherwise it is drawn anew at every dwell
+    """
 
     contribution: str
     outer: float
@@ -158,7 +165,7 @@ def sensitivity(
 
     Parameters
     ----------
-    scattered : errors of single dwells; each gives two columns per dwell
+    scattered : errors of single dwells or poses; each gives two columns for each of them
     """
     entered: list[tuple[Array, InputQuantity | Scattered]] = [
         (one.u * difference(model, state, one.errors)[..., None], one) for one in influences
@@ -167,9 +174,10 @@ def sensitivity(
         for size, errors in ((one.outer, Errors(outer=1.0)), (one.inner, Errors(inner=1.0))):
             if size > 0.0:
                 change = size * difference(model, state, errors)
-                single = np.zeros((*change.shape, change.shape[-2]))
                 every = np.arange(change.shape[-2])
-                single[..., every, :, every] = np.moveaxis(change, -2, 0)
+                drawn = poses_of(state) if one.scope in SAME_AT_EVERY_VISIT else every
+                single = np.zeros((*change.shape, int(drawn.max(initial=-1)) + 1))
+                single[..., every, :, drawn] = np.moveaxis(change, -2, 0)
                 entered.append((single, one))
     if entered:
         changes = np.concatenate([columns for columns, _ in entered], axis=-1)
@@ -182,6 +190,18 @@ def sensitivity(
         tuple(one.dof for one in sources),
         tuple(one.seen for one in sources),
     )
+
+
+def poses_of(state: State) -> Places:
+    """Number of the pose of each dwell (n,): dwells whose angles no gap beyond :data:`APART_DEG` parts are of one pose."""
+    if state.outer is None or state.inner is None:
+        raise ValueError("dwells without angles: their poses are not known")
+    levels = np.zeros((2, state.outer.shape[-1]), dtype=np.intp)
+    for level, angle in zip(levels, (state.outer, state.inner), strict=True):
+        own = np.degrees(angle.reshape(-1, angle.shape[-1])[0])
+        order = np.argsort(own)
+        level[order[1:]] = np.cumsum(np.diff(own[order]) > APART_DEG)
+    return np.unique(levels, axis=1, return_inverse=True)[1].reshape(-1)
 
 
 def difference(model: MeasurementModel, state: State, errors: Errors) -> Array:

@@ -41,9 +41,12 @@ class CentrifugePart(NominalScale):
 
     ``effects`` is the model to be judged; the diagnosis names what is missing. ``radius_m`` is the nominal radius to the proof
     mass and ``radius_um`` its standard uncertainty: with one radius it is the sensitivity's, in full. ``point_ppm`` is the
-    standard uncertainty of a point's acceleration besides (rate, trend), of itself. With ``reference_radius_m``, the radius to a
-    reference sensor on the arm, the acceleration is what this sensor reads, in the ratio of the radii; ``reference_ppm`` is its
-    standard uncertainty.
+    standard uncertainty of the acceleration of one point by the rate and its trend, independent from point to point.
+
+    ``reference_radius_m`` is the radius to a reference sensor on the arm. With it the acceleration is the reading of this sensor
+    times ``radius_m`` over ``reference_radius_m``. ``reference_ppm`` is the standard uncertainty of its scale, which is the
+    sensitivity's in full; ``reference_linearity_ppm`` that of its departure from a straight line, in ppm of the reading: it is in
+    the uncertainty of every point, as independent from point to point. The unit's K2, K3 and Koq also hold those of the sensor.
     """
 
     kind: Literal["centrifuge"]
@@ -57,6 +60,7 @@ class CentrifugePart(NominalScale):
     radius_um: NotNegative = 20.0
     reference_radius_m: Positive | None = None
     reference_ppm: NotNegative = 2500.0
+    reference_linearity_ppm: NotNegative = 100.0
     point_ppm: NotNegative = 2.0
     record_s: Annotated[Positive, Field(le=600.0)] = 5.0
     full_scale_g: Positive = 30.0
@@ -66,6 +70,12 @@ class CentrifugePart(NominalScale):
     @model_validator(mode="after")
     def _known(self) -> Self:
         refuse_unknown_effects(self.effects, EFFECTS, "centrifuges")
+        alone = sorted(self.model_fields_set & {"reference_ppm", "reference_linearity_ppm"})
+        if alone and self.reference_radius_m is None:
+            raise ValueError(
+                f"{alone[0]}: given without reference_radius_m, which is needed; add the radius to the reference sensor, or "
+                f"leave {' and '.join(alone)} out"
+            )
         if self.radii_m is None:
             return self
         if self.reference_radius_m is not None:
@@ -164,7 +174,8 @@ class CentrifugeTest(InG, OnEquipment, RecordByRecord):
         if part.reference_radius_m is not None:
             ratio = way * radius / part.reference_radius_m
             force, scatter = ratio * float(read[:, 1].mean()), float(read[:, 1].std(ddof=1)) / np.sqrt(len(read))
-            common = abs(ratio) * scatter
+            linearity = 1e-6 * part.reference_linearity_ppm * abs(force)
+            common = math.hypot(common, linearity, abs(ratio) * scatter)
         axis = INPUT if len(one.own.letters) > INPUT else 0  # a device without z is mounted by its x
         raw = one.own.output[:, axis]
         output = raw / scale_of(part, device, one.unit)[axis]

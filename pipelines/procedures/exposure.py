@@ -1,12 +1,13 @@
 """Shift of bias and scale by cycles of temperature: six poses, the cycles, the same poses again."""
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 import pandas as pd
 from pydantic import Field, model_validator
 
-from inertial.dynamics.exposure import exposure_shift
+from inertial.arrays import Array
+from inertial.dynamics.exposure import exposure_shift, temperature_slope
 from inertial.dynamics.stability import error_of_mean, short_noise
 from inertial.errors import NotIdentified
 from inertial.frames import force_from_angles
@@ -17,7 +18,6 @@ from pipelines.procedures.recorded import (
     Device,
     ProcedureStep,
     Taken,
-    at_rest,
     noise_columns,
     numbers,
     point_rows,
@@ -46,7 +46,7 @@ Celsius = Annotated[float, Field(ge=-100.0, le=200.0)]
 class ExposurePart(NominalScale):
     """``cycles`` from ``low_C`` to ``high_C``, each at least for the recipe's ``soak_min_s``.
 
-    Six poses are measured ``repeats`` times before and after, each for ``window_s``, at ``temperature_C``.
+    Six poses of ``window_s`` are measured ``repeats`` times before and after, at ``temperature_C``, and once at each extreme.
     """
 
     kind: Literal["exposure"]
@@ -79,45 +79,43 @@ class Exposure(InG, RecordByRecord):
     )
 
     def check(self, part: Any, recipe: Recipe, station: StationConfig) -> None:
-        """Refuse temperatures outside the limits of the station, and a recipe without a scale."""
+        """Refuse temperatures and faces outside the limits of the station, and a recipe without a scale."""
         super().check(part, recipe, station)
-        low, high = station.limits.temperature_C
-        for key in ("low_C", "high_C"):
-            value = getattr(part, key)
+        limits = station.limits
+        wanted = [
+            (key, getattr(part, key), "°C", limits.temperature_C, "temperatures within, or another chamber")
+            for key in ("low_C", "high_C", "temperature_C")
+        ]
+        for face, (outer, inner) in FACES.items():
+            for axis, angle, allowed in (("outer", outer, limits.outer_deg), ("inner", inner, limits.inner_deg)):
+                wanted.append((f"face {face}: {axis} axis", angle, "deg", allowed, "a table that turns so far"))
+        for what, value, unit, (low, high), other in wanted:
             if not low <= value <= high:
                 raise RecipeInvalid(
-                    f"recipe: procedure exposure: {key} {value:g} °C, {low:g} to {high:g} °C is allowed by the station; take "
-                    "temperatures within, or another chamber",
-                    key=key,
+                    f"recipe: procedure exposure: {what} {value:g} {unit}, {low:g} to {high:g} {unit} is allowed by the station; "
+                    f"take {other}",
+                    key=what if hasattr(part, what) else "kind",
                 )
 
     def steps(self, part: ExposurePart, recipe: Recipe) -> list[ProcedureStep]:
-        """Six poses to and fro before, a record at every extreme, six poses to and fro after."""
+        """Six poses several times before, once at every extreme, several times after, always in the same order."""
         ends = [
             (f"{name} {k + 1}", at)
             for k in range(part.cycles)
             for name, at in (("low", part.low_C), ("high", part.high_C))
         ]
-        last = len(ends) + 1
-        between = [
-            ProcedureStep(name, at_rest(name.replace(" ", "")), at, lasting_s=part.window_s, soak=k)
-            for k, (name, at) in enumerate(ends, start=1)
-        ]
-        return [*self._six(part, BEFORE, 0), *between, *self._six(part, AFTER, last)]
-
-    @staticmethod
-    def _six(part: ExposurePart, when: str, soak: int) -> list[ProcedureStep]:
-        faces = list(FACES.items())
-        order = [one for k in range(part.repeats) for one in (faces if k % 2 == 0 else faces[::-1])]
+        still = part.temperature_C, part.repeats
+        series = [(BEFORE, *still), *((name, at, 1) for name, at in ends), (AFTER, *still)]
         return [
             ProcedureStep(
-                f"{when} {name}",
-                Pose(name=f"{when}{k}", outer_deg=outer, inner_deg=inner),
-                part.temperature_C,
+                f"{when} {face}",
+                Pose(name=f"{when.replace(' ', '')}{k}", outer_deg=outer, inner_deg=inner),
+                at,
                 lasting_s=part.window_s,
                 soak=soak,
             )
-            for k, (name, (outer, inner)) in enumerate(order)
+            for soak, (when, at, times) in enumerate(series)
+            for k, (face, (outer, inner)) in enumerate(list(FACES.items()) * times)
         ]
 
     def points(self, part: ExposurePart, one: Taken, device: Device) -> list[dict[str, Any]]:
@@ -142,10 +140,12 @@ class Exposure(InG, RecordByRecord):
         )
 
     def of_unit(self, part: ExposurePart, unit: str, rows: pd.DataFrame, device: Device) -> UnitOutcome:
-        """Shifts of the worst axis."""
-        bias, scale = list[FigureValue](), list[FigureValue]()
+        """Shifts of the worst axis; a finding where the difference of temperature is not taken out."""
+        bias, scale, texts = list[FigureValue](), list[FigureValue](), dict[str, str]()
         for axis, own in rows.groupby("axis", sort=False):
-            still, corrected = _corrected(own)
+            still, corrected, error, why = _corrected(own)
+            if why:
+                texts["temperature"] = f"not corrected for, its difference is in both shifts and not in U: {why}"
             time = still["setting"].to_numpy(dtype=float)
             after = (still["series"] == AFTER).to_numpy()
             if not after.any() or after.all():
@@ -153,7 +153,7 @@ class Exposure(InG, RecordByRecord):
                     f"exposure: no records {BEFORE if after.any() else AFTER} it, both are needed; check the unit and its seat"
                 )
             found = exposure_shift(
-                still[[f"force_{one}" for one in AXES]].to_numpy(dtype=float),
+                _force(still),
                 corrected,
                 after,
                 AXES.index(str(axis)),
@@ -161,21 +161,24 @@ class Exposure(InG, RecordByRecord):
                 float(np.ptp(time[~after])) + part.window_s,
                 float(time[after].mean() - time[~after].mean()),
             )
-            bias.append(FigureValue(BIAS, str(axis), found.bias.value, found.bias.u))
-            scale.append(FigureValue(SCALE, str(axis), found.scale.value, found.scale.u))  # µg per g of the scale: ppm
-        return [worst(bias), worst(scale)], []
+            of_scale = error[1 + AXES.index(str(axis))]
+            bias.append(FigureValue(BIAS, str(axis), found.bias.value, float(np.hypot(found.bias.u, error[0]))))
+            scale.append(
+                FigureValue(SCALE, str(axis), found.scale.value, float(np.hypot(found.scale.u, of_scale)))
+            )  # µg/g: ppm
+        return [worst(bias), worst(scale)], list(texts.items())
 
     def chart(self, part: ExposurePart, points: pd.DataFrame) -> Chart:
         """Output of every record about that of its pose before the exposure."""
         traces: list[Trace] = []
         number = np.ones(1)
         for axis in axes_among(points["axis"]):
-            still, corrected = _corrected(points[points["axis"] == axis])
+            still, corrected, *_ = _corrected(points[points["axis"] == axis])
             number = np.arange(1.0, len(still) + 1.0)
             before = (still["series"] == BEFORE).to_numpy()
             if not before.any():
                 continue
-            own = np.column_stack([np.ones(len(still)), still[[f"force_{one}" for one in AXES]].to_numpy(dtype=float)])
+            own = np.column_stack([np.ones(len(still)), _force(still)])
             fitted = own @ np.linalg.lstsq(own[before], corrected[before], rcond=None)[0]
             error = still["uncertainty"].to_numpy(dtype=float)
             traces.append(Trace(f"axis {axis}", number, corrected - fitted, role=axis, error=error))
@@ -186,13 +189,39 @@ class Exposure(InG, RecordByRecord):
         return Chart(self.title, (Plot("", *axes, (*traces, level(number, 0.0))),))
 
 
-def _corrected(rows: pd.DataFrame) -> tuple[pd.DataFrame, np.ndarray]:
-    """The records before and after of one axis, and their values (n,) at one temperature, by the change between the extremes."""
-    still, ends = rows[rows["series"] != BETWEEN], rows[rows["series"] == BETWEEN]
-    at, value = numbers(ends, "temperature", "value")
-    slope = float(np.polyfit(at, value, 1)[0]) if at.size > 1 and np.ptp(at) > 1.0 else 0.0
-    (temperature, output) = numbers(still, "temperature", "value")
-    return still, output - slope * (temperature - temperature.mean())
+class _Corrected(NamedTuple):
+    """Records before and after of one axis, their values (n,) at one temperature; standard error (4,) that the correction adds.
+
+    ``why`` they are not corrected; empty where they are.
+    """
+
+    still: pd.DataFrame
+    output: Array
+    error: Array
+    why: str
+
+
+def _corrected(rows: pd.DataFrame) -> _Corrected:
+    """The change of bias and response with temperature, by the extremes and the records before them, taken out of one axis.
+
+    The records after it are left out of the slope: a shift is no change with temperature.
+    """
+    still, known = rows[rows["series"] != BETWEEN], rows[rows["series"] != AFTER]
+    temperature, output = numbers(still, "temperature", "value")
+    at, value = numbers(known, "temperature", "value")
+    after = (still["series"] == AFTER).to_numpy()
+    try:
+        middle = float(temperature.mean()) if temperature.size else float("nan")
+        slope = temperature_slope(_force(known), value, at, middle)
+    except NotIdentified as problem:
+        return _Corrected(still, output, np.zeros(4), str(problem))
+    columns = np.column_stack([np.ones(len(still)), _force(still)])
+    apart = float(temperature[after].mean() - temperature[~after].mean()) if after.any() and not after.all() else 0.0
+    return _Corrected(still, output - columns @ slope.value * (temperature - middle), slope.u * abs(apart), "")
+
+
+def _force(rows: pd.DataFrame) -> Array:
+    return rows[[f"force_{one}" for one in AXES]].to_numpy(dtype=float)
 
 
 PROCEDURE = Exposure()

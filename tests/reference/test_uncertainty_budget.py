@@ -102,6 +102,24 @@ def combined(errors: np.ndarray) -> np.ndarray:
     return 1e6 * np.sqrt(np.sum(errors**2, axis=-1))
 
 
+def test_repeats_of_a_pose_average_its_repeatability_and_not_what_is_the_same_at_every_visit() -> None:
+    angles = np.array([[0.0, 0.0], [180.0, 0.0], [90.0, 0.0], [90.0, 180.0], [90.0, 90.0], [90.0, -90.0]])
+
+    def of(scope: str, repeats: int) -> np.ndarray:
+        rng = np.random.default_rng(5)
+        coarse = rng.uniform(-0.04, 0.04, (6 * repeats, 2))  # as by the registers of an arm
+        read = np.tile(angles, (repeats, 1)) + coarse
+        state = posed(read, 30.0, temperature=np.full(len(read), 25.0))
+        source = sensitivity(model_of(BASE), state, [], [Scattered("pose", 3e-4, 3e-4, scope)])
+        fit = fit_design(model_of(BASE), state, np.eye(len(read)))
+        return combined(propagated(fit, source, np.eye(3)).coefficients)
+
+    once = of("pose", 1)
+    assert of("pose", 4) == pytest.approx(once / 2.0, rel=0.01, abs=0.5)
+    assert of("station", 4) == pytest.approx(once, rel=0.01, abs=0.5)
+    assert of("station", 1) == pytest.approx(once, rel=0.01, abs=0.5)
+
+
 def output(influences, effects, force, temperature) -> np.ndarray:
     """u of the corrected output (3,), µg."""
     nothing = np.zeros(1)

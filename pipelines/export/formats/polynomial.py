@@ -23,7 +23,7 @@ FEWER_AXES = True
 COMPLETE = True  # it is fitted to the dwells themselves, and states what it leaves
 DEGREE = 3
 APART_G = 0.05
-"""Between two levels of force along an axis."""
+"""Width of a level of force along an axis."""
 SPAN_K = 5.0
 """Of the temperatures, from which on kT is fitted."""
 TERMS = ("c0", "c1", "c2", "c3", "kT")
@@ -56,13 +56,20 @@ def _fitted(c: UnitCalibration, letter: str) -> AxisPolynomial:
     output, force = (own[f"{name}_{letter}"].to_numpy(dtype=float)[:, None] for name in ("out", "force"))
     temperature = own["unit_C"].to_numpy(dtype=float) if "unit_C" in own else np.full(len(own), np.nan)
     varied = bool(np.isfinite(temperature).all()) and float(np.ptp(temperature)) > SPAN_K
-    sorted_force = np.sort(force[:, 0])
-    levels = 1 + int(np.count_nonzero(sorted_force[1:] - sorted_force[:-1] > APART_G))
-    degree = min(DEGREE, levels - 1)
+    degree = min(DEGREE, _levels(force[:, 0]) - 1)
     try:
         return fit_axis_polynomial(output, force, temperature=temperature if varied else None, degree=max(degree, 1))
     except NotIdentified as problem:
         raise WrongUse(f"export: unit {c.unit}, axis {letter}: {problem}") from None
+
+
+def _levels(force: Array) -> int:
+    """Levels of width :data:`APART_G` that hold the forces (n,), however densely they lie."""
+    count, begin = 0, -np.inf
+    for value in np.sort(force):
+        if value - begin > APART_G:
+            count, begin = count + 1, value
+    return count
 
 
 def _terms(fitted: AxisPolynomial) -> tuple[list[str], list[str]]:

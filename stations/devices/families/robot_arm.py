@@ -1,7 +1,8 @@
 """An arm as the tilt table: its program turns the tool by two angles, and the pose is read from the rotation vector of the TCP.
 
 The registers hold whole milliradians: of a pose each component of the reading is known to ±0.5 mrad, 289 µrad in standard
-uncertainty, which belongs into ``pose`` of the station's [uncertainty] beside the arm's own repeatability.
+uncertainty, which belongs into ``pose`` of the station's [uncertainty] beside the arm's own repeatability. It is the
+same at every visit of the pose, so the scope there is ``station``.
 """
 
 import math

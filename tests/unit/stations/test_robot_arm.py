@@ -1,6 +1,8 @@
 """An arm over Modbus as the tilt table: angles from its rotation vector, orders through its program, what whole mrad cost."""
 
 import math
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -53,3 +55,78 @@ def test_an_arm_goes_to_poses_beyond_half_a_turn_and_stops_for_a_person() -> Non
         plant.emergency_stop = True
         with pytest.raises(OperatorNeeded, match="emergency stop at the arm"):
             table.move(10.0, 10.0)
+
+
+GUIDE = Path(__file__).resolve().parents[3] / "docs" / "how-to" / "poses-from-a-robot-arm.md"
+
+
+class Ended(Exception):
+    """The program has had its turns."""
+
+
+class Controller:
+    """Registers and threads of a controller that carries out the program of the guide, line by line."""
+
+    def __init__(self, registers: dict[int, int], writes: dict[str, dict[int, int]], turns: int = 3) -> None:
+        self.registers = dict.fromkeys(range(128, 137), 0) | registers
+        self.writes, self.turns, self.log = writes, turns, list[str]()
+
+    def event(self, name: str) -> None:
+        """Something happens at the arm; the host writes its orders meanwhile, once."""
+        self.log.append(name)
+        self.registers |= self.writes.pop(name, {})
+
+    def sync(self) -> None:
+        self.turns -= 1
+        self.event("sync")
+        if self.turns == 0:
+            raise Ended
+
+    def run(self) -> None:
+        """The program as Python: its blocks are the same, without ``end``."""
+        text = GUIDE.read_text(encoding="utf-8").split("```text\n")[1].split("```")[0]
+        text = re.sub(r"^ *end\n", "", text, flags=re.MULTILINE)
+        for found, written in (
+            (r"thread (\w+)\(\):", r"def \1():"), (r"run (\w+)\(\)", r"run(\1)"), (r"kill (\w+)", r"kill(\1)"), (r"\bp\[", "["),
+        ):  # fmt: skip
+            text = re.sub(found, written, text)
+        place = {
+            "get_actual_tcp_pose": lambda: [0.0] * 6,
+            "read_port_register": self.registers.__getitem__,
+            "write_port_register": self.registers.__setitem__,
+            "run": lambda thread: self.event(thread.__name__),
+            "kill": lambda _: None,
+            "stopj": lambda _: self.event("stopj"),
+            "sync": self.sync,
+        }
+        exec(text, place)
+        with pytest.raises(Ended):
+            place["poses"]()
+
+
+def test_the_program_of_the_guide_moves_by_orders_only() -> None:
+    idle = Controller({128: 4500, 129: 1000, 130: 1000, 131: 1}, {})
+    idle.run()
+    assert "Go" not in idle.log  # an order of before the start is forgotten
+    ordered = Controller({}, {"sync": {135: 1}})
+    ordered.run()
+    assert ordered.log.count("Go") == 1
+    assert ordered.registers[135] == 3
+
+
+@pytest.mark.parametrize("order", [131, 135])
+@pytest.mark.parametrize("stopped", [131, 135])
+def test_a_stop_while_the_program_brakes_for_an_order_is_kept(order: int, stopped: int) -> None:
+    arm = Controller({}, {"sync": {order: 1}, "stopj": {stopped: 2}})
+    arm.run()
+    assert "Go" not in arm.log
+    assert arm.log.count("stopj") == 2
+    assert (arm.registers[131], arm.registers[135]) == (0, 0)
+
+
+def test_speeds_that_the_arm_does_not_take_are_not_asked_of_it() -> None:
+    config, lot = station_with("universal_robots"), lot_of(1)
+    faster = config.model_copy(update={"limits": config.limits.model_copy(update={"speed_deg_s": 90.0})})
+    with serve_plant(faster, lot, make_plant(faster, lot)) as station:
+        station.table.move(10.0, -10.0)
+        assert station.table.angles() == pytest.approx((10.0, -10.0), abs=0.1)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from inertial.dynamics.exposure import ExposureShift, exposure_shift
+from inertial.dynamics.exposure import ExposureShift, exposure_shift, temperature_slope
 from inertial.dynamics.stability import ShortNoise
 from inertial.errors import NotIdentified
 
@@ -47,3 +47,23 @@ def test_one_pass_of_six_poses_is_refused() -> None:
     force = np.tile(FACES[:5], (2, 1))
     with pytest.raises(NotIdentified, match="10 records for 8 unknowns, 12 in six poses are needed; raise repeats"):
         exposure_shift(force, np.zeros(10), np.repeat([False, True], 5), 0, QUIET, 300.0, 7200.0)
+
+
+def test_a_slope_is_that_at_the_temperature_and_needs_poses_at_three_temperatures() -> None:
+    rng = np.random.default_rng(6)
+    force = np.tile(FACES, (4, 1))
+    at = np.repeat([25.0, 25.0, -40.0, 85.0], 6) + 0.1 * rng.standard_normal(24)
+    true = np.array([80.0, 200.0, -3.0, 0.0])
+    own = np.column_stack([np.ones(24), force])
+    found = []
+    for _ in range(200):
+        output = 1e6 * force[:, 0] + own @ true * (at - 25.0) + 0.5 * (at - 25.0) ** 2 + WHITE * rng.standard_normal(24)
+        slope = temperature_slope(force, output, at, 25.0)
+        found.append((slope.value - true) / slope.u)
+    assert 0.85 < np.std(found) < 1.25
+    assert abs(np.mean(found)) < 0.2
+    with pytest.raises(NotIdentified, match="more than 1 K below and above it"):
+        temperature_slope(force[:18], np.zeros(18), at[:18], 25.0)
+    one_pose = np.vstack([force[:12], np.tile(FACES[0], (12, 1))])
+    with pytest.raises(NotIdentified, match="six poses are needed at the temperature of the test"):
+        temperature_slope(one_pose, np.zeros(24), at, 25.0)

@@ -344,3 +344,16 @@ def test_a_polynomial_of_each_axis_gives_the_force_back_and_has_no_more_powers_t
                 np.abs(back - force[:, k]).max() < 2e-4
             )  # kT has no place for the product of temperature and nonlinearity
             assert row["rms_ug"] == pytest.approx(1e6 * np.sqrt(np.mean((back - force[:, k]) ** 2)), rel=1e-3, abs=1e-3)
+
+
+def test_many_poses_have_no_fewer_powers_than_few() -> None:
+    rng = np.random.default_rng(8)
+    names = [*(f"force_{axis}" for axis in "xyz"), *(f"out_{axis}" for axis in "xyz")]
+    force = rng.normal(size=(400, 3))
+    force /= np.linalg.norm(force, axis=1, keepdims=True)
+    output = NOMINAL * (0.01 + 1.003 * (force - 2e-3 * force**2 + 1e-3 * force**3))
+    dense = replace(unit(), dwells=pd.DataFrame(np.hstack([force, output]), columns=names))
+    (content,) = export_files("polynomial", [dense], "run-1", ExportSettings()).values()
+    table = pd.read_csv(io.BytesIO(content))
+    assert table["c3"].notna().all()
+    assert (table["rms_ug"] < 20.0).all()

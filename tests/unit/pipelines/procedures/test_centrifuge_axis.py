@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from pydantic import ValidationError
 from spun_centrifuge import spins, spun
 
 from pipelines.procedures import PROCEDURES
@@ -94,3 +95,21 @@ def test_the_error_of_the_sensor_is_that_of_the_sensitivity_and_one_that_is_off_
     assert figures["centrifuge_sensitivity_percent"].value == pytest.approx(-0.2, abs=0.01)
     dead, _ = of_sensor(stretch=0.0, gain=0.0)
     assert "check its cable" in dead["centrifuge_linearity_percent"].note
+
+
+def test_what_is_stated_of_rate_and_linearity_is_in_every_point_of_a_sensor() -> None:
+    def errors(**keys: float) -> np.ndarray:
+        part = CENTRIFUGE.part.model_validate(SENSOR | keys)
+        rows = [row for one in turned(0.0, 1.0) for row in CENTRIFUGE.points(part, one, Device({}, {}, 50.0, "V"))]
+        return np.array([row["uncertainty"] / abs(row["setting"]) for row in rows])
+
+    none = errors(point_ppm=0.0, reference_linearity_ppm=0.0)
+    for key in ("point_ppm", "reference_linearity_ppm"):
+        one = errors(**{"point_ppm": 0.0, "reference_linearity_ppm": 0.0, key: 300.0})
+        assert np.sqrt(one**2 - none**2) == pytest.approx(300e-6, rel=1e-3)
+
+
+@pytest.mark.parametrize("key", ["reference_ppm", "reference_linearity_ppm"])
+def test_a_statement_on_a_sensor_that_is_not_there_is_refused(key: str) -> None:
+    with pytest.raises(ValidationError, match=f"{key}: given without reference_radius_m, which is needed"):
+        CENTRIFUGE.part.model_validate({"kind": "centrifuge", "scale": 1.0, key: 100.0})

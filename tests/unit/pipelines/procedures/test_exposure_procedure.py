@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 from small_station import captured, lot_of, short_recipe, station_of
 
+from inertial.frames import force_from_angles
 from pipelines.procedures import PROCEDURES, parts_of, refuse_unusable
 from pipelines.procedures.figures import Outcome
 from pipelines.procedures.recorded import Device, nominal_device, procedure_record
@@ -78,3 +79,73 @@ def test_temperatures_out_of_order_or_beyond_the_station_are_refused() -> None:
         parts_of(recipe_of(low_C=60.0, high_C=-10.0))
     with pytest.raises(RecipeInvalid, match="high_C 125 °C, -40 to 85 °C is allowed"):
         refuse_unusable(recipe_of(high_C=125.0), load_station())
+    with pytest.raises(RecipeInvalid, match="temperature_C 95 °C, -40 to 85 °C is allowed"):
+        refuse_unusable(recipe_of(temperature_C=95.0), load_station())
+    station = load_station()
+    narrow = station.model_copy(update={"limits": station.limits.model_copy(update={"inner_deg": (-45.0, 200.0)})})
+    with pytest.raises(RecipeInvalid, match="face -x: inner axis -90 deg, -45 to 200 deg is allowed"):
+        refuse_unusable(recipe_of(), narrow)
+
+
+def test_no_face_is_measured_twice_without_a_move() -> None:
+    poses = [
+        (step.pose.outer_deg, step.pose.inner_deg) for step in EXPOSURE.steps(parts_of(recipe_of())[0], recipe_of())
+    ]
+    names = [step.name.split()[-1] for step in EXPOSURE.steps(parts_of(recipe_of())[0], recipe_of())]
+    same_soak = [k % 6 != 5 or k // 6 in (0, 4) for k in range(len(names) - 1)]
+    assert len(poses) == 6 * (2 + 2 + 2)
+    assert all(a != b for a, b, same in zip(poses, poses[1:], same_soak, strict=False) if same)
+
+
+LETTERS = {"x": 0, "y": 1, "z": 2}
+FLAT = {"white": 0.0, "flicker": 0.0, "flicker_error": 0.0}
+
+
+def warmer(
+    rng: np.random.Generator,
+    *,
+    bias_ug_K: float,
+    scale_ppm_K: float,
+    curved: float,
+    apart_K: float,
+    missing: bool = False,
+) -> Outcome:
+    """A device with temperature coefficients and no shift, whose records after the exposure are at a higher temperature."""
+    steps_ = EXPOSURE.steps(parts_of(recipe_of())[0], recipe_of())
+    rows = list[dict[str, Any]]()
+    for k, step in enumerate(steps_):
+        series = step.name.split()[0]
+        at = step.temperature_C + (apart_K if series == "after" else 0.0) + 0.02 * rng.standard_normal()
+        theta = at - 25.0
+        force = force_from_angles(*np.radians([step.pose.outer_deg, step.pose.inner_deg]))
+        for axis, i in LETTERS.items():
+            value = (
+                bias_ug_K * theta + curved * theta**2 + force[i] * (1e6 + scale_ppm_K * theta) + rng.standard_normal()
+            )
+            rows.append(
+                {"unit": "U1", "axis": axis, "series": series if series in {"before", "after"} else "exposure", "point": k,
+                 "setting": 60.0 * k, "value": value, "uncertainty": 1.0, "temperature": np.nan if missing else at,
+                 **{f"force_{name}": force[j] for name, j in LETTERS.items()}, **FLAT}
+            )  # fmt: skip
+    return outcome(pd.DataFrame(rows), Device({}, {}, 10.0, "g"))
+
+
+@pytest.mark.parametrize(
+    ("bias_ug_K", "scale_ppm_K", "curved"), [(0.0, 200.0, 0.0), (150.0, 0.0, 0.0), (80.0, -120.0, 1.0)]
+)
+def test_a_difference_of_temperature_is_no_shift(bias_ug_K: float, scale_ppm_K: float, curved: float) -> None:
+    rng = np.random.default_rng(3)
+    for _ in range(20):
+        made = warmer(rng, bias_ug_K=bias_ug_K, scale_ppm_K=scale_ppm_K, curved=curved, apart_K=0.5)
+        for one in made.figures["U1"]:
+            assert abs(one.value) < 4.0 * one.uncertainty
+            assert one.uncertainty < 3.0
+        assert not made.findings
+
+
+def test_without_temperatures_nothing_is_corrected_and_a_finding_says_so() -> None:
+    made = warmer(np.random.default_rng(3), bias_ug_K=0.0, scale_ppm_K=200.0, curved=0.0, apart_K=0.5, missing=True)
+    assert all(np.isfinite(one.value) for one in made.figures["U1"])
+    assert [one.text for one in made.findings] == [
+        "not corrected for, its difference is in both shifts and not in U: the unit's temperature is not recorded"
+    ]
