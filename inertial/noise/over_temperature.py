@@ -6,8 +6,11 @@ import numpy as np
 
 from inertial.arrays import Array
 
+APART_K = 5.0
+"""Between temperatures, from which on noise is compared; and the most that one soak may move."""
 QUADRATIC_FROM = 4
-"""Soaks from which on the curve has a curvature: one degree of freedom is left for its misfit."""
+"""Soaks from which on the curve has a curvature, at three temperatures that are apart: one degree of freedom is left for its
+misfit."""
 
 
 @dataclass(frozen=True)
@@ -36,15 +39,15 @@ class DensityCurve:
 
 
 def density_curve(temperature: Array, value: Array, u: Array) -> DensityCurve | None:
-    """The curve of densities (n,) with standard uncertainties (n,) at temperatures (n,), °C; None for fewer than two.
+    """The curve of densities (n,) with standard uncertainties (n,) at temperatures (n,), °C.
 
-    Weighted least squares on the logarithm; the temperatures of two points must differ.
+    Weighted least squares on the logarithm; None for fewer than two temperatures that are apart.
     """
-    levels = np.unique(np.round(temperature)).size
+    levels = _levels(temperature)
     if levels < 2:
         return None
     middle = float(0.5 * (temperature.min() + temperature.max()))
-    columns = _columns(temperature - middle, 3 if levels >= QUADRATIC_FROM else 2)
+    columns = _columns(temperature - middle, 3 if levels > 2 and value.size >= QUADRATIC_FROM else 2)
     weight = value / u
     rows = columns * weight[:, None]
     covariance = np.linalg.inv(rows.T @ rows)
@@ -53,6 +56,15 @@ def density_curve(temperature: Array, value: Array, u: Array) -> DensityCurve | 
     misfit = float(np.sum((weight * (np.log(value) - columns @ coefficients)) ** 2))
     widened = max(1.0, misfit / dof) if dof > 0 else 1.0
     return DensityCurve(middle, coefficients, np.asarray(widened * covariance, dtype=np.float64))
+
+
+def _levels(temperature: Array) -> int:
+    """Temperatures, each ``APART_K`` or more above the one counted before."""
+    count, last = 0, -np.inf
+    for one in np.sort(temperature).tolist():
+        if one - last >= APART_K:
+            count, last = count + 1, one
+    return count
 
 
 def _columns(theta: Array, count: int) -> Array:

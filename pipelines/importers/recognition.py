@@ -62,7 +62,7 @@ class Recognition:
             labels = self.content.table[named].astype(str).tolist() if whole else own
             return self._proposal(self.keys, self.output, labels)
         time = np.arange(len(self.output)) / ASSUMED_HZ if self.time is None else self.time
-        stops = self.stops or _stops(self.output, time, self.joints)
+        stops = self.stops or _stops(self.output, time, self.guessed.output.meaning, self.joints)
         if self.labels is not None and stops is not None:
             found, every = stretches.labelled(self.labels, _edges(time, self.joints), stops.found)
             proposal = self._of_stretches(self.keys, found, time)
@@ -136,7 +136,11 @@ def of_content(
     gaps = int(np.count_nonzero(steps > gap_limit(steps)))
     faults = sample_faults.look(kept) if kept is not None and len(kept) > 3 and not guessed.dwells else None
     joints = tuple(np.searchsorted(np.flatnonzero(whole), breaks).tolist())
-    stops = _stops(kept, own, joints) if kept is not None and own is not None and not guessed.dwells else None
+    stops = (
+        _stops(kept, own, guessed.output.meaning, joints)
+        if kept is not None and own is not None and not guessed.dwells
+        else None
+    )
     named = guessed.column("dwell")
     labels = None
     if named and kept is not None and not guessed.dwells:
@@ -242,12 +246,12 @@ def _output(content: Content, guessed: Guesses) -> Array | None:
     return np.column_stack([measurable(values.as_numbers(content.table[name], name)) for name in names])
 
 
-def _stops(output: Array, time: Array, joints: Sequence[int] = ()) -> stretches.Stops | None:
+def _stops(output: Array, time: Array, unit: str, joints: Sequence[int] = ()) -> stretches.Stops | None:
     """The stops of a record; None of a few samples, or of a clock that does not advance."""
     steps = np.diff(time)
     if len(output) < 3 or np.any(steps < 0.0) or not np.any(steps > 0.0):
         return None
-    return stretches.found_stops(output, time, _edges(time, joints))
+    return stretches.found_stops(output, time, _edges(time, joints), unit_check.GRAVITY.get(unit))
 
 
 def _edges(time: Array, joints: Sequence[int] = ()) -> list[int]:

@@ -11,6 +11,7 @@ import numpy as np
 from inertial import change_of_level, static_intervals
 from inertial.arrays import Array
 from pipelines.importers.mapping import Mapping
+from pipelines.importers.unit_check import GRAVITY
 from schemas.errors import DataRejected, did_you_mean
 from schemas.units import AXES
 
@@ -22,9 +23,13 @@ _SHIFTED = 0.2
 """Share of the stops in which a hand may have shifted the sensor."""
 HANDLED = 4.0
 """Scatter of a block over that of most, above which the sensor is held by a hand."""
-MOTION, BEYOND_NOISE = 0.05, 1.5
-"""Scatter of a stretch over the size of its mean, and over the noise of neighbouring samples, above which it is motion: a sensor
-that turns by 0.05 rad has a mean 1.3 mg short of gravity. White noise has a ratio of 1, a hand in motion 1.5 and more."""
+_MOTION, _BEYOND_NOISE, _UNSTEADY = 0.05, 1.5, 2.0
+"""Scatter of the means of blocks over gravity, or over the spread of the positions, and over what fast noise leaves in them,
+above which a stretch is motion: a sensor that turns by 0.05 rad has a mean 1.3 mg short of gravity. Steps between neighbouring
+blocks over what noise leaves: 1 of white noise or a vibration, below 2 of flicker, 5 to 8 of a hand at 0.2 to 2 Hz, 2 to 3 of
+one that also shakes."""
+_BLOCK_S, _PARTS = 0.2, 4
+"""Block of such a mean, s, which a vibration of a machine leaves nearly without a trace; and the parts that tell its noise."""
 _NEARLY = 0.9
 _ENOUGH = 6
 """Stops from which a longer window is preferred: the faces of a cube."""
@@ -104,26 +109,28 @@ def stretches(
         intervals = _without_handled_ends(intervals, output, time) if mapping.face else intervals
     else:
         how = _SearchOptions(mapping.window_s or 1.0, mapping.shortest_s or 1.0, mapping.threshold)
-        intervals = _at_rest(_searched(output, time, edges, how), output)
-        intervals = _of_one_position(intervals, output, time, edges, where)
+        gravity = GRAVITY.get(mapping.units.output)
+        intervals = _at_rest(_searched(output, time, edges, how), output, time, gravity)
+        intervals = _of_one_position(intervals, output, time, edges, where, gravity)
     return _named(intervals, mapping, where)
 
 
-def found_stops(output: Array, time: Array, edges: Sequence[int]) -> Stops:
+def found_stops(output: Array, time: Array, edges: Sequence[int], gravity: float | None) -> Stops:
     """The stops of a record that was turned by hand, with the longest window that takes none of several positions for one.
 
     Parameters
     ----------
     edges : 0, the samples before which some are missing, and their number
+    gravity : in the unit of the output; None of counts
     """
-    plain = [_stops(output, time, edges, _SearchOptions(window, window, None)) for window in WINDOWS_S]
+    plain = [_stops(output, time, edges, _SearchOptions(window, window, None), gravity) for window in WINDOWS_S]
     for stops in plain:
         if not stops.several and len(stops.found) >= _ENOUGH:
             return stops
     # a hand that rests for a moment shakes little less than one that moves: stricter limits part what it runs together
     quiet = _limits(output, time)
     strict = [
-        _stops(output, time, edges, _SearchOptions(window, window, float(f"{times * sd:.3g}")))
+        _stops(output, time, edges, _SearchOptions(window, window, float(f"{times * sd:.3g}")), gravity)
         for window, sd in quiet
         for times in STRICT
     ]
@@ -134,8 +141,8 @@ def found_stops(output: Array, time: Array, edges: Sequence[int]) -> Stops:
     return next(stops for stops in clean if len(stops.found) >= nearly)  # the longest window that finds nearly all
 
 
-def _stops(output: Array, time: Array, edges: Sequence[int], how: _SearchOptions) -> Stops:
-    found = _at_rest(_searched(output, time, edges, how), output)
+def _stops(output: Array, time: Array, edges: Sequence[int], how: _SearchOptions, gravity: float | None) -> Stops:
+    found = _at_rest(_searched(output, time, edges, how), output, time, gravity)
     several = tuple(k for k, (a, b) in enumerate(found.spans) if change_of_level.several_levels(output[a:b]) > 1)
     return Stops(how.window_s, found, several, how.threshold)
 
@@ -225,22 +232,55 @@ def _searched(output: Array, time: Array, edges: Sequence[int], how: _SearchOpti
     return Stretches(tuple(spans), tuple(f"dwell {k}" for k in range(len(spans))))
 
 
-def _at_rest(intervals: Stretches, output: Array) -> Stretches:
+def _at_rest(intervals: Stretches, output: Array, time: Array, gravity: float | None) -> Stretches:
     """The stretches of three axes without those that are motion throughout, as in a record without rest; a remark on these."""
-    if output.shape[1] < len(AXES):
+    if output.shape[1] < len(AXES) or not len(intervals):
         return intervals
-    kept = [k for k, (a, b) in enumerate(intervals.spans) if not _is_motion(output[a:b])]
+    # a mean in counts has an offset of any size: between positions it cancels
+    means = np.array([output[a:b].mean(axis=0) for a, b in intervals.spans])
+    size = float(np.linalg.norm(means.std(axis=0))) if gravity is None else gravity
+    kept = [
+        k
+        for k, (a, b) in enumerate(intervals.spans)
+        if not _is_motion(output[a:b], float(time[b - 1] - time[a]), size, is_gravity=gravity is not None)
+    ]
     if len(kept) == len(intervals):
         return intervals
     remark = f"{len(intervals) - len(kept)} of {len(intervals)} stretches are no rest and were left out: more scatter than noise"
     return replace(intervals.only(kept), remarks=(*intervals.remarks, remark))
 
 
-def _is_motion(x: Array) -> bool:
-    scatter = float(np.linalg.norm(x.std(axis=0)))
-    noise = float(np.linalg.norm(change_of_level.neighbour_noise(x)))
-    moving = scatter > max(MOTION * float(np.linalg.norm(x.mean(axis=0))), BEYOND_NOISE * noise)
+def _is_motion(x: Array, duration_s: float, size: float, *, is_gravity: bool) -> bool:
+    """Whether the slow part of a stretch (n, 3) is motion.
+
+    Parameters
+    ----------
+    size : gravity, or the spread of the positions of the record, which is small where there is one: there a drift in minutes is
+        told from motion by the steps between neighbouring blocks
+    """
+    part_s = min(_BLOCK_S, duration_s / _PARTS) / _PARTS
+    parts = _means(x, max(1, int(part_s / duration_s * (len(x) - 1))) if duration_s > 0.0 else 1)
+    few = len(parts) < _PARTS**2
+    blocks, noise = (
+        (x, float(np.linalg.norm(change_of_level.neighbour_noise(x))))
+        if few
+        else (_means(parts, _PARTS), _steps(parts) / np.sqrt(_PARTS))
+    )
+    slow = float(np.linalg.norm(blocks.std(axis=0, ddof=1)))
+    moving = (
+        slow > _MOTION * size and slow > _BEYOND_NOISE * noise and (is_gravity or _steps(blocks) > _UNSTEADY * noise)
+    )
     return moving and change_of_level.several_levels(x) == 1  # several positions back to back are told as such
+
+
+def _means(x: Array, samples: int) -> Array:
+    count = len(x) // samples
+    return x[: count * samples].reshape(count, samples, x.shape[1]).mean(axis=1)
+
+
+def _steps(means: Array) -> float:
+    """Scatter of means (n, 3) by the differences of neighbours: their Allan deviation, all axes together."""
+    return float(np.sqrt(np.sum(np.mean(np.diff(means, axis=0) ** 2, axis=0)) / 2.0))
 
 
 def _has_windows(samples: int, window_s: float, rate: float) -> bool:
@@ -248,7 +288,9 @@ def _has_windows(samples: int, window_s: float, rate: float) -> bool:
     return samples >= 3 * max(3, round(window_s * rate))
 
 
-def _of_one_position(intervals: Stretches, output: Array, time: Array, edges: Sequence[int], where: str) -> Stretches:
+def _of_one_position(
+    intervals: Stretches, output: Array, time: Array, edges: Sequence[int], where: str, gravity: float | None
+) -> Stretches:
     """The stretches without a few that have more scatter than noise, as where a hand shifted the sensor; a remark on these.
 
     Raises
@@ -267,7 +309,7 @@ def _of_one_position(intervals: Stretches, output: Array, time: Array, edges: Se
         return replace(left, remarks=(f"left out, since the sensor was shifted during the stop: {spans}",))
     worst = max(several, key=lambda k: counts[k])
     a, b = intervals.spans[worst]
-    stops = found_stops(output, time, edges)
+    stops = found_stops(output, time, edges, gravity)
     if len(stops.found) and not stops.several:
         offer = f"{options_of(stops)} finds {len(stops.found)} stops, one position in each"
     elif (total := change_of_level.several_levels(output)) > 1:

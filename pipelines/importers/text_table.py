@@ -31,10 +31,12 @@ _FORTRAN = re.compile(r"^\s*[+-]?\d*\.?\d+[dD][+-]?\d+\s*$")
 _SURE = ("'", "\N{RIGHT SINGLE QUOTATION MARK}", "\N{NO-BREAK SPACE}", "\N{NARROW NO-BREAK SPACE}", "\N{THIN SPACE}")
 """Signs that stand in no number for anything else."""
 _RATE = re.compile(
-    r"(?:\bsampl\w*[^\d\n]{0,24}|\bat )(\d+(?:\.\d+)?) ?Hz\b|\bsampl\w*[^\d\n]{0,16}\bHz\b\W{1,4}(\d+(?:\.\d+)?)\s*$",
+    r"(?:\b(?:sampl(?:e|es|ed|ing)|data)[ _-]?(?:rate|frequency)|\bsampl(?:ed|ing|es) at|\bdata file created by\b.* at)"
+    r"[^\w\n]{0,4}(?:(\d+(?:\.\d+)?) ?Hz\b|Hz\b\W{1,4}(\d+(?:\.\d+)?)\s*$)",
     re.IGNORECASE,
 )
-"""A rate of samples in a line before the table: 'at 30 Hz', 'Sample rate: 100 Hz', 'Sampling frequency [Hz]; 200'."""
+"""A rate of samples in a line before the table: 'Sample rate: 100 Hz', 'Sampling frequency [Hz]; 200', 'sampled at 30 Hz', or the
+line by which a logger says how its file was made; that of a shaker or a filter is none."""
 _NAMES = {",": "a comma", ".": "a point", "'": "an apostrophe", _SURE[1]: "an apostrophe"}
 _DIVIDERS = (";", "\t", "|", ",")
 _SAMPLED_LINES = 400
@@ -92,14 +94,20 @@ def content(text: str, where: str, encoding: str = "UTF-8") -> Content:
     remarks = (*_remarks(detected, lines, encoding), *([grouped] if grouped else []))
     # a line break inside a quoted field, or one that the parser joins, moves all rows behind it
     whole = len(lines) == len(text.splitlines()) and len(rows) == len(table)
-    interval = _stated_interval(lines[: detected.first])
-    return Content(table, remarks, units, interval, ((where, rows),) if whole else ())
+    interval, stated_by = _stated_interval(lines[: detected.first])
+    return Content(table, (*remarks, *stated_by), units, interval, ((where, rows),) if whole else ())
 
 
-def _stated_interval(lines: Sequence[str]) -> float | None:
-    """The interval of samples by the one rate, Hz, that lines before the table state; None where there is none or two differ."""
-    rates = {float(found[1] or found[2]) for line in lines[:_SAMPLED_LINES] if (found := _RATE.search(line))}
-    return 1.0 / rates.pop() if len(rates) == 1 and min(rates) > 0.0 else None
+def _stated_interval(lines: Sequence[str]) -> tuple[float | None, tuple[str, ...]]:
+    """The interval of samples by the one rate, Hz, that lines before the table state, and a remark; None if two differ."""
+    found = [(match, line) for line in lines[:_SAMPLED_LINES] if (match := _RATE.search(line))]
+    rates = {float(match[1] or match[2]) for match, _ in found}
+    if len(rates) != 1 or not min(rates) > 0.0:
+        return None, ()
+    line = shown(found[0][1].strip(), 150)
+    return 1.0 / min(rates), (
+        f"{min(rates):g} samples in a second, where no column of time tells it, by the line '{line}'",
+    )
 
 
 def logical_lines(text: str) -> list[str]:

@@ -115,6 +115,7 @@ def import_waveforms(
         raise DataRejected(f"{paths[0].name}: {problem}") from None
     values = outcome.figures.get(unit, [])
     texts = [(f.subject, f.text) for f in outcome.findings]
+    texts += [("file", remark) for remark in recordings[0].remarks if "samples in a second" in remark]
     if not np.isfinite(full_scale):
         texts.append(("not judged", "clipping: full_scale is not given; add it to the file of --set"))
     content |= own.model_dump(include={"duration_ms", "before_ms"} - set(content))
@@ -193,6 +194,7 @@ class _Recording(NamedTuple):
     reference: UnitRecord | None
     unit: str
     source: files.SourceFile
+    remarks: tuple[str, ...]
 
 
 def _recording(path: Path, layout: RecordingLayout, part: Any, procedure: FromWaveforms) -> _Recording:
@@ -214,7 +216,7 @@ def _recording(path: Path, layout: RecordingLayout, part: Any, procedure: FromWa
     for axis, column in outputs.items():
         own.output[:, AXES.index(axis)] = finite_column(content.table, column, path.name)
     if not driven:
-        return _Recording(own, None, text, source)
+        return _Recording(own, None, text, source, content.remarks)
     reference_unit = _unit(other, layout, "reference", layout.columns["reference"], path.name)
     if reference_unit not in known:
         raise DataRejected(
@@ -229,7 +231,7 @@ def _recording(path: Path, layout: RecordingLayout, part: Any, procedure: FromWa
         if f"reference_{axis}" in layout.columns:
             column = layout.columns[f"reference_{axis}"]
             drive[:, k] = known[reference_unit] * finite_column(other.table, column, path.name)
-    return _Recording(own, UnitRecord(drive_time, drive), text, source)
+    return _Recording(own, UnitRecord(drive_time, drive), text, source, content.remarks)
 
 
 def _unit(content: Content, layout: RecordingLayout, meaning: str, column: str, where: str) -> str:
@@ -257,8 +259,9 @@ def _clock(content: Content, layout: RecordingLayout, where: str) -> np.ndarray:
     interval = content.interval_s
     if layout.rate_hz:
         interval = 1.0 / layout.rate_hz
-    elif interval is None and column:
-        unit = layout.units.get("time") or content.units.get(column, "") or unit_in(column)
+    elif column and (
+        (unit := layout.units.get("time") or content.units.get(column, "") or unit_in(column)) or not interval
+    ):
         if unit not in TIMES:
             raise DataRejected(
                 f"{where}: column '{shown(column)}' has no unit of time, one of {', '.join(TIMES)} is needed; add "
@@ -266,8 +269,10 @@ def _clock(content: Content, layout: RecordingLayout, where: str) -> np.ndarray:
             )
         time = TIMES[unit] * finite_column(content.table, column, where)
         steps = np.diff(time)
-        interval = float((time[-1] - time[0]) / max(n - 1, 1))
-        if interval <= 0.0 or np.max(np.abs(steps - interval)) > max(UNEVEN, 2e-16 * n) * interval:
+        stated, interval = interval, float((time[-1] - time[0]) / max(n - 1, 1))
+        # printed digits of a clock that agrees with the stated interval may be coarse
+        agrees = stated is not None and abs(interval - stated) <= UNEVEN * stated
+        if interval <= 0.0 or (not agrees and np.max(np.abs(steps - interval)) > max(UNEVEN, 2e-16 * n) * interval):
             raise DataRejected(
                 f"{where}: the times are not evenly spaced, a constant sample interval is needed; export without gaps"
             )

@@ -9,9 +9,10 @@ import pandas as pd
 
 from inertial.arrays import Array, Index
 from inertial.decisions import LOUDER_BELOW
+from inertial.distributions import normal_tail
 from inertial.estimation.scatter import difference_p
 from inertial.noise.allan import curve_of, variances
-from inertial.noise.over_temperature import density_curve
+from inertial.noise.over_temperature import APART_K, density_curve
 from inertial.noise.resolution import step_of
 from inertial.noise.terms import NoiseTerms, fit_terms
 from pipelines.stages.noise import FEWEST, limits_where_unexplained
@@ -21,10 +22,12 @@ from pipelines.tables.frames import empty_table, rows_of
 from pipelines.tables.summaries import PROCEDURE, STATIC, by_record
 from schemas.units import MICRO
 
-APART_K = 5.0
-"""Between the coldest and the hottest soak, from which on noise is compared; and the most that one soak may move."""
 NORMAL_95 = 1.959964
-GROWS, FALLS, DIFFERS, SAME = ("grows", "falls", "differs", "steady")
+GROWS, FALLS, DIFFERS, SAME, NOT_TOLD, NOT_JUDGED = ("grows", "falls", "differs", "steady", "not told", "not judged")
+FALSE_RATE = 0.01
+"""Probability that any axis of a run without a change is named by its own ratio: each has its part (Bonferroni)."""
+STEADY = 0.2
+"""Departure of the ratio of the ends from one, beyond which its interval may not reach where noise is called steady."""
 UNIT = "µg/√Hz"
 
 
@@ -54,7 +57,8 @@ def soak_noise(
 
     N is that of IEEE Std 952 in µg/√Hz, two-sided, with a 95 % interval: the term of the noise stage, of the mean of the Allan
     variances of all dwells of the soak. ``curve`` is the fitted density, ``curve_u`` its standard uncertainty. p is the F test by
-    which the judge tells louder soaks, over the axes of all units. No rows where the soaks are not apart in temperature.
+    which the judge tells louder soaks, over the axes of all units; each axis is judged by its own ratio too. No rows where the
+    soaks are not apart in temperature.
     """
     if coefficients.empty:
         return _nothing()
@@ -67,7 +71,8 @@ def soak_noise(
     table = table.sort_values(["unit", "axis", "soak"], ignore_index=True)
     p = _difference(table)
     table[["curve", "curve_u"]] = np.nan
-    changes = [_change(table, own, p) for _, own in table.groupby(["unit", "axis"], sort=False)]
+    axes = table.groupby(["unit", "axis"], sort=False)
+    changes = [_change(table, own, p, axes.ngroups) for _, own in axes]
     known = [one for one in changes if one is not None]
     return {"soak_noise": table, "noise_temperature": pd.DataFrame(known)} if known else _nothing()
 
@@ -145,12 +150,12 @@ def _difference(table: pd.DataFrame) -> float:
     return difference_p(2.0 * np.log(sizes.to_numpy(dtype=float)))
 
 
-def _change(table: pd.DataFrame, own: pd.DataFrame, p: float) -> dict[str, Any] | None:
+def _change(table: pd.DataFrame, own: pd.DataFrame, p: float, axes: int) -> dict[str, Any] | None:
     """The change of one axis over temperature; its curve is written into the rows of the table."""
     known = own[own["identified"]]
     temperature, value = (known[name].to_numpy(dtype=float) for name in ("temperature_C", "value"))
     u = (known["high"] - known["low"]).to_numpy(dtype=float) / (2.0 * NORMAL_95)
-    curve = density_curve(temperature, value, u) if len(known) > 1 and np.ptp(temperature) >= APART_K else None
+    curve = density_curve(temperature, value, u) if len(known) > 1 else None
     if curve is None:
         return None
     table.loc[own.index, "curve"], table.loc[own.index, "curve_u"] = curve.at(
@@ -167,15 +172,26 @@ def _change(table: pd.DataFrame, own: pd.DataFrame, p: float) -> dict[str, Any] 
         "low": ratio - u_p,
         "high": ratio + u_p,
         "p_value": p,
-        "verdict": verdict(ratio, u_p, p),
+        "verdict": verdict(ratio, u_p, p, axes),
     }
 
 
-def verdict(ratio: float, half: float, p: float) -> str:
-    """What noise does over temperature, by the probability of equal soaks and the ratio of the ends with its 95 % half width."""
-    if not p < LOUDER_BELOW:
-        return SAME
-    return GROWS if ratio - half > 1.0 else FALLS if ratio + half < 1.0 else DIFFERS
+def verdict(ratio: float, half: float, p: float, axes: int) -> str:
+    """What noise of an axis does over temperature.
+
+    Parameters
+    ----------
+    ratio, half : N of the hottest soak over that of the coldest, and its 95 % half width
+    p : probability of equal soaks over the axes of the lot; nan if there is none
+    axes : judged together, of all units
+    """
+    # in the logarithm, in which the curve is fitted
+    own_p = 2.0 * float(normal_tail(abs(np.log(ratio)) * NORMAL_95 * ratio / half))
+    if own_p < FALSE_RATE / axes or p < LOUDER_BELOW:
+        return GROWS if ratio - half > 1.0 else FALLS if ratio + half < 1.0 else DIFFERS
+    if not np.isfinite([ratio, half, p]).all():
+        return NOT_JUDGED
+    return SAME if max(ratio + half - 1.0, 1.0 - (ratio - half)) <= STEADY else NOT_TOLD
 
 
 def _nothing() -> dict[str, pd.DataFrame]:

@@ -37,7 +37,7 @@ def render(unit: UnitContext) -> str | None:
     judged = (
         f"Probability of such differences of equal soaks, over the axes of the lot: p = {p:.1g}."
         if np.isfinite(p)
-        else "One axis: not judged, two axes are needed."
+        else "The test over the axes of the lot was not made: two axes with all soaks are needed."
     )
     return fill(
         TEMPLATE,

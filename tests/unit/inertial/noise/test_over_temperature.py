@@ -30,6 +30,18 @@ def test_two_soaks_give_a_line_and_one_temperature_none() -> None:
     assert density_curve(np.array([20.0, 20.2]), np.array([1.0, 1.0]), np.array([0.1, 0.1])) is None
 
 
+def test_soaks_at_nearly_one_temperature_do_not_bend_the_curve() -> None:
+    pairs = np.array([24.4, 24.6, 84.4, 84.6])
+    curve = density_curve(pairs, np.array([20.0, 20.5, 30.5, 30.0]), np.full(4, 0.3))
+    assert curve is not None
+    value, u = curve.at(np.array([54.5]))
+    assert value[0] == pytest.approx(np.sqrt(20.25 * 30.25), rel=0.01)
+    assert u[0] < 1.0
+    three = density_curve(np.array([-40.0, 25.0, 25.2, 85.0]), np.full(4, 20.0), np.full(4, 0.3))
+    assert three is not None
+    assert three.coefficients.size == 3
+
+
 def test_the_mean_of_many_records_holds_n_with_an_interval_that_shrinks_with_their_number() -> None:
     rng, rate, sigma = np.random.default_rng(8), 100.0, 3.0
     inside, widths = 0, {4: [], 25: []}

@@ -321,8 +321,11 @@ def test_the_reference_and_the_spread_of_a_table_of_means_are_recognised_by_thei
     assert proposal.fit == ""  # the poses are known: it is fitted as a run is
 
 
-@each([("-- at 30 Hz  Filter Normal --", 30.0), ("Sampling rate: 12.5 Hz", 12.5), ("Sampling frequency [Hz];50", 50.0),
-       ("Low pass 42 Hz", None), ("sampled at 30 Hz\nsampled at 60 Hz", None)])  # fmt: skip
+@each([("-- Data File Created By ActiGraph GT3X+ date format M/d/yyyy at 30 Hz  Filter Normal --", 30.0),
+       ("Sampling rate: 12.5 Hz", 12.5), ("Sampling frequency [Hz];50", 50.0),
+       ("Low pass 42 Hz", None), ("Shaker test at 80 Hz, 1 g", None), ("Low-pass filter at 10 Hz", None),
+       ("Anti-alias filter: -3 dB at 45 Hz", None), ("Bandwidth sampled down, filter 20 Hz", None),
+       ("sampled at 30 Hz\nsampled at 60 Hz", None)])  # fmt: skip
 def test_the_rate_that_stands_above_a_table_without_a_clock_is_taken(told, rng: Rng, tmp_path: Path) -> None:
     text, rate = told
     hand, columns = Hand(rng, rate=30.0), {}

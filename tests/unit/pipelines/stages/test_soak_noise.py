@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from pipelines.stages.soak_noise import DIFFERS, FALLS, GROWS, SAME, soak_noise, verdict
+from pipelines.stages.soak_noise import DIFFERS, FALLS, GROWS, NOT_JUDGED, NOT_TOLD, SAME, soak_noise, verdict
 from pipelines.tables.calibration import column_names
 
 LEVELS = (-40.0, 0.0, 40.0, 80.0)
@@ -13,19 +13,28 @@ RATE, N = 100.0, 400
 
 
 def run_of(
-    per_K: float, seed: int, units: int = 2, dwells: int = 6
+    per_K: float,
+    seed: int,
+    units: int = 2,
+    dwells: int = 6,
+    levels: tuple[float, ...] = LEVELS,
+    louder: dict[str, tuple[float, float, float]] | None = None,
 ) -> tuple[list[pd.DataFrame], pd.DataFrame, pd.DataFrame, pd.DataFrame]:
-    """Samples, readings, coefficients and their covariance of units whose white noise grows by a share per kelvin."""
+    """Samples, readings, coefficients and their covariance of units whose white noise grows by a share per kelvin.
+
+    louder : factors of the axes of some units in the last soak
+    """
     rng, scale = np.random.default_rng(seed), 2.0
     samples, readings = [], []
-    for soak, level in enumerate(LEVELS):
+    for soak, level in enumerate(levels):
         sigma = 1e-6 * DENSITY * np.sqrt(RATE) * np.exp(per_K * (level - 25.0)) * scale
         for k in range(dwells):
             record = soak * dwells + k
             parts = []
             for u in range(units):
                 unit = f"U{u}"
-                output = rng.uniform(-1.0, 1.0, 3) + sigma * rng.standard_normal((N, 3))
+                own = sigma * np.array((louder or {}).get(unit, (1.0, 1.0, 1.0)) if level == levels[-1] else 1.0)
+                output = rng.uniform(-1.0, 1.0, 3) + own * rng.standard_normal((N, 3))
                 parts.append(
                     pd.DataFrame(
                         {
@@ -86,8 +95,8 @@ def test_noise_that_grows_is_told_with_its_ratio_on_every_axis() -> None:
 
 
 def test_noise_that_stays_is_told_to_stay() -> None:
-    named = [soak_noise(*run_of(0.0, seed=seed))["noise_temperature"]["verdict"].iloc[0] for seed in range(20, 28)]
-    assert named == [SAME] * 8
+    named = [soak_noise(*run_of(0.0, seed=seed))["noise_temperature"]["verdict"] for seed in range(20, 28)]
+    assert pd.concat(named).unique().tolist() == [SAME]
 
 
 def test_soaks_at_one_temperature_and_units_without_coefficients_have_no_rows() -> None:
@@ -97,8 +106,26 @@ def test_soaks_at_one_temperature_and_units_without_coefficients_have_no_rows() 
     assert soak_noise(samples, readings, coefficients.iloc[:0], covariance.iloc[:0])["soak_noise"].empty
 
 
-def test_the_verdict_needs_both_the_test_and_the_ratio() -> None:
-    assert verdict(1.5, 0.1, 1e-9) == GROWS
-    assert verdict(0.5, 0.1, 1e-9) == FALLS
-    assert verdict(1.05, 0.1, 1e-9) == DIFFERS
-    assert verdict(1.5, 0.1, 1e-3) == verdict(1.5, 0.1, float("nan")) == SAME
+ENDS = (-40.0, 80.0)
+
+
+@pytest.mark.parametrize(
+    ("units", "louder"),
+    [(1, {"U0": (1.5, 1.5, 1.5)}), (8, {"U3": (2.0, 2.0, 2.0)}), (2, {"U0": (1.0, 1.0, 2.0), "U1": (1.0, 1.0, 2.0)})],
+)
+def test_an_axis_is_judged_by_its_own_ratio(units: int, louder: dict[str, tuple[float, float, float]]) -> None:
+    change = soak_noise(*run_of(0.0, 7, units, levels=ENDS, louder=louder))["noise_temperature"]
+    for unit, own in change.groupby("unit"):
+        for factor, told in zip(
+            louder.get(str(unit), (1.0, 1.0, 1.0)), own.sort_values("axis")["verdict"], strict=True
+        ):
+            assert told == (GROWS if factor > 1.0 else SAME)
+
+
+def test_a_change_is_told_by_the_axis_or_by_the_lot_and_no_change_where_it_is_known() -> None:
+    assert verdict(1.5, 0.1, 1e-9, 24) == verdict(1.5, 0.1, 0.5, 24) == verdict(1.5, 0.1, float("nan"), 1) == GROWS
+    assert verdict(0.5, 0.1, 1e-9, 24) == verdict(0.5, 0.1, 0.5, 24) == FALLS
+    assert verdict(1.05, 0.1, 1e-9, 24) == DIFFERS
+    assert verdict(1.05, 0.1, 0.5, 24) == SAME
+    assert verdict(1.2, 0.18, 0.5, 24) == verdict(1.05, 0.3, 0.5, 24) == NOT_TOLD
+    assert verdict(1.05, 0.1, float("nan"), 1) == verdict(1.05, float("nan"), 0.5, 24) == NOT_JUDGED
