@@ -35,6 +35,9 @@ from stations.profile_files import profile_of
 INPUT = 2  # the input axis is z, radial
 CLOSEST = 1.02  # ratio of two radii
 
+OF_REFERENCE = ("reference_ppm", "reference_linearity_ppm")
+"""What is to be known of a reference sensor."""
+
 
 class CentrifugePart(NominalScale):
     """Speeds up and down again, with the units mounted one way and reversed.
@@ -59,8 +62,8 @@ class CentrifugePart(NominalScale):
     radii_m: Annotated[list[Positive], Field(min_length=2, max_length=4)] | None = None
     radius_um: NotNegative = 20.0
     reference_radius_m: Positive | None = None
-    reference_ppm: NotNegative = 2500.0
-    reference_linearity_ppm: NotNegative = 100.0
+    reference_ppm: NotNegative | None = None
+    reference_linearity_ppm: NotNegative | None = None
     point_ppm: NotNegative = 2.0
     record_s: Annotated[Positive, Field(le=600.0)] = 5.0
     full_scale_g: Positive = 30.0
@@ -70,12 +73,18 @@ class CentrifugePart(NominalScale):
     @model_validator(mode="after")
     def _known(self) -> Self:
         refuse_unknown_effects(self.effects, EFFECTS, "centrifuges")
-        alone = sorted(self.model_fields_set & {"reference_ppm", "reference_linearity_ppm"})
+        alone = [key for key in OF_REFERENCE if getattr(self, key) is not None]
         if alone and self.reference_radius_m is None:
             raise ValueError(
                 f"{alone[0]}: given without reference_radius_m, which is needed; add the radius to the reference sensor, or "
                 f"leave {' and '.join(alone)} out"
             )
+        if self.reference_radius_m is not None:
+            for key in OF_REFERENCE:
+                if getattr(self, key) is None:
+                    raise ValueError(
+                        f"{key}: not given beside reference_radius_m, which needs it; add it, from the sensor's certificate"
+                    )
         if self.radii_m is None:
             return self
         if self.reference_radius_m is not None:
@@ -174,7 +183,7 @@ class CentrifugeTest(InG, OnEquipment, RecordByRecord):
         if part.reference_radius_m is not None:
             ratio = way * radius / part.reference_radius_m
             force, scatter = ratio * float(read[:, 1].mean()), float(read[:, 1].std(ddof=1)) / np.sqrt(len(read))
-            linearity = 1e-6 * part.reference_linearity_ppm * abs(force)
+            linearity = 1e-6 * (part.reference_linearity_ppm or 0.0) * abs(force)
             common = math.hypot(common, linearity, abs(ratio) * scatter)
         axis = INPUT if len(one.own.letters) > INPUT else 0  # a device without z is mounted by its x
         raw = one.own.output[:, axis]
@@ -211,7 +220,7 @@ class CentrifugeTest(InG, OnEquipment, RecordByRecord):
             figures, texts = figures_of_radii(radii, axis, part.full_scale_g), texts_of_radii(radii, part.radii)
         else:
             fit = fitted(part, rows)
-            of_sensor = 0.0 if part.reference_radius_m is None else part.reference_ppm * part.radius_m
+            of_sensor = 0.0 if part.reference_radius_m is None else (part.reference_ppm or 0.0) * part.radius_m
             radius_error = 1e-6 * float(np.hypot(part.radius_um, of_sensor))
             figures = figures_of_radius(fit, axis, part.full_scale_g, part.radius_m, radius_error)
             texts = texts_of_radius(fit, part.radius_m, both=part.reversed)
@@ -219,7 +228,10 @@ class CentrifugeTest(InG, OnEquipment, RecordByRecord):
                 ends = f"{1e6 * (ratio.min() - 1.0):+.4g} to {1e6 * (ratio.max() - 1.0):+.4g} ppm"
                 texts = [
                     *texts,
-                    ("reference sensor", f"reads {ends} beside rω²; U of its reading {2.0 * part.reference_ppm:g} ppm"),
+                    (
+                        "reference sensor",
+                        f"reads {ends} beside rω²; U of its reading {2.0 * (part.reference_ppm or 0.0):g} ppm",
+                    ),
                 ]
         return figures, [*texts, *diagnosis_text(judged(part, rows))]
 

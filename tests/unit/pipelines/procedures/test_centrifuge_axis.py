@@ -49,6 +49,8 @@ SENSOR = {
     "scale": 1.0,
     "radius_m": RADIUS_M,
     "reference_radius_m": SENSOR_M,
+    "reference_ppm": 2500.0,
+    "reference_linearity_ppm": 100.0,
     "full_scale_g": 30.0,
 }
 

@@ -1,0 +1,21 @@
+"""Which stretches of a record that was turned by hand are rest."""
+
+import numpy as np
+
+from pipelines.importers import stretches
+
+
+def kept(output: np.ndarray, rate_hz: float, gravity: float | None) -> int:
+    return len(stretches.found_stops(output, np.arange(len(output)) / rate_hz, [0, len(output)], gravity).found)
+
+
+def test_a_rest_beside_a_machine_is_a_rest_and_a_hand_in_motion_is_none_in_any_unit() -> None:
+    rng, t = np.random.default_rng(4), np.arange(0.0, 20.0, 1e-3)
+    machine = np.array([0.0, 0.0, 1.0]) + 0.1 * np.sin(2.0 * np.pi * 50.0 * t)[:, None] * [0.6, 0.5, 0.6]
+    assert kept(machine + 2e-3 * rng.standard_normal((len(t), 3)), 1000.0, 1.0) == 1
+    slow = np.arange(0.0, 60.0, 0.02)
+    angle = 0.9 * np.sin(2.0 * np.pi * 0.7 * slow) + 0.5 * np.sin(2.0 * np.pi * 0.31 * slow)
+    waved = np.stack([np.sin(angle), 0.3 * np.sin(2.0 * angle), np.cos(angle)], axis=1)
+    waved += 4e-3 * rng.standard_normal(waved.shape)
+    assert kept(waved, 50.0, 1.0) == 0
+    assert kept(np.round(32768.0 + 8192.0 * waved), 50.0, None) == 0
