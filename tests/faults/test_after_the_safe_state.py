@@ -18,8 +18,9 @@ from served_station import modbus_station, moves_ordered, served_plant
 from small_station import lot_of
 
 from schemas.errors import LeaseLost, OperatorNeeded, StationTimeout
+from schemas.safety import SAFE_WITHIN_S
 from stations.opening import open_station
-from stations.safety import folder
+from stations.safety import folder, watchdog_client
 
 QUICK_MOVES = {"speed_deg_s": 90.0, "acceleration_deg_s2": 200.0}
 
@@ -110,8 +111,14 @@ def test_no_order_comes_after_the_safe_state_when_a_run_that_stood_still_wakes(t
 def driven():
     with served_plant() as (port, plant):
         config = modbus_station(port, limits=QUICK_MOVES, safety={"heartbeat_s": 1.0, "lapse_s": 10.0})
-        with open_station(config, lot_of(), run="mine") as station:
-            yield station, plant, station.require.__self__
+        try:
+            with open_station(config, lot_of(), run="mine") as station:
+                yield station, plant, station.require.__self__
+        finally:
+            for (
+                watchdog
+            ) in watchdog_client._running:  # it makes the station safe that the run has lost, while it can be reached
+                watchdog.wait(SAFE_WITHIN_S)
 
 
 @contextmanager
