@@ -17,3 +17,12 @@ def runs_of(inside: Flags) -> tuple[Index, Index]:
     """Starts and ends (one past the last) of the stretches of True."""
     steps = np.diff(np.concatenate([[0], inside.astype(np.int8), [0]]))
     return np.flatnonzero(steps == 1).astype(np.int64), np.flatnonzero(steps == -1).astype(np.int64)
+
+
+def levels_apart(values: Array, width: float) -> int:
+    """Levels of a width that hold values (n,), however densely they lie: each begins at the first value beyond the last one."""
+    count, begin = 0, -np.inf
+    for value in np.sort(values).tolist():
+        if value - begin >= width:
+            count, begin = count + 1, value
+    return count

@@ -9,6 +9,9 @@ from scipy import special
 
 from inertial.arrays import Array
 
+NORMAL_95 = 1.959964
+"""Half width of the two-sided interval of 95 % of a normal distribution, in standard deviations."""
+
 
 def chi2_quantile(probability: ArrayLike, dof: ArrayLike) -> Array:
     """Value below which chi-square with ``dof`` degrees of freedom lies with a probability; broadcast."""

@@ -184,8 +184,8 @@ def _judged_as_far(field: Candidates, model: Model, term: Term) -> Rival:
     """A term added to a model, with refined nonlinear parameters where they can make it significant.
 
     In lots with hidden effects refined parameters gained 2.6 times the logarithm of the probability at the most (a ladder of
-    converter steps), else 1.04 times. To refine what noise explains would take a third of the
-    time of a large lot.
+    converter steps), else 1.04 times. To refine what noise explains would take a third of
+    the time of a large lot.
     """
     first = judge(field, model, term)
     hopeless = _GAINED * first.log_p + np.log(max(field.looks, 1)) > np.log(NAMED_BELOW)

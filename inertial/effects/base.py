@@ -7,7 +7,6 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from inertial import operators
 from inertial.arrays import Array
 from inertial.state import State
 
@@ -171,16 +170,6 @@ class StationEffect(Effect):
     def start_change(self, state: State, **nonlinear: float) -> Array:
         """What the state of a memory before the first dwell would add to the force: (..., n, 3, k); k = 0 without memory."""
         return np.zeros((*state.force.shape, 0))
-
-
-def late_theta(state: State, tau: float, effect: str) -> Array:
-    """Temperature above the reference, (..., n), K, of what follows the sensor's with a time constant ``tau``, s.
-
-    It has the sensor's temperature before the first point. :class:`MissingInput` names the effect where there is none.
-    """
-    state.need("theta", effect)
-    late = state.temperature_operator(("late", tau), lambda time, warm: operators.first_order_lag(time, warm, tau))
-    return late - state.reference
 
 
 def excited(effect: "Effect", columns: Array) -> Array:

@@ -1,7 +1,7 @@
 import numpy as np
 
-from inertial import frames
-from inertial.effects.base import Array, Nonlinear, StationEffect, late_theta
+from inertial import frames, operators
+from inertial.effects.base import Array, Nonlinear, StationEffect
 from inertial.state import State
 
 
@@ -21,7 +21,9 @@ class BaseTilts(StationEffect):
     nonlinear = (Nonlinear("tau", "s", 30.0, 20000.0, "log", 4),)
 
     def force_change(self, state: State, *, tau: float, **nonlinear: float) -> Array:
-        return self._leans(state, late_theta(state, tau, self.id))
+        state.need("theta", self.id)
+        late = state.temperature_operator((self.id, tau), lambda time, warm: operators.first_order_lag(time, warm, tau))
+        return self._leans(state, late - state.reference)
 
     def start_change(self, state: State, *, tau: float, **nonlinear: float) -> Array:
         return self._leans(state, np.exp(-(state.time - state.time[..., :1]) / tau))

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from inertial.arrays import Array
+from inertial.arrays import Array, levels_apart
 
 APART_K = 5.0
 """Between temperatures, from which on noise is compared; and the most that one soak may move."""
@@ -43,7 +43,7 @@ def density_curve(temperature: Array, value: Array, u: Array) -> DensityCurve | 
 
     Weighted least squares on the logarithm; None for fewer than two temperatures that are apart.
     """
-    levels = _levels(temperature)
+    levels = levels_apart(temperature, APART_K)
     if levels < 2:
         return None
     middle = float(0.5 * (temperature.min() + temperature.max()))
@@ -56,15 +56,6 @@ def density_curve(temperature: Array, value: Array, u: Array) -> DensityCurve | 
     misfit = float(np.sum((weight * (np.log(value) - columns @ coefficients)) ** 2))
     widened = max(1.0, misfit / dof) if dof > 0 else 1.0
     return DensityCurve(middle, coefficients, np.asarray(widened * covariance, dtype=np.float64))
-
-
-def _levels(temperature: Array) -> int:
-    """Temperatures, each ``APART_K`` or more above the one counted before."""
-    count, last = 0, -np.inf
-    for one in np.sort(temperature).tolist():
-        if one - last >= APART_K:
-            count, last = count + 1, one
-    return count
 
 
 def _columns(theta: Array, count: int) -> Array:

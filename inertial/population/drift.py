@@ -16,11 +16,11 @@ from scipy.optimize import nnls
 from scipy.stats import norm
 
 from inertial.arrays import Array, Flags
+from inertial.distributions import NORMAL_95
 
 ROUNDS = 4
 CLIP = 4.0  # pairs further out than so many σ tell of a unit, not of its kind
 ODD = 3.0  # a unit whose own slope is so many σ from its kind's is no longer judged by its kind
-TWO_SIDED_95 = 1.959964
 LIKELY = 2.71  # χ² of one degree of freedom that nine in ten stay below: no worse an explanation
 SURELY = 10.83  # χ² of one degree of freedom that one in a thousand exceeds: an explanation is surely worse
 PAIRS_A_DOF = 6.0
@@ -239,7 +239,7 @@ def first_time(condition: Flags, ahead: Array) -> Array:
 
 def leaves(mean: Array, deviation: Array, tolerance: float, ahead: Array) -> tuple[Array, Array, Array]:
     """When values leave ± ``tolerance``: expected time, and the 95 % interval of it, (units,) each, years ahead."""
-    size, reach = np.abs(mean), TWO_SIDED_95 * deviation
+    size, reach = np.abs(mean), NORMAL_95 * deviation
     expected, soonest, latest = (first_time(one > tolerance, ahead) for one in (size, size + reach, size - reach))
     return expected, soonest, latest
 

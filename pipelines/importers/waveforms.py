@@ -115,7 +115,7 @@ def import_waveforms(
         raise DataRejected(f"{paths[0].name}: {problem}") from None
     values = outcome.figures.get(unit, [])
     texts = [(f.subject, f.text) for f in outcome.findings]
-    texts += [("file", remark) for remark in recordings[0].remarks if "samples in a second" in remark]
+    texts += [("file", remark) for remark in recordings[0].remarks]
     if not np.isfinite(full_scale):
         texts.append(("not judged", "clipping: full_scale is not given; add it to the file of --set"))
     content |= own.model_dump(include={"duration_ms", "before_ms"} - set(content))

@@ -9,7 +9,7 @@ import pandas as pd
 
 from inertial.arrays import Array, Index
 from inertial.decisions import LOUDER_BELOW
-from inertial.distributions import normal_tail
+from inertial.distributions import NORMAL_95, normal_tail
 from inertial.estimation.scatter import difference_p
 from inertial.noise.allan import curve_of, variances
 from inertial.noise.over_temperature import APART_K, density_curve
@@ -22,7 +22,6 @@ from pipelines.tables.frames import empty_table, rows_of
 from pipelines.tables.summaries import PROCEDURE, STATIC, by_record
 from schemas.units import MICRO
 
-NORMAL_95 = 1.959964
 GROWS, FALLS, DIFFERS, SAME, NOT_TOLD, NOT_JUDGED = ("grows", "falls", "differs", "steady", "not told", "not judged")
 FALSE_RATE = 0.01
 """Probability that any axis of a run without a change is named by its own ratio: each has its part (Bonferroni)."""

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from inertial.arrays import Array
+from inertial.arrays import Array, levels_apart
 from inertial.errors import NotIdentified
 from inertial.fits.polynomial import AxisPolynomial, fit_axis_polynomial
 from inertial.quantities import FORCE_COLUMNS
@@ -56,20 +56,11 @@ def _fitted(c: UnitCalibration, letter: str) -> AxisPolynomial:
     output, force = (own[f"{name}_{letter}"].to_numpy(dtype=float)[:, None] for name in ("out", "force"))
     temperature = own["unit_C"].to_numpy(dtype=float) if "unit_C" in own else np.full(len(own), np.nan)
     varied = bool(np.isfinite(temperature).all()) and float(np.ptp(temperature)) > SPAN_K
-    degree = min(DEGREE, _levels(force[:, 0]) - 1)
+    degree = min(DEGREE, levels_apart(force[:, 0], APART_G) - 1)
     try:
         return fit_axis_polynomial(output, force, temperature=temperature if varied else None, degree=max(degree, 1))
     except NotIdentified as problem:
         raise WrongUse(f"export: unit {c.unit}, axis {letter}: {problem}") from None
-
-
-def _levels(force: Array) -> int:
-    """Levels of width :data:`APART_G` that hold the forces (n,), however densely they lie."""
-    count, begin = 0, -np.inf
-    for value in np.sort(force):
-        if value - begin > APART_G:
-            count, begin = count + 1, value
-    return count
 
 
 def _terms(fitted: AxisPolynomial) -> tuple[list[str], list[str]]:

@@ -3,13 +3,13 @@
 import numpy as np
 import pandas as pd
 
+from inertial.distributions import NORMAL_95
 from inertial.noise.over_temperature import density_curve
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace
 from pipelines.report.context import UnitContext
 from pipelines.report.interactive import figure_of
 from pipelines.report.numbers import significant, with_uncertainty
 from pipelines.report.templates import fill
-from pipelines.stages.soak_noise import NORMAL_95
 from pipelines.tables.frames import rows_of
 from schemas.units import axes_among
 

@@ -4,13 +4,12 @@ from collections.abc import Callable
 
 import numpy as np
 
+from inertial.distributions import NORMAL_95
 from inertial.uncertainty.degrees import dof_of_upper
 from pipelines.stages.figures.base import FigureKind, UnitTables, Value
 from pipelines.stages.noise import B_BOUND, HOUR_S, TERM
 from pipelines.tables.frames import UnitRows
 from schemas.recipe import Recipe
-
-NORMAL_95 = 1.959964
 
 
 def _worst_axis(term: str) -> Callable[[UnitTables], Value | None]:
