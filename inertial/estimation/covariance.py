@@ -49,11 +49,6 @@ def _pieces(members: Places, size: int) -> list[Places]:
     return np.split(members, range(few, members.size, few))
 
 
-def _about_mean(covariance: Array) -> float:
-    n = max(len(covariance), 1)
-    return float(np.trace(covariance) / n - covariance.sum() / n**2)
-
-
 def _of_steps(covariance: Array) -> float:
     if len(covariance) < 2:
         return 0.0
@@ -115,9 +110,30 @@ class Covariance:
         if same and np.array_equal(one.time, other.time):
             self._whiteners = whiteners
 
-    def about_mean(self, shares: Shares) -> Array:
-        """Mean variance of the wander of each block about its record's own mean, over its white variance, (blocks,)."""
-        return self._of_wander(shares, _about_mean)
+    def squares_after(self, noise: Noise, q: Array) -> float:
+        """Expected sum of squares, g², of the noise of all dwells after a fit weighted by white errors: tr (I − QQᵀ)V.
+
+        Parameters
+        ----------
+        q : (blocks, n, p), orthonormal columns of the fit, weighted by the white errors of the dwells in their block
+        """
+        left = 0.0
+        for members, variance in self._variances(noise.shares):
+            for some in _pieces(members, q[0].size):
+                along = np.einsum("bnp,bnp->b", q[some], variance @ q[some])
+                scale = (self.level * noise.scale)[some] ** 2
+                left += float(np.sum(scale * (np.trace(variance) - along)))
+        return left
+
+    def _variances(self, shares: Shares) -> Iterator[tuple[Places, Array]]:
+        """Blocks, and the covariance (n, n) of their dwells over their white one; 0 where one is missing."""
+        for place, steps, blocks, common in self._groups_at(shares):
+            kernel = self._kernels[place]
+            variance = np.diag(kernel.there.astype(np.float64))
+            for share, each in zip((common.flicker, common.walk), self._wander or (), strict=False):
+                louder = share * 10.0 ** (steps / SHARE_STEP) * each[place] / np.outer(kernel.profile, kernel.profile)
+                variance += np.where(np.outer(kernel.there, kernel.there), louder, 0.0)
+            yield blocks, variance
 
     def side_by_side(self, shares: Shares) -> Array:
         """Half the mean variance of the wander's steps from one dwell to the next, over the white variance, (blocks,)."""

@@ -7,6 +7,7 @@ import numpy as np
 
 from inertial.arrays import Array
 from inertial.errors import NotIdentified
+from inertial.estimation.bases import SEEN, eigen, inverse_roots
 from inertial.estimation.candidate import Candidate
 from inertial.estimation.covariance import LARGE
 from inertial.estimation.noise_shares import Noise, Shares, deviance_of, moderated
@@ -254,20 +255,30 @@ class Model:
         return self._space(self.noise)
 
     def floor(self) -> float:
-        """RMS of the noise of a dwell mean, g: white and wander about the record's own mean."""
-        # the constant part of the wander is part of the bias of the run, not an error between dwells
-        return self._noise_rms(self.problem.covariance.about_mean(self.noise.shares))
+        """RMS of the noise of a dwell mean, g, white and wander, per degree of freedom that least squares leave it.
+
+        The residuals of a correct model have it; what of a wander looks like coefficients is in their uncertainty. A noise that
+        the shares describe badly (a beat with the mains is bounded, a random walk is not) is no more than the residuals hold.
+        """
+        covariance, space = self.problem.covariance, self.even
+        columns = [space.q]
+        if space.gram.shape[0] > 1:
+            values, vectors = eigen(space.gram[1:, 1:])
+            roots = inverse_roots(values, SEEN**2 * float(values[-1]))
+            columns.append(space.targets[..., 1:] @ (vectors * roots))
+        expected = covariance.squares_after(self.noise, np.concatenate(columns, axis=-1))
+        held = covariance.white * float(np.sum(space.residual**2))
+        if self.problem.y.size > LARGE:
+            del self.even
+        return float(np.sqrt(min(expected, held) / max(space.dof, 1)))
 
     def scatter(self) -> float:
         """RMS of the noise of a dwell mean against its neighbours, g: white, and the wander from dwell to dwell.
 
         A random walk raises :meth:`floor` with the length of the record, this with the time between two dwells only.
         """
-        return self._noise_rms(self.problem.covariance.side_by_side(self.noise.shares))
-
-    def _noise_rms(self, wander: Array) -> float:
-        """RMS, g, over all dwells of white noise and a wander of variance (blocks,) over it."""
         covariance = self.problem.covariance
+        wander = covariance.side_by_side(self.noise.shares)
         each = (self.noise.scale * covariance.level) ** 2 * (1.0 + wander)
         return float(np.sqrt(np.sum(each * covariance.count) / max(int(covariance.count.sum()), 1)))
 

@@ -22,7 +22,9 @@ class ErrorFigures(TypedDict):
     """Residual of the model; null where every unit has a data fault."""
 
     rms_ug: Annotated[float | None, "root mean square residual of the units without a fault, µg"]
-    floor_ug: Annotated[float | None, "noise floor: white noise and wander between the dwells, µg"]
+    floor_ug: Annotated[
+        float | None, "noise floor: white noise and wander that a correct model leaves per degree of freedom, µg"
+    ]
     white_noise_ug: NotRequired[
         Annotated[float | None, "white noise alone, from the samples of each dwell (sd/√n), µg"]
     ]

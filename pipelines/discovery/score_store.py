@@ -24,7 +24,7 @@ from pipelines.discovery.scored_run import ScoredRun, scored_runs
 from pipelines.parallel import Distributor, map_partitions
 
 FOLDER = "discovery"
-VERSION = 2
+VERSION = 3
 TEXTS = ("run", "when", "station", "device", "model", "who", "left_out")
 _STEPS = 63.0  # of information shares, an octave
 BATCH = 8  # runs that one process scores at a time

@@ -356,8 +356,9 @@ def rows_of_other_generators() -> Iterator[Row]:
     for seed in (99_100_007, 99_100_009):
         yield Row(Strange("base_tilts"), seed, "late base", first=("base_tilts",), physics=True)
     for seed in (99_200_002, 99_200_003):
-        slips = Strange("encoder_slips", 20.0)
+        slips, early = Strange("encoder_slips", 20.0), Strange("soak_too_early", 20.0)
         yield Row(slips, seed, "slips under load", first=("slips_under_load",), unexplained=frozenset())
+        yield Row(early, seed + 100_000, "soak too early", first=("soak_too_early",), unexplained=frozenset())
     also = changes.may_be_of_the_station
     missed = "an offset of the encoder is named beside two poses that are off, in place of the slip"
     yield Row(Strange("encoder_slips", 20.0), 95_001, "encoder slips", physics=True, also=also, not_reached=missed)

@@ -1,0 +1,94 @@
+from dataclasses import replace
+
+import numpy as np
+
+from inertial.estimation.alternative import Array, Handling, Misfit, soaks
+from inertial.estimation.lot import Lot
+from inertial.state import History
+
+_TAUS = 5  # values of the time constant in the first search
+_BETWEEN = 9  # values between two of them
+_SHARES = (0.05, 1.5)  # of the soak: shortest and longest time constant; a longer one is an offset of the thermometers
+
+
+class SoakTooEarly(Handling):
+    """A soak that is measured before the elements have the temperature that is read: their gap fades with one time constant.
+
+    The output follows the element by the coefficients that it has, T + ΔT₀·exp(−(t − t₀)/τ) from the first dwell of the soak.
+    """
+
+    id = "soak_too_early"
+    symbol = "ΔT₀"
+    equation = "E(T + ΔT₀·e^(−(t − t₀)/τ)) − E(T) in one soak, all units"
+    breaker = "wait in this soak until the outputs stand still, and measure it again"
+    hides_behind = ("thermal_lag", "scale_temperature_quadratic", "bias_temperature_quadratic", "thermal_hysteresis")
+    fewest_units = 1
+    in_part = False
+
+    def places(self, lot: Lot) -> list[dict[str, float]]:
+        """Every soak with several time constants, if there are at least two soaks."""
+        number = int(soaks(lot.state).max()) + 1
+        if number < 2:
+            return []
+        shares = np.geomspace(*_SHARES, _TAUS)
+        spans = [float(np.ptp(lot.state.time[0, soaks(lot.state) == k])) for k in range(number)]
+        return [
+            {"soak": float(k), "tau": span * share} for k, span in enumerate(spans) if span for share in shares.tolist()
+        ]
+
+    def near(self, lot: Lot, **place: float) -> list[dict[str, float]]:
+        """Time constants up to the neighbours in :meth:`places`."""
+        step = (_SHARES[1] / _SHARES[0]) ** (1.0 / (_TAUS - 1))
+        return [{**place, "tau": place["tau"] * step**x} for x in np.linspace(-1.0, 1.0, _BETWEEN)]
+
+    def change(self, lot: Lot, slope: Array | None, **place: float) -> Array:
+        """The contribution of a gap of one kelvin at the first dwell, by each unit's own coefficients."""
+        if slope is None:
+            return np.zeros((*lot.state.time.shape, len(lot.state.axes), 1))
+        fading = _fading(lot, lot.state.time, np.full(len(lot.state.time), place["tau"]), place["soak"])
+        return (slope * fading[..., None])[..., None]
+
+    def describe(self, lot: Lot, size: Array, **place: float) -> str:
+        return (
+            f"soak {int(place['soak']) + 1} was measured too early: the elements began it {size[0]:+.2f} K from what was read, "
+            f"and followed with a time constant of about {place['tau']:.0f} s"
+        )
+
+    def settled(self, lot: Lot, size: Array, misfit: Misfit, **place: float) -> Lot | None:
+        """With the elements' temperatures in place of the readings: each unit's gap and time constant by its own dwells."""
+        from scipy.optimize import minimize  # noqa: PLC0415  # a quarter of a second, and few lots need it
+
+        gaps, taus = np.full(len(lot.state.time), float(size[0])), np.full(len(lot.state.time), place["tau"])
+        for unit in range(len(gaps)):
+            alone = lot.units([unit])
+
+            def left(free: Array, alone: Lot = alone, unit: int = unit) -> float:
+                gap, tau = size[0] * free[0], place["tau"] * np.exp(free[1])
+                return misfit(_corrected(alone, np.array([gap]), np.array([tau]), place["soak"]), (unit,))
+
+            best = minimize(left, [1.0, 0.0], method="Nelder-Mead", options={"xatol": 1e-3, "fatol": 1e-2}).x
+            gaps[unit], taus[unit] = size[0] * best[0], place["tau"] * np.exp(best[1])
+        return _corrected(lot, gaps, taus, place["soak"])
+
+    def dwells(self, lot: Lot, **place: float) -> list[int]:
+        return np.flatnonzero(soaks(lot.state) == int(place["soak"])).tolist()
+
+
+def _fading(lot: Lot, time: Array, tau: Array, soak: float) -> Array:
+    """exp(−(t − t₀)/τ) at times (units, m), s, between the first and the last dwell of a soak, 0 elsewhere."""
+    inside = lot.state.time[:, soaks(lot.state) == int(soak)]
+    first, last = inside.min(axis=1)[:, None], inside.max(axis=1)[:, None]
+    return np.where((time >= first) & (time <= last), np.exp(-np.clip(time - first, 0.0, None) / tau[:, None]), 0.0)
+
+
+def _corrected(lot: Lot, gap: Array, tau: Array, soak: float) -> Lot:
+    """The lot with the temperatures of the elements, gaps (units,) in K and time constants (units,) in s."""
+    state = lot.state
+    if state.temperature is None:
+        return lot
+    temperature = state.temperature + gap[:, None] * _fading(lot, state.time, tau, soak)
+    history = state.history
+    if history is not None:
+        times = np.broadcast_to(history.time, (len(gap), history.time.size))
+        history = History(history.time, history.temperature + gap[:, None] * _fading(lot, times, tau, soak))
+    return replace(lot, state=replace(state, temperature=temperature, history=history, memory={}))
