@@ -202,7 +202,7 @@ def why_recommended(document: dict[str, Any]) -> list[str]:
         if group["scope"] == "sensor or station":
             lines.append(
                 f"{' or '.join(group['effects'])} can be of the sensors or of the station (table, fixture, reference): turn the "
-                "units in their seats, or measure them on another station."
+                f"units in their seats, or measure them on another station.{_without_angles(document)}"
             )
         name, before, after = (added or group["effects"])[0], group.get("heldout_before_ug"), group["heldout_after_ug"]
         if after is None or before is None:
@@ -230,7 +230,17 @@ def unexplained_text(document: dict[str, Any]) -> str:
     if not unexplained:
         return ""
     shape = "" if unexplained.get("period_s") else f" as a {unexplained['shape']}"
-    return f"{unexplained['text']}{shape} (p {equal(unexplained['p_value'])})."
+    of_table = _without_angles(document) if unexplained["driver"] == "pose" else ""
+    return f"{unexplained['text']}{shape} (p {equal(unexplained['p_value'])}).{of_table}"
+
+
+def _without_angles(document: dict[str, Any]) -> str:
+    """What could not be tried because the angles of the table are not recorded, as a sentence to add; empty where they are."""
+    reasons = document.get("reasons", {})
+    names = [name for name in document["unseen"] if reasons.get(name, "").endswith("record outer_deg")]
+    if not names:
+        return ""
+    return f" Without the table's angles {', '.join(names)} could not be tried: record outer_deg and inner_deg."
 
 
 def why_first(document: dict[str, Any]) -> list[str]:
