@@ -188,13 +188,16 @@ def shared_factor(model: Model, term: Term) -> float:
     units = problem.lot.state.time.shape[0]
     if units < 2 or problem.lot.radial:
         return 1.0
-    together = _together(model, units)
+    together = correlation_of_units(model)
     return 1.0 + (units - 1) * together * (1.0 if term.shared else _alike(model, term, units))
 
 
-def _together(model: Model, units: int) -> float:
-    """Correlation of the residuals between units, on the same axis; zero if within chance."""
+def correlation_of_units(model: Model) -> float:
+    """Correlation of the residuals between units, on the same axis; zero if within chance, and for a single unit."""
     problem = model.problem
+    units = problem.lot.state.time.shape[0]
+    if units < 2 or problem.lot.radial:
+        return 0.0
     left = np.nan_to_num(residuals(problem, model.terms, np.ones(problem.n, dtype=bool)) / problem.error)
     correlation = _pairwise(left.reshape(units, -1))
     chance = 1.0 / np.sqrt(left.size / units * units * (units - 1) / 2.0)

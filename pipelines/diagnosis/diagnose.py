@@ -144,6 +144,7 @@ def document(
         *gaps(measurement, faults, left_out),
         *without_history(measurement, terms),
         *result_rows.noise_along(diagnosis.run),
+        *result_rows.noise_of_the_lot(diagnosis.final, len(units)),
     ]
     error = error_of(diagnosis.rms, diagnosis.floor, diagnosis.log_p)
     adequate, reason, error = told(diagnosis.base, diagnosis.adequate, diagnosis.unjudged, error)

@@ -10,13 +10,19 @@ from inertial.criticism.diagnosis import Diagnosis, Named
 from inertial.criticism.examination import ExaminedRun
 from inertial.criticism.influence import CarriedEvidence
 from inertial.data_errors.removed_dwells import BadDwell
+from inertial.estimation.comparison import fitted_residuals, rms
+from inertial.estimation.likelihood import correlation_of_units
 from inertial.estimation.model import Model
 from inertial.estimation.refinement import intervals, settled, terms_of
+from inertial.uncertainty.rounding import short
 from pipelines.tables.sound_lot import probability
 from schemas.units import MICRO
 
 BAD_DWELL = "bad_dwell"
 """Id of a fault of a single dwell of one unit."""
+
+_ALIKE = 0.25
+"""Share of the residuals' variance, alike in all units, from which it is said: half of their size."""
 
 _ACROSS, _ALONG = 0.3, 0.9
 """Forces along the axis, g, below and above which its noise is compared."""
@@ -249,6 +255,16 @@ def noise_along(run: ExaminedRun) -> list[str]:
         f"the white noise of a dwell is {times:.2g} times as large where the axis lies {larger} gravity as {smaller} it"
     )
     return [f"{text}; the dwells are weighted by it; check {cause}"]
+
+
+def noise_of_the_lot(model: Model, units: int) -> list[str]:
+    """A notice where much of the residual of a model is the same in all units."""
+    alike = correlation_of_units(model)
+    if alike < _ALIKE:
+        return []
+    shared, own = (short(MICRO * rms(fitted_residuals(model)) * part**0.5) for part in (alike, 1.0 - alike))
+    text = f"{shared} µg of the residual are alike in all {units} units, {own} µg are each unit's own"
+    return [f"{text}: look for the cause in what they share, such as table, fixture, reference or supply"]
 
 
 def _plausible(size: float, typical: tuple[float, float]) -> bool:
