@@ -35,7 +35,10 @@ EXAMPLES_OF = {
         "tumbleline plan choose range=4g temperature=-40..85 error=2mg bandwidth=100",
         "tumbleline plan choose range=30g error=5mg --device QA700,SF1500",
     ),
-    "line": ("tumbleline plan line line-2.toml", "tumbleline plan line line-2.toml --all --output line-2.svg"),
+    "line": (
+        "tumbleline plan line two-chambers.toml",
+        "tumbleline plan line two-chambers.toml --all --output line.svg",
+    ),
     "keys": ("tumbleline plan keys recipe", "tumbleline plan keys fault --json"),
 }
 """Of the subcommands."""

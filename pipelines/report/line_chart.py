@@ -16,7 +16,7 @@ ROLES: dict[str, Role] = {
 }  # fmt: skip
 OTHER: Role = "after"  # equipment of procedures
 NAMES = {"load": "loading, unloading", "unload": "loading, unloading", "return": "soak"}
-THICK, ROW = 15.0, 30
+THICK, ROW = 14.0, 40
 COLUMNS = ("lot", "fixture", "activity", "temperature_C", "begin_min", "end_min", "resources")
 
 
@@ -47,14 +47,14 @@ def line_chart(document: LineDocument) -> Chart:
     labels = Trace(
         "lots",
         np.array([0.5 * (begin + end) for begin, end, _ in spans]),
-        np.array([row + 0.33 for _, _, row in spans]),
+        np.array([row + 0.42 for _, _, row in spans]),
         "labels",
         "ink",
         texts=tuple(lot["lot"] for lot in document["lots"]),
         legend=False,
     )
     hours = PlotAxis("h from the start", low=0.0, high=1.01 * document["makespan_min"] / 60.0)
-    names = PlotAxis("", names=tuple(rows), low=-0.6, high=len(rows) - 0.3)
+    names = PlotAxis("", names=tuple(rows), low=-0.6, high=len(rows) - 0.2)
     plot = Plot("", hours, names, (waits, *traces, labels))
     return Chart(f"Schedule of the line {document['line']}", (plot,), height=90 + ROW * len(rows))
 
