@@ -16,13 +16,14 @@ from benchmarks.generated_archive import write_archive
 from pipelines.archive import Archive, Run
 from pipelines.discovery.attributes import add_attributes
 from pipelines.report.numbers import significant, with_uncertainty
-from pipelines.report.run_pictures import follows_most
+from pipelines.report.run_pictures import follows_most, quantities, residual_chart
 from pipelines.workbench.application import create_app
 from pipelines.workbench.services import models, requests
 from pipelines.workbench.services.jobs import Jobs, key_of
 from pipelines.workbench.services.work import done_in_process
 from pipelines.workbench.settings import WorkbenchSettings
 from pipelines.workbench.state import AuditPage, DiscoverPage, TwoModelsPage
+from schemas.errors import WrongUse
 
 TOKEN = "Zq8vXy3nR5tB7wK1mP4sD9"
 
@@ -177,3 +178,14 @@ def test_residuals_follow_the_quantity_that_makes_them() -> None:
         )
         residuals["residual_ug"] = 50.0 * values**3 + rng.normal(0.0, 1.0, 40)
         assert follows_most(residuals, dwells) == name
+    supply = rng.normal(3.3, 0.01, 40)
+    recorded = dwells.assign(supply_V=supply, my_column=rng.normal(size=40), n=100, humidity_pct=45.0)
+    residuals["residual_ug"] = 2e4 * (supply - 3.3) ** 2 + rng.normal(0.0, 0.1, 40)
+    assert follows_most(residuals, recorded) == "supply_V"
+    residuals["pose"] = "p1"
+    ramp = recorded.assign(unit_C=25.0 + 20.0 * np.sin(np.arange(40) / 6.0))
+    assert "temperature_rate" in quantities(residuals, ramp)
+    assert list(quantities(residuals, recorded)) == ["force", "time", "supply_V", "my_column", "pose"]
+    assert residual_chart("A1", residuals, recorded, "supply_V").plots[0].x.label == "supply / V"
+    with pytest.raises(WrongUse, match="did you mean supply_V"):
+        residual_chart("A1", residuals, recorded, "suply_V")
