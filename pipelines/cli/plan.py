@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 PART = "Measure"
 ORDER = 120
-SUMMARY = "Show what a recipe can determine, before it is measured; choose a device; schedule a line; list keys."
+SUMMARY = "Show what a recipe can determine; choose a device; schedule a line; list keys."
 EXAMPLES = ("tumbleline plan my.toml", "tumbleline plan optimise my.toml")
 EXAMPLES_OF = {
     "recipe": ("tumbleline plan my.toml", "tumbleline plan my.toml --station line-1.toml --output plan.html"),

@@ -28,33 +28,21 @@ POSE_SHIFT = {"x": -0.2, "y": 0.0, "z": 0.2}
 
 
 def model_chart(dwells: pd.DataFrame, residuals: pd.DataFrame) -> Chart:
-    """Measurement and model against force, and the residuals against force and temperature, axis by axis."""
+    """The residuals against force and temperature, axis by axis."""
     scale = _soak_scale(dwells)
     largest = 1.08 * float(residuals["residual_ug"].abs().max()) or 1.0
     across = PlotAxis(RESIDUAL, low=-largest, high=largest)
-    rows: list[list[Plot]] = [[], [], []]
-    for axis in (a for a in AXES if f"out_{a}" in dwells):
-        own = residuals[residuals["axis"] == axis].merge(dwells[["dwell", "soak", f"out_{axis}"]], on="dwell")
+    rows: list[list[Plot]] = [[], []]
+    for axis in axes_among(residuals["axis"]):
+        own = residuals[residuals["axis"] == axis].merge(dwells[["dwell", "soak"]], on="dwell")
         force, left = own["force_g"].to_numpy(float), own["residual_ug"].to_numpy(float)
         colour = None if scale is None else own["soak"].map(_soak_means(dwells)).to_numpy(float)
-        output = own[f"out_{axis}"].to_numpy(float)
-        measured = Trace("measured", force, output, size=POINT, colour=colour, legend=False)
-        rows[0].append(_response(axis, measured, str(dwells["out_unit"].iloc[0])))
-        along = rows[0][-1].x, PlotAxis(axis_labels()["unit_C"])
-        for row, x, label in zip(rows[1:], (force, own["unit_C"].to_numpy(float)), along, strict=True):
+        along = PlotAxis(f"specific force on {axis} / g"), PlotAxis(axis_labels()["unit_C"])
+        titles = f"axis {axis}", ""
+        for row, title, x, label in zip(rows, titles, (force, own["unit_C"].to_numpy(float)), along, strict=True):
             points = Trace("residual", x, left, size=POINT, colour=colour, texts=_told(own), legend=False)
-            row.append(Plot("", label, across, (level(x, 0.0, dashed=False), points)))
-    return Chart("Model and measurement", (*rows[0], *rows[1], *rows[2]), len(rows[0]), scale, height=250)
-
-
-def _response(axis: str, points: Trace, unit: str) -> Plot:
-    """Measured output of an axis against specific force, with the straight line through it."""
-    traces = [points]
-    if points.x.size > 1 and np.ptp(points.x) > 0.0:
-        ends = np.array([points.x.min(), points.x.max()])
-        line = np.polynomial.Polynomial.fit(points.x, points.y, 1)(ends)
-        traces.insert(0, Trace("straight line", ends, line, "line", "muted"))
-    return Plot(f"axis {axis}", PlotAxis(f"specific force on {axis} / g"), PlotAxis(f"output / {unit}"), tuple(traces))
+            row.append(Plot(title, label, across, (level(x, 0.0, dashed=False), points)))
+    return Chart("Model and measurement", (*rows[0], *rows[1]), len(rows[0]), scale, height=250)
 
 
 def quantities(residuals: pd.DataFrame, dwells: pd.DataFrame) -> dict[str, str]:
@@ -63,13 +51,13 @@ def quantities(residuals: pd.DataFrame, dwells: pd.DataFrame) -> dict[str, str]:
     Of what was recorded, that which varied between its dwells.
     """
     labels = axis_labels()
-    fitted = _with_rate(dwells[dwells["dwell"].isin(residuals["dwell"])])
-    recorded = {
-        name: labels.get(name, name)
-        for name, values in fitted.select_dtypes("number").items()
-        if (str(name) in BY_COLUMN or is_covariate(str(name))) and name != COLUMNS["time"] and np.ptp(values) > 0.0
-    }
-    return {**ALWAYS, **{str(name): label for name, label in recorded.items()}, POSE: POSE}
+    fitted = _with_rate(dwells[dwells["dwell"].isin(residuals["dwell"])]).select_dtypes("number")
+    columns = [
+        *(name for name in BY_COLUMN if name in fitted),
+        *(name for name in map(str, fitted.columns) if is_covariate(name)),
+    ]
+    varied = [name for name in dict.fromkeys(columns) if name != COLUMNS["time"] and np.ptp(fitted[name]) > 0.0]
+    return {**ALWAYS, **{name: labels.get(name, name) for name in varied}, POSE: POSE}
 
 
 def follows_most(residuals: pd.DataFrame, dwells: pd.DataFrame) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from asgi_client import AsgiClient
-from capture_double import small_run
+from capture_double import CaptureDouble, measured_run, small_job, small_run
 from demonstrations import wafer_line
 from lots import lot
 
@@ -146,11 +146,26 @@ def test_two_models_stand_side_by_side_with_verdicts_residuals_on_one_scale_and_
     rows = results[key_of(*works[2])]
     scale = next(row for row in rows if row["effect"] == "scale")
     assert abs(scale["over_a"]) > 2.0  # what the cubic gave to the scale factor
+    change, expanded = with_uncertainty(scale["change"], 2.0 * scale["u_b"])
+    assert f"{change}<br><small>± {expanded}</small>" in text
     assert client.get("/two-models/coefficients.csv?" + state.query()).text.count("\n") == len(rows) + 1
     chart = client.get(state.figure("residuals")).json()
     ranges = {str(chart["layout"][name]["range"]) for name in ("yaxis", "yaxis2")}
     assert len(ranges) == 1
     assert client.get(state.figure("nothing")).status_code == 422
+
+
+def test_two_runs_stand_side_by_side_with_their_differences(tmp_path: Path) -> None:
+    run = small_run(tmp_path)
+    again = measured_run(small_job(tmp_path, repeat=1), run.archive, CaptureDouble(noise_g=2e-4))
+    settings = WorkbenchSettings(archive=str(run.archive.root), folder=tmp_path / "bench", token=TOKEN)
+    client = AsgiClient(create_app(settings), "http://127.0.0.1:8321")
+    text = client.get(f"/run?run={run.id}&beside={again.id}").text
+    own, its = (one.table("figures").set_index(["unit", "figure"]).loc["A1", "bias_error_ug"] for one in (run, again))
+    change, expanded = with_uncertainty(own["value"] - its["value"], np.hypot(own["uncertainty"], its["uncertainty"]))
+    assert f"Δ {change} ± {expanded}</small>" in text
+    other = client.get(f"/run?run={run.id}&beside={run.id}").text  # the same noise in both: no U of the difference
+    assert "Δ 0</small>" in other or "Δ 0.000</small>" in other
 
 
 def test_residuals_are_drawn_against_what_they_depend_on_with_bars_of_the_noise(tmp_path: Path) -> None:
