@@ -87,7 +87,7 @@ define lock
 		--override build/unused.in $(UPGRADE) $(4) $(patsubst %,--extra %,$(2)) $(patsubst %,--constraint requirements-%.lock,$(3)) --output-file requirements-$(1).lock
 endef
 CRATE_NEEDS := roc-validator>=0.13
-USERS := build captures dask pdf recordings signatures sql visa
+USERS := build captures dask pdf recordings schedule signatures sql visa
 # UNUSED of schemas/locks.py: what a library asks for and nothing of it here uses; tests use some of them themselves
 UNUSED := numpydoc apprise matplotlib
 define lock_without

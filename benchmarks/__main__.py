@@ -53,6 +53,7 @@ SHORT: dict[str, str] = {
     "discovery": "names --archives 6",
     "scoreboard": "--seed 1 --share 0.1 --only hand",
     "hand_turned": "friction --runs 2",
+    "line": "--lots 4 --most 2",
 }
 
 

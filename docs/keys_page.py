@@ -31,7 +31,7 @@ which file it uses. The hash of a profile or preset of your own is part of the n
 anew. `tumbleline plan keys names` lists everything that is found.
 """
 TITLES = {
-    "recipe": "Recipe", "limits": "Limits", "station": "Station", "fault": "Faults of a simulated station",
+    "recipe": "Recipe", "limits": "Limits", "station": "Station", "line": "Line", "fault": "Faults of a simulated station",
     "demo": "Hidden effects of `tumbleline demo`",
 }  # fmt: skip
 LEADS = {

@@ -10,12 +10,13 @@ from pydantic import BaseModel
 from pydantic_core import PydanticUndefined
 
 from schemas.limits import Limits
+from schemas.line import Line
 from schemas.recipe import RecipeFile
 from schemas.stated import STATED
 from schemas.station import StationConfig
 from schemas.toml_files import models_in
 
-FILES: dict[str, type[BaseModel]] = {"recipe": RecipeFile, "limits": Limits, "station": StationConfig}
+FILES: dict[str, type[BaseModel]] = {"recipe": RecipeFile, "limits": Limits, "station": StationConfig, "line": Line}
 """The files whose keys are listed, by what a user calls them."""
 
 FORMS = {

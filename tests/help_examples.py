@@ -76,6 +76,7 @@ def line(folder: Path) -> None:
     (folder / "my.toml").write_text(text, encoding="utf-8")
     shutil.copy(RECIPES / "line-six.toml", folder)
     shutil.copy(RECIPES / "line-quick.limits.toml", folder)
+    shutil.copy(ROOT / "deploy" / "lines" / "two-chambers.toml", folder)
     station = (ROOT / "deploy" / "stations" / "simulated.toml").read_text(encoding="utf-8")
     (folder / "line-1.toml").write_text(re.sub('name = ".*"', 'name = "line-1"', station, count=1), encoding="utf-8")
     (folder / "lot-17.csv").write_text("slot,serial\n0,SN1\n1,SN2\n2,SN3\n", encoding="utf-8")

@@ -1,4 +1,4 @@
-"""``tumbleline plan``: visible effects, errors and station time of a recipe; a quicker one; a device; the keys of files."""
+"""``tumbleline plan``: effects, errors and station time of a recipe; a quicker one; a device; a line; the keys of files."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from pipelines.cli.next_commands import archive_words
 from pipelines.cli.options import Setting, argument, option
 from pipelines.cli.plan_choose import choose
 from pipelines.cli.plan_keys import keys
+from pipelines.cli.plan_line import line_schedule
 from pipelines.cli.printing import conclude, give, is_standard_output, print_text, remark
 from pipelines.cli.text.plan_text import print_optimum, print_plan, print_procedures
 from schemas.errors import RecipeInvalid
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 
 PART = "Measure"
 ORDER = 120
-SUMMARY = "Show what a recipe can determine, before it is measured; choose a device; list keys."
+SUMMARY = "Show what a recipe can determine; choose a device; schedule a line; list keys."
 EXAMPLES = ("tumbleline plan my.toml", "tumbleline plan optimise my.toml")
 EXAMPLES_OF = {
     "recipe": ("tumbleline plan my.toml", "tumbleline plan my.toml --station line-1.toml --output plan.html"),
@@ -33,6 +34,10 @@ EXAMPLES_OF = {
     "choose": (
         "tumbleline plan choose range=4g temperature=-40..85 error=2mg bandwidth=100",
         "tumbleline plan choose range=30g error=5mg --device QA700,SF1500",
+    ),
+    "line": (
+        "tumbleline plan line two-chambers.toml",
+        "tumbleline plan line two-chambers.toml --all --output line.svg",
     ),
     "keys": ("tumbleline plan keys recipe", "tumbleline plan keys fault --json"),
 }
@@ -248,7 +253,8 @@ def write_pictures(folder: Path, document: dict[str, Any], context: PlanContext)
 
 
 app = group(
-    "Show visible effects, expected errors and station time of a recipe; write a quicker one; choose a device; list keys.",
-    {"recipe": plan_recipe, "optimise": optimise, "choose": choose, "keys": keys},
+    "Show visible effects, expected errors and station time of a recipe; write a quicker one; choose a device; schedule a line; "
+    "list keys.",
+    {"recipe": plan_recipe, "optimise": optimise, "choose": choose, "line": line_schedule, "keys": keys},
     usual="recipe",
 )

@@ -1,4 +1,4 @@
-"""``tumbleline plan keys``: the keys and names that recipes, limits, stations, --fault and demo accept."""
+"""``tumbleline plan keys``: the keys and names that recipes, limits, stations, lines, --fault and demo accept."""
 
 from collections.abc import Callable
 from typing import Annotated
@@ -10,12 +10,12 @@ from schemas.errors import WrongUse, did_you_mean
 
 def keys(
     subject: Annotated[
-        str, argument("[SUBJECT]", "recipe, limits, station, fault, demo or names; all in short by default.")
+        str, argument("[SUBJECT]", "recipe, limits, station, line, fault, demo or names; all in short by default.")
     ] = "",
     *,
     as_json: JsonOption = False,
 ) -> None:
-    """List what a recipe, limits or station file may contain, what --fault and demo accept, and the names of files.
+    """List what a recipe, limits, station or line file may contain, what --fault and demo accept, and the names of files.
 
     The same lists are on the page docs/reference/keys.md.
     """
@@ -104,6 +104,7 @@ SUBJECTS: dict[str, tuple[str, Callable[[], list[dict[str, str]]]]] = {
     "recipe": ("keys of a recipe file", _keys("recipe")),
     "limits": ("keys of a limits file", _keys("limits")),
     "station": ("keys of a station file", _keys("station")),
+    "line": ("keys of a line file, of 'plan line'", _keys("line")),
     "fault": ("kinds of --fault KIND:KEY=VALUE, with their keys", _faults),
     "demo": ("hidden effects of 'tumbleline demo NAME'", _hidden),
     "names": ("recipes, limits, stations, profiles and presets, built in and of your own", _names),

@@ -13,6 +13,7 @@ from pipelines.drawing.chart import Role, level
 from pipelines.report.templates import template
 
 MOST_LEVELS = 30
+FAINT = 0.5  # powers of ten of evidence that are not drawn
 
 
 def render(findings: Findings, document: DiscoverDocument, archive: str) -> str:
@@ -33,7 +34,7 @@ def render(findings: Findings, document: DiscoverDocument, archive: str) -> str:
         archive=archive,
         document=document,
         shown=shown,
-        strongest=svg_text(strongest_chart(findings)) if document["pooled"]["lots"] else "",
+        strongest="" if (strongest := strongest_chart(findings)) is None else svg_text(strongest),
         reach=svg_text(reach_chart(document, len(findings.state.order))) if document["reach"] else "",
         short=short,
     )
@@ -77,9 +78,11 @@ def growth_charts(findings: Findings, document: DiscoverDocument) -> dict[str, C
     return charts
 
 
-def strongest_chart(findings: Findings) -> Chart:
-    """The largest evidence of each effect by each driver, as powers of ten."""
+def strongest_chart(findings: Findings) -> Chart | None:
+    """The largest evidence of each effect by each driver, as powers of ten; None where there is none to be drawn."""
     state, effects = findings.state, findings.pool.effects
+    if not state.order:
+        return None
     drivers = list(dict.fromkeys(name.removesuffix(INSIDE) for name in state.sensor.drivers))
     drivers.sort(key=lambda name: (name not in {MEAN, STATION}, name))
     grid = np.zeros((len(effects), len(drivers)))
@@ -89,11 +92,13 @@ def strongest_chart(findings: Findings) -> Chart:
         for k, (effect, _) in enumerate(state.columns):
             row = effects.index(effect)
             grid[row, column] = max(grid[row, column], log_e[k] / np.log(10.0))
+    if grid.max(initial=0.0) <= FAINT:
+        return None
     needed = state.needed(MEAN) / np.log(10.0)
     traces: list[Trace] = []
     shown: tuple[tuple[str, Role, NDArray[np.bool_]], ...] = (
         ("beyond the threshold", "before", grid >= needed),
-        ("below it", "muted", (grid < needed) & (grid > 0.5)),
+        ("below it", "muted", (grid < needed) & (grid > FAINT)),
     )
     for name, role, inside in shown:
         rows, columns = np.nonzero(inside)

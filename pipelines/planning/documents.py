@@ -179,6 +179,67 @@ class ChoiceDocument(TypedDict):
     candidates: Annotated[list[ChoiceRow], "those that reach the error first"]
 
 
+class LineActivity(TypedDict):
+    """Something that happens to a lot on a line; times are from the start."""
+
+    lot: str
+    fixture: str
+    activity: Annotated[
+        str,
+        "`load`, `change`, `soak`, `measure`, `ramp`, `static`, `return` to the room, `unload`, or a role of equipment",
+    ]
+    temperature_C: Annotated[float | None, "null: of the lot as it is"]
+    begin_min: float
+    end_min: float
+    resources: Annotated[list[str], "shared resources that it holds; `operator`"]
+
+
+class LineLot(TypedDict):
+    """A lot of a line."""
+
+    lot: str
+    recipe: str
+    fixture: str
+    loaded_min: Annotated[float, "begin of its loading"]
+    unloaded_min: Annotated[float, "end of its unloading"]
+    wait_min: Annotated[float, "that it waits at a temperature, min"]
+
+
+class LineResource(TypedDict):
+    """What the lots of a line need of a shared resource, of the fixtures or of the operators."""
+
+    resource: str
+    count: int
+    minutes_per_lot: float
+    bound_per_lot_min: Annotated[float, "minutes per lot below which no schedule of many lots is, because of it"]
+
+
+class LineRate(TypedDict):
+    """How long a schedule is."""
+
+    makespan_min: Annotated[float, "from the start until the last lot is unloaded"]
+    minutes_per_lot: float
+    lots_per_day: float
+
+
+class LineDocument(TypedDict):
+    """``plan line --json``: the shortest schedule of the lots of a line."""
+
+    line: str
+    station: Annotated[str, "whose timing it is"]
+    solver: str
+    start_min: Annotated[float, "time of day of the start, min"]
+    makespan_min: Annotated[float, "from the start until the last lot is unloaded"]
+    bound_min: Annotated[float, "no schedule is shorter"]
+    proven: Annotated[bool, "whether this one is as short"]
+    minutes_per_lot: float
+    lots_per_day: float
+    one_after_another: Annotated[LineRate, "the same lots, each when the one before is unloaded"]
+    lots: list[LineLot]
+    resources: Annotated[list[LineResource], "the critical one first"]
+    activities: Annotated[list[LineActivity], "in order of their begin"]
+
+
 def worst_axes(reach: dict[str, Any]) -> dict[str, dict[str, Any]]:
     """The row with the largest uncertainty of each quantity that a plan can reach."""
     worst: dict[str, dict[str, Any]] = {}

@@ -1,102 +1,122 @@
 """Charts of a run: model and measurement of a unit, its checks and samples, the verification of the lot, the station."""
 
-from typing import Any, Literal, cast
+from typing import Any, cast
 
 import numpy as np
 import pandas as pd
 
+from inertial.quantities import BY_COLUMN, axis_labels, is_clock, is_covariate, shown_factor
+from inertial.state import State
 from pipelines.drawing.chart import Chart, ColourScale, Plot, PlotAxis, Role, Trace, level, measured_curve
 from pipelines.report.effect_view import BOTH_SIDES, followed
+from pipelines.report.residuals import STILL
 from pipelines.report.smooth_curve import smooth
+from schemas.errors import WrongUse, did_you_mean
 from schemas.units import AXES, axes_among
-
-Against = Literal["force", "unit_C", "time", "pose"]
 
 RESIDUAL = "residual / µg"
 POINT = 5.0
 SAME_SOAK_C = 0.5  # soaks whose temperatures differ by less need no colours
 MOST_SAMPLES = 20_000  # of a dwell, and
 MOST_TIMES = 3000  # of a station, that are drawn
-AGAINST: dict[Against, str] = {
-    "force": "specific force along the axis / g",
-    "unit_C": "temperature of the unit / °C",
-    "time": "station time / h",
-    "pose": "pose",
-}
-COLUMNS: dict[Against, str] = {"force": "force_g", "unit_C": "unit_C", "time": "time_s"}
+ALWAYS = {"force": "specific force along the axis / g", "time": "station time / h"}
+"""What residuals can be drawn against in every run; then what it recorded, and the pose."""
+COLUMNS = {"force": "force_g", "time": "time_s"}
+POSE = "pose"
+RATED = 3  # dwells from which a rate between neighbours can be told
 POSE_SHIFT = {"x": -0.2, "y": 0.0, "z": 0.2}
 
 
 def model_chart(dwells: pd.DataFrame, residuals: pd.DataFrame) -> Chart:
-    """Measurement and model against force, and the residuals against force and temperature, axis by axis."""
+    """The residuals against force and temperature, axis by axis."""
     scale = _soak_scale(dwells)
     largest = 1.08 * float(residuals["residual_ug"].abs().max()) or 1.0
     across = PlotAxis(RESIDUAL, low=-largest, high=largest)
-    rows: list[list[Plot]] = [[], [], []]
-    for axis in (a for a in AXES if f"out_{a}" in dwells):
-        own = residuals[residuals["axis"] == axis].merge(dwells[["dwell", "soak", f"out_{axis}"]], on="dwell")
+    rows: list[list[Plot]] = [[], []]
+    for axis in axes_among(residuals["axis"]):
+        own = residuals[residuals["axis"] == axis].merge(dwells[["dwell", "soak"]], on="dwell")
         force, left = own["force_g"].to_numpy(float), own["residual_ug"].to_numpy(float)
         colour = None if scale is None else own["soak"].map(_soak_means(dwells)).to_numpy(float)
-        output = own[f"out_{axis}"].to_numpy(float)
-        measured = Trace("measured", force, output, size=POINT, colour=colour, legend=False)
-        rows[0].append(_response(axis, measured, str(dwells["out_unit"].iloc[0])))
-        along = rows[0][-1].x, PlotAxis(AGAINST["unit_C"])
-        for row, x, label in zip(rows[1:], (force, own["unit_C"].to_numpy(float)), along, strict=True):
+        along = PlotAxis(f"specific force on {axis} / g"), PlotAxis(axis_labels()["unit_C"])
+        titles = f"axis {axis}", ""
+        for row, title, x, label in zip(rows, titles, (force, own["unit_C"].to_numpy(float)), along, strict=True):
             points = Trace("residual", x, left, size=POINT, colour=colour, texts=_told(own), legend=False)
-            row.append(Plot("", label, across, (level(x, 0.0, dashed=False), points)))
-    return Chart("Model and measurement", (*rows[0], *rows[1], *rows[2]), len(rows[0]), scale, height=250)
+            row.append(Plot(title, label, across, (level(x, 0.0, dashed=False), points)))
+    return Chart("Model and measurement", (*rows[0], *rows[1]), len(rows[0]), scale, height=250)
 
 
-def _response(axis: str, points: Trace, unit: str) -> Plot:
-    """Measured output of an axis against specific force, with the straight line through it."""
-    traces = [points]
-    if points.x.size > 1 and np.ptp(points.x) > 0.0:
-        ends = np.array([points.x.min(), points.x.max()])
-        line = np.polynomial.Polynomial.fit(points.x, points.y, 1)(ends)
-        traces.insert(0, Trace("straight line", ends, line, "line", "muted"))
-    return Plot(f"axis {axis}", PlotAxis(f"specific force on {axis} / g"), PlotAxis(f"output / {unit}"), tuple(traces))
+def quantities(residuals: pd.DataFrame, dwells: pd.DataFrame) -> dict[str, str]:
+    """What the residuals of a unit can be drawn against, by name, with the label: force, time, what was recorded, pose.
+
+    Of what was recorded, that which varied between its dwells.
+    """
+    labels = axis_labels()
+    fitted = _with_rate(dwells[dwells["dwell"].isin(residuals["dwell"])]).select_dtypes("number")
+    columns = [
+        *(name for name in BY_COLUMN if name in fitted),
+        *(name for name in map(str, fitted.columns) if is_covariate(name)),
+    ]
+    varied = [name for name in dict.fromkeys(columns) if name != COLUMNS["time"] and np.ptp(fitted[name]) > 0.0]
+    return {**ALWAYS, **{name: labels.get(name, name) for name in varied}, POSE: POSE}
 
 
-def follows_most(residuals: pd.DataFrame, dwells: pd.DataFrame) -> Against:
-    """What the residuals of a unit depend on most: force, temperature or time; the mean over its axes decides."""
+def follows_most(residuals: pd.DataFrame, dwells: pd.DataFrame) -> str:
+    """The quantity that the residuals of a unit depend on most; the mean over its axes decides."""
     timed = _timed(residuals, dwells)
     axes = [own for _, own in timed.groupby("axis")]
 
-    def share(name: Against) -> float:
-        column = COLUMNS[name]
+    def share(name: str) -> float:
+        column = COLUMNS.get(name, name)
         return sum(followed(own[column].to_numpy(float), own["residual_ug"].to_numpy(float)) for own in axes)
 
-    return max(COLUMNS, key=share)
+    # a clock beside the time says nothing else, and neither does a pose beside its force
+    return max((name for name in quantities(residuals, dwells) if name != POSE and not is_clock(name)), key=share)
 
 
 def _timed(residuals: pd.DataFrame, dwells: pd.DataFrame) -> pd.DataFrame:
-    return residuals.merge(dwells[["dwell", "time_s"]], on="dwell", how="left")
+    """Residuals with what was recorded at their dwells."""
+    own = _with_rate(dwells)
+    return residuals.merge(own[["dwell", *own.columns.difference(residuals.columns)]], on="dwell", how="left")
 
 
-def residual_chart(unit: str, residuals: pd.DataFrame, dwells: pd.DataFrame, against: Against) -> Chart:
-    """Residuals of a unit against force, temperature, time or pose, with what noise alone leaves; a click shows the dwell."""
-    plot = _residuals("", _timed(residuals, dwells), against, 7.0, unit)
-    return Chart(f"Residuals against {AGAINST[against]}", (plot,), height=380)
+def _with_rate(dwells: pd.DataFrame) -> pd.DataFrame:
+    """Dwells of a unit with the rate of its temperature, where it changes while they are taken."""
+    if "unit_C" not in dwells or len(dwells) < RATED:
+        return dwells
+    time, temperature = (dwells[name].to_numpy(float) for name in ("time_s", "unit_C"))
+    rate = State(np.zeros((time.size, 3)), time=time, temperature=temperature).temperature_rate
+    return dwells if rate is None or np.ptp(rate) < STILL["temperature_rate"] else dwells.assign(temperature_rate=rate)
 
 
-def _residuals(title: str, residuals: pd.DataFrame, against: Against, size: float, unit: str = "") -> Plot:
-    """Residuals of all axes; points of a named unit can be selected."""
+def residual_chart(unit: str, residuals: pd.DataFrame, dwells: pd.DataFrame, against: str) -> Chart:
+    """Residuals of a unit against one of its quantities, with what noise alone leaves; a click shows the dwell."""
+    known = quantities(residuals, dwells)
+    if against not in known:
+        raise WrongUse(f"figure: no '{against[:80]}' was recorded that varied; {did_you_mean(against, known)}")
+    plot = _residuals("", _timed(residuals, dwells), (against, known[against]), 7.0, unit)
+    return Chart(f"Residuals against {known[against]}", (plot,), height=380)
+
+
+def _residuals(title: str, residuals: pd.DataFrame, against: tuple[str, str], size: float, unit: str = "") -> Plot:
+    """Residuals of all axes against a quantity, by name and label; points of a named unit can be selected."""
+    quantity, label = against
     poses = list(dict.fromkeys(residuals.sort_values("dwell")["pose"].astype(str)))
+    column = COLUMNS.get(quantity, quantity)
     traces: list[Trace] = []
     for axis in axes_among(residuals["axis"]):
         own = residuals[residuals["axis"] == axis]
         y, role = own["residual_ug"].to_numpy(float), cast("Role", axis)
-        if against == "pose":
+        if quantity == POSE:
             x = np.array([poses.index(str(pose)) + POSE_SHIFT[axis] for pose in own["pose"]])
         else:
-            x = own[COLUMNS[against]].to_numpy(float) / (3600.0 if against == "time" else 1.0)
+            x = own[column].to_numpy(float) * shown_factor(column)
         picks = _picks(unit, own) if unit else ()
         error = BOTH_SIDES * own["expected_ug"].to_numpy(float) if unit and "expected_ug" in own else None
         traces.append(Trace(f"axis {axis}", x, y, role=role, size=size, texts=_told(own), picks=picks, error=error))
-        traces += [] if against == "pose" else smooth(axis, x, y, role)
+        traces += [] if quantity == POSE else smooth(axis, x, y, role)
     zero = level(np.concatenate([trace.x for trace in traces]), 0.0, dashed=False)
-    names = tuple(poses) if against == "pose" else ()
-    return Plot(title, PlotAxis(AGAINST[against], names=names), PlotAxis(RESIDUAL), (zero, *traces))
+    names = tuple(poses) if quantity == POSE else ()
+    return Plot(title, PlotAxis(label, names=names), PlotAxis(RESIDUAL), (zero, *traces))
 
 
 def _told(rows: pd.DataFrame) -> tuple[str, ...]:
@@ -125,7 +145,7 @@ def _soak_scale(dwells: pd.DataFrame) -> ColourScale | None:
 
 def check_chart(residuals: pd.DataFrame, verification: pd.DataFrame, allan: pd.DataFrame) -> Chart:
     """Residuals by pose, the error on poses not used, and the Allan deviation; those that the run has."""
-    plots = [_residuals("residuals by pose", residuals, "pose", 4.0)]
+    plots = [_residuals("residuals by pose", residuals, (POSE, POSE), 4.0)]
     if len(verification):
         plots.append(_verification(verification))
     if len(allan):

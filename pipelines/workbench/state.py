@@ -158,9 +158,6 @@ class RunPage(PageState):
         return ["archive", "diff", self.run, self.beside] if self.beside else ["show", self.run]
 
 
-Against = Literal["", "force", "unit_C", "time", "pose"]
-
-
 class UnitPage(PageState):
     """A unit of a run.
 
@@ -170,7 +167,7 @@ class UnitPage(PageState):
     PATH: ClassVar[str] = "/unit"
     run: Text = "latest"
     unit: Text = ""
-    against: Against = ""
+    against: Text = ""
     dwell: Text = ""
     parameter: Text = "bias x"
 

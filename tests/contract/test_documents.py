@@ -154,6 +154,7 @@ ELSEWHERE = {
     "station program --format teds --json": "e2e/test_one_axis.py",
     "fit --json (an import)": "e2e/test_imported_recording.py",
     "plan choose --json": "unit/pipelines/planning/test_choice.py",
+    "plan line --json": "e2e/test_plan_line.py",
     "simulate --json": "e2e/test_correct.py",
     "demo --yes --json": "e2e/test_models.py",
     "demo --by-hand --json": "e2e/test_models.py",

@@ -10,6 +10,7 @@ import pytest
 from approved import difference, normalised
 from capture_double import finished_run
 from in_process import given
+from root_process import ROOT
 from test_next_lines import MODEL
 
 from pipelines.archive import Archive
@@ -37,6 +38,7 @@ OUTPUTS = {
     "extend": ["extend", "n.toml", "third_order"],
     "plan-choose": ["plan", "choose", "range=4g", "temperature=-40..85", "error=2mg", "bandwidth=100"],
     "plan": ["plan", "small.toml"],
+    "plan-line": ["plan", "line", "line.toml"],
     "run": ["run", "small.toml", "--direct"],
     "station": ["station", "log"],
     "plan-keys": ["plan", "keys", "recipe"],
@@ -93,6 +95,8 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     rest.insert(0, "t", np.arange(3000) / 100.0)
     rest.to_csv(place / "rest.csv", index=False)
     (place / "m.toml").write_text(MODEL, encoding="utf-8")
+    text = (ROOT / "deploy" / "lines" / "two-chambers.toml").read_text(encoding="utf-8")
+    (place / "line.toml").write_text(text.replace("count = 10", "count = 4"), encoding="utf-8")
     finished_run(place)
     return place
 

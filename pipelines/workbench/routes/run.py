@@ -1,5 +1,6 @@
 """A run: its units, each with its result and figures."""
 
+import math
 from collections import Counter
 from collections.abc import Sequence
 from typing import Any
@@ -7,9 +8,11 @@ from typing import Any
 from fastapi import APIRouter, Request
 from starlette.responses import Response
 
+from pipelines.archive import Run
 from pipelines.certificates.ledger import stated
 from pipelines.diagnosis.sentences import plain_verdict
 from pipelines.diagnosis.sentences import verdict as sentence
+from pipelines.report.numbers import with_uncertainty
 from pipelines.report.reasons import grouped_reasons
 from pipelines.stages.judge import verdict_of
 from pipelines.tables.frames import rows_of
@@ -83,7 +86,30 @@ def _other(bench: Workbench, state: RunPage, problems: list[str]) -> dict[str, A
         "cells": _cells(bench, stored.id, tables),
         "outcomes": {str(row["unit"]): str(row["outcome"]) for row in grades},
         "judged": _judged(bench, stored.id, tables),
+        "changes": _changes(bench, bench.archive.run(state.run), stored),
     }
+
+
+def _changes(bench: Workbench, own: Run, other: Run) -> dict[tuple[str, str], tuple[str, str]]:
+    """By unit and figure, this run less the other: the difference and its U as texts.
+
+    Of two measurements U is that of independent ones: what their station has in common makes it smaller. Two analyses of one
+    measurement share its noise, and the difference has no U.
+    """
+    if not all("figures" in one.tables() for one in (own, other)):
+        return {}
+    one, its = (
+        {(str(row["unit"]), str(row["figure"])): row for row in rows_of(run_table(bench, run.id, "figures"))}
+        for run in (own, other)
+    )
+    apart = own.about.get("capture") != other.about.get("capture")
+    found: dict[tuple[str, str], tuple[str, str]] = {}
+    for key in one.keys() & its.keys():
+        change = float(one[key]["value"]) - float(its[key]["value"])
+        sizes = [float(rows[key]["uncertainty"]) for rows in (one, its)]
+        if key[1] in SHOWN and math.isfinite(change):
+            found[key] = with_uncertainty(change, math.hypot(*sizes) if apart else 0.0)
+    return found
 
 
 def _judged(bench: Workbench, run: str, tables: Sequence[str]) -> tuple[bool | None, str]:

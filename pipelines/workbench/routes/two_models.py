@@ -45,7 +45,7 @@ def two_models(request: Request) -> Response:
     return page(
         request, "two_models.html", state, problems, sides=sides, found=found, effects=_lacking(sides), waiting=waiting,
         names=NAMES,
-        rows=None if rows is None else [_worded(row) for row in _ordered(rows)[:MOST]], count=len(rows or ()),
+        rows=None if rows is None else [_worded(row, sides) for row in _ordered(rows)[:MOST]], count=len(rows or ()),
         sources=sources.sources(bench.settings), models=models.models(bench.settings), offered=_offered(state, found),
         against=_quantity(state, found), drivers=[] if table is None else [(k, label) for k, (label, _) in table.drivers.items()],
         units=() if table is None else table.units, unit="" if table is None else table.units[table.place_of(state.unit)],
@@ -92,17 +92,28 @@ def _ordered(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     return sorted(rows, key=lambda row: not np.isfinite(row["change"]))
 
 
-def _worded(row: dict[str, Any]) -> dict[str, Any]:
-    """A coefficient with its values, their U and the difference as texts; empty where a model does not have it."""
+def _worded(row: dict[str, Any], sides: tuple[MissingPage, ...]) -> dict[str, Any]:
+    """A coefficient with its values, their U, and the difference with its own, as texts; empty where a model does not have it."""
     values = [(float(row[side]), COVERAGE * float(row[f"u_{side}"])) for side in ("a", "b")]
-    sides = [with_uncertainty(*one) if np.isfinite(one[0]) else ("", "") for one in values]
-    change = float(row["change"])
-    over = float(row["over_a"]) / COVERAGE
+    texts = [with_uncertainty(*one) if np.isfinite(one[0]) else ("", "") for one in values]
+    change, expanded = float(row["change"]), _of_difference(values[0][1], values[1][1], sides)
+    compared = np.isfinite(change) and expanded > 0.0
     return row | {
-        "sides": sides,
-        "change": significant(change) if np.isfinite(change) else "",
-        "over": significant(over, 2) if np.isfinite(over) else "",
+        "sides": texts,
+        "difference": with_uncertainty(change, expanded) if np.isfinite(change) else ("", ""),
+        "over": significant(change / expanded, 2) if compared else "",
     }
+
+
+def _of_difference(first: float, second: float, sides: tuple[MissingPage, ...]) -> float:
+    """Most that U of a difference can be, from U of both coefficients; the same noise is in both.
+
+    Generalised least squares: the estimate of a model is not correlated with what a larger one changes in it, so the variance
+    of the change is that of the larger model less that of the smaller one (Hausman 1978, 10.2307/1913827). Of other pairs
+    nothing is known of the correlation.
+    """
+    a, b = (set(side.judged) for side in sides)
+    return second if a <= b else first if b <= a else first + second
 
 
 def _quantity(state: TwoModelsPage, found: list[Diagnosed | None]) -> str:

@@ -56,14 +56,16 @@ def unit(request: Request) -> Response:
     }
     grade = next(iter(own.get("grades", [])), None)
     history = _history(bench, state.unit)
+    drivers: dict[str, str] = {}
     parameters = list(dict.fromkeys(_parameter(row) for row in history))
     if parameters and state.parameter not in parameters:
         state = state.model_copy(update={"parameter": parameters[0]})
     if "residuals" in tables and grade is not None and grade["outcome"] != "refused":
         state = state.model_copy(update={"against": _against(bench, state)})
+        drivers = run_pictures.quantities(_table(bench, state, "residuals"), _table(bench, state, "dwells"))
     place = units.index(state.unit)
     return page(
-        request, "unit.html", state, problems, run=run, grade=grade, own=own, tables=tables, units=units,
+        request, "unit.html", state, problems, run=run, grade=grade, own=own, tables=tables, units=units, drivers=drivers,
         before=units[place - 1] if place else "", after=units[place + 1] if place + 1 < len(units) else "",
         coefficients=side_by_side(own.get("coefficients", []), _expanded), parameters=parameters,
         coverage=float((run.about.get("limits") or {}).get("coverage_factor", COVERAGE)),
@@ -106,7 +108,7 @@ def _chart(bench: Workbench, state: UnitPage, name: str) -> Chart:
     raise no_figure(name)
 
 
-def _against(bench: Workbench, state: UnitPage) -> run_pictures.Against:
+def _against(bench: Workbench, state: UnitPage) -> str:
     """What the residuals are drawn against: as the address says, else what they depend on most, if anything is missing."""
     if state.against:
         return state.against

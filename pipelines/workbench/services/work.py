@@ -268,8 +268,8 @@ def discovered(request: Mapping[str, Any], report_progress: ReportProgress) -> d
     document = looked.document
     charts = {f"levels-{row['id']}": page.levels_chart(row) for row in document["discoveries"] if row["levels"]}
     charts |= page.growth_charts(looked.findings, document)
-    if document["pooled"]["lots"]:
-        charts["strongest"] = page.strongest_chart(looked.findings)
+    if (strongest := page.strongest_chart(looked.findings)) is not None:
+        charts["strongest"] = strongest
     if document["reach"]:
         charts["reach"] = page.reach_chart(document, document["pooled"]["lots"])
     texts = {row["id"]: (headline(row), scope_text(row)) for row in document["discoveries"]}

@@ -33,7 +33,7 @@ def test_shows_every_unit_rule_and_origin_opens_without_a_network_and_is_the_sam
     assert not re.findall(r'(?:src|href)="(?!#)', page.replace('xlink:href="#', ""))
     assert not re.findall(r"url\((?!#)", page)
     assert all(f'id="{unit}"' in page for unit in ("A1", "A2", "A3"))
-    assert page.count("<svg") == 2 + 2 * 3
+    assert page.count("<svg") == 2 + 3 * 3
     for words in (
         "Allan deviation", "scale_temperature", "not stated", "ILAC-G8:09/2019 guarded acceptance", "9.8123 m/s²", run.id,
         str(run.about["capture"]),
@@ -107,7 +107,7 @@ def test_the_policy_of_a_report_admits_its_two_scripts_and_no_other(page: str) -
 def test_every_figure_has_its_picture_and_the_same_numbers_for_the_script(page: str, run: Run) -> None:
     figures = re.findall(r'<div class="figure">(<svg.*?</svg>).*?</script></div>', page, flags=re.DOTALL)
     data = [json.loads(text) for text in DATA.findall(page)]
-    assert len(figures) == len(data) == 1 + 2 * 3
+    assert len(figures) == len(data) == 1 + 3 * 3
     residuals = run.table("residuals")
     wanted = residuals[(residuals["unit"] == "A1") & (residuals["axis"] == "x")]["residual_ug"].to_numpy()
     model = next(one for one in data if one["layout"]["meta"]["title"] == "Model and measurement")

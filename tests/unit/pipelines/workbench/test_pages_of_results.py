@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from asgi_client import AsgiClient
-from capture_double import small_run
+from capture_double import CaptureDouble, measured_run, small_job, small_run
 from demonstrations import wafer_line
 from lots import lot
 
@@ -16,13 +16,14 @@ from benchmarks.generated_archive import write_archive
 from pipelines.archive import Archive, Run
 from pipelines.discovery.attributes import add_attributes
 from pipelines.report.numbers import significant, with_uncertainty
-from pipelines.report.run_pictures import follows_most
+from pipelines.report.run_pictures import follows_most, quantities, residual_chart
 from pipelines.workbench.application import create_app
 from pipelines.workbench.services import models, requests
 from pipelines.workbench.services.jobs import Jobs, key_of
 from pipelines.workbench.services.work import done_in_process
 from pipelines.workbench.settings import WorkbenchSettings
 from pipelines.workbench.state import AuditPage, DiscoverPage, TwoModelsPage
+from schemas.errors import WrongUse
 
 TOKEN = "Zq8vXy3nR5tB7wK1mP4sD9"
 
@@ -145,11 +146,26 @@ def test_two_models_stand_side_by_side_with_verdicts_residuals_on_one_scale_and_
     rows = results[key_of(*works[2])]
     scale = next(row for row in rows if row["effect"] == "scale")
     assert abs(scale["over_a"]) > 2.0  # what the cubic gave to the scale factor
+    change, expanded = with_uncertainty(scale["change"], 2.0 * scale["u_b"])
+    assert f"{change}<br><small>± {expanded}</small>" in text
     assert client.get("/two-models/coefficients.csv?" + state.query()).text.count("\n") == len(rows) + 1
     chart = client.get(state.figure("residuals")).json()
     ranges = {str(chart["layout"][name]["range"]) for name in ("yaxis", "yaxis2")}
     assert len(ranges) == 1
     assert client.get(state.figure("nothing")).status_code == 422
+
+
+def test_two_runs_stand_side_by_side_with_their_differences(tmp_path: Path) -> None:
+    run = small_run(tmp_path)
+    again = measured_run(small_job(tmp_path, repeat=1), run.archive, CaptureDouble(noise_g=2e-4))
+    settings = WorkbenchSettings(archive=str(run.archive.root), folder=tmp_path / "bench", token=TOKEN)
+    client = AsgiClient(create_app(settings), "http://127.0.0.1:8321")
+    text = client.get(f"/run?run={run.id}&beside={again.id}").text
+    own, its = (one.table("figures").set_index(["unit", "figure"]).loc["A1", "bias_error_ug"] for one in (run, again))
+    change, expanded = with_uncertainty(own["value"] - its["value"], np.hypot(own["uncertainty"], its["uncertainty"]))
+    assert f"Δ {change} ± {expanded}</small>" in text
+    other = client.get(f"/run?run={run.id}&beside={run.id}").text  # the same noise in both: no U of the difference
+    assert "Δ 0</small>" in other or "Δ 0.000</small>" in other
 
 
 def test_residuals_are_drawn_against_what_they_depend_on_with_bars_of_the_noise(tmp_path: Path) -> None:
@@ -177,3 +193,14 @@ def test_residuals_follow_the_quantity_that_makes_them() -> None:
         )
         residuals["residual_ug"] = 50.0 * values**3 + rng.normal(0.0, 1.0, 40)
         assert follows_most(residuals, dwells) == name
+    supply = rng.normal(3.3, 0.01, 40)
+    recorded = dwells.assign(supply_V=supply, my_column=rng.normal(size=40), n=100, humidity_pct=45.0)
+    residuals["residual_ug"] = 2e4 * (supply - 3.3) ** 2 + rng.normal(0.0, 0.1, 40)
+    assert follows_most(residuals, recorded) == "supply_V"
+    residuals["pose"] = "p1"
+    ramp = recorded.assign(unit_C=25.0 + 20.0 * np.sin(np.arange(40) / 6.0))
+    assert "temperature_rate" in quantities(residuals, ramp)
+    assert list(quantities(residuals, recorded)) == ["force", "time", "supply_V", "my_column", "pose"]
+    assert residual_chart("A1", residuals, recorded, "supply_V").plots[0].x.label == "supply / V"
+    with pytest.raises(WrongUse, match="did you mean supply_V"):
+        residual_chart("A1", residuals, recorded, "suply_V")

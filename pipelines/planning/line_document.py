@@ -1,0 +1,138 @@
+"""The document of a line: its shortest schedule beside one lot after the other, and what bounds it."""
+
+from collections.abc import Callable, Sequence
+from itertools import count
+
+from pipelines.planning.documents import LineActivity, LineDocument, LineLot, LineRate, LineResource
+from pipelines.planning.line_lots import Phase, phases_of
+from pipelines.planning.line_schedule import STEP_S, Placed, Shortest, shortest, stays, step_count
+from schemas.line import DAY_MIN, Line
+from schemas.recipe import Recipe
+from schemas.station import StationConfig
+
+PER_MIN = 60.0 / STEP_S
+OPERATOR = "operator"
+
+
+def plan_line(line: Line, station: StationConfig, recipe_named: Callable[[str], Recipe]) -> LineDocument:
+    """The schedule of a line's lots; see :func:`pipelines.planning.line_schedule.shortest` for what it keeps and raises.
+
+    recipe_named : the recipe of a name in the line's file
+    """
+    recipes = [(recipe_named(one.recipe), one.count) for one in line.lots]
+    phases = [own for recipe, number in recipes for own in [phases_of(recipe, station)] * number]
+    counters = {recipe.name: count(1) for recipe, _ in recipes}
+    names = [recipe.name for recipe, number in recipes for _ in range(number)]
+    best = shortest(line, phases)
+    alone = (
+        best if len(line.fixtures) == 1 else shortest(line.model_copy(update={"fixtures": line.fixtures[:1]}), phases)
+    )
+    spans = [(placed.load, placed.unload + step_count(60.0 * line.unload_min)) for placed in best.lots]
+    fixtures = [line.fixtures[k] for k in free_places(spans)]
+    labels = [f"{name}-{next(counters[name])}" for name in names]
+    activities = [
+        activity
+        for label, fixture, placed, own in zip(labels, fixtures, best.lots, phases, strict=True)
+        for activity in _activities(line, label, fixture, placed, own)
+    ]
+    resources = _resources(line, phases)
+    return {
+        "line": line.name,
+        "station": station.name,
+        "solver": best.solver,
+        "start_min": line.start,
+        **_rate(best),
+        "bound_min": best.bound / PER_MIN,
+        "proven": best.bound == best.makespan,
+        "one_after_another": _rate(alone),
+        "lots": [
+            _lot(label, name, fixture, [one for one in activities if one["lot"] == label])
+            for label, name, fixture in zip(labels, names, fixtures, strict=True)
+        ],
+        "resources": resources,
+        "activities": sorted(activities, key=lambda one: (one["begin_min"], one["end_min"], one["lot"])),
+    }
+
+
+def free_places(spans: Sequence[tuple[int, int]]) -> list[int]:
+    """For each (begin, end) the lowest place, from 0, that is free at its begin."""
+    until: list[int] = []
+    places = [0] * len(spans)
+    for number in sorted(range(len(spans)), key=lambda k: spans[k]):
+        begin, end = spans[number]
+        place = next((k for k, taken in enumerate(until) if taken <= begin), len(until))
+        until[place : place + 1] = [end]
+        places[number] = place
+    return places
+
+
+def _rate(found: Shortest) -> LineRate:
+    minutes = found.makespan / PER_MIN
+    each = minutes / len(found.lots)
+    return {"makespan_min": minutes, "minutes_per_lot": each, "lots_per_day": DAY_MIN / each}
+
+
+def _activities(line: Line, lot: str, fixture: str, placed: Placed, phases: Sequence[Phase]) -> list[LineActivity]:
+    """What happens to a lot, in order."""
+
+    def activity(
+        kind: str, begin: int, steps: int, resources: Sequence[str], temperature: float | None
+    ) -> LineActivity:
+        return {
+            "lot": lot, "fixture": fixture, "activity": kind, "temperature_C": temperature,
+            "begin_min": begin / PER_MIN, "end_min": (begin + steps) / PER_MIN, "resources": list(resources),
+        }  # fmt: skip
+
+    made = [activity("load", placed.load, step_count(60.0 * line.load_min), [OPERATOR], None)]
+    for phase, stay, begin in zip(phases, stays(line, phases), placed.begins, strict=True):
+        if stay.change:
+            hands = [OPERATOR] if stay.by_hand else []
+            made.append(activity("change", begin - stay.change, stay.change, [*stay.changed, *hands], None))
+        made.append(activity(phase.kind, begin, step_count(phase.seconds), stay.resources, phase.temperature))
+    return [*made, activity("unload", placed.unload, step_count(60.0 * line.unload_min), [OPERATOR], None)]
+
+
+def _lot(lot: str, recipe: str, fixture: str, activities: Sequence[LineActivity]) -> LineLot:
+    """A lot from loading to unloading; it waits where none of its phases goes on."""
+    phases = [one for one in activities if one["activity"] not in {"load", "change", "unload"}]
+    first, last = phases[0]["begin_min"], phases[-1]["end_min"]
+    return {
+        "lot": lot, "recipe": recipe, "fixture": fixture,
+        "loaded_min": activities[0]["begin_min"], "unloaded_min": activities[-1]["end_min"],
+        "wait_min": last - first - sum(one["end_min"] - one["begin_min"] for one in phases),
+    }  # fmt: skip
+
+
+def _resources(line: Line, lots: Sequence[Sequence[Phase]]) -> list[LineResource]:
+    """What the lots need of everything that there is a number of: the most for each of it first.
+
+    Of operators it is counted against the part of the day that has a shift.
+    """
+    held = dict.fromkeys((one.name for one in line.shared), 0.0)
+    hands = fixtures = 0.0
+    for phases in lots:
+        by_hand = step_count(60.0 * line.load_min) + step_count(60.0 * line.unload_min)
+        fixtures += by_hand
+        for phase, stay in zip(phases, stays(line, phases), strict=True):
+            fixtures += step_count(phase.seconds)
+            by_hand += stay.change if stay.by_hand else 0
+            for name in stay.resources:
+                held[name] += step_count(phase.seconds) + (stay.change if name in stay.changed else 0)
+        hands += by_hand
+    needed = [(one.name, one.count, held[one.name]) for one in line.shared]
+    staffed = sum(end - begin for begin, end in line.operators.shifts) / DAY_MIN if line.operators.shifts else 1.0
+    needed += [("fixtures", len(line.fixtures), fixtures), (OPERATOR, line.operators.count, hands)]
+    rows: list[LineResource] = [
+        {
+            "resource": name,
+            "count": number,
+            "minutes_per_lot": steps / PER_MIN / len(lots),
+            "bound_per_lot_min": steps
+            / PER_MIN
+            / len(lots)
+            / number
+            / (min(staffed, 1.0) if name == OPERATOR else 1.0),
+        }
+        for name, number, steps in needed
+    ]
+    return sorted(rows, key=lambda row: -row["bound_per_lot_min"])

@@ -1,0 +1,234 @@
+"""The shortest schedule of lots over the fixtures of a line, and a proof of how short it can be, by CP-SAT of OR-tools.
+
+A lot is loaded, goes through its phases in one fixture, and is unloaded. What holds:
+
+- a phase is not interrupted, and the shared resources that it needs are held from its begin to its end;
+- between two phases a lot waits at its temperature, ``longest_wait_min`` and a change at most; loaded or done it waits at will;
+- phases that need the same shared resource without a soak between follow each other at once: one stay on it;
+- each stay begins with a change, during which the lot is not measured; one fixture stays where it is between equal stays;
+- loading, unloading and changes by hand take one operator each, within one shift.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+from pipelines.planning.line_lots import Phase
+from schemas.bounds import DAY_S
+from schemas.errors import RecipeInvalid
+from schemas.library import library
+from schemas.line import Line, Shared
+
+STEP_S = 10.0
+"""Of the times of a schedule: every duration is rounded up to it."""
+WORK = 10.0
+"""Of the search for the shortest schedule, in the solver's own measure: one is of the order of a second."""
+TIDYING = 1.0
+"""Of the search for the one with the shortest waits among those."""
+LONGEST_DAYS = 14  # for each lot: a line with shifts too short for its lots is refused
+_DAY = round(DAY_S / STEP_S)
+
+
+@dataclass(frozen=True)
+class Stay:
+    """What a phase holds: names of the shared resources, steps of the change before it, and whether that takes an operator."""
+
+    resources: tuple[str, ...]
+    changed: tuple[str, ...]
+    change: int
+    by_hand: bool
+
+
+@dataclass(frozen=True)
+class Placed:
+    """A lot in a schedule, in steps: begin of its loading, of each phase, and of its unloading."""
+
+    load: int
+    begins: tuple[int, ...]
+    unload: int
+
+
+@dataclass(frozen=True)
+class Shortest:
+    """The lots in the order given, the steps until the last one is unloaded, and the bound below which no schedule is."""
+
+    lots: list[Placed]
+    makespan: int
+    bound: int
+    solver: str
+
+
+def step_count(seconds: float) -> int:
+    """Steps of a duration, rounded up."""
+    return -int(-round(seconds, 3) // STEP_S)
+
+
+def stays(line: Line, phases: Sequence[Phase]) -> list[Stay]:
+    """What each phase of a lot holds."""
+    needed = [[one for one in line.shared if phase.needs.intersection(one.needed_for)] for phase in phases]
+    users = [k for k, of_phase in enumerate(needed) if of_phase and phases[k].kind != "soak"]
+    made: list[Stay] = []
+    for k, resources in enumerate(needed):
+        if len(line.fixtures) == 1:  # it stays where it is, and each lot ends on what the next begins on
+            last = users[users.index(k) - 1] if k in users else k
+        else:
+            last = k - 1 if k and phases[k - 1].kind != "soak" else None
+        there = set[str]() if last is None else {one.name for one in needed[last]}
+        new = [one for one in resources if one.name not in there]
+        change = max((step_count(60.0 * one.change_min) for one in new), default=0)
+        made.append(Stay(_names(resources), _names(new), change, any(one.by_hand and one.change_min for one in new)))
+    return made
+
+
+def _names(resources: Sequence[Shared]) -> tuple[str, ...]:
+    return tuple(one.name for one in resources)
+
+
+def shortest(line: Line, lots: Sequence[Sequence[Phase]]) -> Shortest:
+    """The shortest schedule of lots, each given by its phases.
+
+    Raises
+    ------
+    WrongUse
+        OR-tools is not installed.
+    RecipeInvalid
+        There is none within two weeks for each lot.
+    """
+    cp = library("ortools.sat.python.cp_model", "schedule", f"line {line.name}: the shortest schedule")
+    model = _Model(cp, line, lots)
+    solver = cp.CpSolver()
+    # one thread, and work counted in place of seconds: the same schedule on every machine
+    solver.parameters.num_workers, solver.parameters.linearization_level, solver.parameters.random_seed = 1, 2, 1
+    solver.parameters.max_deterministic_time = WORK
+    model.cp.minimize(model.makespan)
+    status = solver.solve(model.cp)
+    if status not in {cp.OPTIMAL, cp.FEASIBLE}:
+        raise RecipeInvalid(
+            f"line {line.name}: no schedule keeps longest_wait_min {line.longest_wait_min:g} with these shifts; lengthen a shift "
+            "or the wait, or let the change of a shared resource be automatic"
+        )
+    makespan, bound = (
+        round(solver.objective_value),
+        min(round(solver.best_objective_bound), round(solver.objective_value)),
+    )
+    for variable in model.variables:
+        model.cp.add_hint(variable, solver.value(variable))
+    model.cp.add(model.makespan <= makespan)
+    model.cp.minimize(sum(2 * placed[2] - placed[0] for placed in model.placed))
+    solver.parameters.max_deterministic_time = TIDYING
+    tidy = cp.CpSolver()
+    tidy.parameters.copy_from(solver.parameters)
+    found = tidy if tidy.solve(model.cp) in {cp.OPTIMAL, cp.FEASIBLE} else solver
+    placed = [
+        Placed(found.value(load), tuple(found.value(begin) for begin in begins), found.value(unload))
+        for load, begins, unload in model.placed
+    ]
+    return Shortest(placed, makespan, bound, f"CP-SAT {library('ortools', 'schedule', line.name).__version__}")
+
+
+class _Model:
+    """The constraints of a line as a model of CP-SAT."""
+
+    def __init__(self, cp: Any, line: Line, lots: Sequence[Sequence[Phase]]) -> None:
+        self.cp, self.line, self._domain = cp.CpModel(), line, cp.Domain
+        self.load, self.unload = step_count(60.0 * line.load_min), step_count(60.0 * line.unload_min)
+        self.wait = int(60.0 * line.longest_wait_min // STEP_S)
+        self.horizon = LONGEST_DAYS * _DAY * len(lots) if line.operators.shifts else self._one_by_one(lots)
+        self.variables: list[Any] = []
+        self.held: dict[str, list[Any]] = {one.name: [] for one in line.shared}
+        self.hands: list[Any] = []
+        self.fixtures: list[Any] = []
+        self.placed = [self._lot(phases) for phases in lots]
+        self.makespan = self._time()
+        for _, _, unload in self.placed:
+            self.cp.add(self.makespan >= unload + self.unload)
+        for one in line.shared:
+            self._at_most(self.held[one.name], one.count)
+        self._at_most(self.hands, line.operators.count)
+        self._at_most(self.fixtures, len(line.fixtures))
+        self._in_order(lots)
+
+    def _one_by_one(self, lots: Sequence[Sequence[Phase]]) -> int:
+        """Steps in which the lots are done one after the other, with every change."""
+        return sum(
+            self.load
+            + self.unload
+            + sum(step_count(p.seconds) for p in phases)
+            + sum(s.change for s in stays(self.line, phases))
+            for phases in lots
+        )
+
+    def _time(self, by_hand: int = 0) -> Any:
+        """A time; where an operator works for ``by_hand`` steps from then on, within a shift."""
+        shifts = self.line.operators.shifts
+        if not by_hand or not shifts:
+            made = self.cp.new_int_var(0, self.horizon, "")
+        else:
+            start = step_count(60.0 * self.line.start)
+            spans = [
+                [
+                    max(0, step_count(60.0 * begin) - start + _DAY * day),
+                    int(60.0 * end // STEP_S) - start + _DAY * day - by_hand,
+                ]
+                for day in range(-2, self.horizon // _DAY + 1)
+                for begin, end in shifts
+            ]
+            made = self.cp.new_int_var_from_domain(
+                self._domain.from_intervals([span for span in spans if span[0] <= span[1]]), ""
+            )
+        self.variables.append(made)
+        return made
+
+    def _lot(self, phases: Sequence[Phase]) -> tuple[Any, list[Any], Any]:
+        """Begin of loading, of each phase and of unloading of a lot."""
+        load = self._time(self.load)
+        self.hands.append(self.cp.new_fixed_size_interval_var(load, self.load, ""))
+        end = free = load + self.load  # end of the phase before; of the last one in which the lot cannot be moved
+        begins: list[Any] = []
+        held: set[str] = set()
+        for phase, stay in zip(phases, stays(self.line, phases), strict=True):
+            length, begin = step_count(phase.seconds), self._time()
+            self.cp.add(begin >= end)
+            if held.intersection(stay.resources) or phase.kind == "return":
+                self.cp.add(begin == end)
+            elif begins:
+                self.cp.add(begin <= end + self.wait + stay.change)
+            if stay.change:
+                change = self._time(stay.change if stay.by_hand else 0)
+                self.cp.add(change + stay.change == begin)
+                self.cp.add(change >= free)
+                if stay.by_hand:
+                    self.hands.append(self.cp.new_fixed_size_interval_var(change, stay.change, ""))
+            for name in stay.resources:
+                before = stay.change if name in stay.changed else 0
+                self.held[name].append(self.cp.new_fixed_size_interval_var(begin - before, length + before, ""))
+            begins.append(begin)
+            end, held = begin + length, set(stay.resources) if phase.kind != "soak" else set()
+            free = free if phase.kind == "soak" else end
+        unload = self._time(self.unload)
+        self.cp.add(unload >= end)
+        self.hands.append(self.cp.new_fixed_size_interval_var(unload, self.unload, ""))
+        self.fixtures.append(self.cp.new_interval_var(load, self._time(), unload + self.unload, ""))
+        return load, begins, unload
+
+    def _at_most(self, intervals: Sequence[Any], count: int) -> None:
+        """No more than ``count`` of these at a time."""
+        if count == 1:
+            self.cp.add_no_overlap(intervals)
+        elif intervals:
+            self.cp.add_cumulative(intervals, [1] * len(intervals), count)
+
+    def _in_order(self, lots: Sequence[Sequence[Phase]]) -> None:
+        """Equal lots go through every phase in the order given: two that overtake each other may change their names there."""
+        equal: dict[tuple[Phase, ...], list[tuple[Any, list[Any], Any]]] = {}
+        for phases, placed in zip(lots, self.placed, strict=True):
+            equal.setdefault(tuple(phases), []).append(placed)
+        for group in equal.values():
+            for (a, earlier, b), (c, later, d) in pairwise(group):
+                for first, second in zip((a, *earlier, b), (c, *later, d), strict=True):
+                    self.cp.add(first <= second)
+        if len(equal) == 1:
+            apart = len(self.line.fixtures)
+            for (_, _, unload), (load, _, _) in zip(self.placed, self.placed[apart:], strict=False):
+                self.cp.add(load >= unload + self.unload)

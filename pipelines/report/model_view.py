@@ -1,0 +1,56 @@
+"""What a run's model takes off the residuals of a unit: before with bias, scale and misalignment, after with all its effects."""
+
+import numpy as np
+import pandas as pd
+
+from inertial.quantities import FORCE_COLUMNS, shown_factor
+from pipelines.report.effect_view import EffectView
+from pipelines.report.run_pictures import COLUMNS, follows_most, quantities
+from schemas.units import MICRO, axes_among
+
+LINEAR = ("bias", "scale", "misalignment")
+FEW = 2  # effects that are named
+
+
+def model_view(unit: str, dwells: pd.DataFrame, residuals: pd.DataFrame, effects: list[str]) -> EffectView:
+    """The axis of a unit that the model changes most, against the quantity that its residuals follow most without it.
+
+    dwells, residuals : of the fit, of the unit; effects : of the model. Without effects beyond the linear ones, or without
+    known forces, there is the residual of the model alone.
+    """
+    more = [one for one in effects if one not in LINEAR]
+    compared = bool(more) and set(FORCE_COLUMNS) <= set(dwells)
+    both = residuals.assign(before_ug=_linear(dwells, residuals) if compared else residuals["residual_ug"])
+    fall = {axis: _fall(both[both["axis"] == axis]) for axis in axes_among(both["axis"])}
+    axis = max(fall, key=lambda one: fall[one])
+    own = both[both["axis"] == axis].sort_values("dwell")
+    quantity = follows_most(own.assign(residual_ug=own["before_ug"]), dwells)
+    column = COLUMNS.get(quantity, quantity)
+    recorded = own if column in own else own.merge(dwells[["dwell", column]], on="dwell")
+    before, after = (own[name].to_numpy(float)[None] for name in ("before_ug", "residual_ug"))
+    expected = own["expected_ug"].to_numpy(float) if "expected_ug" in own else np.zeros(1)
+    changed = compared and fall[axis] > 0.0
+    return EffectView(
+        ("" if not changed else ", ".join(more) if len(more) <= FEW else f"{len(more)} more effects"),
+        quantities(own, dwells)[quantity], axis, (unit,), 0, recorded[column].to_numpy(float)[None] * shown_factor(column),
+        before, after if changed else None, before - after if changed else None, float(np.sqrt(np.mean(expected**2))),
+    )  # fmt: skip
+
+
+def _fall(own: pd.DataFrame) -> float:
+    """What the model takes off the squares of the residuals of an axis; their size where it takes nothing."""
+    before, after = (float(np.mean(own[name].to_numpy(float) ** 2)) for name in ("before_ug", "residual_ug"))
+    return before - after or before
+
+
+def _linear(dwells: pd.DataFrame, residuals: pd.DataFrame) -> pd.Series:
+    """Residuals of least squares in the forces along all axes, µg, in the rows of ``residuals``."""
+    left = pd.Series(np.nan, index=residuals.index)
+    for axis, own in residuals.groupby("axis"):
+        rows = own[["dwell"]].merge(dwells, on="dwell", how="left")
+        force, output = rows[list(FORCE_COLUMNS)].to_numpy(float), rows[f"out_{axis}"].to_numpy(float)
+        design = np.column_stack([np.ones(len(rows)), force])
+        coefficients = np.linalg.lstsq(design, output, rcond=None)[0]
+        scale = abs(float(coefficients[1 + "xyz".index(str(axis))]))
+        left.loc[own.index] = MICRO * (output - design @ coefficients) / scale
+    return left

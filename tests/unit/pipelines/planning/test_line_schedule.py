@@ -1,0 +1,128 @@
+"""Schedules of lines: every rule is kept, none is shorter, and the durations are those of the plan."""
+
+import pytest
+from hypothesis import given as drawn
+from hypothesis import settings
+from hypothesis import strategies as st
+from line_rules import Trial, broken
+
+from pipelines.jobs.recipes import load_recipe
+from pipelines.planning.line_document import free_places, plan_line
+from pipelines.planning.line_lots import Phase, phases_of
+from pipelines.planning.line_schedule import shortest
+from pipelines.schedule.steps import steps
+from pipelines.schedule.timing import minutes
+from schemas.errors import RecipeInvalid
+from schemas.line import Line
+from schemas.station import load_station
+
+NEEDS = {
+    "soak": {"soak"},
+    "measure": {"measure"},
+    "ramp": {"measure", "soak"},
+    "static": {"static"},
+    "exciter": {"exciter"},
+}
+
+
+def phase(kind: str, steps_long: int) -> Phase:
+    return Phase(kind, 25.0, 10.0 * steps_long, frozenset(NEEDS[kind]))
+
+
+def line_of(fixtures: int, lots: int, **keys: object) -> Line:
+    return Line.model_validate(
+        {
+            "name": "drawn",
+            "fixtures": [f"F{k}" for k in range(fixtures)],
+            "load_min": 0.5,
+            "unload_min": 0.5,
+            "lots": [{"recipe": "any", "count": lots}],
+            **keys,
+        }
+    )
+
+
+phases = st.lists(st.builds(phase, st.sampled_from(sorted(NEEDS)), st.integers(1, 9)), min_size=1, max_size=5)
+tables = st.builds(
+    lambda change, hand, static: {
+        "name": "table", "needed_for": ["measure", *(["static"] if static else [])], "change_min": change / 6.0, "by_hand": hand,
+    },
+    st.integers(0, 4), st.booleans(), st.booleans(),
+)  # fmt: skip
+coolers = st.builds(lambda count: {"name": "cooler", "needed_for": ["soak"], "count": count}, st.integers(1, 2))
+exciters = st.just({"name": "exciter", "needed_for": ["exciter"], "change_min": 0.5, "by_hand": True})
+shared = st.lists(st.one_of(tables, coolers, exciters), max_size=3, unique_by=lambda one: one["name"])
+
+
+@settings(max_examples=60, deadline=None)
+@drawn(st.integers(1, 3), st.lists(phases, min_size=1, max_size=4), shared, st.integers(0, 12), st.integers(1, 2))
+def test_a_schedule_keeps_every_rule(
+    fixtures: int, lots: list[list[Phase]], shared: list, wait: int, people: int
+) -> None:
+    line = line_of(fixtures, len(lots), shared=shared, longest_wait_min=wait / 6.0, operators={"count": people})
+    found = shortest(line, lots)
+    assert broken(line, lots, found.lots) == []
+    ends = [own.unload + 3 for own in found.lots]
+    assert found.bound <= max(ends) <= found.makespan
+
+
+@settings(max_examples=20, deadline=None)
+@drawn(st.integers(1, 3), st.lists(phases, min_size=1, max_size=3), shared)
+def test_work_by_hand_lies_in_shifts(fixtures: int, lots: list[list[Phase]], shared: list) -> None:
+    shifts = {"shifts": ["08:00-08:05", "23:58-00:02"]}
+    line = line_of(fixtures, len(lots), shared=shared, longest_wait_min=24 * 60, operators=shifts, start="07:59")
+    assert broken(line, lots, shortest(line, lots).lots) == []
+
+
+@settings(max_examples=40, deadline=None)
+@drawn(
+    st.sampled_from([1, 3]), st.lists(phases, min_size=1, max_size=3), st.lists(tables, max_size=1), st.integers(0, 6)
+)
+def test_no_order_is_shorter(fixtures: int, lots: list[list[Phase]], shared: list, wait: int) -> None:
+    line = line_of(fixtures, len(lots), shared=shared, longest_wait_min=wait / 6.0)
+    found = shortest(line, lots)
+    assert found.bound == found.makespan == Trial(line, lots).steps()
+
+
+def test_the_rules_see_what_is_wrong() -> None:
+    lots = [[phase("soak", 6), phase("measure", 6)]] * 2
+    line = line_of(2, 2, shared=[{"name": "table", "needed_for": ["measure"], "change_min": 0.5, "by_hand": True}])
+    right = shortest(line, lots).lots
+    assert broken(line, lots, right) == []
+    assert broken(line, lots, [right[0], right[0]])
+    first = right[0]
+    later = type(first)(first.load, (first.begins[0], first.begins[1] + 10_000), first.unload + 10_000)
+    assert any("waits" in text for text in broken(line, lots, [later, right[1]]))
+
+
+def test_the_phases_of_a_recipe_take_as_long_as_its_plan_says() -> None:
+    station = load_station()
+    for name in ("production", "quick"):
+        recipe = load_recipe(name)
+        own = [one for one in phases_of(recipe, station) if one.kind != "return"]
+        assert sum(one.seconds for one in own) / 60.0 == pytest.approx(minutes(steps(recipe), station, recipe).total)
+    kinds = [one.kind for one in phases_of(load_recipe("quick"), station)]
+    assert kinds == ["ramp", "soak", "static", "return"]
+
+
+def test_two_fixtures_hide_the_soaks_of_each_other() -> None:
+    line = line_of(2, 4, shared=[{"name": "table", "needed_for": ["measure", "static"]}], load_min=6, unload_min=4)
+    found = plan_line(line, load_station(), lambda name: load_recipe("production"))
+    alone = found["one_after_another"]["makespan_min"]
+    assert found["proven"]
+    assert found["bound_min"] == found["makespan_min"] < 0.6 * alone
+    assert {lot["fixture"] for lot in found["lots"]} == {"F0", "F1"}
+    assert found["resources"][0]["resource"] == "fixtures"
+    assert alone == pytest.approx(4 * found["resources"][0]["minutes_per_lot"], abs=0.01)
+
+
+def test_a_line_without_a_schedule_is_refused() -> None:
+    lots = [[phase("measure", 6), phase("exciter", 5000), phase("measure", 6)]]
+    shared = [{"name": name, "needed_for": [name], "change_min": 2, "by_hand": True} for name in ("measure", "exciter")]
+    line = line_of(2, 1, longest_wait_min=1, operators={"shifts": ["06:00-06:10"]}, start="06:00", shared=shared)
+    with pytest.raises(RecipeInvalid, match=r"longest_wait_min 1 .* lengthen a shift"):
+        shortest(line, lots)
+
+
+def test_places_are_taken_as_they_become_free() -> None:
+    assert free_places([(0, 5), (1, 3), (3, 9), (5, 6), (2, 4)]) == [0, 1, 1, 0, 2]

@@ -1,0 +1,47 @@
+"""The first picture of a unit: what the model takes off the residuals, against what they follow."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from capture_double import small_run
+
+from pipelines.report.effect_view import effect_chart
+from pipelines.report.model_view import model_view
+
+
+@pytest.fixture(scope="module")
+def unit(tmp_path_factory: pytest.TempPathFactory) -> tuple[pd.DataFrame, pd.DataFrame, list[str]]:
+    """Dwells, residuals and effects of a unit of a run at two temperatures."""
+    run = small_run(tmp_path_factory.mktemp("view"))
+    dwells, residuals = (table[table["unit"] == "A1"] for table in (run.table("dwells"), run.table("residuals")))
+    return dwells[dwells["kind"] == "dwell"], residuals, list(dict.fromkeys(run.table("coefficients")["effect"]))
+
+
+def test_before_is_what_the_linear_model_leaves_and_after_the_residual_of_the_run(unit) -> None:
+    dwells, residuals, effects = unit
+    view = model_view("A1", dwells, residuals, effects)
+    assert view.effect == "bias_temperature, scale_temperature"
+    assert view.quantity == "temperature of the unit / °C"
+    own = residuals[residuals["axis"] == view.axis].sort_values("dwell")
+    assert np.array_equal(view.after[0], own["residual_ug"])
+    assert np.sqrt(np.mean(view.before**2)) > 50.0 * np.sqrt(np.mean(view.after**2))
+    x, line = view.line(0)
+    assert np.all(np.diff(x) > 0.0)
+    assert line[-1] - line[0] > 1000.0  # the bias over temperature of these units, µg
+    assert [plot.title.split(",")[0] for plot in effect_chart(view).plots] == ["before", "after"]
+
+
+def test_before_does_not_depend_on_the_unit_of_the_output(unit) -> None:
+    dwells, residuals, effects = unit
+    scaled = dwells.assign(**{f"out_{axis}": -3.0 * dwells[f"out_{axis}"] + 7.0 for axis in "xyz"})
+    one, other = (model_view("A1", table, residuals, effects) for table in (dwells, scaled))
+    assert np.allclose(one.before, -other.before)
+
+
+def test_a_linear_model_and_unknown_forces_have_the_residual_alone(unit) -> None:
+    dwells, residuals, effects = unit
+    for table, names in ((dwells, ["bias", "scale", "misalignment"]), (dwells.drop(columns="force_x"), effects)):
+        view = model_view("A1", table, residuals, names)
+        assert view.after is None
+        assert np.abs(view.before).max() <= residuals["residual_ug"].abs().max()
+        assert len(effect_chart(view).plots) == 1
