@@ -95,6 +95,8 @@ class Job:
         if self.captured:
             return self.captured
         measured = self.recipe.model_dump(mode="json", exclude=ANALYSIS_KEYS)
+        if self.recipe.stop is not None:  # model and limits decide then when the lot ends
+            measured |= {"effects": self.recipe.effects, "limits": self.limits.model_dump(mode="json")}
         if not measured["soaks"]:  # recipes without them keep the names that their captures had before there were any
             del measured["soaks"]
         unmoved = {"pace", "reference", "uncertainty", *GUARDS}  # plan time, state standards, guard: they drive nothing

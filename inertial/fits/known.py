@@ -1,0 +1,69 @@
+"""When enough is known: how a decision during a run allows for a noise that the same dwells show, and the length of a dwell.
+
+A run that ends as soon as its uncertainty is small enough ends more often where the noise is estimated too small. With ν degrees of
+freedom the estimated variance over the true one is χ²/ν, so the true standard deviation exceeds the estimated one times
+√(ν/χ²_q) with probability q. With q = 5 % over the number of looks, that is missed at any of them with at most 5 % (Bonferroni): the
+uncertainty that is asked for is compared with the estimated one times this factor. For the same reason a coverage factor k of one
+decision becomes that of as many decisions as there are looks, Φ(−k′) = Φ(−k)/looks.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from inertial.arrays import Array
+from inertial.distributions import chi2_quantile, normal_tail, normal_upper
+from inertial.noise.flicker import SLOWEST_FITTED, flicker_kernel
+
+MISSED = 0.05
+"""Probability that the noise is larger than the guard allows at any look: that of the interval that U states."""
+
+GROWTH = 1.15
+"""Dwells at a look over those at the look before: the errors fall by 7 % between two, and a plan has about ten of them."""
+
+
+def looks_at(first: int, last: int) -> list[int]:
+    """Numbers of dwells at which a run looks, from the first at which it could end to before the last."""
+    counts: list[int] = []
+    count = float(first)
+    while count < last:
+        counts.append(int(count))
+        count = max(count * GROWTH, count + 1.0)
+    return counts
+
+
+def noise_guard(dof: int, looks: int) -> float:
+    """Factor of an estimated standard deviation of ``dof`` degrees of freedom that the true one exceeds at no look, but for 5 %."""
+    return float(np.sqrt(dof / chi2_quantile(MISSED / looks, dof)))
+
+
+def over_looks(coverage_factor: float, looks: int) -> float:
+    """Coverage factor with which any of several decisions is wrong as seldom as a single one is with the given factor."""
+    return float(normal_upper(normal_tail(coverage_factor) / looks))
+
+
+def largest_ratio(errors: Array, effects: Sequence[str], asked: dict[str, float]) -> Array:
+    """Largest error over what is asked for, (units,), of errors (units, m, p) by the effect of their columns; zero without any."""
+    columns = [(k, asked[effect]) for k, effect in enumerate(effects) if effect in asked]
+    if not columns:
+        return np.zeros(len(errors))
+    index, limit = zip(*columns, strict=True)
+    return np.max(errors[..., list(index)] / np.array(limit), axis=(-2, -1))
+
+
+def best_length(white: float, flicker: float, spacing: float, length: float, lengths: Array) -> float:
+    """The length of a dwell, of some lengths in s, with the most information per station time.
+
+    Neighbouring dwells have their slow part in common; what they tell apart is the white part, which falls with the length, and
+    the slow part that has changed from one to the next. The variance of that, times the time of a dwell with its move, is least.
+
+    Parameters
+    ----------
+    white, flicker : standard deviations of a dwell of ``length`` s, in one unit
+    spacing : s, from one dwell to the next
+    """
+    beside = spacing - length
+    kernel = flicker_kernel(spacing * np.arange(3.0), slowest=SLOWEST_FITTED)
+    slow = flicker**2 * float(kernel[0, 0] - kernel[0, 1])
+    cost = (white**2 * length / lengths + slow) * (lengths + beside)
+    return float(lengths[int(np.argmin(cost))])

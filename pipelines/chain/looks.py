@@ -1,0 +1,213 @@
+"""Looks during a capture: the chain on the records so far, and whether every unit of the lot is known.
+
+A look is the fit, the budget and the decisions that the run would end with if it ended now; nothing is computed in another way. A
+unit is known when its figures pass, or a coefficient fails, and its uncertainties are those that ``[stop]`` asks for, both with the
+allowance of :mod:`inertial.fits.known` for a noise that the same dwells show.
+"""
+
+from collections.abc import Iterator
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from threadpoolctl import threadpool_limits
+
+from inertial.arrays import Array
+from inertial.errors import InertialError
+from inertial.fits.known import best_length, largest_ratio, noise_guard, over_looks
+from inertial.planning.visibility import visibilities
+from pipelines.archive import Records
+from pipelines.capture.early_end import TUMBLED, Look
+from pipelines.jobs.job import Job
+from pipelines.jobs.priors import family
+from pipelines.planning.soak_order import look_counts
+from pipelines.planning.timed_design import SHORTEST_DWELL_S
+from pipelines.schedule.planned_state import state_of
+from pipelines.schedule.steps import steps
+from pipelines.schedule.timing import schedule
+from pipelines.stages.figures.base import LotCoefficients
+from pipelines.stages.figures.coefficients import FIGURES
+from pipelines.stages.fit import fit_in_memory
+from pipelines.stages.grade import GradeEvidence, grade
+from pipelines.stages.judge import verdict_on
+from pipelines.stages.noise import noise
+from pipelines.stages.reduce import reduce
+from pipelines.stages.uncertainty.budget_terms import BudgetTables
+from pipelines.stages.uncertainty.decision_budget import decision_budget
+from pipelines.stages.validate import validate
+from pipelines.stages.verify import verify_tables
+from pipelines.tables.dwells import LotTables
+from pipelines.tables.summaries import summarised
+from schemas.errors import TumblelineError
+from schemas.recipe import FEWEST_SAMPLES
+from schemas.stopping import StopTerms
+from schemas.units import MICRO
+
+BLOCKS = 5
+"""Parts of the recipe's dwell in which its length is chosen: as often as the station is observed within it."""
+
+OF_COEFFICIENTS = frozenset(kind.name for kind in FIGURES)
+"""Figures that fail for good: their uncertainty is that of the coefficients. A figure of verification may fail by one dwell."""
+
+
+class LotLooks:
+    """Looks at the records of a job while they are captured."""
+
+    def __init__(self, job: Job, terms: StopTerms, records: Records) -> None:
+        self.job, self.terms, self.records = job, terms, records
+        self._summaries: dict[int, pd.DataFrame] = {}
+        self._activities = schedule(steps(job.recipe), job.station, job.recipe)
+        dwells = [one.step.record for one in self._activities if one.kind == "dwell"]
+        self._due = {dwells[count - 1] for count in look_counts(self._activities, job.recipe)}
+
+    def due(self, record: int) -> bool:
+        """Whether the records are looked at after this one."""
+        return record in self._due
+
+    def look(self, record: int, told: frozenset[str]) -> Look:
+        """What the records up to this one say."""
+        with threadpool_limits(1):
+            try:
+                return self._look(record, told)
+            except (TumblelineError, InertialError) as problem:
+                return Look(known=False, text=f"cannot be judged yet: {problem}")
+
+    def _look(self, record: int, told: frozenset[str]) -> Look:
+        state = _Evaluated(self.job, self._readings(), self._summary(), self.records.gathered("history"))
+        guard = noise_guard(state.dof, len(self._due))
+        factor = over_looks(self.job.limits.coverage_factor, len(self._due)) * guard
+        wide = self.job.limits.model_copy(update={"rule": "guarded_acceptance", "coverage_factor": factor})
+        tables = grade(state.evidence, wide, self.job.recipe.zero_output)
+        fails = _failing(tables["figures"])
+        grades = tables["grades"].set_index("unit")["outcome"]
+        ratio = guard * self.job.limits.coverage_factor * state.ratios(self.terms.asked, self.job.recipe.zero_output)
+        fitted = dict(zip(state.units, ratio, strict=True))
+        open_units = [
+            unit for unit, one in fitted.items() if unit not in fails and not (grades[unit] == "pass" and one <= 1.0)
+        ]
+        worst = float(max((one for unit, one in fitted.items() if unit not in fails), default=0.0))
+        told_of = f"U at most {worst:.2f} of what is asked, " if self.terms.asked else ""
+        text = f"{told_of}{len(grades) - len(open_units)} of {len(grades)} units decided"
+        new = {unit: sentence for unit, sentence in fails.items() if unit not in told}
+        missing = "" if open_units else self._missing(record, state)
+        if open_units or missing:
+            length = self._length(state)
+            return Look(known=False, text=text + missing, fails=new, dwell_s=length)
+        return Look(known=True, text=text, fails=new, given_up=self._given_up(record))
+
+    def _missing(self, record: int, state: "_Evaluated") -> str:
+        """What else is needed before the lot may end, with a leading semicolon; empty where nothing is."""
+        if self.terms.visible:
+            effects = self.job.recipe.effects
+            rows = visibilities(self._state(record), effects, 1.0, self.terms.visible)
+            unseen = [row.effect for row in rows if not row.seen]
+            if unseen:
+                return f"; {', '.join(unseen)} not visible yet"
+        verdict = verdict_on(state.lot.dwells, state.lot.history, self.job.recipe.effects)
+        if verdict["adequate"] is False:
+            return "; the model is not adequate, a diagnosis needs the other dwells"
+        return ""
+
+    def _given_up(self, record: int) -> tuple[str, ...]:
+        """Effects that the whole plan would show, and the dwells so far do not."""
+        seen = [
+            {row.effect for row in visibilities(self._state(last), self.job.recipe.effects, 1.0) if row.seen}
+            for last in (record, self._activities[-1].step.record)
+        ]
+        return tuple(sorted(seen[1] - seen[0]))
+
+    def _state(self, record: int) -> Any:
+        """The planned dwells up to a record."""
+        until = [one for one in self._activities if one.step.record <= record]
+        return state_of(until, self.job.station, self.job.recipe, history=True)
+
+    def _readings(self) -> pd.DataFrame:
+        readings = self.records.gathered("readings")
+        return readings[readings["kind"].isin(list(TUMBLED))].reset_index(drop=True)
+
+    def _summary(self) -> pd.DataFrame:
+        """Summaries of the samples so far; each record is decoded once."""
+        readings, recipe = self._readings(), self.job.recipe
+        new = set(readings["record"].tolist()) - self._summaries.keys()
+        rows = summarised(self.records.samples(new), readings, recipe.zero_output, recipe.sensor_axes)
+        self._summaries |= {int(record): own for record, own in rows.groupby("record")}
+        return pd.concat([self._summaries[record] for record in sorted(self._summaries)], ignore_index=True)
+
+    def _length(self, state: "_Evaluated") -> float | None:
+        """The length of the next dwells with the most information per time, in blocks; None where the recipe's stays."""
+        recipe, longest = self.job.recipe, self.terms.longest_dwell_s
+        spacing = state.spacing
+        if longest is None or spacing is None:
+            return None
+        block = recipe.dwell_s / BLOCKS
+        shortest = max(SHORTEST_DWELL_S, FEWEST_SAMPLES / recipe.rate_hz)
+        lengths = block * np.arange(1, int(longest / block + 1e-9) + 1)
+        lengths = lengths[lengths >= shortest - 1e-9]
+        if not lengths.size:
+            return None
+        return round(best_length(state.white, state.flicker, spacing, state.length, lengths), 6)
+
+
+class _Evaluated:
+    """The records so far, evaluated as the end of the run would.
+
+    units : those that were fitted; dof : of the noise of the lot
+    white, flicker : standard deviations of a dwell, µg; length, spacing : s, of the dwells; no spacing where there is one dwell
+    """
+
+    def __init__(self, job: Job, readings: pd.DataFrame, summaries: pd.DataFrame, history: pd.DataFrame) -> None:
+        recipe, terms = job.recipe, job.terms
+        verdicts = validate(summaries, readings, job.lot.units)
+        dwells = reduce(summaries, readings, verdicts, recipe.local_gravity_m_s2, terms.follows)
+        self.lot = lot = LotTables(dwells, history)
+        made, expected, own = fit_in_memory(lot, recipe.effects, family(job.prior))
+        made |= verify_tables(lot, made["coefficients"], made["covariance"], expected, own)
+        names = ("coefficients", "covariance", "verification", "verification_poses")
+        # the static record comes after the poses: its figures are decided at the end of the run
+        shared: dict[str, Any] = {
+            **{name: made[name] for name in names},
+            "noise": noise(None)["noise"],
+            "calibration": own,
+        }
+        tables = BudgetTables(dwells, history, wander=made["wander"], prior=made["prior"], lot=lot, **shared)
+        stated = decision_budget(tables, terms)
+        full = readings.drop_duplicates("unit").set_index("unit")["full_scale"].astype(float).to_dict()
+        self.evidence = GradeEvidence(verdicts, residuals=made["residuals"], budget=stated, full_scale=full, **shared)
+        self.units = () if own is None else own.units
+        wander = made["wander"]
+        self.dof = max(int(wander["dof"].sum()), 1)
+        self.white, self.flicker = (
+            float(np.sqrt(np.mean(wander[name] ** 2))) if len(wander) else 0.0 for name in ("white_ug", "flicker_ug")
+        )
+        fitted = readings[readings["kind"] == "dwell"].drop_duplicates("record")
+        gaps = [b - a for a, b in pairwise(fitted["start_s"])]
+        self.length = float(fitted["duration_s"].median())
+        self.spacing = float(np.median(gaps)) if gaps else None
+
+    def ratios(self, asked: dict[str, float], zero_g: float) -> Array:
+        """Largest standard uncertainty over what is asked for, (units,)."""
+        calibration, stated = self.evidence.calibration, self.evidence.budget
+        if calibration is None:
+            return np.zeros(0)
+        lot = LotCoefficients(calibration, zero_g, None if stated is None else stated.covariance)
+        worst = [
+            [MICRO * float(np.max(errors / scale)) for _, errors, scale in (lot.effect(e, u) for e in asked)]
+            for u in range(len(calibration.units))
+        ]
+        return largest_ratio(np.array(worst).reshape(len(worst), 1, len(asked)), list(asked), asked)
+
+
+def _failing(figures: pd.DataFrame) -> dict[str, str]:
+    """Units with a coefficient beyond its limit by more than its uncertainty, and the figure in words."""
+    return {unit: sentence for unit, sentence in reversed(list(_failed(figures)))}
+
+
+def _failed(figures: pd.DataFrame) -> Iterator[tuple[str, str]]:
+    own = figures[(figures["outcome"] == "fail") & figures["figure"].isin(list(OF_COEFFICIENTS))]
+    for row in own.to_dict("records"):
+        unit = "" if row["unit_text"] == "1" else f" {row['unit_text']}"
+        yield (
+            str(row["unit"]),
+            f"{row['figure']} {row['value']:.4g} ± {row['uncertainty']:.2g}{unit}, limit {row['limit']:.4g}{unit}",
+        )
