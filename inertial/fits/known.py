@@ -1,9 +1,9 @@
 """When enough is known: how a decision during a run allows for a noise that the same dwells show, and the length of a dwell.
 
-A run that ends as soon as its uncertainty is small enough ends more often where the noise is estimated too small. With ν degrees of
-freedom the estimated variance over the true one is χ²/ν, so the true standard deviation exceeds the estimated one times
-√(ν/χ²_q) with probability q. With q = 5 % over the number of looks, that is missed at any of them with at most 5 % (Bonferroni): the
-uncertainty that is asked for is compared with the estimated one times this factor. For the same reason a coverage factor k of one
+A run that ends as soon as its uncertainty is small enough ends more often where the noise is estimated too small. With ν degrees
+of freedom the estimated variance over the true one is χ²/ν, so the true standard deviation exceeds the estimated one times
+√(ν/χ²_q) with probability q. With q = 5 % over the number of looks it is missed at any of them with at most 5 % (Bonferroni):
+what is asked for is compared with the estimated uncertainty times this factor. For the same reason a coverage factor k of one
 decision becomes that of as many decisions as there are looks, Φ(−k′) = Φ(−k)/looks.
 """
 
@@ -33,7 +33,7 @@ def looks_at(first: int, last: int) -> list[int]:
 
 
 def noise_guard(dof: int, looks: int) -> float:
-    """Factor of an estimated standard deviation of ``dof`` degrees of freedom that the true one exceeds at no look, but for 5 %."""
+    """Factor of a standard deviation of ``dof`` degrees of freedom that the true one exceeds at any look with at most 5 %."""
     return float(np.sqrt(dof / chi2_quantile(MISSED / looks, dof)))
 
 
@@ -43,7 +43,7 @@ def over_looks(coverage_factor: float, looks: int) -> float:
 
 
 def largest_ratio(errors: Array, effects: Sequence[str], asked: dict[str, float]) -> Array:
-    """Largest error over what is asked for, (units,), of errors (units, m, p) by the effect of their columns; zero without any."""
+    """Largest error over what is asked for, (units,), of errors (units, m, p) by the effect of their columns; zero for none."""
     columns = [(k, asked[effect]) for k, effect in enumerate(effects) if effect in asked]
     if not columns:
         return np.zeros(len(errors))

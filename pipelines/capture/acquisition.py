@@ -7,14 +7,13 @@ from typing import Protocol
 import numpy as np
 import pandas as pd
 
-from pipelines.capture.early_end import TUMBLED
 from pipelines.capture.record import Plausibility, Record, TemperatureLog, readings_row
 from pipelines.capture.supervision import Power, Supervisor, short_of_samples
 from pipelines.capture.turning import Turning
 from pipelines.procedures import procedure_of
 from pipelines.procedures.base import OnEquipment, SetsEquipment
 from pipelines.procedures.recorded import ProcedureStep
-from pipelines.schedule.steps import Step
+from pipelines.schedule.steps import TUMBLED, Step
 from schemas.errors import LinkLost, OperatorNeeded, StationError, StationTimeout
 from schemas.event import NO_RECORD
 from schemas.lot import Lot, Unit

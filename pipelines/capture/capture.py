@@ -1,9 +1,10 @@
 """Capture: drives a station through a recipe and hands every record to a sink; the only place that does."""
 
 from pipelines.capture.acquisition import Acquisition, CaptureSink
-from pipelines.capture.early_end import DWELL_S, Looks, left_out, recorded_look
+from pipelines.capture.look import DWELL_S, Looks, recorded_look
 from pipelines.capture.supervision import LINK_ATTEMPTS, LOST_FOR, WARMING, StillSuspended, Supervisor
 from pipelines.capture.time_left import Approach, Remaining
+from pipelines.schedule.early_end import left_out
 from pipelines.schedule.steps import Step, steps
 from schemas.errors import LeaseLost, LinkLost, NotReached, StationError, StationTimeout
 from schemas.event import EventLog, MemoryLog

@@ -1,8 +1,8 @@
 """Looks during a capture: the chain on the records so far, and whether every unit of the lot is known.
 
-A look is the fit, the budget and the decisions that the run would end with if it ended now; nothing is computed in another way. A
-unit is known when its figures pass, or a coefficient fails, and its uncertainties are those that ``[stop]`` asks for, both with the
-allowance of :mod:`inertial.fits.known` for a noise that the same dwells show.
+A look is the fit, the budget and the decisions that the run would end with if it ended now; nothing is computed in another way.
+A unit is known when its figures pass and its uncertainties are those that ``[stop]`` asks for, or when a coefficient fails, all
+with the allowance of :mod:`inertial.fits.known` for a noise that the same dwells show.
 """
 
 from collections.abc import Iterator
@@ -18,16 +18,16 @@ from inertial.errors import InertialError
 from inertial.fits.known import best_length, largest_ratio, noise_guard, over_looks
 from inertial.planning.visibility import visibilities
 from pipelines.archive import Records
-from pipelines.capture.early_end import TUMBLED, Look
+from pipelines.capture.look import Look
 from pipelines.jobs.job import Job
 from pipelines.jobs.priors import family
 from pipelines.planning.soak_order import look_counts
 from pipelines.planning.timed_design import SHORTEST_DWELL_S
 from pipelines.schedule.planned_state import state_of
-from pipelines.schedule.steps import steps
+from pipelines.schedule.steps import TUMBLED, steps
 from pipelines.schedule.timing import schedule
+from pipelines.stages.figures import coefficients, errors
 from pipelines.stages.figures.base import LotCoefficients
-from pipelines.stages.figures.coefficients import FIGURES
 from pipelines.stages.fit import fit_in_memory
 from pipelines.stages.grade import GradeEvidence, grade
 from pipelines.stages.judge import verdict_on
@@ -40,6 +40,7 @@ from pipelines.stages.verify import verify_tables
 from pipelines.tables.dwells import LotTables
 from pipelines.tables.summaries import summarised
 from schemas.errors import TumblelineError
+from schemas.limits import Limits
 from schemas.recipe import FEWEST_SAMPLES
 from schemas.stopping import StopTerms
 from schemas.units import MICRO
@@ -47,7 +48,10 @@ from schemas.units import MICRO
 BLOCKS = 5
 """Parts of the recipe's dwell in which its length is chosen: as often as the station is observed within it."""
 
-OF_COEFFICIENTS = frozenset(kind.name for kind in FIGURES)
+BEFORE_THE_RECORD = frozenset(kind.name for kind in (*coefficients.FIGURES, *errors.FIGURES))
+"""Figures of the dwells: those of the static record and of procedures are decided at the end of the run."""
+
+OF_COEFFICIENTS = frozenset(kind.name for kind in coefficients.FIGURES)
 """Figures that fail for good: their uncertainty is that of the coefficients. A figure of verification may fail by one dwell."""
 
 
@@ -75,25 +79,33 @@ class LotLooks:
 
     def _look(self, record: int, told: frozenset[str]) -> Look:
         state = _Evaluated(self.job, self._readings(), self._summary(), self.records.gathered("history"))
-        guard = noise_guard(state.dof, len(self._due))
-        factor = over_looks(self.job.limits.coverage_factor, len(self._due)) * guard
-        wide = self.job.limits.model_copy(update={"rule": "guarded_acceptance", "coverage_factor": factor})
-        tables = grade(state.evidence, wide, self.job.recipe.zero_output)
-        fails = _failing(tables["figures"])
-        grades = tables["grades"].set_index("unit")["outcome"]
-        ratio = guard * self.job.limits.coverage_factor * state.ratios(self.terms.asked, self.job.recipe.zero_output)
-        fitted = dict(zip(state.units, ratio, strict=True))
-        open_units = [
-            unit for unit, one in fitted.items() if unit not in fails and not (grades[unit] == "pass" and one <= 1.0)
-        ]
-        worst = float(max((one for unit, one in fitted.items() if unit not in fails), default=0.0))
-        told_of = f"U at most {worst:.2f} of what is asked, " if self.terms.asked else ""
-        text = f"{told_of}{len(grades) - len(open_units)} of {len(grades)} units decided"
+        if not state.units:
+            return Look(known=False, text="no unit is fitted")
+        limits, zero_g, looks = self.job.limits, self.job.recipe.zero_output, len(self._due)
+        guard = noise_guard(state.dof, looks)
+        wide = limits.model_copy(
+            update={
+                "rule": "guarded_acceptance",
+                "coverage_factor": over_looks(limits.coverage_factor, looks) * guard,
+            }
+        )
+        own, guarded = (grade(state.evidence, rule, zero_g) for rule in (limits, wide))
+        fails = _failing(guarded["figures"])
+        passed = set(own["grades"].query("outcome == 'pass'")["unit"]) & _passed(
+            own["figures"], guarded["figures"], limits
+        )
+        ratio = guard * limits.coverage_factor * state.ratios(self.terms.asked, zero_g)
+        fitted = dict(zip(state.units, ratio.tolist(), strict=True))
+        reached = {unit for unit, one in fitted.items() if one <= 1.0}
+        undecided = fitted.keys() - (passed & reached) - fails.keys()
+        worst = max((one for unit, one in fitted.items() if unit not in fails), default=0.0)
+        asked = f"U at most {worst:.2f} of what is asked, " if self.terms.asked else ""
+        units = len(own["grades"])
+        text = f"{asked}{units - len(undecided)} of {units} units decided"
         new = {unit: sentence for unit, sentence in fails.items() if unit not in told}
-        missing = "" if open_units else self._missing(record, state)
-        if open_units or missing:
-            length = self._length(state)
-            return Look(known=False, text=text + missing, fails=new, dwell_s=length)
+        missing = "" if undecided else self._missing(record, state)
+        if undecided or missing:
+            return Look(known=False, text=text + missing, fails=new, dwell_s=self._length(state))
         return Look(known=True, text=text, fails=new, given_up=self._given_up(record))
 
     def _missing(self, record: int, state: "_Evaluated") -> str:
@@ -192,15 +204,28 @@ class _Evaluated:
             return np.zeros(0)
         lot = LotCoefficients(calibration, zero_g, None if stated is None else stated.covariance)
         worst = [
-            [MICRO * float(np.max(errors / scale)) for _, errors, scale in (lot.effect(e, u) for e in asked)]
+            [MICRO * float(np.max(spread / scale)) for _, spread, scale in (lot.effect(e, u) for e in asked)]
             for u in range(len(calibration.units))
         ]
         return largest_ratio(np.array(worst).reshape(len(worst), 1, len(asked)), list(asked), asked)
 
 
+def _passed(own: pd.DataFrame, guarded: pd.DataFrame, limits: Limits) -> set[str]:
+    """Units whose limited figures of the dwells pass: coefficients by the guarded rule, verification by that of the limits.
+
+    Further dwells of the fit hardly change a figure of verification, so that looks do not give it more chances to pass.
+    """
+    needed = BEFORE_THE_RECORD & limits.figures.keys()
+    of_fit = guarded[guarded["figure"].isin(list(needed & OF_COEFFICIENTS))]
+    of_checks = own[own["figure"].isin(list(needed - OF_COEFFICIENTS))]
+    rows = pd.concat([of_fit, of_checks])
+    counts = rows[rows["outcome"] == "pass"].groupby("unit").size()
+    return {str(unit) for unit, count in counts.items() if count == len(needed)}
+
+
 def _failing(figures: pd.DataFrame) -> dict[str, str]:
     """Units with a coefficient beyond its limit by more than its uncertainty, and the figure in words."""
-    return {unit: sentence for unit, sentence in reversed(list(_failed(figures)))}
+    return dict(reversed(list(_failed(figures))))
 
 
 def _failed(figures: pd.DataFrame) -> Iterator[tuple[str, str]]:

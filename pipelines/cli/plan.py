@@ -13,6 +13,7 @@ from pipelines.cli.next_commands import archive_words
 from pipelines.cli.options import Setting, argument, option
 from pipelines.cli.plan_choose import choose
 from pipelines.cli.plan_keys import keys
+from pipelines.cli.plan_order import order
 from pipelines.cli.printing import conclude, give, is_standard_output, print_text, remark
 from pipelines.cli.text.plan_text import print_optimum, print_plan, print_procedures
 from schemas.errors import RecipeInvalid
@@ -30,6 +31,7 @@ EXAMPLES_OF = {
         "tumbleline plan optimise my.toml",
         "tumbleline plan optimise my.toml --criterion T:third_order,odd_quadratic --set size=10000",
     ),
+    "order": ("tumbleline plan order my.toml", "tumbleline plan order my.toml --output my-first.toml"),
     "choose": (
         "tumbleline plan choose range=4g temperature=-40..85 error=2mg bandwidth=100",
         "tumbleline plan choose range=30g error=5mg --device QA700,SF1500",
@@ -249,6 +251,6 @@ def write_pictures(folder: Path, document: dict[str, Any], context: PlanContext)
 
 app = group(
     "Show visible effects, expected errors and station time of a recipe; write a quicker one; choose a device; list keys.",
-    {"recipe": plan_recipe, "optimise": optimise, "choose": choose, "keys": keys},
+    {"recipe": plan_recipe, "optimise": optimise, "order": order, "choose": choose, "keys": keys},
     usual="recipe",
 )

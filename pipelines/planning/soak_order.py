@@ -1,8 +1,9 @@
 """The order of a recipe's soaks and poses with which its model is known first: nothing is added, nothing left out.
 
-Of the orders of soaks the one is taken that reaches the required errors, at both ends of the range, in the least station time; the
-soaks that are not needed for that follow, the nearest first. Within a soak each pose is the one that lowers the variances most per
-time of its move and dwell. Ramps keep their order, which their temperatures decide, and so do poses with waits or without power.
+Of the orders of soaks the one is taken that reaches the required errors, at both ends of the range, in the least station time;
+the soaks that are not needed for that follow, the nearest first. Within a soak each pose is the one that lowers the variances
+most per time of its move and dwell. Ramps keep their order, which their temperatures decide, and so do poses with waits of their
+own or without power.
 """
 
 import math
@@ -38,12 +39,12 @@ COMPARED = 2
 """Lengths of orders that are completed and compared, from the shortest that is enough."""
 
 FIRST_MATRIX = 1e-3
-"""Information about every coefficient before the first dwell, over what is required: below it a matrix of few dwells is singular."""
+"""Information about every coefficient before the first dwell, over what is required: without any a matrix is singular."""
 
 
 @dataclass(frozen=True)
 class Ordered:
-    """A recipe in its new order. ``until``, ``before``: minutes until it is known in the new and in the given order; None: never."""
+    """A recipe in its new order, with the minutes until it is known then, ``until``, and as given, ``before``; None: never."""
 
     recipe: Recipe
     until: float | None
@@ -63,8 +64,8 @@ def ordered(context: PlanContext, required: Array) -> Ordered:
     parts = _parts(recipe)
     if not all(part.settled for part in parts):
         raise RecipeInvalid(
-            f"recipe {recipe.name}: it measures on ramps, soaks that settle are needed to put them into another order; a ramp has "
-            "that of its temperatures",
+            f"recipe {recipe.name}: it measures on ramps, soaks that settle are needed to put them into another "
+            "order; leave it as it is",
             key="soaks",
         )
     tried = [
@@ -94,7 +95,7 @@ def look_counts(activities: Sequence[Activity], recipe: Recipe) -> list[int]:
 
 
 def known_after(context: PlanContext, required: Array) -> float | None:
-    """Minutes of station time after which a lot of devices with the planned noise is known; None where the plan does not reach it."""
+    """Minutes of station time after which a lot of devices with the planned noise is known; None where it never is."""
     dwells = [one for one in context.activities if one.kind == "dwell"]
     counts = look_counts(context.activities, context.recipe)
     for count in counts:
@@ -169,7 +170,7 @@ def _orders(context: PlanContext, parts: list[SoakPart], required: Array) -> lis
 
 
 def _completed(parts: list[SoakPart], order: list[int]) -> list[SoakPart]:
-    """An order with the soaks that it leaves out behind it, the nearest first; the given order where they do not fit behind it."""
+    """An order with the soaks that it leaves out behind it, the nearest first; as given where they do not fit behind it."""
     left = [k for k in range(len(parts)) if k not in order]
     while left:
         now = parts[order[-1]].temperature_C

@@ -1,47 +1,14 @@
-"""The early end of a lot whose units are known: what a look says, which records are left out, and what a run keeps of it."""
+"""The early end of a lot whose units are known: which records it leaves out, and what a run keeps of it."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from typing import Annotated, Protocol
+from typing import Annotated
 
 from typing_extensions import TypedDict
 
 from pipelines.archive import Run
-from pipelines.schedule.steps import Step, steps
+from pipelines.schedule.steps import TUMBLED, Step, steps
 from pipelines.tables.frames import rows_of
-from schemas.event import Event
 from schemas.recipe import Recipe
-
-TUMBLED = ("dwell", "verification")
-DWELL_S = "dwell_s"
-
-
-@dataclass(frozen=True)
-class Look:
-    """What the records so far say.
-
-    known : whether every unit is decided; text : why, or what is missing
-    fails : units that have not been told before, with the figure that they fail; given_up : effects that the end leaves unseen
-    dwell_s : length of the dwells from here on; None where it stays
-    """
-
-    known: bool
-    text: str
-    fails: dict[str, str] = field(default_factory=dict[str, str])
-    given_up: tuple[str, ...] = ()
-    dwell_s: float | None = None
-
-
-class Looks(Protocol):
-    """What decides during a capture."""
-
-    def due(self, record: int) -> bool:
-        """Whether the records are looked at after this one."""
-        ...
-
-    def look(self, record: int, told: frozenset[str]) -> Look:
-        """What the records up to this one say; ``told``: units that fail already."""
-        ...
 
 
 def left_out(plan: Sequence[Step], at: int) -> list[Step]:
@@ -66,21 +33,14 @@ def _check(step: Step) -> tuple[str, int]:
     return step.pose.name, step.soak if step.settled else -1
 
 
-def recorded_look(events: Sequence[Event], record: int) -> Look | None:
-    """The look after a record that the journal has; None where it was not taken."""
-    for event in events:
-        if event.kind in ("look", "known") and event.record == record:
-            return Look(event.kind == "known", event.reason, dwell_s=event.figures.get(DWELL_S))
-    return None
-
-
 class EarlyEnd(TypedDict):
     """The end of a lot ahead of its plan, or the units that were told to fail before its end."""
 
     ended: Annotated[bool, "whether dwells of the plan were not taken"]
     reason: Annotated[str, "why the lot ended; empty where it did not end early"]
     dwells: Annotated[int, "dwells that were not taken"]
-    soaks_C: Annotated[list[float], "temperatures that the chamber did not go to any more, °C"]  # noqa: N815
+    soaks_C: Annotated[list[float], "temperatures that the chamber did not go to any more, °C"]
+    dwell_s: Annotated[list[float], "shortest and longest dwell of the fit, s; the run may choose its length"]
     given_up: Annotated[list[str], "effects that the whole plan would have shown"]
     fails: Annotated[dict[str, str], "units that failed before the end, with the figure"]
 
@@ -92,7 +52,8 @@ def early_end(run: Run) -> EarlyEnd | None:
         return None
     events = rows_of(run.table("events"))
     recipe = Recipe.model_validate(about["recipe"])
-    taken = set(run.table("readings")["record"])
+    readings = run.table("readings")
+    taken, lengths = set(readings["record"]), readings.loc[readings["kind"] == "dwell", "duration_s"]
     plan = steps(recipe)
     missing = [step for step in plan if step.record not in taken]
     soaks = {step.soak for step in plan if step.record in taken}
@@ -103,6 +64,7 @@ def early_end(run: Run) -> EarlyEnd | None:
         "reason": reasons[0] if reasons else "",
         "dwells": len(missing),
         "soaks_C": list(left.values()),
+        "dwell_s": [float(lengths.min()), float(lengths.max())] if len(lengths) else [],
         "given_up": [str(event["action"]) for event in events if event["kind"] == "given_up"],
         "fails": {
             str(event["action"]).split()[1]: str(event["reason"]) for event in events if event["kind"] == "fails"
@@ -111,13 +73,15 @@ def early_end(run: Run) -> EarlyEnd | None:
 
 
 def early_end_sentence(end: EarlyEnd) -> str:
-    """The early end in words, for summary, report and certificate; empty where all of the plan was measured."""
+    """The early end in words, for summary, report and certificate; empty where the plan was measured as it stands."""
+    lengths = " to ".join(f"{seconds:.3g}" for seconds in dict.fromkeys(end["dwell_s"]))
+    chosen = f"dwells of {lengths} s by the noise of the run" if len(set(end["dwell_s"])) > 1 else ""
     if not end["ended"]:
-        return ""
+        return chosen
     soaks = ", ".join(f"{t:g}" for t in end["soaks_C"])
     parts = [f"ended when it was known: {end['reason']}", f"{end['dwells']} dwells of the plan not taken"]
     if soaks:
         parts[-1] += f", no soak at {soaks} °C any more"
     if end["given_up"]:
         parts.append(f"given up: {', '.join(end['given_up'])}, which the whole plan shows")
-    return "; ".join(parts)
+    return "; ".join([*parts, *([chosen] if chosen else [])])
