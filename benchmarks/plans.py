@@ -282,7 +282,7 @@ class Looked:
             course = replace(course, rate=RATE_HZ)
         state, mean, error = measured(course, preset, truths, seed)
         dwells = [one for one in plan.activities if one.kind == "dwell"]
-        counts = look_counts(plan.activities, plan.recipe)
+        counts = look_counts(plan.activities, plan.station, plan.recipe)
         for count in [*counts, len(dwells)]:
             part = State(
                 force=state.force[:, :count],

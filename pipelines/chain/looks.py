@@ -63,7 +63,7 @@ class LotLooks:
         self._summaries: dict[int, pd.DataFrame] = {}
         self._activities = schedule(steps(job.recipe), job.station, job.recipe)
         dwells = [one.step.record for one in self._activities if one.kind == "dwell"]
-        self._due = {dwells[count - 1] for count in look_counts(self._activities, job.recipe)}
+        self._due = {dwells[count - 1] for count in look_counts(self._activities, job.station, job.recipe)}
 
     def due(self, record: int) -> bool:
         """Whether the records are looked at after this one."""

@@ -28,6 +28,7 @@ from pipelines.stages.noisy_fit import FEWEST_TO_SPARE
 from schemas.errors import RecipeInvalid
 from schemas.poses import SoakPart
 from schemas.recipe import Recipe
+from schemas.station import StationConfig
 
 LONGEST = 6
 """Soaks of an order that is searched: a plan that needs more is known about as late in any order."""
@@ -40,6 +41,16 @@ COMPARED = 2
 
 FIRST_MATRIX = 1e-3
 """Information about every coefficient before the first dwell, over what is required: without any a matrix is singular."""
+
+
+LEVERAGE = 0.5
+"""Largest share of a dwell's error in the fit of that dwell: with less, most of it shows in the residuals, and so in the noise.
+
+With one dwell at the end of the range it is one: its error decides a coefficient over temperature, and nothing tells.
+"""
+
+SINGULAR = 1e-5
+"""Smallest over largest singular value of scaled columns that determine all coefficients."""
 
 
 @dataclass(frozen=True)
@@ -80,24 +91,38 @@ def ordered(context: PlanContext, required: Array) -> Ordered:
     return Ordered(tried[best], until[best], before)
 
 
-def look_counts(activities: Sequence[Activity], recipe: Recipe) -> list[int]:
-    """Numbers of dwells of the fit after which a run of a recipe looks: from the first with which the model may be determined.
+def look_counts(activities: Sequence[Activity], station: StationConfig, recipe: Recipe) -> list[int]:
+    """Numbers of dwells of the fit after which a run of a recipe looks: from the first with which the model can be judged.
 
-    They must determine the coefficients, spare enough for the noise, and reach both ends of the range.
+    They reach both ends of the range, spare enough for the noise, and no dwell decides a coefficient alone (:data:`LEVERAGE`).
     """
     dwells = [one for one in activities if one.kind == "dwell"]
-    heat = np.array(
-        [one.step.temperature if one.step.settled else 0.5 * (one.begin.device + one.end.device) for one in dwells]
-    )
-    fewest = len(recipe.effects) + 2 + FEWEST_TO_SPARE  # misalignment has two columns
-    ready = (k for k in range(fewest, len(dwells)) if short_of(heat[:k], recipe.temperatures_C) <= 0.0)
-    return looks_at(next(ready, len(dwells)), len(dwells))
+    state = state_of(activities, station, recipe, history=True)
+    sensor, _ = design.split(recipe.effects)
+    columns = design.local_columns(sensor, state, design.starting_values(sensor, state))
+    heat = np.zeros(0) if state.temperature is None else state.temperature
+
+    def judged(count: int) -> bool:
+        reaches = short_of(heat[:count], recipe.temperatures_C) <= 0.0
+        return reaches and _leverage(columns[:, :count]) <= LEVERAGE
+
+    ready = (k for k in range(columns.shape[-1] + FEWEST_TO_SPARE, len(dwells)) if judged(k))
+    return [count for count in looks_at(next(ready, len(dwells)), len(dwells)) if judged(count)]
+
+
+def _leverage(columns: Array) -> float:
+    """Largest part of a dwell's error that its own fit takes up, of columns (axes, n, p); one where they are not determined."""
+    size = np.linalg.norm(columns, axis=-2, keepdims=True)
+    left, value, _ = np.linalg.svd(columns / np.where(size > 0.0, size, 1.0), full_matrices=False)
+    if np.any(value[:, -1] <= SINGULAR * value[:, 0]):
+        return 1.0
+    return float(np.max(np.sum(left**2, axis=-1)))
 
 
 def known_after(context: PlanContext, required: Array) -> float | None:
     """Minutes of station time after which a lot of devices with the planned noise is known; None where it never is."""
     dwells = [one for one in context.activities if one.kind == "dwell"]
-    counts = look_counts(context.activities, context.recipe)
+    counts = look_counts(context.activities, context.station, context.recipe)
     for count in counts:
         until = dwells[count - 1]
         if _ratio(context, count, required, len(counts)) <= 1.0:
@@ -145,7 +170,7 @@ def _orders(context: PlanContext, parts: list[SoakPart], required: Array) -> lis
     ends = {min(recipe.temperatures_C), max(recipe.temperatures_C)}
     names = [part.model_dump_json() for part in parts]
     chosen: list[list[SoakPart]] = [parts]
-    looks = max(1, len(look_counts(context.activities, recipe)))
+    looks = max(1, len(look_counts(context.activities, station, recipe)))
     for length in range(len(ends), min(LONGEST, len(parts)) + 1):
         alike = {
             tuple(names[k] for k in order): order

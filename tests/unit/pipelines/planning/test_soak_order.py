@@ -5,6 +5,7 @@ from collections import Counter
 import numpy as np
 import pytest
 
+from inertial import design
 from inertial.poses import plan
 from pipelines.jobs.recipes import load_recipe
 from pipelines.planning.context import PlanContext, noise_of, plan_context
@@ -63,9 +64,21 @@ def test_little_that_is_asked_needs_both_ends_alone(context: PlanContext) -> Non
 
 
 def test_no_look_comes_before_both_ends_of_the_range(context: PlanContext) -> None:
-    counts = look_counts(context.activities, context.recipe)
-    assert counts[0] == 25  # the first dwell of the third soak of twelve
+    counts = look_counts(context.activities, context.station, context.recipe)
+    assert 24 < counts[0] <= 30  # the third soak of twelve has begun
     assert counts[-1] < 60
+
+
+def test_no_look_rests_on_a_single_dwell(context: PlanContext) -> None:
+    """By hand: the hat matrix of the dwells so far, of which no diagonal element may exceed one half."""
+    columns = design.local_columns(
+        design.split(context.recipe.effects)[0], context.state, design.starting_values([], context.state)
+    )
+    first = look_counts(context.activities, context.station, context.recipe)[0]
+    hat = [h @ np.linalg.pinv(h) for h in columns[:, :first]]
+    assert max(np.max(np.diagonal(one)) for one in hat) <= 0.5
+    before = [h @ np.linalg.pinv(h) for h in columns[:, : first - 1]]
+    assert max(np.max(np.diagonal(one)) for one in before) > 0.5
 
 
 def test_poses_with_waits_keep_their_order() -> None:
