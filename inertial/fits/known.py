@@ -8,6 +8,7 @@ decision becomes that of as many decisions as there are looks, Φ(−k′) = Φ(
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -20,6 +21,9 @@ MISSED = 0.05
 
 GROWTH = 1.15
 """Dwells at a look over those at the look before: the errors fall by 7 % between two, and a plan has about ten of them."""
+
+LOSS = 1.1
+"""Variance that a shorter dwell may have over that of the planned one: the errors of the whole plan grow by at most 5 %."""
 
 
 def looks_at(first: int, last: int) -> list[int]:
@@ -51,19 +55,31 @@ def largest_ratio(errors: Array, effects: Sequence[str], asked: dict[str, float]
     return np.max(errors[..., list(index)] / np.array(limit), axis=(-2, -1))
 
 
-def best_length(white: float, flicker: float, spacing: float, length: float, lengths: Array) -> float:
-    """The length of a dwell, of some lengths in s, with the most information per station time.
+@dataclass(frozen=True)
+class DwellNoise:
+    """Noise of a dwell of ``length`` s, standard deviations in one unit, and the ``spacing`` from one to the next, s."""
 
-    Neighbouring dwells have their slow part in common; what they tell apart is the white part, which falls with the length, and
-    the slow part that has changed from one to the next. The variance of that, times the time of a dwell with its move, is least.
+    white: float
+    flicker: float
+    length: float
+    spacing: float
 
-    Parameters
-    ----------
-    white, flicker : standard deviations of a dwell of ``length`` s, in one unit
-    spacing : s, from one dwell to the next
+    def variance(self, lengths: Array) -> Array:
+        """What dwells of some lengths, s, tell apart: the white part, and the slow part that changes from one to the next."""
+        kernel = flicker_kernel(self.spacing * np.arange(3.0), slowest=SLOWEST_FITTED)
+        return self.white**2 * self.length / lengths + self.flicker**2 * float(kernel[0, 0] - kernel[0, 1])
+
+
+def chosen_length(noise: DwellNoise, planned: float, lengths: Array, *, enough: bool) -> float:
+    """The length of the next dwells, of some lengths in s.
+
+    Where the dwells that are left are ``enough``, the shortest whose variance is at most :data:`LOSS` times that of the planned
+    length: a longer mean is no better known, since the output wanders. Where they are not, the one, not below the planned
+    length, with the least variance times station time.
     """
-    beside = spacing - length
-    kernel = flicker_kernel(spacing * np.arange(3.0), slowest=SLOWEST_FITTED)
-    slow = flicker**2 * float(kernel[0, 0] - kernel[0, 1])
-    cost = (white**2 * length / lengths + slow) * (lengths + beside)
-    return float(lengths[int(np.argmin(cost))])
+    variance = noise.variance(lengths)
+    if enough:
+        allowed = LOSS * float(noise.variance(np.array([planned]))[0])
+        return float(np.min(lengths[variance <= allowed], initial=planned))
+    cost = np.where(lengths >= planned, variance * (lengths + noise.spacing - noise.length), np.inf)
+    return float(lengths[int(np.argmin(cost))]) if np.isfinite(cost).any() else planned

@@ -15,7 +15,7 @@ from threadpoolctl import threadpool_limits
 
 from inertial.arrays import Array
 from inertial.errors import InertialError
-from inertial.fits.known import best_length, largest_ratio, noise_guard, over_looks
+from inertial.fits.known import DwellNoise, chosen_length, largest_ratio, noise_guard, over_looks
 from inertial.planning.visibility import visibilities
 from pipelines.archive import Records
 from pipelines.capture.look import Look
@@ -63,6 +63,7 @@ class LotLooks:
         self._summaries: dict[int, pd.DataFrame] = {}
         self._activities = schedule(steps(job.recipe), job.station, job.recipe)
         dwells = [one.step.record for one in self._activities if one.kind == "dwell"]
+        self._dwells = len(dwells)
         self._due = {dwells[count - 1] for count in look_counts(self._activities, job.station, job.recipe)}
 
     def due(self, record: int) -> bool:
@@ -105,7 +106,12 @@ class LotLooks:
         new = {unit: sentence for unit, sentence in fails.items() if unit not in told}
         missing = "" if undecided else self._missing(record, state)
         if undecided or missing:
-            return Look(known=False, text=text + missing, fails=new, dwell_s=self._length(state))
+            return Look(
+                known=False,
+                text=text + missing,
+                fails=new,
+                dwell_s=self._length(state, worst * np.sqrt(state.count / self._dwells)),
+            )
         return Look(known=True, text=text, fails=new, given_up=self._given_up(record))
 
     def _missing(self, record: int, state: "_Evaluated") -> str:
@@ -143,29 +149,32 @@ class LotLooks:
         readings, recipe = self._readings(), self.job.recipe
         new = set(readings["record"].tolist()) - self._summaries.keys()
         rows = summarised(self.records.samples(new), readings, recipe.zero_output, recipe.sensor_axes)
-        self._summaries |= {int(record): own for record, own in rows.groupby("record")}
+        self._summaries |= {record: rows[rows["record"] == record] for record in new}
         return pd.concat([self._summaries[record] for record in sorted(self._summaries)], ignore_index=True)
 
-    def _length(self, state: "_Evaluated") -> float | None:
-        """The length of the next dwells with the most information per time, in blocks; None where the recipe's stays."""
+    def _length(self, state: "_Evaluated", expected: float) -> float | None:
+        """The length of the next dwells in blocks, s; None where it stays.
+
+        expected : U over what is asked for at the end of the plan
+        """
         recipe, longest = self.job.recipe, self.terms.longest_dwell_s
-        spacing = state.spacing
-        if longest is None or spacing is None:
+        if longest is None or state.dwell is None:
             return None
         block = recipe.dwell_s / BLOCKS
+        count = int(max(longest, recipe.dwell_s) / block + 1e-9)
+        lengths = np.linspace(block, count * block, count)
         shortest = max(SHORTEST_DWELL_S, FEWEST_SAMPLES / recipe.rate_hz)
-        lengths = block * np.arange(1, int(longest / block + 1e-9) + 1)
-        lengths = lengths[lengths >= shortest - 1e-9]
+        lengths = lengths[(lengths >= shortest - 1e-9) & (lengths <= longest + 1e-9)]
         if not lengths.size:
             return None
-        return round(best_length(state.white, state.flicker, spacing, state.length, lengths), 6)
+        return round(chosen_length(state.dwell, recipe.dwell_s, lengths, enough=expected <= 1.0), 6)
 
 
 class _Evaluated:
     """The records so far, evaluated as the end of the run would.
 
     units : those that were fitted; dof : of the noise of the lot
-    white, flicker : standard deviations of a dwell, µg; length, spacing : s, of the dwells; no spacing where there is one dwell
+    dwell : their noise, µg; None where there is one dwell
     """
 
     def __init__(self, job: Job, readings: pd.DataFrame, summaries: pd.DataFrame, history: pd.DataFrame) -> None:
@@ -184,18 +193,18 @@ class _Evaluated:
         }
         tables = BudgetTables(dwells, history, wander=made["wander"], prior=made["prior"], lot=lot, **shared)
         stated = decision_budget(tables, terms)
-        full = readings.drop_duplicates("unit").set_index("unit")["full_scale"].astype(float).to_dict()
+        first = readings.drop_duplicates("unit")
+        full = dict(zip(first["unit"].astype(str), first["full_scale"].astype(float), strict=True))
         self.evidence = GradeEvidence(verdicts, residuals=made["residuals"], budget=stated, full_scale=full, **shared)
         self.units = () if own is None else own.units
         wander = made["wander"]
         self.dof = max(int(wander["dof"].sum()), 1)
-        self.white, self.flicker = (
-            float(np.sqrt(np.mean(wander[name] ** 2))) if len(wander) else 0.0 for name in ("white_ug", "flicker_ug")
-        )
         fitted = readings[readings["kind"] == "dwell"].drop_duplicates("record")
+        self.count = len(fitted)
         gaps = [b - a for a, b in pairwise(fitted["start_s"])]
-        self.length = float(fitted["duration_s"].median())
-        self.spacing = float(np.median(gaps)) if gaps else None
+        white, flicker = (float(np.sqrt(np.mean(wander[name] ** 2))) for name in ("white_ug", "flicker_ug"))
+        length = float(np.median(fitted["duration_s"]))
+        self.dwell = DwellNoise(white, flicker, length, float(np.median(gaps))) if gaps and len(wander) else None
 
     def ratios(self, asked: dict[str, float], zero_g: float) -> Array:
         """Largest standard uncertainty over what is asked for, (units,)."""

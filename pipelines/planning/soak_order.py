@@ -85,10 +85,10 @@ def ordered(context: PlanContext, required: Array) -> Ordered:
     ]
     until = [known_after(_planned(context, one), required) for one in tried]
     best = min(range(len(tried)), key=lambda k: (math.inf if until[k] is None else until[k], k))
-    before = known_after(context, required)
-    if before is not None and (until[best] is None or before <= until[best]):
+    before, after = known_after(context, required), until[best]
+    if before is not None and (after is None or before <= after):
         return Ordered(recipe, before, before)
-    return Ordered(tried[best], until[best], before)
+    return Ordered(tried[best], after, before)
 
 
 def look_counts(activities: Sequence[Activity], station: StationConfig, recipe: Recipe) -> list[int]:

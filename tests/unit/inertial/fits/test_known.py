@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from inertial.distributions import normal_tail
-from inertial.fits.known import MISSED, best_length, largest_ratio, looks_at, noise_guard, over_looks
+from inertial.fits.known import MISSED, DwellNoise, chosen_length, largest_ratio, looks_at, noise_guard, over_looks
 
 LOTS = 4000
 
@@ -45,10 +45,19 @@ def test_only_what_is_asked_for_is_compared() -> None:
     assert largest_ratio(errors, effects, {}) == pytest.approx([0.0, 0.0])
 
 
-def test_white_noise_wants_long_dwells_and_wander_short_ones() -> None:
+def test_a_dwell_ends_when_its_mean_is_no_better_known() -> None:
+    """White noise alone: a tenth more variance is a tenth less time. Wander alone: the shortest dwell says as much."""
     lengths = np.arange(1.0, 21.0)
-    assert best_length(1.0, 0.0, 15.0, 10.0, lengths) == 20.0
-    assert best_length(0.0, 1.0, 15.0, 10.0, lengths) == 1.0
-    both = [best_length(white, 1.0, 15.0, 10.0, lengths) for white in (0.2, 0.5, 1.0)]
-    assert both == sorted(both)
-    assert 1.0 < both[1] < 20.0
+    assert chosen_length(DwellNoise(1.0, 0.0, 10.0, 15.0), 10.0, lengths, enough=True) == 10.0
+    assert chosen_length(DwellNoise(0.0, 1.0, 10.0, 15.0), 10.0, lengths, enough=True) == 1.0
+    between = [chosen_length(DwellNoise(w, 1.0, 10.0, 15.0), 10.0, lengths, enough=True) for w in (0.1, 0.2, 0.4, 1.0)]
+    assert between == sorted(between)
+    assert 1.0 < between[1] < 10.0
+
+
+def test_a_dwell_is_longer_where_the_plan_is_not_enough() -> None:
+    """By hand: white variance w·L₀/L times L + b falls with L: the longest is the best; wander makes longer ones idle."""
+    lengths = np.arange(1.0, 21.0)
+    assert chosen_length(DwellNoise(1.0, 0.0, 10.0, 15.0), 10.0, lengths, enough=False) == 20.0
+    assert chosen_length(DwellNoise(0.0, 1.0, 10.0, 15.0), 10.0, lengths, enough=False) == 10.0
+    assert chosen_length(DwellNoise(1.0, 0.0, 10.0, 15.0), 10.0, lengths[:5], enough=False) == 10.0
