@@ -25,7 +25,7 @@ sys.path.insert(0, str(ROOT))
 
 import numpy as np  # noqa: E402
 
-from inertial.fits.known import noise_guard  # noqa: E402
+from inertial.fits.known import noise_guard, over_looks  # noqa: E402
 from inertial.fits.wander import fit_lot_with_wander  # noqa: E402
 from inertial.frames import force_from_angles  # noqa: E402
 from inertial.noise.dwells import DwellNoise  # noqa: E402
@@ -258,7 +258,8 @@ def known(name: str, options: argparse.Namespace) -> None:
             print(
                 f"  {factor:g} times its errors, {title}: {early} of {len(lots)} lots end early, {minutes.mean():.0f} min "
                 f"({minutes.min():.0f} to {minutes.max():.0f}), {100.0 * minutes.mean() / against.minutes:.1f} %; "
-                f"within U {inside_of(looked)}"
+                f"within U {inside_of(looked)}; at any look beyond what a failure is told by: "
+                f"{100.0 * np.mean(np.concatenate([one.beyond for one in looked])):.2f} %"
             )
             ratios = {
                 effect: rms_of(looked, effect) / rms_of(whole, effect) for effect in dict.fromkeys(looked[0].effects)
@@ -273,7 +274,8 @@ class Looked:
     """A lot that ends when it is known.
 
     required : (3, p), standard errors in g; early : whether it ends before the plan; minutes : of the station until then
-    off, inside : (units, 3, p), errors in g, and whether they are within U
+    off, inside, beyond : (units, 3, p), errors in g, whether they are within U, and whether they are beyond what a unit would be
+        told to fail by, at any look
     """
 
     def __init__(self, plan: PlanContext, preset: Preset, truths: list[Truth], seed: int, required: Array) -> None:
@@ -282,6 +284,7 @@ class Looked:
             course = replace(course, rate=RATE_HZ)
         state, mean, error = measured(course, preset, truths, seed)
         dwells = [one for one in plan.activities if one.kind == "dwell"]
+        self.beyond = np.zeros((len(truths), *required.shape), dtype=bool)
         counts = look_counts(plan.activities, plan.station, plan.recipe)
         for count in [*counts, len(dwells)]:
             part = State(
@@ -294,10 +297,12 @@ class Looked:
             fit = fit_lot_with_wander(plan.recipe.effects, part, mean[:, :count], error[:, :count]).fit
             spread = np.sqrt(np.diagonal(fit.covariance, axis1=-2, axis2=-1))
             guard = noise_guard(int(fit.dof.sum()), len(counts))
+            off = fit.coefficients - truth_of(truths, fit.names)
+            self.beyond = self.beyond | (np.abs(off) > over_looks(2.0, len(counts)) * guard * spread)
             if count < len(dwells) and np.all(guard * spread <= required):
                 break
         self.effects = [effect for effect, _ in fit.names[0]]
-        self.off = fit.coefficients - truth_of(truths, fit.names)
+        self.off = off
         self.inside = np.abs(self.off) <= 2.0 * spread
         self.early = count < len(dwells)
         self.minutes = (dwells[count - 1].start + dwells[count - 1].seconds) / 60.0

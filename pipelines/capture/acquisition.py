@@ -173,7 +173,8 @@ class Acquisition:
         self.rest(recipe.settle_s if step.wait_s is None else step.wait_s)
         self.supervisor.check_before(self.slots)
         self.supervisor.require_steady_clocks(spoilt=False)
-        chosen = self.dwell_s if step.kind == "dwell" else None
+        # on a ramp the length of the dwells decides how far the devices come
+        chosen = self.dwell_s if step.kind == "dwell" and step.settled else None
         duration, rate = chosen or step.lasts(recipe), step.rate_hz or recipe.rate_hz
         powered = station.reader.since_power()
         station.reader.start(rate)

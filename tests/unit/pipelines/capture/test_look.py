@@ -6,7 +6,9 @@ from small_station import MemorySink, lot_of, short_recipe
 from pipelines.capture.capture import capture
 from pipelines.capture.look import Look
 from schemas.event import MemoryLog
+from schemas.poses import SoakPart
 from schemas.progress import silent
+from schemas.recipe import Recipe
 from schemas.station import load_station
 from stations.opening import open_station
 
@@ -33,9 +35,9 @@ class Told:
         )
 
 
-def captured(sink: MemorySink, events: MemoryLog, looks: Told) -> None:
+def captured(sink: MemorySink, events: MemoryLog, looks: Told, recipe: Recipe = RECIPE) -> None:
     with open_station(load_station(), lot_of(2), resume=sink.last_state()) as station:
-        capture(station, RECIPE, lot_of(2), sink, progress=silent, events=events, looks=looks)
+        capture(station, recipe, lot_of(2), sink, progress=silent, events=events, looks=looks)
 
 
 def looks() -> Told:
@@ -62,6 +64,14 @@ def test_a_lot_ends_when_it_is_known_and_says_so() -> None:
         ("given_up", 2, "third_order"),
         ("known", 2, "2 records not taken"),
     ]
+
+
+def test_dwells_on_a_ramp_keep_their_length() -> None:
+    """They decide how far the devices come on the way."""
+    sink, ramp = MemorySink(), SoakPart(temperature_C=23.0, settled=False)
+    captured(sink, MemoryLog(), looks(), RECIPE.model_copy(update={"soaks": [ramp], "static_record_s": 0.0}))
+    lengths = {float(readings["duration_s"].iloc[0]) for _, readings, _ in sink.records.values()}
+    assert lengths == {2.0}
 
 
 @pytest.mark.parametrize("after", [2, 3, 4])
