@@ -19,8 +19,8 @@ from inertial.fits.known import DwellNoise, chosen_length, largest_ratio, noise_
 from inertial.planning.visibility import visibilities
 from pipelines.archive import Records
 from pipelines.capture.look import Look
+from pipelines.chain.in_memory import evaluated
 from pipelines.jobs.job import Job
-from pipelines.jobs.priors import family
 from pipelines.planning.soak_order import look_counts
 from pipelines.planning.timed_design import SHORTEST_DWELL_S
 from pipelines.schedule.planned_state import state_of
@@ -28,15 +28,11 @@ from pipelines.schedule.steps import TUMBLED, steps
 from pipelines.schedule.timing import schedule
 from pipelines.stages.figures import coefficients, errors
 from pipelines.stages.figures.base import LotCoefficients
-from pipelines.stages.fit import fit_in_memory
-from pipelines.stages.grade import GradeEvidence, grade
+from pipelines.stages.grade import grade
 from pipelines.stages.judge import verdict_on
 from pipelines.stages.noise import noise
 from pipelines.stages.reduce import reduce
-from pipelines.stages.uncertainty.budget_terms import BudgetTables
-from pipelines.stages.uncertainty.decision_budget import decision_budget
 from pipelines.stages.validate import validate
-from pipelines.stages.verify import verify_tables
 from pipelines.tables.dwells import LotTables
 from pipelines.tables.summaries import summarised
 from schemas.errors import TumblelineError
@@ -123,9 +119,9 @@ class LotLooks:
             if unseen:
                 return f"; {', '.join(unseen)} not visible yet"
         verdict = verdict_on(state.lot.dwells, state.lot.history, self.job.recipe.effects)
-        if verdict["adequate"] is False:
-            return "; the model is not adequate, a diagnosis needs the other dwells"
-        return ""
+        if verdict["adequate"] is None:
+            return f"; whether the model is adequate cannot be judged yet: {verdict['reason']}"
+        return "" if verdict["adequate"] else "; the model is not adequate, a diagnosis needs the other dwells"
 
     def _given_up(self, record: int) -> tuple[str, ...]:
         """Effects that the whole plan would show, and the dwells so far do not."""
@@ -181,22 +177,12 @@ class _Evaluated:
         recipe, terms = job.recipe, job.terms
         verdicts = validate(summaries, readings, job.lot.units)
         dwells = reduce(summaries, readings, verdicts, recipe.local_gravity_m_s2, terms.follows)
-        self.lot = lot = LotTables(dwells, history)
-        made, expected, own = fit_in_memory(lot, recipe.effects, family(job.prior))
-        made |= verify_tables(lot, made["coefficients"], made["covariance"], expected, own)
-        names = ("coefficients", "covariance", "verification", "verification_poses")
-        # the static record comes after the poses: its figures are decided at the end of the run
-        shared: dict[str, Any] = {
-            **{name: made[name] for name in names},
-            "noise": noise(None)["noise"],
-            "calibration": own,
-        }
-        tables = BudgetTables(dwells, history, wander=made["wander"], prior=made["prior"], lot=lot, **shared)
-        stated = decision_budget(tables, terms)
+        self.lot = LotTables(dwells, history)
         first = readings.drop_duplicates("unit")
         full = dict(zip(first["unit"].astype(str), first["full_scale"].astype(float), strict=True))
-        self.evidence = GradeEvidence(verdicts, residuals=made["residuals"], budget=stated, full_scale=full, **shared)
-        self.units = () if own is None else own.units
+        # the static record comes after the poses: its figures are decided at the end of the run
+        made, self.evidence = evaluated(job, self.lot, verdicts, noise(None)["noise"], full)
+        self.units = () if self.evidence.calibration is None else self.evidence.calibration.units
         wander = made["wander"]
         self.dof = max(int(wander["dof"].sum()), 1)
         fitted = readings[readings["kind"] == "dwell"].drop_duplicates("record")

@@ -105,6 +105,18 @@ def test_a_unit_beyond_its_limit_is_told_once(run: Run, tmp_path: Path) -> None:
     assert looks.look(last, frozenset({"A1"})).fails.keys() == {"A2", "A3"}
 
 
+def test_a_model_that_is_not_adequate_keeps_the_lot_going(run: Run, tmp_path: Path) -> None:
+    """Misalignment of milliradians that the model lacks: its U is small, and means nothing."""
+    job = job_of(tmp_path, 800.0)
+    figures = {"zero_g_offset_mg": job.limits.figures["zero_g_offset_mg"]}
+    recipe = job.recipe.model_copy(update={"effects": ["bias", "scale"]})
+    plain = Job(recipe, job.limits.model_copy(update={"figures": figures}), job.lot, job.station)
+    assert run.records is not None
+    found = LotLooks(plain, StopTerms(), run.records).look(int(run.table("readings")["record"].max()), frozenset())
+    assert not found.known
+    assert found.text == "3 of 3 units decided; the model is not adequate, a diagnosis needs the other dwells"
+
+
 def test_effects_that_must_be_visible_keep_the_lot_going(run: Run, tmp_path: Path) -> None:
     job = job_of(tmp_path, 800.0)
     assert run.records is not None
