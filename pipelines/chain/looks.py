@@ -5,7 +5,8 @@ A unit is known when its figures pass and its uncertainties are those that ``[st
 with the allowance of :mod:`inertial.fits.known` for a noise that the same dwells show.
 """
 
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -88,9 +89,8 @@ class LotLooks:
         )
         own, guarded = (grade(state.evidence, rule, zero_g) for rule in (limits, wide))
         fails = _failing(guarded["figures"])
-        passed = set(own["grades"].query("outcome == 'pass'")["unit"]) & _passed(
-            own["figures"], guarded["figures"], limits
-        )
+        figures = _open_figures(own["figures"], guarded["figures"], limits, state.units)
+        passed = set(own["grades"].query("outcome == 'pass'")["unit"]) - figures.keys()
         ratio = guard * limits.coverage_factor * state.ratios(self.terms.asked, zero_g)
         fitted = dict(zip(state.units, ratio.tolist(), strict=True))
         reached = {unit for unit, one in fitted.items() if one <= 1.0}
@@ -98,7 +98,7 @@ class LotLooks:
         worst = max((one for unit, one in fitted.items() if unit not in fails), default=0.0)
         asked = f"U at most {worst:.2f} of what is asked, " if self.terms.asked else ""
         units = len(own["grades"])
-        text = f"{asked}{units - len(undecided)} of {units} units decided"
+        text = f"{asked}{units - len(undecided)} of {units} units decided{_most_often(figures, undecided)}"
         new = {unit: sentence for unit, sentence in fails.items() if unit not in told}
         missing = "" if undecided else self._missing(record, state)
         if undecided or missing:
@@ -205,17 +205,25 @@ class _Evaluated:
         return largest_ratio(np.array(worst).reshape(len(worst), 1, len(asked)), list(asked), asked)
 
 
-def _passed(own: pd.DataFrame, guarded: pd.DataFrame, limits: Limits) -> set[str]:
-    """Units whose limited figures of the dwells pass: coefficients by the guarded rule, verification by that of the limits.
+def _open_figures(
+    own: pd.DataFrame, guarded: pd.DataFrame, limits: Limits, units: Sequence[str]
+) -> dict[str, frozenset[str]]:
+    """Limited figures of the dwells that do not pass, by unit: coefficients by the guarded rule, verification by the limits' own.
 
     Further dwells of the fit hardly change a figure of verification, so that looks do not give it more chances to pass.
     """
     needed = BEFORE_THE_RECORD & limits.figures.keys()
-    of_fit = guarded[guarded["figure"].isin(list(needed & OF_COEFFICIENTS))]
-    of_checks = own[own["figure"].isin(list(needed - OF_COEFFICIENTS))]
-    rows = pd.concat([of_fit, of_checks])
-    counts = rows[rows["outcome"] == "pass"].groupby("unit").size()
-    return {str(unit) for unit, count in counts.items() if count == len(needed)}
+    of_fit = guarded[guarded["figure"].isin(list(OF_COEFFICIENTS))]
+    of_checks = own[~own["figure"].isin(list(OF_COEFFICIENTS))]
+    rows = pd.concat([of_fit, of_checks]).query("outcome == 'pass'")
+    left = {unit: frozenset(needed - set(rows.loc[rows["unit"] == unit, "figure"])) for unit in units}
+    return {unit: names for unit, names in left.items() if names}
+
+
+def _most_often(figures: Mapping[str, frozenset[str]], undecided: Collection[str]) -> str:
+    """The figure that keeps most units undecided, with a leading semicolon; empty where none does."""
+    counts = Counter(name for unit in undecided for name in sorted(figures.get(unit, ())))
+    return "".join(f"; {name} open in {count}" for name, count in counts.most_common(1))
 
 
 def _failing(figures: pd.DataFrame) -> dict[str, str]:
