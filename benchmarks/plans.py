@@ -2,7 +2,9 @@
 
 200 units drawn from the physics of the plant (transfer, temperature, flicker, random walk, converter) are measured with both
 recipes, at the time of each dwell on the station; dwells are averaged and fitted as in the chain. The benchmark compares the
-RMS errors (estimate − truth) of every coefficient, the share of truths within U, and the station time. The air is that of the
+RMS errors (estimate − truth) of every coefficient, the share of truths within U, and the station time. With `--known 1.5,2` the
+textbook plan ends, as given and in the order of `plan order`, when lots of eight know their coefficients with 1.5 and 2 times its
+errors, by the looks of a run (without the budget of the references and the verdict on the model). The air is that of the
 plant's chamber, each unit follows it with its own lag and place in the air stream, and its thermometer has noise. Registers are
 not simulated: a test compares the planned station time with the clock of the simulated station.
 """
@@ -11,6 +13,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import shlex
 import sys
 import time
 from dataclasses import dataclass, replace
@@ -22,6 +25,7 @@ sys.path.insert(0, str(ROOT))
 
 import numpy as np  # noqa: E402
 
+from inertial.fits.known import noise_guard, over_looks  # noqa: E402
 from inertial.fits.wander import fit_lot_with_wander  # noqa: E402
 from inertial.frames import force_from_angles  # noqa: E402
 from inertial.noise.dwells import DwellNoise  # noqa: E402
@@ -33,6 +37,7 @@ from pipelines.planning.lower_bound import lower_bound  # noqa: E402
 from pipelines.planning.optimise import optimise  # noqa: E402
 from pipelines.planning.plan import identified  # noqa: E402
 from pipelines.planning.requirement import Requirement, candidates, temperature_choices  # noqa: E402
+from pipelines.planning.soak_order import look_counts, ordered  # noqa: E402
 from pipelines.planning.textbook import seen_by, textbook  # noqa: E402
 from pipelines.schedule.timing import spent  # noqa: E402
 from schemas.errors import TumblelineError  # noqa: E402
@@ -49,6 +54,8 @@ CHUNK = 25
 PARTS = 4
 """Parts of a dwell with temperatures of their own."""
 THERMOMETER_K = 0.005
+RATE_HZ = 25.0
+"""Samples of a dwell, where no filter of the device would be aliased."""
 
 
 @dataclass(frozen=True)
@@ -225,6 +232,99 @@ def compared(name: str, options: argparse.Namespace) -> None:
     print(f"  truth within U (k = 2): textbook {100.0 * inside_before:.1f} %, optimal {100.0 * inside:.1f} %")
 
 
+LOT = 8
+
+
+def known(name: str, options: argparse.Namespace) -> None:
+    """Prints what a device's lots need until they are known."""
+    preset = load_preset(name)
+    update = {"device": name, "effects": list(STARTING_MODEL), "static_record_s": 0.0, "name": name.lower()}
+    base = load_recipe().model_copy(update=update)
+    white = 1e-6 * preset.sampled_density_ug(base.rate_hz)
+    noise = DwellNoise(white, 1e-6 * preset.bias_instability_ug, 1e-6 * preset.rate_random_walk_ug)
+    levels = tuple(float(part) for part in options.temperatures.split(","))
+    against = plan_context(textbook(base, levels), load_station(), noise)
+    expected = identified(against).errors
+    truths = truths_of(preset, options.units, options.seed)
+    lots = [truths[k : k + LOT] for k in range(0, len(truths), LOT)]
+    whole = [Looked(against, preset, lot, options.seed + k, 0.0 * expected) for k, lot in enumerate(lots)]
+    print(f"{name}: textbook plan {against.minutes:.0f} min, within U {inside_of(whole)}", flush=True)
+    for factor in map(float, options.known.split(",")):
+        new = plan_context(ordered(against, factor * expected).recipe, against.station, noise)
+        for title, plan in (("as given", against), ("in order", new)):
+            looked = [Looked(plan, preset, lot, options.seed + k, factor * expected) for k, lot in enumerate(lots)]
+            minutes = np.array([one.minutes for one in looked])
+            early = sum(one.early for one in looked)
+            print(
+                f"  {factor:g} times its errors, {title}: {early} of {len(lots)} lots end early, {minutes.mean():.0f} min "
+                f"({minutes.min():.0f} to {minutes.max():.0f}), {100.0 * minutes.mean() / against.minutes:.1f} %; "
+                f"within U {inside_of(looked)}; at any look beyond what a failure is told by: "
+                f"{100.0 * np.mean(np.concatenate([one.beyond for one in looked])):.2f} %"
+            )
+            ratios = {
+                effect: rms_of(looked, effect) / rms_of(whole, effect) for effect in dict.fromkeys(looked[0].effects)
+            }
+            print(
+                f"    RMS error over the whole plan's: {', '.join(f'{e} {r:.2f}' for e, r in ratios.items())}",
+                flush=True,
+            )
+
+
+class Looked:
+    """A lot that ends when it is known.
+
+    required : (3, p), standard errors in g; early : whether it ends before the plan; minutes : of the station until then
+    off, inside, beyond : (units, 3, p), errors in g, whether they are within U, and whether they are beyond what a unit would be
+        told to fail by, at any look
+    """
+
+    def __init__(self, plan: PlanContext, preset: Preset, truths: list[Truth], seed: int, required: Array) -> None:
+        course = course_of(plan)
+        if preset.noise_bandwidth_hz == 0.0:  # the mean has the same noise as at the recipe's rate
+            course = replace(course, rate=RATE_HZ)
+        state, mean, error = measured(course, preset, truths, seed)
+        dwells = [one for one in plan.activities if one.kind == "dwell"]
+        self.beyond = np.zeros((len(truths), *required.shape), dtype=bool)
+        counts = look_counts(plan.activities, plan.station, plan.recipe)
+        for count in [*counts, len(dwells)]:
+            part = State(
+                force=state.force[:, :count],
+                time=state.time[:, :count],
+                temperature=np.asarray(state.temperature)[:, :count],
+            )
+            if count < len(dwells) and not required.any():
+                continue
+            fit = fit_lot_with_wander(plan.recipe.effects, part, mean[:, :count], error[:, :count]).fit
+            spread = np.sqrt(np.diagonal(fit.covariance, axis1=-2, axis2=-1))
+            guard = noise_guard(int(fit.dof.sum()), len(counts))
+            off = fit.coefficients - truth_of(truths, fit.names)
+            self.beyond = self.beyond | (np.abs(off) > over_looks(2.0, len(counts)) * guard * spread)
+            if count < len(dwells) and np.all(guard * spread <= required):
+                break
+        self.effects = [effect for effect, _ in fit.names[0]]
+        self.off = off
+        self.inside = np.abs(self.off) <= 2.0 * spread
+        self.early = count < len(dwells)
+        self.minutes = (dwells[count - 1].start + dwells[count - 1].seconds) / 60.0
+
+
+def inside_of(looked: list[Looked]) -> str:
+    """Share of truths within U by effect, in words."""
+    every = np.concatenate([one.inside for one in looked])
+    names = looked[0].effects
+    parts = [
+        f"{effect} {100.0 * every[..., [c for c, other in enumerate(names) if other == effect]].mean():.1f}"
+        for effect in dict.fromkeys(names)
+    ]
+    return f"{100.0 * every.mean():.1f} % ({', '.join(parts)})"
+
+
+def rms_of(looked: list[Looked], effect: str) -> float:
+    """RMS error of an effect's coefficients over units and axes, g."""
+    own = [c for c, other in enumerate(looked[0].effects) if other == effect]
+    return float(np.sqrt(np.mean(np.concatenate([one.off for one in looked])[..., own] ** 2)))
+
+
 def squared_errors(course: PlanContext, preset: Preset, options: argparse.Namespace) -> tuple[Names, Array, float]:
     """Names, squared errors (units, 3, p) in g of fits to units drawn from the physics of the plant, share within 2 σ."""
     truths = truths_of(preset, options.units, options.seed)
@@ -261,10 +361,11 @@ def main() -> None:
         "--verification", type=int, default=1, help="dwells of each verification pose; the textbook plan has none"
     )
     parser.add_argument("--ramp", action="store_true", help="measure while the chamber ramps, without soaks")
+    parser.add_argument("--known", default="", help="end when known with so many times the textbook plan's errors")
     options = parser.parse_args()
-    print(f"python benchmarks/plans.py --units {options.units} --seed {options.seed} --factor {options.factor:g}")
+    print(f"python benchmarks/plans.py {shlex.join(sys.argv[1:])}")
     for name in options.device or ("adxl355", "analogue"):
-        compared(name, options)
+        (known if options.known else compared)(name, options)
 
 
 if __name__ == "__main__":

@@ -3,7 +3,21 @@
 from dataclasses import asdict, dataclass, field
 from typing import Any, Literal, Protocol
 
-Kind = Literal["reference", "soak", "suspended", "resumed", "spoilt", "unit_lost", "power", "emergency_stop", "stopped"]
+Kind = Literal[
+    "reference",
+    "soak",
+    "suspended",
+    "resumed",
+    "spoilt",
+    "unit_lost",
+    "power",
+    "emergency_stop",
+    "stopped",
+    "look",
+    "fails",
+    "known",
+    "given_up",
+]
 
 NO_RECORD = -1
 

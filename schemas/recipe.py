@@ -29,6 +29,7 @@ from schemas.bounds import (
 from schemas.fault import FaultOrder
 from schemas.poses import Pose, SoakPart
 from schemas.prior import PriorTerms
+from schemas.stopping import StopTerms
 from schemas.strict import Grown, Strict, refuse_repeated
 from schemas.uncertainty import Uncertainty
 from schemas.validity import CertificateTerms, Stability
@@ -54,13 +55,13 @@ class _Measurement(Grown):
     simulated station, to try what a recipe does then. ``verification_order``: at the end of each soak, or spread among the poses
     of the fit; it is part of the recipe because it moves the figure of verification. ``uncertainty`` states what the recipe's own
     fixture adds to the station's, ``stability`` what this kind of device does beyond a run, ``certificate`` what is certified.
-    ``prior`` names earlier calibrations of the device that count beside the measurement.
+    ``prior`` names earlier calibrations of the device that count beside the measurement, ``stop`` what ends the lot early.
     ``procedures`` lists the test procedures of the lot in order; without it
     the lot goes through the multi-position test and the static record.
     """
 
     later: ClassVar[frozenset[str]] = frozenset(
-        {"sensor_axes", "verification_order", "uncertainty", "stability", "certificate", "procedures", "prior"}
+        {"sensor_axes", "verification_order", "uncertainty", "stability", "certificate", "procedures", "prior", "stop"}
     )
 
     name: Annotated[Name, Field(pattern=r"^[a-z0-9][a-z0-9._-]*$")]
@@ -90,6 +91,7 @@ class _Measurement(Grown):
     stability: Stability | None = None
     certificate: CertificateTerms | None = None
     prior: PriorTerms | None = None
+    stop: StopTerms | None = None
 
     @property
     def tumbles(self) -> bool:
@@ -129,6 +131,15 @@ class _Measurement(Grown):
                     f"{key}: {getattr(self, key) * self.rate_hz:.3g} samples in one record, at most {MOST_SAMPLES:.0e} are "
                     f"possible; lower {key} or rate_hz"
                 )
+        return self
+
+    @model_validator(mode="after")
+    def _stops_by_its_model(self) -> "_Measurement":
+        missing = [effect for effect in (self.stop.asked if self.stop else ()) if effect not in self.effects]
+        if missing and self.effects:
+            raise ValueError(
+                f"stop: an uncertainty of {missing[0]} is asked for, the model has no such effect; remove it, or add the effect"
+            )
         return self
 
     @field_validator("temperatures_C")

@@ -76,7 +76,10 @@ CODE = {
     "import with a fit": (*_READ, "pipelines.diagnosis", "pipelines.parallel", "pipelines.stages"),
     "import of waveforms": (*_PROCEDURES, "pipelines.archive", "pipelines.importers"),
     "import of a transfer function": _READ,
-    "report": (*(*_DRAWN, "stations", "pipelines.capture", "pipelines.importers", "pipelines.jobs"),),
+    "report": (
+        *(*_DRAWN, "stations", "pipelines.capture", "pipelines.importers", "pipelines.jobs"),
+        *("pipelines.schedule.early_end", "pipelines.schedule.steps"),
+    ),
     "report of an import": (*_DRAWN, "pipelines.diagnosis", "pipelines.jobs.model_files", "pipelines.parallel"),
     "inquiry": (
         *("schemas", "inertial", "pipelines.diagnosis", "pipelines.parallel"),

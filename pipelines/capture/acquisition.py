@@ -13,7 +13,7 @@ from pipelines.capture.turning import Turning
 from pipelines.procedures import procedure_of
 from pipelines.procedures.base import OnEquipment, SetsEquipment
 from pipelines.procedures.recorded import ProcedureStep
-from pipelines.schedule.steps import Step
+from pipelines.schedule.steps import TUMBLED, Step
 from schemas.errors import LinkLost, OperatorNeeded, StationError, StationTimeout
 from schemas.event import NO_RECORD
 from schemas.lot import Lot, Unit
@@ -54,7 +54,6 @@ class CaptureSink(Protocol):
 OBSERVATIONS = 5  # observations of encoders and instruments within a dwell
 HISTORY_S = 10.0
 OK = "ok"
-TUMBLED = ("dwell", "verification")
 LONG_ROWS = 1_000_000  # most samples of a record in memory; a longer record is stored in pieces
 PIECE_ROWS = 250_000
 FILL = 0.5  # part of the slots' memory that may fill before it is emptied
@@ -84,6 +83,8 @@ class Acquisition:
     plausibility: Plausibility = field(init=False)
     power: Power = field(init=False)
     at: int = NO_RECORD
+    dwell_s: float | None = None
+    """Length of the dwells of the fit that a look has chosen; that of the recipe where None."""
 
     def __post_init__(self) -> None:
         """Prepares the checks of records, and the power orders where the recipe has some."""
@@ -172,7 +173,9 @@ class Acquisition:
         self.rest(recipe.settle_s if step.wait_s is None else step.wait_s)
         self.supervisor.check_before(self.slots)
         self.supervisor.require_steady_clocks(spoilt=False)
-        duration, rate = step.lasts(recipe), step.rate_hz or recipe.rate_hz
+        # on a ramp the length of the dwells decides how far the devices come
+        chosen = self.dwell_s if step.kind == "dwell" and step.settled else None
+        duration, rate = chosen or step.lasts(recipe), step.rate_hz or recipe.rate_hz
         powered = station.reader.since_power()
         station.reader.start(rate)
         record = Record(step.record, step.kind, step.pose, step.soak, station.clock.now(), duration, rate)

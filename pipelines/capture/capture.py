@@ -1,8 +1,10 @@
 """Capture: drives a station through a recipe and hands every record to a sink; the only place that does."""
 
 from pipelines.capture.acquisition import Acquisition, CaptureSink
+from pipelines.capture.look import DWELL_S, Looks, recorded_look
 from pipelines.capture.supervision import LINK_ATTEMPTS, LOST_FOR, WARMING, StillSuspended, Supervisor
 from pipelines.capture.time_left import Approach, Remaining
+from pipelines.schedule.early_end import left_out
 from pipelines.schedule.steps import Step, steps
 from schemas.errors import LeaseLost, LinkLost, NotReached, StationError, StationTimeout
 from schemas.event import EventLog, MemoryLog
@@ -21,6 +23,7 @@ def capture(
     *,
     progress: Progress,
     events: EventLog | None = None,
+    looks: Looks | None = None,
 ) -> None:
     """Takes every record of a recipe that the sink does not have yet, in order.
 
@@ -31,12 +34,13 @@ def capture(
     Parameters
     ----------
     events : journal of pauses, repeats and their reasons; kept in memory only where there is none
+    looks : decide during the capture whether the rest of the poses is needed; they all are where None
     """
     plan = steps(recipe)
     check(station, recipe, plan)
     supervisor = Supervisor(station, events if events is not None else MemoryLog())
     remaining = Remaining(plan, station.config, recipe)
-    CaptureRun(Acquisition(station, recipe, lot, sink, supervisor), remaining, progress).run(plan)
+    CaptureRun(Acquisition(station, recipe, lot, sink, supervisor), remaining, progress, looks).run(plan)
 
 
 def check(station: Station, recipe: Recipe, plan: list[Step]) -> None:
@@ -56,8 +60,10 @@ def check(station: Station, recipe: Recipe, plan: list[Step]) -> None:
 class CaptureRun:
     """The capture of one lot, record by record, each from its checkpoint; ``approach`` follows the soak under way."""
 
-    def __init__(self, acquisition: Acquisition, remaining: Remaining, progress: Progress) -> None:
-        self.acquisition, self.remaining, self.progress = acquisition, remaining, progress
+    def __init__(
+        self, acquisition: Acquisition, remaining: Remaining, progress: Progress, looks: Looks | None = None
+    ) -> None:
+        self.acquisition, self.remaining, self.progress, self.looks = acquisition, remaining, progress, looks
         self.station, self.supervisor = acquisition.station, acquisition.supervisor
         self.approach: Approach | None = None
 
@@ -70,15 +76,48 @@ class CaptureRun:
         try:
             self.supervisor.begin(acquisition.lot.units)
             soak = max((step.soak for step in plan if step.record in done), default=-1) if self.station.exact else -1
+            missing = set[int]()
             for number, step in enumerate(plan):
+                if step.record in missing:
+                    continue
                 if step.record not in done:
                     acquisition.at = number
                     self.record(step, settled=step.soak <= soak)
                     soak = max(soak, step.soak)
+                if not missing and self.looks is not None and self.looks.due(step.record):
+                    missing = self.look(plan, number, self.looks, passed=step.record < max(done, default=-1))
         except (StationError, LeaseLost) as problem:
             self.supervisor.stop(acquisition.at, problem)
             raise
         self.progress(len(plan), len(plan), "captured")
+
+    def look(self, plan: list[Step], number: int, looks: Looks, *, passed: bool) -> set[int]:
+        """Looks at the records so far, once for each; gives the records that are not needed any more.
+
+        passed : whether the capture has gone on since, so that the journal alone says what was decided
+        """
+        step, supervisor, acquisition = plan[number], self.supervisor, self.acquisition
+        look = recorded_look(supervisor.events.recorded(), step.record)
+        if look is None and not passed:
+            self.report(step, "comparing the records so far with what is asked for")
+            told = frozenset(event.action.split()[1] for event in supervisor.events.recorded() if event.kind == "fails")
+            look = looks.look(step.record, told)
+            for serial, sentence in look.fails.items():
+                supervisor.note("fails", step.record, sentence, f"unit {serial} fails already, the others go on")
+                self.report(step, f"unit {serial} fails already: {sentence}")
+            for effect in look.given_up if look.known else ():
+                supervisor.note("given_up", step.record, "the whole plan would show it", effect)
+            missing = f"{len(left_out(plan, number))} records not taken" if look.known else "the lot goes on"
+            figures = {} if look.dwell_s is None else {DWELL_S: look.dwell_s}
+            supervisor.note("known" if look.known else "look", step.record, look.text, missing, figures)
+        if look is None:
+            return set()
+        acquisition.dwell_s = look.dwell_s or acquisition.dwell_s
+        if not look.known:
+            return set()
+        missing_steps = left_out(plan, number)
+        self.remaining.leave_out({one.record for one in missing_steps})
+        return {one.record for one in missing_steps}
 
     def record(self, step: Step, *, settled: bool) -> None:
         """Measures one record; after an interruption again from its checkpoint, as often as the station's file allows."""

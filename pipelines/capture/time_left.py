@@ -137,6 +137,11 @@ class Remaining:
             soaks += self._soak.get(step.record, 0.0)
             records += self._record[step.record]
 
+    def leave_out(self, records: set[int]) -> None:
+        """Goes on without some records."""
+        self.plan = [step for step in self.plan if step.record not in records]
+        self._planned(self.config)
+
     @property
     def total(self) -> int:
         """Records in all."""

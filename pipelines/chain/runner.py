@@ -39,6 +39,7 @@ Measure = Callable[["Job", "Records", "Progress"], None]
 def from_station(job: Job, records: Records, progress: Progress, before: Records | None = None) -> None:
     """Measure a job's lot on its station, going on behind the last record that is stored, or from the end of another capture."""
     from pipelines.capture.capture import capture  # a re-run of archived data opens no station
+    from pipelines.chain.looks import LotLooks
     from pipelines.procedures import roles_of
     from stations import open_station
 
@@ -46,7 +47,9 @@ def from_station(job: Job, records: Records, progress: Progress, before: Records
     roles = roles_of(job.recipe)
     state = records.last_state() or (None if before is None else before.last_state())
     with open_station(job.station, job.lot, resume=state, run=run, roles=roles) as station:
-        capture(station, job.recipe, job.lot, records, progress=progress, events=records.events)
+        terms = job.recipe.stop
+        looks = None if terms is None else LotLooks(job, terms, records)
+        capture(station, job.recipe, job.lot, records, progress=progress, events=records.events, looks=looks)
 
 
 def captured_tables(records: Records) -> dict[str, pd.DataFrame]:

@@ -14,6 +14,7 @@ from pipelines.cli.options import Setting, argument, option
 from pipelines.cli.plan_choose import choose
 from pipelines.cli.plan_keys import keys
 from pipelines.cli.plan_line import line_schedule
+from pipelines.cli.plan_order import order
 from pipelines.cli.printing import conclude, give, is_standard_output, print_text, remark
 from pipelines.cli.text.plan_text import print_optimum, print_plan, print_procedures
 from schemas.errors import RecipeInvalid
@@ -31,6 +32,7 @@ EXAMPLES_OF = {
         "tumbleline plan optimise my.toml",
         "tumbleline plan optimise my.toml --criterion T:third_order,odd_quadratic --set size=10000",
     ),
+    "order": ("tumbleline plan order my.toml", "tumbleline plan order my.toml --output my-first.toml"),
     "choose": (
         "tumbleline plan choose range=4g temperature=-40..85 error=2mg bandwidth=100",
         "tumbleline plan choose range=30g error=5mg --device QA700,SF1500",
@@ -255,6 +257,13 @@ def write_pictures(folder: Path, document: dict[str, Any], context: PlanContext)
 app = group(
     "Show visible effects, expected errors and station time of a recipe; write a quicker one; choose a device; schedule a line; "
     "list keys.",
-    {"recipe": plan_recipe, "optimise": optimise, "choose": choose, "line": line_schedule, "keys": keys},
+    {
+        "recipe": plan_recipe,
+        "optimise": optimise,
+        "order": order,
+        "choose": choose,
+        "line": line_schedule,
+        "keys": keys,
+    },
     usual="recipe",
 )

@@ -68,6 +68,9 @@ STYLES = {
     "resumed": "green",
     "unit_lost": "magenta",
     "power": "yellow",
+    "fails": "red",
+    "known": "green",
+    "given_up": "yellow",
     "emergency_stop": "bold red",
     "stopped": "red",
     "not_safe": "bold red",
@@ -76,7 +79,7 @@ STYLES = {
     "watchdog_lost": "yellow",
     "lease_lost": "bold red",
 }
-QUIET = {"reference", "soak"}  # shown only with --all, because they occur in every run
+QUIET = {"reference", "soak", "look"}  # shown only with --all, because they occur in every run
 
 
 def log(

@@ -7,6 +7,7 @@ from pipelines.archive import Run
 from pipelines.capture.interruptions import Interruptions, interruptions
 from pipelines.cli.printing import STYLES, print_table, say, short
 from pipelines.report.reasons import grouped_reasons
+from pipelines.schedule.early_end import EarlyEnd, early_end, early_end_sentence
 from pipelines.tables.frames import rows_of
 from pipelines.tables.json_values import json_value
 from pipelines.tables.prior import prior_document, prior_sentence
@@ -56,6 +57,7 @@ def summary(run: Run) -> dict[str, Any]:
         "refused": outcomes.count("refused"),
         "yield": outcomes.count("pass") / len(units),
         "prior": prior_document(run.table("prior")) if "prior" in run.tables() else None,
+        "early_end": early_end(run),
         "interruptions": interruptions(run),
         "report": str(run.report),
         "archive": str(run.archive.root),
@@ -93,6 +95,8 @@ def print_summary(document: dict[str, Any]) -> None:
         say(f"  {NOISE_ONLY}", style="dim")
     for line in _interrupted(document["interruptions"]):
         say(line)
+    for line in _ended(document["early_end"]):
+        say(line)
     if document["prior"] is not None:
         say(prior_sentence(document["prior"]))
     total = len(document["units"])
@@ -122,6 +126,14 @@ def _limited(document: dict[str, Any]) -> list[tuple[str, str]]:
                 unit_text = "" if figure["unit_text"] == "1" else figure["unit_text"]
                 heads[name] = f"{figure_label(name)}\n{unit_text}"
     return list(heads.items())
+
+
+def _ended(end: EarlyEnd | None) -> list[str]:
+    """The early end of a run as lines, and the units that were told to fail before."""
+    if end is None:
+        return []
+    told = [f"{unit} failed before the end: {figure}" for unit, figure in end["fails"].items()]
+    return [*told, *filter(None, [early_end_sentence(end)])]
 
 
 def _interrupted(interrupted: Interruptions | None) -> list[str]:

@@ -98,6 +98,7 @@ def follow_up(sequence: Sequence[SequenceStep], base: Job, last: Job, parents: S
         "verification": [],
         "soaks": soaks,
         "temperatures_C": [s.temperature_C for s in soaks],
+        "stop": None,
         "static_record_s": 0.0,
         "static_temperature_C": soaks[-1].temperature_C,
     }
@@ -118,7 +119,8 @@ def _parts(sequence: Sequence[SequenceStep]) -> list[list[SequenceStep]]:
 
 def _settled(number: int, part: Sequence[SequenceStep], base: Job, now: StationPose) -> bool:
     """Whether the devices must settle first: not where they are already settled, nor for dwells during a temperature change."""
-    stayed = number == 0 and base.station.kind == "simulated"
+    # a lot that ended early stands elsewhere than its plan ends
+    stayed = number == 0 and base.station.kind == "simulated" and base.recipe.stop is None
     return part[0].soaked and not (stayed and abs(part[0].temperature - now.device) < 0.5)
 
 

@@ -15,6 +15,7 @@ from pipelines.jobs.model_files import model_keys, read_model, refuse_unknown_ef
 from pipelines.jobs.priors import stored_family, stored_in
 from pipelines.jobs.recipes import MAIN_JOB, folder_of, load_limits, load_recipe, lot_of, units_of
 from pipelines.jobs.terms import (
+    asked_of_noise,
     budget_terms,
     refuse_beyond_station,
     refuse_contradictions,
@@ -95,6 +96,8 @@ class Job:
         if self.captured:
             return self.captured
         measured = self.recipe.model_dump(mode="json", exclude=ANALYSIS_KEYS)
+        if self.recipe.stop is not None:  # model and limits decide then when the lot ends
+            measured |= {"effects": self.recipe.effects, "limits": self.limits.model_dump(mode="json")}
         if not measured["soaks"]:  # recipes without them keep the names that their captures had before there were any
             del measured["soaks"]
         unmoved = {"pace", "reference", "uncertainty", *GUARDS}  # plan time, state standards, guard: they drive nothing
@@ -181,6 +184,7 @@ class Request:
         refuse_beyond_station(job.recipe, job.station)
         _refuse_inconsistent(job, recorded_columns(station.devices.reader))
         refuse_unreachable(job.recipe, job.station, job.limits)
+        _refuse_unusable_stop(job)
         serials = {unit.serial for unit in lot.units}
         family = stored_family(recipe, archive or Archive(), serials, station.kind)
         return replace(job, prior=family, full=self._full(recipe, archive))
@@ -268,6 +272,20 @@ def _refuse_inconsistent(job: Job, recorded: Sequence[str]) -> None:
         refuse_unidentified(job.recipe, recorded)
     except InertialError as problem:
         raise RecipeInvalid(str(problem), key="effects") from None
+
+
+def _refuse_unusable_stop(job: Job) -> None:
+    """Refuse a ``[stop]`` that could never end the lot: without poses, of unknown effects, below what the references allow."""
+    terms = job.recipe.stop
+    if terms is None:
+        return
+    if not job.recipe.tumbles:
+        raise RecipeInvalid(
+            f"recipe {job.recipe.name}: [stop] ends the multi-position test, its procedures have none; remove it",
+            key="stop",
+        )
+    refuse_unknown_effects(terms.visible, "stop.visible")
+    asked_of_noise(job.recipe, job.station, job.limits)
 
 
 def _refuse_more_units_than_slots(job: Job) -> None:

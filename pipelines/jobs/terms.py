@@ -55,6 +55,31 @@ def refuse_unreachable(recipe: Recipe, station: StationConfig, limits: Limits) -
         )
 
 
+def asked_of_noise(recipe: Recipe, station: StationConfig, limits: Limits) -> dict[str, float]:
+    """Standard errors by noise that ``[stop]`` of a recipe leaves beside the stated references, by effect, µg per unit.
+
+    Raises RecipeInvalid: the references alone exceed an uncertainty that is asked for, so that the lot would never end early.
+    """
+    asked = {} if recipe.stop is None else recipe.stop.asked
+    terms = planned_terms(recipe, station, limits)
+    references = dict.fromkeys(asked, 0.0)
+    if asked and terms.stated is not None:
+        for one in reachable(without_noise(recipe, station), terms, recipe.effects):
+            if one.quantity in references:
+                references[one.quantity] = max(references[one.quantity], one.u)
+    allowed = {
+        effect: (value / limits.coverage_factor) ** 2 - references[effect] ** 2 for effect, value in asked.items()
+    }
+    for effect in (effect for effect, square in allowed.items() if square <= 0.0):
+        raise RecipeInvalid(
+            f"recipe {recipe.name} on station {station.name}: [stop] asks for U = {asked[effect]:g} of {effect}, the references "
+            f"alone have U = {limits.coverage_factor * references[effect]:.3g}; ask for more, or lower their uncertainty "
+            "(see 'tumbleline plan')",
+            key="stop",
+        )
+    return {effect: float(np.sqrt(square)) for effect, square in allowed.items()}
+
+
 def without_noise(recipe: Recipe, station: StationConfig) -> PlannedDwells:
     """The dwells that a recipe plans, of a device of no noise: their weights are alike, and nothing is added to them."""
     dwells = planned_dwells(recipe, station)

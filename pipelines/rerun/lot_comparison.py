@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -12,16 +11,12 @@ from inertial.design import carried_over
 from inertial.errors import InertialError
 from pipelines.archive import Archive, Run
 from pipelines.archive.buffered_run import BufferedRun
+from pipelines.chain.in_memory import evaluated
 from pipelines.jobs.model_change import ModelChange
-from pipelines.jobs.priors import family
 from pipelines.rerun.partition import Batch
 from pipelines.rerun.selection import SelectedRun, entry_of
 from pipelines.rerun.steps import archived_job
-from pipelines.stages.fit import fit_in_memory
-from pipelines.stages.grade import GradeEvidence, grade
-from pipelines.stages.uncertainty.budget_terms import BudgetTables
-from pipelines.stages.uncertainty.decision_budget import decision_budget
-from pipelines.stages.verify import verify_tables
+from pipelines.stages.grade import grade
 from pipelines.tables.calibration import Calibration, read_calibration
 from pipelines.tables.dwells import KINDS, LotTables, lot_arrays
 from pipelines.tables.frames import ByUnit
@@ -103,17 +98,13 @@ def _both(run: Run, change: ModelChange) -> tuple[Side, Side]:
     job = archived_job(run, change)
     old = {name: run.table(name, columns) for name, columns in OLD_TABLES.items()}
     lot = LotTables(run.table("dwells"), run.table("history"))
-    new, expected, own = fit_in_memory(lot, job.recipe.effects, family(job.prior))
-    new |= verify_tables(lot, new["coefficients"], new["covariance"], expected, own)
-    names = ("coefficients", "covariance", "verification", "verification_poses")
     # the noise is in µg already, and the response by which it was made so hardly depends on the model
-    shared: dict[str, Any] = {**{name: new[name] for name in names}, "noise": old["noise"], "calibration": own}
-    tables = BudgetTables(lot.dwells, lot.history, wander=new["wander"], prior=new["prior"], lot=lot, **shared)
-    stated = decision_budget(tables, job.terms)
-    evidence = GradeEvidence(old["verdicts"], residuals=new["residuals"], budget=stated, **shared)
+    new, evidence = evaluated(job, lot, old["verdicts"], old["noise"])
     new |= grade(evidence, job.limits, job.recipe.zero_output, figures=False)
     fitted = len(old["coefficients"])  # no unit may have been
-    return _side(old, read_calibration(old["coefficients"], old["covariance"]) if fitted else None), _side(new, own)
+    return _side(old, read_calibration(old["coefficients"], old["covariance"]) if fitted else None), _side(
+        new, evidence.calibration
+    )
 
 
 def _side(tables: Mapping[str, pd.DataFrame], calibration: Calibration | None) -> Side:

@@ -9,6 +9,7 @@ from schemas.poses import Pose
 from schemas.recipe import Recipe
 
 Kind = Literal["dwell", "verification", "allan", "procedure"]
+TUMBLED = ("dwell", "verification")
 AS_STATED = ("kind", "pose", "wait_s", "settled", "off_s", "lasting_s", "rate_hz")
 """What a step has from the step of its procedure as it is."""
 

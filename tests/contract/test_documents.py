@@ -145,6 +145,7 @@ ELSEWHERE = {
     "show RUN --json (no grades)": "e2e/test_inquiry.py",
     "investigate --json": "e2e/test_inquiry.py",
     "station operator --json": "e2e/test_inquiry.py",
+    "plan order --json": "e2e/test_run_that_ends.py",
     "discover --explain ID --json": "e2e/test_discover.py",
     "demo --lots N --json": "e2e/test_discover.py",
     "certificate write --json": "unit/pipelines/certificates/document/test_compose.py",

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from capture_double import BRIEF, PulledPlug, recipe_file, small_job
+from capture_double import AT_ROOM, BRIEF, PulledPlug, recipe_file, small_job
 from root_process import ROOT
 
 from pipelines.archive import Archive
@@ -126,3 +126,50 @@ def test_a_plug_pulled_at_random_times_loses_no_finished_dwell(tmp_path: Path, m
         assert (again.run.path / path).read_bytes() == (whole.run.path / path).read_bytes()
     kept = [list(archive.capture(whole.job.capture_id).samples()) for archive in (pulled, Archive(tmp_path / "whole"))]
     assert all(left.equals(right) for left, right in zip(*kept, strict=True))
+
+
+ENDS_EARLY = (
+    *AT_ROOM[:2],
+    ('limits = "consumer"', 'limits = "offsets.toml"'),
+    ('poses = "nine"', 'poses = "orthogonal24"'),
+    ("static_record_s = 30.0", 'static_record_s = 30.0\nverification_order = "interleaved"'),
+    (
+        '["bias", "scale", "misalignment"]',
+        '["bias", "scale", "misalignment"]\nstop = { bias_ug = 800.0, longest_dwell_s = 2.0 }',
+    ),
+)
+OFFSETS = 'name = "offsets"\ngrade = "none"\n[figures]\nzero_g_offset_mg = { max = 75.0, unit = "mg" }\n'
+
+
+def ending_early(folder: Path) -> None:
+    recipe_file(folder, *ENDS_EARLY)
+    (folder / "offsets.toml").write_text(OFFSETS, encoding="utf-8")
+
+
+def decided(folder: Path) -> list[tuple[str, int, str]]:
+    """What the journal says of the looks at a lot."""
+    [capture] = (folder / "archive" / "captures").iterdir()
+    events = Archive(folder / "archive").capture(capture.name).events.recorded()
+    kinds = ("look", "known", "given_up", "fails")
+    return [(event.kind, event.record, event.reason) for event in events if event.kind in kinds]
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+def test_a_lot_that_ends_early_is_killed_and_decides_the_same(tmp_path: Path) -> None:
+    """Killed within dwells, at looks and at files that are not yet in their place: the same looks, the same bytes."""
+    whole, again = tmp_path / "whole", tmp_path / "again"
+    for folder in (whole, again):
+        folder.mkdir()
+        ending_early(folder)
+    results = finish(whole)
+    looks = decided(whole)
+    assert [kind for kind, _, _ in looks if kind == "known"] == ["known"]
+    assert len(pd.read_parquet(BytesIO(results["readings"]))["record"].unique()) < 24
+    length = station_seconds(results)
+    for time in np.sort(np.random.default_rng(34).uniform(1.0, length, 8)):
+        killed(again, f"plant:{time:.6f}")
+    for number in (1, 3, 8):
+        killed(again, f"file:{number}")
+    assert finish(again) == results
+    assert decided(again) == looks

@@ -10,6 +10,7 @@ from schemas.fault import FaultOrder
 from schemas.poses import SoakPart
 from schemas.prior import PriorTerms
 from schemas.recipe import Recipe, RecipeFile
+from schemas.stopping import StopTerms
 from schemas.toml_files import parse_as
 from schemas.uncertainty import Uncertainty
 from schemas.validity import Ageing, CertificateTerms, Stability
@@ -77,6 +78,16 @@ PROCEDURES = st.fixed_dictionaries(
 )
 
 
+ASKED = {"bias": "bias_ug", "scale": "scale_ppm", "misalignment": "misalignment_urad"}
+
+
+def stops(effects):
+    """What is to be known of a model with these effects."""
+    asked = {name: maybe(numbers(1.0, 1e4)) for effect, name in ASKED.items() if effect in effects}
+    visible = st.lists(st.sampled_from(["third_order", "thermal_lag"]), max_size=2, unique=True)
+    return st.builds(StopTerms, visible=visible, longest_dwell_s=maybe(numbers(1.0, 100.0)), **asked)
+
+
 @st.composite
 def soaks(draw, poses, verification):
     """What is measured at one soak, with waits and pauses for its poses."""
@@ -104,6 +115,7 @@ def recipe_files(draw):
     checks = repeats * len(verification)
     parts = [draw(soaks(len(angles), checks)) for _ in temperatures] if draw(st.booleans()) else []
     short = draw(st.booleans())
+    effects = draw(st.lists(st.sampled_from(EFFECTS), min_size=1, unique=True))
     return RecipeFile(
         name=draw(st.from_regex(r"[a-z0-9][a-z0-9._-]{0,12}", fullmatch=True)),
         description=draw(TEXTS),
@@ -121,7 +133,8 @@ def recipe_files(draw):
         sensor_axes=draw(st.integers(1, 3)),
         zero_output=draw(numbers(-5.0, 5.0)),
         span_min_g=draw(numbers(1.0, 1.4)),
-        effects=draw(st.lists(st.sampled_from(EFFECTS), min_size=1, unique=True)),
+        effects=effects,
+        stop=draw(maybe(stops(effects))),
         limits=draw(NAMES),
         units=draw(st.lists(SERIALS, max_size=3, unique=True)),
         seed=draw(st.integers(0, 2**60)),

@@ -10,6 +10,7 @@ from pipelines.certificates.document.laboratory import LaboratoryFile
 from pipelines.certificates.entries import STATIC
 from pipelines.certificates.stated_budget import StatedBudget
 from pipelines.procedures import PROCEDURES
+from pipelines.schedule.early_end import early_end, early_end_sentence
 from pipelines.stages.uncertainty.contributions import left_out
 from pipelines.stages.uncertainty.tables import LABELS
 from pipelines.tables.prior import prior_document, prior_sentence
@@ -101,6 +102,9 @@ def methods(
     if static:
         yield _static_method(run, recipe)
         yield from _of_earlier_calibrations(run, serial)
+        end = early_end(run)
+        if end is not None and (sentence := early_end_sentence(end)):
+            yield f"Plan: {sentence.replace('_', ' ')}."
     yield from compared
 
 
@@ -109,7 +113,8 @@ def _static_method(run: Run, recipe: dict[str, Any]) -> str:
     kinds = dwells["kind"].astype(str)
     poses, kept = (dwells.loc[kinds == kind, "pose"].nunique() for kind in ("dwell", "verification"))
     verified = f"; verification in {kept} other poses" if kept else "; no pose was kept for verification"
-    soaks = number_of(len(recipe.get("temperatures_C") or [0]), "temperature")
+    planned = len(recipe.get("temperatures_C") or [0])
+    soaks = number_of(int(dwells["soak"].nunique()) if "soak" in dwells else planned, "temperature")
     return (
         f"Static multi-position calibration in the gravity of the Earth: {poses} poses at "
         f"{soaks}, {recipe.get('dwell_s', 'unknown')} s per pose, recipe "

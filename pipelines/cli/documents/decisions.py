@@ -7,6 +7,7 @@ from typing_extensions import TypedDict
 from pipelines.archive import RunInfo
 from pipelines.capture.interruptions import Interruptions
 from pipelines.jobs.references import ReferencesDocument
+from pipelines.schedule.early_end import EarlyEnd
 from pipelines.stages.judge import AdequacyDocument
 from pipelines.tables.prior import PriorDocument
 
@@ -59,6 +60,7 @@ RunDocument = TypedDict(
         "report": Annotated[str, "path of the HTML report"],
         "archive": str,
         "prior": NotRequired[Annotated[PriorDocument | None, "null: no [prior] in the recipe"]],
+        "early_end": NotRequired[Annotated[EarlyEnd | None, "null: no [stop] in the recipe"]],
         "interruptions": NotRequired[Annotated[Interruptions | None, "null: the archive has no record of them"]],
         "adequacy": NotRequired[Annotated[AdequacyDocument | None, "null: no multi-position test; not in `show`"]],
         "references": NotRequired[

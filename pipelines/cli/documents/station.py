@@ -119,6 +119,20 @@ class StationProfilesDocument(TypedDict):
     profiles: Annotated[list[dict[str, Any]], "keys of a [profile](../how-to/add-a-device.md)"]
 
 
+class OrderDocument(TypedDict):
+    """``plan order --json``: the order of soaks with which a recipe is known first."""
+
+    recipe: str
+    file: Annotated[str, "recipe file that was written"]
+    temperatures_C: Annotated[list[float], "soaks in their new order, °C"]
+    minutes: Annotated[float, "station time of the whole plan without the static record, min"]
+    given_minutes: Annotated[float, "the same of the given recipe"]
+    known_minutes: Annotated[
+        float | None, "expected station time until every unit is known, min; null: the whole plan does not reach it"
+    ]
+    given_known_minutes: Annotated[float | None, "the same of the given recipe"]
+
+
 class KeysDocument(TypedDict):
     """``plan keys [SUBJECT] --json``: the keys of a file, or the names that an option takes."""
 

@@ -1,0 +1,79 @@
+"""A run with ``[stop]``: it ends when its units are known, says so wherever the run is shown, and is run again as it was."""
+
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+from capture_double import AT_ROOM, recipe_file
+from in_process import document_of, refused, text_of
+
+from pipelines.archive import Archive
+from pipelines.certificates.document.circumstances import methods
+from pipelines.certificates.document.laboratory import LaboratoryFile
+
+OFFSETS = """
+name = "offsets"
+grade = "none"
+[figures]
+zero_g_offset_mg = { max = 75.0, unit = "mg" }
+"""
+
+
+def ending(folder: Path, limit: float = 75.0) -> str:
+    changes = (
+        *AT_ROOM[:2],
+        ('["A1", "A2", "A3"]', '["A1"]'),
+        ('limits = "consumer"', 'limits = "offsets.toml"'),
+        ('poses = "nine"', 'poses = "orthogonal24"'),
+        ("static_record_s = 30.0", 'static_record_s = 0.0\nverification_order = "interleaved"'),
+    )
+    path = Path(recipe_file(folder, *changes))
+    path.write_text(f"{path.read_text(encoding='utf-8')}\n[stop]\nbias_ug = 900.0\n", encoding="utf-8")
+    (folder / "offsets.toml").write_text(OFFSETS.replace("75.0", str(limit)), encoding="utf-8")
+    return str(path)
+
+
+@pytest.mark.usefixtures("no_next_measurement")
+def test_a_run_that_ends_early_says_so_everywhere(tmp_path: Path) -> None:
+    root = tmp_path / "archive"
+    found = document_of("run", ending(tmp_path), "--direct", "--archive", root)
+    end = found["early_end"]
+    assert end["ended"]
+    assert end["dwells"] > 0
+    assert "third_order" not in end["given_up"]
+    sentence = f"ended when it was known: {end['reason']}"
+    assert sentence in text_of("show", found["run"], "--archive", root)
+    assert sentence in Path(found["report"]).read_text(encoding="utf-8")
+    run = Archive(root).run(found["run"])
+    about = methods(
+        run,
+        "A1",
+        run.about["recipe"],
+        LaboratoryFile.model_construct(method=SimpleNamespace(procedure="")),
+        (),
+        static=True,
+    )
+    assert any(sentence in line for line in about)
+    text_of("rerun", found["run"], "--archive", root, "--check")
+
+
+@pytest.mark.usefixtures("no_next_measurement")
+def test_a_unit_that_fails_is_told_before_the_end(tmp_path: Path) -> None:
+    found = document_of("run", ending(tmp_path, 0.5), "--direct", "--archive", tmp_path / "archive")
+    assert found["early_end"]["ended"]
+    assert found["early_end"]["fails"]["A1"].startswith("zero_g_offset_mg")
+    assert found["units"][0]["outcome"] == "fail"
+
+
+def test_an_order_needs_to_know_what_is_asked_for(tmp_path: Path) -> None:
+    assert "no table [stop]" in refused("plan", "order", recipe_file(tmp_path))
+
+
+def test_the_recipe_of_an_order_is_usable(tmp_path: Path) -> None:
+    path = Path(recipe_file(tmp_path, ("[0.0, 50.0]", "[0.0, 25.0, 50.0, 25.0]"), ('units = ["A1", "A2", "A3"]\n', "")))
+    path.write_text(f"{path.read_text(encoding='utf-8')}\n[stop]\n", encoding="utf-8")
+    target = tmp_path / "first.toml"
+    found = document_of("plan", "order", path, "--output", target)
+    assert found["known_minutes"] <= found["given_known_minutes"]
+    assert sorted(found["temperatures_C"]) == [0.0, 25.0, 25.0, 50.0]
+    assert document_of("plan", target)["dwells"] == document_of("plan", path)["dwells"]

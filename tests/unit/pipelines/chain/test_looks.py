@@ -1,0 +1,142 @@
+"""A look during a run: the numbers of the run as if it ended there, with the allowance for its own noise."""
+
+from pathlib import Path
+
+import pytest
+from capture_double import AT_ROOM, recipe_file
+from in_process import refused
+from once import once
+
+from inertial.fits.known import noise_guard
+from pipelines.archive import Archive, Run
+from pipelines.chain.looks import LotLooks
+from pipelines.chain.runner import Runner
+from pipelines.jobs.job import Job, Request
+from pipelines.schedule.early_end import early_end
+from schemas.stopping import StopTerms
+
+ASKED = "[stop]\nbias_ug = {bias}\n{more}"
+LIMITS = """
+name = "offsets"
+rule = "guarded_acceptance"
+grade = "none"
+[figures]
+zero_g_offset_mg = { max = 75.0, unit = "mg" }
+misalignment_mrad = { max = 20.0, unit = "mrad" }
+"""
+CHANGES = (
+    *AT_ROOM[:2],
+    ('limits = "consumer"', 'limits = "offsets.toml"'),
+    ('poses = "nine"', 'poses = "orthogonal24"'),
+    ("static_record_s = 30.0", 'static_record_s = 0.0\nverification_order = "interleaved"'),
+)
+
+
+def recipe_of(folder: Path, bias: float, more: str = "") -> str:
+    """Path of the small recipe in one soak, which asks for U of the bias in µg."""
+    path = Path(recipe_file(folder, *CHANGES))
+    path.write_text(f"{path.read_text(encoding='utf-8')}\n{ASKED.format(bias=bias, more=more)}", encoding="utf-8")
+    (folder / "offsets.toml").write_text(LIMITS, encoding="utf-8")
+    return str(path)
+
+
+def job_of(folder: Path, bias: float) -> Job:
+    return Request(recipe=recipe_of(folder, bias)).job()
+
+
+def made(folder: Path) -> tuple[Path, str]:
+    runner = Runner(job_of(folder, 800.0), Archive(folder / "archive"))
+    for stage in (
+        "capture",
+        "validate",
+        "reduce",
+        "fit",
+        "judge",
+        "verify",
+        "noise",
+        "soak_noise",
+        "procedures",
+        "budget",
+    ):
+        runner.stage(stage)
+    return folder / "archive", runner.run.id
+
+
+@pytest.fixture
+def run() -> Run:
+    root, name = once("ended-early", made)
+    return Archive(root).run(name)
+
+
+def test_a_lot_that_knows_enough_ends(run: Run) -> None:
+    end = early_end(run)
+    assert end is not None
+    assert end["ended"]
+    taken = run.table("readings").drop_duplicates("record")["kind"].value_counts()
+    assert 10 <= taken["dwell"] < 24
+    assert taken["verification"] == 2
+    assert end["dwells"] == 24 - taken["dwell"]
+
+
+def test_what_the_look_says_is_what_the_run_states(run: Run, tmp_path: Path) -> None:
+    """U of a look at all records, with its guard, is that of the run's budget: there is one estimate."""
+    job = job_of(tmp_path, 800.0)
+    assert run.records is not None
+    looks = LotLooks(job, StopTerms(bias_ug=800.0), run.records)
+    stated = run.table("uncertainties").query("quantity == 'bias'")["u"].max()
+    guard = noise_guard(int(run.table("wander")["dof"].sum()), len(looks._due))
+    found = looks.look(int(run.table("readings")["record"].max()), frozenset())
+    assert found.text.startswith(f"U at most {guard * 2.0 * stated / 800.0:.2f} of what is asked")
+
+
+def test_a_unit_beyond_its_limit_is_told_once(run: Run, tmp_path: Path) -> None:
+    job = job_of(tmp_path, 800.0)
+    figures = dict(job.limits.figures)
+    name = next(name for name in figures if name.endswith("_mg"))
+    figures[name] = figures[name].model_copy(update={"max": 0.5})
+    strict = Job(job.recipe, job.limits.model_copy(update={"figures": figures}), job.lot, job.station)
+    assert run.records is not None
+    looks = LotLooks(strict, StopTerms(), run.records)
+    last = int(run.table("readings")["record"].max())
+    told = looks.look(last, frozenset())
+    assert told.known
+    assert set(told.fails) == {"A1", "A2", "A3"}
+    assert "limit 0.5 mg" in told.fails["A1"]
+    assert looks.look(last, frozenset({"A1"})).fails.keys() == {"A2", "A3"}
+
+
+def test_a_model_that_is_not_adequate_keeps_the_lot_going(run: Run, tmp_path: Path) -> None:
+    """Misalignment of milliradians that the model lacks: its U is small, and means nothing."""
+    job = job_of(tmp_path, 800.0)
+    figures = {"zero_g_offset_mg": job.limits.figures["zero_g_offset_mg"]}
+    recipe = job.recipe.model_copy(update={"effects": ["bias", "scale"]})
+    plain = Job(recipe, job.limits.model_copy(update={"figures": figures}), job.lot, job.station)
+    assert run.records is not None
+    found = LotLooks(plain, StopTerms(), run.records).look(int(run.table("readings")["record"].max()), frozenset())
+    assert not found.known
+    assert found.text == "3 of 3 units decided; the model is not adequate, a diagnosis needs the other dwells"
+
+
+def test_effects_that_must_be_visible_keep_the_lot_going(run: Run, tmp_path: Path) -> None:
+    job = job_of(tmp_path, 800.0)
+    assert run.records is not None
+    looks = LotLooks(job, StopTerms(visible=["bias_temperature"]), run.records)
+    found = looks.look(int(run.table("readings")["record"].max()), frozenset())
+    assert not found.known
+    assert found.text.endswith("; bias_temperature not visible yet")
+
+
+@pytest.mark.parametrize(
+    ("bias", "more", "message"),
+    [
+        (0.001, "", "[stop] asks for U = 0.001 of bias, the references alone have U ="),
+        (800.0, 'visible = ["no_such"]', "no_such"),
+        (
+            800.0,
+            "scale_temperature_ppm_K = 5.0",
+            "an uncertainty of scale_temperature is asked for, the model has no such",
+        ),
+    ],
+)
+def test_what_can_never_end_a_lot_is_refused(tmp_path: Path, bias: float, more: str, message: str) -> None:
+    assert message in refused("run", recipe_of(tmp_path, bias, more), "--direct", "--archive", tmp_path / "archive")
