@@ -93,7 +93,7 @@ def shortest(line: Line, lots: Sequence[Sequence[Phase]]) -> Shortest:
     WrongUse
         OR-tools is not installed.
     RecipeInvalid
-        There is none within two weeks for each lot.
+        There is none within two weeks for each lot, or the search finds none.
     """
     cp = library("ortools.sat.python.cp_model", "schedule", f"line {line.name}: the shortest schedule")
     model = _Model(cp, line, lots)
@@ -103,10 +103,14 @@ def shortest(line: Line, lots: Sequence[Sequence[Phase]]) -> Shortest:
     solver.parameters.max_deterministic_time = WORK
     model.cp.minimize(model.makespan)
     status = solver.solve(model.cp)
-    if status not in {cp.OPTIMAL, cp.FEASIBLE}:
+    if status == cp.INFEASIBLE:
         raise RecipeInvalid(
             f"line {line.name}: no schedule keeps longest_wait_min {line.longest_wait_min:g} with these shifts; lengthen a shift "
             "or the wait, or let the change of a shared resource be automatic"
+        )
+    if status not in {cp.OPTIMAL, cp.FEASIBLE}:
+        raise RecipeInvalid(
+            f"line {line.name}: the search found no schedule of {len(lots)} lots in its time; plan fewer lots at once"
         )
     makespan, bound = (
         round(solver.objective_value),

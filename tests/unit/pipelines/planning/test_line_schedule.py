@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from line_rules import Trial, broken
 
 from pipelines.jobs.recipes import load_recipe
+from pipelines.planning import line_schedule
 from pipelines.planning.line_document import free_places, plan_line
 from pipelines.planning.line_lots import Phase, phases_of
 from pipelines.planning.line_schedule import shortest
@@ -122,6 +123,14 @@ def test_a_line_without_a_schedule_is_refused() -> None:
     line = line_of(2, 1, longest_wait_min=1, operators={"shifts": ["06:00-06:10"]}, start="06:00", shared=shared)
     with pytest.raises(RecipeInvalid, match=r"longest_wait_min 1 .* lengthen a shift"):
         shortest(line, lots)
+
+
+def test_a_search_that_ends_without_a_schedule_does_not_say_that_there_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(line_schedule, "WORK", 0.0)
+    lots = [[phase("soak", 6), phase("measure", 6)]] * 4
+    table = [{"name": "table", "needed_for": ["measure"], "change_min": 0.5, "by_hand": True}]
+    with pytest.raises(RecipeInvalid, match="the search found no schedule of 4 lots"):
+        shortest(line_of(2, 4, shared=table), lots)
 
 
 def test_places_are_taken_as_they_become_free() -> None:
