@@ -152,7 +152,7 @@ class _Work:
         direction = force / np.linalg.norm(force, axis=-1, keepdims=True)
         along = np.einsum("uni,uij->unj", direction, np.linalg.inv(response_matrix(theta, self.names)))
         by_axis = -np.einsum("unj,ujnp->unjp", along, columns)
-        slopes = [self._slope(theta, state, along, *one) for one in self.parameters()]
+        slopes = [self._slope(theta, state, along, *parameter) for parameter in self.parameters()]
         return by_axis[:, :, self.free], np.stack(slopes, axis=-1) if slopes else np.zeros((*force.shape[:2], 0))
 
     def parameters(self) -> list[tuple[str, str]]:
@@ -224,7 +224,7 @@ class _Work:
         for unit in range(len(theta)):
             noises = [SolvedNorms(every[unit], left[unit], one.weight, one.whiten[unit], 1.0) for one in plausible]
             noises = noises or [SolvedNorms(every[unit], left[unit], 1.0, self.whiten[unit])]
-            whole = np.sum([one.weight * one.covariance(int(dof[unit])) for one in noises], axis=0)
+            whole = np.sum([noise.weight * noise.covariance(int(dof[unit])) for noise in noises], axis=0)
             together[unit] = whole[:free, :free]
             if record is not None:
                 share = used[unit] * (1.0 if weights is None else np.nan_to_num(weights[unit]))

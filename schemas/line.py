@@ -95,7 +95,7 @@ class Line(Strict):
     def _possible(self) -> "Line":
         refuse_repeated(self.fixtures, "fixtures: ", "give each its own name")
         refuse_repeated([one.name for one in self.shared], "shared: ", "give each its own name")
-        if (count := sum(one.count for one in self.lots)) > MOST_LOTS:
+        if (count := sum(lot.count for lot in self.lots)) > MOST_LOTS:
             raise ValueError(f"lots: {count} lots, at most {MOST_LOTS} are planned at once; plan fewer")
         by_hand = {"load_min": self.load_min, "unload_min": self.unload_min}
         by_hand |= {f"change_min of {one.name}": one.change_min for one in self.shared if one.by_hand}

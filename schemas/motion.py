@@ -40,7 +40,7 @@ class Motion(Strict):
         if moments[2] <= 0.0:
             return ""
         share = PEAK_FACTOR * level_g / math.sqrt(moments[2])
-        mm, m_s = (share * STANDARD_GRAVITY_M_S2 * math.sqrt(one) for one in moments[:2])
+        mm, m_s = (share * STANDARD_GRAVITY_M_S2 * math.sqrt(moment) for moment in moments[:2])
         return self._beyond(1e3 * mm, m_s, PEAK_FACTOR * level_g)
 
     def _beyond(self, mm: float, m_s: float, g: float) -> str:

@@ -150,7 +150,7 @@ class StationConfig(Grown):
 
 def refuse_untraced(stated: Uncertainty, references: Sequence[Reference], *, simulated: bool) -> None:
     """Refuse (ValueError) a budget that names a reference that is not there, claims more than it, or is exact on hardware."""
-    known = {one.id: one for one in references}
+    known = {reference.id: reference for reference in references}
     for name, entry in stated.every_entry.items():
         if entry.exact and not simulated and name != "reader":  # that of a digital device is in the device
             raise ValueError(

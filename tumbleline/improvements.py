@@ -34,7 +34,7 @@ class ImprovedModel(JudgedModel):
     @property
     def undecided(self) -> list[list[str]]:
         """Classes of effects that these data do not separate: none was added; name one with ``effect=``."""
-        open_ = [one for one in self.document["choices"] if one["decided_by"] == "undecided"]
+        open_ = [choice for choice in self.document["choices"] if choice["decided_by"] == "undecided"]
         return [[one["effect"], *one["not_separated_from"]] for one in open_]
 
     @property

@@ -212,10 +212,10 @@ def _plain_fit(force: Array, output: Array) -> tuple[Array, float]:
     return coefficients, float(np.sum((output - x @ coefficients) ** 2))
 
 
-def exchanged(one: Split, other: Split) -> bool:
+def exchanged(split: Split, other: Split) -> bool:
     """Whether two units took over each other's calibration at the same place."""
-    if abs(one.place - other.place) > 2:
+    if abs(split.place - other.place) > 2:
         return False
-    own = float(np.linalg.norm(one.after - one.before)) + float(np.linalg.norm(other.after - other.before))
-    crossed = float(np.linalg.norm(one.after - other.before)) + float(np.linalg.norm(other.after - one.before))
+    own = float(np.linalg.norm(split.after - split.before)) + float(np.linalg.norm(other.after - other.before))
+    crossed = float(np.linalg.norm(split.after - other.before)) + float(np.linalg.norm(other.after - split.before))
     return crossed < 0.3 * own

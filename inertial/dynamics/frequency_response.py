@@ -154,20 +154,20 @@ def _band(f: Array, x: Complex, y: Complex) -> tuple[float, complex, complex, fl
     return middle, h1, across / np.conj(cross) if cross else 0j, coherence, error, lines
 
 
-def _sharpened(one: Response) -> Response:
+def _sharpened(response: Response) -> Response:
     """The response with the average over each band undone to the second order: H − Δ²H/24 for bands of equal width.
 
     A third of what is added stays as a rectangular uncertainty: neighbours that are not excited show no curvature.
     """
-    h = one.h1
+    h = response.h1
     if h.size < 3:
-        return one
+        return response
     bend = np.zeros_like(h)
     bend[1:-1] = (h[2:] - 2.0 * h[1:-1] + h[:-2]) / 24.0
-    sound = one.error < LARGEST_ERROR
+    sound = response.error < LARGEST_ERROR
     bend[1:-1][~(sound[2:] & sound[1:-1] & sound[:-2])] = 0.0
-    error = np.hypot(one.error, np.abs(bend) / np.maximum(np.abs(h), 1e-300) / 3.0)
-    return replace(one, h1=h - bend, h2=one.h2 - bend, error=error)
+    error = np.hypot(response.error, np.abs(bend) / np.maximum(np.abs(h), 1e-300) / 3.0)
+    return replace(response, h1=h - bend, h2=response.h2 - bend, error=error)
 
 
 _PARTS = 8

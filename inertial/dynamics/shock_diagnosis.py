@@ -74,7 +74,7 @@ def fit_shock(record: ShockRecord, effects: Sequence[str], rows: Sequence[Flags]
     """
     duration = record.duration_s
     parameters = [(name, p) for name in effects for p in EFFECTS[name].parameters(duration)]
-    used = [np.ones(len(one.unit), dtype=bool) for one in record.shocks] if rows is None else list(rows)
+    used = [np.ones(len(shock.unit), dtype=bool) for shock in record.shocks] if rows is None else list(rows)
     count = sum(int(one.sum()) for one in used)
     if count < len(effects) + len(parameters) + 2:
         raise NotIdentified(
@@ -125,7 +125,9 @@ class Design:
         self.record, self.effects = record, tuple(effects)
         self.coordinates = Coordinates([p for _, p in parameters])
         self._own = [np.array([of == name for of, _ in parameters], dtype=bool) for name in self.effects]
-        extra = [[EFFECTS[name].added(one.reference, record.rate_hz) for name in self.effects] for one in record.shocks]
+        extra = [
+            [EFFECTS[name].added(shock.reference, record.rate_hz) for name in self.effects] for shock in record.shocks
+        ]
         self._added = [[column for column in each if column is not None] for each in extra]
         self._waves: dict[tuple[object, ...], Array] = {}
 
@@ -155,9 +157,9 @@ def _residuals(record: ShockRecord, design: Array, c: Array) -> list[Array]:
     """Residuals of all samples of every shock, g."""
     left, at = list[Array](), 0
     fitted = design @ c
-    for one in record.shocks:
-        n = len(one.unit)
-        left.append(one.unit - fitted[at : at + n] * one.error)
+    for shock in record.shocks:
+        n = len(shock.unit)
+        left.append(shock.unit - fitted[at : at + n] * shock.error)
         at += n
     return left
 
@@ -250,7 +252,7 @@ def _left_out(record: ShockRecord, effects: Sequence[str]) -> float:
     """Rms weighted residual of samples that were not fitted, every fifth left out in turn."""
     total, count = 0.0, 0
     for fold in range(FOLDS):
-        out = [np.arange(len(one.unit)) % FOLDS == fold for one in record.shocks]
+        out = [np.arange(len(shock.unit)) % FOLDS == fold for shock in record.shocks]
         fit = fit_shock(record, effects, [~one for one in out])
         for one, left, rows in zip(record.shocks, fit.residuals, out, strict=True):
             total += float(np.sum((left[rows] / one.error[rows]) ** 2))

@@ -165,7 +165,7 @@ def _where(points: Points, fit: TransferFit) -> tuple[Failure, ...]:
         for rows in np.array_split(order, 3):
             f = points.conditions.frequency[rows]
             failures.append(Failure(float(f.min()), float(f.max()), part, float(one[rows].sum()) / total))
-    return tuple(sorted((one for one in failures if one.share > 1.0 / 6.0), key=lambda one: -one.share))
+    return tuple(sorted((failure for failure in failures if failure.share > 1.0 / 6.0), key=lambda one: -one.share))
 
 
 def _left_out(points: Points, effects: Sequence[str]) -> float:
@@ -196,7 +196,7 @@ def _next_frequencies(
     grid = np.geomspace(low, max(highest, top), 200)
     plan = Conditions(grid, *(np.full(200, np.median(each)) for each in (c.level, c.temperature, c.record_s)))
     models = [one for one in (extended, *rivals) if all(EFFECTS[name].parameters(plan) for name in one.effects)]
-    values = np.stack([np.log(np.maximum(np.abs(one.response(plan)), 1e-300)) for one in models])
+    values = np.stack([np.log(np.maximum(np.abs(model.response(plan)), 1e-300)) for model in models])
     spread = np.ptp(values, axis=0)
     error = float(np.median(points.magnitude_error))
     if spread.max() > SEPARATED * error:

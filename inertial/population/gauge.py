@@ -81,7 +81,7 @@ def gauge_study(values: Array) -> Gauge:
     ms_cross = ms_error if pooled else ss_cross / df_cross
     squares = np.array([ss_part / (p - 1), ss_station / (o - 1) if o > 1 else 0.0, ms_cross, ms_error])
     dof = (p - 1, o - 1, df_cross, df_error + df_cross if pooled else df_error)
-    part, station, interaction = (float(one) for one in _components(squares, values.shape))
+    part, station, interaction = (float(component) for component in _components(squares, values.shape))
     gauge_interval, percent_interval = _intervals(squares, dof, values.shape, pooled=pooled)
     return Gauge(
         parts=p,

@@ -168,7 +168,7 @@ def sensitivity(
     scattered : errors of single dwells or poses; each gives two columns for each of them
     """
     entered: list[tuple[Array, InputQuantity | Scattered]] = [
-        (one.u * difference(model, state, one.errors)[..., None], one) for one in influences
+        (influence.u * difference(model, state, influence.errors)[..., None], influence) for influence in influences
     ]
     for one in scattered:
         for size, errors in ((one.outer, Errors(outer=1.0)), (one.inner, Errors(inner=1.0))):
@@ -186,7 +186,7 @@ def sensitivity(
     sources = [one for columns, one in entered for _ in range(columns.shape[-1])]
     return Sensitivity(
         changes,
-        tuple(one.contribution for one in sources),
+        tuple(source.contribution for source in sources),
         tuple(one.dof for one in sources),
         tuple(one.seen for one in sources),
     )

@@ -237,4 +237,4 @@ def _drop_old_states(source: Place, target: Place) -> None:
 
 def _records(capture: Place) -> int:
     """Number of complete records of a capture."""
-    return sum((one / "record.json").is_file() for one in capture.iterdir()) if capture.is_dir() else 0
+    return sum((path / "record.json").is_file() for path in capture.iterdir()) if capture.is_dir() else 0

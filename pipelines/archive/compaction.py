@@ -77,7 +77,7 @@ def compact(archive: Archive, before: str = "") -> Compacted:
             for name in _ledger(root):
                 _free(root, known, name, done)
         for merged, replaced in merge_packs(root).items():
-            done.packs = [*(one for one in done.packs if one not in replaced), merged]
+            done.packs = [*(pack for pack in done.packs if pack not in replaced), merged]
     return done
 
 

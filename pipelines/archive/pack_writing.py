@@ -133,7 +133,7 @@ def remove_replaced(root: Path) -> None:
 def _merged_pack(root: Path, what: str, own: Sequence[Path]) -> str:
     """One pack in place of some of one month; empty where later packs have all their files."""
     known, top = packs.Packs(root), root / packs.FOLDER
-    tables = [one for one in known.contents() if one.pack in own]
+    tables = [content for content in known.contents() if content.pack in own]
     names: dict[str, int] = {}  # with the last change of the folder before it was packed
     for one in tables:
         if files.sha256(one.pack) != one.about().get("sha256"):

@@ -149,7 +149,7 @@ class PackedPath(Base):
             return None
         if rest in packed.files:
             return packed.files[rest]
-        return packed.mtime_ns if not rest or any(one.startswith(f"{rest}/") for one in packed.files) else None
+        return packed.mtime_ns if not rest or any(file.startswith(f"{rest}/") for file in packed.files) else None
 
     def _member(self) -> packs.Member | None:
         """The packed file of this name; None where no pack has it."""

@@ -169,7 +169,7 @@ class Packs:
 def read_together(members: Mapping[str, Member]) -> dict[str, bytes]:
     """The bytes of files of a folder, by name, in one read for each pack: a disk reads on faster than it seeks."""
     out: dict[str, bytes] = {}
-    for pack in {one.pack for one in members.values()}:
+    for pack in {member.pack for member in members.values()}:
         own = {name: one for name, one in members.items() if one.pack == pack}
         start = min(one.offset for one in own.values())
         end = max(one.offset + one.size for one in own.values())
@@ -238,5 +238,5 @@ def _is_contents(place: Path) -> bool:
 
 def _together(parts: list[PackedFolder]) -> PackedFolder:
     """A folder of several packs, the newest last."""
-    files = {name: member for one in parts for name, member in one.files.items()}
+    files = {name: member for part in parts for name, member in part.files.items()}
     return PackedFolder(max(one.mtime_ns for one in parts), files)

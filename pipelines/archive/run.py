@@ -122,7 +122,9 @@ class Run:
         """The number of the entry in the archive's chain that names all manifests of the run as they are."""
         mark = self.path / SEALED
         names = [path for path in self.path.glob("*.json") if path.name != mark.name]
-        sealed = {f"runs/{self.id}/{path.name}": files.sha256(path) for path in sorted(names, key=lambda one: one.name)}
+        sealed = {
+            f"runs/{self.id}/{path.name}": files.sha256(path) for path in sorted(names, key=lambda name: name.name)
+        }
         if self.records is not None and self.records.is_complete():
             end = self.records.path / COMPLETE
             sealed[f"captures/{end.parent.name}/{end.name}"] = files.sha256(end)

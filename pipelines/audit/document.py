@@ -39,7 +39,7 @@ def document(audit: Audit, listed: list[AuditFinding], archive: str) -> AuditDoc
         "population": {
             "yield": [asdict(share) for share in audit.yields],
             "capability": [asdict(able) for able in audit.abilities],
-            "differences": [asdict(one) for one in audit.differences],
+            "differences": [asdict(difference) for difference in audit.differences],
             "odd": [{**asdict(odd), "date": date_of(odd.day)} for odd in audit.odd],
         },
         "gauge": [_study(study) for study in audit.studies],
@@ -102,13 +102,13 @@ def _due(audit: Audit) -> DueDocument:
 def _kinds(audit: Audit) -> list[dict[str, Any]]:
     return [
         {
-            "device": one.device, "parameter": one.parameter, "unit_text": unit_text(one.parameter), "pairs": one.kind.pairs,
-            "slope_mean_per_year": one.kind.mean_slope, "slope_sd_per_year": one.kind.slope_sd,
-            "walk_sd_per_root_year": one.kind.walk_sd, "seating_sd": one.kind.mount_sd, "median_change": one.median,
-            "share_beyond_uncertainty": one.beyond, "share_beyond_tolerance": one.out,
-            "tolerance": one.tolerance, "reliable_months": one.reliable_months,
+            "device": kind.device, "parameter": kind.parameter, "unit_text": unit_text(kind.parameter), "pairs": kind.kind.pairs,
+            "slope_mean_per_year": kind.kind.mean_slope, "slope_sd_per_year": kind.kind.slope_sd,
+            "walk_sd_per_root_year": kind.kind.walk_sd, "seating_sd": kind.kind.mount_sd, "median_change": kind.median,
+            "share_beyond_uncertainty": kind.beyond, "share_beyond_tolerance": kind.out,
+            "tolerance": kind.tolerance, "reliable_months": kind.reliable_months,
         }
-        for one in audit.kinds
+        for kind in audit.kinds
     ]  # fmt: skip
 
 

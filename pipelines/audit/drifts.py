@@ -68,14 +68,14 @@ def kind_drifts(calibrations: Calibrations, good: Flags, rules: Rules, since: fl
 def _reliable_months(calibrations: Calibrations, pairs: Pairs, kinds: list[KindDrift], target: float) -> float:
     """Time in which a new unit stays in all tolerances of its kind with the target's probability, months."""
     probability = np.ones((1, AHEAD.size))
-    for one in kinds:
-        if np.isfinite(one.tolerance):
-            of_kind = calibrations.device[pairs.later] == one.device
-            sigma = float(np.nanmedian(calibrations.error(one.parameter)[pairs.later[of_kind]]))
-            start, fresh = np.array([0.0]), np.array([sigma**2 + one.ahead.mount_sd**2])
-            slope, spread = np.array([one.ahead.mean_slope]), np.array([one.ahead.slope_sd**2])
+    for kind in kinds:
+        if np.isfinite(kind.tolerance):
+            of_kind = calibrations.device[pairs.later] == kind.device
+            sigma = float(np.nanmedian(calibrations.error(kind.parameter)[pairs.later[of_kind]]))
+            start, fresh = np.array([0.0]), np.array([sigma**2 + kind.ahead.mount_sd**2])
+            slope, spread = np.array([kind.ahead.mean_slope]), np.array([kind.ahead.slope_sd**2])
             new = LatestState(start, slope, fresh, start, spread, start, start)
-            probability *= in_tolerance(*forecast(new, one.ahead, AHEAD, origin=0.0), one.tolerance)
+            probability *= in_tolerance(*forecast(new, kind.ahead, AHEAD, origin=0.0), kind.tolerance)
     return 12.0 * float(last_reliable(probability, target, AHEAD)[0])
 
 

@@ -156,12 +156,18 @@ def _incapable(audit: Audit) -> Iterator[AuditFinding]:
 
 
 def _different(audit: Audit) -> Iterator[AuditFinding]:
-    for one in audit.differences:
-        if one.by != "lot" and one.p < DIFFERENT_P and one.comparison.effect > TELLING_EFFECT:
+    for difference in audit.differences:
+        if difference.by != "lot" and difference.p < DIFFERENT_P and difference.comparison.effect > TELLING_EFFECT:
             message = (
-                f"{one.device}: {one.figure} differs between {one.by}s: {100 * one.comparison.effect:.0f} % of its variance, "
-                f"p {equal(one.p)} over {one.comparison.groups} {one.by}s; find out which, and why"
+                f"{difference.device}: {difference.figure} differs between {difference.by}s: "
+                f"{100 * difference.comparison.effect:.0f} % of its variance, p {equal(difference.p)} over "
+                f"{difference.comparison.groups} {difference.by}s; find out which, and why"
             )
-            who = "station" if one.by in {"station", "slot"} else "product"
-            evidence = {"figure": one.figure, "by": one.by, "share": one.comparison.effect, "p_value": one.p}
-            yield AuditFinding(who, f"differs_by_{one.by}", one.device, message, (), evidence)
+            who = "station" if difference.by in {"station", "slot"} else "product"
+            evidence = {
+                "figure": difference.figure,
+                "by": difference.by,
+                "share": difference.comparison.effect,
+                "p_value": difference.p,
+            }
+            yield AuditFinding(who, f"differs_by_{difference.by}", difference.device, message, (), evidence)

@@ -41,12 +41,12 @@ def render(audit: Audit, listed: list[AuditFinding], archive: str) -> str:
         chart_count=len(audit.charts),
         yield_svg=svg_text(drawn.yield_chart(months)) if len(months) > 1 else "",
         due_svg=svg_text(drawn.due_chart(audit)) if audit.due.row.size else "",
-        drift_svg="".join(svg_text(drawn.drift_chart(audit, one)) for one in drifts),
+        drift_svg="".join(svg_text(drawn.drift_chart(audit, drift)) for drift in drifts),
         shares=[share for share in audit.yields if share.of in {"device", "station"}],
         kinds=audit.kinds,
         furthest=furthest(audit, MOST_ROWS),
         abilities=audit.abilities,
-        differences=[one for one in audit.differences if one.p < 0.05],
+        differences=[difference for difference in audit.differences if difference.p < 0.05],
         compared=len(audit.differences),
         studies=audit.studies,
         slots=audit.slot_means,
@@ -95,7 +95,7 @@ def _telling_series(audit: Audit) -> list[StationSeries]:
             kept.append(one)
     if kept:
         return kept[:MOST_SERIES]
-    return [one for one in audit.stations if one.where == "level_error"][:MOST_SERIES]
+    return [station for station in audit.stations if station.where == "level_error"][:MOST_SERIES]
 
 
 def _telling_drifts(audit: Audit) -> list[UnitDrift]:

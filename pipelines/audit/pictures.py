@@ -58,67 +58,71 @@ def due_chart(audit: Audit) -> Chart:
     return Chart("Re-calibrations due", (Plot("", *axes, (bars,)),), height=260)
 
 
-def control_chart(one: ControlChart) -> Chart:
+def control_chart(chart: ControlChart) -> Chart:
     """A control chart: values within 1, 2 and 3 σ, the moving average, and the signals."""
-    centre, sigma = one.chart.centre, one.chart.sigma
+    centre, sigma = chart.chart.centre, chart.chart.sigma
     traces = [
-        between(one.day, centre - width * sigma, centre + width * sigma, f"± {width} σ", legend=False)
+        between(chart.day, centre - width * sigma, centre + width * sigma, f"± {width} σ", legend=False)
         for width in (3, 2, 1)
     ]
-    traces.append(Trace("moving average", one.day, one.average, "line", "before"))
-    texts = np.array([f"{run}: {value:.5g}" for run, value in zip(one.run, one.value, strict=True)], dtype=object)
-    for rows, (name, role, symbol, size) in zip((~one.hit, one.hit), SIGNALS, strict=True):
+    traces.append(Trace("moving average", chart.day, chart.average, "line", "before"))
+    texts = np.array([f"{run}: {value:.5g}" for run, value in zip(chart.run, chart.value, strict=True)], dtype=object)
+    for rows, (name, role, symbol, size) in zip((~chart.hit, chart.hit), SIGNALS, strict=True):
         told = tuple(texts[rows])
-        traces.append(Trace(name, one.day[rows], one.value[rows], "points", role, symbol, size, texts=told))
-    alarms = f"{number_of(one.alarms, 'alarm')}, {one.expected:.1f} expected by chance"
-    title = f"{one.station}: {one.standard}, {one.parameter}: {alarms}"
-    plot = Plot(title, PlotAxis("date", dates=True), PlotAxis(f"{one.parameter} / {one.unit_text}"), tuple(traces))
-    return Chart(f"Control chart of {one.standard} on {one.station}", (plot,), height=280)
+        traces.append(Trace(name, chart.day[rows], chart.value[rows], "points", role, symbol, size, texts=told))
+    alarms = f"{number_of(chart.alarms, 'alarm')}, {chart.expected:.1f} expected by chance"
+    title = f"{chart.station}: {chart.standard}, {chart.parameter}: {alarms}"
+    plot = Plot(title, PlotAxis("date", dates=True), PlotAxis(f"{chart.parameter} / {chart.unit_text}"), tuple(traces))
+    return Chart(f"Control chart of {chart.standard} on {chart.station}", (plot,), height=280)
 
 
-def series_chart(one: StationSeries) -> Chart:
+def series_chart(series: StationSeries) -> Chart:
     """A quantity of a station over time, its level between changes, and the days of these with their intervals."""
-    low, high = np.percentile(one.value, (0.5, 99.5))  # a single outlier leaves room for the rest
+    low, high = np.percentile(series.value, (0.5, 99.5))  # a single outlier leaves room for the rest
     room = 0.25 * (high - low) + 1e-9
     low, high = float(low - room), float(high + room)
-    edges = [0, *(change.first for change in one.changes), one.day.size]
-    thin = slice(None, None, 1 + one.day.size // MOST_POINTS)
-    runs = tuple(str(run) for run in one.run[thin])
-    traces = [Trace("runs", one.day[thin], one.value[thin], role="muted", size=4.0, texts=runs)]
+    edges = [0, *(change.first for change in series.changes), series.day.size]
+    thin = slice(None, None, 1 + series.day.size // MOST_POINTS)
+    runs = tuple(str(run) for run in series.run[thin])
+    traces = [Trace("runs", series.day[thin], series.value[thin], role="muted", size=4.0, texts=runs)]
     for start, stop in pairwise(edges):
-        between_changes = one.day[[start, stop - 1]]
-        traces.append(level(between_changes, one.value[start:stop].mean(), "accent", "level", dashed=False))
-    for change in one.changes:
-        when = one.day[[max(change.low - 1, 0), min(change.high, one.day.size - 1)]]
+        between_changes = series.day[[start, stop - 1]]
+        traces.append(level(between_changes, series.value[start:stop].mean(), "accent", "level", dashed=False))
+    for change in series.changes:
+        when = series.day[[max(change.low - 1, 0), min(change.high, series.day.size - 1)]]
         traces.append(between(when, low, high, "interval of the change", "limit"))
-        day = np.full(2, one.day[change.first])
+        day = np.full(2, series.day[change.first])
         traces.append(Trace("change", day, np.array([low, high]), "line", "limit", dashed=True))
-    title = f"{one.station}: {one.where}, {one.parameter}"
-    label = f"{one.parameter} / {one.unit_text}" if one.unit_text else one.parameter
+    title = f"{series.station}: {series.where}, {series.parameter}"
+    label = f"{series.parameter} / {series.unit_text}" if series.unit_text else series.parameter
     plot = Plot(title, PlotAxis("date", dates=True), PlotAxis(label, low=low, high=high), tuple(traces))
     return Chart(title, (plot,), height=260)
 
 
-def drift_chart(audit: Audit, one: UnitDrift) -> Chart:
+def drift_chart(audit: Audit, drift: UnitDrift) -> Chart:
     """The history of a unit's parameter, the tolerance about the last calibration, and the drift until it leaves that."""
-    rows = np.flatnonzero(audit.good & (audit.all.unit == one.unit) & (audit.all.device == one.device))
-    day, value, error = audit.all.day[rows], audit.all.column(one.parameter)[rows], audit.all.error(one.parameter)[rows]
-    end = day[-1] + YEAR_D * min(MOST_FORECAST_Y, 1.1 * _years_to(one))
+    rows = np.flatnonzero(audit.good & (audit.all.unit == drift.unit) & (audit.all.device == drift.device))
+    day, value, error = (
+        audit.all.day[rows],
+        audit.all.column(drift.parameter)[rows],
+        audit.all.error(drift.parameter)[rows],
+    )
+    end = day[-1] + YEAR_D * min(MOST_FORECAST_Y, 1.1 * _years_to(drift))
     ahead = np.array([day[-1], end])
     texts = tuple(str(run) for run in audit.all.run[rows])
     traces = [Trace("calibrations, k = 2", day, value, error=2.0 * error, texts=texts)]
     last = float(value[-1])
-    if np.isfinite(one.slope):
-        traces.append(Trace("drift", ahead, last + one.slope * (ahead - day[-1]) / YEAR_D, "line", "before"))
-    if np.isfinite(one.tolerance):
-        low, high = last - one.tolerance, last + one.tolerance
+    if np.isfinite(drift.slope):
+        traces.append(Trace("drift", ahead, last + drift.slope * (ahead - day[-1]) / YEAR_D, "line", "before"))
+    if np.isfinite(drift.tolerance):
+        low, high = last - drift.tolerance, last + drift.tolerance
         traces += [level(ahead, edge, "limit", "tolerance") for edge in (low, high)]
-        if np.isfinite(one.leaves):
-            window = np.array([max(one.soonest, day[-1]), min(one.latest, end)])
+        if np.isfinite(drift.leaves):
+            window = np.array([max(drift.soonest, day[-1]), min(drift.latest, end)])
             traces.append(between(window, low, high, "leaves its tolerance", "before"))
-    label = f"{one.parameter} / {unit_text(one.parameter)}"
-    plot = Plot(f"{one.unit}: {one.parameter}", PlotAxis("date", dates=True), PlotAxis(label), tuple(traces))
-    return Chart(f"Drift of {one.unit}: {one.parameter}, E_n {one.e_n:.2f}", (plot,), height=260)
+    label = f"{drift.parameter} / {unit_text(drift.parameter)}"
+    plot = Plot(f"{drift.unit}: {drift.parameter}", PlotAxis("date", dates=True), PlotAxis(label), tuple(traces))
+    return Chart(f"Drift of {drift.unit}: {drift.parameter}, E_n {drift.e_n:.2f}", (plot,), height=260)
 
 
 def _years_to(drift: UnitDrift) -> float:
@@ -136,7 +140,7 @@ def evidence_chart(audit: Audit, finding: AuditFinding) -> Chart | None:
         return next((series_chart(one) for one in series), None)
     if "standard" in numbers:
         same = (str(numbers["station"]), str(numbers["standard"]), parameter)
-        charts = (one for one in audit.charts if (one.station, one.standard, one.parameter) == same)
+        charts = (chart for chart in audit.charts if (chart.station, chart.standard, chart.parameter) == same)
         return next((control_chart(one) for one in charts), None)
     if not finding.units or len(finding.units) > len(UNIT_ROLES) or "run" not in numbers:
         return None

@@ -91,7 +91,7 @@ class Record:
         """Means over the observations, for the station and one slot, by column of the readings."""
         first = self.observations[0]
         # in one: the mean of a single column is summed up in another order
-        means = np.mean([np.concatenate(list(one.values())) for one in self.observations], axis=0)
+        means = np.mean([np.concatenate(list(observation.values())) for observation in self.observations], axis=0)
         by_slot = np.split(means, np.cumsum([values.size for values in first.values()]))
         return {
             **{column: float(mean[slot if mean.size > 1 else 0]) for column, mean in zip(first, by_slot, strict=False)},

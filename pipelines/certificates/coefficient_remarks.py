@@ -32,7 +32,7 @@ def signature_remarks(run: Run, serials: Iterable[str] = ()) -> list[str]:
         return []
     by_state: dict[str, list[str]] = {}
     manifests = (run.path / f"{name}.json" for name in ("run", *TABLES))
-    for place in (*(one for one in manifests if one.is_file()), *_certificates(run, serials)):
+    for place in (*(manifest for manifest in manifests if manifest.is_file()), *_certificates(run, serials)):
         state = check(files.read_json(place), keys)
         name = str(place)[len(str(run.archive.root)) :].lstrip("/\\")
         if state == BAD:
@@ -56,10 +56,10 @@ def library_remarks(run: Run) -> list[str]:
 def _certificates(run: Run, serials: Iterable[str]) -> list[Place]:
     ledger, root = Ledger(run.archive.root), run.archive.root
     return [
-        root / folder_of(serial) / f"{one.event.sequence:06d}.json"
+        root / folder_of(serial) / f"{calibration.event.sequence:06d}.json"
         for serial in serials
-        for one in ledger.calibrations(serial)
-        if one.run == run.id
+        for calibration in ledger.calibrations(serial)
+        if calibration.run == run.id
     ]
 
 

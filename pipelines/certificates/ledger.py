@@ -50,7 +50,7 @@ class Ledger:
 
     def valid_at(self, serial: str, day: str, known: str = "") -> Calibration | None:
         """The valid calibration of a unit on a day; None without one."""
-        return next((one for one in self.calibrations(serial, known) if one.holds(day)), None)
+        return next((calibration for calibration in self.calibrations(serial, known) if calibration.holds(day)), None)
 
     def all(self) -> Iterator[Calibration]:
         """Every calibration of every unit."""
@@ -90,7 +90,9 @@ class Ledger:
         written = self._append(event.serial, decided)
         if written is not None:
             return written, False
-        return next(one.event for one in self.calibrations(event.serial) if _same(one, event)), True
+        return next(
+            calibration.event for calibration in self.calibrations(event.serial) if _same(calibration, event)
+        ), True
 
     def revoke(self, serial: str, reason: str, *, day: str = "", certificate: int = 0) -> LedgerEntry:
         """The event that ends a unit's calibrations.
@@ -125,7 +127,7 @@ class Ledger:
     def anchor(self, events: Sequence[LedgerEntry]) -> None:
         """Add events to the chain of the archive, so that the removal of one is detected."""
         if events:
-            places = {self._place(one.serial, one.sequence): one for one in events}
+            places = {self._place(event.serial, event.sequence): event for event in events}
             sealed = {place: files.sha256(self.root / place) for place in sorted(places)}
             hash_chain.append(self.root, "calibrations", sealed, {**provenance(), "run": events[0].run})
 
@@ -207,9 +209,9 @@ def _stamped(event: LedgerEntry, known: Sequence[tuple[LedgerEntry, str]]) -> Le
     return replace(event, sequence=len(known) + 1, previous=known[-1][1] if known else "", **stamp)
 
 
-def _same(one: Calibration, event: LedgerEntry) -> bool:
+def _same(calibration: Calibration, event: LedgerEntry) -> bool:
     """Whether an event would certify a valid calibration again."""
-    old = (one.run, one.event.coefficients, one.start, one.until)
+    old = (calibration.run, calibration.event.coefficients, calibration.start, calibration.until)
     return old == (event.run, event.coefficients, event.start, event.until)
 
 
@@ -223,7 +225,7 @@ def stated(run: Run, serials: Iterable[str]) -> dict[str, Calibration]:
     """
     ledger, out = Ledger(run.archive.root), dict[str, Calibration]()
     for serial in serials:
-        own = [one for one in ledger.calibrations(serial) if one.run == run.id]
+        own = [calibration for calibration in ledger.calibrations(serial) if calibration.run == run.id]
         if not own:
             continue
         chosen = out[serial] = next((one for one in own if one.state == "valid"), own[-1])

@@ -217,10 +217,10 @@ def _of_shard(top: Path, shard: str) -> dict[str, str]:
         for unit in units:
             if unit.is_dir():
                 with os.scandir(unit.path) as entries:
-                    events = [one for one in entries if one.name.endswith(".json") and one.name[0] != "."]
-                for one in events:
-                    about = one.stat()
-                    out[f"{shard}/{unit.name}/{one.name}"] = f"{about.st_size}.{about.st_mtime_ns}"
+                    events = [entry for entry in entries if entry.name.endswith(".json") and entry.name[0] != "."]
+                for event in events:
+                    about = event.stat()
+                    out[f"{shard}/{unit.name}/{event.name}"] = f"{about.st_size}.{about.st_mtime_ns}"
     return out
 
 

@@ -59,7 +59,7 @@ def stated_budget(run: Run, unit: str) -> StatedBudget:
         validity_months=int(terms.get("validity_months", 12)),
         customer_agreed=bool(terms.get("customer_agreed", False)),
         quantities=tuple(
-            (row, [one for one in parts if (one["quantity"], one["axis"]) == (row["quantity"], row["axis"])])
+            (row, [part for part in parts if (part["quantity"], part["axis"]) == (row["quantity"], row["axis"])])
             for row in sums
         ),
         decisions=tuple(row for row in figures if np.isfinite(edge(row))),

@@ -59,7 +59,7 @@ class LotLooks:
         self.job, self.terms, self.records = job, terms, records
         self._summaries: dict[int, pd.DataFrame] = {}
         self._activities = schedule(steps(job.recipe), job.station, job.recipe)
-        dwells = [one.step.record for one in self._activities if one.kind == "dwell"]
+        dwells = [activity.step.record for activity in self._activities if activity.kind == "dwell"]
         self._dwells = len(dwells)
         self._due = {dwells[count - 1] for count in look_counts(self._activities, job.station, job.recipe)}
 
@@ -133,7 +133,7 @@ class LotLooks:
 
     def _state(self, record: int) -> Any:
         """The planned dwells up to a record."""
-        until = [one for one in self._activities if one.step.record <= record]
+        until = [activity for activity in self._activities if activity.step.record <= record]
         return state_of(until, self.job.station, self.job.recipe, history=True)
 
     def _readings(self) -> pd.DataFrame:

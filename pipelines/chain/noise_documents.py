@@ -185,7 +185,7 @@ def statistic_of_run(run: Run, spacing: str, statistic: str) -> dict[str, Any]:
     parts = [
         allan_document(
             EvenSeries(
-                tuple(f"{one.unit} {one.axis}" for one in channels),
+                tuple(f"{channel.unit} {channel.axis}" for channel in channels),
                 np.stack([one.record for one in channels]),
                 record.rate_hz / record.size,
                 "µg",

@@ -146,8 +146,10 @@ def flowing(text: str) -> str:
     """A help text whose paragraphs are one line each, so that a terminal breaks them at its own width only; lists are kept."""
     paragraphs = cleandoc(text).split("\n\n")
     return "\n\n".join(
-        one if any(line.startswith((" ", "-", "*", "\b")) for line in one.splitlines()) else " ".join(one.splitlines())
-        for one in paragraphs
+        paragraph
+        if any(line.startswith((" ", "-", "*", "\b")) for line in paragraph.splitlines())
+        else " ".join(paragraph.splitlines())
+        for paragraph in paragraphs
     )
 
 

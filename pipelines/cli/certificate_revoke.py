@@ -29,7 +29,9 @@ def revoke(
     ledger = Ledger(store)
     event = ledger.revoke(serial, reason, day=day_of(since, "--since") if since else "", certificate=certificate)
     ended = [f"{serial}/{number}" for number in event.ends]
-    for run in dict.fromkeys(one.run for one in ledger.calibrations(serial) if one.certificate in ended):
+    for run in dict.fromkeys(
+        calibration.run for calibration in ledger.calibrations(serial) if calibration.certificate in ended
+    ):
         renew_report(Run(store, run))
     lines = [f"revoked {', '.join(ended)} from {event.start} on: {event.reason}"]
     give({"unit": serial, "revoked": ended, **event.document()}, lines, as_json=as_json)

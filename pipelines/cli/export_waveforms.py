@@ -27,7 +27,7 @@ def write_record(run: Run, record: int, unit: str, form: str, output: Path | Non
         print_text(_one_text(form, channels, suffix))
         return
     target = output or Path(f"{run.id[:12]}-record{record}{suffix}")
-    names = ", ".join(one.name for one in channels)
+    names = ", ".join(channel.name for channel in channels)
     for path in write_waveforms(form, channels, target):
         say(f"{path}: {names}")
 

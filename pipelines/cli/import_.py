@@ -203,7 +203,7 @@ def _waveforms(
     columns, units, rate, group = stated
     layout = RecordingLayout(pairs(columns, "--map"), pairs(units, "--unit-of"), rate, group)
     imported = import_waveforms(paths, procedure, part, unit, layout, archive)
-    passed = all(one["identified"] for one in imported["figures"])
+    passed = all(figure["identified"] for figure in imported["figures"])
     conclude(dict(imported), _print_waveforms, as_json=as_json, passed=passed)
 
 
@@ -218,8 +218,15 @@ def _print_transfers(imports: Sequence[Mapping[str, Any]]) -> None:
 def _print_waveforms(imported: Mapping[str, Any]) -> None:
     say(f"{imported['unit']}: {imported['records']} recordings, kept as run {imported['run']}")
     rows = [
-        [one["figure"], one["axis"], short(one["value"]), short(one["uncertainty"]), one["unit"], one["note"]]
-        for one in imported["figures"]
+        [
+            figure["figure"],
+            figure["axis"],
+            short(figure["value"]),
+            short(figure["uncertainty"]),
+            figure["unit"],
+            figure["note"],
+        ]
+        for figure in imported["figures"]
     ]
     print_table(["figure", "axis", "value", "standard uncertainty", "unit", "remark"], rows, whole=2)
     for line in imported["text"]:
@@ -249,17 +256,17 @@ def _print_dwells(dwells: list[dict[str, Any]], unit: str) -> None:
         heads,
         [
             [
-                str(one["dwell"]),
-                one["label"],
-                f"{one['start_s']:.2f}",
-                f"{one['end_s']:.2f}",
-                "" if one["n"] is None else str(one["n"]),
-                " / ".join(f"{value:.6g}" for value in one["mean"]),
-                "" if one["sd"] is None else short_values(one["sd"]),
-                "" if one["residual_ug"] is None else f"{one['residual_ug']:.1f}",
-                short(one["influence"]),
+                str(dwell["dwell"]),
+                dwell["label"],
+                f"{dwell['start_s']:.2f}",
+                f"{dwell['end_s']:.2f}",
+                "" if dwell["n"] is None else str(dwell["n"]),
+                " / ".join(f"{value:.6g}" for value in dwell["mean"]),
+                "" if dwell["sd"] is None else short_values(dwell["sd"]),
+                "" if dwell["residual_ug"] is None else f"{dwell['residual_ug']:.1f}",
+                short(dwell["influence"]),
             ]
-            for one in dwells
+            for dwell in dwells
         ],
         whole=2,
     )

@@ -65,7 +65,7 @@ def command(
             inspections.append(inspect(paths, join=join, group=group))
     if picture or page:
         _write(inspections[0], picture, page)
-    documents = [one.document for one in inspections]
+    documents = [inspection.document for inspection in inspections]
     whole = documents[0] if len(documents) == 1 else {"inspections": documents}
     passed = not any(document["open"] for document in documents)
     conclude(whole, lambda _: _print_all(documents), as_json=as_json, passed=passed)

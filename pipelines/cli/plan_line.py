@@ -99,7 +99,7 @@ def _print(document: LineDocument, *, everything: bool) -> None:
     if everything:
         print_table(
             ["from", "to", "lot", "fixture", "step", "°C", "holds"],
-            [_step(document, one) for one in document["activities"]],
+            [_step(document, activity) for activity in document["activities"]],
         )
 
 
@@ -110,20 +110,20 @@ def _shared(resources: list[LineResource]) -> list[str]:
 def _held(document: LineDocument, lot: str, resource: str) -> str:
     """When a lot is on a shared resource, changes not counted."""
     return ", ".join(
-        f"{clock(document, one['begin_min'])}–{clock(document, one['end_min'])}"
-        for one in document["activities"]
-        if one["lot"] == lot and resource in one["resources"] and one["activity"] != "change"
+        f"{clock(document, activity['begin_min'])}–{clock(document, activity['end_min'])}"
+        for activity in document["activities"]
+        if activity["lot"] == lot and resource in activity["resources"] and activity["activity"] != "change"
     )
 
 
-def _step(document: LineDocument, one: LineActivity) -> list[str]:
-    temperature = one["temperature_C"]
+def _step(document: LineDocument, activity: LineActivity) -> list[str]:
+    temperature = activity["temperature_C"]
     return [
-        clock(document, one["begin_min"]),
-        clock(document, one["end_min"]),
-        one["lot"],
-        one["fixture"],
-        one["activity"],
+        clock(document, activity["begin_min"]),
+        clock(document, activity["end_min"]),
+        activity["lot"],
+        activity["fixture"],
+        activity["activity"],
         "" if temperature is None else f"{temperature:g}",
-        ", ".join(one["resources"]),
+        ", ".join(activity["resources"]),
     ]

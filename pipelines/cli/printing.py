@@ -158,7 +158,7 @@ def _print_part(shown: Console, columns: Sequence[_Column], title: str, gap: int
     for one, width in zip(columns, widths, strict=True):
         justify = "right" if one.numeric else "left"
         table.add_column(one.head, justify=justify, overflow="fold", no_wrap=one.kept, width=width)
-    for line in zip(*(one.cells for one in columns), strict=True):
+    for line in zip(*(column.cells for column in columns), strict=True):
         table.add_row(*line)
     table.width = sum(widths) + gap * len(widths) + 1
     if title:
@@ -168,7 +168,7 @@ def _print_part(shown: Console, columns: Sequence[_Column], title: str, gap: int
 
 def _widths(columns: Sequence[_Column], room: int) -> list[int]:
     """Widths between what columns need at least and at most; room is given to the narrowest of those that want more."""
-    widths = [one.least for one in columns]
+    widths = [column.least for column in columns]
     while sum(widths) < room and (wanting := [k for k, one in enumerate(columns) if widths[k] < one.most]):
         widths[min(wanting, key=lambda k: widths[k])] += 1
     return widths

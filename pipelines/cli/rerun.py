@@ -79,13 +79,13 @@ def command(
 
 
 def _counts(outcomes: list[RerunOutcome]) -> dict[str, int]:
-    failed = sum(bool(one.error) for one in outcomes)
+    failed = sum(bool(outcome.error) for outcome in outcomes)
     anew = sum(bool(one.new) and one.new != one.run for one in outcomes)
     return {"selected": len(outcomes), "rerun": anew, "unchanged": len(outcomes) - anew - failed, "failed": failed}
 
 
 def _print(outcomes: list[RerunOutcome], archive: str | None, document: dict[str, Any]) -> None:
-    lines = [_line(one) for one in outcomes[:SHOWN] if not one.error]
+    lines = [_line(outcome) for outcome in outcomes[:SHOWN] if not outcome.error]
     if lines:
         print_table(["run", "re-run", "changed", "stages computed"], lines, whole=2)
     if len(outcomes) > SHOWN:
@@ -103,10 +103,15 @@ def _print(outcomes: list[RerunOutcome], archive: str | None, document: dict[str
     )
 
 
-def _line(one: RerunOutcome) -> list[str]:
-    whats = dict.fromkeys(change["what"] for change in one.because)
-    worked = [name for name, how in one.stages.items() if how == "computed"]
-    return [one.run, one.new if one.new != one.run else "—", ", ".join(whats) or "nothing", ", ".join(worked) or "none"]
+def _line(outcome: RerunOutcome) -> list[str]:
+    whats = dict.fromkeys(change["what"] for change in outcome.because)
+    worked = [name for name, how in outcome.stages.items() if how == "computed"]
+    return [
+        outcome.run,
+        outcome.new if outcome.new != outcome.run else "—",
+        ", ".join(whats) or "nothing",
+        ", ".join(worked) or "none",
+    ]
 
 
 def _print_check(results: list[Reproduction]) -> None:
@@ -118,7 +123,7 @@ def _print_check(results: list[Reproduction]) -> None:
         if one.differences:
             unknown = "neither code nor libraries; the computer differs or the stored file is damaged"
             say(f"    changed since: {', '.join(one.changed) or unknown}")
-    left = sum(how == "not checked" for one in results for how in one.tables.values())
+    left = sum(how == "not checked" for result in results for how in result.tables.values())
     same = sum(one.same for one in results)
     say(
         f"{same} of {number_of(len(results), 'run')} reproduced: {number_of(tables, 'table')} with the same bytes",

@@ -193,8 +193,12 @@ def _print(serial: str, day: str, valid: Calibration | None, history: list[Calib
         print_table(["effect", "axis", "name", "value", "standard error", "unit"], cells)
 
 
-def _why(one: Calibration) -> str:
-    return one.ended_by.reason or f"by {one.ended_by.certificate}" if one.ended_by else one.event.reason
+def _why(calibration: Calibration) -> str:
+    return (
+        calibration.ended_by.reason or f"by {calibration.ended_by.certificate}"
+        if calibration.ended_by
+        else calibration.event.reason
+    )
 
 
 NOT_NEEDED = (

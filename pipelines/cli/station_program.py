@@ -85,7 +85,7 @@ def program(
     )
     result = document(source, outcomes, certificates)
     give(result, _print, as_json=as_json)
-    raise typer.Exit(PART_FAILED if any(one.outcome != "proved" for one in outcomes) else DONE)
+    raise typer.Exit(PART_FAILED if any(outcome.outcome != "proved" for outcome in outcomes) else DONE)
 
 
 def _write_teds(
@@ -98,7 +98,7 @@ def _write_teds(
 
     stated = data_sheet(sheet, measured_on(source))
     outcomes = program_teds(source, chosen, config, stated, lambda text: remark(f"program: {text}"))
-    give({"run": source.id, "teds": [one.document() for one in outcomes]}, _print_teds, as_json=as_json)
+    give({"run": source.id, "teds": [outcome.document() for outcome in outcomes]}, _print_teds, as_json=as_json)
     raise typer.Exit(PART_FAILED if any(one.outcome != "proved" for one in outcomes) else DONE)
 
 

@@ -144,8 +144,8 @@ def _interrupted(interrupted: Interruptions | None) -> list[str]:
     door = f", the door was opened {number_of(opened, 'time')}" if opened else ""
     head = f"  station: {number_of(interrupted['pauses'], 'pause')} ({interrupted['paused_s'] / 60.0:.1f} min waited){door}"
     dwells = [
-        f"  dwell {one['record']} (pose {one['pose']}) measured again {number_of(one['times'], 'time')}: "
-        f"{'; '.join(one['reasons'])}"
-        for one in interrupted["repeated_dwells"]
+        f"  dwell {dwell['record']} (pose {dwell['pose']}) measured again {number_of(dwell['times'], 'time')}: "
+        f"{'; '.join(dwell['reasons'])}"
+        for dwell in interrupted["repeated_dwells"]
     ]
     return [head, *dwells]

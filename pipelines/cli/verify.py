@@ -146,40 +146,40 @@ def check_certificates(
     conclude(document, lambda _: [_print_checked(one) for one in done], as_json=as_json, passed=accepted)
 
 
-def _document(one: CheckedFile) -> dict[str, Any]:
+def _document(file: CheckedFile) -> dict[str, Any]:
     return {
-        "file": one.path,
-        "certificate": getattr(one.facts, "number", ""),
-        **{key: getattr(one.facts, key, "") for key in ("serial", "run", "issued")},
-        **{key: getattr(one, key) for key in ("signers", "checks", "proven_by", "accepted")},
+        "file": file.path,
+        "certificate": getattr(file.facts, "number", ""),
+        **{key: getattr(file.facts, key, "") for key in ("serial", "run", "issued")},
+        **{key: getattr(file, key) for key in ("signers", "checks", "proven_by", "accepted")},
     }
 
 
-def _print_checked(one: CheckedFile) -> None:
-    head = f"{one.path}: certificate {one.facts.number}, unit {one.facts.serial}" if one.facts else str(one.path)
+def _print_checked(file: CheckedFile) -> None:
+    head = f"{file.path}: certificate {file.facts.number}, unit {file.facts.serial}" if file.facts else str(file.path)
     say(head, style="bold")
-    for check in one.checks:
+    for check in file.checks:
         mark = {"good": "ok", "bad": "WRONG", "not checked": "-"}[check.state]
         say(f"  {mark:<6}{check.check:<11} {check.message}", style=STYLES[check.state])
-    wrong = sum(check.state == "bad" for check in one.checks)
+    wrong = sum(check.state == "bad" for check in file.checks)
     if wrong:
-        say(f"  not accepted: {wrong} of {len(one.checks)} checks failed", style="bold red")
-    elif one.accepted:
+        say(f"  not accepted: {wrong} of {len(file.checks)} checks failed", style="bold red")
+    elif file.accepted:
         by = {"signature": "a trusted signature", "archive": "the archive"}
-        proven = " and ".join(by[name] for name in one.proven_by)
+        proven = " and ".join(by[name] for name in file.proven_by)
         say(f"  accepted: nothing is wrong, proven by {proven}", style="bold green")
     else:
         say(
-            f"  not accepted: nothing is wrong, and nothing shows where the file comes from; {_needed(one)}",
+            f"  not accepted: nothing is wrong, and nothing shows where the file comes from; {_needed(file)}",
             style="bold yellow",
         )
 
 
-def _needed(one: CheckedFile) -> str:
+def _needed(file: CheckedFile) -> str:
     """What would prove the origin: an archive proves the values of an XML, and nothing of the pages of a PDF."""
-    signed = any(check.check == "signature" and check.state == "good" for check in one.checks)
-    if one.path.suffix.lower() == ".pdf" and not signed:
+    signed = any(check.check == "signature" and check.state == "good" for check in file.checks)
+    if file.path.suffix.lower() == ".pdf" and not signed:
         return "the pages of an unsigned PDF cannot be proven: give its XML with --archive, or ask for a signed PDF"
-    if any(check.check == "laboratory" for check in one.checks):
+    if any(check.check == "laboratory" for check in file.checks):
         return "names and addresses are not proven by the archive: give --laboratory FILE, or --trust for its signature"
     return "give --trust FILE with the certificate of the laboratory's key, or --archive with --laboratory"

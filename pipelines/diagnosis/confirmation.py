@@ -106,7 +106,7 @@ def _by_left_out(before: LeftOut, after: LeftOut, doubt: Callable[[], str | None
 
 def _disagreement(gains: Mapping[Kind, float], falls: Mapping[Kind, tuple[float, float]]) -> str | None:
     """A kind of dwells left out that can judge the effects and is not clearly for them, as text; None if there is none."""
-    for kind, gain in sorted(gains.items(), key=lambda one: falls[one[0]][0]):
+    for kind, gain in sorted(gains.items(), key=lambda item: falls[item[0]][0]):
         fall, error = falls[kind]
         left = f"with {_TOLD.get(kind, kind)} left out"
         # an error that cannot be stated is none that the fall exceeds

@@ -39,7 +39,7 @@ class Section:
 
     def heads(self, join: str) -> list[str]:
         """The headings, ``join`` between a name and its unit."""
-        return [one if isinstance(one, str) else join.join(filter(None, one)) for one in self.columns]
+        return [column if isinstance(column, str) else join.join(filter(None, column)) for column in self.columns]
 
 
 def faults(document: dict[str, Any]) -> Section:

@@ -118,7 +118,7 @@ def _places(archive: Archive) -> list[Any]:
     folder = archive.root / FOLDER
     if not folder.is_dir():
         return []
-    return sorted((one for one in folder.iterdir() if one.name.endswith(".json")), key=lambda one: one.name)
+    return sorted((path for path in folder.iterdir() if path.name.endswith(".json")), key=lambda one: one.name)
 
 
 def _append(archive: Archive, content: Mapping[str, Any]) -> str:

@@ -95,7 +95,7 @@ def _with_effects(
     """The same lots with effects in the model of each, and what is left of every discovery."""
     catalogue.get_all(effects)
     pool = before.pool
-    added = [one for one in effects if one in pool.effects]
+    added = [effect for effect in effects if effect in pool.effects]
     if not added:
         raise WrongUse(
             f"discover: none of {', '.join(effects)} is beyond the model of the lots, one at least is needed; "
@@ -119,7 +119,12 @@ def _compared(row: DiscoveryRow, before: Findings, after: Findings) -> ComparedA
         "size_ug_before": row["size_ug"],
         # of the largest effect that is still named for the driver
         "size_ug_after": next(
-            (MICRO * size_of(one.name)[0] for one in after.discoveries if one.drivers[0] == row["driver"]), 0.0
+            (
+                MICRO * size_of(discovery.name)[0]
+                for discovery in after.discoveries
+                if discovery.drivers[0] == row["driver"]
+            ),
+            0.0,
         ),
     }
 
@@ -133,9 +138,9 @@ def _largest(findings: Findings, row: DiscoveryRow) -> float:
 
 def _of_drivers(document: DiscoverDocument, drivers: Sequence[str]) -> DiscoverDocument:
     known = [row["name"] for row in document["drivers"]]
-    for one in drivers:
-        if known and one not in known:
-            raise WrongUse(f"discover: no driver is called '{one}'; {did_you_mean(one, known)}")
+    for driver in drivers:
+        if known and driver not in known:
+            raise WrongUse(f"discover: no driver is called '{driver}'; {did_you_mean(driver, known)}")
     document["discoveries"] = [row for row in document["discoveries"] if set(row["drivers"]) & set(drivers)]
     document["held"] = [row for row in document["held"] if row["driver"].removesuffix(INSIDE) in drivers]
     document["drivers"] = [row for row in document["drivers"] if row["name"] in drivers]

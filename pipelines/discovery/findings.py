@@ -88,14 +88,14 @@ class Findings:
         place = {column: at for at, column in enumerate(columns)}
         lot, inside, size = np.zeros((AXES, k, k)), np.zeros((AXES, k, k)), np.zeros((AXES, k))
         weight = np.zeros(k)
-        for one in self.source.store.products():
-            at = np.array([place[column] for column in one.columns if column in place])
-            if at.size != len(one.columns):
+        for product in self.source.store.products():
+            at = np.array([place[column] for column in product.columns if column in place])
+            if at.size != len(product.columns):
                 continue
-            lot[:, at[:, None], at] += one.runs * one.lot
-            inside[:, at[:, None], at] += one.runs * one.inside
-            size[:, at] += one.runs * one.size.reshape(AXES, -1)
-            weight[at] += one.runs
+            lot[:, at[:, None], at] += product.runs * product.lot
+            inside[:, at[:, None], at] += product.runs * product.inside
+            size[:, at] += product.runs * product.size.reshape(AXES, -1)
+            weight[at] += product.runs
         return Pool(columns, (size / np.maximum(weight, 1.0)).reshape(-1), lot, inside)
 
     @cached_property
@@ -113,7 +113,7 @@ class Findings:
                 continue
             since = min(alarms, key=lambda a: (a.lots, -a.log_e))
             raised = {plain(a.driver) for a in alarms}
-            drivers = tuple(one for one in name.drivers if one in raised) or (name.drivers[0],)
+            drivers = tuple(driver for driver in name.drivers if driver in raised) or (name.drivers[0],)
             out.append(Discovery(name, since, drivers, *self._carried(name, since)))
         return sorted(out, key=lambda one: one.since.lots)
 
@@ -177,7 +177,9 @@ class Findings:
         }
 
     def _rows(self) -> list[DiscoveryRow]:
-        rows = [self._row(one) for one in self.discoveries] + [self._station_row(alarm) for alarm in self._of_station]
+        rows = [self._row(discovery) for discovery in self.discoveries] + [
+            self._station_row(alarm) for alarm in self._of_station
+        ]
         for number, row in enumerate(rows, start=1):
             row["id"] = f"D{number}"
         return rows

@@ -65,7 +65,7 @@ class DiscoveryArchive:
         """The kind of device that is judged: the one asked for, else that of most runs."""
         counts = Counter(info.device for info in self.infos)
         if self._device:
-            wanted = next((one for one in counts if one.lower() == self._device.lower()), None)
+            wanted = next((count for count in counts if count.lower() == self._device.lower()), None)
             if wanted is None:
                 raise WrongUse(
                     f"discover: --device '{self._device}' has no run in {self.archive.root}; {did_you_mean(self._device, counts)}"
@@ -115,7 +115,7 @@ class DiscoveryArchive:
     @cached_property
     def columns(self) -> tuple[tuple[Column, ...], tuple[Column, ...]]:
         """Columns of the sensor and of the station that any run of the archive has."""
-        sensor = dict.fromkeys(one for products in self.store.products() for one in products.columns)
+        sensor = dict.fromkeys(column for products in self.store.products() for column in products.columns)
         station = dict.fromkeys(one for products in self.store.products() for one in products.of_station)
         return tuple(sensor), tuple(station)
 
@@ -185,7 +185,7 @@ class DiscoveryArchive:
             if name in {MEAN, STATION, SLOT, UNIT, "date"}:
                 continue
             every = (of.values() for of in (self.attributes.serial, self.attributes.run))
-            out[name] = as_numbers([one.get(name, "") for values in every for one in values])
+            out[name] = as_numbers([value.get(name, "") for values in every for value in values])
         return out
 
     def earlier(self, order: Sequence[str]) -> Callable[[str, int], tuple[Array, Array] | None]:

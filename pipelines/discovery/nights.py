@@ -103,7 +103,7 @@ def brought_up(source: DiscoveryArchive) -> Evidences:
 def _nights(folder: Place) -> list[dict[str, Any]]:
     """The ledger's entries in order."""
     top = folder / "nights"
-    places = sorted(top.iterdir(), key=lambda one: one.name) if top.is_dir() else []
+    places = sorted(top.iterdir(), key=lambda path: path.name) if top.is_dir() else []
     return [files.read_json(place) for place in places if place.name.endswith(".json")]
 
 
@@ -180,7 +180,7 @@ def rows_of_before(source: DiscoveryArchive, state: Evidences) -> list[Discovery
 def discovered_before(archive: Archive) -> list[tuple[str, int]]:
     """Kinds of devices with discoveries of an earlier look, and their number; nothing is judged."""
     top = archive.root / FOLDER
-    places = sorted(top.iterdir(), key=lambda one: one.name) if top.is_dir() else []
+    places = sorted(top.iterdir(), key=lambda path: path.name) if top.is_dir() else []
     found = {place.name: _found(place) for place in places if place.name not in {"scores", "lock"}}
     return [(name, len(stored["discoveries"])) for name, stored in found.items() if stored and stored["discoveries"]]
 
@@ -208,7 +208,7 @@ def remembered(source: DiscoveryArchive, state: Evidences, document: DiscoverDoc
             free.remove(same)
             row["id"], row["since"], row["lots_then"] = same["id"], same["since"], same["lots_then"]
         else:
-            row["id"] = next(one for one in numbers if one not in used)
+            row["id"] = next(number for number in numbers if number not in used)
             used.add(row["id"])
     known = {row["id"] for row in before}
     document["new"] = [row["id"] for row in document["discoveries"] if row["id"] not in known]

@@ -56,7 +56,7 @@ def levels_chart(row: DiscoveryRow) -> Chart:
 
 def growth_charts(findings: Findings, document: DiscoverDocument) -> dict[str, Chart]:
     """How the evidence of each discovery came together from lot to lot, by ``grown-<id>``."""
-    known = {(one.name.effects[0], one.drivers[0]): one.carried for one in findings.discoveries}
+    known = {(discovery.name.effects[0], discovery.drivers[0]): discovery.carried for discovery in findings.discoveries}
     charts: dict[str, Chart] = {}
     for row in document["discoveries"]:
         carried = known.get((row["recommended"], row["driver"]))

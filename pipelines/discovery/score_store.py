@@ -93,7 +93,7 @@ class ScoreStore:
 
     def products(self) -> list[Products]:
         """Products of columns, of every file."""
-        return [one for file in self.files for one in file.products]
+        return [product for file in self.files for product in file.products]
 
     def add(self, ids: Sequence[str], workers: int, distribute: Distributor | None = None) -> int:
         """Score runs that are not scored yet, in processes; the number of new ones."""
@@ -112,7 +112,7 @@ class ScoreStore:
         return len(scored)
 
     def _places(self) -> list[Place]:
-        return [one for one in self.folder.iterdir() if one.name.endswith(".scores")] if self.folder.is_dir() else []
+        return [path for path in self.folder.iterdir() if path.name.endswith(".scores")] if self.folder.is_dir() else []
 
 
 def written(runs: Sequence[ScoredRun]) -> bytes:

@@ -71,7 +71,7 @@ def _scored(run: Run) -> ScoredRun:
     about = run.about
     effects = list((about.get("recipe") or {}).get("effects") or [])
     lot_of_run = about.get("lot") or {}
-    slots = {str(one["serial"]): str(one.get("slot", "")) for one in lot_of_run.get("units", [])}
+    slots = {str(unit["serial"]): str(unit.get("slot", "")) for unit in lot_of_run.get("units", [])}
     head: dict[str, Any] = {
         "run": run.id,
         "when": str(about["when"]),

@@ -78,7 +78,9 @@ def _pinned() -> Check:
         remedy = "install the product from its wheel"
         return Check(PART, "lock", "not configured", f"{LOCK} is not installed", "", remedy)
     locked = {pin.name: pin.version for pin in pins(path.read_text(encoding="utf-8")) if pin.holds()}
-    held: dict[str, str] = {canonicalize_name(one.name): one.version for one in metadata.distributions()}
+    held: dict[str, str] = {
+        canonicalize_name(distribution.name): distribution.version for distribution in metadata.distributions()
+    }
     other = [
         f"{name} {held[name]}, not {version}"
         for name, version in sorted(locked.items())
@@ -94,7 +96,7 @@ def _pinned() -> Check:
 
 def _optional() -> Check:
     """Extras whose libraries are installed, and those whose libraries are not: formats of recordings, certificates as PDF."""
-    declared = [Requirement(one) for one in metadata.requires(PRODUCT) or ()]
+    declared = [Requirement(require) for require in metadata.requires(PRODUCT) or ()]
     have: list[str] = []
     lack: list[str] = []
     for extra in sorted(set(metadata.metadata(PRODUCT).get_all("Provides-Extra") or ()) - DEVELOPMENT):

@@ -124,7 +124,7 @@ def data_sheet(text: str, measured: str) -> DataSheet:
     """
     pairs = [part.partition("=") for part in text.split(",") if part.strip()]
     given = {key.strip(): value.strip() for key, _, value in pairs}
-    known = [one.name for one in fields(DataSheet) if one.name != "measured"]
+    known = [field.name for field in fields(DataSheet) if field.name != "measured"]
     for key in given:
         if key not in known:
             raise WrongUse(f"--set teds: no key is called '{shown(key)}'; {did_you_mean(key, known)}")
@@ -158,16 +158,17 @@ class Accelerometer:
     reference_C: float = 25.0
 
 
-def page(sheet: DataSheet, serial: int, one: Accelerometer) -> bytes:
+def page(sheet: DataSheet, serial: int, accelerometer: Accelerometer) -> bytes:
     """The 32 bytes with basic TEDS and template 25."""
     letter, number = sheet.version[0], int(sheet.version[1:])
     basic = [(sheet.manufacturer, 14), (sheet.model, 15), (_letters(letter), 5), (number, 6), (serial, 24)]
     template = [
         (0, 2), (_TEMPLATE, 8),  # selector of a template of IEEE
         (0, 1), (0, 1),  # accelerometer, no switching of the sensitivity
-        (SENSITIVITY.code(abs(one.sensitivity)), 16), (HIGH_PASS.code(one.high_pass_hz), 8), (one.axis, 2),
-        (MASS.code(sheet.mass_g), 6), (int(one.sensitivity < 0.0), 1), (0, 1),  # no transfer function
-        (REFERENCE.code(one.reference_hz), 8), (round(2.0 * (one.reference_C - 15.0)), 5),
+        (SENSITIVITY.code(abs(accelerometer.sensitivity)), 16),
+        (HIGH_PASS.code(accelerometer.high_pass_hz), 8), (accelerometer.axis, 2),
+        (MASS.code(sheet.mass_g), 6), (int(accelerometer.sensitivity < 0.0), 1), (0, 1),  # no transfer function
+        (REFERENCE.code(accelerometer.reference_hz), 8), (round(2.0 * (accelerometer.reference_C - 15.0)), 5),
         (sheet.days_after_1998, 16), (_letters(sheet.initials), 15), (sheet.period_days or 0, 12),
         (0, 11),  # place of the measurement
         (_END, 2), (_NO_USER_DATA, 1),

@@ -72,7 +72,7 @@ def channels_of(run: Run, number: int, unit: str) -> list[Channel]:
     channels: list[Channel] = []
     for name, label, text, group in ((serial, serial, out_unit, "units"), (REFERENCE, "reference", "g", "reference")):
         rows = [table[table["unit"] == name] for table in tables]
-        time = np.concatenate([one["time_s"].to_numpy(dtype=float) for one in rows])
+        time = np.concatenate([row["time_s"].to_numpy(dtype=float) for row in rows])
         if time.size < 2:
             continue
         interval = float((time[-1] - time[0]) / (time.size - 1))
@@ -85,7 +85,7 @@ def channels_of(run: Run, number: int, unit: str) -> list[Channel]:
 
 def _same_length(channels: list[Channel]) -> list[Channel]:
     """Channels of one interval cut to the shortest of them, so that they share a clock."""
-    intervals = {round(one.interval_s, 15) for one in channels}
+    intervals = {round(channel.interval_s, 15) for channel in channels}
     if len(intervals) > 1 and max(intervals) - min(intervals) > 1e-9 * max(intervals):
         return channels
     count = min(len(one.samples) for one in channels)
@@ -104,7 +104,7 @@ class Writer(NamedTuple):
 def _csv(channels: Sequence[Channel]) -> bytes:
     """Time in s and a column for each channel, the unit in brackets; 17 digits, which represent every double exactly."""
     columns = {"time [s]": channels[0].time}
-    columns |= {f"{one.name} [{one.unit}]": one.samples for one in channels}
+    columns |= {f"{channel.name} [{channel.unit}]": channel.samples for channel in channels}
     return pd.DataFrame(columns).to_csv(index=False, lineterminator="\n", float_format="%.17g").encode()
 
 
@@ -114,9 +114,9 @@ def _hdf5(channels: Sequence[Channel]) -> bytes:
     sink = io.BytesIO()
     with h5py.File(sink, "w") as file:
         file.create_dataset("time", data=channels[0].time).attrs["unit"] = "s"
-        for one in channels:
-            stored = file.create_dataset(one.name, data=one.samples)
-            stored.attrs["unit"], stored.attrs["sample_interval_s"] = one.unit, one.interval_s
+        for channel in channels:
+            stored = file.create_dataset(channel.name, data=channel.samples)
+            stored.attrs["unit"], stored.attrs["sample_interval_s"] = channel.unit, channel.interval_s
     return sink.getvalue()
 
 
@@ -135,7 +135,7 @@ def _lvm(channels: Sequence[Channel]) -> bytes:
         end,
         "",
         f"Channels\t{count}",
-        "Samples" + "".join(f"\t{len(one.samples)}" for one in channels),
+        "Samples" + "".join(f"\t{len(channel.samples)}" for channel in channels),
         "Y_Unit_Label" + "".join(f"\t{one.unit}" for one in channels),
         "X_Dimension" + "\tTime" * count,
         "X0" + "".join(f"\t{one.start_s:.17g}" for one in channels),
@@ -153,9 +153,9 @@ def _mat(channels: Sequence[Channel]) -> bytes:
     from scipy.io import savemat  # a third of a second
 
     content: dict[str, Any] = {"time": channels[0].time}
-    for one in channels:
-        name = "".join(letter if letter.isalnum() else "_" for letter in one.name)
-        content |= {name: one.samples, f"{name}_unit": one.unit}
+    for channel in channels:
+        name = "".join(letter if letter.isalnum() else "_" for letter in channel.name)
+        content |= {name: channel.samples, f"{name}_unit": channel.unit}
     sink = io.BytesIO()
     savemat(sink, content, oned_as="column")
     return sink.getvalue()
@@ -165,10 +165,10 @@ def _tdms(channels: Sequence[Channel]) -> bytes:
     """A group for each clock, channels with ``wf_increment``, ``wf_start_offset`` and ``unit_string``."""
     nptdms = library("nptdms", "tdms", "waveforms: a TDMS file")
     made: list[Any] = []
-    for one in channels:
-        about = {"wf_increment": one.interval_s, "wf_start_offset": one.start_s}
-        about |= {"wf_samples": len(one.samples), "unit_string": one.unit}
-        made.append(nptdms.ChannelObject(one.group, one.name, one.samples, about))
+    for channel in channels:
+        about = {"wf_increment": channel.interval_s, "wf_start_offset": channel.start_s}
+        about |= {"wf_samples": len(channel.samples), "unit_string": channel.unit}
+        made.append(nptdms.ChannelObject(channel.group, channel.name, channel.samples, about))
     sink = io.BytesIO()
     with nptdms.TdmsWriter(sink) as file:
         file.write_segment([nptdms.RootObject({}), *made])
@@ -214,7 +214,7 @@ def _wav(channels: Sequence[Channel]) -> bytes:
     if abs(rate - round(rate)) > 1e-6 * rate:
         raise WrongUse(f"waveforms: {rate:.6g} Hz, a WAV file has whole rates only; choose another format")
     sink = io.BytesIO()
-    wavfile.write(sink, round(rate), np.column_stack([one.samples for one in channels]))
+    wavfile.write(sink, round(rate), np.column_stack([channel.samples for channel in channels]))
     return sink.getvalue()
 
 

@@ -69,8 +69,8 @@ def keep_table_of_dwells(
     """The run that holds a table of dwells in the exchange format, complete for a fit (:func:`complete_table`)."""
     tables = {"dwells": dwells} if history is None else {"dwells": dwells, "history": history}
     digest = hashlib.sha256()
-    for one in tables.values():
-        digest.update(one.to_csv(index=False).encode())
+    for table in tables.values():
+        digest.update(table.to_csv(index=False).encode())
     serials = list(dict.fromkeys(dwells["unit"].astype(str)))
     about: dict[str, Any] = {
         "name": f"dwells of {', '.join(serials[:3])}",

@@ -39,7 +39,7 @@ def send(sink: Any, value: Any) -> None:
     """A value to the other process; arrays are written from where they are."""
     arrays: list[pickle.PickleBuffer] = []
     head = pickle.dumps(value, 5, buffer_callback=arrays.append)
-    pieces: list[Any] = [head, *(one.raw() for one in arrays)]
+    pieces: list[Any] = [head, *(array.raw() for array in arrays)]
     sink.write(struct.pack(f">{len(pieces) + 1}Q", len(pieces), *(len(memoryview(one)) for one in pieces)))
     for piece in pieces:
         sink.write(piece)

@@ -28,7 +28,7 @@ _NUMBER = re.compile(r"^(?:dwell|pos|position|no|nr|number|index|step)(?:[ _.-]?
 
 def serials(table: pd.DataFrame) -> str:
     """The column of serial numbers; empty if there is none. Units of measurement are none, nor are numbers of the rows."""
-    for name in (str(one) for one in table.columns if _SERIAL.match(str(one))):
+    for name in (str(column) for column in table.columns if _SERIAL.match(str(column))):
         distinct = table[name].unique()
         few = len(distinct) == 1 or 2 * len(distinct) <= len(table)
         if few and table[name].notna().all() and not all(output_unit(str(one)) for one in distinct):

@@ -44,7 +44,9 @@ def _fields(message: Any) -> dict[str, Any]:
     if isinstance(message, Mapping):
         return {str(key): value for key, value in message.items()}
     if is_dataclass(message):
-        return {one.name: getattr(message, one.name) for one in fields(message) if not one.name.startswith("__")}
+        return {
+            field.name: getattr(message, field.name) for field in fields(message) if not field.name.startswith("__")
+        }
     names = getattr(message, "__slots__", None) or getattr(message, "__dict__", {})
     return {str(name): getattr(message, str(name)) for name in names if not str(name).startswith("_")}
 

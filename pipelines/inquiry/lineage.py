@@ -52,7 +52,9 @@ class RunSequence:
     def minutes(self) -> list[float]:
         """Station time of each run, min."""
         readings = [run.table("readings") for run in self.runs]
-        ends = [float((one["start_s"] + one["duration_s"]).max()) for one in readings]  # on the station's clock
+        ends = [
+            float((reading["start_s"] + reading["duration_s"]).max()) for reading in readings
+        ]  # on the station's clock
         return [(end - begin) / 60.0 for begin, end in zip([0.0, *ends], ends, strict=False)]
 
 

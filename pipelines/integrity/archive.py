@@ -106,7 +106,9 @@ def verify(
     report = looked()
     if report.checked.findings and open_still:
         first, report = {(one.kind, one.path) for one in report.checked.findings}, looked()
-        report.checked.findings = [one for one in report.checked.findings if (one.kind, one.path) in first]
+        report.checked.findings = [
+            finding for finding in report.checked.findings if (finding.kind, finding.path) in first
+        ]
     return report
 
 

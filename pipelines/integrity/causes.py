@@ -50,7 +50,7 @@ def _without_disagreements(
         links = [one.because for one in by_path.get(path, ())]
         if path not in causes or path in differing or not links or not all(links):
             continue
-        others = [one for one in dict.fromkeys(links) if one in causes and one != path]
+        others = [link for link in dict.fromkeys(links) if link in causes and link != path]
         proved = [one for one in others if one in differing]
         direct = [one for one in others if any(not finding.because for finding in by_path.get(one, ()))]
         fuller = [one for one in others if len(by_path.get(one, ())) > len(links)]
@@ -88,7 +88,7 @@ def _by_folder(
 def _one(findings: list[IntegrityFinding]) -> IntegrityFinding:
     """The findings of one path as one: an invalid signature first, then the first finding."""
     first = min(findings, key=lambda one: one.kind != SIGNATURE)
-    return _with(first, [one for one in findings if one is not first])
+    return _with(first, [finding for finding in findings if finding is not first])
 
 
 def _with(cause: IntegrityFinding, more: Iterable[IntegrityFinding]) -> IntegrityFinding:
@@ -103,7 +103,7 @@ def _gone(causes: Mapping[str, IntegrityFinding], root: Place) -> dict[str, list
     for path, finding in causes.items():
         if finding.kind != MISSING:
             continue
-        parents = [str(one) for one in PurePosixPath(path).parents if str(one) not in {".", *TOPS}]
+        parents = [str(parent) for parent in PurePosixPath(path).parents if str(parent) not in {".", *TOPS}]
         for folder in parents:
             if folder not in there:
                 there[folder] = (root / folder).is_dir()

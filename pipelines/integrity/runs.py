@@ -145,7 +145,7 @@ def check_capture(path: Place, checked: VerifiedPart, schema: int) -> VerifiedPa
     _check_order(records, part)
     _check_end(path, records, part, schema)
     if unusable is not None:  # the gap that it leaves in the order
-        part.findings = [replace(one, because=checked.name(unusable)) for one in part.findings]
+        part.findings = [replace(finding, because=checked.name(unusable)) for finding in part.findings]
     checked.add(part)
     if records:
         _check_state(path, records[-1], checked)
@@ -155,7 +155,7 @@ def check_capture(path: Place, checked: VerifiedPart, schema: int) -> VerifiedPa
 def check_strangers(folder: Place, known: set[str], checked: VerifiedPart) -> None:
     """Tables in a folder that the archive did not write."""
     what = f"was not written by the archive: {REMOVE_FOREIGN}"
-    for place in sorted(folder.iterdir(), key=lambda one: one.name) if folder.is_dir() else ():
+    for place in sorted(folder.iterdir(), key=lambda path: path.name) if folder.is_dir() else ():
         if place.suffix == ".parquet" and place.name not in known and place.is_file():
             checked.wrong(FOREIGN, place, what)
 

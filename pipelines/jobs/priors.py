@@ -119,9 +119,9 @@ def stored_family(recipe: Recipe, own: Archive, units: set[str], kind: str) -> S
     except NotIdentified as problem:
         raise RecipeInvalid(f"recipe {recipe.name}: {problem} (archive {archive.address})", key="prior") from None
     numbers = {
-        one.name: value.tolist() if isinstance(value := getattr(found, one.name), np.ndarray) else value
-        for one in fields(found)
-        if one.name != "own"
+        field.name: value.tolist() if isinstance(value := getattr(found, field.name), np.ndarray) else value
+        for field in fields(found)
+        if field.name != "own"
     }
     alone = {unit: {"mean": m.tolist(), "covariance": c.tolist()} for unit, (m, c) in found.own.items()}
     return StoredFamily.model_validate({**numbers, "effects": archived.effects, "runs": archived.runs, "own": alone})

@@ -94,19 +94,19 @@ def _document(judged: LotReferences | str, stated: Uncertainty) -> ReferencesDoc
     }
 
 
-def _seen(one: Size, stated: Uncertainty, *, told_from: float, worse: bool) -> SeenReference:
-    standard = stated.entries[one.name].standard()
+def _seen(size: Size, stated: Uncertainty, *, told_from: float, worse: bool) -> SeenReference:
+    standard = stated.entries[size.name].standard()
     own = standard.u / TO_SI[standard.unit]
     return {
-        "entry": one.name,
+        "entry": size.name,
         "unit": standard.unit,
         "stated": own,
-        "found": own * one.factor,
-        "low": own * one.low,
-        "high": _finite(own * one.high),
+        "found": own * size.factor,
+        "low": own * size.low,
+        "high": _finite(own * size.high),
         "told_from": _finite(own * told_from),
         "worse": worse,
-        "rivals": list(one.rivals),
+        "rivals": list(size.rivals),
     }
 
 
@@ -131,12 +131,14 @@ def contradiction(judged: ReferencesDocument) -> str:
     return text
 
 
-def _found(one: SeenReference) -> str:
-    unit, high = UNITS.get(one["unit"], one["unit"]), one["high"]
-    interval = f"above {_digits(one['low'])}" if high is None else f"{_digits(one['low'])} to {_digits(high)}"
-    names = " or ".join(LABELS[name] for name in (one["entry"], *one["rivals"]))
-    values = f"stated u {_digits(one['stated'])} {unit}, found {_digits(one['found'])} {unit} (95 %: {interval} {unit})"
-    return f"{names}: {values}"
+def _found(reference: SeenReference) -> str:
+    unit, high = UNITS.get(reference["unit"], reference["unit"]), reference["high"]
+    interval = (
+        f"above {_digits(reference['low'])}" if high is None else f"{_digits(reference['low'])} to {_digits(high)}"
+    )
+    names = " or ".join(LABELS[name] for name in (reference["entry"], *reference["rivals"]))
+    stated, found = (_digits(reference[name]) for name in ("stated", "found"))
+    return f"{names}: stated u {stated} {unit}, found {found} {unit} (95 %: {interval} {unit})"
 
 
 def _digits(value: float, count: int = 3) -> str:
@@ -154,6 +156,6 @@ def unseen(judged: ReferencesDocument) -> str:
     return "; ".join(parts) or "it shows nothing of the table"
 
 
-def _from(one: SeenReference) -> str:
-    unit = UNITS.get(one["unit"], one["unit"])
-    return f"from u = {_digits(one['told_from'] or 0.0, 2)} {unit} (stated {_digits(one['stated'])})"
+def _from(reference: SeenReference) -> str:
+    unit = UNITS.get(reference["unit"], reference["unit"])
+    return f"from u = {_digits(reference['told_from'] or 0.0, 2)} {unit} (stated {_digits(reference['stated'])})"

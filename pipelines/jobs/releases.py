@@ -118,7 +118,7 @@ def release(
     archive.prepare()
     content: dict[str, Any] = {
         "schema": SCHEMA,
-        "model": {**change.of_model(), "formulas": [one.model_dump(mode="json") for one in change.formulas]},
+        "model": {**change.of_model(), "formulas": [formula.model_dump(mode="json") for formula in change.formulas]},
         "from": since.isoformat(),
         "device": device,
         "station": station,
@@ -207,7 +207,7 @@ def _read(archive: Archive, number: int) -> Release:
     content = files.read_json(_place(archive, number))
     model = content["model"]
     as_written = ("device", "station", "reason", "evidence", "forced", "who", "when")
-    formulas = tuple(FormulaSpec.model_validate(one) for one in model["formulas"])
+    formulas = tuple(FormulaSpec.model_validate(formula) for formula in model["formulas"])
     return Release(
         number=number,
         model=ModelChange(tuple(model["effects"]), formulas, model["model_name"], model["model_version"]),

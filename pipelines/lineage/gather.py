@@ -59,7 +59,12 @@ class Gatherer:
     def certificates_of(self, run: Run) -> list[str]:
         """Add the certificates of the units of a run; return their ids."""
         serials = [unit["serial"] for unit in run.about.get("lot", {}).get("units", [])]
-        own = (one for serial in serials for one in Ledger(self.archive).calibrations(serial) if one.run == run.id)
+        own = (
+            calibration
+            for serial in serials
+            for calibration in Ledger(self.archive).calibrations(serial)
+            if calibration.run == run.id
+        )
         return [self._certificate(one) for one in own]
 
     def _other(self, name: str) -> Run | None:
@@ -101,7 +106,7 @@ class Gatherer:
 
     def _tables(self, run: Run, raw: list[str], start: str) -> None:
         """Add the tables of a run, stage by stage."""
-        places = sorted(run.path.glob("*.json"), key=lambda one: one.name)
+        places = sorted(run.path.glob("*.json"), key=lambda path: path.name)
         manifests = {one.stem: files.read_json(one) for one in places if one.name not in {"run.json", SEALED}}
         steps: dict[str, list[str]] = {}
         for name, content in manifests.items():
@@ -125,14 +130,16 @@ class Gatherer:
         label = str(source.get("path") or name)
         return self.graph.add(Node(f"source:{value}", "source", label, sha256=value, about=dict(source)))
 
-    def _certificate(self, one: Calibration) -> str:
-        event = one.event
+    def _certificate(self, calibration: Calibration) -> str:
+        event = calibration.event
         place = f"{folder_of(event.serial)}/{event.sequence:06d}.json"
-        name = self.graph.add(Node(place, "certificate", one.certificate, place, about=dict(one.document())))
+        name = self.graph.add(
+            Node(place, "certificate", calibration.certificate, place, about=dict(calibration.document()))
+        )
         rests = tuple(f"runs/{event.run}/{table}.parquet" for table, _ in event.evidence)
         used = tuple(node for node in (*rests, f"runs/{event.run}") if node in self.graph.nodes)
         self.graph.put(ProvActivity(f"{event.action} {event.certificate}", event.action, used, (name,), _by(event)))
-        ended = one.ended_by
+        ended = calibration.ended_by
         if ended is not None and ended.action == "revoke":
             file, label = f"{folder_of(ended.serial)}/{ended.sequence:06d}.json", f"revocation {ended.certificate}"
             revocation = self.graph.add(Node(file, "revocation", label, file, about={"reason": ended.reason}))

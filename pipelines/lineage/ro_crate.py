@@ -54,7 +54,7 @@ def crate_of(traced: Lineage, contents: dict[str, bytes]) -> dict[str, Any]:
         "description": f"From certificate to raw samples: all sources and all results of {traced.kind} {traced.target}.",
         "datePublished": published, "license": {"@id": "#license"}, "publisher": {"@id": "#owner"},
         "author": _one_or_all([{"@id": person["@id"]} for person in people]),
-        "hasPart": _one_or_all([{"@id": one["@id"]} for one in parts]),
+        "hasPart": _one_or_all([{"@id": part["@id"]} for part in parts]),
         "mentions": _one_or_all([{"@id": action["@id"]} for action in actions]),
     }  # fmt: skip
     licence = {

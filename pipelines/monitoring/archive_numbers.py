@@ -113,7 +113,7 @@ class ArchiveReader:
         station_s = float(dwells["time_s"].max()) if dwells is not None and len(dwells) else 0.0
         if interrupted is None:
             return RunTime(station_s)
-        repeated = sum(one["times"] for one in interrupted["repeated_dwells"])
+        repeated = sum(dwell["times"] for dwell in interrupted["repeated_dwells"])
         return RunTime(station_s, interrupted["pauses"], interrupted["paused_s"], repeated, interrupted["door_opened"])
 
     def _lag(self, finished: Iterable[RunInfo], numbers: ArchiveNumbers, at: datetime) -> None:

@@ -19,7 +19,7 @@ def plan_line(line: Line, station: StationConfig, recipe_named: Callable[[str], 
 
     recipe_named : the recipe of a name in the line's file
     """
-    recipes = [(recipe_named(one.recipe), one.count) for one in line.lots]
+    recipes = [(recipe_named(lot.recipe), lot.count) for lot in line.lots]
     phases = [own for recipe, number in recipes for own in [phases_of(recipe, station)] * number]
     counters = {recipe.name: count(1) for recipe, _ in recipes}
     names = [recipe.name for recipe, number in recipes for _ in range(number)]
@@ -94,12 +94,12 @@ def _activities(line: Line, lot: str, fixture: str, placed: Placed, phases: Sequ
 
 def _lot(lot: str, recipe: str, fixture: str, activities: Sequence[LineActivity]) -> LineLot:
     """A lot from loading to unloading; it waits where none of its phases goes on."""
-    phases = [one for one in activities if one["activity"] not in {"load", "change", "unload"}]
+    phases = [activity for activity in activities if activity["activity"] not in {"load", "change", "unload"}]
     first, last = phases[0]["begin_min"], phases[-1]["end_min"]
     return {
         "lot": lot, "recipe": recipe, "fixture": fixture,
         "loaded_min": activities[0]["begin_min"], "unloaded_min": activities[-1]["end_min"],
-        "wait_min": last - first - sum(one["end_min"] - one["begin_min"] for one in phases),
+        "wait_min": last - first - sum(phase["end_min"] - phase["begin_min"] for phase in phases),
     }  # fmt: skip
 
 

@@ -75,14 +75,14 @@ def stays(line: Line, phases: Sequence[Phase]) -> list[Stay]:
         else:
             last = k - 1 if k and phases[k - 1].kind != "soak" else None
         there = set[str]() if last is None else {one.name for one in needed[last]}
-        new = [one for one in resources if one.name not in there]
+        new = [resource for resource in resources if resource.name not in there]
         change = max((step_count(60.0 * one.change_min) for one in new), default=0)
         made.append(Stay(_names(resources), _names(new), change, any(one.by_hand and one.change_min for one in new)))
     return made
 
 
 def _names(resources: Sequence[Shared]) -> tuple[str, ...]:
-    return tuple(one.name for one in resources)
+    return tuple(resource.name for resource in resources)
 
 
 def shortest(line: Line, lots: Sequence[Sequence[Phase]]) -> Shortest:

@@ -96,7 +96,7 @@ def look_counts(activities: Sequence[Activity], station: StationConfig, recipe: 
 
     They reach both ends of the range, spare enough for the noise, and no dwell decides a coefficient alone (:data:`LEVERAGE`).
     """
-    dwells = [one for one in activities if one.kind == "dwell"]
+    dwells = [activity for activity in activities if activity.kind == "dwell"]
     state = state_of(activities, station, recipe, history=True)
     sensor, _ = design.split(recipe.effects)
     columns = design.local_columns(sensor, state, design.starting_values(sensor, state))
@@ -121,7 +121,7 @@ def _leverage(columns: Array) -> float:
 
 def known_after(context: PlanContext, required: Array) -> float | None:
     """Minutes of station time after which a lot of devices with the planned noise is known; None where it never is."""
-    dwells = [one for one in context.activities if one.kind == "dwell"]
+    dwells = [activity for activity in context.activities if activity.kind == "dwell"]
     counts = look_counts(context.activities, context.station, context.recipe)
     for count in counts:
         until = dwells[count - 1]
@@ -139,7 +139,7 @@ def _ratio(context: PlanContext, count: int, required: Array, looks: int) -> flo
     if spare <= 0:
         return math.inf
     last = [one.step.record for one in context.activities if one.kind == "dwell"][count - 1]
-    taken = [one for one in context.activities if one.step.record <= last]
+    taken = [activity for activity in context.activities if activity.step.record <= last]
     state = state_of(taken, context.station, context.recipe, history=True)
     try:
         found = expected_errors(context.recipe.effects, state, context.covariance[:count, :count], prior=context.prior)

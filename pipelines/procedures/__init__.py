@@ -61,7 +61,7 @@ def find_procedures(package: str, path: Any) -> dict[str, Procedure]:
             )
         _refuse_half(f"{package}.{info.name}", one)
         procedures.append(one)
-    figures = [figure.name for one in procedures for figure in one.figures]
+    figures = [figure.name for procedure in procedures for figure in procedure.figures]
     twice = sorted({name for name in figures if figures.count(name) > 1})
     if twice:
         raise IncompleteProcedure(f"{package}: figure {', '.join(twice)} is declared twice; rename one")
@@ -214,17 +214,17 @@ def procedure_tables(results: Sequence[tuple[int, str, pd.DataFrame, Outcome]]) 
     points = [own.assign(number=number, procedure=name) for number, name, own, _ in results if len(own)]
     figures = [
         {
-            "unit": unit, "procedure": name, "number": number, "figure": one.figure, "axis": one.axis, "value": one.value,
-            "uncertainty": one.uncertainty, "low": one.low, "high": one.high,
-            "identified": bool(one.identified and np.isfinite(one.value)),
-            "unit_text": FIGURES[one.figure].unit, "note": one.note, "dof": one.dof, "removed": one.removed,
+            "unit": unit, "procedure": name, "number": number, "figure": value.figure, "axis": value.axis, "value": value.value,
+            "uncertainty": value.uncertainty, "low": value.low, "high": value.high,
+            "identified": bool(value.identified and np.isfinite(value.value)),
+            "unit_text": FIGURES[value.figure].unit, "note": value.note, "dof": value.dof, "removed": value.removed,
         }
-        for number, name, _, outcome in results for unit, values in outcome.figures.items() for one in values
+        for number, name, _, outcome in results for unit, values in outcome.figures.items() for value in values
     ]  # fmt: skip
     findings = [
-        {"unit": one.unit, "procedure": name, "number": number, "subject": one.subject, "text": one.text}
+        {"unit": finding.unit, "procedure": name, "number": number, "subject": finding.subject, "text": finding.text}
         for number, name, _, outcome in results
-        for one in outcome.findings
+        for finding in outcome.findings
     ]
     compared = [
         {"unit": unit, "procedure": name, "number": number, "role": PROCEDURES[name].roles[0], **one.row()}

@@ -100,7 +100,7 @@ class Evaluated(Procedure):
                 figures[unit], texts = self.nothing(part, str(problem), axis), []
             else:
                 if isinstance(self, Compares):
-                    values = {one.figure: one for one in figures[unit] if one.identified}
+                    values = {figure.figure: figure for figure in figures[unit] if figure.identified}
                     results[unit], curves[unit] = self.compared(part, rows, values, device.out_unit)
             findings += [Finding(unit, *text) for text in texts]
         findings += [Finding("", *text) for text in self.of_lot(part, points)]
@@ -120,7 +120,7 @@ class RecordByRecord(Evaluated):
         return point_table(row for one in taken(records) for row in self.points(part, one, device))
 
     @abstractmethod
-    def points(self, part: Any, one: Taken, device: Device) -> Iterable[Mapping[str, Any]]:
+    def points(self, part: Any, taken: Taken, device: Device) -> Iterable[Mapping[str, Any]]:
         """The points of one unit in one record."""
 
 

@@ -48,16 +48,16 @@ class BiasStability(InG, RecordByRecord):
         pose = Pose(name="stability", outer_deg=part.pose_deg[0], inner_deg=part.pose_deg[1])
         return [ProcedureStep(pose.name, pose, part.temperature_C, lasting_s=part.lasting_s, rate_hz=part.rate_hz)]
 
-    def points(self, part: BiasStabilityPart, one: Taken, device: Device) -> Iterator[dict[str, Any]]:
+    def points(self, part: BiasStabilityPart, taken: Taken, device: Device) -> Iterator[dict[str, Any]]:
         """Means of 1 s in µg from the start of the record."""
-        size, scale = round(part.rate_hz), scale_of(part, device, one.unit)
-        for i, axis in enumerate(one.own.letters):
-            second = block_means(one.own.output[:, i], size) / scale[i] * MICRO
+        size, scale = round(part.rate_hz), scale_of(part, device, taken.unit)
+        for i, axis in enumerate(taken.own.letters):
+            second = block_means(taken.own.output[:, i], size) / scale[i] * MICRO
             k = np.arange(second.size)
-            time = one.own.time[0] + k * size / part.rate_hz
+            time = taken.own.time[0] + k * size / part.rate_hz
             spread = second.std(ddof=1) if second.size > 1 else np.nan
             yield from point_rows(
-                unit=one.unit,
+                unit=taken.unit,
                 axis=axis,
                 series="mean_1s",
                 point=k,

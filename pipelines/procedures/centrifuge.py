@@ -173,11 +173,11 @@ class CentrifugeTest(InG, OnEquipment, RecordByRecord):
         rate = math.degrees(math.sqrt(one["force_g"] * 9.80665 / one["radius_m"]))
         return equipment.spin(rate, int(one["direction"]), one["record_s"], slots, one["radius_m"])
 
-    def points(self, part: CentrifugePart, one: Taken, device: Device) -> Iterator[dict[str, Any]]:
+    def points(self, part: CentrifugePart, taken: Taken, device: Device) -> Iterator[dict[str, Any]]:
         """Mean output in g over the acceleration by the measured rate."""
-        read = one.record.samples[REFERENCE].output
+        read = taken.record.samples[REFERENCE].output
         rate = np.radians(read[:, 0].mean())
-        radius, way = (one.record.step.setting[name] for name in ("radius_m", "direction"))
+        radius, way = (taken.record.step.setting[name] for name in ("radius_m", "direction"))
         by_rate = force = way * radius * rate**2 / 9.80665
         common = 1e-6 * part.point_ppm * abs(force)
         if part.reference_radius_m is not None:
@@ -185,14 +185,14 @@ class CentrifugeTest(InG, OnEquipment, RecordByRecord):
             force, scatter = ratio * float(read[:, 1].mean()), float(read[:, 1].std(ddof=1)) / np.sqrt(len(read))
             linearity = 1e-6 * (part.reference_linearity_ppm or 0.0) * abs(force)
             common = math.hypot(common, linearity, abs(ratio) * scatter)
-        axis = INPUT if len(one.own.letters) > INPUT else 0  # a device without z is mounted by its x
-        raw = one.own.output[:, axis]
-        output = raw / scale_of(part, device, one.unit)[axis]
+        axis = INPUT if len(taken.own.letters) > INPUT else 0  # a device without z is mounted by its x
+        raw = taken.own.output[:, axis]
+        output = raw / scale_of(part, device, taken.unit)[axis]
         clipped = device.at_end(raw) > 0
         error = float(np.hypot(output.std(ddof=1) / np.sqrt(output.size), common))
         yield {
-            "unit": one.unit, "axis": one.own.letters[axis], "series": "output", "point": one.number, "setting": float(force),
-            "value": np.nan if clipped else float(output.mean()), "uncertainty": error,
+            "unit": taken.unit, "axis": taken.own.letters[axis], "series": "output", "point": taken.number,
+            "setting": float(force), "value": np.nan if clipped else float(output.mean()), "uncertainty": error,
             "spread": float(output.std(ddof=1)), "radius_m": radius, "by_rate": float(by_rate),
         }  # fmt: skip
 

@@ -111,7 +111,7 @@ def response_results(part: Any, rows: pd.DataFrame, out_unit: str) -> list[Compa
         of_phase = {"phase": float(np.degrees(1.0)), "transverse": float(np.degrees(share))}
         results.append(ComparedResult("response_phase", unit="°", value=float(row["phase_deg"]), u=angle,
                                       sensitivities=of_phase, **about))  # fmt: skip
-    sizes = [one for one in results if one.quantity == "response_magnitude"]
+    sizes = [result for result in results if result.quantity == "response_magnitude"]
     middle = getattr(part, "level_frequency_hz", MIDDLE_HZ)
     near = min(sizes, key=lambda one: (abs(np.log(one.setting / middle)), one.point))
     return [replace(near, quantity="reference_sensitivity"), *results]

@@ -118,23 +118,23 @@ class Exposure(InG, RecordByRecord):
             for k, (face, (outer, inner)) in enumerate(list(FACES.items()) * times)
         ]
 
-    def points(self, part: ExposurePart, one: Taken, device: Device) -> list[dict[str, Any]]:
+    def points(self, part: ExposurePart, taken: Taken, device: Device) -> list[dict[str, Any]]:
         """Mean of a record in µg with its time, temperature and force, and the noise of its samples."""
-        letters = one.own.letters
-        output = one.own.output / scale_of(part, device, one.unit)[: len(letters)] * MICRO
-        angles = (np.radians(float(one.reading[name])) for name in ("outer_deg", "inner_deg"))
+        letters = taken.own.letters
+        output = taken.own.output / scale_of(part, device, taken.unit)[: len(letters)] * MICRO
+        angles = (np.radians(float(taken.reading[name])) for name in ("outer_deg", "inner_deg"))
         force = force_from_angles(*angles)
-        noise = [noise_columns(short_noise(output[:, i], one.own.rate_hz)) for i in range(len(letters))]
-        series = one.record.step.name.split()[0]
+        noise = [noise_columns(short_noise(output[:, i], taken.own.rate_hz)) for i in range(len(letters))]
+        series = taken.record.step.name.split()[0]
         return point_rows(
-            unit=one.unit,
+            unit=taken.unit,
             axis=letters,
             series=series if series in {BEFORE, AFTER} else BETWEEN,
-            point=one.number,
-            setting=float(one.own.time.mean()),
+            point=taken.number,
+            setting=float(taken.own.time.mean()),
             value=[output[:, i].mean() for i in range(len(letters))],
             uncertainty=error_of_mean(output),
-            temperature=float(one.reading["unit_C"]),
+            temperature=float(taken.reading["unit_C"]),
             **{f"force_{axis}": float(force[i]) for i, axis in enumerate(AXES)},
             **{name: [each[name] for each in noise] for name in noise[0]},
         )
@@ -221,7 +221,7 @@ def _corrected(rows: pd.DataFrame) -> _Corrected:
 
 
 def _force(rows: pd.DataFrame) -> Array:
-    return rows[[f"force_{one}" for one in AXES]].to_numpy(dtype=float)
+    return rows[[f"force_{axis}" for axis in AXES]].to_numpy(dtype=float)
 
 
 PROCEDURE = Exposure()

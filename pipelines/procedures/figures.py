@@ -95,8 +95,8 @@ def worst(values: Sequence[FigureValue]) -> FigureValue:
     Its interval is that of the largest magnitude of all axes; see :func:`interval_of_largest`.
     """
 
-    def size(one: FigureValue) -> float:
-        bound = abs(one.value) + 2.0 * one.uncertainty
+    def size(value: FigureValue) -> float:
+        bound = abs(value.value) + 2.0 * value.uncertainty
         return bound if np.isfinite(bound) else np.inf  # max() passes over a nan that is not the first
 
     missing = next((one for one in values if not one.identified), None)
@@ -117,7 +117,7 @@ def interval_of_largest(values: Sequence[FigureValue], sign: float) -> tuple[flo
     true value is among them. The lower end is the largest of lower ends of 0.975^(1/n) each, so that all n hold together with
     97.5 % (Šidák). Where it is below zero the sign is open, and the interval is the hull of the intervals of all axes.
     """
-    ends = [_ends(one) for one in values]
+    ends = [_ends(value) for value in values]
     magnitudes = [
         (low, high) if one.value >= 0.0 else (-high, -low) for one, (low, high) in zip(values, ends, strict=True)
     ]
@@ -139,11 +139,11 @@ def _ends(one: FigureValue) -> tuple[float, float]:
     return low, high
 
 
-def _lower(one: FigureValue, low: float, tail: float) -> float:
+def _lower(value: FigureValue, low: float, tail: float) -> float:
     """Lower end of a magnitude with a smaller tail than that of its interval of 95 %."""
-    if np.isfinite(one.dof):
-        return DeviationLaw(one.value, one.dof, one.removed).quantile(tail)
-    return abs(one.value) - (abs(one.value) - low) * float(normal_upper(tail)) / REACH_95
+    if np.isfinite(value.dof):
+        return DeviationLaw(value.value, value.dof, value.removed).quantile(tail)
+    return abs(value.value) - (abs(value.value) - low) * float(normal_upper(tail)) / REACH_95
 
 
 MINUS = "−"

@@ -262,7 +262,7 @@ def _response(
     except NotIdentified:
         return []
     profile = np.array(load_vibration_profile(part.profile).breakpoints)[:, 0]
-    return [one for one in points if not (one["setting"] < profile[0] or one["setting"] > profile[-1])]
+    return [point for point in points if not (point["setting"] < profile[0] or point["setting"] > profile[-1])]
 
 
 def _diagnosis(part: RandomVibrationPart, response: pd.DataFrame) -> TransferDiagnosis:

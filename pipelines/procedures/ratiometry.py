@@ -117,17 +117,17 @@ class Ratiometry(SetsEquipment, RecordByRecord):
         """Sets the supply; returns the ratio to its nominal voltage, which the monitor of the slots expects then."""
         return {"supply_ratio": equipment.set_voltage(step.setting["supply_V"])}
 
-    def points(self, part: RatiometryPart, one: Taken, device: Device) -> Iterator[dict[str, Any]]:
+    def points(self, part: RatiometryPart, taken: Taken, device: Device) -> Iterator[dict[str, Any]]:
         """Mean of the axis on a face at a voltage, in the unit of the output, with the measured supply."""
-        setting, rate = one.record.step.setting, one.own.rate_hz
+        setting, rate = taken.record.step.setting, taken.own.rate_hz
         axis = int(setting["axis"])
-        output = one.own.output[:, axis]
+        output = taken.own.output[:, axis]
         point = {
-            "unit": one.unit, "axis": AXES[axis], "series": "face", "point": one.number,
+            "unit": taken.unit, "axis": AXES[axis], "series": "face", "point": taken.number,
             "setting": setting["supply_V"], "value": float(output.mean()),
             "uncertainty": float(output.std(ddof=1) / np.sqrt(output.size)), "side": setting["side"],
-            "window_s": output.size / rate, "time_s": float(one.own.time.mean()),
-            "measured_V": float(one.reading["supply_V"]), "constant": float(np.ptp(output) == 0.0),
+            "window_s": output.size / rate, "time_s": float(taken.own.time.mean()),
+            "measured_V": float(taken.reading["supply_V"]), "constant": float(np.ptp(output) == 0.0),
         }  # fmt: skip
         yield point | noise_columns(short_noise(output, rate))
 

@@ -187,7 +187,7 @@ def numbers(rows: pd.DataFrame, *names: str) -> list[Array]:
 
 def point_rows(**columns: Any) -> list[dict[str, Any]]:
     """Rows of points from columns in their order; what is one value, not a sequence, is that of every row."""
-    count = max(np.size(one) for one in columns.values())
+    count = max(np.size(column) for column in columns.values())
     spread = {name: [one] * count if np.ndim(one) == 0 else one for name, one in columns.items()}
     return [dict(zip(spread, row, strict=True)) for row in zip(*spread.values(), strict=True)]
 

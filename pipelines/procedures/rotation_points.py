@@ -91,13 +91,13 @@ def _angle(record: ProcedureRecord, which: int) -> float:
 
 
 def _points(
-    part: RotationPart, number: int, one: Taken, sweeps: Sequence[Sweep], still: Array, device: Device
+    part: RotationPart, number: int, taken: Taken, sweeps: Sequence[Sweep], still: Array, device: Device
 ) -> list[dict[str, Any]]:
-    time, letters = one.own.time, one.own.letters
-    output = one.own.output / scale_of(part, device, one.unit)[: len(letters)]
-    clipped = device.at_end(one.own.output) > 0
-    turned, plane = one.record.step.turns[0].axis == "inner", one.record.step.name
-    other = float(one.reading["outer_deg" if turned else "inner_deg"])
+    time, letters = taken.own.time, taken.own.letters
+    output = taken.own.output / scale_of(part, device, taken.unit)[: len(letters)]
+    clipped = device.at_end(taken.own.output) > 0
+    turned, plane = taken.record.step.turns[0].axis == "inner", taken.record.step.name
+    other = float(taken.reading["outer_deg" if turned else "inner_deg"])
     spread = _white([output[(time >= s.begin) & (time < s.end)] for s in sweeps])
     rows: list[dict[str, Any]] = []
 
@@ -109,7 +109,7 @@ def _points(
         steady = np.degrees([span, *motion]).tolist()
         rows.extend(
             point_rows(
-                unit=one.unit, axis=letters, series=plane, point=1000 * number + len(rows) // len(letters), setting=own,
+                unit=taken.unit, axis=letters, series=plane, point=1000 * number + len(rows) // len(letters), setting=own,
                 value=np.full(len(letters), np.nan) if clipped else output[where].mean(axis=0),
                 uncertainty=spread / np.sqrt(len(where)), time_s=float(time[where].mean()), sweep=float(sweep),
                 **dict(zip(COMMON, (*common, *steady), strict=True)),
@@ -143,7 +143,7 @@ def _points(
 
 def _white(outputs: Sequence[Array]) -> Array:
     """Standard deviation (axes,) of a sample by white noise: second differences, which a turn and wander do not reach."""
-    seconds = np.concatenate([np.diff(one, n=2, axis=0) for one in outputs])
+    seconds = np.concatenate([np.diff(output, n=2, axis=0) for output in outputs])
     return np.sqrt(np.mean(seconds**2, axis=0) / 6.0)
 
 

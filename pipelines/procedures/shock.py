@@ -144,7 +144,7 @@ class ShockTest(InG, OnEquipment, FromWaveforms, Compares):
     def completed(self, part: ShockPart, references: Sequence[UnitRecord]) -> ShockPart:
         """The part with the duration of the pulse and the time before it from the recordings, where the user has stated none."""
         axis = AXES.index(part.axis)
-        found = np.array([found_duration(one.output[:, axis], one.rate_hz) for one in references])
+        found = np.array([found_duration(reference.output[:, axis], reference.rate_hz) for reference in references])
         duration, before = 1e3 * float(np.median(found[:, 0])), 1e3 * float(found[:, 1].min())
         stated = part.model_fields_set
         if "duration_ms" in stated and not 1.0 / TOO_FAR < part.duration_ms / duration < TOO_FAR:

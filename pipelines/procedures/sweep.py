@@ -142,7 +142,7 @@ class Sweep(OnEquipment, FromWaveforms, Compares):
             return self.nothing(part, str(problem)), texts
         figures = figures_of_transfer(part, diagnosis, transfer_points(kept), device.scale.get(unit))
         texts += [*diagnosis_text(diagnosis), *condition_texts(kept)]
-        band = next(one for one in figures if one.figure == "sweep_bandwidth_hz")
+        band = next(figure for figure in figures if figure.figure == "sweep_bandwidth_hz")
         if band.identified:
             texts.append(("sampling", sampling_text(float(kept["rate_hz"].max()), band.value, part.bandwidth_order)))
         return figures, texts

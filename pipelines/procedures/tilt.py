@@ -81,18 +81,18 @@ class Tilt(RecordByRecord):
         plane = _plane(part)
         return [] if any(axis in letters for axis in plane) else list(plane)
 
-    def points(self, part: TiltPart, one: Taken, device: Device) -> list[dict[str, Any]]:
+    def points(self, part: TiltPart, taken: Taken, device: Device) -> list[dict[str, Any]]:
         """Mean output of every axis at an angle, which is the encoder's."""
-        output = one.own.output
+        output = taken.own.output
         return point_rows(
-            unit=one.unit,
-            axis=one.own.letters,
+            unit=taken.unit,
+            axis=taken.own.letters,
             series="output",
-            point=one.number,
-            setting=float(one.reading["outer_deg"]),
+            point=taken.number,
+            setting=float(taken.reading["outer_deg"]),
             value=output.mean(axis=0),
             uncertainty=output.std(axis=0, ddof=1) / np.sqrt(len(output)),
-            time_s=float(one.own.time.mean()),
+            time_s=float(taken.own.time.mean()),
         )
 
     def of_unit(self, part: TiltPart, unit: str, rows: pd.DataFrame, device: Device) -> UnitOutcome:
@@ -170,22 +170,22 @@ def _fit(part: TiltPart, rows: pd.DataFrame, orders: int | None = None) -> TiltF
     return fit_tilt(angle, output, error, orders=part.orders if orders is None else orders, time=time)
 
 
-def _linearity(axis: str, one: TiltFit) -> FigureValue:
+def _linearity(axis: str, fit: TiltFit) -> FigureValue:
     """By K2 and K3 where they are fitted: the largest of many residuals is noise, whatever the axis does."""
-    if "second_order" in one.names:
-        value, error = (MICRO * part / one.scale[0] for part in one.departure)
+    if "second_order" in fit.names:
+        value, error = (MICRO * part / fit.scale[0] for part in fit.departure)
         low, high = value - NORMAL * error, value + NORMAL * error
         return FigureValue("tilt_linearity_ug", axis, value, error, max(0.0, low), high)
-    residual = MICRO * one.residuals / one.scale[0]
+    residual = MICRO * fit.residuals / fit.scale[0]
     k = int(np.argmax(np.abs(residual)))
     spread = float(np.sqrt(np.mean(residual**2)))
     return FigureValue("tilt_linearity_ug", axis, float(abs(residual[k])), spread)
 
 
-def _residual(axis: str, one: TiltFit) -> tuple[str, str]:
-    residual = MICRO * one.residuals / one.scale[0]
+def _residual(axis: str, fit: TiltFit) -> tuple[str, str]:
+    residual = MICRO * fit.residuals / fit.scale[0]
     k = int(np.argmax(np.abs(residual)))
-    text = f"{residual[k]:+.3g} µg at {np.degrees(one.angle[k]):.4g}°, rms {np.sqrt(np.mean(residual**2)):.3g} µg"
+    text = f"{residual[k]:+.3g} µg at {np.degrees(fit.angle[k]):.4g}°, rms {np.sqrt(np.mean(residual**2)):.3g} µg"
     return f"largest residual from bias and scale, axis {axis}", text
 
 

@@ -24,7 +24,7 @@ def judged_points(points: Points, effects: Sequence[str], highest_hz: float) -> 
     """The diagnosis of a model on the points of one unit."""
     c = points.conditions
     arrays = (c.frequency, c.level, c.temperature, c.record_s, points.value, points.magnitude_error, points.phase_error)
-    key = f"{' '.join(effects)} {highest_hz} {hash(b''.join(one.tobytes() for one in arrays))}"
+    key = f"{' '.join(effects)} {highest_hz} {hash(b''.join(array.tobytes() for array in arrays))}"
     if key not in _last_judged:
         if len(_last_judged) >= MOST_KEPT:
             _last_judged.clear()
@@ -103,7 +103,7 @@ def _bandwidth(axis: str, diagnosis: TransferDiagnosis, points: Points) -> Figur
     if not np.isfinite(value):
         note = "the model does not fall by 3 dB; sweep to higher frequencies"
         return FigureValue.not_determined("sweep_bandwidth_hz", axis, note)
-    found = [(value, error), *(_bandwidth_with_error(one, top) for one in diagnosis.rivals)]
+    found = [(value, error), *(_bandwidth_with_error(rival, top) for rival in diagnosis.rivals)]
     ends = [(v * np.exp(-1.96 * e / v), v * np.exp(1.96 * min(e / v, 10.0))) for v, e in found if np.isfinite(v)]
     low, high = float(min(end[0] for end in ends)), float(max(end[1] for end in ends))
     error = max(error, (value - low) / 1.96, (high - value) / 1.96)

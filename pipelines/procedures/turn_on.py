@@ -59,16 +59,16 @@ class TurnOn(InG, RecordByRecord):
             for k in range(part.cycles)
         ]
 
-    def points(self, part: TurnOnPart, one: Taken, device: Device) -> list[dict[str, Any]]:
+    def points(self, part: TurnOnPart, taken: Taken, device: Device) -> list[dict[str, Any]]:
         """Mean of a cycle in µg; its uncertainty from the scatter of ten parts of the window."""
-        letters = one.own.letters
-        output = one.own.output / scale_of(part, device, one.unit)[: len(letters)] * MICRO
+        letters = taken.own.letters
+        output = taken.own.output / scale_of(part, device, taken.unit)[: len(letters)] * MICRO
         return point_rows(
-            unit=one.unit,
+            unit=taken.unit,
             axis=letters,
             series="mean",
-            point=one.number,
-            setting=one.number + 1.0,
+            point=taken.number,
+            setting=taken.number + 1.0,
             value=[output[:, i].mean() for i in range(len(letters))],
             uncertainty=error_of_mean(output),
         )

@@ -55,17 +55,17 @@ class WarmUp(InG, RecordByRecord):
             )
         ]
 
-    def points(self, part: WarmUpPart, one: Taken, device: Device) -> Iterator[dict[str, Any]]:
+    def points(self, part: WarmUpPart, taken: Taken, device: Device) -> Iterator[dict[str, Any]]:
         """Means of 1 s in µg over the time since power-on."""
-        size, scale = round(part.rate_hz), scale_of(part, device, one.unit)
-        begun = float(one.reading["since_power_s"]) - 0.5 * float(one.reading["duration_s"])
-        for i, axis in enumerate(one.own.letters):
-            second = block_means(one.own.output[:, i], size) / scale[i] * MICRO
+        size, scale = round(part.rate_hz), scale_of(part, device, taken.unit)
+        begun = float(taken.reading["since_power_s"]) - 0.5 * float(taken.reading["duration_s"])
+        for i, axis in enumerate(taken.own.letters):
+            second = block_means(taken.own.output[:, i], size) / scale[i] * MICRO
             noise = float(np.std(np.diff(second), ddof=1) / np.sqrt(2.0)) if second.size > 2 else np.nan
             k = np.arange(second.size)
             time = begun + (k + 0.5) * size / part.rate_hz
             yield from point_rows(
-                unit=one.unit, axis=axis, series="mean_1s", point=k, setting=time, value=second, uncertainty=noise
+                unit=taken.unit, axis=axis, series="mean_1s", point=k, setting=time, value=second, uncertainty=noise
             )
 
     def of_unit(self, part: WarmUpPart, unit: str, rows: pd.DataFrame, device: Device) -> UnitOutcome:

@@ -75,7 +75,10 @@ def program_run(
 
     def end_certificate(serial: str) -> int:
         held[serial] = _held(ledger, serial, run.id, day)
-        if any(one.until > day and one.start < one.until for one in ledger.calibrations(serial)):
+        if any(
+            calibration.until > day and calibration.start < calibration.until
+            for calibration in ledger.calibrations(serial)
+        ):
             ledger.revoke(serial, REASON, day=day)
         return len(ledger.events(serial)) + 1 if held[serial] is not None else 0
 
@@ -88,43 +91,43 @@ def program_run(
         worker = Programmer(station, root, run.id, recipe, choice, door, end_certificate, report, saved)
         outcomes = worker.program(units)
     given: dict[str, str] = {}
-    for one in outcomes:
-        old = held.get(one.serial)
-        if one.outcome == "proved" and old is not None:
-            renewed = _renewed(ledger, run, one, day, old.stated_until)
+    for outcome in outcomes:
+        old = held.get(outcome.serial)
+        if outcome.outcome == "proved" and old is not None:
+            renewed = _renewed(ledger, run, outcome, day, old.stated_until)
             if renewed:
-                given[one.serial] = renewed
+                given[outcome.serial] = renewed
     return outcomes, given
 
 
-def _renewed(ledger: Ledger, run: Run, one: ProgrammingOutcome, day: str, until: str) -> str:
+def _renewed(ledger: Ledger, run: Run, outcome: ProgrammingOutcome, day: str, until: str) -> str:
     """The certificate of a unit whose memory is verified; empty where it would not have the number that the device contains."""
-    reason = f"written into the device, copy {one.copy.upper()}, sequence {one.document()['sequence']}"
-    event = certify(ledger, run, [one.serial], day, until, reason=reason, keys=public_keys()).events[0]
-    if event.sequence == one.certificate:
+    reason = f"written into the device, copy {outcome.copy.upper()}, sequence {outcome.document()['sequence']}"
+    event = certify(ledger, run, [outcome.serial], day, until, reason=reason, keys=public_keys()).events[0]
+    if event.sequence == outcome.certificate:
         return event.certificate
-    ledger.revoke(one.serial, REASON, day=day, certificate=event.sequence)
-    one.outcome, one.step = "failed", "certify"
-    one.reason = (
-        f"the device contains certificate number {one.certificate}, and another process wrote to the ledger, so that its number "
-        f"became {event.sequence}; repeat the command"
+    ledger.revoke(outcome.serial, REASON, day=day, certificate=event.sequence)
+    outcome.outcome, outcome.step = "failed", "certify"
+    outcome.reason = (
+        f"the device contains certificate number {outcome.certificate}, and another process wrote to the ledger, so that its "
+        f"number became {event.sequence}; repeat the command"
     )
-    add(run.archive.root, one.serial, "failed", {"run": run.id, "reason": one.reason, **one.document()})
+    add(run.archive.root, outcome.serial, "failed", {"run": run.id, "reason": outcome.reason, **outcome.document()})
     return ""
 
 
 def _refuse_older(ledger: Ledger, run: Run, serial: str, day: str) -> None:
     """Refuse coefficients that were not measured after those of another run that are certified for the unit today."""
-    for one in ledger.calibrations(serial):
-        if one.run == run.id or not one.holds(day) or STATIC not in one.event.covers.split():
+    for calibration in ledger.calibrations(serial):
+        if calibration.run == run.id or not calibration.holds(day) or STATIC not in calibration.event.covers.split():
             continue
-        other = Run(run.archive, one.run)
+        other = Run(run.archive, calibration.run)
         theirs, ours = _measured_at(other), _measured_at(run)
         same = bool(run.about.get("capture")) and other.about.get("capture") == run.about.get("capture")
         if same or theirs >= ours:
             raise WrongUse(
-                f"program: unit {serial}: certificate {one.certificate} is of run {one.run}, measured {theirs}, and run {run.id} "
-                f"was measured {ours}, not after it; write that run, or end its certificate with "
+                f"program: unit {serial}: certificate {calibration.certificate} is of run {calibration.run}, measured {theirs}, "
+                f"and run {run.id} was measured {ours}, not after it; write that run, or end its certificate with "
                 f"'tumbleline certificate revoke {serial}'"
             )
 
@@ -141,7 +144,11 @@ def _held(ledger: Ledger, serial: str, run: str, day: str) -> Calibration | None
     The last one of the run decides: one before it, which an earlier writing ended, does not come back where the last was ended
     for another reason.
     """
-    own = [one for one in ledger.calibrations(serial) if one.run == run and one.stated_until > day >= one.start]
+    own = [
+        calibration
+        for calibration in ledger.calibrations(serial)
+        if calibration.run == run and calibration.stated_until > day >= calibration.start
+    ]
     last = own[-1] if own else None
     if last is None or last.holds(day):
         return last
@@ -168,4 +175,7 @@ def open_lot(run: Run, config: StationConfig) -> Generator[tuple[Any, Callable[[
 
 def document(run: Run, outcomes: Sequence[ProgrammingOutcome], given: Mapping[str, str]) -> dict[str, Any]:
     """The result for JSON."""
-    return {"run": run.id, "units": [{**one.document(), "certificate": given.get(one.serial)} for one in outcomes]}
+    return {
+        "run": run.id,
+        "units": [{**outcome.document(), "certificate": given.get(outcome.serial)} for outcome in outcomes],
+    }

@@ -70,7 +70,7 @@ class Programmer:
                 ("archive the memory", self._archive), ("write", self._write), ("read back", self._read_back),
             ):  # fmt: skip
                 self._each(outcomes, step, act)
-            if any(one.open for one in outcomes):
+            if any(outcome.open for outcome in outcomes):
                 step = "power cycle"
                 self._power_cycle()
             self._each(outcomes, "read back after the power cycle", self._after_power)
@@ -117,55 +117,58 @@ class Programmer:
             self.station.clock.sleep(BOOT_S)
         if reader.sampling() == "running":
             reader.stop()
-        for one in outcomes:
-            one.memory.require()
-            if not reader.slots[one.slot].holds(one.serial):
+        for outcome in outcomes:
+            outcome.memory.require()
+            if not reader.slots[outcome.slot].holds(outcome.serial):
                 raise OperatorNeeded(
-                    f"slot {one.slot}: unit {one.serial} is not in it; seat the unit, or correct the lot"
+                    f"slot {outcome.slot}: unit {outcome.serial} is not in it; seat the unit, or correct the lot"
                 )
-            one.step_counts = one.memory.offset_step if self.choice.with_offsets else 0
-            if self.choice.with_offsets and not one.step_counts:
+            outcome.step_counts = outcome.memory.offset_step if self.choice.with_offsets else 0
+            if self.choice.with_offsets and not outcome.step_counts:
                 raise WrongUse(
-                    f"program: unit {one.serial} has no offset registers, they are needed; leave --set offset_registers=yes out"
+                    f"program: unit {outcome.serial} has no offset registers, they are needed; "
+                    "leave --set offset_registers=yes out"
                 )
 
     def _each(
         self, outcomes: Sequence[ProgrammingOutcome], step: str, act: Callable[[ProgrammingOutcome], None]
     ) -> None:
         """A step for every unit that has not failed; a unit that fails does not stop the others."""
-        for one in outcomes:
-            if not one.open:
+        for outcome in outcomes:
+            if not outcome.open:
                 continue
-            self.report(f"{one.serial}: {step}")
+            self.report(f"{outcome.serial}: {step}")
             self.station.require()
             try:
-                act(one)
+                act(outcome)
             except (StationError, WrongUse) as problem:
-                if one.block is None:  # nothing has been written
-                    one.outcome, one.step, one.reason = "failed", step, str(problem)
+                if outcome.block is None:  # nothing has been written
+                    outcome.outcome, outcome.step, outcome.reason = "failed", step, str(problem)
                 else:
-                    self._failed(one, step, str(problem))
+                    self._failed(outcome, step, str(problem))
             self.saved()
 
-    def _failed(self, one: ProgrammingOutcome, step: str, reason: str) -> None:
-        one.outcome, one.step, one.reason = "failed", step, reason
-        add(self.root, one.serial, "failed", {"run": self.run, "step": step, "reason": reason, **one.document()})
+    def _failed(self, outcome: ProgrammingOutcome, step: str, reason: str) -> None:
+        outcome.outcome, outcome.step, outcome.reason = "failed", step, reason
+        add(
+            self.root, outcome.serial, "failed", {"run": self.run, "step": step, "reason": reason, **outcome.document()}
+        )
 
-    def _archive(self, one: ProgrammingOutcome) -> None:
+    def _archive(self, outcome: ProgrammingOutcome) -> None:
         """Archives the content of the memory, chooses the copy to write, and records the beginning in the journal."""
-        memory, status = one.memory, one.memory.wait()
+        memory, status = outcome.memory, outcome.memory.wait()
         there = {copy: memory.read(copy) for copy in COPIES}
         valid = {copy: block for copy in COPIES if (block := unpack(there[copy])) is not None}
         newest = max(valid, key=lambda copy: valid[copy].sequence, default=None)
-        one.copy = "b" if newest == "a" else "a"
-        if status.erases[one.copy] >= status.endurance:
+        outcome.copy = "b" if newest == "a" else "a"
+        if status.erases[outcome.copy] >= status.endurance:
             raise StationRefused(
-                f"{memory.name}: copy {one.copy.upper()} has {status.erases[one.copy]} erasures, {status.endurance} are "
+                f"{memory.name}: copy {outcome.copy.upper()} has {status.erases[outcome.copy]} erasures, {status.endurance} are "
                 "specified; the memory is worn out: replace the device"
             )
         block = block_of(
-            one.unit, self.choice.form, sequence=valid[newest].sequence + 1 if newest else 1, certificate=0,
-            date=self.choice.date, offsets=self._offsets(one), step=one.step_counts,
+            outcome.unit, self.choice.form, sequence=valid[newest].sequence + 1 if newest else 1, certificate=0,
+            date=self.choice.date, offsets=self._offsets(outcome), step=outcome.step_counts,
         )  # fmt: skip
         pack(block)  # coefficients that the block cannot represent are refused while the certificate still holds
         before = {
@@ -173,50 +176,51 @@ class Programmer:
             "erasures": {copy.upper(): status.erases[copy] for copy in COPIES},
             "offsets": list(memory.offsets()) if memory.offset_step else None,
         }
-        one.certificate = self.before_first_write(one.serial)
-        one.block = replace(block, certificate=one.certificate)
-        one.content = pack(one.block)
-        add(self.root, one.serial, "begun", {
-            "run": self.run, "station": self.station.name, "slot": one.slot, "before": before, **one.document(),
-            "content": one.content.hex(),
+        outcome.certificate = self.before_first_write(outcome.serial)
+        outcome.block = replace(block, certificate=outcome.certificate)
+        outcome.content = pack(outcome.block)
+        add(self.root, outcome.serial, "begun", {
+            "run": self.run, "station": self.station.name, "slot": outcome.slot, "before": before, **outcome.document(),
+            "content": outcome.content.hex(),
         })  # fmt: skip
 
-    def _offsets(self, one: ProgrammingOutcome) -> tuple[int, int, int]:
+    def _offsets(self, outcome: ProgrammingOutcome) -> tuple[int, int, int]:
         """Steps that bring the output at 25 °C nearest to zero: the registers add, so they get the bias with its sign changed."""
-        if not one.step_counts:
+        if not outcome.step_counts:
             return 0, 0, 0
         x, y, z = (
-            int(np.clip(round(-float(b) / one.step_counts), -LARGEST_STEP, LARGEST_STEP)) for b in one.unit.bias[0]
+            int(np.clip(round(-float(b) / outcome.step_counts), -LARGEST_STEP, LARGEST_STEP))
+            for b in outcome.unit.bias[0]
         )
         return x, y, z
 
-    def _write(self, one: ProgrammingOutcome) -> None:
-        one.memory.program(one.copy, one.content)
-        if one.block is not None and one.step_counts:
-            one.memory.set_offsets(one.block.offsets)
+    def _write(self, outcome: ProgrammingOutcome) -> None:
+        outcome.memory.program(outcome.copy, outcome.content)
+        if outcome.block is not None and outcome.step_counts:
+            outcome.memory.set_offsets(outcome.block.offsets)
 
-    def _read_back(self, one: ProgrammingOutcome) -> None:
+    def _read_back(self, outcome: ProgrammingOutcome) -> None:
         """Refuses a copy that differs from the written bytes."""
-        read_back = one.memory.read(one.copy)[: len(one.content)]
-        if read_back != one.content:
-            place = next(i for i, (a, b) in enumerate(zip(read_back, one.content, strict=True)) if a != b)
+        read_back = outcome.memory.read(outcome.copy)[: len(outcome.content)]
+        if read_back != outcome.content:
+            place = next(i for i, (a, b) in enumerate(zip(read_back, outcome.content, strict=True)) if a != b)
             raise StationRefused(
-                f"{one.memory.name}: copy {one.copy.upper()} differs from what was written from byte {place} on "
-                f"({read_back[place]:#04x}, {one.content[place]:#04x} is needed); replace the device"
+                f"{outcome.memory.name}: copy {outcome.copy.upper()} differs from what was written from byte {place} on "
+                f"({read_back[place]:#04x}, {outcome.content[place]:#04x} is needed); replace the device"
             )
 
     def _power_cycle(self) -> None:
         self.report("power cycle")
         power_cycle(self.station, self.door_closed)
 
-    def _after_power(self, one: ProgrammingOutcome) -> None:
+    def _after_power(self, outcome: ProgrammingOutcome) -> None:
         """Refuses a device whose new copy changed, or whose other copy has the larger sequence number."""
-        self._read_back(one)
-        valid = [(block.sequence, copy) for copy in COPIES if (block := unpack(one.memory.read(copy))) is not None]
-        if max(valid)[1] != one.copy:
+        self._read_back(outcome)
+        valid = [(block.sequence, copy) for copy in COPIES if (block := unpack(outcome.memory.read(copy))) is not None]
+        if max(valid)[1] != outcome.copy:
             raise StationRefused(
-                f"{one.memory.name}: copy {max(valid)[1].upper()} is the newest after the power cycle, copy "
-                f"{one.copy.upper()} is needed; replace the device"
+                f"{outcome.memory.name}: copy {max(valid)[1].upper()} is the newest after the power cycle, copy "
+                f"{outcome.copy.upper()} is needed; replace the device"
             )
 
     def _poses(self) -> list[Any]:
@@ -230,7 +234,7 @@ class Programmer:
     def _verify(self, outcomes: Sequence[ProgrammingOutcome]) -> None:
         """Two poses: the coefficients in the device, applied to its output, give the force of the pose."""
         for number, pose in enumerate(self._poses()):
-            if not any(one.open for one in outcomes):
+            if not any(outcome.open for outcome in outcomes):
                 return
             self.report(f"verify in pose {pose.name}")
             self._require()
@@ -267,4 +271,6 @@ class Programmer:
         clock.sleep(recipe.dwell_s + 2.0 / recipe.rate_hz)
         reader.stop()
         self._require()
-        return {one.slot: reader.slots[one.slot].take().outputs.mean(axis=0) for one in outcomes if one.open}
+        return {
+            outcome.slot: reader.slots[outcome.slot].take().outputs.mean(axis=0) for outcome in outcomes if outcome.open
+        }

@@ -83,7 +83,7 @@ def program_teds(
         for step, act in (("archive the memory", _archive), ("write", _write), ("read back", _read_back)):
             _each(outcomes, step, act, report)
             saved()
-        if any(one.outcome == "begun" for one in outcomes):
+        if any(outcome.outcome == "begun" for outcome in outcomes):
             report("power cycle")
             power_cycle(station, config.suspenders.door)
         _each(outcomes, "read back after the power cycle", _read_back, report)
@@ -96,30 +96,32 @@ def program_teds(
 def _each(
     outcomes: Sequence[TedsOutcome], step: str, act: Callable[[TedsOutcome], None], report: Callable[[str], None]
 ) -> None:
-    for one in outcomes:
-        if one.outcome != "begun":
+    for outcome in outcomes:
+        if outcome.outcome != "begun":
             continue
-        report(f"{one.unit}: {step}")
+        report(f"{outcome.unit}: {step}")
         try:
-            act(one)
+            act(outcome)
         except StationError as problem:
-            one.outcome, one.step, one.reason = "failed", step, str(problem)
+            outcome.outcome, outcome.step, outcome.reason = "failed", step, str(problem)
 
 
-def _archive(one: TedsOutcome) -> None:
-    one.before = one.memory.read()
+def _archive(outcome: TedsOutcome) -> None:
+    outcome.before = outcome.memory.read()
 
 
-def _write(one: TedsOutcome) -> None:
-    for number, page in enumerate(one.pages.values()):
-        one.memory.write_page(number, page)
+def _write(outcome: TedsOutcome) -> None:
+    for number, page in enumerate(outcome.pages.values()):
+        outcome.memory.write_page(number, page)
 
 
-def _read_back(one: TedsOutcome) -> None:
+def _read_back(outcome: TedsOutcome) -> None:
     """Refuses a memory whose pages differ from what was written, or whose sums are not 0 modulo 256."""
-    found = one.memory.read()[: len(one.content)]
-    wrong = [k for k, (a, b) in enumerate(zip(found, one.content, strict=True)) if a != b]
+    found = outcome.memory.read()[: len(outcome.content)]
+    wrong = [k for k, (a, b) in enumerate(zip(found, outcome.content, strict=True)) if a != b]
     sums = [sum(found[k : k + PAGE]) % 256 for k in range(0, len(found), PAGE)]
     if wrong or any(sums):
         where = f"differs from byte {wrong[0]} on" if wrong else f"has page sums {sums}"
-        raise StationRefused(f"{one.memory.name}: the memory {where}, the written pages are needed; replace the memory")
+        raise StationRefused(
+            f"{outcome.memory.name}: the memory {where}, the written pages are needed; replace the memory"
+        )

@@ -168,9 +168,9 @@ def _order(residual: Array) -> DriverValues:
     )
 
 
-def _of_axis(one: DriverValues, axis: int) -> DriverValues:
-    values = one.values[..., axis] if one.values.ndim > 2 else one.values
-    return DriverValues(one.name, one.label, values, one.period)
+def _of_axis(driver: DriverValues, axis: int) -> DriverValues:
+    values = driver.values[..., axis] if driver.values.ndim > 2 else driver.values
+    return DriverValues(driver.name, driver.label, values, driver.period)
 
 
 def _forces(problem: Problem, axis: int) -> list[DriverValues]:
@@ -190,7 +190,7 @@ def _forces(problem: Problem, axis: int) -> list[DriverValues]:
 def _quantities(problem: Problem, term: Term, axis: int) -> Iterator[DriverValues]:
     """What an effect may be a function of: its own quantities, the components of the force, then products of two of these."""
     state, effect = problem.lot.state, term.effect
-    known = {one.name: _of_axis(one, axis) for one in recorded_quantities(problem)}
+    known = {quantity.name: _of_axis(quantity, axis) for quantity in recorded_quantities(problem)}
     if isinstance(effect, Handling):
         yield from (known[name] for name in ("time_s",) if name in known)
         return
@@ -212,14 +212,14 @@ def _quantities(problem: Problem, term: Term, axis: int) -> Iterator[DriverValue
 FORCES = frozenset({"fx", "fy", "fz"})
 
 
-def _about(one: DriverValues) -> Array:
+def _about(driver: DriverValues) -> Array:
     """A component of the force as it is; another quantity about its mean."""
-    return one.values if one.name in FORCES else one.values - np.nanmean(one.values)
+    return driver.values if driver.name in FORCES else driver.values - np.nanmean(driver.values)
 
 
-def _product(one: DriverValues, other: DriverValues) -> str:
+def _product(driver: DriverValues, other: DriverValues) -> str:
     """The label of the product of two quantities."""
-    parts = [(part.label.partition(" / ")[0], part.label.partition(" / ")[2], part.name) for part in (one, other)]
+    parts = [(part.label.partition(" / ")[0], part.label.partition(" / ")[2], part.name) for part in (driver, other)]
     names = [name if name in FORCES else f"({label} less its mean)" for label, _, name in parts]
     if parts[0] == parts[1]:
         return f"{names[0]}² / {parts[0][1]}²"

@@ -64,12 +64,12 @@ def line_csv(document: LineDocument) -> str:
     sink = io.StringIO()
     writer = csv.writer(sink, lineterminator="\n")
     writer.writerow(COLUMNS)
-    for one in document["activities"]:
-        texts = [one["lot"], one["fixture"], one["activity"]]
+    for activity in document["activities"]:
+        texts = [activity["lot"], activity["fixture"], activity["activity"]]
         numbers = [
-            "" if (heat := one["temperature_C"]) is None else heat,
-            round(one["begin_min"], 3),
-            round(one["end_min"], 3),
+            "" if (heat := activity["temperature_C"]) is None else heat,
+            round(activity["begin_min"], 3),
+            round(activity["end_min"], 3),
         ]
-        writer.writerow([*map(safe_cell, texts), *numbers, safe_cell("; ".join(one["resources"]))])
+        writer.writerow([*map(safe_cell, texts), *numbers, safe_cell("; ".join(activity["resources"]))])
     return sink.getvalue()

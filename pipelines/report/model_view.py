@@ -18,7 +18,7 @@ def model_view(unit: str, dwells: pd.DataFrame, residuals: pd.DataFrame, effects
     dwells, residuals : of the fit, of the unit; effects : of the model. Without effects beyond the linear ones, or without
     known forces, there is the residual of the model alone.
     """
-    more = [one for one in effects if one not in LINEAR]
+    more = [effect for effect in effects if effect not in LINEAR]
     compared = bool(more) and set(FORCE_COLUMNS) <= set(dwells)
     both = residuals.assign(before_ug=_linear(dwells, residuals) if compared else residuals["residual_ug"])
     fall = {axis: _fall(both[both["axis"] == axis]) for axis in axes_among(both["axis"])}

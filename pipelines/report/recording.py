@@ -32,11 +32,12 @@ def chart_of(inspection: Inspection) -> Chart | None:
         room = ROOM * (high - low) or 1.0
         low, high = low - room, high + room
         shades = [
-            (time[one["first_row"] - 1], time[min(one["first_row"] - 1 + one["samples"], len(time) - 1)], STUCK)
-            for one in document["faults"]
-            if one["axis"] == axis and one["fault"] == "stuck_output"
+            (time[fault["first_row"] - 1], time[min(fault["first_row"] - 1 + fault["samples"], len(time) - 1)], STUCK)
+            for fault in document["faults"]
+            if fault["axis"] == axis and fault["fault"] == "stuck_output"
         ] + [
-            (one["start_s"], one["end_s"], SEVERAL if one["positions"] > 1 else STILL) for one in document["intervals"]
+            (interval["start_s"], interval["end_s"], SEVERAL if interval["positions"] > 1 else STILL)
+            for interval in document["intervals"]
         ]
         shaded = [between(np.array([start, end]), low, high, *look) for start, end, look in shades]
         traces = (*shaded, Trace("", x, y, "line", axis, width=0.8, legend=False))

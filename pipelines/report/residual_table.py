@@ -60,7 +60,7 @@ def residual_table(measurement: Measured, diagnosis: Diagnosis, units: tuple[str
     """
     problem = diagnosis.base.problem
     state = problem.lot.state
-    drivers = {one.name: (one.label, one.values) for one in residuals.recorded_quantities(problem)}  # noqa: PD011 - no table of pandas
+    drivers = {quantity.name: (quantity.label, quantity.values) for quantity in residuals.recorded_quantities(problem)}  # noqa: PD011 - no table of pandas
     shape = (len(units), problem.n)
     drivers["force"] = (FORCE_LABEL, np.asarray(state.force, dtype=float))
     drivers.setdefault("time_s", (LABELS["time_s"], state.time * shown_factor("time_s")))

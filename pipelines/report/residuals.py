@@ -110,7 +110,7 @@ def recorded_quantities(problem: Problem) -> list[DriverValues]:
 
 def drivers_shown(diagnosis: Diagnosis) -> list[DriverValues]:
     """Drivers with a picture: those of the added effects, those that the residual follows, then the usual ones if they vary."""
-    known = {one.name: one for one in recorded_quantities(diagnosis.problem)}
+    known = {quantity.name: quantity for quantity in recorded_quantities(diagnosis.problem)}
     forces, named = quantities_of_added(diagnosis)
     unknown = diagnosis.unexplained
     first = [] if unknown is None else [unknown.driver]

@@ -166,7 +166,7 @@ def _chosen(a: Run, b: Run) -> list[dict[str, Any]]:
     if models[0] != models[1]:
         rows.append(_row("model", "", _model_text(*models), _model_text(*reversed(models))))
     if limits[0] != limits[1]:
-        first, second = (one or {} for one in limits)
+        first, second = (limit or {} for limit in limits)
         rows.append(_row("limits", _limits_text(first, second), *(one.get("name", "none") for one in (first, second))))
     return rows
 

@@ -78,7 +78,7 @@ def _changed(run: Run, step: StageCall, changed: list[str]) -> None:
         changed.append(f"code of {step.name}")
     before, now = manifest.get("libraries", {}), libraries()
     texts = [f"{name} {before.get(name, '?')} → {now[name]}" for name in now if before.get(name) != now[name]]
-    changed += [one for one in texts if one not in changed]
+    changed += [text for text in texts if text not in changed]
 
 
 def _difference(before: pd.DataFrame, after: pd.DataFrame) -> str:

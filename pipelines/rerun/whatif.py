@@ -63,7 +63,7 @@ def fresh_tasks(lots: Sequence[LotComparison], archive: str, change: ModelChange
     last: dict[str, LotComparison] = {}
     tasks: list[FreshTask] = []
     by_run = {judged.entry.id: judged for judged in lots}
-    for judged in (one for one in lots if one.sides):
+    for judged in (lot for lot in lots if lot.sides):
         earlier: dict[str, list[str]] = defaultdict(list)
         capture = judged.entry.capture
         for unit in judged.sides[1].fitted:
@@ -162,7 +162,7 @@ def _verdict(
         return EQUAL, f"{sentence}: the scatter of {count} explains as much"
     hurt: list[str] = []
     for row in rows:
-        own = [one for one in lots if (one.entry.station, one.entry.device) == (row["station"], row["device"])]
+        own = [lot for lot in lots if (lot.entry.station, lot.entry.device) == (row["station"], row["device"])]
         ratios = _log_ratios(figure, own, fresh)
         grown = figure in _known(row) and _share(row[figure]) > FALLS and ratios.size >= FEWEST and ratios.mean() > 0.0
         if grown and _differs(ratios, LEVEL / len(rows)):
@@ -184,7 +184,7 @@ def _decided(share: float, mean: float, hurt: Sequence[str], sentence: str) -> t
 def _pairs(figure: str, lots: Sequence[LotComparison], fresh: dict[str, Fresh]) -> list[tuple[Sums, Sums]]:
     """Errors of the units of each lot, under the old and the new model."""
     if figure == "fresh_rms_ug":
-        return [(later.old, later.new) for one in lots if (later := fresh.get(one.entry.id))]
+        return [(later.old, later.new) for lot in lots if (later := fresh.get(lot.entry.id))]
     return [(old.verified, new.verified) for old, new in (one.sides for one in lots)]
 
 

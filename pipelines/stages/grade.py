@@ -77,7 +77,11 @@ def refuse_limits_without_figures(limits: Limits, recipe: Recipe) -> None:
         elif name in figures_of_recipe(recipe):
             missing = ""
         else:
-            owner = next(one.name for one in PROCEDURES.values() if name in {figure.name for figure in one.figures})
+            owner = next(
+                procedure.name
+                for procedure in PROCEDURES.values()
+                if name in {figure.name for figure in procedure.figures}
+            )
             missing = f"procedure {owner}"
         if missing:
             raise RecipeInvalid(
@@ -135,7 +139,9 @@ def grade(
             if f.name in limits.figures and not f.of.why_not
         ]
         if figures:
-            figure_rows += [_figure_row(unit, one, decisions, limits) for one in own_figures if not one.of.why_not]
+            figure_rows += [
+                _figure_row(unit, figure, decisions, limits) for figure in own_figures if not figure.of.why_not
+            ]
             for one in own_figures:
                 squares.setdefault(one.name, []).append(one.of.shared**2)
         grade_rows.append(_decided(verdict, own_figures, decisions, limits, evidence.basis))
@@ -294,4 +300,4 @@ def _figure_row(unit: str, figure: Figure, decisions: list[Decision], limits: Li
 
 def has_least(limits: Limits) -> bool:
     """Whether a limit is a least value: such figures stand in a column of their own, since ``limit`` is of a magnitude."""
-    return any(one.min is not None for one in limits.figures.values())
+    return any(figure.min is not None for figure in limits.figures.values())

@@ -204,7 +204,7 @@ def _why_silent(values: np.ndarray) -> str:
 
 def alike(channels: list[StaticChannel]) -> list[list[StaticChannel]]:
     """The usable channels, grouped by length of record."""
-    lengths = dict.fromkeys(len(one.record) for one in channels if not one.silent)
+    lengths = dict.fromkeys(len(channel.record) for channel in channels if not channel.silent)
     return [[one for one in channels if not one.silent and len(one.record) == length] for length in lengths]
 
 
@@ -241,7 +241,7 @@ def _curve_rows(channels: list[StaticChannel], curve: AllanCurve, terms: NoiseTe
     explained = (terms.p_value >= UNEXPLAINED_P)[..., None]
     return pd.DataFrame(
         {
-            "unit": np.array([one.unit for one in channels], dtype=object)[c],
+            "unit": np.array([channel.unit for channel in channels], dtype=object)[c],
             "axis": np.array([one.axis for one in channels], dtype=object)[c],
             "tau_s": curve.tau[t],
             "deviation_ug": curve.deviation.ravel(),

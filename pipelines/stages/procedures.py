@@ -71,7 +71,7 @@ def _analysed(
     whole: dict[str, list[FigureValue]] = {}
     for unit in units:
         values = list(outcome.figures.get(unit, []))
-        there = {one.figure for one in values}
+        there = {value.figure for value in values}
         missing = [spec for spec in procedure.figures if spec.name not in there]
         whole[unit] = values + [FigureValue.not_determined(spec.name, "*", why) for spec in missing]
     return table, replace(outcome, figures=whole)

@@ -72,7 +72,7 @@ def soak_noise(
     table[["curve", "curve_u"]] = np.nan
     axes = table.groupby(["unit", "axis"], sort=False)
     changes = [_change(table, own, p, axes.ngroups) for _, own in axes]
-    known = [one for one in changes if one is not None]
+    known = [change for change in changes if change is not None]
     return {"soak_noise": table, "noise_temperature": pd.DataFrame(known)} if known else _nothing()
 
 

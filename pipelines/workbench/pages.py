@@ -236,7 +236,7 @@ def static_version() -> str:
     """Part of the addresses of scripts and styles that changes with their content, so that browsers can cache them."""
     digest = hashlib.sha256()
     shared = files("pipelines.drawing") / "paint.js"
-    for place in (*sorted((files("pipelines.workbench") / "static").iterdir(), key=lambda one: one.name), shared):
+    for place in (*sorted((files("pipelines.workbench") / "static").iterdir(), key=lambda path: path.name), shared):
         if place.is_file():
             digest.update(place.name.encode() + place.read_bytes())
     return digest.hexdigest()[:12]

@@ -120,7 +120,7 @@ def preset_names() -> list[str]:
 def load_preset(name: str, overrides: Mapping[str, float] | None = None) -> Preset:
     """The preset of that name (in any case), with some figures replaced; unknown names and keys are refused."""
     texts = {key.lower(): text for key, text in _texts().items()}
-    own = next((one for one in own_files("presets") if one.lower() == name.lower()), name)
+    own = next((file for file in own_files("presets") if file.lower() == name.lower()), name)
     path = own_file("presets", own, {own} if own.lower() in texts else ())
     if path is None and name.lower() not in texts:
         raise RecipeInvalid(f"device: no preset '{name}'; {did_you_mean(name, preset_names())}", key="device")

@@ -70,7 +70,7 @@ def _host(name: str) -> str:
     except OSError:  # a name that cannot be resolved now stays the same name
         return name.lower()
     numbers = sorted(
-        (ipaddress.ip_address(one.partition("%")[0]) for one in addresses), key=lambda one: (one.version, one)
+        (ipaddress.ip_address(address.partition("%")[0]) for address in addresses), key=lambda one: (one.version, one)
     )
     if any(number.is_loopback or _is_own(str(number)) for number in numbers):
         return HERE
@@ -129,7 +129,7 @@ def lease_file(folder: Path, address: str) -> Path:
 
 def read_holder(path: Path) -> Holder | None:
     """The holder in a lease's note; None where it is missing or unreadable, and the lock decides."""
-    known = {one.name for one in fields(Holder)}
+    known = {field.name for field in fields(Holder)}
     try:
         content = json.loads(path.read_text("utf-8"))
         return Holder(**{name: value for name, value in content.items() if name in known})

@@ -153,17 +153,17 @@ def _named(element: Any) -> str:
     return " ".join(reversed(path[:3]))
 
 
-def _ended(one: Calibration) -> tuple[str, str]:
+def _ended(calibration: Calibration) -> tuple[str, str]:
     """Why a calibration is not valid any more, and until when it still is where its end is known; each may be empty."""
-    by = one.ended_by
+    by = calibration.ended_by
     if by is None:
         return "", ""
     reason = f": {by.reason}" if by.reason else ""
     if by.action == "revoke":
-        return f"revoked on {by.when[:10]} by {by.who}, not valid from {one.until} on{reason}", ""
-    amended = "amended and replaced" if by.run == one.run else "superseded"
-    text = f"{amended} by certificate {by.certificate} on {by.when[:10]}, not valid from {one.until} on{reason}"
-    return ("", text) if today() < one.until else (text, "")
+        return f"revoked on {by.when[:10]} by {by.who}, not valid from {calibration.until} on{reason}", ""
+    amended = "amended and replaced" if by.run == calibration.run else "superseded"
+    text = f"{amended} by certificate {by.certificate} on {by.when[:10]}, not valid from {calibration.until} on{reason}"
+    return ("", text) if today() < calibration.until else (text, "")
 
 
 CORE, ITEM = "dcc:coreData", "dcc:items/dcc:item"

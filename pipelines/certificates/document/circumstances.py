@@ -35,15 +35,15 @@ def source_words(text: str) -> str:
     return text
 
 
-def standard_of(one: Reference) -> content.ReferenceStandard:
+def standard_of(reference: Reference) -> content.ReferenceStandard:
     """A standard of the station as a certificate names it."""
-    accreditation = f" ({one.accreditation})" if one.accreditation else ""
+    accreditation = f" ({reference.accreditation})" if reference.accreditation else ""
     return content.ReferenceStandard(
-        laboratory=one.laboratory + accreditation,
-        date="" if one.date is None else one.date.isoformat(),
-        due=one.due.isoformat(),
-        uncertainty="" if one.U is None else f"U = {one.U:g} {one.unit or ''} (k = {one.k:g})",
-        **{name: getattr(one, name) for name in ("id", "what", "certificate", "sha256")},
+        laboratory=reference.laboratory + accreditation,
+        date="" if reference.date is None else reference.date.isoformat(),
+        due=reference.due.isoformat(),
+        uncertainty="" if reference.U is None else f"U = {reference.U:g} {reference.unit or ''} (k = {reference.k:g})",
+        **{name: getattr(reference, name) for name in ("id", "what", "certificate", "sha256")},
     )
 
 

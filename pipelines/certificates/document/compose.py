@@ -112,7 +112,7 @@ def compose(run: Run, calibration: Calibration, known: list[Calibration], who: L
         norms=NORMS,
         frame=FRAMES.get(budget.frame, budget.frame) if static else FRAME_OF_COMPARISONS,
         conditions=(*conditions_of(run, serial, recipe, static=static), *compared.conditions),
-        references=tuple(standard_of(one) for one in budget.references),
+        references=tuple(standard_of(reference) for reference in budget.references),
         traceability=traceability(budget, entries_of(run, event.covers)),
         results=(
             *(_result(row, coefficients) for row, _ in fitted if row["quantity"] != LARGEST_ERROR),
@@ -141,16 +141,16 @@ def compose(run: Run, calibration: Calibration, known: list[Calibration], who: L
     )
 
 
-def _refuse(run: Run, one: Calibration) -> None:
-    if one.state == "revoked" and one.ended_by is not None:
+def _refuse(run: Run, calibration: Calibration) -> None:
+    if calibration.state == "revoked" and calibration.ended_by is not None:
         raise WrongUse(
-            f"certificate {one.certificate} of run {run.id} was revoked ({one.ended_by.reason}); no document is made of it, "
-            "certify the unit again"
+            f"certificate {calibration.certificate} of run {run.id} was revoked ({calibration.ended_by.reason}); no document "
+            "is made of it, certify the unit again"
         )
-    if run.manifest("coefficients")["sha256"] != one.event.coefficients:
-        stated(run, [one.serial])  # says which hash is which
+    if run.manifest("coefficients")["sha256"] != calibration.event.coefficients:
+        stated(run, [calibration.serial])  # says which hash is which
         raise ArchiveUnusable(
-            f"certificate {one.certificate}: run {run.id} has other coefficients than were certified; restore the table "
+            f"certificate {calibration.certificate}: run {run.id} has other coefficients than were certified; restore the table "
             "from a copy"
         )
 
@@ -206,7 +206,7 @@ def _budget(row: Row, parts: list[Row], words: str) -> content.BudgetTable:
                 source=source_words(one["source"]),
                 **{name: one[name] for name in ("type", "distribution", "u", "share")},
             )
-            for one in sorted(parts, key=lambda one: -one["share"])
+            for one in sorted(parts, key=lambda part: -part["share"])
         ),
     )
 

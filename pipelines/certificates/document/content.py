@@ -61,7 +61,7 @@ class Contribution(Strict):
 
 def letters_of(coefficients: Sequence[Coefficient]) -> str:
     """The axes that have coefficients of their own, in order."""
-    return "".join(axes_among(one.axis for one in coefficients))
+    return "".join(axes_among(coefficient.axis for coefficient in coefficients))
 
 
 class BudgetTable(Strict):

@@ -254,34 +254,34 @@ def _results(w: _Writer, results: Any, c: CertificateContent) -> None:
         own = w.add(results, "result")
         w.text(own, "name", "coefficients of the fit, as archived; their uncertainty is in the results above")
         box = w.add(w.add(own, "data"), "list")
-        for one in c.coefficients:
+        for coefficient in c.coefficients:
             quantity = w.add(box, "quantity")
-            w.text(quantity, "name", f"{one.effect} {one.name} {one.axis}")
-            w.real(quantity, one.value, one.unit)
+            w.text(quantity, "name", f"{coefficient.effect} {coefficient.name} {coefficient.axis}")
+            w.real(quantity, coefficient.value, coefficient.unit)
 
 
-def _response(w: _Writer, parent: Any, one: Response) -> None:
+def _response(w: _Writer, parent: Any, response: Response) -> None:
     """Sensitivity over frequency as lists in the order of the points, and the curve through it."""
     own = w.add(parent, "result")
-    w.text(own, "name", f"sensitivity over frequency, {one.title}")
+    w.text(own, "name", f"sensitivity over frequency, {response.title}")
     box = w.add(w.add(own, "data"), "list")
-    points = one.points
+    points = response.points
     for name, unit, values in (
         ("frequency", "Hz", [(p.frequency_hz, None, 0.0) for p in points]),
         ("amplitude of the motion", "g", [(p.level_g, None, 0.0) for p in points]),
         ("temperature of the item", "°C", [(p.temperature_C, None, 0.0) for p in points]),
         (
             "magnitude of the sensitivity",
-            one.unit,
+            response.unit,
             [(p.magnitude, p.magnitude_expanded, p.magnitude_k) for p in points],
         ),
         ("phase of the sensitivity", "°", [(p.phase_deg, p.phase_expanded, p.phase_k) for p in points]),
     ):
         w.reals(box, name, unit, values)
-    if (curve := one.curve) is None:
+    if (curve := response.curve) is None:
         return
     own = w.add(parent, "result")
-    w.text(own, "name", f"curve through the sensitivity over frequency, {one.title}")
+    w.text(own, "name", f"curve through the sensitivity over frequency, {response.title}")
     text = f"{curve.model}, {curve.verdict}, p {curve.p_value:.3g}, from {curve.low_hz:g} to {curve.high_hz:g} Hz"
     w.text(own, "description", text)
     box = w.add(w.add(own, "data"), "list")
@@ -309,12 +309,12 @@ def _reference(w: _Writer, parent: Any, one: Any) -> None:
 
 
 def _conditions(w: _Writer, parent: Any, c: CertificateContent) -> None:
-    for one in c.conditions:
+    for condition in c.conditions:
         box = w.add(parent, "influenceCondition")
-        w.text(box, "name", one.name)
+        w.text(box, "name", condition.name)
         data = w.add(box, "data")
-        for label, value in (("lowest", one.low), ("highest", one.high)):
-            w.real(w.add(data, "quantity"), value, one.unit, label)
+        for label, value in (("lowest", condition.low), ("highest", condition.high)):
+            w.real(w.add(data, "quantity"), value, condition.unit, label)
     a = c.adjustment
     for status, rms, text in (
         ("beforeAdjustment", a.found_rms_ug, f"with the coefficients of certificate {a.earlier}"),
@@ -328,9 +328,9 @@ def _conditions(w: _Writer, parent: Any, c: CertificateContent) -> None:
             w.real(w.add(w.add(box, "data"), "quantity"), rms, "µg")
 
 
-def _conformity(w: _Writer, parent: Any, one: Conformity, c: CertificateContent) -> None:
+def _conformity(w: _Writer, parent: Any, conformity: Conformity, c: CertificateContent) -> None:
     w.add(parent, "norm", " ".join(c.decision_rule.split()))
-    limit = f"limit {one.limit:g} {one.unit} of '{c.limits}'"
-    text = f"{one.figure}: {limit}, specific probability of false acceptance {least_of(one.pfa)}"
+    limit = f"limit {conformity.limit:g} {conformity.unit} of '{c.limits}'"
+    text = f"{conformity.figure}: {limit}, specific probability of false acceptance {least_of(conformity.pfa)}"
     w.text(parent, "declaration", f"{text}. {c.grade_statement}".removesuffix(". "))
-    w.add(parent, "conformity", OUTCOMES.get(one.outcome, "noPass"))
+    w.add(parent, "conformity", OUTCOMES.get(conformity.outcome, "noPass"))

@@ -48,7 +48,7 @@ class CheckedFile:
     @property
     def accepted(self) -> bool:
         """Whether nothing is wrong with it and its origin is proven."""
-        return bool(self.proven_by) and not any(one.state == "bad" for one in self.checks)
+        return bool(self.proven_by) and not any(check.state == "bad" for check in self.checks)
 
     def add(self, check: str, state: State, message: str) -> None:
         """Add a check."""
@@ -148,7 +148,7 @@ def _pdf(data: bytes, done: CheckedFile, against: Against) -> Any | None:
         signers = []
     else:
         if signers:
-            names = ", ".join(one.name for one in signers)
+            names = ", ".join(signer.name for signer in signers)
             done.add("signature", "good", f"pages and attachment are as they were signed by {names}")
             _trust(done, signers, against)
         else:
@@ -165,7 +165,7 @@ def _pdf(data: bytes, done: CheckedFile, against: Against) -> Any | None:
 
 
 def _trust(done: CheckedFile, signers: Sequence[Signer], against: Against) -> None:
-    done.signers = [one.name for one in signers]
+    done.signers = [signer.name for signer in signers]
     if not against.trusted:
         done.add(
             "signer", "not checked", "no trusted certificate is given: anybody can sign in this name; give --trust FILE"

@@ -85,11 +85,12 @@ def _parts(c: CertificateContent) -> list[dict[str, Any]]:
         {"title": "Method", "before": [c.method], "facts": [["Evaluated by", ", ".join(c.norms)], ["Deviations", deviations],
          *([["Model of the fit", c.adequacy]] if c.adequacy else []),
          ["Software", c.software], ["Record", f"run {c.run}"]]},
-        {"title": "Conditions", "facts": [[one.name.capitalize(), _span(one.low, one.high, one.unit)] for one in c.conditions]},
+        {"title": "Conditions", "facts": [
+            [condition.name.capitalize(), _span(condition.low, condition.high, condition.unit)] for condition in c.conditions]},
         _references(c),
         _as_found(c.adjustment),
         _results(c),
-        *(_response(one) for one in c.responses),
+        *(_response(response) for response in c.responses),
         _conformity(c),
         _budgets(c),
         _coefficients(c),
@@ -107,8 +108,16 @@ def _span(low: float, high: float, unit: str) -> str:
 
 def _references(c: CertificateContent) -> dict[str, Any]:
     rows = [
-        [one.id, one.what, one.certificate, one.laboratory, one.date or "not stated", one.due, one.uncertainty]
-        for one in c.references
+        [
+            reference.id,
+            reference.what,
+            reference.certificate,
+            reference.laboratory,
+            reference.date or "not stated",
+            reference.due,
+            reference.uncertainty,
+        ]
+        for reference in c.references
     ]
     heads = ["standard", "quantity", "certificate", "laboratory", "date", "due", "uncertainty"]
     tables = [_table("", heads, rows, [2, 2, 2, 3, "auto", "auto", 2], [])] if rows else []
@@ -133,12 +142,12 @@ def _as_found(a: Adjustment) -> dict[str, Any]:
 
 def _results(c: CertificateContent) -> dict[str, Any]:
     rows: list[list[str]] = []
-    for one in c.results:
-        if one.expanded is None or one.k is None:
-            rows.append([one.quantity, one.axis, significant(one.value or 0.0), "", one.unit, ""])
+    for result in c.results:
+        if result.expanded is None or result.k is None:
+            rows.append([result.quantity, result.axis, significant(result.value or 0.0), "", result.unit, ""])
             continue
-        value, expanded = with_uncertainty(one.value, one.expanded)
-        rows.append([one.quantity, one.axis, value, expanded, one.unit, f"{one.k:.2f}"])
+        value, expanded = with_uncertainty(result.value, result.expanded)
+        rows.append([result.quantity, result.axis, value, expanded, result.unit, f"{result.k:.2f}"])
     heads = ["quantity", "axis", "value", "U", "unit", "k"]
     table = _table("", heads, rows, [1, "auto", "auto", "auto", "auto", "auto"], [2, 3, 5])
     after = [
@@ -149,18 +158,18 @@ def _results(c: CertificateContent) -> dict[str, Any]:
     return {"title": "Results", "tables": [table], "after": after}  # fmt: skip
 
 
-def _response(one: Response) -> dict[str, Any]:
+def _response(response: Response) -> dict[str, Any]:
     """Sensitivity over frequency, and the curve through it."""
     rows = [
         [significant(p.frequency_hz, 5), significant(p.level_g), *with_uncertainty(p.magnitude, p.magnitude_expanded),
          significant(100.0 * p.magnitude_expanded / p.magnitude, 2), *with_uncertainty(p.phase_deg, p.phase_expanded),
          f"{max(p.magnitude_k, p.phase_k):.2f}"]
-        for p in one.points
+        for p in response.points
     ]  # fmt: skip
-    heads = ["Hz", "amplitude, g", f"sensitivity, {one.unit}", "U", "U, %", "phase, °", "U, °", "k"]
+    heads = ["Hz", "amplitude, g", f"sensitivity, {response.unit}", "U", "U, %", "phase, °", "U, °", "k"]
     tables = [_table("", heads, rows, ["auto"] * 8, list(range(8)))]
     after: list[str] = []
-    if (curve := one.curve) is not None:
+    if (curve := response.curve) is not None:
         rows = [
             [p.name.replace("_", " "), *with_uncertainty(p.value, p.expanded), p.unit, f"{p.k:.2f}"]
             for p in curve.parameters
@@ -171,7 +180,7 @@ def _response(one: Response) -> dict[str, Any]:
             f"{significant(curve.low_hz)} to {significant(curve.high_hz)} Hz; the covariance of its parameters is in the "
             "attached XML. Outside this band, and as properties of the item, its parameters are not certified."
         )
-    return {"title": one.title, "tables": tables, "after": after}
+    return {"title": response.title, "tables": tables, "after": after}
 
 
 def _conformity(c: CertificateContent) -> dict[str, Any]:
@@ -240,9 +249,11 @@ def _budgets(c: CertificateContent) -> dict[str, Any]:
 
 def _coefficients(c: CertificateContent) -> dict[str, Any]:
     rows = []
-    for one in c.coefficients:
-        value, error = with_uncertainty(one.value, one.standard_error)
-        rows.append([one.effect.replace("_", " "), one.name, one.axis, value, error, one.unit])
+    for coefficient in c.coefficients:
+        value, error = with_uncertainty(coefficient.value, coefficient.standard_error)
+        rows.append(
+            [coefficient.effect.replace("_", " "), coefficient.name, coefficient.axis, value, error, coefficient.unit]
+        )
     heads = ["effect", "coefficient", "axis", "value", "standard uncertainty of noise", "unit"]
     table = _table("", heads, rows, [2, "auto", "auto", "auto", "auto", 1], [3, 4])
     text = "Coefficients of the fit. The stated uncertainty is that of the results above; noise alone is printed here."

@@ -67,9 +67,9 @@ def not_trusted(signer: Signer, trusted: Sequence[Certificate]) -> str:
     return "" if any(own == one for one in trusted) else _path_problem(signer, trusted, now)
 
 
-def not_valid(one: Certificate, now: datetime) -> str:
+def not_valid(certificate: Certificate, now: datetime) -> str:
     """Why a certificate is not valid at a time; empty where it is."""
-    first, last = one.not_valid_before_utc, one.not_valid_after_utc
+    first, last = certificate.not_valid_before_utc, certificate.not_valid_after_utc
     if first <= now <= last:
         return ""
     return f"the certificate is valid from {first:%Y-%m-%d} to {last:%Y-%m-%d}, not on {now:%Y-%m-%d}"
@@ -87,8 +87,8 @@ def _path_problem(signer: Signer, trusted: Sequence[Certificate], moment: dateti
     certvalidator = library("pyhanko_certvalidator", EXTRA, WHERE)
     asn1 = library("asn1crypto.x509", EXTRA, WHERE)
 
-    def loaded(one: Certificate) -> object:
-        return asn1.Certificate.load(one.public_bytes(Encoding.DER))
+    def loaded(certificate: Certificate) -> object:
+        return asn1.Certificate.load(certificate.public_bytes(Encoding.DER))
 
     context = certvalidator.ValidationContext(
         trust_roots=[loaded(one) for one in trusted], moment=moment, best_signature_time=moment, allow_fetching=False

@@ -95,7 +95,8 @@ def print_explained(row: DiscoveryRow) -> None:
         say(f"    later lots {'show' if row['confirmed'] else 'do not show'} what earlier ones predict")
     if row["kind"] == "levels":
         lines = [
-            [one["level"], short(one["size_ug"]), short(one["u_ug"]), str(one["units"] or "")] for one in row["levels"]
+            [level["level"], short(level["size_ug"]), short(level["u_ug"]), str(level["units"] or "")]
+            for level in row["levels"]
         ]
         print_table([row["driver"], "size\nµg", "u\nµg", "units"], lines[:_SHOWN_LEVELS])
         if len(lines) > _SHOWN_LEVELS:

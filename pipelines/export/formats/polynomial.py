@@ -71,6 +71,6 @@ def _terms(fitted: AxisPolynomial) -> tuple[list[str], list[str]]:
 
 
 def _texts(numbers: Array, degree: int, *, heat: bool) -> list[str]:
-    texts = [repr(float(one)) for one in numbers]
+    texts = [repr(float(number)) for number in numbers]
     powers, last = texts[: degree + 1], texts[-1] if heat else ""
     return [*powers, *[""] * (DEGREE - degree), last]

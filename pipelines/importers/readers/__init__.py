@@ -65,7 +65,7 @@ def find_readers(package: str, path: Iterable[str]) -> dict[str, FileReader]:
         readers.append(one)
     if missing:
         raise IncompleteReader(f"{package}: {'; '.join(missing)}")
-    return {one.NAME: one for one in sorted(readers, key=lambda one: one.ORDER)}
+    return {one.NAME: one for one in sorted(readers, key=lambda reader: reader.ORDER)}
 
 
 READERS: dict[str, FileReader] = find_readers(__name__, __path__)

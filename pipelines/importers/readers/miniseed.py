@@ -52,7 +52,7 @@ def read(name: str, data: bytes, group: str) -> Content:
         pd.Series(np.concatenate([v for _, v, _ in own]), index=np.concatenate([t for t, _, _ in own]), name=channel)
         for channel, own in sorted(channels[title].items())
     ]
-    table = pd.concat([one[~one.index.duplicated()] for one in frames], axis=1, join="inner").sort_index()
+    table = pd.concat([frame[~frame.index.duplicated()] for frame in frames], axis=1, join="inner").sort_index()
     rates = {rate for own in channels[title].values() for _, _, rate in own}
     since = table.index.to_numpy(np.int64)
     table.insert(0, "time", 1e-6 * (since - since[:1]))

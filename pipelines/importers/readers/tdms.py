@@ -62,7 +62,7 @@ class _LibraryLog(logging.Handler):
         """A block in which the library's log comes here."""
         names = {"nptdms", *(name for name in logging.root.manager.loggerDict if name.startswith("nptdms"))}
         loggers = [logging.getLogger(name) for name in names]
-        before = [(one, list(one.handlers), one.propagate) for one in loggers]
+        before = [(logger, list(logger.handlers), logger.propagate) for logger in loggers]
         try:
             for one in loggers:
                 one.handlers, one.propagate = [self], False

@@ -73,7 +73,7 @@ def _line(unit: UnitContext, row: dict[str, Any], meanings: dict[str, str]) -> d
     expanded = unit.report.coverage * row["uncertainty"]
     value, spread = with_uncertainty(row["value"], expanded)
     ends = [row["low"], row["high"]]
-    interval = " … ".join(with_uncertainty(one, expanded)[0] for one in ends) if np.isfinite(ends).all() else ""
+    interval = " … ".join(with_uncertainty(end, expanded)[0] for end in ends) if np.isfinite(ends).all() else ""
     return {
         "meaning": meanings.get(row["figure"], row["figure"]),
         "axis": row["axis"],

@@ -19,7 +19,7 @@ def _zero_g_offset(tables: UnitTables) -> Value | None:
 def _orthogonality(tables: UnitTables) -> Value | None:
     lot, unit = tables.coefficients
     angles = [lot.angle(unit, first, second) for first, second in ((0, 1), (1, 2), (2, 0))]
-    values = [Value(1e3 * one[0], 1e3 * one[1]) for one in angles if one is not None]
+    values = [Value(1e3 * angle[0], 1e3 * angle[1]) for angle in angles if angle is not None]
     return max(values, key=lambda value: value.reach(tables.guard)) if values else None
 
 

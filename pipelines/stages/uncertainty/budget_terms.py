@@ -97,7 +97,7 @@ class BudgetTerms:
             "uncertainty": self.stated.model_dump(mode="json"),
             "stability": None if self.stability is None else self.stability.model_dump(mode="json"),
             "certificate": self.certificate.model_dump(mode="json"),
-            "reference": [one.model_dump(mode="json") for one in self.references],
+            "reference": [reference.model_dump(mode="json") for reference in self.references],
             "soak_min_s": self.soak_min_s,
             "dwell_s": self.dwell_s,
             "room_C": self.room_C,

@@ -96,7 +96,7 @@ def _own(name: str, u: float, kind: str, dof: float, source: str) -> dict[str, A
 def _sum(row: Mapping[str, Any], own: Iterable[Mapping[str, Any]]) -> dict[str, Any]:
     """Value, u of both types and together, ν_eff, k and U of one result."""
     parts = list(own)
-    u = np.array([one["u"] for one in parts])
+    u = np.array([part["u"] for part in parts])
     random = np.array([one["type"] == "A" for one in parts])
     dof = effective_degrees(u[None, :], np.array([one["dof"] for one in parts])[None, :])
     k, whole = float(coverage_factors(dof)[0]), float(np.sqrt(np.sum(u**2)))

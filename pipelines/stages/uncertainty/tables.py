@@ -103,7 +103,7 @@ def tables_of(
     """
     units, places = lot.calibration.units, groups_of(lot.variances)
     quantities = [one for one in quantities_of(lot) if (one.name, one.axis) not in left_out]
-    parts = [_contributions(one, places, lot.variances, known, lot.terms) for one in quantities]
+    parts = [_contributions(quantity, places, lot.variances, known, lot.terms) for quantity in quantities]
     return {
         "budget": _budget_rows(units, quantities, parts),
         "uncertainties": _sum_rows(units, quantities, parts, places, lot.terms),
@@ -125,25 +125,25 @@ def groups_of(variances: VarianceParts) -> dict[str, Places]:
     return {group: np.flatnonzero(names == group) for group in dict.fromkeys(names.tolist())}
 
 
-def combined(one: BudgetQuantity, places: Mapping[str, Places]) -> tuple[Array, Array, Array]:
+def combined(quantity: BudgetQuantity, places: Mapping[str, Places]) -> tuple[Array, Array, Array]:
     """Standard uncertainty of type A, of type B and of both of a quantity, (units,) each."""
-    noise = np.asarray(one.noise, dtype=float)
-    if one.extra:  # an expected RMS: its contributions make its value, its uncertainty is that of the RMS
+    noise = np.asarray(quantity.noise, dtype=float)
+    if quantity.extra:  # an expected RMS: its contributions make its value, its uncertainty is that of the RMS
         stated = np.zeros_like(noise)
     else:
-        groups = [values for name, values in _parts(one, places).items() if name not in {NOISE, PRIOR}]
+        groups = [values for name, values in _parts(quantity, places).items() if name not in {NOISE, PRIOR}]
         stated = np.sqrt(_summed(np.stack(groups, axis=1) ** 2)) if groups else np.zeros_like(noise)
     return noise, stated, np.hypot(noise, stated)
 
 
 def _contributions(
-    one: BudgetQuantity,
+    quantity: BudgetQuantity,
     places: Mapping[str, Places],
     variances: VarianceParts,
     known: Mapping[str, UncertaintySource],
     terms: BudgetTerms,
 ) -> _Contributions:
-    own = _parts(one, places)
+    own = _parts(quantity, places)
     u = np.ascontiguousarray(np.stack(list(own.values()), axis=1))
     stated, dof, sensitivity = u.copy(), np.full(u.shape, np.inf), np.full(u.shape, np.nan)
     about: dict[str, list[Any]] = {name: [] for name in SAME}
@@ -151,7 +151,7 @@ def _contributions(
         if name in {NOISE, PRIOR} or name in BEYOND:
             row = _beyond(name, terms)
             if name in {NOISE, "run"}:
-                dof[:, column] = one.dof_noise
+                dof[:, column] = quantity.dof_noise
         else:
             row = _referred(known[name], variances.visible[places[name]])
             stated[:, column], dof[:, column] = known[name].stated.stated, float(known[name].entry.dof or np.inf)
@@ -163,15 +163,15 @@ def _contributions(
     return _Contributions(list(own), u, about, stated, dof, sensitivity)
 
 
-def _parts(one: BudgetQuantity, places: Mapping[str, Places]) -> dict[str, Array]:
+def _parts(quantity: BudgetQuantity, places: Mapping[str, Places]) -> dict[str, Array]:
     """Standard uncertainty of every contribution, (units,) each; the noise first."""
-    if one.extra:
-        return {name: np.asarray(values, dtype=float) for name, values in one.extra.items()}
-    out = {NOISE: np.asarray(one.noise, dtype=float)}
-    if one.of_prior is not None:
-        out |= {NOISE: out[NOISE] * np.sqrt(1.0 - one.of_prior), PRIOR: out[NOISE] * np.sqrt(one.of_prior)}
+    if quantity.extra:
+        return {name: np.asarray(values, dtype=float) for name, values in quantity.extra.items()}
+    out = {NOISE: np.asarray(quantity.noise, dtype=float)}
+    if quantity.of_prior is not None:
+        out |= {NOISE: out[NOISE] * np.sqrt(1.0 - quantity.of_prior), PRIOR: out[NOISE] * np.sqrt(quantity.of_prior)}
     for group, own in places.items():
-        out[group] = np.sqrt(np.sum(np.ascontiguousarray(one.parts[:, own]) ** 2, axis=1))
+        out[group] = np.sqrt(np.sum(np.ascontiguousarray(quantity.parts[:, own]) ** 2, axis=1))
     return out
 
 
@@ -275,7 +275,7 @@ def _sum_rows(
     return pd.DataFrame(
         {
             "unit": [unit for unit in units for _ in range(count)],
-            "quantity": [one.name for one in quantities] * many,
+            "quantity": [quantity.name for quantity in quantities] * many,
             "axis": [one.axis for one in quantities] * many,
             "unit_text": [one.unit for one in quantities] * many,
             **numbers,

@@ -28,8 +28,8 @@ def norm_budget(tables: BudgetTables, terms: BudgetTerms) -> dict[str, pd.DataFr
         return empty()
     stated = terms.stated.model_copy(update=dict.fromkeys(OF_POSES))
     own = [
-        tables_of(_of_unit(one, tables, replace(terms, stated=stated), stated), sources(stated), ROTATIONS)
-        for one in norm_dwells(tables.dwells, tables.history, tables.coefficients, tables.covariance, tables.wander)
+        tables_of(_of_unit(dwell, tables, replace(terms, stated=stated), stated), sources(stated), ROTATIONS)
+        for dwell in norm_dwells(tables.dwells, tables.history, tables.coefficients, tables.covariance, tables.wander)
     ]
     return {name: pd.concat([part[name] for part in own], ignore_index=True) for name in own[0]}
 

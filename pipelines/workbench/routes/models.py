@@ -60,11 +60,11 @@ def _releases(bench: Workbench) -> list[dict[str, Any]]:
     records, now = releases(bench.archive), datetime.now(UTC)
     return [
         {
-            "record": one,
-            "scope": f"{one.device} on {one.station}".removeprefix(" on ").removesuffix(" on ") or "all",
-            "in_use": released(bench.archive, one.device, one.station, now) == one,
+            "record": record,
+            "scope": f"{record.device} on {record.station}".removeprefix(" on ").removesuffix(" on ") or "all",
+            "in_use": released(bench.archive, record.device, record.station, now) == record,
         }
-        for one in records[::-1]
+        for record in records[::-1]
     ]
 
 

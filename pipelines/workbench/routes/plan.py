@@ -109,7 +109,7 @@ def plan(request: Request) -> Response:
     planned, job = bench.work("plan", state, problems)
     poses = [] if planned is None else planned["poses"]
     rows = [] if planned is None else sorted(planned["document"]["effects"], key=lambda row: row["left"])
-    chosen = next((one for one in poses if one["name"] == state.edit), next(iter(poses), None))
+    chosen = next((pose for pose in poses if pose["name"] == state.edit), next(iter(poses), None))
     return page(
         request, "plan.html", state, problems, planned=planned, job=job, recipes=requests.recipes(bench.settings),
         scientific=scientific, listed=[row for row in rows if _is_listed(row, state)], chosen=chosen,

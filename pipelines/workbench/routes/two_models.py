@@ -95,7 +95,7 @@ def _ordered(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
 def _worded(row: dict[str, Any], sides: tuple[MissingPage, ...]) -> dict[str, Any]:
     """A coefficient with its values, their U, and the difference with its own, as texts; empty where a model does not have it."""
     values = [(float(row[side]), COVERAGE * float(row[f"u_{side}"])) for side in ("a", "b")]
-    texts = [with_uncertainty(*one) if np.isfinite(one[0]) else ("", "") for one in values]
+    texts = [with_uncertainty(*value) if np.isfinite(value[0]) else ("", "") for value in values]
     change, expanded = float(row["change"]), _of_difference(values[0][1], values[1][1], sides)
     compared = np.isfinite(change) and expanded > 0.0
     return row | {
@@ -119,7 +119,7 @@ def _of_difference(first: float, second: float, sides: tuple[MissingPage, ...]) 
 def _quantity(state: TwoModelsPage, found: list[Diagnosed | None]) -> str:
     """The quantity of the address, else the one on which the effect depends that the second has besides, else force."""
     tables = [one.table for one in found[::-1] if one is not None and one.table is not None]
-    wanted = [state.against, *(one.first for one in tables)]
+    wanted = [state.against, *(table.first for table in tables)]
     return next((name for name in wanted if tables and name in tables[0].drivers), "force")
 
 

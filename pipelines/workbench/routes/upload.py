@@ -35,8 +35,8 @@ def upload(request: Request) -> Response:
         except TumblelineError as problem:
             problems.append(str(problem))
     folder = bench.settings.folder / uploads.FOLDER
-    files = [one for one in folder.iterdir() if not one.name.startswith(uploads.PART)] if folder.is_dir() else []
-    there = sorted(files, key=lambda one: -one.stat().st_mtime)[:12]
+    files = [path for path in folder.iterdir() if not path.name.startswith(uploads.PART)] if folder.is_dir() else []
+    there = sorted(files, key=lambda file: -file.stat().st_mtime)[:12]
     return page(
         request, "upload.html", state, problems, reading=reading, job=job, done=done, there=[str(one) for one in there],
         meanings=MEANINGS, mapped=dict(pair.split("=", 1) for pair in state.columns if "=" in pair),

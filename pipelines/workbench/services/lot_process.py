@@ -48,7 +48,7 @@ class Pages:
     def ask(self, prompt: Prompt) -> Answer:
         """The answer of the user of a page, without time limit."""
         number = int(self._state["number"]) + 1
-        question = {"kind": prompt.kind, "text": prompt.text, "slots": [list(one) for one in prompt.slots]}
+        question = {"kind": prompt.kind, "text": prompt.text, "slots": [list(slot) for slot in prompt.slots]}
         self.put(phase="asks", question=question, number=number)
         place = self._place / f"answer-{number}.json"
         while not place.is_file() or place.stat().st_size == 0:

@@ -166,7 +166,7 @@ def pause(settings: WorkbenchSettings, name: str) -> LotState:
 
 def pause_all(settings: WorkbenchSettings) -> list[str]:
     """Pause every lot that is measured, and wait until its process has made the station safe; the lots that did not in time."""
-    working = [one for one in lots(settings) if not one.idle]
+    working = [lot for lot in lots(settings) if not lot.idle]
     for one in working:
         pause(settings, one.id)
     end = time.monotonic() + SAFE_S
@@ -191,7 +191,7 @@ def lots(settings: WorkbenchSettings) -> list[LotState]:
     if not top.is_dir():
         return []
     states = [state_of(place) for place in top.iterdir() if (place / "state.json").is_file()]
-    return sorted(states, key=lambda one: -one.since)[:NEWEST]
+    return sorted(states, key=lambda state: -state.since)[:NEWEST]
 
 
 def place_of(settings: WorkbenchSettings, name: str) -> Path:

@@ -74,7 +74,7 @@ def _of_model(settings: WorkbenchSettings, source: str, model: str, added: tuple
 
 def coefficients(settings: WorkbenchSettings, page: TwoModelsPage) -> Request:
     """The coefficients of two models on the same dwells."""
-    both = [_judging(settings, one) for one in two_models(settings, page)]
+    both = [_judging(settings, model) for model in two_models(settings, page)]
     return f"coefficients of two models on {page.source}", {"both": both}
 
 

@@ -38,7 +38,7 @@ def resolve(settings: WorkbenchSettings, name: str, where: str) -> str:
     WrongUse
         It is neither a run of the archive nor a file of the folder.
     """
-    files = {one.name for one in _files(settings.folder)}
+    files = {file.name for file in _files(settings.folder)}
     if name in files:
         return name
     if "/" in name or "\\" in name or name.endswith(ENDINGS):
@@ -48,7 +48,7 @@ def resolve(settings: WorkbenchSettings, name: str, where: str) -> str:
 
 def is_file(settings: WorkbenchSettings, name: str) -> bool:
     """Whether a source is a file of the folder."""
-    return name in {one.name for one in _files(settings.folder)}
+    return name in {file.name for file in _files(settings.folder)}
 
 
 def stamp(settings: WorkbenchSettings, name: str) -> str:
@@ -66,7 +66,7 @@ def archive_stamp(settings: WorkbenchSettings) -> str:
     archive = Archive(settings.archive)
     runs = archive.root / "runs"
     if not isinstance(runs, Path):
-        return digest({"runs": [[one.id, list(one.stages)] for one in archive.runs()]})[:20]
+        return digest({"runs": [[run.id, list(run.stages)] for run in archive.runs()]})[:20]
     if not runs.is_dir():
         return ""
     with os.scandir(runs) as entries:
@@ -79,7 +79,7 @@ def twin(settings: WorkbenchSettings, name: str) -> str:
     place = Path(name)
     for stem in (place.stem.replace("dwells", "fresh"), f"{place.stem}-fresh", f"fresh-{place.stem}"):
         beside = place.with_name(stem + place.suffix)
-        if beside != place and str(beside) in {one.name for one in _files(settings.folder)}:
+        if beside != place and str(beside) in {file.name for file in _files(settings.folder)}:
             return str(beside)
     return ""
 

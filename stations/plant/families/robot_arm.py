@@ -38,8 +38,8 @@ def simulated(world: World, axis: Axis, profile: Profile) -> Bank:
         angles = [world.outer.encoder(world.now), world.inner.encoder(world.now)]
         return Rotation.from_euler("XZ", angles, degrees=True)
 
-    def order_of(one: Axis) -> Source:
-        return lambda: MOVING if one.moving(world.now) else DONE
+    def order_of(axis: Axis) -> Source:
+        return lambda: MOVING if axis.moving(world.now) else DONE
 
     def joints() -> Value:
         wrist = [math.radians(one.encoder(world.now)) for one in (world.outer, world.inner)]

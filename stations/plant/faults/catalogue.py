@@ -27,7 +27,7 @@ def fault_rows() -> list[dict[str, str]]:
     return [
         {
             "fault": name,
-            "target": " or ".join("serial=SN" if one == UNIT else f"device={one}" for one in kind.targets),
+            "target": " or ".join("serial=SN" if target == UNIT else f"device={target}" for target in kind.targets),
             "keys": ":".join(f"{key}={value:g}" for key, value in kind.figures.items()),
             "meaning": kind.meaning.replace("``", ""),
         }
