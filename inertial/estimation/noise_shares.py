@@ -34,20 +34,20 @@ class Shares(NamedTuple):
 
     def of_block(self, block: int) -> "Shares":
         """Those of one block: its own, or the lot's."""
-        return next((Shares(flicker, walk) for own, flicker, walk in self.own if own == block), self.common)
+        return next((Shares(flicker, walk) for number, flicker, walk in self.own if number == block), self.common)
 
     def pick(self, blocks: list[int]) -> "Shares":
         """The shares of some blocks, numbered as they are given."""
         if not self.own:
             return self
         by_block = {block: rest for block, *rest in self.own}
-        own = [(place, *by_block[block]) for place, block in enumerate(blocks) if block in by_block]
-        return self._replace(own=tuple(own))
+        of_picked = [(number, *by_block[block]) for number, block in enumerate(blocks) if block in by_block]
+        return self._replace(own=tuple(of_picked))
 
     def times(self, flicker: float, walk: float) -> "Shares":
         """Each share times a factor of its kind."""
-        own = tuple((block, flicker * one, walk * other) for block, one, other in self.own)
-        return Shares(flicker * self.flicker, walk * self.walk, own)
+        of_blocks = tuple((block, flicker * first, walk * second) for block, first, second in self.own)
+        return Shares(flicker * self.flicker, walk * self.walk, of_blocks)
 
 
 @dataclass(frozen=True)
