@@ -298,7 +298,9 @@ def history(home: Path, query: str) -> list[tuple[str, ...]]:
         return database.execute(query).fetchall()
 
 
-def test_a_run_through_the_orchestrator_leaves_its_history_and_no_credentials_of_an_object_store(tmp_path: Path) -> None:
+def test_a_run_through_the_orchestrator_leaves_its_history_and_no_credentials_of_an_object_store(
+    tmp_path: Path,
+) -> None:
     user, secret = "AKIAQUITEUNLIKELY", "wJalrXUtnFEMIK7MDENG"
     with s3_bucket() as query:
         more = {"XDG_CACHE_HOME": str(tmp_path / "cache"), "AWS_EC2_METADATA_DISABLED": "true"}
