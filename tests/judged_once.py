@@ -2,7 +2,7 @@
 
 import pickle
 from collections import OrderedDict
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from typing import Any
 
@@ -15,7 +15,7 @@ KEPT = 3
 
 
 @contextmanager
-def judged_once() -> Iterator[None]:
+def judged_once() -> Generator[None]:
     """Within it a verdict and a diagnosis are made once for the same dwells and the same model of the catalogue."""
     from pipelines.diagnosis import diagnose
     from pipelines.stages import judge
