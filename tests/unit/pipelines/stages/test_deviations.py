@@ -1,7 +1,8 @@
-"""Other statistics than the Allan deviation: units, coverage of their intervals, where there is none."""
+"""Other statistics than the Allan deviation: units, coverage of their intervals, where there is none, MTIE against a peer."""
 
 from dataclasses import replace
 
+import allantools
 import made_noise as generate
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ import pytest
 from inertial.noise.allan import overlapping
 from inertial.noise.mixture import basis
 from inertial.noise.terms import fit_terms
+from pipelines.cli import noise
 from pipelines.stages.deviations import STATISTICS, Deviations, deviations
 
 RECORDS, N = 150, 2048
@@ -52,6 +54,15 @@ def test_intervals_cover_the_truth_as_often_as_they_say(name: str, kind: str) ->
     assert np.all(np.abs(covered[4:] - 0.6827) < 0.12), covered
     if (name, kind) == ("total", "white"):  # it claims no more at one sample than the Allan deviation
         assert np.mean((found.low[:, 0] <= 1.0) & (found.high[:, 0] >= 1.0)) > 0.6
+
+
+def test_the_maximum_time_interval_error_is_that_of_allantools() -> None:
+    record = np.random.default_rng(3).normal(size=3000) + 5.0
+    m = np.array([1.0, 2.0, 3.0, 64.0, 501.0, 1000.0])
+    mine = STATISTICS["mtie"].compute(record, 50.0, m)
+    peer = allantools.mtie(record, rate=50.0, data_type="freq", taus=m / 50.0)[1]
+    np.testing.assert_allclose(mine, peer, rtol=1e-12)
+    assert ("allan", *STATISTICS) == noise.STATISTICS  # the command offers every statistic
 
 
 def test_integrals_of_an_acceleration_are_velocities() -> None:
