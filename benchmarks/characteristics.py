@@ -59,15 +59,15 @@ def _walk(world: World, seed: int) -> float:
 
 def prior_grid(runs: int, first: int) -> Iterator[str]:
     """What is lost in the likelihood if the prior degrees of freedom lie between two of the grid."""
-    from inertial.estimation.noise_shares import _deviance_at
+    from inertial.estimation.noise_shares import _deviances
 
     rng, fine = np.random.default_rng(SEED + first), np.geomspace(2.0, 256.0, 57)
     lost = []
     for _ in range(40 * runs):
         dof, prior = np.full(24, 60.0), float(np.exp(rng.uniform(np.log(2.0), np.log(64.0))))
         squares = rng.chisquare(60.0, 24) * prior / rng.chisquare(prior, 24)
-        best = min(_deviance_at(squares, dof, p)[0] for p in fine)
-        lost.append(min(_deviance_at(squares, dof, p)[0] for p in decisions.PRIOR_DOF) - best)
+        best = min(_deviances(squares, dof, tuple(fine))[0])
+        lost.append(min(_deviances(squares, dof)[0]) - best)
     yield (
         f"24 series, {len(lost)} draws: deviance lost to the grid, median {np.median(lost):.3f}, 95 % "
         f"{np.quantile(lost, 0.95):.3f}; of {decisions.PRIOR_BETTER} that decide"

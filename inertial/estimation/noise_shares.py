@@ -34,20 +34,20 @@ class Shares(NamedTuple):
 
     def of_block(self, block: int) -> "Shares":
         """Those of one block: its own, or the lot's."""
-        return next((Shares(flicker, walk) for own, flicker, walk in self.own if own == block), self.common)
+        return next((Shares(flicker, walk) for number, flicker, walk in self.own if number == block), self.common)
 
     def pick(self, blocks: list[int]) -> "Shares":
         """The shares of some blocks, numbered as they are given."""
         if not self.own:
             return self
         by_block = {block: rest for block, *rest in self.own}
-        own = [(place, *by_block[block]) for place, block in enumerate(blocks) if block in by_block]
-        return self._replace(own=tuple(own))
+        of_picked = [(number, *by_block[block]) for number, block in enumerate(blocks) if block in by_block]
+        return self._replace(own=tuple(of_picked))
 
     def times(self, flicker: float, walk: float) -> "Shares":
         """Each share times a factor of its kind."""
-        own = tuple((block, flicker * one, walk * other) for block, one, other in self.own)
-        return Shares(flicker * self.flicker, walk * self.walk, own)
+        of_blocks = tuple((block, flicker * first, walk * second) for block, first, second in self.own)
+        return Shares(flicker * self.flicker, walk * self.walk, of_blocks)
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ class Noise:
 
 def deviance_of(squares: Array, dof: Array) -> float:
     """−2 log likelihood of blocks' sums of squares, at the best prior."""
-    return min(_deviance_at(squares, dof, prior)[0] for prior in (*PRIOR_DOF, np.inf))
+    return min(float(np.min(_deviances(squares, dof)[0])), _deviance_of_equal(squares, dof)[0])
 
 
 def moderated(squares: Array, dof: Array) -> tuple[Array, float]:
@@ -79,28 +79,35 @@ def moderated(squares: Array, dof: Array) -> tuple[Array, float]:
     ----------
     squares, dof : (blocks,), whitened sums of squares and their degrees of freedom
     """
-    together, pooled = _deviance_at(squares, dof, np.inf)
-    tried = [(*_deviance_at(squares, dof, prior), prior) for prior in PRIOR_DOF] if squares.size > 1 else []
-    best = min(tried, default=None)
-    if best is None or together - best[0] < PRIOR_BETTER:
-        return np.full(squares.size, max(pooled, 1e-30)), np.inf
-    _, centre, prior = best
-    return np.maximum((squares + prior * centre) / (dof + prior), 1e-30), prior
+    together, pooled = _deviance_of_equal(squares, dof)
+    if squares.size > 1:
+        deviances, centres = _deviances(squares, dof)
+        best = int(np.argmin(deviances))
+        prior = PRIOR_DOF[best]
+        if together - deviances[best] >= PRIOR_BETTER:
+            return np.maximum((squares + prior * centres[best]) / (dof + prior), 1e-30), prior
+    return np.full(squares.size, max(pooled, 1e-30)), np.inf
 
 
-def _deviance_at(squares: Array, dof: Array, prior: float) -> tuple[float, float]:
-    """−2 log likelihood at so many prior degrees of freedom, and the centre of the variances."""
-    squares = np.maximum(squares, 0.0)  # those of a block that is fitted exactly can lie below by rounding
-    total = float(np.sum(dof))
-    pooled = max(float(np.sum(squares)) / max(total, 1.0), 1e-300)
-    if not np.isfinite(prior):
-        return total * (np.log(2.0 * pooled) + 1.0), pooled
-    centre = pooled
+def _deviance_of_equal(squares: Array, dof: Array) -> tuple[float, float]:
+    """−2 log likelihood of blocks of one variance, and that variance."""
+    # a sum of squares of a block that is fitted exactly can lie below zero by rounding
+    total, sum_of_squares = float(np.sum(dof)), float(np.sum(np.maximum(squares, 0.0)))
+    pooled = max(sum_of_squares / max(total, 1.0), 1e-300)
+    return total * (np.log(2.0 * pooled) + 1.0), pooled
+
+
+def _deviances(squares: Array, dof: Array, priors: tuple[float, ...] = PRIOR_DOF) -> tuple[Array, Array]:
+    """−2 log likelihoods at each of the prior degrees of freedom, and the centres of the variances there, (priors,)."""
+    squares, prior = np.maximum(squares, 0.0), np.array(priors)[:, None]
+    weight = dof + prior
+    centre = np.full(prior.shape, _deviance_of_equal(squares, dof)[1])
     for _ in range(60):
-        again = squares.size / float(np.sum((dof + prior) / (squares + prior * centre)))
-        if abs(again / centre - 1.0) < 1e-5:
+        again = squares.size / np.add.reduce(weight / (squares + prior * centre), axis=1, keepdims=True)
+        near = np.abs(again / centre - 1.0) < 1e-5
+        if near.all():
             break
-        centre = again
-    terms = (dof + prior) * np.log(squares + prior * centre) - prior * np.log(prior * centre)
-    terms = terms - 2.0 * gammaln(0.5 * (dof + prior)) + 2.0 * gammaln(0.5 * prior)
-    return float(np.sum(terms)), centre
+        centre = np.where(near, centre, again)
+    terms = weight * np.log(squares + prior * centre) - prior * np.log(prior * centre)
+    terms = terms - 2.0 * gammaln(0.5 * weight) + 2.0 * gammaln(0.5 * prior)
+    return terms.sum(axis=1), centre[:, 0]

@@ -3,16 +3,16 @@
 A recording comes from a result file: a MATLAB file with a rate, a unit and slots.
 """
 
+from __future__ import annotations
+
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
-from scipy.io import loadmat
 
 from schemas.errors import OperatorNeeded, StationError, StationRefused, StationTimeout
 from schemas.motion import Motion
@@ -20,6 +20,9 @@ from schemas.vibration_profile import load_vibration_profile
 from stations.clock import Clock
 from stations.codec import Value
 from stations.devices.commands import Values
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Array = NDArray[np.float64]
 REFERENCE = "@reference"
@@ -52,6 +55,8 @@ class Recording:
 
     def reference_frame(self, record: int, start: float) -> pd.DataFrame:
         """The reference as samples, under a name that no serial can have."""
+        import pandas as pd  # a watchdog opens the devices, and has no second for what it never makes
+
         n = len(self.reference)
         columns = {
             "unit": pd.Series([REFERENCE] * n, dtype="str"),
@@ -70,6 +75,8 @@ def read_recording(path: Path, slots: list[int], name: str, units: Mapping[str, 
     name : of the equipment, for messages
     units : allowed units of the reference, with their number in the one that is returned
     """
+    from scipy.io import loadmat  # a third of a second
+
     try:
         content: dict[str, Any] = loadmat(path, simplify_cells=True)
     except (OSError, ValueError, NotImplementedError) as problem:  # the last: files of MATLAB 7.3, which are HDF5

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from browser import chromium
 from capture_double import finished_run
+from judged_once import judged_once
 from root_process import ROOT
 
 from pipelines.archive import Archive
@@ -19,6 +20,12 @@ sys.path.insert(0, str(ROOT / "benchmarks/worlds"))  # a generator of lots with 
 def no_key_of_the_user() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv(VARIABLE, "")
+        yield
+
+
+@pytest.fixture(scope="package", autouse=True)
+def one_judgement_of_a_lot() -> Iterator[None]:
+    with judged_once():
         yield
 
 

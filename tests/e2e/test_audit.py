@@ -17,7 +17,6 @@ from root_process import ROOT, python
 from s3_server import CREDENTIALS, s3_bucket
 
 from benchmarks.generated_archive import write_archive
-from benchmarks.generated_ledger import write_ledger
 from pipelines.archive import Archive
 from pipelines.audit.audit import Scope, audit
 from pipelines.audit.calibrations import date_of, day_of
@@ -307,15 +306,3 @@ def test_the_weekly_audit_leaves_its_findings_as_artifacts(tmp_path):
     assert [row["finding"] for row in json.loads(json.loads(artifacts["tumbleline-audit"]))] == messages
     assert "# Audit until 2023-12-31" in artifacts["tumbleline-audit-summary"]
     assert "<svg" in (folder / "audit-2023-12-31.html").read_text(encoding="utf-8")
-
-
-def test_the_calibration_of_a_day_has_the_coefficients_of_its_run(copy):
-    archive = Archive(copy)
-    info = archive.runs()[0]
-    unit = info.units[0]
-    write_ledger(copy, [(unit, info.device, info.id, "line-1", info.started[:10])])
-    shown = document_of("show", unit, "--at", info.started[:10], "--archive", copy, status=0)
-    assert shown["calibration"]["run"] == info.id
-    rows = archive.run(info.id).table("coefficients")
-    own = rows[rows["unit"] == unit]
-    assert [row["value"] for row in shown["calibration"]["coefficients"]] == pytest.approx(own["value"].tolist())

@@ -109,7 +109,7 @@ def test_what_cannot_be_judged_is_said(tmp_path: Path) -> None:
 
 def test_few_lots_are_told_and_a_full_folder_is_refused(tmp_path: Path, folder: Path) -> None:
     assert "--lots takes no name" in refused("demo", "pendulous_mass", "--lots", "60")
-    made = write_lots(tmp_path, Line(6), 3)
+    made = write_lots(tmp_path, Line(6, units=2), 3)
     status, out, err = given("discover", "--archive", made.folder)
     assert status == 0, err
     assert "3 lots; the earliest discovery is possible at 30" in " ".join(out.split())
@@ -136,7 +136,7 @@ def test_python_and_the_audit_tell_the_same(folder: Path) -> None:
 
 @pytest.mark.slow
 def test_scores_on_dask_are_those_of_this_machine(folder: Path, tmp_path: Path) -> None:
-    made = write_lots(tmp_path, Line(8), 3)
+    made = write_lots(tmp_path, Line(8, units=2), 3)
     assert document_of("discover", "--archive", made.folder, "--dask", "local", "--workers", "1")["pooled"]["lots"] == 3
 
 

@@ -16,7 +16,6 @@ from capture_double import finished_run
 from each import each
 from in_process import document_of, given
 from printed_pages import ROOT
-from typed_commands import unknown_options
 
 from inertial import frames, poses
 from inertial.planning.reasons import reason
@@ -53,23 +52,6 @@ PRINTED = re.findall(
 
 def read(page: Path) -> str:
     return page.read_text(encoding="utf-8")
-
-
-def typed(page: Path) -> list[str]:
-    """Every `tumbleline …` of a page: lines of code blocks and code within a sentence."""
-    text = re.sub(r" *\\\n *", " ", read(page))  # a backslash joins the next line to the command
-    lines = re.findall(r"^[ $]*(tumbleline +[a-z].*)$", text, re.MULTILINE)
-    inline = re.findall(r"(?<!`)`(tumbleline +[a-z][^`\n]*)`(?!`)", text)
-    return [line.split("  #")[0].strip() for line in (*lines, *inline)]
-
-
-LINES = sorted({(page.stem, line) for page in PAGES for line in typed(page)})
-
-
-@each(LINES, ": ".join)
-def test_a_command_that_is_shown_exists_with_its_options(shown: tuple[str, str]) -> None:
-    assert len(LINES) > 200
-    assert unknown_options(shown[1]) == set()
 
 
 @each([*PAGES, BENCHMARKS])

@@ -34,6 +34,13 @@ def state(tmp_path, monkeypatch):
                 os.kill(int(process.name), signal.SIGKILL)
 
 
+@pytest.mark.parametrize("module", ["stations.watchdog", "stations.bringup.keeper"])
+def test_what_makes_a_device_safe_starts_without_libraries_of_tables(module: str) -> None:
+    code = f"import sys, {module}; print(*sys.modules)"
+    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    assert {"pandas", "scipy", "pyarrow"}.isdisjoint(loaded)
+
+
 def test_a_killed_run_leaves_its_station_safe_and_free():
     with served() as port:
         config = modbus_station(port, limits=SLOW)

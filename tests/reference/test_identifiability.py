@@ -69,14 +69,6 @@ def test_the_ranks_of_polynomials_on_the_sphere_are_reproduced(name):
         assert np.linalg.matrix_rank(terms, tol=1e-8) == expected
 
 
-def test_faces_cannot_see_cross_coupling_and_say_what_to_add():
-    sight = {s.effect: s for s in visibility.visibilities(planned("six"), ("bias", "scale", "misalignment"), 1e-5)}
-    assert not sight["cross_coupling"].seen
-    assert "45" in sight["cross_coupling"].breaker or "90°" in sight["cross_coupling"].breaker
-    assert sight["second_order"].seen
-    assert {"scale_asymmetry", "fourth_order"} <= set(sight["second_order"].alias)
-
-
 def test_second_order_terms_add_up_to_the_bias_and_third_order_ones_to_the_scale():
     state = state_of(poses.fibonacci(60))
     for axis in range(3):

@@ -33,11 +33,6 @@ def test_spectrum_and_allan_variance_say_the_same() -> None:
     np.testing.assert_allclose(np.mean(curve.deviation**2, axis=0), expected, rtol=0.05)
 
 
-def test_a_white_density_is_read_off_the_spectrum_as_one_sided() -> None:
-    x = generate.white(np.random.default_rng(0), (4, 2**15), 25e-6, 250.0)
-    assert np.median(one_sided(x, 250.0).amplitude) == pytest.approx(25e-6, rel=0.03)
-
-
 @pytest.mark.parametrize(("count", "segment"), [(1000, 125), (1001, 124), (64, 64), (500, 333)])
 def test_the_spectrum_is_that_of_scipy_signal(count: int, segment: int) -> None:
     x = np.random.default_rng(61).normal(3.0, 2.0, (2, count))

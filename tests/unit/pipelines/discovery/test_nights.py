@@ -8,31 +8,34 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from demonstrations import wafer_line
 
 from pipelines.archive import Archive
 from pipelines.audit.calibrations import Calibrations
-from pipelines.demo.archive_lots import Hidden, Line, write_lots
+from pipelines.demo.archive_lots import Line, write_lots
 from pipelines.discovery.attributes import add_attributes
 from pipelines.discovery.discover import Look, discovered
 from pipelines.discovery.lot_source import DiscoveryArchive
 from pipelines.discovery.nights import brought_up
 from pipelines.discovery.score_store import ScoreStore
 
-LOTS, FEW = 64, 6
+LOTS, FEW = 44, 6
 
 
-def scored(folder: Path, lots: int) -> Archive:
-    """An archive of a line with a hard spring in one wafer, scored."""
-    made = write_lots(folder, Line(5, hidden=Hidden("W03", 40e-6), wafers=6), lots)
-    archive = Archive(str(made.folder))
-    add_attributes(archive, pd.read_csv(made.units, dtype=str), "serial", "units.csv")
+def small_line(folder: Path) -> Archive:
+    """An archive of a few small lots, scored."""
+    archive = Archive(str(write_lots(folder, Line(5, units=2), FEW).folder))
     DiscoveryArchive(archive).score(1)
     return archive
 
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory: pytest.TempPathFactory) -> Archive:
-    return scored(tmp_path_factory.mktemp("line"), LOTS)
+    """A line with a soft spring in one wafer, scored, with the wafers as attributes."""
+    made = wafer_line(tmp_path_factory.mktemp("line"))
+    archive = Archive(str(made.folder))
+    add_attributes(archive, pd.read_csv(made.units, dtype=str), "serial", "units.csv")
+    return archive
 
 
 @pytest.fixture
@@ -99,7 +102,7 @@ def test_a_state_that_is_gone_or_edited_is_made_again(archive: Archive, caplog: 
 
 
 def test_scores_that_were_edited_are_made_again(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    archive = scored(tmp_path, FEW)
+    archive = small_line(tmp_path)
     (file,) = (Path(str(archive.root)) / "discovery" / "scores").iterdir()
     data = bytearray(file.read_bytes())
     data[-100] ^= 255
@@ -176,7 +179,7 @@ def test_two_populations_in_a_coefficient_are_told_with_their_means(
 
 
 def test_a_damaged_run_is_told_and_pooled_once_it_is_restored(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    archive = scored(tmp_path, FEW)
+    archive = small_line(tmp_path)
     shutil.rmtree(Path(str(archive.root)) / "discovery")
     table = next((Path(str(archive.root)) / "runs").iterdir()) / "dwells.parquet"
     sound = table.read_bytes()

@@ -23,13 +23,13 @@ def second_order(x, natural_hz, damping, rate_hz):
 
 
 def swept(rng):
-    t = np.arange(int(8.0 * RATE_HZ)) / RATE_HZ
+    t = np.arange(int(4.0 * RATE_HZ)) / RATE_HZ
     return 0.5 * signal.chirp(t, 5.0, t[-1], 3000.0, method="log") * signal.windows.tukey(t.size, 0.02)
 
 
 def shaken(rng):
     sos = signal.butter(4, 3000.0, fs=RATE_HZ, output="sos")
-    return 0.5 * signal.sosfilt(sos, rng.standard_normal(int(8.0 * RATE_HZ)))
+    return 0.5 * signal.sosfilt(sos, rng.standard_normal(int(4.0 * RATE_HZ)))
 
 
 def written(path: Path, x, y, rng, noise_V):

@@ -26,6 +26,7 @@ from schemas.errors import RecipeInvalid, WrongUse
 
 FULL = 'effects = ["bias", "scale", "misalignment", "bias_temperature", "scale_temperature"]'
 POOR = 'effects = ["bias", "scale", "misalignment", "bias_temperature"]'
+LIGHT = ('poses = "nine"', 'poses = "six"'), ("static_record_s = 30.0", "static_record_s = 0.0")
 LIMITS = """
 name = "plain"
 rule = "simple_acceptance"
@@ -47,7 +48,7 @@ def archive(tmp_path_factory: pytest.TempPathFactory) -> Archive:
     folder = tmp_path_factory.mktemp("whatif")
     (folder / "plain.toml").write_text(LIMITS)
     for repeat, noise in enumerate((1e-4, 2e-4)):
-        job = small_job(folder, (FULL, POOR), ('limits = "consumer"', 'limits = "plain.toml"'), repeat=repeat)
+        job = small_job(folder, (FULL, POOR), *LIGHT, ('limits = "consumer"', 'limits = "plain.toml"'), repeat=repeat)
         measured_run(job, Archive(folder / "archive"), CaptureDouble(noise_g=noise))
     return Archive(folder / "archive")
 

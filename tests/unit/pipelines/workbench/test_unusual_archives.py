@@ -1,5 +1,6 @@
 """The workbench on an archive with many units, broken runs and scripts in every name; in a browser: tests/e2e."""
 
+import re
 from pathlib import Path
 from urllib.parse import urlencode
 
@@ -34,6 +35,7 @@ def page(client: AsgiClient, address: str) -> str:
 
 def test_five_hundred_units_are_found_and_paged(top: Path, client: AsgiClient) -> None:
     assert "51 to 100 of" in page(client, "/units?search=MANY0&outcome=pass&page=2")
+    assert re.search(r'href="/units\?[^"]*page=2[^"]*"[^>]*>\s*Next', page(client, "/units?search=MANY0&outcome=pass"))
     run = next(path.name for path in top.glob("archive/runs/bench-*"))
     text = page(client, f"/run?run={run}")
     assert [one for one in MANY if one not in text] == []
