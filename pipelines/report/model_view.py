@@ -5,7 +5,7 @@ import pandas as pd
 
 from inertial.quantities import FORCE_COLUMNS, shown_factor
 from pipelines.report.effect_view import EffectView
-from pipelines.report.run_pictures import COLUMNS, follows_most, quantities
+from pipelines.report.run_pictures import COLUMNS, follows_most, quantities, timed
 from schemas.units import MICRO, axes_among
 
 LINEAR = ("bias", "scale", "misalignment")
@@ -26,13 +26,13 @@ def model_view(unit: str, dwells: pd.DataFrame, residuals: pd.DataFrame, effects
     own = both[both["axis"] == axis].sort_values("dwell")
     quantity = follows_most(own.assign(residual_ug=own["before_ug"]), dwells)
     column = COLUMNS.get(quantity, quantity)
-    recorded = own if column in own else own.merge(dwells[["dwell", column]], on="dwell")
+    across = shown_factor(column) * timed(own, dwells)[column].to_numpy(float)[None]
     before, after = (own[name].to_numpy(float)[None] for name in ("before_ug", "residual_ug"))
     expected = own["expected_ug"].to_numpy(float) if "expected_ug" in own else np.zeros(1)
     changed = compared and fall[axis] > 0.0
     return EffectView(
         ("" if not changed else ", ".join(more) if len(more) <= FEW else f"{len(more)} more effects"),
-        quantities(own, dwells)[quantity], axis, (unit,), 0, recorded[column].to_numpy(float)[None] * shown_factor(column),
+        quantities(own, dwells)[quantity], axis, (unit,), 0, across,
         before, after if changed else None, before - after if changed else None, float(np.sqrt(np.mean(expected**2))),
     )  # fmt: skip
 

@@ -51,7 +51,8 @@ def quantities(residuals: pd.DataFrame, dwells: pd.DataFrame) -> dict[str, str]:
     Of what was recorded, that which varied between its dwells.
     """
     labels = axis_labels()
-    fitted = _with_rate(dwells[dwells["dwell"].isin(residuals["dwell"])]).select_dtypes("number")
+    rated = _with_rate(dwells)
+    fitted = rated[rated["dwell"].isin(residuals["dwell"])].select_dtypes("number")
     columns = [
         *(name for name in BY_COLUMN if name in fitted),
         *(name for name in map(str, fitted.columns) if is_covariate(name)),
@@ -62,8 +63,7 @@ def quantities(residuals: pd.DataFrame, dwells: pd.DataFrame) -> dict[str, str]:
 
 def follows_most(residuals: pd.DataFrame, dwells: pd.DataFrame) -> str:
     """The quantity that the residuals of a unit depend on most; the mean over its axes decides."""
-    timed = _timed(residuals, dwells)
-    axes = [own for _, own in timed.groupby("axis")]
+    axes = [own for _, own in timed(residuals, dwells).groupby("axis")]
 
     def share(name: str) -> float:
         column = COLUMNS.get(name, name)
@@ -73,7 +73,7 @@ def follows_most(residuals: pd.DataFrame, dwells: pd.DataFrame) -> str:
     return max((name for name in quantities(residuals, dwells) if name != POSE and not is_clock(name)), key=share)
 
 
-def _timed(residuals: pd.DataFrame, dwells: pd.DataFrame) -> pd.DataFrame:
+def timed(residuals: pd.DataFrame, dwells: pd.DataFrame) -> pd.DataFrame:
     """Residuals with what was recorded at their dwells."""
     own = _with_rate(dwells)
     return residuals.merge(own[["dwell", *own.columns.difference(residuals.columns)]], on="dwell", how="left")
@@ -93,7 +93,7 @@ def residual_chart(unit: str, residuals: pd.DataFrame, dwells: pd.DataFrame, aga
     known = quantities(residuals, dwells)
     if against not in known:
         raise WrongUse(f"figure: no '{against[:80]}' was recorded that varied; {did_you_mean(against, known)}")
-    plot = _residuals("", _timed(residuals, dwells), (against, known[against]), 7.0, unit)
+    plot = _residuals("", timed(residuals, dwells), (against, known[against]), 7.0, unit)
     return Chart(f"Residuals against {known[against]}", (plot,), height=380)
 
 

@@ -17,7 +17,7 @@ ROOM = ROOT / "pipelines" / "audit"
 GUIDE = (ROOT / "docs" / "how-to" / "audit.md").read_text(encoding="utf-8")
 ROW = re.compile(r"^\| `(\w+)` \| (\w+) \| (.+) \|$", re.MULTILINE)
 DOCUMENTED = {kind: (who, text) for kind, who, text in ROW.findall(GUIDE.partition("## Findings")[2])}
-FILLINGS = {"odd.kind": ("lot", "unit"), "one.by": ("station", "slot")}  # values of a kind that is put together
+FILLINGS = {"odd.kind": ("lot", "unit"), "difference.by": ("station", "slot")}  # values of a kind that is put together
 WITHOUT_EVIDENCE = {"due", "unreadable", "ledger"}  # the message and the subject say all that there is
 
 

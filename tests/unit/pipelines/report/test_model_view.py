@@ -45,3 +45,15 @@ def test_a_linear_model_and_unknown_forces_have_the_residual_alone(unit) -> None
         assert view.after is None
         assert np.abs(view.before).max() <= residuals["residual_ug"].abs().max()
         assert len(effect_chart(view).plots) == 1
+
+
+def test_residuals_that_follow_the_rate_of_the_temperature_are_drawn_against_it(unit) -> None:
+    dwells, residuals, _ = unit
+    phase = 2.0 * np.pi * 3.0 * (dwells["time_s"] - dwells["time_s"].min()) / np.ptp(dwells["time_s"])
+    swinging = dwells.assign(unit_C=25.0 + 8.0 * np.sin(phase))
+    followed = residuals.assign(
+        residual_ug=residuals["dwell"].map(dict(zip(dwells["dwell"], 40.0 * np.cos(phase), strict=True)))
+    )
+    view = model_view("A1", swinging, followed.dropna(subset="residual_ug"), ["bias", "scale", "misalignment"])
+    assert view.quantity.startswith("rate of temperature")
+    assert abs(np.corrcoef(view.x[0], view.before[0])[0, 1]) > 0.9
