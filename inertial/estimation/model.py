@@ -255,9 +255,9 @@ class Model:
         return self._space(self.noise)
 
     def floor(self) -> float:
-        """RMS of the noise of a dwell mean, g, white and wander, per degree of freedom that least squares leave it.
+        """RMS, g, that the noise of the measurement, white and wander, leaves in the residuals of least squares.
 
-        The residuals of a correct model have it; what of a wander looks like coefficients is in their uncertainty. A noise that
+        The residuals of a correct model have it; what of the noise looks like coefficients is in their uncertainty. A noise that
         the shares describe badly (a beat with the mains is bounded, a random walk is not) is no more than the residuals hold.
         """
         covariance, space = self.problem.covariance, self.even
@@ -270,12 +270,12 @@ class Model:
         held = covariance.white * float(np.sum(space.residual**2))
         if self.problem.y.size > LARGE:
             del self.even
-        return float(np.sqrt(min(expected, held) / max(space.dof, 1)))
+        return float(np.sqrt(max(min(expected, held), 0.0) / max(int(covariance.count.sum()), 1)))
 
     def scatter(self) -> float:
         """RMS of the noise of a dwell mean against its neighbours, g: white, and the wander from dwell to dwell.
 
-        A random walk raises :meth:`floor` with the length of the record, this with the time between two dwells only.
+        Of a random walk :meth:`floor` has what it does over the whole record, this what it does between two dwells.
         """
         covariance = self.problem.covariance
         wander = covariance.side_by_side(self.noise.shares)

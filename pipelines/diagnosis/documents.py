@@ -23,7 +23,7 @@ class ErrorFigures(TypedDict):
 
     rms_ug: Annotated[float | None, "root mean square residual of the units without a fault, µg"]
     floor_ug: Annotated[
-        float | None, "noise floor: white noise and wander that a correct model leaves per degree of freedom, µg"
+        float | None, "noise of the measurement: what it leaves in the residuals of a correct model, µg"
     ]
     white_noise_ug: NotRequired[
         Annotated[float | None, "white noise alone, from the samples of each dwell (sd/√n), µg"]

@@ -166,10 +166,10 @@ def _lines(done: FittedNorms, smaller: FittedNorms | None, verdict: dict[str, An
 
 
 def _noise_line(error: dict[str, Any], count: int) -> str:
-    """Noise floor and probability; for a long record judged by a part of its dwells also the residual of that part."""
+    """Noise and probability; for a long record judged by a part of its dwells also the residual of that part."""
     white = "" if error.get("white_noise_ug") is None else f" (white noise alone {error['white_noise_ug']:.1f} µg)"
     judged = f"; judged by {MOST} of the dwells, residual {error['rms_ug']:.1f} µg" if count > MOST else ""
-    return f"noise floor between dwells {error['floor_ug']:.1f} µg{white}; p {equal(error['p_value'])}{judged}"
+    return f"noise of the measurement {error['floor_ug']:.1f} µg{white}; p {equal(error['p_value'])}{judged}"
 
 
 def _evidence_line(done: FittedNorms, smaller: FittedNorms | None, evidence: dict[str, Any], out_unit: str) -> str:

@@ -25,7 +25,9 @@ class AdequacyDocument(TypedDict):
     adequate: Annotated[bool | None, "null: cannot be judged, see `reason`"]
     reason: Annotated[str | None, "why it cannot be judged, with what is missing"]
     rms_ug: Annotated[float | None, "root mean square residual of the units without a data fault, µg"]
-    floor_ug: Annotated[float | None, "noise of the measurement: white noise and wander between the dwells, µg"]
+    floor_ug: Annotated[
+        float | None, "noise of the measurement: what it leaves in the residuals of a correct model, µg"
+    ]
     p_value: Annotated[float | None, "probability of such a residual if the model is adequate, at least 1e-300"]
     named: Annotated[bool, "whether an effect, a driver or an error of handling is found that the model lacks"]
     units: Annotated[int, "number of units that were judged"]

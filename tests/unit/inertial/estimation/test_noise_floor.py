@@ -5,7 +5,7 @@ import pytest
 from made_worlds import BASE, World, make
 
 from inertial.criticism.examination import ExaminedRun
-from inertial.estimation.comparison import fitted_residuals
+from inertial.estimation.comparison import fitted_residuals, rms
 from inertial.estimation.model import Model
 from pipelines.tables.dwells import lot_of, measured
 
@@ -20,10 +20,9 @@ def model_with(added_ug: np.ndarray) -> Model:
     return ExaminedRun(lot, BASE).model()
 
 
-def left_per_freedom(model: Model) -> float:
-    """RMS of the residuals per degree of freedom, µg."""
-    left = fitted_residuals(model)
-    return 1e6 * float(np.sqrt(np.nansum(left**2) / model.space.dof))
+def left_ug(model: Model) -> float:
+    """RMS of the residuals, µg."""
+    return 1e6 * rms(fitted_residuals(model))
 
 
 @pytest.mark.parametrize("walk_ug", [0.0, 5.0, 20.0])
@@ -31,7 +30,7 @@ def test_it_is_what_white_noise_and_a_walk_leave_after_the_fit(walk_ug: float) -
     rng = np.random.default_rng(SEED)
     shape = (4, make(World(units=1), SEED).dwells["dwell"].nunique(), 3)
     model = model_with(np.cumsum(rng.normal(0.0, walk_ug, shape), axis=1))
-    assert 1e6 * model.floor() == pytest.approx(left_per_freedom(model), rel=0.06)
+    assert 1e6 * model.floor() == pytest.approx(left_ug(model), rel=0.06)
     if not walk_ug:
         assert 1e6 * model.floor() == pytest.approx(make(World(units=4), SEED).floor_ug, rel=0.1)
 
@@ -40,4 +39,4 @@ def test_a_bounded_beat_that_looks_like_a_walk_is_no_more_than_the_residuals_hol
     dwells = make(World(units=1), SEED).dwells["dwell"].nunique()
     beat = 20.0 * np.sin(np.arange(dwells) / 2.5)[None, :, None] * np.ones((4, 1, 3))
     model = model_with(beat)
-    assert 1e6 * model.floor() <= 1.001 * left_per_freedom(model)
+    assert 1e6 * model.floor() <= 1.001 * left_ug(model)
