@@ -237,7 +237,7 @@ def unexplained_text(document: dict[str, Any]) -> str:
 def _without_angles(document: dict[str, Any]) -> str:
     """What could not be tried because the angles of the table are not recorded, as a sentence to add; empty where they are."""
     reasons = document.get("reasons", {})
-    names = [name for name in document["unseen"] if reasons.get(name, "").endswith("record outer_deg")]
+    names = [name for name in document["unseen"] if "outer_deg" in reasons.get(name, "")]
     if not names:
         return ""
     return f" Without the table's angles {', '.join(names)} could not be tried: record outer_deg and inner_deg."
