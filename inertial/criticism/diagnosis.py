@@ -120,7 +120,10 @@ def _classes(field: Candidates, base: Model, final: Model) -> list[EffectClass]:
 
 
 def _named(problem: Problem, base: Model, classes: Sequence[EffectClass]) -> tuple[Named, ...]:
-    """Errors after each class is added to those before it."""
+    """Errors after each class is added to those before it; where it adds nothing so, beside all others.
+
+    A second effect as large as the first, of another shape, hides from the dwells left out what the first predicts.
+    """
     named: list[Named] = []
     model = base
     # an error of handling if there is no effect
@@ -132,7 +135,11 @@ def _named(problem: Problem, base: Model, classes: Sequence[EffectClass]) -> tup
         errors = worst(before, after) if before is not None else (float("nan"), float("nan"))
         rest = Model(problem, [*base.terms, *(t for t in terms if t is not first)], near=base.noise)
         left = rms_of(fitted_residuals(model))
-        named.append(Named(group, left, *errors, carried=carried_by(rest, first)))
+        found = Named(group, left, *errors, carried=carried_by(rest, first))
+        if not found.predicts and len(classes) > 1:
+            errors = worst(left_out(rest, also=terms), left_out(rest.with_term(first), also=terms))
+            found = replace(found, heldout_before=errors[0], heldout_after=errors[1])
+        named.append(found)
         before = after
     return tuple(named)
 
