@@ -157,10 +157,10 @@ class LotLooks:
         if longest is None or state.dwell is None:
             return None
         block = recipe.dwell_s / BLOCKS
-        count = int(max(longest, recipe.dwell_s) / block + 1e-9)
+        count = int(longest / block + 1e-9)
         lengths = np.linspace(block, count * block, count)
         shortest = max(SHORTEST_DWELL_S, FEWEST_SAMPLES / recipe.rate_hz)
-        lengths = lengths[(lengths >= shortest - 1e-9) & (lengths <= longest + 1e-9)]
+        lengths = lengths[lengths >= shortest - 1e-9]
         if not lengths.size:
             return None
         return round(chosen_length(state.dwell, recipe.dwell_s, lengths, enough=expected <= 1.0), 6)
