@@ -107,8 +107,8 @@ def refuse_unusable_stop(recipe: Recipe, station: StationConfig, limits: Limits)
         rows = visibilities(planned_state(recipe, station, history=True), recipe.effects, 1.0, terms.visible)
         if unseen := [row.effect for row in rows if not row.seen]:
             raise RecipeInvalid(
-                f"recipe {recipe.name}: key 'stop.visible': the whole plan does not show {', '.join(unseen)}, so that the lot would "
-                "never end early; leave it out, or change poses or soaks (see 'tumbleline plan')",
+                f"recipe {recipe.name}: key 'stop.visible': the whole plan does not show {', '.join(unseen)}, the lot "
+                "would never end early; leave it out, or change poses or soaks (see 'tumbleline plan')",
                 key="stop.visible",
             )
     if terms.longest_dwell_s is not None and terms.longest_dwell_s < recipe.dwell_s:

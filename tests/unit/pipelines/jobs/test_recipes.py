@@ -125,14 +125,14 @@ PRIOR = StoredFamily(
 
 
 @pytest.mark.parametrize(
-    ("own", "named"),
+    ("own", "names"),
     [
-        ("", False),
-        ("[stop]\nbias_ug = 900.0\n", True),
-        ("[stop]\nbias_ug = 900.0\n[certificate]\nvalidity_months = 6\n", True),
+        ("", 1),
+        ("[stop]\nbias_ug = 900.0\n", 6),
+        ("[stop]\nbias_ug = 900.0\n[certificate]\nvalidity_months = 6\n", 6),
     ],
 )
-def test_a_capture_that_may_end_is_named_by_all_that_a_look_decides_by(tmp_path: Path, own: str, named: bool) -> None:
+def test_a_capture_that_may_end_is_named_by_all_that_a_look_decides_by(tmp_path: Path, own: str, names: int) -> None:
     """What a budget rests on changes what is known, and nothing of a capture that takes every dwell."""
     limits = 'limits = "consumer"'
     small = small_job(tmp_path, (limits, f"{limits}\n{own}"))
@@ -149,7 +149,7 @@ def test_a_capture_that_may_end_is_named_by_all_that_a_look_decides_by(tmp_path:
         replace(small, prior=PRIOR),
         replace(small, prior=PRIOR.model_copy(update={"runs": ["other"]})),
     ]
-    assert len({job.capture_id for job in several}) == (len(several) if named else 1)
+    assert len({job.capture_id for job in several}) == names
     older = PRIOR.model_copy(update={"own": {"A1": StoredOwn(mean=[[0.0]], covariance=[[[2.0]]])}})
     assert replace(small, prior=older).capture_id == several[-2].capture_id  # a killed capture is gone on with
 
