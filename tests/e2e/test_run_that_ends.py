@@ -54,6 +54,7 @@ def test_a_run_that_ends_early_says_so_everywhere(tmp_path: Path) -> None:
         static=True,
     )
     assert any(sentence in line for line in about)
+    assert end["not_reached"] == []
     text_of("rerun", found["run"], "--archive", root, "--check")
 
 
