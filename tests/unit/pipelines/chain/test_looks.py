@@ -1,5 +1,6 @@
 """A look during a run: the numbers of the run as if it ended there, with the allowance for its own noise."""
 
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,8 @@ from pipelines.chain.looks import LotLooks
 from pipelines.chain.runner import Runner
 from pipelines.jobs.job import Job, Request
 from pipelines.schedule.early_end import early_end
+from pipelines.stages.uncertainty.budget import lot_budget
+from pipelines.stages.uncertainty.budget_terms import BudgetTables, archived_terms
 from pipelines.stages.validate import validate
 from schemas.stopping import StopTerms
 
@@ -138,6 +141,20 @@ def test_an_uncertainty_that_was_asked_for_and_not_reached_is_said(
     found = {one["unit"]: one["share"] for one in end["not_reached"] if one["figure"] == "bias"}
     by_unit = sums[sums["quantity"] == "bias"].groupby("unit")["u" if stated else "u_a"].max()
     assert found == pytest.approx((by_unit / 50.0).to_dict())
+
+
+def test_the_period_counts_from_dwells_as_long_as_they_were(run: Run) -> None:
+    """A user averages over a dwell: as measured where the run chose it, of the recipe elsewhere."""
+    names = [field.name for field in fields(BudgetTables) if field.name in run.tables()]
+    tables = BudgetTables(**{name: run.table(name) for name in names})
+    longer = replace(tables, dwells=tables.dwells.assign(duration_s=3.0))
+    terms = archived_terms(run.about)
+    assert terms is not None
+    assert not terms.dwells_chosen
+    chosen = replace(terms, dwells_chosen=True)
+    assert [lot_budget(longer, one).terms.dwell_s for one in (terms, chosen)] == [1.0, 3.0]
+    about = {**run.about, "recipe": {**run.about["recipe"], "stop": {"longest_dwell_s": 2.0}}}
+    assert archived_terms(about) == chosen
 
 
 def test_a_model_that_is_not_adequate_keeps_the_lot_going(run: Run, tmp_path: Path) -> None:
