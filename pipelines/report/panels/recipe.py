@@ -22,4 +22,4 @@ def render(report: ReportContext) -> str:
     end = early_end(report.run)
     text = "" if end is None else "; ".join([early_end_sentence(end) or "as planned", *told_sentences(end)])
     dwell = "" if end is None else dwell_words(end)
-    return fill(TEMPLATE, recipe=report.recipe, end=text, dwell=dwell or report.recipe.dwell_s)
+    return fill(TEMPLATE, recipe=report.recipe, end=text, dwell=dwell or report.recipe.get("dwell_s", ""))
