@@ -91,14 +91,17 @@ class LotLooks:
         fails = _failing(guarded["figures"])
         figures = _open_figures(own["figures"], guarded["figures"], limits, state.units)
         passed = set(own["grades"].query("outcome == 'pass'")["unit"]) - figures.keys()
-        ratio = guard * limits.coverage_factor * state.ratios(self.terms.asked, zero_g)
+        ratio = limits.coverage_factor * state.ratios(self.terms.asked, zero_g)
         fitted = dict(zip(state.units, ratio.tolist(), strict=True))
-        reached = {unit for unit, one in fitted.items() if one <= 1.0}
+        reached = {unit for unit, one in fitted.items() if guard * one <= 1.0}
         undecided = fitted.keys() - (passed & reached) - fails.keys()
-        worst = max((one for unit, one in fitted.items() if unit not in fails), default=0.0)
-        asked = f"U at most {worst:.2f} of what is asked, " if self.terms.asked else ""
-        units = len(own["grades"])
-        text = f"{asked}{units - len(undecided)} of {units} units decided{_most_often(figures, undecided)}"
+        ratios = [one for unit, one in fitted.items() if unit not in fails]
+        worst = max(ratios, default=0.0)
+        asked = _share(worst, guard, others=bool(fails)) if self.terms.asked and ratios else ""
+        lost = len(own["grades"]) - len(fitted)
+        not_fitted = f", {lost} not fitted" if lost else ""
+        decided = f"{len(fitted) - len(undecided)} of {len(fitted)} units decided{not_fitted}"
+        text = f"{asked}{decided}{_most_often(figures, undecided)}"
         new = {unit: sentence for unit, sentence in fails.items() if unit not in told}
         missing = "" if undecided else self._missing(record, state)
         if undecided or missing:
@@ -106,7 +109,7 @@ class LotLooks:
                 known=False,
                 text=text + missing,
                 fails=new,
-                dwell_s=self._length(state, worst * np.sqrt(state.count / self._dwells)),
+                dwell_s=self._length(state, guard * worst * np.sqrt(state.count / self._dwells)),
             )
         return Look(known=True, text=text, fails=new, given_up=self._given_up(record))
 
@@ -157,10 +160,10 @@ class LotLooks:
         if longest is None or state.dwell is None:
             return None
         block = recipe.dwell_s / BLOCKS
-        count = int(max(longest, recipe.dwell_s) / block + 1e-9)
+        count = int(longest / block + 1e-9)
         lengths = np.linspace(block, count * block, count)
         shortest = max(SHORTEST_DWELL_S, FEWEST_SAMPLES / recipe.rate_hz)
-        lengths = lengths[(lengths >= shortest - 1e-9) & (lengths <= longest + 1e-9)]
+        lengths = lengths[lengths >= shortest - 1e-9]
         if not lengths.size:
             return None
         return round(chosen_length(state.dwell, recipe.dwell_s, lengths, enough=expected <= 1.0), 6)
@@ -218,6 +221,12 @@ def _open_figures(
     rows = pd.concat([of_fit, of_checks]).query("outcome == 'pass'")
     left = {unit: frozenset(needed - set(rows.loc[rows["unit"] == unit, "figure"])) for unit in units}
     return {unit: names for unit, names in left.items() if names}
+
+
+def _share(worst: float, guard: float, *, others: bool) -> str:
+    """The largest U over what is asked for in words, and the allowance of a look, which is no part of U."""
+    whose = " of the units that do not fail" if others else ""
+    return f"U{whose} at most {worst:.2f} of what is asked (times {guard:.2f} as allowance for its noise), "
 
 
 def _most_often(figures: Mapping[str, frozenset[str]], undecided: Collection[str]) -> str:

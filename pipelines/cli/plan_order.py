@@ -10,9 +10,10 @@ from pipelines.cli import options
 from pipelines.cli.documents.station import OrderDocument
 from pipelines.cli.options import argument, option
 from pipelines.cli.printing import give, is_standard_output, print_text, say
-from schemas.errors import RecipeInvalid
+from schemas.errors import RecipeInvalid, WrongUse
 
 NOT_REACHED = "not reached"
+ENDING = "-ordered"
 
 
 def order(
@@ -27,13 +28,14 @@ def order(
 ) -> None:
     """Write a recipe with its soaks and poses in the order with which its units are known first.
 
-    Nothing is added or left out. The minutes are those until [stop] ends the lot, expected with the noise of the device's preset.
+    Nothing is added or left out. The minutes are those until the uncertainties of [stop] are reached, expected with the noise of
+    the device's preset; limits and visible effects are not part of them, and may let the lot go on for longer.
     """
     from inertial.design import local_names, split
     from pipelines.archive import files
     from pipelines.jobs.recipe_text import limits_from, recipe_text
     from pipelines.jobs.recipes import folder_of, load_limits, load_recipe
-    from pipelines.jobs.terms import asked_of_noise
+    from pipelines.jobs.terms import asked_of_noise, refuse_unusable_stop
     from pipelines.planning.context import noise_of, plan_context
     from pipelines.planning.soak_order import ordered
     from schemas.station import load_station
@@ -44,15 +46,18 @@ def order(
     config, base, home = load_station(station), load_recipe(recipe), folder_of(recipe)
     if base.stop is None:
         raise RecipeInvalid(f"recipe {base.name}: no table [stop], which says what is to be known; add one", key="stop")
-    allowed = asked_of_noise(base, config, load_limits(base, home))
+    limits = load_limits(base, home)
+    refuse_unusable_stop(base, config, limits)
+    allowed = asked_of_noise(base, config, limits)
     names = [effect for effect, _ in local_names(split(base.effects)[0], 0)]
     required = np.array([[allowed.get(effect, np.inf) / MICRO for effect in names]] * base.sensor_axes)
     context = plan_context(base, config, noise_of(base, base.device, None, None))
     found = ordered(context, required)
-    target = file or Path(f"{base.name}-ordered.toml")
-    new = found.recipe.model_copy(
-        update={"name": f"{base.name}-ordered", "limits": limits_from(base.limits, home, target.parent)}
-    )
+    name = f"{base.name.removesuffix(ENDING)}{ENDING}"
+    target = file or Path(f"{name}.toml")
+    if target.exists() and Path(recipe).exists() and target.samefile(recipe):
+        raise WrongUse(f"plan order: {target} is the given recipe, a file of its own is needed; name one with --output")
+    new = found.recipe.model_copy(update={"name": name, "limits": limits_from(base.limits, home, target.parent)})
     text = recipe_text(new, [f"Written by 'tumbleline plan order' for station {config.name}."])
     if not printed:
         files.publish(target, text.encode(), "plan order", files.ELSEWHERE)
@@ -74,11 +79,14 @@ def _print(document: OrderDocument, text: str) -> None:
         return
     heat = ", ".join(f"{t:g}" for t in document["temperatures_C"])
     until, before = (
-        NOT_REACHED if minutes is None else f"{minutes:.0f} min"
-        for minutes in (document["known_minutes"], document["given_known_minutes"])
+        NOT_REACHED if known is None else "only at its end" if known >= whole else f"{known:.0f} min"
+        for known, whole in (
+            (document["known_minutes"], document["minutes"]),
+            (document["given_known_minutes"], document["given_minutes"]),
+        )
     )
     say(
         f"{document['recipe']}: soaks at {heat} °C, {document['minutes']:.0f} min (given: {document['given_minutes']:.0f} min)"
     )
-    say(f"known after: {until} (given: {before})")
+    say(f"uncertainties reached after: {until} (given: {before}), limits and visible effects left out")
     say(f"Recipe file: {document['file']}")

@@ -7,7 +7,7 @@ from pipelines.archive import Run
 from pipelines.capture.interruptions import Interruptions, interruptions
 from pipelines.cli.printing import STYLES, print_table, say, short
 from pipelines.report.reasons import grouped_reasons
-from pipelines.schedule.early_end import EarlyEnd, early_end, early_end_sentence
+from pipelines.schedule.early_end import EarlyEnd, early_end, early_end_sentence, told_sentences
 from pipelines.tables.frames import rows_of
 from pipelines.tables.json_values import json_value
 from pipelines.tables.prior import prior_document, prior_sentence
@@ -132,8 +132,7 @@ def _ended(end: EarlyEnd | None) -> list[str]:
     """The early end of a run as lines, and the units that were told to fail before."""
     if end is None:
         return []
-    told = [f"{unit} failed before the end: {figure}" for unit, figure in end["fails"].items()]
-    return [*told, *filter(None, [early_end_sentence(end)])]
+    return [*told_sentences(end), *filter(None, [early_end_sentence(end)])]
 
 
 def _interrupted(interrupted: Interruptions | None) -> list[str]:

@@ -15,11 +15,11 @@ from pipelines.jobs.model_files import model_keys, read_model, refuse_unknown_ef
 from pipelines.jobs.priors import stored_family, stored_in
 from pipelines.jobs.recipes import MAIN_JOB, folder_of, load_limits, load_recipe, lot_of, units_of
 from pipelines.jobs.terms import (
-    asked_of_noise,
     budget_terms,
     refuse_beyond_station,
     refuse_contradictions,
     refuse_unreachable,
+    refuse_unusable_stop,
     with_stability,
 )
 from pipelines.procedures import refuse_unusable
@@ -56,6 +56,9 @@ ANALYSIS_KEYS = {
     "faults",  # they are the station's, which is in the capture's name
 }
 
+
+DECIDING = {"effects", "formulas", "zero_output", "uncertainty", "stability", "certificate"}
+"""Of these keys what ``[stop]`` decides by: with it they are measured by, as are the limits, the whole station and the prior."""
 
 OF_RUN = "run:"  # what a recipe's name begins with where it is the run whose units are measured again
 GUARDS = {"suspenders", "safety", "self_test"}
@@ -95,19 +98,27 @@ class Job:
         """Name of the capture: the same for recipes that differ only in what is made of the data."""
         if self.captured:
             return self.captured
-        measured = self.recipe.model_dump(mode="json", exclude=ANALYSIS_KEYS)
-        if self.recipe.stop is not None:  # model and limits decide then when the lot ends
-            measured |= {"effects": self.recipe.effects, "limits": self.limits.model_dump(mode="json")}
+        unmoved, decided = {*GUARDS}, dict[str, Any]()
+        if self.recipe.stop is None:
+            measured = self.recipe.model_dump(mode="json", exclude=ANALYSIS_KEYS)
+            unmoved |= {"pace", "reference", "uncertainty"}  # plan time, state standards: they drive nothing
+        else:
+            measured = self.recipe.model_dump(mode="json", exclude=ANALYSIS_KEYS - DECIDING)
+            decided = {"limits": self.limits.model_dump(mode="json"), "prior": self._prior_but_its_age}
         if not measured["soaks"]:  # recipes without them keep the names that their captures had before there were any
             del measured["soaks"]
-        unmoved = {"pace", "reference", "uncertainty", *GUARDS}  # plan time, state standards, guard: they drive nothing
         if not self.recipe.procedures:
             unmoved.add("equipment")
         station = self.station.model_dump(mode="json", exclude=unmoved)
         after = {"parents": list(self.parents)} if self.parents else {}
         own = {"own_files": hashes} if (hashes := self.own_files) else {}
-        content = {"recipe": measured, "lot": self.lot.model_dump(), "station": station, **after, **own}
+        content = {"recipe": measured, "lot": self.lot.model_dump(), "station": station, **after, **own, **decided}
         return digest(content)[:16]
+
+    @property
+    def _prior_but_its_age(self) -> dict[str, Any] | None:
+        """The prior without what widens as time passes, so that a capture which was killed is gone on with."""
+        return None if self.prior is None else self.prior.model_dump(exclude={"own": {"__all__": {"covariance"}}})
 
     @cached_property  # read when the job is made: later edits of a file do not change the run
     def own_files(self) -> dict[str, str]:
@@ -184,7 +195,7 @@ class Request:
         refuse_beyond_station(job.recipe, job.station)
         _refuse_inconsistent(job, recorded_columns(station.devices.reader))
         refuse_unreachable(job.recipe, job.station, job.limits)
-        _refuse_unusable_stop(job)
+        refuse_unusable_stop(job.recipe, job.station, job.limits)
         serials = {unit.serial for unit in lot.units}
         family = stored_family(recipe, archive or Archive(), serials, station.kind)
         return replace(job, prior=family, full=self._full(recipe, archive))
@@ -272,20 +283,6 @@ def _refuse_inconsistent(job: Job, recorded: Sequence[str]) -> None:
         refuse_unidentified(job.recipe, recorded)
     except InertialError as problem:
         raise RecipeInvalid(str(problem), key="effects") from None
-
-
-def _refuse_unusable_stop(job: Job) -> None:
-    """Refuse a ``[stop]`` that could never end the lot: without poses, of unknown effects, below what the references allow."""
-    terms = job.recipe.stop
-    if terms is None:
-        return
-    if not job.recipe.tumbles:
-        raise RecipeInvalid(
-            f"recipe {job.recipe.name}: [stop] ends the multi-position test, its procedures have none; remove it",
-            key="stop",
-        )
-    refuse_unknown_effects(terms.visible, "stop.visible")
-    asked_of_noise(job.recipe, job.station, job.limits)
 
 
 def _refuse_more_units_than_slots(job: Job) -> None:

@@ -5,9 +5,11 @@ from typing import Any
 
 import numpy as np
 
+from inertial.planning.visibility import visibilities
+from pipelines.jobs.model_files import refuse_unknown_effects
 from pipelines.jobs.recipes import load_limits, lot_of
 from pipelines.procedures import refuse_unusable
-from pipelines.schedule.planned_state import planned_dwells
+from pipelines.schedule.planned_state import planned_dwells, planned_state
 from pipelines.stages.uncertainty.budget_terms import BudgetTerms, terms_of
 from pipelines.stages.uncertainty.contributions import merged
 from pipelines.stages.uncertainty.reachable import PlannedDwells, reachable, unreachable
@@ -78,6 +80,44 @@ def asked_of_noise(recipe: Recipe, station: StationConfig, limits: Limits) -> di
             key="stop",
         )
     return {effect: float(np.sqrt(square)) for effect, square in allowed.items()}
+
+
+def refuse_unusable_stop(recipe: Recipe, station: StationConfig, limits: Limits) -> None:
+    """Refuse a ``[stop]`` that could never end the lot, or of which a key could never do what it says.
+
+    Raises RecipeInvalid: it has no poses, asks for effects that the dwells can never show, for less than the references allow,
+    or for dwells no longer than the planned ones.
+    """
+    terms = recipe.stop
+    if terms is None:
+        return
+    if not recipe.tumbles:
+        raise RecipeInvalid(
+            f"recipe {recipe.name}: [stop] ends the multi-position test, its procedures have none; remove it",
+            key="stop",
+        )
+    refuse_unknown_effects(terms.visible, "stop.visible")
+    if fitted := [effect for effect in terms.visible if effect in recipe.effects]:
+        raise RecipeInvalid(
+            f"recipe {recipe.name}: key 'stop.visible': {', '.join(fitted)} in the model, effects beside it are needed; ask for "
+            "an uncertainty in [stop], or leave it out",
+            key="stop.visible",
+        )
+    if terms.visible:
+        rows = visibilities(planned_state(recipe, station, history=True), recipe.effects, 1.0, terms.visible)
+        if unseen := [row.effect for row in rows if not row.seen]:
+            raise RecipeInvalid(
+                f"recipe {recipe.name}: key 'stop.visible': the whole plan does not show {', '.join(unseen)}, the lot "
+                "would never end early; leave it out, or change poses or soaks (see 'tumbleline plan')",
+                key="stop.visible",
+            )
+    if terms.longest_dwell_s is not None and terms.longest_dwell_s < recipe.dwell_s:
+        raise RecipeInvalid(
+            f"recipe {recipe.name}: key 'stop.longest_dwell_s': {terms.longest_dwell_s:g} s, dwell_s is {recipe.dwell_s:g} s; "
+            "at least that is needed",
+            key="stop.longest_dwell_s",
+        )
+    asked_of_noise(recipe, station, limits)
 
 
 def without_noise(recipe: Recipe, station: StationConfig) -> PlannedDwells:

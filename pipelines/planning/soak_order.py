@@ -55,7 +55,10 @@ SINGULAR = 1e-5
 
 @dataclass(frozen=True)
 class Ordered:
-    """A recipe in its new order, with the minutes until it is known then, ``until``, and as given, ``before``; None: never."""
+    """A recipe in its new order, with the minutes until it is known then, ``until``, and as given, ``before``; None: never.
+
+    They are those of the uncertainties alone: the figures of a device, and the effects that it is asked to show, are not planned.
+    """
 
     recipe: Recipe
     until: float | None
@@ -120,18 +123,21 @@ def _leverage(columns: Array) -> float:
 
 
 def known_after(context: PlanContext, required: Array) -> float | None:
-    """Minutes of station time after which a lot of devices with the planned noise is known; None where it never is."""
+    """Minutes of station time after which the uncertainties of a lot with the planned noise are those that are asked for.
+
+    Those of the whole plan where no look says so, and its end does, which needs no allowance; None where it does not, either.
+    """
     dwells = [activity for activity in context.activities if activity.kind == "dwell"]
     counts = look_counts(context.activities, context.station, context.recipe)
     for count in counts:
         until = dwells[count - 1]
         if _ratio(context, count, required, len(counts)) <= 1.0:
             return (until.start + until.seconds) / 60.0
-    return None
+    return context.minutes if _ratio(context, len(dwells), required, 0) <= 1.0 else None
 
 
 def _ratio(context: PlanContext, count: int, required: Array, looks: int) -> float:
-    """Largest expected error over the required one with the first dwells, with the allowance of a run for its own noise.
+    """Largest expected error over the required one with the first dwells, with the allowance of so many looks at its own noise.
 
     Infinite where they do not determine the model, or leave nothing to judge the noise by.
     """
@@ -145,7 +151,8 @@ def _ratio(context: PlanContext, count: int, required: Array, looks: int) -> flo
         found = expected_errors(context.recipe.effects, state, context.covariance[:count, :count], prior=context.prior)
     except NotIdentified:
         return math.inf
-    return float(np.max(found.errors / required, initial=0.0)) * noise_guard(spare, looks)
+    guard = noise_guard(spare, looks) if looks else 1.0
+    return float(np.max(found.errors / required, initial=0.0)) * guard
 
 
 def _parts(recipe: Recipe) -> list[SoakPart]:

@@ -1,14 +1,16 @@
 """The early end of a lot whose units are known: which records it leaves out, and what a run keeps of it."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Annotated
 
+import pandas as pd
 from typing_extensions import TypedDict
 
 from pipelines.archive import Run
 from pipelines.schedule.steps import TUMBLED, Step, steps
 from pipelines.tables.frames import rows_of
 from schemas.recipe import Recipe
+from schemas.units import MICRO
 
 
 def left_out(plan: Sequence[Step], at: int) -> list[Step]:
@@ -33,6 +35,14 @@ def _check(step: Step) -> tuple[str, int]:
     return step.pose.name, step.soak if step.settled else -1
 
 
+class NotReached(TypedDict):
+    """An uncertainty that ``[stop]`` asks for, and that a unit's calibration does not have."""
+
+    figure: Annotated[str, "effect of the coefficient"]
+    unit: str
+    share: Annotated[float, "U of the worst axis over what is asked for, above one"]
+
+
 class EarlyEnd(TypedDict):
     """The end of a lot ahead of its plan, or the units that were told to fail before its end."""
 
@@ -43,6 +53,8 @@ class EarlyEnd(TypedDict):
     dwell_s: Annotated[list[float], "shortest and longest dwell of the fit, s; the run may choose its length"]
     given_up: Annotated[list[str], "effects that the whole plan would have shown"]
     fails: Annotated[dict[str, str], "units that failed before the end, with the figure"]
+    withdrawn: Annotated[list[str], "units among them that pass by the whole run"]
+    not_reached: Annotated[list[NotReached], "uncertainties that were asked for and that the result does not have"]
 
 
 def early_end(run: Run) -> EarlyEnd | None:
@@ -59,6 +71,9 @@ def early_end(run: Run) -> EarlyEnd | None:
     soaks = {step.soak for step in plan if step.record in taken}
     left = {step.soak: step.temperature for step in missing if step.soak not in soaks}
     reasons = [str(event["reason"]) for event in events if event["kind"] == "known"]
+    fails = {str(event["action"]).split()[1]: str(event["reason"]) for event in events if event["kind"] == "fails"}
+    grades = run.table("grades") if "grades" in run.tables() else None
+    passed = set[str]() if grades is None else set(grades.loc[grades["outcome"] == "pass", "unit"])
     return {
         "ended": bool(reasons),
         "reason": reasons[0] if reasons else "",
@@ -66,22 +81,59 @@ def early_end(run: Run) -> EarlyEnd | None:
         "soaks_C": list(left.values()),
         "dwell_s": [float(lengths.min()), float(lengths.max())] if len(lengths) else [],
         "given_up": [str(event["action"]) for event in events if event["kind"] == "given_up"],
-        "fails": {
-            str(event["action"]).split()[1]: str(event["reason"]) for event in events if event["kind"] == "fails"
-        },
+        "fails": fails,
+        "withdrawn": [unit for unit in fails if unit in passed],
+        "not_reached": list(_not_reached(run, recipe)),
     }
 
 
-def early_end_sentence(end: EarlyEnd) -> str:
-    """The early end in words, for summary, report and certificate; empty where the plan was measured as it stands."""
-    lengths = " to ".join(f"{seconds:.3g}" for seconds in dict.fromkeys(end["dwell_s"]))
+def _not_reached(run: Run, recipe: Recipe) -> Iterator[NotReached]:
+    """What ``[stop]`` asks for over the uncertainties of a run, of the noise alone where nothing is stated."""
+    if recipe.stop is None or not {"uncertainties", "coefficients"} <= set(run.tables()):
+        return
+    stated = run.table("uncertainties")
+    if stated.empty:
+        own = run.table("coefficients")
+        scale = own[own["effect"] == "scale"].set_index(["unit", "axis"])["value"].abs()
+        per_g = scale.reindex(pd.MultiIndex.from_frame(own[["unit", "axis"]])).to_numpy()
+        stated = own.assign(quantity=own["effect"], u=MICRO * own["standard_error"] / per_g)
+    factor = run.about["limits"]["coverage_factor"]
+    for effect, asked in recipe.stop.asked.items():
+        largest = factor / asked * stated[stated["quantity"] == effect].groupby("unit", observed=True)["u"].max()
+        for unit, share in largest[largest > 1.0].items():
+            yield {"figure": effect, "unit": str(unit), "share": float(share)}
+
+
+def told_sentences(end: EarlyEnd) -> list[str]:
+    """The units that were told to fail before the end, in words."""
+    withdrawn = dict.fromkeys(end["withdrawn"], "; withdrawn: by the whole run it passes")
+    return [f"{unit} failed before the end: {figure}{withdrawn.get(unit, '')}" for unit, figure in end["fails"].items()]
+
+
+def early_end_sentence(end: EarlyEnd, unit: str = "") -> str:
+    """The early end in words, for summary, report and certificate; empty where the plan was measured as it stands.
+
+    unit : the one whose uncertainties are spoken of; all where empty
+    """
+    lengths = dwell_words(end)
     chosen = f"dwells of {lengths} s by the noise of the run" if len(set(end["dwell_s"])) > 1 else ""
+    larger = ", ".join(
+        f"{one['figure']} of {one['unit']} ({one['share']:.2f} of what is asked)"
+        for one in end["not_reached"]
+        if unit in ("", one["unit"])
+    )
+    last = [*([chosen] if chosen else []), *([f"asked uncertainty not reached: {larger}"] if larger else [])]
     if not end["ended"]:
-        return chosen
+        return "; ".join(last)
     soaks = ", ".join(f"{t:g}" for t in end["soaks_C"])
     parts = [f"ended when it was known: {end['reason']}", f"{end['dwells']} dwells of the plan not taken"]
     if soaks:
         parts[-1] += f", no soak at {soaks} °C any more"
     if end["given_up"]:
         parts.append(f"given up: {', '.join(end['given_up'])}, which the whole plan shows")
-    return "; ".join([*parts, *([chosen] if chosen else [])])
+    return "; ".join([*parts, *last])
+
+
+def dwell_words(end: EarlyEnd) -> str:
+    """The length of the dwells of the fit as measured, or the shortest and the longest, s."""
+    return " to ".join(f"{seconds:.3g}" for seconds in dict.fromkeys(end["dwell_s"]))

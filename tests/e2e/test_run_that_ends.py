@@ -54,6 +54,7 @@ def test_a_run_that_ends_early_says_so_everywhere(tmp_path: Path) -> None:
         static=True,
     )
     assert any(sentence in line for line in about)
+    assert end["not_reached"] == []
     text_of("rerun", found["run"], "--archive", root, "--check")
 
 
@@ -67,6 +68,29 @@ def test_a_unit_that_fails_is_told_before_the_end(tmp_path: Path) -> None:
 
 def test_an_order_needs_to_know_what_is_asked_for(tmp_path: Path) -> None:
     assert "no table [stop]" in refused("plan", "order", recipe_file(tmp_path))
+
+
+def test_an_order_refuses_what_a_run_refuses(tmp_path: Path) -> None:
+    path = Path(ending(tmp_path))
+    path.write_text(f'{path.read_text(encoding="utf-8")}visible = ["no_such"]\n', encoding="utf-8")
+    said = refused("plan", "order", path)
+    assert "stop.visible: unknown effect 'no_such'" in said
+    assert said == refused("run", path, "--direct", "--archive", tmp_path / "archive")
+
+
+def test_an_order_does_not_replace_the_recipe_that_it_is_made_from(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    path = Path(ending(tmp_path))
+    text = path.read_text(encoding="utf-8").replace('name = "small"', 'name = "small-ordered"')
+    path.write_text(text, encoding="utf-8")
+    path = path.rename(tmp_path / "small-ordered.toml")
+    assert "small-ordered.toml is the given recipe" in refused("plan", "order", path)
+    assert path.read_text(encoding="utf-8") == text
+    said = text_of("plan", "order", path, "--output", "first.toml")
+    assert said.startswith("small-ordered: soaks at 23 °C")
+    assert "limits and visible effects left out" in said
 
 
 def test_the_recipe_of_an_order_is_usable(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ from pipelines.certificates.document.laboratory import LaboratoryFile
 from pipelines.certificates.entries import STATIC
 from pipelines.certificates.stated_budget import StatedBudget
 from pipelines.procedures import PROCEDURES
-from pipelines.schedule.early_end import early_end, early_end_sentence
+from pipelines.schedule.early_end import dwell_words, early_end, early_end_sentence
 from pipelines.stages.uncertainty.contributions import left_out
 from pipelines.stages.uncertainty.tables import LABELS
 from pipelines.tables.prior import prior_document, prior_sentence
@@ -100,15 +100,16 @@ def methods(
     if who.method.procedure:
         yield f"{who.method.procedure}."
     if static:
-        yield _static_method(run, recipe)
-        yield from _of_earlier_calibrations(run, serial)
         end = early_end(run)
-        if end is not None and (sentence := early_end_sentence(end)):
+        yield _static_method(run, recipe, "" if end is None else dwell_words(end))
+        yield from _of_earlier_calibrations(run, serial)
+        if end is not None and (sentence := early_end_sentence(end, serial)):
             yield f"Plan: {sentence.replace('_', ' ')}."
     yield from compared
 
 
-def _static_method(run: Run, recipe: dict[str, Any]) -> str:
+def _static_method(run: Run, recipe: dict[str, Any], lengths: str) -> str:
+    """The static calibration; ``lengths``: of its dwells, s, where the run may have chosen them."""
     dwells = run.table("dwells")
     kinds = dwells["kind"].astype(str)
     poses, kept = (dwells.loc[kinds == kind, "pose"].nunique() for kind in ("dwell", "verification"))
@@ -117,7 +118,7 @@ def _static_method(run: Run, recipe: dict[str, Any]) -> str:
     soaks = number_of(int(dwells["soak"].nunique()) if "soak" in dwells else planned, "temperature")
     return (
         f"Static multi-position calibration in the gravity of the Earth: {poses} poses at "
-        f"{soaks}, {recipe.get('dwell_s', 'unknown')} s per pose, recipe "
+        f"{soaks}, {lengths or recipe.get('dwell_s', 'unknown')} s per pose, recipe "
         f"'{recipe.get('name', '')}'; least-squares fit of {', '.join(recipe.get('effects', ())).replace('_', ' ')}{verified}."
     )
 

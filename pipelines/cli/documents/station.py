@@ -128,7 +128,8 @@ class OrderDocument(TypedDict):
     minutes: Annotated[float, "station time of the whole plan without the static record, min"]
     given_minutes: Annotated[float, "the same of the given recipe"]
     known_minutes: Annotated[
-        float | None, "expected station time until every unit is known, min; null: the whole plan does not reach it"
+        float | None,
+        "expected station time until the uncertainties are those asked for, min; null: the whole plan has larger ones",
     ]
     given_known_minutes: Annotated[float | None, "the same of the given recipe"]
 

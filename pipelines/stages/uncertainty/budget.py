@@ -49,6 +49,9 @@ def lot_budget(tables: BudgetTables, terms: BudgetTerms) -> LotBudget:
     if lot.state.outer is None:  # faces or forces that are known otherwise: as a table would have turned to them
         outer, inner = angles_from_force(lot.state.force)
         lot = replace(lot, state=replace(lot.state, outer=outer, inner=inner, memory={}))
+    if terms.dwells_chosen:
+        fitted = tables.dwells.loc[tables.dwells["kind"] == "dwell", "duration_s"]
+        terms = replace(terms, dwell_s=float(fitted.mean()))
     calibration = tables.calibrated()
     at = conditions(lot, tables.dwells, calibration.response, terms)
     return LotBudget(lot, calibration, tables, terms, propagate(lot, calibration, tables.wander, terms, at))

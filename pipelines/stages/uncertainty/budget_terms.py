@@ -56,6 +56,7 @@ class BudgetTerms:
     """The statements of station, device and certificate; JSON-able, part of the stage's key.
 
     stated : ``[uncertainty]`` of station and recipe together; None: noise only
+    dwell_s : of the recipe; dwells_chosen : whether a run may choose it, so that the mean of its dwells counts
     """
 
     stated: Uncertainty | None
@@ -65,6 +66,7 @@ class BudgetTerms:
     soak_min_s: float
     dwell_s: float
     room_C: float
+    dwells_chosen: bool = False
 
     @property
     def follows(self) -> FollowedSupply | None:
@@ -121,6 +123,7 @@ def terms_of(
         soak_min_s=recipe.soak_min_s,
         dwell_s=recipe.dwell_s,
         room_C=room_c,
+        dwells_chosen=recipe.stop is not None and recipe.stop.longest_dwell_s is not None,
     )
 
 
@@ -145,4 +148,5 @@ def archived_terms(about: Mapping[str, Any]) -> BudgetTerms | None:
         soak_min_s=float(recipe.get("soak_min_s", 0.0)),
         dwell_s=float(recipe.get("dwell_s", 1.0)),
         room_C=float((station.get("pace") or {}).get("room_C", Pace().room_C)),
+        dwells_chosen=(recipe.get("stop") or {}).get("longest_dwell_s") is not None,
     )

@@ -1,7 +1,10 @@
 """A look during a run: the numbers of the run as if it ended there, with the allowance for its own noise."""
 
+from dataclasses import fields, replace
 from pathlib import Path
+from typing import Any
 
+import pandas as pd
 import pytest
 from capture_double import AT_ROOM, recipe_file
 from in_process import refused
@@ -13,6 +16,9 @@ from pipelines.chain.looks import LotLooks
 from pipelines.chain.runner import Runner
 from pipelines.jobs.job import Job, Request
 from pipelines.schedule.early_end import early_end
+from pipelines.stages.uncertainty.budget import lot_budget
+from pipelines.stages.uncertainty.budget_terms import BudgetTables, archived_terms
+from pipelines.stages.validate import validate
 from schemas.stopping import StopTerms
 
 ASKED = "[stop]\nbias_ug = {bias}\n{more}"
@@ -79,14 +85,16 @@ def test_a_lot_that_knows_enough_ends(run: Run) -> None:
 
 
 def test_what_the_look_says_is_what_the_run_states(run: Run, tmp_path: Path) -> None:
-    """U of a look at all records, with its guard, is that of the run's budget: there is one estimate."""
+    """U of a look at all records is that of the run's budget, its guard apart: there is one estimate."""
     job = job_of(tmp_path, 800.0)
     assert run.records is not None
     looks = LotLooks(job, StopTerms(bias_ug=800.0), run.records)
     stated = run.table("uncertainties").query("quantity == 'bias'")["u"].max()
     guard = noise_guard(int(run.table("wander")["dof"].sum()), len(looks._due))
     found = looks.look(int(run.table("readings")["record"].max()), frozenset())
-    assert found.text.startswith(f"U at most {guard * 2.0 * stated / 800.0:.2f} of what is asked")
+    assert found.text.startswith(
+        f"U at most {2.0 * stated / 800.0:.2f} of what is asked (times {guard:.2f} as allowance for its noise), "
+    )
 
 
 def test_a_unit_beyond_its_limit_is_told_once(run: Run, tmp_path: Path) -> None:
@@ -96,13 +104,57 @@ def test_a_unit_beyond_its_limit_is_told_once(run: Run, tmp_path: Path) -> None:
     figures[name] = figures[name].model_copy(update={"max": 0.5})
     strict = Job(job.recipe, job.limits.model_copy(update={"figures": figures}), job.lot, job.station)
     assert run.records is not None
-    looks = LotLooks(strict, StopTerms(), run.records)
+    looks = LotLooks(strict, StopTerms(bias_ug=1.0), run.records)
     last = int(run.table("readings")["record"].max())
     told = looks.look(last, frozenset())
     assert told.known
     assert set(told.fails) == {"A1", "A2", "A3"}
     assert "limit 0.5 mg" in told.fails["A1"]
+    assert told.text == "3 of 3 units decided"  # no U is compared with what is asked where every unit fails
     assert looks.look(last, frozenset({"A1"})).fails.keys() == {"A2", "A3"}
+
+
+def test_a_unit_that_is_not_fitted_is_not_decided(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def one_refused(*given: Any) -> pd.DataFrame:
+        verdicts = validate(*given)
+        return verdicts.assign(refused=verdicts["refused"] | (verdicts["unit"] == "A2"))
+
+    monkeypatch.setattr("pipelines.chain.looks.validate", one_refused)
+    assert run.records is not None
+    looks = LotLooks(job_of(tmp_path, 800.0), StopTerms(), run.records)
+    found = looks.look(int(run.table("readings")["record"].max()), frozenset())
+    assert found.text == "2 of 2 units decided, 1 not fitted"
+
+
+@pytest.mark.parametrize("stated", [True, False])
+def test_an_uncertainty_that_was_asked_for_and_not_reached_is_said(
+    run: Run, monkeypatch: pytest.MonkeyPatch, *, stated: bool
+) -> None:
+    """By hand: U = 2·u of the budget, or of the noise alone where nothing is stated."""
+    about = {**run.about, "recipe": {**run.about["recipe"], "stop": {"bias_ug": 100.0}}}
+    monkeypatch.setattr(Run, "about", about)
+    tables, sums = Run.table, run.table("uncertainties")
+    if not stated:
+        monkeypatch.setattr(Run, "table", lambda run, name: sums[:0] if name == "uncertainties" else tables(run, name))
+    end = early_end(run)
+    assert end is not None
+    found = {one["unit"]: one["share"] for one in end["not_reached"] if one["figure"] == "bias"}
+    by_unit = sums[sums["quantity"] == "bias"].groupby("unit")["u" if stated else "u_a"].max()
+    assert found == pytest.approx((by_unit / 50.0).to_dict())
+
+
+def test_the_period_counts_from_dwells_as_long_as_they_were(run: Run) -> None:
+    """A user averages over a dwell: as measured where the run chose it, of the recipe elsewhere."""
+    names = [field.name for field in fields(BudgetTables) if field.name in run.tables()]
+    tables = BudgetTables(**{name: run.table(name) for name in names})
+    longer = replace(tables, dwells=tables.dwells.assign(duration_s=3.0))
+    terms = archived_terms(run.about)
+    assert terms is not None
+    assert not terms.dwells_chosen
+    chosen = replace(terms, dwells_chosen=True)
+    assert [lot_budget(longer, one).terms.dwell_s for one in (terms, chosen)] == [1.0, 3.0]
+    about = {**run.about, "recipe": {**run.about["recipe"], "stop": {"longest_dwell_s": 2.0}}}
+    assert archived_terms(about) == chosen
 
 
 def test_a_model_that_is_not_adequate_keeps_the_lot_going(run: Run, tmp_path: Path) -> None:
@@ -131,6 +183,9 @@ def test_effects_that_must_be_visible_keep_the_lot_going(run: Run, tmp_path: Pat
     [
         (0.001, "", "[stop] asks for U = 0.001 of bias, the references alone have U ="),
         (800.0, 'visible = ["no_such"]', "no_such"),
+        (800.0, 'visible = ["bias"]', "key 'stop.visible': bias in the model, effects beside it are needed"),
+        (800.0, 'visible = ["bias_temperature"]', "the whole plan does not show bias_temperature"),
+        (800.0, "longest_dwell_s = 0.6", "key 'stop.longest_dwell_s': 0.6 s, dwell_s is 1 s"),
         (
             800.0,
             "scale_temperature_ppm_K = 5.0",

@@ -1,6 +1,8 @@
 """Recipes: what is accepted, and that what is refused names the key and what to do."""
 
 import shutil
+from dataclasses import replace
+from datetime import date
 from importlib.resources import files
 from pathlib import Path
 
@@ -15,7 +17,10 @@ from pipelines.jobs.recipes import load_recipe, read_limits, recipe_names
 from pipelines.schedule.steps import steps
 from schemas import own_files
 from schemas.errors import RecipeInvalid, WrongUse
+from schemas.prior import StoredFamily, StoredOwn
+from schemas.reference import Reference
 from schemas.station import load_station
+from schemas.uncertainty import Uncertainty
 from stations.plant.preset import load_preset
 from stations.profile_files import load_profile
 
@@ -103,6 +108,50 @@ def test_the_capture_is_shared_by_recipes_that_differ_in_the_model_only(tmp_path
     assert small_job(tmp_path, ('"scale_temperature"]', '"scale_temperature", "second_order"]')).capture_id == capture
     assert small_job(tmp_path, ("[0.0, 50.0]", "[0.0, 51.0]")).capture_id != capture
     assert small_job(tmp_path, repeat=1).capture_id != capture  # a fresh measurement
+
+
+PRIOR = StoredFamily(
+    effects=["bias"],
+    runs=["one"],
+    mean=[[0.0]],
+    unit=[[[1.0]]],
+    lot=[[[1.0]]],
+    error=[[[1.0]]],
+    units=9,
+    lots=3,
+    tails=[[1.0]],
+    own={"A1": StoredOwn(mean=[[0.0]], covariance=[[[1.0]]])},
+)
+
+
+@pytest.mark.parametrize(
+    ("own", "names"),
+    [
+        ("", 1),
+        ("[stop]\nbias_ug = 900.0\n", 6),
+        ("[stop]\nbias_ug = 900.0\n[certificate]\nvalidity_months = 6\n", 6),
+    ],
+)
+def test_a_capture_that_may_end_is_named_by_all_that_a_look_decides_by(tmp_path: Path, own: str, names: int) -> None:
+    """What a budget rests on changes what is known, and nothing of a capture that takes every dwell."""
+    limits = 'limits = "consumer"'
+    small = small_job(tmp_path, (limits, f"{limits}\n{own}"))
+    stated = small.recipe.model_copy(
+        update={"uncertainty": Uncertainty.model_validate({"pose": {"u_urad": 2300.0, "source": "x"}})}
+    )
+    slower = small.station.pace.model_copy(update={"record_s": 9.0})
+    reference = Reference(id="R1", what="table", laboratory="L", certificate="C", due=date(2099, 1, 1))
+    several = [
+        small,
+        replace(small, recipe=stated),
+        replace(small, station=small.station.model_copy(update={"pace": slower})),
+        replace(small, station=small.station.model_copy(update={"reference": [reference]})),
+        replace(small, prior=PRIOR),
+        replace(small, prior=PRIOR.model_copy(update={"runs": ["other"]})),
+    ]
+    assert len({job.capture_id for job in several}) == names
+    older = PRIOR.model_copy(update={"own": {"A1": StoredOwn(mean=[[0.0]], covariance=[[[2.0]]])}})
+    assert replace(small, prior=older).capture_id == several[-2].capture_id  # a killed capture is gone on with
 
 
 SOAKS = """

@@ -63,6 +63,13 @@ def test_little_that_is_asked_needs_both_ends_alone(context: PlanContext) -> Non
     assert found.until < 0.6 * context.minutes
 
 
+def test_what_the_whole_plan_reaches_is_known_at_its_end(context: PlanContext) -> None:
+    """At its end there is no allowance for several looks; a plan with larger errors never reaches what is asked for."""
+    errors = identified(context).errors
+    assert known_after(context, 1.001 * errors) == context.minutes
+    assert known_after(context, 0.999 * errors) is None
+
+
 def test_no_look_comes_before_both_ends_of_the_range(context: PlanContext) -> None:
     counts = look_counts(context.activities, context.station, context.recipe)
     assert 24 < counts[0] <= 30  # the third soak of twelve has begun

@@ -2,7 +2,7 @@
 
 from small_station import short_recipe
 
-from pipelines.schedule.early_end import EarlyEnd, early_end_sentence, left_out
+from pipelines.schedule.early_end import EarlyEnd, NotReached, early_end_sentence, left_out, told_sentences
 from pipelines.schedule.steps import steps
 
 
@@ -33,10 +33,35 @@ def test_the_sentence_names_what_was_left_out() -> None:
         "soaks_C": [25.0, -10.0],
         "dwell_s": [4.0, 10.0],
         "given_up": ["third_order"],
-        "fails": {},
+        "fails": {"A1": "bias 3 ± 1 mg, limit 1 mg", "A2": "bias 4 ± 1 mg, limit 1 mg"},
+        "withdrawn": ["A2"],
+        "not_reached": [],
     }
     assert early_end_sentence(end) == (
         "ended when it was known: 8 of 8 units decided; 40 dwells of the plan not taken, no soak at 25, -10 °C any more; "
         "given up: third_order, which the whole plan shows; dwells of 4 to 10 s by the noise of the run"
     )
     assert early_end_sentence(end | {"ended": False, "dwell_s": [10.0, 10.0]}) == ""
+    assert told_sentences(end) == [
+        "A1 failed before the end: bias 3 ± 1 mg, limit 1 mg",
+        "A2 failed before the end: bias 4 ± 1 mg, limit 1 mg; withdrawn: by the whole run it passes",
+    ]
+
+
+def test_the_sentence_names_what_was_not_reached_of_all_or_of_one_unit() -> None:
+    missed: list[NotReached] = [{"figure": "bias", "unit": unit, "share": 1.25} for unit in ("A1", "A2")]
+    end: EarlyEnd = {
+        "ended": False,
+        "reason": "",
+        "dwells": 0,
+        "soaks_C": [],
+        "dwell_s": [10.0, 10.0],
+        "given_up": [],
+        "fails": {},
+        "withdrawn": [],
+        "not_reached": missed,
+    }
+    said = "asked uncertainty not reached: bias of A1 (1.25 of what is asked)"
+    assert early_end_sentence(end) == f"{said}, bias of A2 (1.25 of what is asked)"
+    assert early_end_sentence(end, "A1") == said
+    assert early_end_sentence(end, "A3") == ""
