@@ -45,10 +45,10 @@ def line_of(fixtures: int, lots: int, **keys: object) -> Line:
 
 phases = st.lists(st.builds(phase, st.sampled_from(sorted(NEEDS)), st.integers(1, 9)), min_size=1, max_size=5)
 tables = st.builds(
-    lambda change, hand, static: {
-        "name": "table", "needed_for": ["measure", *(["static"] if static else [])], "change_min": change / 6.0, "by_hand": hand,
+    lambda change, hand, more: {
+        "name": "table", "needed_for": ["measure", *more], "change_min": change / 6.0, "by_hand": hand,
     },
-    st.integers(0, 4), st.booleans(), st.booleans(),
+    st.integers(0, 4), st.booleans(), st.lists(st.sampled_from(["static", "soak", "exciter"]), unique=True),
 )  # fmt: skip
 coolers = st.builds(lambda count: {"name": "cooler", "needed_for": ["soak"], "count": count}, st.integers(1, 2))
 exciters = st.just({"name": "exciter", "needed_for": ["exciter"], "change_min": 0.5, "by_hand": True})
@@ -82,6 +82,33 @@ def test_work_by_hand_lies_in_shifts(fixtures: int, lots: list[list[Phase]], sha
 def test_no_order_is_shorter(fixtures: int, lots: list[list[Phase]], shared: list, wait: int) -> None:
     line = line_of(fixtures, len(lots), shared=shared, longest_wait_min=wait / 6.0)
     found = shortest(line, lots)
+    assert found.bound == found.makespan == Trial(line, lots).steps()
+
+
+@pytest.mark.parametrize("fixtures", [2, 3])
+def test_a_chamber_that_is_the_table_keeps_its_lot_from_the_soak_to_the_measurement(fixtures: int) -> None:
+    lots = [[phase("soak", 9), phase("measure", 3), phase("soak", 9), phase("measure", 3)]] * 3
+    one = {"name": "table", "needed_for": ["soak", "measure"], "change_min": 0.5, "by_hand": True}
+    line = line_of(fixtures, 3, shared=[one])
+    found = shortest(line, lots)
+    assert broken(line, lots, found.lots) == []
+    for own in found.lots:
+        assert [begin - own.begins[0] for begin in own.begins] == [0, 9, 12, 21]
+    first, second, _ = (own.begins[0] for own in found.lots)
+    assert second - first == 24 + 3
+
+
+def test_what_is_kept_is_held_while_another_resource_comes() -> None:
+    vibrated = Phase("measure", 25.0, 60.0, frozenset({"measure", "exciter"}))
+    lots = [[phase("measure", 6), vibrated]] * 2
+    keys = {"change_min": 0.5, "by_hand": True}
+    shared = [
+        {"name": name, "needed_for": [need], **keys} for name, need in (("table", "measure"), ("shaker", "exciter"))
+    ]
+    line = line_of(2, 2, shared=shared)
+    found = shortest(line, lots)
+    assert broken(line, lots, found.lots) == []
+    assert [own.begins[1] - own.begins[0] for own in found.lots] == [6 + 3] * 2
     assert found.bound == found.makespan == Trial(line, lots).steps()
 
 
