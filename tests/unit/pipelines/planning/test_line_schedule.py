@@ -14,7 +14,7 @@ from pipelines.planning.line_schedule import shortest
 from pipelines.schedule.steps import steps
 from pipelines.schedule.timing import minutes
 from schemas.errors import RecipeInvalid
-from schemas.line import Line
+from schemas.line import Line, staffed
 from schemas.station import load_station
 
 NEEDS = {
@@ -142,6 +142,35 @@ def test_two_fixtures_hide_the_soaks_of_each_other() -> None:
     assert {lot["fixture"] for lot in found["lots"]} == {"F0", "F1"}
     assert found["resources"][0]["resource"] == "fixtures"
     assert alone == pytest.approx(4 * found["resources"][0]["minutes_per_lot"], abs=0.01)
+
+
+def test_one_lot_after_the_other_is_the_schedule_where_changes_take_longer_than_they_save() -> None:
+    table = {"name": "table", "needed_for": ["measure", "static"], "change_min": 40, "by_hand": True}
+    line = line_of(2, 4, shared=[table], load_min=6, unload_min=4)
+    found = plan_line(line, load_station(), lambda name: load_recipe("quick"))
+    assert found["makespan_min"] == found["one_after_another"]["makespan_min"] < found["bound_min"]
+    assert found["proven"]
+    assert {lot["fixture"] for lot in found["lots"]} == {"F0"}
+    assert "change" not in {one["activity"] for one in found["activities"]}
+    assert max(lot["unloaded_min"] for lot in found["lots"]) == pytest.approx(found["makespan_min"])
+
+
+@pytest.mark.parametrize(
+    ("shifts", "part"),
+    [
+        ([], 1.0),
+        (["06:00-14:00"], 8 / 24),
+        (["08:00-16:00", "06:00-14:00"], 10 / 24),
+        (["22:00-06:00", "05:00-07:00"], 9 / 24),
+        (["00:00-24:00", "06:00-14:00"], 1.0),
+    ],
+)
+def test_shifts_that_overlap_count_once(shifts: list[str], part: float) -> None:
+    line = line_of(1, 1, operators={"shifts": shifts})
+    assert staffed(line.operators.shifts) == pytest.approx(part)
+    found = plan_line(line, load_station(), lambda name: load_recipe("quick"))
+    row = next(row for row in found["resources"] if row["resource"] == "operator")
+    assert row["bound_per_lot_min"] == pytest.approx(row["minutes_per_lot"] / part)
 
 
 def test_a_line_without_a_schedule_is_refused() -> None:
