@@ -27,27 +27,18 @@ def steps_of(minutes: float) -> int:
 
 def changes(line: Line, phases: Sequence[Phase]) -> list[tuple[set[str], set[str], int]]:
     """Of each phase: shared resources, those that are new, steps of the change before it."""
+    uses = [{one.name for one in line.shared if set(one.needed_for) & phase.needs} for phase in phases]
+    supplies = {one.name for one in line.shared if set(one.needed_for) == {"soak"}}
     found = []
-    for k, phase in enumerate(phases):
-        uses = {one.name for one in line.shared if set(one.needed_for) & phase.needs}
-        others = [
-            {one.name for one in line.shared if set(one.needed_for) & other.needs}
-            for other in phases
-            if other.kind != "soak"
-        ]
-        others = [other for other in others if other]
-        if len(line.fixtures) == 1 and phase.kind == "soak":
-            new = set[str]()
-        elif len(line.fixtures) == 1 and uses:
-            measured = [p for p in phases if p.kind != "soak" and any(set(o.needed_for) & p.needs for o in line.shared)]
-            at = next(j for j, p in enumerate(measured) if p is phase)
-            new = uses - others[at - 1]
-        elif k and phases[k - 1].kind != "soak":
-            new = uses - {one.name for one in line.shared if set(one.needed_for) & phases[k - 1].needs}
-        else:
-            new = uses
+    for k, of_phase in enumerate(uses):
+        new = of_phase - uses[k - 1] if k else of_phase
+        if len(line.fixtures) == 1:
+            new = of_phase - supplies
+            turn = [*uses[k + 1 :], *uses[: k + 1]] if new else []
+            others = [other - supplies for other in (turn[-2::-1] + turn[-1:]) if other - supplies]
+            new = new - others[0] if others else new
         length = max((steps_of(one.change_min) for one in line.shared if one.name in new), default=0)
-        found.append((uses, new, length))
+        found.append((of_phase, new, length))
     return found
 
 
@@ -58,11 +49,15 @@ def by_hand(line: Line, new: set[str]) -> bool:
 def tasks_of(line: Line, number: int, placed: Placed, phases: Sequence[Phase]) -> list[Task]:
     load, unload = steps_of(line.load_min), steps_of(line.unload_min)
     made = [Task(number, "load", ("operator",), placed.load, load)]
+    before, end = set[str](), placed.load + load
     for (uses, new, change), phase, begin in zip(changes(line, phases), phases, placed.begins, strict=True):
+        if uses & before:
+            made.append(Task(number, "hold", tuple(sorted(uses & before)), end, begin - end))
         if change:
             hands = ("operator",) if by_hand(line, new) else ()
             made.append(Task(number, "change", (*sorted(new), *hands), begin - change, change))
         made.append(Task(number, phase.kind, tuple(sorted(uses)), begin, steps_of(phase.seconds / 60.0)))
+        before, end = uses, made[-1].begin + made[-1].length
     made.append(Task(number, "unload", ("operator",), placed.unload, unload))
     return [*made, Task(number, "seat", ("fixture",), placed.load, placed.unload + unload - placed.load)]
 
@@ -110,7 +105,7 @@ def _broken_in_a_lot(line: Line, number: int, phases: Sequence[Phase], own: Plac
     of_phases = changes(line, phases)
     for k, (begin, end) in enumerate(zip(own.begins[1:], ends, strict=False), start=1):
         gap = begin - end
-        same = of_phases[k][0] & of_phases[k - 1][0] and phases[k - 1].kind != "soak"
+        same = of_phases[k][0] & of_phases[k - 1][0] and not of_phases[k][1]
         most = 0 if same or phases[k].kind == "return" else line.longest_wait_min * 60.0 / STEP_S + of_phases[k][2]
         out += [] if 0 <= gap <= most else [f"{number}: waits {gap} steps before phase {k}"]
     for k, (_, _, change) in enumerate(of_phases):
@@ -150,7 +145,7 @@ class Trial:
             rests = [0, *(i + 1 for i in range(j) if phases[i].kind != "soak")]
             orders += [(at + i, at + j + 1, lengths[i] + change) for i in rests if change]
             if j:
-                same = uses & of_phases[j - 1][0] and phases[j - 1].kind != "soak"
+                same = uses & of_phases[j - 1][0] and not of_phases[j][1]
                 most = int(self.line.longest_wait_min * 60.0 // STEP_S) + change
                 orders.append((at + j + 1, at + j, -lengths[j] - (0 if same or phases[j].kind == "return" else most)))
         return orders
@@ -171,7 +166,9 @@ class Trial:
         for (a, variable, offset), (_, other, before) in (met, met[::-1]):
             if a.what == "seat":  # its end hangs on the unloading
                 last = self.first[a.lot] + len(self.lots[a.lot]) + 1
-                self._search([*orders, (last, other, steps_of(self.line.unload_min))])
+                self._search([*orders, (last, other, steps_of(self.line.unload_min) - before)])
+            elif a.what == "hold":  # and of this on the begin of the next phase
+                self._search([*orders, (variable + 1, other, -before)])
             else:
                 self._search([*orders, (variable, other, offset + a.length - before)])
 
@@ -208,7 +205,7 @@ class Trial:
         out: list[tuple[Task, int, int]] = []
         place = at + 1
         for task in tasks_of(self.line, k, placed, self.lots[k]):
-            own = variable.get(task.what, place)
+            own = variable.get(task.what, place - (task.what == "hold"))
             out.append((task, own, task.begin - times[own]))
-            place += task.what not in {*variable, "change"}
+            place += task.what not in {*variable, "change", "hold"}
         return out

@@ -64,16 +64,13 @@ def clock(document: LineDocument, minutes: float) -> str:
 
 def _print(document: LineDocument, *, everything: bool) -> None:
     lots, alone = len(document["lots"]), document["one_after_another"]
-    bound = (
-        "no schedule is shorter"
-        if document["proven"]
-        else f"no schedule is shorter than {document['bound_min']:.0f} min"
-    )
+    least = "" if document["proven"] else f" than {document['bound_min']:.0f} min"
     say(
         f"{document['line']}: {lots} lots in {document['makespan_min']:.0f} min, {document['minutes_per_lot']:.1f} min per lot, "
-        f"{document['lots_per_day']:.1f} lots a day; {bound}"
+        f"{document['lots_per_day']:.1f} lots a day; no schedule with a change before each stay is shorter{least}"
     )
-    say(f"one after the other: {alone['makespan_min']:.0f} min, {alone['minutes_per_lot']:.1f} min per lot")
+    this = ": this is the schedule" if alone["makespan_min"] == document["makespan_min"] else ""
+    say(f"one after the other: {alone['makespan_min']:.0f} min, {alone['minutes_per_lot']:.1f} min per lot{this}")
     print_table(
         ["critical first", "number", "needed,\nmin per lot", "no less than,\nmin per lot"],
         [
@@ -104,7 +101,9 @@ def _print(document: LineDocument, *, everything: bool) -> None:
 
 
 def _shared(resources: list[LineResource]) -> list[str]:
-    return [row["resource"] for row in resources if row["resource"] not in {"fixtures", "operator"}]
+    from schemas.line import FIXTURES, OPERATOR
+
+    return [row["resource"] for row in resources if row["resource"] not in {FIXTURES, OPERATOR}]
 
 
 def _held(document: LineDocument, lot: str, resource: str) -> str:

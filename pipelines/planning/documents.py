@@ -230,8 +230,8 @@ class LineDocument(TypedDict):
     solver: str
     start_min: Annotated[float, "time of day of the start, min"]
     makespan_min: Annotated[float, "from the start until the last lot is unloaded"]
-    bound_min: Annotated[float, "no schedule is shorter"]
-    proven: Annotated[bool, "whether this one is as short"]
+    bound_min: Annotated[float, "no schedule with a change before each stay on what is shared is shorter"]
+    proven: Annotated[bool, "whether none of those is shorter than this one"]
     minutes_per_lot: float
     lots_per_day: float
     one_after_another: Annotated[LineRate, "the same lots, each when the one before is unloaded"]

@@ -6,12 +6,11 @@ from itertools import count
 from pipelines.planning.documents import LineActivity, LineDocument, LineLot, LineRate, LineResource
 from pipelines.planning.line_lots import Phase, phases_of
 from pipelines.planning.line_schedule import STEP_S, Placed, Shortest, shortest, stays, step_count
-from schemas.line import DAY_MIN, Line
+from schemas.line import DAY_MIN, FIXTURES, OPERATOR, Line, staffed
 from schemas.recipe import Recipe
 from schemas.station import StationConfig
 
 PER_MIN = 60.0 / STEP_S
-OPERATOR = "operator"
 
 
 def plan_line(line: Line, station: StationConfig, recipe_named: Callable[[str], Recipe]) -> LineDocument:
@@ -23,27 +22,31 @@ def plan_line(line: Line, station: StationConfig, recipe_named: Callable[[str], 
     phases = [own for recipe, number in recipes for own in [phases_of(recipe, station)] * number]
     counters = {recipe.name: count(1) for recipe, _ in recipes}
     names = [recipe.name for recipe, number in recipes for _ in range(number)]
-    best = shortest(line, phases)
-    alone = (
-        best if len(line.fixtures) == 1 else shortest(line.model_copy(update={"fixtures": line.fixtures[:1]}), phases)
-    )
+    used, best = line, shortest(line, phases)
+    bound = best.bound
+    single = line.model_copy(update={"fixtures": line.fixtures[:1]})
+    alone = best if len(line.fixtures) == 1 else shortest(single, phases)
+    if (
+        alone.makespan < best.makespan
+    ):  # changes take longer than the soaks that they make use of: one fixture needs none
+        used, best = single, alone
     spans = [(placed.load, placed.unload + step_count(60.0 * line.unload_min)) for placed in best.lots]
     fixtures = [line.fixtures[k] for k in free_places(spans)]
     labels = [f"{name}-{next(counters[name])}" for name in names]
     activities = [
         activity
         for label, fixture, placed, own in zip(labels, fixtures, best.lots, phases, strict=True)
-        for activity in _activities(line, label, fixture, placed, own)
+        for activity in _activities(used, label, fixture, placed, own)
     ]
-    resources = _resources(line, phases)
+    resources = _resources(used, phases)
     return {
         "line": line.name,
         "station": station.name,
         "solver": best.solver,
         "start_min": line.start,
         **_rate(best),
-        "bound_min": best.bound / PER_MIN,
-        "proven": best.bound == best.makespan,
+        "bound_min": bound / PER_MIN,
+        "proven": bound >= best.makespan,
         "one_after_another": _rate(alone),
         "lots": [
             _lot(label, name, fixture, [one for one in activities if one["lot"] == label])
@@ -120,18 +123,14 @@ def _resources(line: Line, lots: Sequence[Sequence[Phase]]) -> list[LineResource
                 held[name] += step_count(phase.seconds) + (stay.change if name in stay.changed else 0)
         hands += by_hand
     needed = [(one.name, one.count, held[one.name]) for one in line.shared]
-    staffed = sum(end - begin for begin, end in line.operators.shifts) / DAY_MIN if line.operators.shifts else 1.0
-    needed += [("fixtures", len(line.fixtures), fixtures), (OPERATOR, line.operators.count, hands)]
+    day = staffed(line.operators.shifts)
+    needed += [(FIXTURES, len(line.fixtures), fixtures), (OPERATOR, line.operators.count, hands)]
     rows: list[LineResource] = [
         {
             "resource": name,
             "count": number,
             "minutes_per_lot": steps / PER_MIN / len(lots),
-            "bound_per_lot_min": steps
-            / PER_MIN
-            / len(lots)
-            / number
-            / (min(staffed, 1.0) if name == OPERATOR else 1.0),
+            "bound_per_lot_min": steps / PER_MIN / len(lots) / number / (day if name == OPERATOR else 1.0),
         }
         for name, number, steps in needed
     ]

@@ -4,7 +4,8 @@ A lot is loaded, goes through its phases in one fixture, and is unloaded. What h
 
 - a phase is not interrupted, and the shared resources that it needs are held from its begin to its end;
 - between two phases a lot waits at its temperature, ``longest_wait_min`` and a change at most; loaded or done it waits at will;
-- phases that need the same shared resource without a soak between follow each other at once: one stay on it;
+- successive phases that need the same shared resource are one stay on it: it is held between them, too, and they follow each
+  other at once unless another resource comes in between;
 - each stay begins with a change, during which the lot is not measured; one fixture stays where it is between equal stays;
 - loading, unloading and changes by hand take one operator each, within one shift.
 """
@@ -32,9 +33,13 @@ _DAY = round(DAY_S / STEP_S)
 
 @dataclass(frozen=True)
 class Stay:
-    """What a phase holds: names of the shared resources, steps of the change before it, and whether that takes an operator."""
+    """Names of the shared resources that a phase holds, of those among them that it keeps from the phase before, and of the new.
+
+    change : steps of the change before it; by_hand : whether that takes an operator
+    """
 
     resources: tuple[str, ...]
+    kept: tuple[str, ...]
     changed: tuple[str, ...]
     change: int
     by_hand: bool
@@ -67,17 +72,19 @@ def step_count(seconds: float) -> int:
 def stays(line: Line, phases: Sequence[Phase]) -> list[Stay]:
     """What each phase of a lot holds."""
     needed = [[one for one in line.shared if phase.needs.intersection(one.needed_for)] for phase in phases]
-    users = [k for k, of_phase in enumerate(needed) if of_phase and phases[k].kind != "soak"]
+    # a supply for soaks alone reaches a single fixture wherever it is
+    places = [[one for one in of_phase if set(one.needed_for) != {"soak"}] for of_phase in needed]
+    users = [k for k, of_phase in enumerate(places) if of_phase]
     made: list[Stay] = []
     for k, resources in enumerate(needed):
+        kept = [resource for resource in resources if k and resource in needed[k - 1]]
+        new = [resource for resource in resources if resource not in kept]
         if len(line.fixtures) == 1:  # it stays where it is, and each lot ends on what the next begins on
-            last = users[users.index(k) - 1] if k in users else k
-        else:
-            last = k - 1 if k and phases[k - 1].kind != "soak" else None
-        there = set[str]() if last is None else {one.name for one in needed[last]}
-        new = [resource for resource in resources if resource.name not in there]
+            there = places[users[users.index(k) - 1]] if k in users else []
+            new = [resource for resource in places[k] if resource not in there]
         change = max((step_count(60.0 * one.change_min) for one in new), default=0)
-        made.append(Stay(_names(resources), _names(new), change, any(one.by_hand and one.change_min for one in new)))
+        by_hand = any(one.by_hand and one.change_min for one in new)
+        made.append(Stay(_names(resources), _names(kept), _names(new), change, by_hand))
     return made
 
 
@@ -190,14 +197,17 @@ class _Model:
         self.hands.append(self.cp.new_fixed_size_interval_var(load, self.load, ""))
         end = free = load + self.load  # end of the phase before; of the last one in which the lot cannot be moved
         begins: list[Any] = []
-        held: set[str] = set()
         for phase, stay in zip(phases, stays(self.line, phases), strict=True):
             length, begin = step_count(phase.seconds), self._time()
             self.cp.add(begin >= end)
-            if held.intersection(stay.resources) or phase.kind == "return":
+            if phase.kind == "return" or (stay.kept and not stay.changed):
                 self.cp.add(begin == end)
             elif begins:
                 self.cp.add(begin <= end + self.wait + stay.change)
+                for name in stay.kept:
+                    between = self._time()
+                    self.cp.add(between == begin - end)
+                    self.held[name].append(self.cp.new_interval_var(end, between, begin, ""))
             if stay.change:
                 change = self._time(stay.change if stay.by_hand else 0)
                 self.cp.add(change + stay.change == begin)
@@ -208,7 +218,7 @@ class _Model:
                 before = stay.change if name in stay.changed else 0
                 self.held[name].append(self.cp.new_fixed_size_interval_var(begin - before, length + before, ""))
             begins.append(begin)
-            end, held = begin + length, set(stay.resources) if phase.kind != "soak" else set()
+            end = begin + length
             free = free if phase.kind == "soak" else end
         unload = self._time(self.unload)
         self.cp.add(unload >= end)

@@ -15,32 +15,30 @@ FEW = 2  # effects that are named
 def model_view(unit: str, dwells: pd.DataFrame, residuals: pd.DataFrame, effects: list[str]) -> EffectView:
     """The axis of a unit that the model changes most, against the quantity that its residuals follow most without it.
 
-    dwells, residuals : of the fit, of the unit; effects : of the model. Without effects beyond the linear ones, or without
-    known forces, there is the residual of the model alone.
+    dwells, residuals : of the fit, of the unit; effects : of the model. The residual of the model stands alone, of the axis where
+    it is largest: without effects beyond the linear ones, without known forces, and where the fit in the forces along all axes
+    leaves less than the model (weights, a prior, no misalignment), since the effects were not added to that fit then.
     """
     more = [effect for effect in effects if effect not in LINEAR]
     compared = bool(more) and set(FORCE_COLUMNS) <= set(dwells)
     both = residuals.assign(before_ug=_linear(dwells, residuals) if compared else residuals["residual_ug"])
-    fall = {axis: _fall(both[both["axis"] == axis]) for axis in axes_among(both["axis"])}
-    axis = max(fall, key=lambda one: fall[one])
+    squares = (both[["before_ug", "residual_ug"]] ** 2).groupby(both["axis"]).mean().loc[axes_among(both["axis"])]
+    fall = squares["before_ug"] - squares["residual_ug"]
+    changed = compared and fall.max() > 0.0
+    if not changed:
+        both["before_ug"], fall = both["residual_ug"], squares["residual_ug"]
+    axis = str(fall.idxmax())
     own = both[both["axis"] == axis].sort_values("dwell")
     quantity = follows_most(own.assign(residual_ug=own["before_ug"]), dwells)
     column = COLUMNS.get(quantity, quantity)
     across = shown_factor(column) * timed(own, dwells)[column].to_numpy(float)[None]
     before, after = (own[name].to_numpy(float)[None] for name in ("before_ug", "residual_ug"))
     expected = own["expected_ug"].to_numpy(float) if "expected_ug" in own else np.zeros(1)
-    changed = compared and fall[axis] > 0.0
     return EffectView(
         ("" if not changed else ", ".join(more) if len(more) <= FEW else f"{len(more)} more effects"),
         quantities(own, dwells)[quantity], axis, (unit,), 0, across,
         before, after if changed else None, before - after if changed else None, float(np.sqrt(np.mean(expected**2))),
     )  # fmt: skip
-
-
-def _fall(own: pd.DataFrame) -> float:
-    """What the model takes off the squares of the residuals of an axis; their size where it takes nothing."""
-    before, after = (float(np.mean(own[name].to_numpy(float) ** 2)) for name in ("before_ug", "residual_ug"))
-    return before - after or before
 
 
 def _linear(dwells: pd.DataFrame, residuals: pd.DataFrame) -> pd.Series:

@@ -25,7 +25,9 @@ def diff(a: Run, b: Run) -> dict[str, Any]:
     Raises DataRejected: the runs have no unit in common, or nothing to compare.
     """
     coefficients = changed(_table(a, "coefficients"), _table(b, "coefficients"), COEFFICIENT, "standard_error")
-    figures = changed(_standard(a), _standard(b), FIGURE, "standard_error")
+    figures = changed(
+        *(with_standard_error(one.about, _table(one, "figures")) for one in (a, b)), FIGURE, "standard_error"
+    )
     before, after = _grades(a), _grades(b)
     if before.keys().isdisjoint(after):
         raise DataRejected(
@@ -57,16 +59,20 @@ def _table(run: Run, name: str) -> pd.DataFrame:
     return pd.DataFrame({"unit": [], "figure": [], "value": [], "uncertainty": [], "limit": [], "unit_text": []})
 
 
-def _standard(run: Run) -> pd.DataFrame:
-    """Figures with their standard uncertainty; the table has the expanded one, with the factor of the limits.
+def coverage_of(about: dict[str, Any]) -> float:
+    """The coverage factor k of a run: of its limits, 2 where it has none."""
+    return float((about.get("limits") or {}).get("coverage_factor", PLAIN_FACTOR))
+
+
+def with_standard_error(about: dict[str, Any], figures: pd.DataFrame) -> pd.DataFrame:
+    """Figures of a run with their standard uncertainty; the table has the expanded one, with the factor of the limits.
 
     Runs of versions before the risk of decisions have figures without a limit with twice the standard uncertainty, whatever the
     factor of their limits.
     """
-    figures = _table(run, "figures")
-    factor = (run.about.get("limits") or {}).get("coverage_factor", PLAIN_FACTOR)
     limited = figures["limit"].notna() | ("pfa" in figures)
-    return figures.assign(standard_error=figures["uncertainty"].astype(float) / np.where(limited, factor, PLAIN_FACTOR))
+    factor = np.where(limited, coverage_of(about), PLAIN_FACTOR)
+    return figures.assign(standard_error=figures["uncertainty"].astype(float) / factor)
 
 
 def changed(a: pd.DataFrame, b: pd.DataFrame, key: list[str], error: str) -> pd.DataFrame:

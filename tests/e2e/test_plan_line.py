@@ -58,6 +58,15 @@ def test_a_night_without_operators_is_part_of_the_schedule(line: Path) -> None:
     assert text.count("+1 d 06:0") == 2  # loaded in the afternoon, unloaded in the morning
 
 
+def test_the_start_is_a_time_of_day_or_hours(line: Path) -> None:
+    text = {}
+    for start in ('"13:30"', "13.5"):
+        line.write_text(f"start = {start}\n{SMALL}", encoding="utf-8")
+        text[start] = text_of("plan", "line", line, status=0)
+    assert text["13.5"] == text['"13:30"']
+    assert " 13:30 " in text["13.5"]
+
+
 @each(
     [
         ('"measure"', '"mesure"', "did you mean measure"),
@@ -65,7 +74,20 @@ def test_a_night_without_operators_is_part_of_the_schedule(line: Path) -> None:
         ('"B"', '"A"', "A is there twice"),
         ("count = 2", "count = 500", "100"),
         ("load_min = 6", "load_min = 1500", "longest shift has 1440 min"),
-        ("load_min = 6", 'load_min = 6\nstart = "25:61"', "a time of day as 06:00 is needed"),
+        (
+            "load_min = 6",
+            'load_min = 6\nstart = "25:61"',
+            "key 'start': found '25:61': a time of day as 06:00 is needed",
+        ),
+        ("load_min = 6", 'load_min = 6\nstart = "24:00"', "hours from 0 to below 24 are needed"),
+        ("load_min = 6", "load_min = 6\nstart = nan", "hours from 0 to below 24 are needed"),
+        ("load_min = 6", "load_min = 6\nstart = -inf", "hours from 0 to below 24 are needed"),
+        ("load_min = 6", "load_min = 6\nstart = -5", "hours from 0 to below 24 are needed"),
+        ("load_min = 6", "load_min = 6\nstart = true", "hours from 0 to below 24 are needed"),
+        ('"table"', '"operator"', "found the name 'operator', which a schedule has for its own"),
+        ('"table"', '"fixtures"', "found the name 'fixtures', which a schedule has for its own"),
+        ("count = 2", 'count = 2\n[operators]\nshifts = ["06-14"]', "found '06-14': a time of day as 06:00 is needed"),
+        ("count = 2", "count = 2\n[operators]\nshifts = [[0, 1]]", "begin and end as 06:00-14:00 are needed"),
         ("unload_min = 4", 'unload_min = 4\nstation = "nowhere"', "station: nowhere"),
     ]
 )

@@ -14,6 +14,7 @@ from pipelines.diagnosis.sentences import plain_verdict
 from pipelines.diagnosis.sentences import verdict as sentence
 from pipelines.report.numbers import with_uncertainty
 from pipelines.report.reasons import grouped_reasons
+from pipelines.rerun.diff import coverage_of, with_standard_error
 from pipelines.stages.judge import verdict_of
 from pipelines.tables.frames import rows_of
 from pipelines.workbench.pages import Workbench, asked, page, run_table, saved_as, table_csv
@@ -79,37 +80,45 @@ def _other(bench: Workbench, state: RunPage, problems: list[str]) -> dict[str, A
     except TumblelineError as problem:
         problems.append(str(problem))
         return None
-    tables = stored.tables()
+    own, tables = bench.archive.run(state.run), stored.tables()
     grades = rows_of(run_table(bench, stored.id, "grades")) if "grades" in tables else []
     return {
         "id": stored.id,
         "cells": _cells(bench, stored.id, tables),
         "outcomes": {str(row["unit"]): str(row["outcome"]) for row in grades},
         "judged": _judged(bench, stored.id, tables),
-        "changes": _changes(bench, bench.archive.run(state.run), stored),
+        "changes": _changes(bench, own, stored),
+        "k": f"{coverage_of(own.about):g}",
     }
 
 
 def _changes(bench: Workbench, own: Run, other: Run) -> dict[tuple[str, str], tuple[str, str]]:
     """By unit and figure, this run less the other: the difference and its U as texts.
 
-    Of two measurements U is that of independent ones: what their station has in common makes it smaller. Two analyses of one
-    measurement share its noise, and the difference has no U.
+    Of two measurements U is that of independent ones, with k of this run: what their station has in common makes it smaller. Two
+    analyses of one measurement share its noise, and the difference has no U.
     """
     if not all("figures" in one.tables() for one in (own, other)):
         return {}
     one, its = (
-        {(str(row["unit"]), str(row["figure"])): row for row in rows_of(run_table(bench, run.id, "figures"))}
-        for run in (own, other)
+        {(str(row["unit"]), str(row["figure"])): row for row in rows_of(with_standard_error(run.about, table))}
+        for run, table in ((run, run_table(bench, run.id, "figures")) for run in (own, other))
     )
-    apart = own.about.get("capture") != other.about.get("capture")
+    apart, k = _measurement(own) != _measurement(other), coverage_of(own.about)
     found: dict[tuple[str, str], tuple[str, str]] = {}
     for key in one.keys() & its.keys():
         change = float(one[key]["value"]) - float(its[key]["value"])
-        sizes = [float(rows[key]["uncertainty"]) for rows in (one, its)]
+        standard = [float(rows[key]["standard_error"]) for rows in (one, its)]
         if key[1] in SHOWN and math.isfinite(change):
-            found[key] = with_uncertainty(change, math.hypot(*sizes) if apart else 0.0)
+            found[key] = with_uncertainty(change, k * math.hypot(*standard) if apart else 0.0)
     return found
+
+
+def _measurement(run: Run) -> str:
+    """What all analyses of one measurement have in common: its capture, else the file that it was imported from, else the run."""
+    about = run.about
+    source = (about.get("source") or {}).get("sha256")
+    return str(about.get("capture") or source or about.get("rerun_of") or run.id)
 
 
 def _judged(bench: Workbench, run: str, tables: Sequence[str]) -> tuple[bool | None, str]:

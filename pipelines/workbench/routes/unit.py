@@ -13,6 +13,7 @@ from pipelines.drawing import Chart
 from pipelines.report import run_pictures
 from pipelines.report.numbers import axis_word, side_by_side, with_uncertainty
 from pipelines.report.unit_panels.budget import NAMES
+from pipelines.rerun.diff import coverage_of
 from pipelines.stages.figures import figure_label
 from pipelines.stages.judge import verdict_of
 from pipelines.tables.frames import rows_of
@@ -34,7 +35,7 @@ from schemas.errors import WrongUse
 router = APIRouter()
 CERTIFICATES = 20
 COVERAGE = 2.0
-"""Coverage factor of the coefficients, and of figures whose run names none."""
+"""Coverage factor of the coefficients."""
 
 
 @router.get("/unit")
@@ -68,7 +69,7 @@ def unit(request: Request) -> Response:
         request, "unit.html", state, problems, run=run, grade=grade, own=own, tables=tables, units=units, drivers=drivers,
         before=units[place - 1] if place else "", after=units[place + 1] if place + 1 < len(units) else "",
         coefficients=side_by_side(own.get("coefficients", []), _expanded), parameters=parameters,
-        coverage=float((run.about.get("limits") or {}).get("coverage_factor", COVERAGE)),
+        coverage=coverage_of(run.about),
         names=NAMES, axis_word=axis_word, figure_label=figure_label,
         certificates=Ledger(bench.archive).calibrations(state.unit)[-CERTIFICATES:][::-1],
     )  # fmt: skip

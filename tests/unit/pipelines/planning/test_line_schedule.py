@@ -14,7 +14,7 @@ from pipelines.planning.line_schedule import shortest
 from pipelines.schedule.steps import steps
 from pipelines.schedule.timing import minutes
 from schemas.errors import RecipeInvalid
-from schemas.line import Line
+from schemas.line import Line, staffed
 from schemas.station import load_station
 
 NEEDS = {
@@ -45,10 +45,10 @@ def line_of(fixtures: int, lots: int, **keys: object) -> Line:
 
 phases = st.lists(st.builds(phase, st.sampled_from(sorted(NEEDS)), st.integers(1, 9)), min_size=1, max_size=5)
 tables = st.builds(
-    lambda change, hand, static: {
-        "name": "table", "needed_for": ["measure", *(["static"] if static else [])], "change_min": change / 6.0, "by_hand": hand,
+    lambda change, hand, more: {
+        "name": "table", "needed_for": ["measure", *more], "change_min": change / 6.0, "by_hand": hand,
     },
-    st.integers(0, 4), st.booleans(), st.booleans(),
+    st.integers(0, 4), st.booleans(), st.lists(st.sampled_from(["static", "soak", "exciter"]), unique=True),
 )  # fmt: skip
 coolers = st.builds(lambda count: {"name": "cooler", "needed_for": ["soak"], "count": count}, st.integers(1, 2))
 exciters = st.just({"name": "exciter", "needed_for": ["exciter"], "change_min": 0.5, "by_hand": True})
@@ -85,6 +85,33 @@ def test_no_order_is_shorter(fixtures: int, lots: list[list[Phase]], shared: lis
     assert found.bound == found.makespan == Trial(line, lots).steps()
 
 
+@pytest.mark.parametrize("fixtures", [2, 3])
+def test_a_chamber_that_is_the_table_keeps_its_lot_from_the_soak_to_the_measurement(fixtures: int) -> None:
+    lots = [[phase("soak", 9), phase("measure", 3), phase("soak", 9), phase("measure", 3)]] * 3
+    one = {"name": "table", "needed_for": ["soak", "measure"], "change_min": 0.5, "by_hand": True}
+    line = line_of(fixtures, 3, shared=[one])
+    found = shortest(line, lots)
+    assert broken(line, lots, found.lots) == []
+    for own in found.lots:
+        assert [begin - own.begins[0] for begin in own.begins] == [0, 9, 12, 21]
+    first, second, _ = (own.begins[0] for own in found.lots)
+    assert second - first == 24 + 3
+
+
+def test_what_is_kept_is_held_while_another_resource_comes() -> None:
+    vibrated = Phase("measure", 25.0, 60.0, frozenset({"measure", "exciter"}))
+    lots = [[phase("measure", 6), vibrated]] * 2
+    keys = {"change_min": 0.5, "by_hand": True}
+    shared = [
+        {"name": name, "needed_for": [need], **keys} for name, need in (("table", "measure"), ("shaker", "exciter"))
+    ]
+    line = line_of(2, 2, shared=shared)
+    found = shortest(line, lots)
+    assert broken(line, lots, found.lots) == []
+    assert [own.begins[1] - own.begins[0] for own in found.lots] == [6 + 3] * 2
+    assert found.bound == found.makespan == Trial(line, lots).steps()
+
+
 def test_the_rules_see_what_is_wrong() -> None:
     lots = [[phase("soak", 6), phase("measure", 6)]] * 2
     line = line_of(2, 2, shared=[{"name": "table", "needed_for": ["measure"], "change_min": 0.5, "by_hand": True}])
@@ -115,6 +142,35 @@ def test_two_fixtures_hide_the_soaks_of_each_other() -> None:
     assert {lot["fixture"] for lot in found["lots"]} == {"F0", "F1"}
     assert found["resources"][0]["resource"] == "fixtures"
     assert alone == pytest.approx(4 * found["resources"][0]["minutes_per_lot"], abs=0.01)
+
+
+def test_one_lot_after_the_other_is_the_schedule_where_changes_take_longer_than_they_save() -> None:
+    table = {"name": "table", "needed_for": ["measure", "static"], "change_min": 40, "by_hand": True}
+    line = line_of(2, 4, shared=[table], load_min=6, unload_min=4)
+    found = plan_line(line, load_station(), lambda name: load_recipe("quick"))
+    assert found["makespan_min"] == found["one_after_another"]["makespan_min"] < found["bound_min"]
+    assert found["proven"]
+    assert {lot["fixture"] for lot in found["lots"]} == {"F0"}
+    assert "change" not in {one["activity"] for one in found["activities"]}
+    assert max(lot["unloaded_min"] for lot in found["lots"]) == pytest.approx(found["makespan_min"])
+
+
+@pytest.mark.parametrize(
+    ("shifts", "part"),
+    [
+        ([], 1.0),
+        (["06:00-14:00"], 8 / 24),
+        (["08:00-16:00", "06:00-14:00"], 10 / 24),
+        (["22:00-06:00", "05:00-07:00"], 9 / 24),
+        (["00:00-24:00", "06:00-14:00"], 1.0),
+    ],
+)
+def test_shifts_that_overlap_count_once(shifts: list[str], part: float) -> None:
+    line = line_of(1, 1, operators={"shifts": shifts})
+    assert staffed(line.operators.shifts) == pytest.approx(part)
+    found = plan_line(line, load_station(), lambda name: load_recipe("quick"))
+    row = next(row for row in found["resources"] if row["resource"] == "operator")
+    assert row["bound_per_lot_min"] == pytest.approx(row["minutes_per_lot"] / part)
 
 
 def test_a_line_without_a_schedule_is_refused() -> None:

@@ -47,6 +47,18 @@ def test_a_linear_model_and_unknown_forces_have_the_residual_alone(unit) -> None
         assert len(effect_chart(view).plots) == 1
 
 
+def test_where_the_model_leaves_more_than_the_linear_fit_its_own_residual_is_drawn(unit) -> None:
+    dwells, residuals, effects = unit
+    worse = residuals.assign(residual_ug=1e5 + 1e4 * (residuals["axis"] == "y") + residuals["dwell"])
+    view = model_view("A1", dwells, worse, effects)
+    assert view.after is view.curve is None
+    assert view.axis == "y"
+    assert np.array_equal(view.before[0], worse[worse["axis"] == "y"].sort_values("dwell")["residual_ug"])
+    (plot,) = effect_chart(view).plots
+    assert "residual" in [trace.name for trace in plot.traces]
+    assert effect_chart(view).title.startswith("Residual of the model against")
+
+
 def test_residuals_that_follow_the_rate_of_the_temperature_are_drawn_against_it(unit) -> None:
     dwells, residuals, _ = unit
     phase = 2.0 * np.pi * 3.0 * (dwells["time_s"] - dwells["time_s"].min()) / np.ptp(dwells["time_s"])

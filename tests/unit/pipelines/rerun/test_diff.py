@@ -2,7 +2,6 @@
 
 import json
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -11,7 +10,7 @@ from capture_double import CaptureDouble, measured_run, small_job, small_run
 
 from pipelines.archive import Archive, Run
 from pipelines.jobs.model_change import change_from_options
-from pipelines.rerun.diff import _standard, diff
+from pipelines.rerun.diff import diff, with_standard_error
 from pipelines.rerun.rerun import again
 from schemas.errors import DataRejected
 
@@ -106,7 +105,5 @@ def test_standard_uncertainties_of_figures_are_found_with_the_factor_that_they_w
 ) -> None:
     shared = {"unit": "A", "value": 1.0, "uncertainty": 10.0, "unit_text": "µg", **dict.fromkeys(columns, 0.0)}
     figures = pd.DataFrame({"figure": ["f", "g"], "limit": [100.0, np.nan], **shared})
-    run = SimpleNamespace(
-        id="r", about={"limits": {"coverage_factor": 2.5}}, tables=lambda: ["figures"], table=lambda _: figures
-    )
-    assert _standard(run)["standard_error"].tolist() == [4.0, unlimited]  # pyright: ignore[reportArgumentType]
+    about = {"limits": {"coverage_factor": 2.5}}
+    assert with_standard_error(about, figures)["standard_error"].tolist() == [4.0, unlimited]

@@ -1,6 +1,7 @@
 """Pages of an audit, of discoveries and of a unit in the workbench: their numbers, figures and tables."""
 
 import itertools
+import json
 import re
 from pathlib import Path
 
@@ -14,15 +15,17 @@ from lots import lot
 
 from benchmarks.generated_archive import write_archive
 from pipelines.archive import Archive, Run
+from pipelines.archive.run import START
 from pipelines.discovery.attributes import add_attributes
 from pipelines.report.numbers import significant, with_uncertainty
 from pipelines.report.run_pictures import follows_most, quantities, residual_chart
 from pipelines.workbench.application import create_app
+from pipelines.workbench.routes.two_models import _worded
 from pipelines.workbench.services import models, requests
 from pipelines.workbench.services.jobs import Jobs, key_of
 from pipelines.workbench.services.work import done_in_process
 from pipelines.workbench.settings import WorkbenchSettings
-from pipelines.workbench.state import AuditPage, DiscoverPage, TwoModelsPage
+from pipelines.workbench.state import AuditPage, DiscoverPage, MissingPage, TwoModelsPage
 from schemas.errors import WrongUse
 
 TOKEN = "Zq8vXy3nR5tB7wK1mP4sD9"
@@ -148,11 +151,19 @@ def test_two_models_stand_side_by_side_with_verdicts_residuals_on_one_scale_and_
     assert abs(scale["over_a"]) > 2.0  # what the cubic gave to the scale factor
     change, expanded = with_uncertainty(scale["change"], 2.0 * scale["u_b"])
     assert f"{change}<br><small>± {expanded}</small>" in text
+    assert "noise alone exceeds it in up to one row of twenty" in text
     assert client.get("/two-models/coefficients.csv?" + state.query()).text.count("\n") == len(rows) + 1
     chart = client.get(state.figure("residuals")).json()
     ranges = {str(chart["layout"][name]["range"]) for name in ("yaxis", "yaxis2")}
     assert len(ranges) == 1
     assert client.get(state.figure("nothing")).status_code == 422
+
+
+def test_the_u_of_a_difference_is_that_of_the_larger_model_and_of_models_beside_each_other_the_sum() -> None:
+    row = {"a": 1.0, "u_a": 0.1, "b": 2.0, "u_b": 0.3, "change": 1.0}
+    small, large, other = (MissingPage(effects=("bias", *more)) for more in ((), ("third_order",), ("second_order",)))
+    for sides, expanded in (((small, large), 0.6), ((large, small), 0.2), ((large, other), 0.8)):
+        assert _worded(row, sides)["difference"] == with_uncertainty(1.0, expanded)
 
 
 def test_two_runs_stand_side_by_side_with_their_differences(tmp_path: Path) -> None:
@@ -166,6 +177,34 @@ def test_two_runs_stand_side_by_side_with_their_differences(tmp_path: Path) -> N
     assert f"Δ {change} ± {expanded}</small>" in text
     other = client.get(f"/run?run={run.id}&beside={run.id}").text  # the same noise in both: no U of the difference
     assert "Δ 0</small>" in other or "Δ 0.000</small>" in other
+
+
+def rewritten(run: Run, **entries: object) -> None:
+    """A run's ``run.json`` with other entries, as an import or other limits would have written it."""
+    path = run.path / START
+    path.write_text(json.dumps({**run.about, **entries}), encoding="utf-8")
+
+
+def test_the_difference_of_two_runs_has_k_of_the_first_and_imports_of_two_files_are_two_measurements(
+    tmp_path: Path,
+) -> None:
+    run = small_run(tmp_path)
+    again = measured_run(small_job(tmp_path, repeat=1), run.archive, CaptureDouble(noise_g=2e-4))
+    settings = WorkbenchSettings(archive=str(run.archive.root), folder=tmp_path / "bench", token=TOKEN)
+    own, its = (one.table("figures").set_index(["unit", "figure"]).loc["A1", "bias_error_ug"] for one in (run, again))
+    change = own["value"] - its["value"]
+    k = {run: 2.5, again: float(again.about["limits"]["coverage_factor"])}
+    standard = np.hypot(own["uncertainty"] / k[run], its["uncertainty"] / k[again])
+    told, expanded = with_uncertainty(change, 2.5 * standard)
+    limits = {**run.about["limits"], "coverage_factor": k[run]}
+    for other, with_u in (("b" * 64, True), ("a" * 64, False)):
+        rewritten(run, limits=limits, capture="", source={"sha256": "a" * 64})
+        rewritten(again, capture="", source={"sha256": other})
+        client = AsgiClient(create_app(settings), "http://127.0.0.1:8321")
+        text = client.get(f"/run?run={run.id}&beside={again.id}").text
+        assert "with its U, k = 2.5, for measurements" in text
+        assert (f"Δ {told} ± {expanded}</small>" in text) is with_u
+        assert ("± " in text[text.index("data-two-runs") :].partition("</table>")[0]) is with_u
 
 
 def test_residuals_are_drawn_against_what_they_depend_on_with_bars_of_the_noise(tmp_path: Path) -> None:
