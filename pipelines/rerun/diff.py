@@ -25,9 +25,8 @@ def diff(a: Run, b: Run) -> dict[str, Any]:
     Raises DataRejected: the runs have no unit in common, or nothing to compare.
     """
     coefficients = changed(_table(a, "coefficients"), _table(b, "coefficients"), COEFFICIENT, "standard_error")
-    figures = changed(
-        *(with_standard_error(one.about, _table(one, "figures")) for one in (a, b)), FIGURE, "standard_error"
-    )
+    own, its = (with_standard_error(one.about, _table(one, "figures")) for one in (a, b))
+    figures = changed(own, its, FIGURE, "standard_error")
     before, after = _grades(a), _grades(b)
     if before.keys().isdisjoint(after):
         raise DataRejected(
