@@ -21,8 +21,8 @@ from schemas.units import MICRO
 BAD_DWELL = "bad_dwell"
 """Id of a fault of a single dwell of one unit."""
 
-_ALIKE = 0.25
-"""Share of the residuals' variance, alike in all units, from which it is said: half of their size."""
+_ALIKE = 0.5
+"""Share of the residuals' variance from which it is said that they are alike in all units: more than is the units' own."""
 
 _ACROSS, _ALONG = 0.3, 0.9
 """Forces along the axis, g, below and above which its noise is compared."""
@@ -263,7 +263,7 @@ def noise_of_the_lot(model: Model, units: int) -> list[str]:
     if alike < _ALIKE:
         return []
     shared, own = (short(MICRO * rms(fitted_residuals(model)) * part**0.5) for part in (alike, 1.0 - alike))
-    text = f"{shared} µg of the residual are alike in all {units} units, {own} µg are each unit's own"
+    text = f"of what remains {shared} µg are alike in all {units} units, {own} µg are each unit's own"
     return [f"{text}: look for the cause in what they share, such as table, fixture, reference or supply"]
 
 
