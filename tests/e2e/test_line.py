@@ -341,14 +341,14 @@ def test_the_server_goes_when_its_last_user_has_gone(tmp_path: Path) -> None:
 TWICE = """
 import sys, time
 from pathlib import Path
-from pipelines.archive import Archive
 from pipelines.flows.local import reached
+home = Path(sys.argv[1]) / "orchestrator"
 for _ in range(2):
-    with reached(Archive(sys.argv[1])):
+    with reached(home):
         from pipelines.flows.operator import waiting
         assert waiting() == []
     end = time.monotonic() + 60.0
-    while (Path(sys.argv[1]) / "orchestrator" / "server.json").exists() and time.monotonic() < end:
+    while (home / "server.json").exists() and time.monotonic() < end:
         time.sleep(0.1)
 """
 
