@@ -110,30 +110,46 @@ class Covariance:
         if same and np.array_equal(one.time, other.time):
             self._whiteners = whiteners
 
-    def squares_after(self, noise: Noise, q: Array) -> float:
-        """Expected sum of squares, g², of the noise of all dwells after a fit weighted by white errors: tr (I − QQᵀ)V.
+    def squares_left(self, noise: Noise, local: Array, shared: Array, residual: Array) -> tuple[float, float]:
+        """Sums of squares, g², of the residuals of a fit weighted by the white errors: what noise leaves in them, and they hold.
+
+        With P = I − LLᵀ of the block's own columns, each block's residuals P·z − S·Σ Sᵀz have the covariance
+        P·V·P − P·V·S·Sᵀ − S·Sᵀ·V·P + S·(Σ SᵀVS)·Sᵀ, of which the diagonal counts.
 
         Parameters
         ----------
-        q : (blocks, n, p), orthonormal columns of the fit, weighted by the white errors of the dwells in their block
+        local, shared : (blocks, n, p) and (blocks, n, t), orthonormal columns of each block and of all together
+        residual : (blocks, n); all three weighted by the white errors within the block, and of equal weight for all blocks
         """
-        left = 0.0
-        for members, variance in self._variances(noise.shares):
-            for some in _pieces(members, q[0].size):
-                along = np.einsum("bnp,bnp->b", q[some], variance @ q[some])
-                scale = (self.level * noise.scale)[some] ** 2
-                left += float(np.sum(scale * (np.trace(variance) - along)))
-        return left
+        terms = shared.shape[-1]
+        left, held, between, weight = 0.0, 0.0, np.zeros((terms, terms)), np.zeros((terms, terms))
+        for members, variance, white in self._variances(noise.shares):
+            for some in _pieces(members, local[0].size):
+                size = (self.level * noise.scale)[some] ** 2 / self.white
+                own, common = local[some], shared[some]
+                along, beside = variance @ own, variance @ common
+                inner = np.swapaxes(own, -1, -2) @ along
+                free = beside - own @ (np.swapaxes(own, -1, -2) @ beside)
+                each = np.diagonal(variance) + np.sum((own @ inner - 2.0 * along) * own, axis=-1)
+                each = each - 2.0 * np.sum(free * common, axis=-1)
+                left += float(np.sum(size[:, None] * white**2 * each))
+                held += float(np.sum((white * residual[some]) ** 2))
+                between += np.einsum("bnt,bns,b->ts", common, beside, size)
+                weight += np.einsum("bnt,bns,n->ts", common, common, white**2)
+        return self.white * (left + float(np.sum(weight * between))), self.white * held
 
-    def _variances(self, shares: Shares) -> Iterator[tuple[Places, Array]]:
-        """Blocks, and the covariance (n, n) of their dwells over their white one; 0 where one is missing."""
+    def _variances(self, shares: Shares) -> Iterator[tuple[Places, Array, Array]]:
+        """Blocks that have in common the covariance (n, n) of their dwells over the white one, and the white errors (n,).
+
+        Both are zero where a dwell is missing.
+        """
         for place, steps, blocks, common in self._groups_at(shares):
             kernel = self._kernels[place]
             variance = np.diag(kernel.there.astype(np.float64))
             for share, each in zip((common.flicker, common.walk), self._wander or (), strict=False):
                 louder = share * 10.0 ** (steps / SHARE_STEP) * each[place] / np.outer(kernel.profile, kernel.profile)
                 variance += np.where(np.outer(kernel.there, kernel.there), louder, 0.0)
-            yield blocks, variance
+            yield blocks, variance, np.where(kernel.there, kernel.white, 0.0)
 
     def side_by_side(self, shares: Shares) -> Array:
         """Half the mean variance of the wander's steps from one dwell to the next, over the white variance, (blocks,)."""

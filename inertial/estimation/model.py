@@ -7,7 +7,7 @@ import numpy as np
 
 from inertial.arrays import Array
 from inertial.errors import NotIdentified
-from inertial.estimation.bases import SEEN, eigen, inverse_roots
+from inertial.estimation.bases import orthonormal
 from inertial.estimation.candidate import Candidate
 from inertial.estimation.covariance import LARGE
 from inertial.estimation.noise_shares import Noise, Shares, deviance_of, moderated
@@ -261,16 +261,12 @@ class Model:
         the shares describe badly (a beat with the mains is bounded, a random walk is not) is no more than the residuals hold.
         """
         covariance, space = self.problem.covariance, self.even
-        columns = [space.q]
-        if space.gram.shape[0] > 1:
-            values, vectors = eigen(space.gram[1:, 1:])
-            roots = inverse_roots(values, SEEN**2 * float(values[-1]))
-            columns.append(space.targets[..., 1:] @ (vectors * roots))
-        expected = covariance.squares_after(self.noise, np.concatenate(columns, axis=-1))
-        held = covariance.white * float(np.sum(space.residual**2))
+        shared = space.targets[..., 1:]
+        common = orthonormal(shared.reshape(1, shared[..., 0].size if shared.size else 0, shared.shape[-1]))[0]
+        left, held = covariance.squares_left(self.noise, space.q, common.reshape(shared.shape), space.residual)
         if self.problem.y.size > LARGE:
             del self.even
-        return float(np.sqrt(max(min(expected, held), 0.0) / max(int(covariance.count.sum()), 1)))
+        return float(np.sqrt(max(min(left, held), 0.0) / max(int(covariance.count.sum()), 1)))
 
     def scatter(self) -> float:
         """RMS of the noise of a dwell mean against its neighbours, g: white, and the wander from dwell to dwell.

@@ -107,12 +107,13 @@ def _shared(resources: list[LineResource]) -> list[str]:
 
 
 def _held(document: LineDocument, lot: str, resource: str) -> str:
-    """When a lot is on a shared resource, changes not counted."""
-    return ", ".join(
-        f"{clock(document, activity['begin_min'])}–{clock(document, activity['end_min'])}"
-        for activity in document["activities"]
-        if activity["lot"] == lot and resource in activity["resources"] and activity["activity"] != "change"
-    )
+    """When a lot is on a shared resource, changes not counted; what follows at once is one stay."""
+    spans: list[tuple[float, float]] = []
+    for activity in document["activities"]:
+        if activity["lot"] == lot and resource in activity["resources"] and activity["activity"] != "change":
+            begin = spans.pop()[0] if spans and spans[-1][1] >= activity["begin_min"] else activity["begin_min"]
+            spans.append((begin, activity["end_min"]))
+    return ", ".join(f"{clock(document, begin)}–{clock(document, end)}" for begin, end in spans)
 
 
 def _step(document: LineDocument, activity: LineActivity) -> list[str]:

@@ -1,6 +1,5 @@
 """The tables of a diagnosis with their sentences, the same at a terminal, in a report and on a page."""
 
-import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,7 +12,6 @@ from inertial.quantities import BY_COLUMN
 from inertial.uncertainty.rounding import chance, short, short_values
 from pipelines.diagnosis import sentences
 
-_NOT_RECORDED = re.compile(r"the dwells carry no (\w+):")
 HIDDEN, SHOWN = 3.0, 4
 """Factor by which slow noise must raise the smallest detectable size of an effect to list it, and the number of effects
 listed."""
@@ -152,8 +150,8 @@ def unseen(document: dict[str, Any], *, brief: bool = False) -> Section:
     """
     reasons = document.get("reasons", {})
     rows = [[name, reasons.get(name) or document["breakers"][name]] for name in document["unseen"]]
-    counts = Counter(match[1] for _, text in rows if brief and (match := _NOT_RECORDED.match(text)))
-    kept = [row for row in rows if not (brief and _NOT_RECORDED.match(row[1]))]
+    counts = Counter(column for _, text in rows if brief and (column := sentences.not_recorded(text)))
+    kept = [row for row in rows if not (brief and sentences.not_recorded(row[1]))]
     listed = ", ".join(f"{_quantity(column)} ({number_of(count, 'effect')})" for column, count in counts.most_common())
     notes = [f"not recorded: {listed}; --all lists them"] if listed else []
     return Section(

@@ -1,5 +1,6 @@
 """A diagnosis in sentences: the verdict with its numbers, its basis, the dwells that decide it, the next measurement."""
 
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -10,6 +11,7 @@ from inertial.uncertainty.rounding import chance, equal, short
 from pipelines.tables.sound_lot import SMALL_MISFIT, is_small
 
 BAD_DWELL = "bad_dwell"
+_NOT_RECORDED = re.compile(r"the dwells carry no (\w+):")
 NAMED_DWELLS = 5
 """Number of dwells named in a sentence."""
 
@@ -234,10 +236,16 @@ def unexplained_text(document: dict[str, Any]) -> str:
     return f"{unexplained['text']}{shape} (p {equal(unexplained['p_value'])}).{of_table}"
 
 
+def not_recorded(reason: str) -> str:
+    """The column that the dwells lack by a reason of :mod:`inertial.planning.reasons`; empty for another reason."""
+    match = _NOT_RECORDED.match(reason)
+    return "" if match is None else match[1]
+
+
 def _without_angles(document: dict[str, Any]) -> str:
     """What could not be tried because the angles of the table are not recorded, as a sentence to add; empty where they are."""
     reasons = document.get("reasons", {})
-    names = [name for name in document["unseen"] if "outer_deg" in reasons.get(name, "")]
+    names = [name for name in document["unseen"] if not_recorded(reasons.get(name, "")) == "outer_deg"]
     if not names:
         return ""
     return f" Without the table's angles {', '.join(names)} could not be tried: record outer_deg and inner_deg."

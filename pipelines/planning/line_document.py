@@ -26,9 +26,8 @@ def plan_line(line: Line, station: StationConfig, recipe_named: Callable[[str], 
     bound = best.bound
     single = line.model_copy(update={"fixtures": line.fixtures[:1]})
     alone = best if len(line.fixtures) == 1 else shortest(single, phases)
-    if (
-        alone.makespan < best.makespan
-    ):  # changes take longer than the soaks that they make use of: one fixture needs none
+    if alone.makespan < best.makespan:
+        # changes take longer than the soaks that they make use of: one fixture needs none
         used, best = single, alone
     spans = [(placed.load, placed.unload + step_count(60.0 * line.unload_min)) for placed in best.lots]
     fixtures = [line.fixtures[k] for k in free_places(spans)]

@@ -119,10 +119,8 @@ def shortest(line: Line, lots: Sequence[Sequence[Phase]]) -> Shortest:
         raise RecipeInvalid(
             f"line {line.name}: the search found no schedule of {len(lots)} lots in its time; plan fewer lots at once"
         )
-    makespan, bound = (
-        round(solver.objective_value),
-        min(round(solver.best_objective_bound), round(solver.objective_value)),
-    )
+    makespan = round(solver.objective_value)
+    bound = min(round(solver.best_objective_bound), makespan)
     for variable in model.variables:
         model.cp.add_hint(variable, solver.value(variable))
     model.cp.add(model.makespan <= makespan)
