@@ -120,13 +120,15 @@ class Line(Strict):
     @model_validator(mode="after")
     def _possible(self) -> "Line":
         refuse_repeated(self.fixtures, "fixtures: ", "give each its own name")
-        refuse_repeated([one.name for one in self.shared], "shared: ", "give each its own name")
-        for taken in (one.name for one in self.shared if one.name in {OPERATOR, FIXTURES}):
+        refuse_repeated([resource.name for resource in self.shared], "shared: ", "give each its own name")
+        for taken in (resource.name for resource in self.shared if resource.name in {OPERATOR, FIXTURES}):
             raise ValueError(f"shared: found the name '{taken}', which a schedule has for its own; choose another name")
         if (count := sum(lot.count for lot in self.lots)) > MOST_LOTS:
             raise ValueError(f"lots: {count} lots, at most {MOST_LOTS} are planned at once; plan fewer")
         by_hand = {"load_min": self.load_min, "unload_min": self.unload_min}
-        by_hand |= {f"change_min of {one.name}": one.change_min for one in self.shared if one.by_hand}
+        by_hand |= {
+            f"change_min of {resource.name}": resource.change_min for resource in self.shared if resource.by_hand
+        }
         longest = max((end - begin for begin, end in self.operators.shifts), default=DAY_MIN)
         for key, minutes in by_hand.items():
             if minutes > longest:

@@ -116,8 +116,8 @@ class CaptureRun:
         if not look.known:
             return set()
         missing_steps = left_out(plan, number)
-        self.remaining.leave_out({one.record for one in missing_steps})
-        return {one.record for one in missing_steps}
+        self.remaining.leave_out({skipped.record for skipped in missing_steps})
+        return {skipped.record for skipped in missing_steps}
 
     def record(self, step: Step, *, settled: bool) -> None:
         """Measures one record; after an interruption again from its checkpoint, as often as the station's file allows."""

@@ -93,9 +93,9 @@ class LotLooks:
         passed = set(own["grades"].query("outcome == 'pass'")["unit"]) - figures.keys()
         ratio = limits.coverage_factor * state.ratios(self.terms.asked, zero_g)
         fitted = dict(zip(state.units, ratio.tolist(), strict=True))
-        reached = {unit for unit, one in fitted.items() if guard * one <= 1.0}
+        reached = {unit for unit, share in fitted.items() if guard * share <= 1.0}
         undecided = fitted.keys() - (passed & reached) - fails.keys()
-        ratios = [one for unit, one in fitted.items() if unit not in fails]
+        ratios = [share for unit, share in fitted.items() if unit not in fails]
         worst = max(ratios, default=0.0)
         asked = _share(worst, guard, others=bool(fails)) if self.terms.asked and ratios else ""
         lost = len(own["grades"]) - len(fitted)

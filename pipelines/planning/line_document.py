@@ -48,11 +48,13 @@ def plan_line(line: Line, station: StationConfig, recipe_named: Callable[[str], 
         "proven": bound >= best.makespan,
         "one_after_another": _rate(alone),
         "lots": [
-            _lot(label, name, fixture, [one for one in activities if one["lot"] == label])
+            _lot(label, name, fixture, [activity for activity in activities if activity["lot"] == label])
             for label, name, fixture in zip(labels, names, fixtures, strict=True)
         ],
         "resources": resources,
-        "activities": sorted(activities, key=lambda one: (one["begin_min"], one["end_min"], one["lot"])),
+        "activities": sorted(
+            activities, key=lambda activity: (activity["begin_min"], activity["end_min"], activity["lot"])
+        ),
     }
 
 
@@ -110,7 +112,7 @@ def _resources(line: Line, lots: Sequence[Sequence[Phase]]) -> list[LineResource
 
     Of operators it is counted against the part of the day that has a shift.
     """
-    held = dict.fromkeys((one.name for one in line.shared), 0.0)
+    held = dict.fromkeys((resource.name for resource in line.shared), 0.0)
     hands = fixtures = 0.0
     for phases in lots:
         by_hand = step_count(60.0 * line.load_min) + step_count(60.0 * line.unload_min)
@@ -121,7 +123,7 @@ def _resources(line: Line, lots: Sequence[Sequence[Phase]]) -> list[LineResource
             for name in stay.resources:
                 held[name] += step_count(phase.seconds) + (stay.change if name in stay.changed else 0)
         hands += by_hand
-    needed = [(one.name, one.count, held[one.name]) for one in line.shared]
+    needed = [(resource.name, resource.count, held[resource.name]) for resource in line.shared]
     day = staffed(line.operators.shifts)
     needed += [(FIXTURES, len(line.fixtures), fixtures), (OPERATOR, line.operators.count, hands)]
     rows: list[LineResource] = [

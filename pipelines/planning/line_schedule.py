@@ -71,9 +71,11 @@ def step_count(seconds: float) -> int:
 
 def stays(line: Line, phases: Sequence[Phase]) -> list[Stay]:
     """What each phase of a lot holds."""
-    needed = [[one for one in line.shared if phase.needs.intersection(one.needed_for)] for phase in phases]
+    needed = [
+        [resource for resource in line.shared if phase.needs.intersection(resource.needed_for)] for phase in phases
+    ]
     # a supply for soaks alone reaches a single fixture wherever it is
-    places = [[one for one in of_phase if set(one.needed_for) != {"soak"}] for of_phase in needed]
+    places = [[resource for resource in of_phase if set(resource.needed_for) != {"soak"}] for of_phase in needed]
     users = [k for k, of_phase in enumerate(places) if of_phase]
     made: list[Stay] = []
     for k, resources in enumerate(needed):
@@ -82,8 +84,8 @@ def stays(line: Line, phases: Sequence[Phase]) -> list[Stay]:
         if len(line.fixtures) == 1:  # it stays where it is, and each lot ends on what the next begins on
             there = places[users[users.index(k) - 1]] if k in users else []
             new = [resource for resource in places[k] if resource not in there]
-        change = max((step_count(60.0 * one.change_min) for one in new), default=0)
-        by_hand = any(one.by_hand and one.change_min for one in new)
+        change = max((step_count(60.0 * resource.change_min) for resource in new), default=0)
+        by_hand = any(resource.by_hand and resource.change_min for resource in new)
         made.append(Stay(_names(resources), _names(kept), _names(new), change, by_hand))
     return made
 
@@ -145,15 +147,15 @@ class _Model:
         self.wait = int(60.0 * line.longest_wait_min // STEP_S)
         self.horizon = LONGEST_DAYS * _DAY * len(lots) if line.operators.shifts else self._one_by_one(lots)
         self.variables: list[Any] = []
-        self.held: dict[str, list[Any]] = {one.name: [] for one in line.shared}
+        self.held: dict[str, list[Any]] = {resource.name: [] for resource in line.shared}
         self.hands: list[Any] = []
         self.fixtures: list[Any] = []
         self.placed = [self._lot(phases) for phases in lots]
         self.makespan = self._time()
         for _, _, unload in self.placed:
             self.cp.add(self.makespan >= unload + self.unload)
-        for one in line.shared:
-            self._at_most(self.held[one.name], one.count)
+        for resource in line.shared:
+            self._at_most(self.held[resource.name], resource.count)
         self._at_most(self.hands, line.operators.count)
         self._at_most(self.fixtures, len(line.fixtures))
         self._in_order(lots)

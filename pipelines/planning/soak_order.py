@@ -86,7 +86,7 @@ def ordered(context: PlanContext, required: Array) -> Ordered:
         _with(recipe, [_by_information(context, part, required) for part in soaks])
         for soaks in _orders(context, parts, required)
     ]
-    until = [known_after(_planned(context, one), required) for one in tried]
+    until = [known_after(_planned(context, plan), required) for plan in tried]
     best = min(range(len(tried)), key=lambda k: (math.inf if until[k] is None else until[k], k))
     before, after = known_after(context, required), until[best]
     if before is not None and (after is None or before <= after):
@@ -144,7 +144,7 @@ def _ratio(context: PlanContext, count: int, required: Array, looks: int) -> flo
     spare = max(1, len(context.recipe.units)) * len(required) * (count - required.shape[1])
     if spare <= 0:
         return math.inf
-    last = [one.step.record for one in context.activities if one.kind == "dwell"][count - 1]
+    last = [activity.step.record for activity in context.activities if activity.kind == "dwell"][count - 1]
     taken = [activity for activity in context.activities if activity.step.record <= last]
     state = state_of(taken, context.station, context.recipe, history=True)
     try:
@@ -190,9 +190,9 @@ def _orders(context: PlanContext, parts: list[SoakPart], required: Array) -> lis
         )[:MANY]
         planned = [(_planned(context, _with(recipe, [parts[k] for k in order])), list(order)) for order in quickest]
         enough = [
-            (known_after(one, required) or one.minutes, order)
-            for one, order in planned
-            if _ratio(one, one.state.time.size, required, looks) <= 1.0
+            (known_after(plan, required) or plan.minutes, order)
+            for plan, order in planned
+            if _ratio(plan, plan.state.time.size, required, looks) <= 1.0
         ]
         if enough:
             chosen.append(_completed(parts, min(enough)[1]))
@@ -238,7 +238,7 @@ def _by_information(context: PlanContext, part: SoakPart, required: Array) -> So
         pose = [poses[numbers[k] - 1] for k in left]
         tried = matrix + np.einsum("akp,akq->kapq", rows[:, left], rows[:, left])
         gain = float(value(matrix)) - value(tried)
-        seconds = np.array([move_seconds(now, one, context.station) for one in pose]) + beside
+        seconds = np.array([move_seconds(now, target, context.station) for target in pose]) + beside
         best = int(np.argmax(gain / seconds))
         matrix, now = tried[best], replace(now, outer=pose[best].outer_deg, inner=pose[best].inner_deg)
         order.append(numbers[left.pop(best)])

@@ -118,9 +118,9 @@ def early_end_sentence(end: EarlyEnd, unit: str = "") -> str:
     lengths = dwell_words(end)
     chosen = f"dwells of {lengths} s by the noise of the run" if len(set(end["dwell_s"])) > 1 else ""
     larger = ", ".join(
-        f"{one['figure']} of {one['unit']} ({one['share']:.2f} of what is asked)"
-        for one in end["not_reached"]
-        if unit in ("", one["unit"])
+        f"{row['figure']} of {row['unit']} ({row['share']:.2f} of what is asked)"
+        for row in end["not_reached"]
+        if unit in ("", row["unit"])
     )
     last = [*([chosen] if chosen else []), *([f"asked uncertainty not reached: {larger}"] if larger else [])]
     if not end["ended"]:
