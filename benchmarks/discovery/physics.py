@@ -36,6 +36,11 @@ def _leaning_pendulum(force: Array, _kelvin: Array, _time: Array) -> Array:
     return np.sin(SMALL * force) / SMALL * np.roll(force, -1, axis=1)
 
 
+def _twisting_hinge(force: Array, _kelvin: Array, _time: Array) -> Array:
+    """A hinge that twists with the square of its load turns the sensitive axis: no effect of the catalogue is like it."""
+    return np.sin(SMALL * force**2) / SMALL * np.roll(force, -1, axis=1)
+
+
 def _band_gap(_force: Array, kelvin: Array, _time: Array) -> Array:
     """The curvature of a band-gap reference, which moves the zero."""
     bend = kelvin / 300.0 * np.log(kelvin / 300.0) - (kelvin / 300.0 - 1.0)
@@ -64,7 +69,8 @@ def _creeping_spring(force: Array, _kelvin: Array, time: Array) -> Array:
 
 PHYSICS: dict[str, Callable[[Array, Array, Array], Array]] = {
     "third_order": _hard_spring, "second_order": _narrow_gap, "scale_asymmetry": _two_springs,
-    "cross_coupling": _leaning_pendulum, "bias_temperature_quadratic": _band_gap,
+    "cross_coupling": _leaning_pendulum, "twisting_hinge": _twisting_hinge,
+    "bias_temperature_quadratic": _band_gap,
     "scale_temperature_quadratic": _magnet, "creep_after_move": _creeping_spring,
 }  # fmt: skip
 

@@ -2,7 +2,7 @@
 
 Every driver's sums say for each effect by how much it lowers the misfit of all lots, D; with k coefficients its score is
 D − k(1 + ln(D/k)), as for a variance that is estimated. Effects within 15 of the best are one class. The best is taken out of all
-sums by the products of the columns, and what is left is looked at again.
+sums by the products of the columns, and what is left is looked at again: at last for any function of the pose.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -16,6 +16,7 @@ from inertial.arrays import Array, Places
 from inertial.decisions import CLASS_WIDTH
 from inertial.discovery.driver_sums import INSIDE_ONLY, DriverSums, about_common, gathered, shrinkage, weights_of
 from inertial.discovery.evidence import INSIDE, MEAN, ScoredLot
+from inertial.discovery.pose_shape import SHAPE
 from inertial.discovery.station_wander import over
 
 _MOST = 6
@@ -51,6 +52,21 @@ class Name:
     score: float
 
 
+@dataclass(frozen=True)
+class Unnamed:
+    """A function of the pose that differs by a driver and that no named effect is.
+
+    level : of the driver that departs most, "" where it has none · size : (axes, p), of the free functions, g
+    covariance : (axes, p, p) · score : of all levels
+    """
+
+    driver: str
+    level: str
+    size: Array
+    covariance: Array
+    score: float
+
+
 class Pool:
     """All lots of an archive, gathered for some drivers.
 
@@ -66,8 +82,10 @@ class Pool:
         self.lot, self.inside = _correlation(lot), _correlation(inside)
         self.axes = len(lot)
 
-    def names(self, lots: Sequence[ScoredLot], alarms: Iterable[tuple[str, str]], needed: float) -> list[Name]:
-        """The names of what the lots hold, the strongest first.
+    def names(
+        self, lots: Sequence[ScoredLot], alarms: Iterable[tuple[str, str]], needed: float
+    ) -> tuple[list[Name], list[Unnamed]]:
+        """The names of what the lots hold, and what has none, the strongest first.
 
         Parameters
         ----------
@@ -75,27 +93,76 @@ class Pool:
         needed : score from which on something is named
         """
         alarmed = {(name.removesuffix(INSIDE), effect) for name, effect in alarms}
-        names = list(dict.fromkeys(name for name, _ in sorted(alarmed)))
-        found: list[Name] = []
-        while len(found) < _MOST:
-            sums = gathered(lots, names)
+        drivers = list(dict.fromkeys(name for name, _ in sorted(alarmed)))
+        found, every = list[Name](), lots
+        of_pose: list[dict[str, float]] = []  # before each name, and after the last
+        while True:
+            sums = gathered(lots, drivers)
             scores = {name: self.scores(name, of) for name, of in sums.items()}
             again = self._again(lots, list(sums))
+            of_pose.append({name: of.get(SHAPE, 0.0) for name, of in scores.items()})
             pairs = [
                 (score, name, effect)
                 for name, of in scores.items()
                 for effect, score in of.items()
-                if score > needed
+                if effect != SHAPE
+                and score > needed
                 and again[name][effect] > np.sqrt(2.0 * needed)
                 # what is left of others rises to a name only where it had an alarm of its own, and stands out
                 and (not found or ((name, effect) in alarmed and score > needed + CLASS_WIDTH))
             ]
             name = next((one for one in self._in_order(pairs, sums, scores) if not self._told(found, one)), None)
-            if name is None:
+            if name is None or len(found) == _MOST:
                 break
             found.append(name)
             lots = self._fitted_out(lots, name.drivers[0], name.effects[0])
-        return found
+        kept = [name for at, name in enumerate(found) if at not in _imitations(found, of_pose, needed)]
+        if len(kept) < len(found):
+            lots = every
+            for name in kept:
+                lots = self._fitted_out(lots, name.drivers[0], name.effects[0])
+        return kept, self._unnamed(lots, kept, drivers, needed)
+
+    def _unnamed(
+        self, lots: Sequence[ScoredLot], names: Sequence[Name], drivers: Sequence[str], needed: float
+    ) -> list[Unnamed]:
+        """Functions of the pose that differ by a driver in lots without what is named."""
+        out: list[Unnamed] = []
+        least = max([needed, *(_REMAINDER * name.score for name in names)])
+        while SHAPE in self.effects and len(out) < _MOST:
+            sums = gathered(lots, drivers)
+            again = self._again(lots, list(sums))
+            scores = {driver: self.scores(driver, of)[SHAPE] for driver, of in sums.items()}
+            left = [driver for driver in scores if again[driver][SHAPE] > np.sqrt(2.0 * needed)]
+            best = max(left, key=lambda driver: scores[driver], default=None)
+            if best is None or scores[best] <= least or best in {one.driver for one in out}:
+                break
+            out.append(self._shape(best, sums[best], scores[best]))
+            least = max(least, _REMAINDER * scores[best])
+            lots = self._fitted_out(lots, best, SHAPE)
+        return out
+
+    def _shape(self, driver: str, sums: DriverSums, score: float) -> Unnamed:
+        """The function of the pose of the level that departs most."""
+        size, products = self._fitted(driver, SHAPE, sums)
+        z = size / np.sqrt(np.maximum(np.diagonal(products, axis1=2, axis2=3), 1e-300))
+        level = int(np.argmax(np.sum(z**2, axis=(0, 2))))
+        label = sums.labels[level] if len(sums.labels) > 1 else ""
+        return Unnamed(driver, label, size[:, level], products[:, level], score)
+
+    def _fitted(self, driver: str, effect: str, sums: DriverSums) -> tuple[Array, Array]:
+        """Sizes (axes, levels, p) of a driver's levels, the columns of an effect together, and their covariances."""
+        at, count = self.places(effect), len(self.columns)
+        centred, products = about_common(driver, sums), self.inside if sums.mixed else self.lot
+        sizes, covariances = list[Array](), list[Array]()
+        for axis in range(self.axes):
+            here = axis * count + at
+            inner = np.linalg.pinv(products[axis][np.ix_(at, at)], rcond=_SEEN, hermitian=True)
+            root = np.sqrt(np.maximum(sums.information[:, here], 0.0))
+            scale = over(np.ones_like(root), root)
+            sizes.append(scale * (over(centred[:, here], root) @ inner))
+            covariances.append(scale[:, :, None] * inner * scale[:, None, :])
+        return np.stack(sizes), np.stack(covariances)
 
     def _in_order(
         self,
@@ -132,14 +199,12 @@ class Pool:
         return lots
 
     def _sizes(self, driver: str, effect: str, sums: DriverSums) -> Array:
-        """Sizes (axes, levels, p) of a driver's levels."""
-        at, count = self.places(effect), len(self.columns)
-        here = np.arange(self.axes)[:, None] * count + at
-        info = sums.information[:, here.reshape(-1)]
-        size = over(about_common(driver, sums)[:, here.reshape(-1)], info)
+        """Sizes (axes, levels, p) of a driver's levels, drawn to zero by what is noise of them."""
+        size, covariance = self._fitted(driver, effect, sums)
         if len(sums.labels) > 1:
-            size = size * shrinkage(size, info)
-        return np.moveaxis(size.reshape(-1, self.axes, at.size), 1, 0)
+            known = np.diagonal(covariance, axis1=2, axis2=3)
+            size = np.stack([of * shrinkage(of, over(np.ones_like(c), c)) for of, c in zip(size, known, strict=True)])
+        return size
 
     def _again(self, lots: Sequence[ScoredLot], drivers: Sequence[str]) -> dict[str, dict[str, float]]:
         """By how many standard deviations one half of the lots predicts the other, for every driver and effect.
@@ -285,7 +350,7 @@ class Pool:
     def _name(self, driver: str, sums: DriverSums, effect: str, scores: Mapping[str, Mapping[str, float]]) -> Name:
         count, top = len(self.columns), scores[driver][effect]
         width = max(CLASS_WIDTH, _INEXACT * top)
-        effects = [one for one, score in scores[driver].items() if score > top - width]
+        effects = [one for one, score in scores[driver].items() if score > top - width and one != SHAPE]
         drivers = [name for name, of in scores.items() if of[effect] > top - CLASS_WIDTH]
         effects.sort(key=lambda one: self._rank(one, top - scores[driver][one], top))
         drivers.sort(key=lambda one: (one != driver, -scores[one][effect]))
@@ -297,6 +362,24 @@ class Pool:
         )
         weights = np.array(list(sums.units.values()), dtype=np.float64)
         return Name(tuple(effects), tuple(drivers), tuple(sums.levels), weights, sizes, errors, top)
+
+
+def _imitations(names: Sequence[Name], of_pose: Sequence[Mapping[str, float]], needed: float) -> set[int]:
+    """Names that are parts of a function of the pose which no effect is: together they explain less than it does alone.
+
+    Parameters
+    ----------
+    of_pose : for each name, and after the last, score of such a function by each driver
+    """
+    out: set[int] = set()
+    for driver in {name.drivers[0] for name in names}:
+        before = [scores.get(driver, 0.0) for scores in of_pose]
+        own = [at for at, name in enumerate(names) if name.drivers[0] == driver]
+        parts = [at for at in own if before[at] - before[at + 1] > 0.5 * names[at].score]
+        explained = sum(names[at].score for at in parts)
+        if parts and before[-1] > max(needed, _REMAINDER * explained):
+            out |= set(parts) if before[parts[0]] > explained * (1.0 + _INEXACT) + CLASS_WIDTH else set()
+    return out
 
 
 def _of_units(lot: ScoredLot, driver: str, sums: DriverSums) -> Array:

@@ -13,7 +13,9 @@ import numpy as np
 
 from inertial import effects as catalogue
 from inertial.arrays import Array
+from inertial.criticism.drivers import forces_along
 from inertial.design import starting_values
+from inertial.discovery.pose_shape import COUNT, SHAPE, harmonics
 from inertial.effects.base import AnyEffect
 from inertial.errors import MissingInput
 from inertial.estimation.bases import SEEN
@@ -62,7 +64,7 @@ def scores_of(lot: Lot, effects: Sequence[str], tried: Iterable[AnyEffect] | Non
     ----------
     lot : dwells in g, of units without a fault of the data
     effects : ids of the model
-    tried : effects to score; all of the catalogue by default
+    tried : effects to score; all of the catalogue, and free functions of the pose, by default
 
     Raises
     ------
@@ -75,6 +77,8 @@ def scores_of(lot: Lot, effects: Sequence[str], tried: Iterable[AnyEffect] | Non
     known = set(effects)
     all_tried = [e for e in (catalogue.built_in().values() if tried is None else tried) if e.id not in known]
     local, names = _columns(problem, [e for e in all_tried if e.scope == "sensor"])
+    if tried is None:
+        local, names = np.concatenate([local, _free(problem)], axis=-1), (*names, *((SHAPE, k) for k in range(COUNT)))
     shared, station = _columns(problem, [e for e in all_tried if e.scope == "station"])
     return _scored(model, local, names, shared, station)
 
@@ -96,6 +100,12 @@ def _columns(problem: Problem, effects: Sequence[AnyEffect]) -> tuple[Array, tup
     if not made:
         return np.zeros((problem.blocks, problem.n, 0)), ()
     return np.concatenate(made, axis=-1), tuple(names)
+
+
+def _free(problem: Problem) -> Array:
+    """Free functions of the pose, the same columns for every axis of a unit, (blocks, n, 21)."""
+    of_units = harmonics(np.moveaxis(forces_along(problem), 1, -1))
+    return np.repeat(of_units, problem.per_unit, axis=0)
 
 
 def _scored(

@@ -90,9 +90,11 @@ class UnexplainedRow(TypedDict):
     """Evidence by a driver that no effect of the catalogue accounts for."""
 
     driver: str
+    level: Annotated[str, "of the driver, which the map is of: the one that departs most; empty where it has none"]
     axes: list[str]
     map: Annotated[
-        list[list[float]], "outer and inner angle in degrees, residual and its standard error in µg; empty: not known"
+        list[list[float]],
+        "outer and inner angle in degrees, what is left and its standard error in µg; empty: no function of the pose",
     ]
     log_e: float
     nearest: Annotated[str, "the effect with the largest evidence"]

@@ -11,7 +11,8 @@ from scipy import stats
 from inertial.arrays import Array
 from inertial.counts import number_of
 from inertial.discovery.evidence import DATE, FIRST, INSIDE, MEAN, SLOT, STATION, UNIT, ScoredLot
-from inertial.discovery.naming import Name, Pool
+from inertial.discovery.naming import Name, Pool, Unnamed
+from inertial.discovery.pose_shape import SHAPE, angles_of, map_of
 from pipelines.discovery import documents
 from pipelines.discovery.documents import DiscoveryRow, DriverRow, HeldAlarm, ReachRow, UnexplainedRow
 from pipelines.discovery.evidence_state import ALPHA, Alarm, Evidences, hypothesis
@@ -99,16 +100,26 @@ class Findings:
         return Pool(columns, (size / np.maximum(weight, 1.0)).reshape(-1), lot, inside)
 
     @cached_property
+    def _of_sensor(self) -> list[Alarm]:
+        """Open alarms of the devices' effects and of functions of the pose."""
+        return [alarm for alarm in self.open_alarms if alarm.place < self.state.sensor.count]
+
+    @cached_property
+    def _named(self) -> tuple[list[Name], list[Unnamed]]:
+        """Names of what the lots hold, and functions of the pose that no effect is."""
+        if not self._of_sensor:
+            return [], []
+        alarms = [(alarm.driver, self._effect(alarm)) for alarm in self._of_sensor]
+        return self.pool.names(self.lots, alarms, max(self.state.needed(alarm.driver) for alarm in self._of_sensor))
+
+    @cached_property
     def discoveries(self) -> list[Discovery]:
         """Names of what is beyond the threshold, in the order of their first night."""
-        of_sensor = [alarm for alarm in self.open_alarms if alarm.place < self.state.sensor.count]
-        if not of_sensor:
-            return []
-        needed = max(self.state.needed(alarm.driver) for alarm in of_sensor)
-        names = self.pool.names(self.lots, [(alarm.driver, self._effect(alarm)) for alarm in of_sensor], needed)
         out: list[Discovery] = []
-        for name in names:
-            alarms = [a for a in of_sensor if plain(a.driver) in name.drivers and self._effect(a) in name.effects]
+        for name in self._named[0]:
+            # what is seen as a function of the pose first is named with the effect that it turns out to be
+            known = {*name.effects, SHAPE}
+            alarms = [a for a in self._of_sensor if plain(a.driver) in name.drivers and self._effect(a) in known]
             if not alarms:
                 continue
             since = min(alarms, key=lambda a: (a.lots, -a.log_e))
@@ -165,7 +176,7 @@ class Findings:
             },
             "discoveries": rows,
             "held": self._held(),
-            "unexplained": [] if rows else self._unexplained(),
+            "unexplained": self._unexplained(named=bool(rows)),
             "population": [],
             "reach": self.reach(),
             "unseen": self._unseen(),
@@ -314,16 +325,34 @@ class Findings:
                 rows.append({"effect": effect, "axis": axis, "driver": alarm.driver, "log_e": log_e, "reason": reason})
         return sorted(rows, key=lambda row: -row["log_e"])
 
-    def _unexplained(self) -> list[UnexplainedRow]:
-        """Drivers with an alarm, where no name accounts for any."""
-        out: dict[str, UnexplainedRow] = {}
-        for alarm in sorted(self.open_alarms, key=self._log_e, reverse=True):
-            driver = plain(alarm.driver)
-            if alarm.place < self.state.sensor.count and driver not in out:
+    def _unexplained(self, *, named: bool) -> list[UnexplainedRow]:
+        """Functions of the pose that no effect is; and, where nothing is named, every driver with an alarm."""
+        rows = {of.driver: self._map_row(of) for of in self._named[1]}
+        if not named:
+            for alarm in sorted(self._of_sensor, key=self._log_e, reverse=True):
                 effect, _, axis = hypothesis(self.state, alarm.place)
-                log_e = round(self._log_e(alarm), 2)
-                out[driver] = {"driver": driver, "nearest": effect, "axes": [axis], "map": [], "log_e": log_e}
-        return list(out.values())
+                log_e, driver = round(self._log_e(alarm), 2), plain(alarm.driver)
+                row: UnexplainedRow = {
+                    "driver": driver, "level": "", "nearest": effect, "axes": [axis], "map": [], "log_e": log_e,
+                }  # fmt: skip
+                rows.setdefault(driver, row)
+        return list(rows.values())
+
+    def _map_row(self, of: Unnamed) -> UnexplainedRow:
+        """What is left by a driver over the poses of the newest lot, on the axis where it stands out most."""
+        force = self.source.poses(self.state.order[-1])
+        maps = [map_of(force, *fit) for fit in zip(of.size, of.covariance, strict=True)]
+        best = int(np.argmax([np.sum(value**2) / np.sum(error**2) for value, error in maps]))
+        alarms = [a for a in self._of_sensor if plain(a.driver) == of.driver]
+        strongest = max(alarms, key=self._log_e)
+        return {
+            "driver": of.driver,
+            "level": of.level,
+            "axes": ["xyz"[best]],
+            "map": np.column_stack([angles_of(force), MICRO * np.column_stack(maps[best])]).tolist(),
+            "log_e": round(self._log_e(strongest), 2),
+            "nearest": self._effect(strongest),
+        }
 
     def reach(self) -> list[ReachRow]:
         """The smallest size of each effect that this archive would have shown in 95 % of cases."""

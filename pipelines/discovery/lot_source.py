@@ -13,7 +13,7 @@ import numpy as np
 
 from inertial.arrays import Array
 from inertial.discovery.evidence import MEAN, SLOT, STATION, UNIT, ScoredLot
-from pipelines.archive import Archive
+from pipelines.archive import Archive, Run
 from pipelines.archive.locks import alone
 from pipelines.archive.store import Place
 from pipelines.certificates.ledger import Ledger
@@ -21,12 +21,14 @@ from pipelines.discovery.attributes import Attributes, as_numbers, known_attribu
 from pipelines.discovery.score_store import FOLDER, ScoreStore
 from pipelines.discovery.scored_run import ScoredRun
 from pipelines.parallel import Distributor
+from pipelines.tables.dwells import measured
 from schemas.errors import WrongUse, did_you_mean
 
 Column = tuple[str, int]
 
 AXES = 3
 SEASON, OPERATOR = "season", "operator"
+_PLACES = 3  # of a force in g, within which poses are the same
 
 
 class DiscoveryArchive:
@@ -213,6 +215,11 @@ class DiscoveryArchive:
             return score, information
 
         return of
+
+    def poses(self, run: str) -> Array:
+        """Forces (n, 3), g, of the poses of a run, each once."""
+        force = measured(Run(self.archive, run).table("dwells")).state.force.reshape(-1, 3)
+        return np.unique(np.round(force, _PLACES), axis=0)
 
     def folder(self) -> Place:
         """Where the evidence of the device is kept."""

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
+from numpy.typing import NDArray
 
 from inertial.arrays import Array
 from pipelines.archive import Archive, derived, files
@@ -24,9 +25,13 @@ from pipelines.discovery.scored_run import ScoredRun, scored_runs
 from pipelines.parallel import Distributor, map_partitions
 
 FOLDER = "discovery"
-VERSION = 3
+VERSION = 4
 TEXTS = ("run", "when", "station", "device", "model", "who", "left_out")
 _STEPS = 63.0  # of information shares, an octave
+_SHARE_STEPS = 58.0  # of what the station leaves of the information, an octave: down to one part in twenty
+_MEAN_STEPS = 256.0  # of information, an octave
+_FINE, _LINEAR = 16.0, 64.0  # steps of a score a standard deviation, up to so many of them; relative ones beyond
+_NOTHING = -(2**15)
 BATCH = 8  # runs that one process scores at a time
 
 
@@ -143,22 +148,45 @@ def _group(run: ScoredRun) -> str:
 
 
 def _packed(name: str, run: ScoredRun) -> bytes:
-    """Arrays in few bytes: scores over the root of their information have three digits, shares of information two."""
+    """Arrays in few bytes: scores in sixteenths of their standard deviation, information to three digits."""
     if run.left_out or run.score is None or run.own is None or run.information is None or run.station_scores is None:
         return b""
     if name == "score":
         root = np.sqrt(np.where(run.own > 0.0, run.own, 1.0))
-        return (run.score / root).astype(np.float16).tobytes()
+        steps = np.round(_FINE * _LINEAR * np.arcsinh(run.score / (root * _LINEAR))).astype("<i2")
+        return _planes(steps)
     mean = run.own.mean(axis=0)
     if name == "own":
         # ratios between a quarter and four in steps of one per cent; zero is zero
         ratio = run.own / np.where(mean > 0.0, mean, 1.0)
-        steps = np.round(_STEPS * np.log2(np.clip(ratio, 1e-30, None))) + 128
-        return np.where(ratio > 0.0, np.clip(steps, 1, 255), 0).astype(np.uint8).tobytes()
+        code = _logarithms(ratio, _STEPS, 128)
+        # a unit's ratios are much the same in all columns: their differences are small
+        return np.diff(code, axis=1, prepend=np.uint8(0)).tobytes()
     if name == "information":
-        share = run.information / np.where(mean > 0.0, mean, 1.0)
-        return mean.astype(np.float32).tobytes() + share.astype(np.float16).tobytes()
+        share = run.information / np.where(mean > 0.0, len(run.own) * mean, 1.0)
+        octaves = np.where(mean > 0.0, np.round(_MEAN_STEPS * np.log2(np.where(mean > 0.0, mean, 1.0))), _NOTHING)
+        return _planes(octaves.astype("<i2")) + _logarithms(share, _SHARE_STEPS, 254).tobytes()
     return run.station_scores.astype(np.float32).tobytes()
+
+
+def _planes(values: NDArray[np.int16]) -> bytes:
+    """Numbers of two bytes, all high ones first: they are nearly the same, and are compressed away."""
+    return values.view(np.uint8).reshape(-1, 2).T[::-1].tobytes()
+
+
+def _of_planes(data: bytes) -> Array:
+    pairs = np.frombuffer(data, dtype=np.uint8).reshape(2, -1)[::-1].T
+    return np.ascontiguousarray(pairs).view("<i2").astype(np.float64).reshape(-1)
+
+
+def _logarithms(ratio: Array, steps: float, one: int) -> NDArray[np.uint8]:
+    """Ratios as logarithms in one byte, of which ``one`` is a ratio of one; zero is zero."""
+    code = np.round(steps * np.log2(np.clip(ratio, 1e-30, None))) + one
+    return np.where(ratio > 0.0, np.clip(code, 1, 255), 0).astype(np.uint8)
+
+
+def _of_logarithms(code: NDArray[np.uint8], steps: float, one: int) -> Array:
+    return np.where(code > 0, 2.0 ** ((code.astype(np.float64) - one) / steps), 0.0)
 
 
 def _products_of(runs: Sequence[ScoredRun]) -> dict[str, Array]:
@@ -209,13 +237,15 @@ def _run_of(row: dict[str, Any], names: dict[str, Any]) -> ScoredRun:
     if row["left_out"]:
         return ScoredRun(**texts, units=units)
     columns, station, _ = names[row["columns"]]
-    packed, count = row["information"], len(row["information"]) // 6
-    mean = np.frombuffer(packed[: 4 * count], dtype=np.float32).astype(np.float64)
-    information = mean * np.frombuffer(packed[4 * count :], dtype=np.float16).astype(np.float64)
-    code = np.frombuffer(row["own"], dtype=np.uint8)
-    ratio = np.where(code > 0, 2.0 ** ((code.astype(np.float64) - 128.0) / _STEPS), 0.0)
-    own = ratio.reshape(len(units), -1) * mean
-    z = np.frombuffer(row["score"], dtype=np.float16).astype(np.float64).reshape(own.shape)
+    packed, count = row["information"], len(row["information"]) // 3
+    octaves = _of_planes(packed[: 2 * count])
+    mean = np.where(octaves > _NOTHING, 2.0 ** (octaves / _MEAN_STEPS), 0.0)
+    share = _of_logarithms(np.frombuffer(packed[2 * count :], dtype=np.uint8), _SHARE_STEPS, 254)
+    information = len(units) * mean * share
+    code = np.cumsum(np.frombuffer(row["own"], dtype=np.uint8).reshape(len(units), -1), axis=1, dtype=np.uint8)
+    own = _of_logarithms(code, _STEPS, 128) * mean
+    steps = _of_planes(row["score"]).reshape(own.shape)
+    z = _LINEAR * np.sinh(steps / (_FINE * _LINEAR))
     return ScoredRun(
         **texts,
         units=units,

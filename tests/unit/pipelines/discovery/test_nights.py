@@ -53,7 +53,7 @@ def largest(archive: Archive) -> dict[str, float]:
     return {name: float(sums.log_e.max()) for name, sums in state.sensor.drivers.items()}
 
 
-def test_scores_on_disk_are_few_bytes_and_three_digits(archive: Archive) -> None:
+def test_scores_on_disk_are_few_bytes_and_nearly_those_of_the_dwells(archive: Archive) -> None:
     source = DiscoveryArchive(archive)
     files = list((Path(str(archive.root)) / "discovery" / "scores").iterdir())
     assert len(source.pooled()) == LOTS
