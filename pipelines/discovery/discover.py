@@ -19,7 +19,7 @@ from pipelines.discovery.evidence_state import ALPHA
 from pipelines.discovery.figures_of_name import size_of
 from pipelines.discovery.findings import Findings
 from pipelines.discovery.lot_source import DiscoveryArchive
-from pipelines.discovery.nights import brought_up, fresh, grown_by_days, remembered, rows_of_before
+from pipelines.discovery.nights import brought_up, found_before, fresh, grown_by_days, remembered
 from pipelines.parallel import Distributor
 from schemas.errors import WrongUse, did_you_mean
 from schemas.units import MICRO
@@ -68,7 +68,7 @@ def discovered(archive: Archive, look: Look) -> Looked:
         source.score(look.workers, look.distribute)
         state = brought_up(source)
         findings = Findings(source, state)
-        document = remembered(source, state, findings.document(rows=rows_of_before(source, state)))
+        document = remembered(source, state, findings.document(found_before(source, state)))
         if look.since or look.looking_back:
             findings = _in_memory(source, look)
             document = findings.document(looking_back=True)

@@ -6,10 +6,10 @@ from typing import Any, Literal
 import numpy as np
 
 from inertial.arrays import Array
-from inertial.discovery.evidence import INSIDE, SLOT, STATION, Sums
+from inertial.discovery.evidence import INSIDE, MEAN, SLOT, STATION, Sums
 from inertial.discovery.naming import Name
 from inertial.uncertainty.rounding import short
-from pipelines.discovery.documents import DiscoveredLevel, DiscoveryRow
+from pipelines.discovery.documents import DiscoveredLevel, DiscoveryRow, UnexplainedRow
 from schemas.units import MICRO
 
 Scope = Literal["sensor", "station", "sensor_or_station", "thermometer"]
@@ -121,6 +121,21 @@ def scope_text(row: DiscoveryRow) -> str:
         top = row["levels"][0]
         text += f"; largest {top['level']} {_signed(top['size_ug'])} ± {short(2.0 * top['u_ug'])} µg"
     return text
+
+
+def unexplained_text(row: UnexplainedRow) -> str:
+    """A sentence on what differs by a driver and is no effect of the catalogue."""
+    what = "a function of the pose" if row["map"] else "something"
+    if row["driver"] == MEAN:
+        text = f"unexplained: {what} is common to all lots, and no effect of the catalogue is like it"
+    else:
+        most = f", most in {row['level']}" if row["level"] else ""
+        text = f"unexplained: {what} differs by {row['driver']}{most}, and no effect of the catalogue is like it"
+    if not row["map"]:
+        return text
+    size, error = np.array(row["map"])[:, 2:].T
+    largest = int(np.argmax(np.abs(size)))
+    return f"{text}; up to {short(abs(float(size[largest])))} ± {short(2.0 * float(error[largest]))} µg in axis {row['axes'][0]}"
 
 
 def _signed(value: float) -> str:

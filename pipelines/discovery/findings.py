@@ -146,17 +146,20 @@ class Findings:
         return carried, (factor, error) if able >= LATER else None
 
     def document(
-        self, *, looking_back: bool = False, rows: list[DiscoveryRow] | None = None
+        self,
+        before: tuple[list[DiscoveryRow], list[UnexplainedRow]] | None = None,
+        *,
+        looking_back: bool = False,
     ) -> documents.DiscoverDocument:
         """The findings as a document.
 
         Parameters
         ----------
-        rows : discoveries of an earlier night with the same alarms; their names are not found again
+        before : discoveries and what is unexplained of an earlier night with the same alarms; they are not found again
         """
         state, source = self.state, self.source
         heads = [source.store.head(run) for run in state.order]
-        rows = self._rows() if rows is None else rows
+        rows, unexplained = self._found() if before is None else before
         largest = max((source.store.head(run)["model"] for run in state.order[-1:]), default="")
         return {
             "pooled": {
@@ -176,7 +179,7 @@ class Findings:
             },
             "discoveries": rows,
             "held": self._held(),
-            "unexplained": self._unexplained(named=bool(rows)),
+            "unexplained": unexplained,
             "population": [],
             "reach": self.reach(),
             "unseen": self._unseen(),
@@ -187,13 +190,13 @@ class Findings:
             "looking_back": looking_back,
         }
 
-    def _rows(self) -> list[DiscoveryRow]:
+    def _found(self) -> tuple[list[DiscoveryRow], list[UnexplainedRow]]:
         rows = [self._row(discovery) for discovery in self.discoveries] + [
             self._station_row(alarm) for alarm in self._of_station
         ]
         for number, row in enumerate(rows, start=1):
             row["id"] = f"D{number}"
-        return rows
+        return rows, self._unexplained(named=bool(rows))
 
     def _day_of(self, alarm: Alarm) -> str:
         return str(self.source.store.head(self.state.order[min(alarm.lots, len(self.state.order)) - 1])["when"])[:10]
@@ -351,8 +354,14 @@ class Findings:
             "axes": ["xyz"[best]],
             "map": np.column_stack([angles_of(force), MICRO * np.column_stack(maps[best])]).tolist(),
             "log_e": round(self._log_e(strongest), 2),
-            "nearest": self._effect(strongest),
+            "nearest": self._nearest(of.driver),
         }
+
+    def _nearest(self, driver: str) -> str:
+        """The effect of the catalogue with the largest evidence by a driver."""
+        log_e = np.max([of.log_e for name, of in self.state.sensor.drivers.items() if plain(name) == driver], axis=0)
+        places = [at for at in range(log_e.size) if hypothesis(self.state, at)[0] != SHAPE]
+        return hypothesis(self.state, max(places, key=lambda at: float(log_e[at])))[0]
 
     def reach(self) -> list[ReachRow]:
         """The smallest size of each effect that this archive would have shown in 95 % of cases."""

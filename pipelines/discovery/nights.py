@@ -18,7 +18,7 @@ from inertial.discovery.station_wander import WALK_FROM
 from pipelines.archive import Archive, derived, files
 from pipelines.archive.locks import alone
 from pipelines.archive.store import Place
-from pipelines.discovery.documents import DiscoverDocument, DiscoveryRow
+from pipelines.discovery.documents import DiscoverDocument, DiscoveryRow, UnexplainedRow
 from pipelines.discovery.evidence_state import STATION_DRIVERS, Alarm, Evidences, hypothesis, state_bytes, stored_state
 from pipelines.discovery.lot_source import AXES, DiscoveryArchive
 from pipelines.discovery.score_store import FOLDER
@@ -169,12 +169,15 @@ def alarm_key(state: Evidences) -> list[str]:
     return sorted(f"{alarm.driver} {alarm.place}" for alarm in state.alarms if not held(state, alarm))
 
 
-def rows_of_before(source: DiscoveryArchive, state: Evidences) -> list[DiscoveryRow] | None:
-    """The discoveries of the last night, where no alarm is new and few lots came in since; None where they are found again."""
+def found_before(source: DiscoveryArchive, state: Evidences) -> tuple[list[DiscoveryRow], list[UnexplainedRow]] | None:
+    """Discoveries and what is unexplained as of the last night; None where they are to be found again.
+
+    They stay where no alarm is new and few lots came in since.
+    """
     before = _found(source.folder())
     if before is None or before["alarms"] != alarm_key(state) or len(state.order) > _GROWN * before["lots"]:
         return None
-    return before["discoveries"]
+    return (before["discoveries"], before["unexplained"]) if "unexplained" in before else None
 
 
 def discovered_before(archive: Archive) -> list[tuple[str, int]]:
@@ -214,10 +217,11 @@ def remembered(source: DiscoveryArchive, state: Evidences, document: DiscoverDoc
     document["new"] = [row["id"] for row in document["discoveries"] if row["id"] not in known]
     kept = {
         "discoveries": document["discoveries"],
+        "unexplained": document["unexplained"],
         "lots": len(state.order),
         "alarms": alarm_key(state),
         "when": datetime.now(UTC).isoformat(timespec="seconds"),
     }
-    if stored.get("alarms") != kept["alarms"] or len(state.order) > _GROWN * stored["lots"]:
+    if "unexplained" not in stored or stored.get("alarms") != kept["alarms"] or kept["lots"] > _GROWN * stored["lots"]:
         files.publish(source.folder() / "found", derived.framed(json.dumps(json_value(kept), sort_keys=True).encode()))
     return document

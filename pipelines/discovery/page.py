@@ -4,12 +4,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial.discovery.evidence import INSIDE, MEAN, STATION, Sums
+from inertial.frames import force_from_angles
 from inertial.uncertainty.rounding import short
-from pipelines.discovery.documents import DiscoverDocument, DiscoveryRow
-from pipelines.discovery.figures_of_name import headline, scope_text
+from pipelines.discovery.documents import DiscoverDocument, DiscoveryRow, UnexplainedRow
+from pipelines.discovery.figures_of_name import headline, scope_text, unexplained_text
 from pipelines.discovery.findings import Findings
 from pipelines.drawing import Chart, Plot, PlotAxis, Trace, svg_text
-from pipelines.drawing.chart import Role, level
+from pipelines.drawing.chart import Role, level, symmetric
+from pipelines.drawing.mollweide import project, sphere
 from pipelines.report.templates import template
 
 MOST_LEVELS = 30
@@ -34,6 +36,9 @@ def render(findings: Findings, document: DiscoverDocument, archive: str) -> str:
         archive=archive,
         document=document,
         shown=shown,
+        unexplained=[
+            (unexplained_text(row), svg_text(map_chart(row)) if row["map"] else "") for row in document["unexplained"]
+        ],
         strongest="" if (strongest := strongest_chart(findings)) is None else svg_text(strongest),
         reach=svg_text(reach_chart(document, len(findings.state.order))) if document["reach"] else "",
         short=short,
@@ -52,6 +57,21 @@ def levels_chart(row: DiscoveryRow) -> Chart:
     axis = PlotAxis(row["driver"], names=tuple(one["level"] for one in levels))
     plot = Plot("", axis, PlotAxis(f"{row['recommended']} in a dwell / µg"), traces)
     return Chart(f"{row['recommended']} by {row['driver']}", (plot,), height=280)
+
+
+def map_chart(row: UnexplainedRow) -> Chart:
+    """What differs by a driver and is no effect of the catalogue, over the sphere of the force."""
+    outer, inner, size, error = np.array(row["map"]).T
+    force = force_from_angles(np.radians(outer), np.radians(inner))
+    texts = tuple(
+        f"f = ({x:+.2f}, {y:+.2f}, {z:+.2f}) g: {value:.3g} ± {2.0 * u:.2g} µg"
+        for (x, y, z), value, u in zip(force, size, error, strict=True)
+    )
+    points = Trace("left", *project(force), size=11.0, colour=size, texts=texts, legend=False)
+    title = f"axis {row['axes'][0]}" + (f", {row['driver']} {row['level']}" if row["level"] else "")
+    note = f"95 % of a value: about ± {short(2.0 * float(np.median(error)))} µg"
+    scale = symmetric(size, "what is left / µg")
+    return Chart("Left by every effect of the catalogue", (sphere(title, (points,)),), 1, scale, height=260, note=note)
 
 
 def growth_charts(findings: Findings, document: DiscoverDocument) -> dict[str, Chart]:

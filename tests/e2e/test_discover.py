@@ -3,14 +3,16 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 from demonstrations import wafer_line
 from each import each
 from in_process import document_of, given, refused, text_of
 from typed_commands import printed_commands
 
+from inertial.frames import force_from_angles
 from pipelines.archive import Archive
-from pipelines.demo.archive_lots import Line, write_lots
+from pipelines.demo.archive_lots import Hidden, Line, write_lots
 from pipelines.discovery.lot_source import DiscoveryArchive
 from pipelines.discovery.nights import discovered_before
 
@@ -149,3 +151,30 @@ def test_the_demonstration_for_people_ends_with_a_command_that_runs(tmp_path: Pa
     assert words[:2] == ["tumbleline", "discover"]
     assert given(*words[1:])[0] in {0, 1}
     assert (tmp_path / "few" / "discoveries.html").is_file()
+
+
+def test_what_no_effect_is_like_is_said_with_its_map(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In the devices of one wafer the sensitive axis turns with the square of its load."""
+
+    def twisted(force: np.ndarray, twist: float) -> np.ndarray:
+        return force + np.sin(twist * force**2) * np.roll(force, -1, axis=1)
+
+    monkeypatch.setattr("pipelines.demo.archive_lots._deflection", twisted)
+    made = write_lots(tmp_path, Line(9, hidden=Hidden("W02", 150e-6), wafers=4), 44)
+    text_of("attributes", "add", made.units, "--archive", made.folder)
+    page = tmp_path / "d.html"
+    options = ("discover", "--archive", made.folder, "--workers", "1")
+    said = document_of(*options, "--html", page)
+    (row,) = said["unexplained"]
+    assert (said["discoveries"], row["driver"], row["level"]) == ([], "wafer", "W02")
+    outer, inner, left, error = np.array(row["map"]).T
+    force = force_from_angles(np.radians(outer), np.radians(inner))
+    function = 150.0 * force**2 * np.roll(force, -1, axis=1)
+    linear = np.column_stack([np.ones(len(force)), force])
+    expected = (function - linear @ np.linalg.lstsq(linear, function, rcond=None)[0])[:, "xyz".index(row["axes"][0])]
+    share = float(left @ expected / (expected @ expected))  # less what the mean of all wafers has of it
+    assert 0.6 < share < 1.1
+    assert np.sqrt(np.mean(((left - share * expected) / error) ** 2)) < 2.0
+    assert document_of(*options)["unexplained"] == said["unexplained"]  # as found the night before
+    assert "no effect of the catalogue is like it" in page.read_text("utf-8")
+    assert "differs by wafer, most in W02" in given(*options)[1]

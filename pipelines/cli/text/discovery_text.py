@@ -6,7 +6,7 @@ from inertial.counts import number_of
 from pipelines.cli.next_commands import command_line, print_next
 from pipelines.cli.printing import print_table, say, short
 from pipelines.discovery.documents import DiscoverDocument, DiscoveryRow
-from pipelines.discovery.figures_of_name import headline, scope_text
+from pipelines.discovery.figures_of_name import headline, scope_text, unexplained_text
 
 _SHOWN_HELD, _SHOWN_LEVELS, _SHOWN_OUT, _SHOWN_REACH = 3, 12, 3, 40
 
@@ -28,7 +28,7 @@ def print_discoveries(document: DiscoverDocument, again: Sequence[str] = (), *, 
     if len(pooled["left_out"]) > _SHOWN_OUT:
         say(f"left out  {len(pooled['left_out']) - _SHOWN_OUT} more; --json has all", style="dim")
     say()
-    if not document["discoveries"]:
+    if not document["discoveries"] and not document["unexplained"]:
         say("no discovery")
     for row in document["discoveries"]:
         say(headline(row), style="yellow" if row["id"] in document["new"] else "")
@@ -51,8 +51,7 @@ def print_discoveries(document: DiscoverDocument, again: Sequence[str] = (), *, 
 def _beside(document: DiscoverDocument) -> None:
     """What is no discovery: unexplained evidence, what a model leaves, what may be the station's own wander."""
     for found in document["unexplained"]:
-        text = f"unexplained: something differs by {found['driver']}, and no effect of the catalogue accounts for it"
-        say(text, style="yellow")
+        say(unexplained_text(found), style="yellow")
     for one in document["compared"]:
         sizes = f"{short(one['size_ug_before'])} → {short(one['size_ug_after'])} µg"
         evidence = f"evidence e^{short(one['log_e_before'])} → e^{short(one['log_e_after'])}"

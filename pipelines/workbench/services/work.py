@@ -261,7 +261,7 @@ def discovered(request: Mapping[str, Any], report_progress: ReportProgress) -> d
     from pipelines.discovery import page
     from pipelines.discovery.discover import Look
     from pipelines.discovery.discover import discovered as looked_at
-    from pipelines.discovery.figures_of_name import headline, scope_text
+    from pipelines.discovery.figures_of_name import headline, scope_text, unexplained_text
 
     looked = looked_at(Archive(request["archive"]), Look(device=str(request["device"])))
     report_progress(1, 2, "drawing")
@@ -273,7 +273,9 @@ def discovered(request: Mapping[str, Any], report_progress: ReportProgress) -> d
     if document["reach"]:
         charts["reach"] = page.reach_chart(document, document["pooled"]["lots"])
     texts = {row["id"]: (headline(row), scope_text(row)) for row in document["discoveries"]}
-    return {"document": document, "charts": charts, "texts": texts}
+    unexplained = [unexplained_text(row) for row in document["unexplained"]]
+    charts |= {f"left-{k}": page.map_chart(row) for k, row in enumerate(document["unexplained"]) if row["map"]}
+    return {"document": document, "charts": charts, "texts": texts, "unexplained": unexplained}
 
 
 def address_of(finding: AuditFinding) -> str:

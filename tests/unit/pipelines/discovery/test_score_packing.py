@@ -1,0 +1,40 @@
+"""Scores of a run in a file: how near they are to those that were put in."""
+
+import numpy as np
+import pytest
+
+from inertial.arrays import Array
+from pipelines.discovery.score_store import _read, _run_of, written
+from pipelines.discovery.scored_run import ScoredRun
+
+UNITS, K = 4, 5
+
+
+def made(run: str, size: float, rng: np.random.Generator) -> ScoredRun:
+    own = np.exp(rng.uniform(20.0, 40.0, 3 * K)) * rng.uniform(0.6, 1.6, (UNITS, 1))
+    own[:, 2] = 0.0
+    z: Array = size * rng.standard_normal(own.shape)
+    products = np.tile(np.eye(K), (3, 1, 1))
+    return ScoredRun(
+        run, "2026-03-02T10:00:00+00:00", "line-1", "DEMO", "bias,scale", "", "", tuple("abcd"), tuple("1234"),
+        tuple((f"effect{k}", 0) for k in range(K)), (("level", 0),), z * np.sqrt(own), own,
+        own.sum(axis=0) * rng.uniform(0.06, 1.0, 3 * K), np.ones((2, 1)), products, products, np.ones(3 * K), 1e-5,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("size", [1.0, 30.0, 1e5])
+def test_scores_keep_a_thirtieth_of_their_standard_deviation_and_information_a_hundredth(size: float) -> None:
+    rng = np.random.default_rng(6)
+    runs = [made(f"r{k}", size, rng) for k in range(5)]
+    file = _read(written(runs))
+    assert file is not None
+    for row, run in zip(file.rows, runs, strict=True):
+        kept = _run_of(row, file.names)
+        assert run.own is not None
+        seen = run.own > 0.0
+        root = np.sqrt(np.where(seen, run.own, 1.0))
+        exact, near = run.score / root, kept.score / root
+        assert np.all(np.abs(near - exact)[seen] <= 1.0 / 28.0 + 0.006 * np.abs(exact)[seen])
+        assert kept.own == pytest.approx(run.own, rel=0.01)
+        assert kept.information == pytest.approx(run.information, rel=0.012)
+        assert (kept.units, kept.columns, kept.of_station) == (run.units, run.columns, run.of_station)
