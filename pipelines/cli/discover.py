@@ -46,7 +46,11 @@ def command(
     *,
     reach: Annotated[bool, option("--reach", "Print the smallest effects that this archive could have shown.")] = False,
     populations: Annotated[
-        bool, option("--populations", "Also test each coefficient for two populations; takes a second for each.")
+        bool,
+        option(
+            "--populations",
+            "Also test coefficients for two populations, and for correlations; takes a second for each.",
+        ),
     ] = False,
     looking_back: Annotated[
         bool,

@@ -4,18 +4,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import reduce
 
-import numpy as np
 from threadpoolctl import threadpool_limits
 
 from inertial import effects as catalogue
 from inertial.discovery.evidence import INSIDE
-from inertial.discovery.populations import two_populations
 from pipelines.archive import Archive
-from pipelines.audit.calibrations import dated_runs, first_runs, load
-from pipelines.audit.index import up_to_date
-from pipelines.audit.parameters import FAMILIES, FAMILY_OF, NAMES, unit_text
-from pipelines.discovery.documents import ComparedAlarm, DiscoverDocument, DiscoveryRow, PopulationRow
-from pipelines.discovery.evidence_state import ALPHA
+from pipelines.discovery.coefficient_populations import populations
+from pipelines.discovery.documents import ComparedAlarm, DiscoverDocument, DiscoveryRow
 from pipelines.discovery.figures_of_name import size_of
 from pipelines.discovery.findings import Findings
 from pipelines.discovery.lot_source import DiscoveryArchive
@@ -32,7 +27,7 @@ class Look:
     device : kind of device; that of most runs if empty · since : only lots from this day on; nothing is kept then
     drivers : only discoveries of these; all if empty · effects : in the model of every lot beside its own
     looking_back : judge all lots again with every attribute that is known now; nothing is kept then
-    populations : look for two populations in each coefficient
+    populations : look for two populations in each coefficient, and for coefficients that correlate
     workers, distribute : processes, or other machines, that score new runs
     """
 
@@ -161,26 +156,3 @@ def explained(document: DiscoverDocument, name: str) -> DiscoveryRow:
         hint = did_you_mean(name, ids) if ids else "there is none in this archive"
         raise WrongUse(f"discover: no discovery is called '{name}'; {hint}")
     return found
-
-
-_SEED = 20
-
-
-def populations(archive: Archive, device: str, workers: int = 1) -> list[PopulationRow]:
-    """Coefficients whose units are two populations: each unit once, by its first calibration."""
-    index = up_to_date(archive, workers=workers)
-    every = load(index, first_runs(dated_runs(index), np.inf))
-    own = every.chosen(every.device.astype(str) == device)
-    order = np.argsort(own.day, kind="stable")
-    first = own.chosen(order[np.unique(own.unit[order].astype(str), return_index=True)[1]])
-    judged = [name for name in NAMES if FAMILIES[FAMILY_OF[name]].own]
-    needed = float(np.log(len(judged) / ALPHA))
-    rows: list[PopulationRow] = []
-    for name in judged:
-        found = two_populations(first.column(name), np.random.default_rng(_SEED))
-        if found is None or found.log_e < needed:
-            continue
-        detail = {"means": list(found.means), "widths": list(found.widths), "share": found.share}
-        detail |= {"unit": unit_text(name), "units": len(first)}
-        rows.append({"figure": name, "kind": "two_populations", "log_e": round(found.log_e, 2), "detail": detail})
-    return rows

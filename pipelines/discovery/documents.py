@@ -104,7 +104,7 @@ class PopulationRow(TypedDict):
     """A finding on coefficients of many units."""
 
     figure: str
-    kind: Literal["two_populations"]
+    kind: Literal["two_populations", "correlation"]
     log_e: float
     detail: dict[str, Any]
 
@@ -154,7 +154,10 @@ class DiscoverDocument(TypedDict):
     discoveries: list[DiscoveryRow]
     held: list[HeldAlarm]
     unexplained: Annotated[list[UnexplainedRow], "evidence that no effect of the catalogue accounts for"]
-    population: Annotated[list[PopulationRow], "with --populations: coefficients whose units are two populations"]
+    population: Annotated[
+        list[PopulationRow],
+        "with --populations: coefficients whose units are two populations, and pairs that correlate",
+    ]
     reach: list[ReachRow]
     unseen: list[UntoldEffect]
     drivers: list[DriverRow]

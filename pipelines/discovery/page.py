@@ -126,7 +126,7 @@ def strongest_chart(findings: Findings) -> Chart | None:
         at = columns.astype(float), rows.astype(float)
         traces.append(Trace(name, *at, role=role, symbol="square", size=9.0, texts=texts))
     plot = Plot("", PlotAxis("driver", names=tuple(drivers)), PlotAxis("", names=tuple(effects)), tuple(traces))
-    return Chart("Evidence by effect and driver", (plot,), height=max(260, 17 * len(effects)))
+    return Chart("Evidence by effect and driver", (plot,), height=max(260, 18 * len(effects) + 70))
 
 
 def reach_chart(document: DiscoverDocument, lots: int) -> Chart:

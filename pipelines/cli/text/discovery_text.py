@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from inertial.counts import number_of
 from pipelines.cli.next_commands import command_line, print_next
 from pipelines.cli.printing import print_table, say, short
-from pipelines.discovery.documents import DiscoverDocument, DiscoveryRow
+from pipelines.discovery.documents import DiscoverDocument, DiscoveryRow, PopulationRow
 from pipelines.discovery.figures_of_name import headline, scope_text, unexplained_text
 
 _SHOWN_HELD, _SHOWN_LEVELS, _SHOWN_OUT, _SHOWN_REACH = 3, 12, 3, 40
@@ -56,20 +56,27 @@ def _beside(document: DiscoverDocument) -> None:
         sizes = f"{short(one['size_ug_before'])} → {short(one['size_ug_after'])} µg"
         evidence = f"evidence e^{short(one['log_e_before'])} → e^{short(one['log_e_after'])}"
         say(f"{one['id']} with {one['recommended']} in every lot's model: {sizes}, {evidence}", style="green")
-    for kind in document["population"]:
-        detail = kind["detail"]
-        both = zip(detail["means"], detail["widths"], strict=True)
-        means = " and ".join(f"{short(value)} ± {short(width)}" for value, width in both)
-        share = f"{short(100.0 * detail['share'])} % are the first"
-        say(
-            f"two populations in {kind['figure']} of {detail['units']} units: {means} {detail['unit']}; {share}",
-            style="yellow",
-        )
+    for finding in document["population"]:
+        say(_of_population(finding), style="yellow")
     for row in document["held"][:_SHOWN_HELD]:
         axis = f" {row['axis']}" if row["axis"] else ""
         say(f"held back: {row['effect']}{axis} by {row['driver']}: {row['reason']}", style="dim")
     if len(document["held"]) > _SHOWN_HELD:
         say(f"held back: {len(document['held']) - _SHOWN_HELD} more; --json has all", style="dim")
+
+
+def _of_population(finding: PopulationRow) -> str:
+    detail = finding["detail"]
+    if finding["kind"] == "correlation":
+        value = f"{short(detail['correlation'])} ± {short(2.0 * detail['u'])}"
+        return (
+            f"{finding['figure']} and {detail['with']} of {detail['units']} units correlate by {value}, "
+            "the errors of their fits taken out"
+        )
+    both = zip(detail["means"], detail["widths"], strict=True)
+    means = " and ".join(f"{short(value)} ± {short(width)}" for value, width in both)
+    share = f"{short(100.0 * detail['share'])} % are the first"
+    return f"two populations in {finding['figure']} of {detail['units']} units: {means} {detail['unit']}; {share}"
 
 
 def print_explained(row: DiscoveryRow) -> None:

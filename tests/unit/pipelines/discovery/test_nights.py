@@ -154,7 +154,7 @@ def test_two_populations_in_a_coefficient_are_told_with_their_means(
     archive: Archive, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from pipelines.audit.parameters import NAMES
-    from pipelines.discovery import discover
+    from pipelines.discovery import coefficient_populations
 
     units = 400
     rng = np.random.default_rng(3)
@@ -171,7 +171,7 @@ def test_two_populations_in_a_coefficient_are_told_with_their_means(
         values=values,
         errors=np.ones_like(values),
     )
-    monkeypatch.setattr(discover, "load", lambda *_: every)
+    monkeypatch.setattr(coefficient_populations, "load", lambda *_: every)
     (row,) = discovered(archive, Look(populations=True)).document["population"]
     assert (row["figure"], row["kind"], row["detail"]["units"]) == ("bias_y", "two_populations", units)
     assert row["detail"]["share"] == pytest.approx(0.15, abs=0.02)

@@ -1,0 +1,81 @@
+"""Correlations of the coefficients of units, with the correlated errors of their fits taken out.
+
+A plan that is not centred makes the errors of a bias and of its temperature coefficient alike: over thousands of units they
+correlate although nothing in the devices does. A lot says Σ(a·b) − (1 − 1/n)·ΣC of a pair, a and b about the means of the lot, C the covariance of the fit; its
+mean is zero where the devices' own values do not correlate, and evidence over the lots is valid however often it is looked at.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from inertial.arrays import Array
+from inertial.discovery.evidence import FIRST, Scale, Sums
+from inertial.discovery.station_wander import over
+
+
+@dataclass(frozen=True)
+class Correlation:
+    """Two coefficients of an axis, by their places: evidence, correlation of the devices' own values, its standard error."""
+
+    axis: int
+    first: int
+    second: int
+    log_e: float
+    value: float
+    error: float
+
+
+class Correlations:
+    """Sums of lots, in the order of their measurement."""
+
+    def __init__(self) -> None:
+        self._lots: list[Array] = []
+        self.units = 0
+
+    def add(self, values: Array, covariance: Array) -> None:
+        """Add a lot.
+
+        Parameters
+        ----------
+        values : (units, axes, p), coefficients · covariance : (units, axes, p, p), of their errors
+        """
+        n = len(values)
+        if n < 2:
+            return
+        about = values - values.mean(axis=0)
+        self._lots.append(np.einsum("uap,uaq->apq", about, about) - (1.0 - 1.0 / n) * covariance.sum(axis=0))
+        self.units += n
+
+    def found(self, alpha: float) -> list[Correlation]:
+        """Pairs that correlate, the strongest first; the probability of one where none does is at most ``alpha``."""
+        if len(self._lots) < FIRST:
+            return []
+        every = np.array(self._lots)
+        p = every.shape[2]
+        first, second = np.triu_indices(p, 1)
+        pairs = every[:, :, first, second].reshape(len(every), -1)
+        needed = np.log(pairs.shape[1] / alpha) if pairs.shape[1] else np.inf
+        log_e = _evidence(pairs)
+        variance = np.diagonal(every.sum(axis=0), axis1=1, axis2=2)  # (axes, p), of the devices' own values
+        both = np.sqrt(np.maximum(variance[:, first] * variance[:, second], 0.0)).reshape(-1)
+        own = (variance[:, first] > 0.0) & (variance[:, second] > 0.0)
+        value, error = over(pairs.sum(axis=0), both), over(np.sqrt((pairs**2).sum(axis=0)), both)
+        out = [
+            Correlation(k // first.size, int(first[k % first.size]), int(second[k % first.size]), *row)
+            for k, row in enumerate(zip(log_e.tolist(), value.tolist(), error.tolist(), strict=True))
+            if row[0] >= needed and own.reshape(-1)[k]
+        ]
+        return sorted(out, key=lambda one: -one.log_e)
+
+
+def _evidence(increments: Array) -> Array:
+    """Logarithm of the evidence (h,) of increments (lots, h), each bounded by what came before; medians begin."""
+    spread = 1.4826 * np.median(np.abs(increments[:FIRST]), axis=0)
+    scale = Scale(np.where(spread > 0.0, spread, 1.0))
+    sums = Sums.of(increments.shape[1], two_sided=True)
+    for x in increments:
+        bounded = scale.bounded(x)
+        sums.add(bounded / scale.rms)
+        scale.add(bounded)
+    return sums.log_e
