@@ -50,7 +50,7 @@ def cost(lots: int, seed: int) -> None:
 def _copies(folder: Path, count: int, seed: int) -> None:
     """Runs with other names, days and serials, and the scores of them with other signs."""
     source = DiscoveryArchive(Archive(str(folder)))
-    products = source.store.products()[0]
+    products = source.store.products[0]
     runs = [source.store.run(run) for run in source.store.place]
     rng = np.random.default_rng(seed)
     new = []

@@ -1,8 +1,9 @@
 """Correlations of the coefficients of units, with the correlated errors of their fits taken out.
 
 A plan that is not centred makes the errors of a bias and of its temperature coefficient alike: over thousands of units they
-correlate although nothing in the devices does. A lot says Σ(a·b) − (1 − 1/n)·ΣC of a pair, a and b about the means of the lot, C the covariance of the fit; its
-mean is zero where the devices' own values do not correlate, and evidence over the lots is valid however often it is looked at.
+correlate although nothing in the devices does. A lot says Σ(a·b) − (1 − 1/n)·ΣC of a pair, a and b about the means of the lot, C
+the covariance of the fit; its mean is zero where the devices' own values do not correlate, and evidence over the lots is valid
+however often it is looked at.
 """
 
 from dataclasses import dataclass

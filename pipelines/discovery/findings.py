@@ -89,7 +89,7 @@ class Findings:
         place = {column: at for at, column in enumerate(columns)}
         lot, inside, size = np.zeros((AXES, k, k)), np.zeros((AXES, k, k)), np.zeros((AXES, k))
         weight = np.zeros(k)
-        for product in self.source.store.products():
+        for product in self.source.store.products:
             at = np.array([place[column] for column in product.columns if column in place])
             if at.size != len(product.columns):
                 continue

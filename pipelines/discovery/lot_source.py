@@ -117,8 +117,8 @@ class DiscoveryArchive:
     @cached_property
     def columns(self) -> tuple[tuple[Column, ...], tuple[Column, ...]]:
         """Columns of the sensor and of the station that any run of the archive has."""
-        sensor = dict.fromkeys(column for products in self.store.products() for column in products.columns)
-        station = dict.fromkeys(one for products in self.store.products() for one in products.of_station)
+        sensor = dict.fromkeys(column for products in self.store.products for column in products.columns)
+        station = dict.fromkeys(one for products in self.store.products for one in products.of_station)
         return tuple(sensor), tuple(station)
 
     def lots(self, runs: Iterable[str]) -> Iterable[tuple[ScoredLot, ScoredLot]]:
@@ -197,17 +197,21 @@ class DiscoveryArchive:
         ----------
         order : the lots of the evidence, which grows while they are added
         """
-        index: dict[str, list[tuple[int, str]]] = {}
+        index: dict[str, int | list[int]] = {}  # most units are measured once
         known = 0
 
         def of(unit: str, taken: int) -> tuple[Array, Array] | None:
             nonlocal known
             for number in range(known, len(order)):
-                file, row = self.store.place[order[number]]
-                for one in self.store.files[file].rows[row]["units"]:
-                    index.setdefault(one, []).append((number, order[number]))
+                for one in self.store.head(order[number])["units"]:
+                    there = index.setdefault(one, number)
+                    if isinstance(there, list):
+                        there.append(number)
+                    elif there != number:
+                        index[one] = [there, number]
             known = len(order)
-            before = [run for number, run in index.get(unit, ()) if number < taken]
+            places = index.get(unit, [])
+            before = [order[k] for k in (places if isinstance(places, list) else [places]) if k < taken]
             if not before:
                 return None
             lots = (self.lot_of(self.store.run(run)) for run in before)

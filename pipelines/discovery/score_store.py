@@ -5,10 +5,13 @@ A derived cache with a seal: where it was edited, or has another layout, it is m
 products of the columns are kept once a file, as means.
 """
 
+from __future__ import annotations
+
 import io
 import json
+import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -23,6 +26,7 @@ from pipelines.archive.keys import digest
 from pipelines.archive.store import Place
 from pipelines.discovery.scored_run import ScoredRun, scored_runs
 from pipelines.parallel import Distributor, map_partitions
+from schemas.errors import ArchiveUnusable
 
 FOLDER = "discovery"
 VERSION = 4
@@ -32,6 +36,7 @@ _SHARE_STEPS = 58.0  # of what the station leaves of the information, an octave:
 _MEAN_STEPS = 256.0  # of information, an octave
 _FINE, _LINEAR = 16.0, 64.0  # steps of a score a standard deviation, up to so many of them; relative ones beyond
 _NOTHING = -(2**15)
+MOST_OPEN = 32  # files whose rows are kept in memory: units that come again were often measured together
 BATCH = 8  # runs that one process scores at a time
 
 
@@ -46,16 +51,25 @@ class Products:
     size: Array
     runs: int
 
+    def with_more(self, other: Products) -> Products:
+        """Means over the runs of both."""
+        total = self.runs + other.runs
+        means = {
+            name: (self.runs * getattr(self, name) + other.runs * getattr(other, name)) / total
+            for name in ("lot", "inside", "size")
+        }
+        return replace(self, runs=total, **means)
+
 
 class ScoreFile(NamedTuple):
-    """One file of scores: rows stay packed until they are asked for.
+    """One file of scores, of which the packed rows stay on disk.
 
-    names : columns of the sensor and of the station by their mark
+    heads : texts, units and noise of each run · names : columns of the sensor and of the station by their mark
     """
 
-    rows: list[dict[str, Any]]
+    place: Place
+    heads: list[dict[str, Any]]
     names: dict[str, Any]
-    products: list[Products]
 
 
 class ScoreStore:
@@ -64,41 +78,67 @@ class ScoreStore:
     def __init__(self, archive: Archive) -> None:
         self.archive = archive
         self.folder: Place = archive.root / FOLDER / "scores"
+        self._opened: dict[int, pa.Table] = {}
 
     @cached_property
-    def files(self) -> list[ScoreFile]:
-        """Every file that is sound, in the order of their making."""
-        out = list[ScoreFile]()
+    def _all(self) -> tuple[list[ScoreFile], list[Products]]:
+        """Every file that is sound, in the order of their making, and the products of all of them."""
+        out, products = list[ScoreFile](), dict[Any, Products]()
         for place in sorted(self._places(), key=lambda one: one.name):
             data, state = derived.unframed(place)
             if state == derived.EDITED:
                 derived.warn_of_edits(place)
-            if state == derived.SOUND and (read := _read(data)) is not None:
-                out.append(read)
-        return out
+            if state != derived.SOUND or (read := _content(data)) is None:
+                continue
+            names = _names(read.about)
+            heads = read.table.select([*TEXTS, "units", "floor"]).to_pylist()
+            for head in heads:  # of a hundred thousand runs, many have the same
+                head.update({name: sys.intern(head[name]) for name in TEXTS if name not in {"run", "when"}})
+            out.append(ScoreFile(place, heads, names))
+            with np.load(io.BytesIO(read.products), allow_pickle=False) as arrays:
+                for name in filter(None, names):
+                    columns, station, runs = names[name]
+                    product = _unfolded(name, columns, station, runs, arrays)
+                    key = product.columns, product.of_station
+                    products[key] = product if key not in products else products[key].with_more(product)
+        return out, list(products.values())
+
+    @property
+    def files(self) -> list[ScoreFile]:
+        """Every file that is sound, in the order of their making."""
+        return self._all[0]
+
+    @property
+    def products(self) -> list[Products]:
+        """Products of columns, for each set of columns."""
+        return self._all[1]
 
     @cached_property
     def place(self) -> dict[str, tuple[int, int]]:
         """File and row of every run, in the order of arrival."""
         found: dict[str, tuple[int, int]] = {}
         for number, file in enumerate(self.files):
-            for row, content in enumerate(file.rows):
+            for row, content in enumerate(file.heads):
                 found.setdefault(content["run"], (number, row))
         return found
 
     def head(self, run: str) -> dict[str, Any]:
         """The texts of a run: when, station, device, model, why it was left out."""
         number, row = self.place[run]
-        return self.files[number].rows[row]
+        return self.files[number].heads[row]
 
     def run(self, run: str) -> ScoredRun:
         """The scores of a run."""
         number, row = self.place[run]
-        return _run_of(self.files[number].rows[row], self.files[number].names)
-
-    def products(self) -> list[Products]:
-        """Products of columns, of every file."""
-        return [product for file in self.files for product in file.products]
+        file = self.files[number]
+        if number not in self._opened:
+            read = _content(derived.unframed(file.place)[0])
+            if read is None:
+                raise ArchiveUnusable(f"{file.place}: the scores were changed while they were read; run it again")
+            while len(self._opened) >= MOST_OPEN:
+                self._opened.pop(next(iter(self._opened)))
+            self._opened[number] = read.table
+        return _run_of(self._opened[number].slice(row, 1).to_pylist()[0], file.names)
 
     def add(self, ids: Sequence[str], workers: int, distribute: Distributor | None = None) -> int:
         """Score runs that are not scored yet, in processes; the number of new ones."""
@@ -112,7 +152,8 @@ class ScoreStore:
             return 0
         number = 1 + max((int(place.name.split(".")[0]) for place in self._places()), default=0)
         files.publish(self.folder / f"{number:06d}.scores", derived.framed(written(scored)))
-        self.__dict__.pop("files", None)
+        self._opened.clear()
+        self.__dict__.pop("_all", None)
         self.__dict__.pop("place", None)
         return len(scored)
 
@@ -200,17 +241,22 @@ def _products_of(runs: Sequence[ScoredRun]) -> dict[str, Array]:
     return out
 
 
-def _read(data: bytes) -> ScoreFile | None:
-    """The runs and products of a file; None where another version wrote it."""
+class _Content(NamedTuple):
+    table: pa.Table
+    about: dict[str, Any]
+    products: bytes
+
+
+def _content(data: bytes) -> _Content | None:
+    """The rows of a file, what is said of its columns, and its products; None where another version wrote it."""
     length = int.from_bytes(data[:8], "big")
     table = pq.read_table(pa.BufferReader(data[8 : 8 + length]))
     about = json.loads((table.schema.metadata or {}).get(b"about", b"{}"))
-    if about.get("version") != VERSION:
-        return None
-    names = {name: (_pairs(of[0]), _pairs(of[1]), int(of[2])) for name, of in about["columns"].items()}
-    with np.load(io.BytesIO(data[8 + length :]), allow_pickle=False) as arrays:
-        products = [_unfolded(name, *names[name], arrays) for name in names if name]
-    return ScoreFile(table.to_pylist(), names, products)
+    return _Content(table, about, data[8 + length :]) if about.get("version") == VERSION else None
+
+
+def _names(about: dict[str, Any]) -> dict[str, Any]:
+    return {name: (_pairs(of[0]), _pairs(of[1]), int(of[2])) for name, of in about["columns"].items()}
 
 
 def _pairs(listed: Sequence[Sequence[Any]]) -> tuple[tuple[str, int], ...]:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from inertial.arrays import Array
-from pipelines.discovery.score_store import _read, _run_of, written
+from pipelines.discovery.score_store import _content, _names, _run_of, written
 from pipelines.discovery.scored_run import ScoredRun
 
 UNITS, K = 4, 5
@@ -26,10 +26,10 @@ def made(run: str, size: float, rng: np.random.Generator) -> ScoredRun:
 def test_scores_keep_a_thirtieth_of_their_standard_deviation_and_information_a_hundredth(size: float) -> None:
     rng = np.random.default_rng(6)
     runs = [made(f"r{k}", size, rng) for k in range(5)]
-    file = _read(written(runs))
-    assert file is not None
-    for row, run in zip(file.rows, runs, strict=True):
-        kept = _run_of(row, file.names)
+    content = _content(written(runs))
+    assert content is not None
+    for row, run in zip(content.table.to_pylist(), runs, strict=True):
+        kept = _run_of(row, _names(content.about))
         assert run.own is not None
         seen = run.own > 0.0
         root = np.sqrt(np.where(seen, run.own, 1.0))
