@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
-import resource
 import shutil
+import subprocess
+import sys
 import tempfile
 import time
 from dataclasses import replace
@@ -14,9 +15,9 @@ import numpy as np
 
 from pipelines.archive import Archive, derived, files
 from pipelines.demo.archive_lots import Line, write_lots, write_run
-from pipelines.discovery.discover import Look, discovered
 from pipelines.discovery.lot_source import DiscoveryArchive
 from pipelines.discovery.score_store import written
+from pipelines.discovery.scored_run import ScoredRun
 
 REAL, A_FILE, NIGHT = 60, 500, 20
 
@@ -32,19 +33,30 @@ def cost(lots: int, seed: int) -> None:
         kept = sum(place.stat().st_size for place in (made.folder / "discovery" / "scores").iterdir())
         print(f"on disk: {kept / REAL:.0f} bytes a lot")
         _copies(made.folder, lots - REAL, seed)
-        begin = time.perf_counter()
-        discovered(archive, Look())
-        print(f"first look at {lots} lots: {time.perf_counter() - begin:.1f} s")
+        seconds, memory = _looked(made.folder)
+        print(f"first look at {lots} lots: {seconds:.1f} s; peak memory {memory:.0f} MB", flush=True)
         line = Line(seed + 1, hidden=None)
         for number in range(NIGHT):
             dwells, about = line.lot("line-1")
             for table in (dwells, about):
                 table["unit"] = "N" + table["unit"]
             write_run(archive, 10**6 + number, "line-1", dwells, about)
-        begin = time.perf_counter()
-        discovered(Archive(str(made.folder)), Look())
-        memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
-        print(f"a night of {NIGHT} lots: {time.perf_counter() - begin:.1f} s; peak memory {memory:.0f} MB")
+        seconds, memory = _looked(made.folder)
+        print(f"a night of {NIGHT} lots: {seconds:.1f} s; peak memory {memory:.0f} MB")
+
+
+def _looked(folder: Path) -> tuple[float, float]:
+    """Seconds and peak memory, MB, of the command in a process of its own."""
+    peak = "import atexit, pathlib; atexit.register(lambda: print(pathlib.Path('/proc/self/status').read_text()))"
+    call = f"{peak}; import sys; from pipelines.cli import main; sys.exit(main())"
+    begin = time.perf_counter()
+    command = [sys.executable, "-c", call, "discover", "--archive", str(folder), "--workers", "1", "--json"]
+    done = subprocess.run(command, check=False, capture_output=True, text=True)
+    seconds = time.perf_counter() - begin
+    lines = [line for line in done.stdout.splitlines() if line.startswith("VmHWM")]
+    if done.returncode not in {0, 1}:
+        raise RuntimeError(done.stderr)
+    return seconds, float(lines[0].split()[1]) / 1e3
 
 
 def _copies(folder: Path, count: int, seed: int) -> None:
@@ -53,7 +65,7 @@ def _copies(folder: Path, count: int, seed: int) -> None:
     products = source.store.products[0]
     runs = [source.store.run(run) for run in source.store.place]
     rng = np.random.default_rng(seed)
-    new = []
+    new: list[ScoredRun] = []
     for number in range(count):
         one = runs[number % REAL]
         if one.score is None or one.station_scores is None:
@@ -74,6 +86,7 @@ def _copies(folder: Path, count: int, seed: int) -> None:
         }
         averages = {"lot": products.lot, "inside": products.inside, "size": products.size}
         new.append(replace(one, run=name, when=about["when"], units=units, **scores, **averages))
-    for at in range(0, count, A_FILE):
-        place = folder / "discovery" / "scores" / f"{at // A_FILE + 2:06d}.scores"
-        files.publish(place, derived.framed(written(new[at : at + A_FILE])))
+        if len(new) == A_FILE or number == count - 1:
+            scores_file = folder / "discovery" / "scores" / f"{number // A_FILE + 2:06d}.scores"
+            files.publish(scores_file, derived.framed(written(new)))
+            new.clear()
