@@ -150,6 +150,7 @@ class ArchiveMaker:
             information,
             levels,
             {"radius": radius},
+            {"own temperature coefficient": np.repeat(one.tempco, len(self.columns), axis=1)},
         )
 
     def _change(self, one: LotScores, effect: str, size: Array) -> Array:

@@ -33,6 +33,9 @@ INSIDE = ", inside lots"
 SHARED: float = float(np.log(300.0))
 """Logarithm of the odds from which on a mean is taken to be of the sensors, and not of the stations' references."""
 
+SLOPE, ALL = "slope", "all"
+"""Sums of a number that differs by axis: what its slope is estimated from, and the information of all units."""
+
 _MIXED = np.array([0.3, 0.03, 0.003])
 _RATES: Array = np.exp2(np.arange(1.0, -15.0, -1.0))
 
@@ -44,6 +47,7 @@ class ScoredLot:
     score : (units, h), errors of the station taken out · own : (units, h), information before that
     information : (h,), of the sums, errors of the station taken out
     levels : driver → label of each unit, "" where it is not known · numbers : driver → (units,), nan where not known
+    slopes : driver → (units, h), numbers that differ by axis, judged inside the lot alone
     day : since an epoch
     """
 
@@ -56,6 +60,7 @@ class ScoredLot:
     information: Array
     levels: Mapping[str, tuple[str, ...]] = field(default_factory=dict[str, tuple[str, ...]])
     numbers: Mapping[str, Array] = field(default_factory=dict[str, Array])
+    slopes: Mapping[str, Array] = field(default_factory=dict[str, Array])
 
     @cached_property
     def total(self) -> Array:
@@ -358,11 +363,22 @@ class Evidence:
             if np.isfinite(numbers).all() and float(np.ptp(numbers)) > 0.0:
                 predicted = np.broadcast_to(numbers[:, None], own.shape)
                 self._add_inside(name + INSIDE, lot, predicted, left, two_sided=True)
+        self._slopes(lot, left)
         scale.add(np.sqrt(np.mean(over(left, root) ** 2, axis=0)))
         if self._earlier is None:
             for unit, *own in zip(lot.units, left, information, strict=True):
                 score, known = self._units.get(unit, (0.0, 0.0))
                 self._units[unit] = score + own[0], known + own[1]
+
+    def _slopes(self, lot: ScoredLot, left: Array) -> None:
+        """Numbers that differ by axis, too, and the sums that their slopes are estimated from."""
+        for name, numbers in lot.slopes.items():
+            about = numbers - lot.averaged(numbers)
+            if np.isfinite(about).all() and about.any():
+                self._add_inside(name + INSIDE, lot, numbers, left, two_sided=True)
+                sums = np.stack([(left * about).sum(axis=0), np.zeros(self.count)])
+                squares = np.stack([(lot.own * about**2).sum(axis=0), lot.own.sum(axis=0)])
+                self.levels.setdefault(name + INSIDE, Levels(self.count)).add((SLOPE, ALL), sums, squares)
 
     def _add_inside(self, name: str, lot: ScoredLot, predicted: Array, left: Array, *, two_sided: bool) -> None:
         about = predicted - lot.averaged(predicted)

@@ -28,6 +28,9 @@ from inertial.estimation.term import with_turn_on
 LEAST_LEFT = 0.05
 """Share of its information that an effect keeps beside free errors of the station; below it, no lot can tell it from them."""
 
+TEMPCO = "bias_temperature"
+"""The effect whose coefficient an error of the thermometer is multiplied by."""
+
 _RIDGE = 1e-9
 
 
@@ -41,6 +44,7 @@ class LotScores:
     lot : (m, k, k), information of the sums over the units, errors of the station taken out
     inside : (m, k, k), mean information of a unit before that
     station_score, station_information : (q,), of the columns of the station, each alone
+    tempco : (units, m), temperature coefficients of the biases that the model has, g/K; nan without
     floor : rms of the noise of a dwell, g · size : (m, k), rms over the dwells that a coefficient of one leaves of its column, g
     """
 
@@ -53,6 +57,7 @@ class LotScores:
     inside: Array
     station_score: Array
     station_information: Array
+    tempco: Array
     floor: float
     size: Array
 
@@ -148,9 +153,22 @@ def _scored(
         inside=own.reshape(-1, m, k, k).mean(axis=0),
         station_score=station_score,
         station_information=np.diagonal(of_station).copy(),
+        tempco=_tempco(model).reshape(-1, m),
         floor=model.floor(),
         size=rms.reshape(-1, m, k).mean(axis=0),
     )
+
+
+def _tempco(model: Model) -> Array:
+    """Temperature coefficient of the bias of each block, (blocks,), g/K; nan where the model has none."""
+    problem, space = model.problem, model.space
+    place = next((at.start for term, at in model.places(shared=False) if term.effect.id == TEMPCO), None)
+    if place is None:
+        return np.full(problem.blocks, np.nan)
+    shared = model.shared @ space.shared_sizes if model.shared.shape[-1] else np.zeros_like(problem.y)
+    target = space.whiten((problem.y - shared)[..., None])[..., 0]
+    fits = zip(space.local, target, strict=True)
+    return np.array([np.linalg.lstsq(columns, own, rcond=None)[0][place] for columns, own in fits])
 
 
 def _inverse(information: Array) -> Array:

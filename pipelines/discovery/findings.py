@@ -23,11 +23,11 @@ from pipelines.discovery.figures_of_name import (
     next_of,
     plain,
     size_of,
-    station_sizes,
     without_largest,
 )
-from pipelines.discovery.lot_source import AXES, SEASON, DiscoveryArchive
+from pipelines.discovery.lot_source import AXES, OWN_TEMPCO, SEASON, DiscoveryArchive
 from pipelines.discovery.nights import held
+from pipelines.discovery.reference_rows import PROPORTIONAL, station_row, thermometer_row
 from schemas.units import MICRO
 
 LATER = 20  # lots after an alarm from which on they confirm or do not
@@ -101,15 +101,22 @@ class Findings:
 
     @cached_property
     def _of_sensor(self) -> list[Alarm]:
-        """Open alarms of the devices' effects and of functions of the pose."""
-        return [alarm for alarm in self.open_alarms if alarm.place < self.state.sensor.count]
+        """Open alarms of the devices' effects and of functions of the pose; those of the thermometer stand apart."""
+        of_devices = (alarm for alarm in self.open_alarms if alarm.place < self.state.sensor.count)
+        return [alarm for alarm in of_devices if plain(alarm.driver) != OWN_TEMPCO]
+
+    @cached_property
+    def of_thermometer(self) -> list[Alarm]:
+        """Alarms of what is proportional to a unit's own temperature coefficient, the strongest first."""
+        alarms = (alarm for alarm in self.open_alarms if plain(alarm.driver) == OWN_TEMPCO)
+        return sorted(alarms, key=lambda alarm: -self.log_e(alarm))
 
     @cached_property
     def _named(self) -> tuple[list[Name], list[Unnamed]]:
         """Names of what the lots hold, and functions of the pose that no effect is."""
         if not self._of_sensor:
             return [], []
-        alarms = [(alarm.driver, self._effect(alarm)) for alarm in self._of_sensor]
+        alarms = [(alarm.driver, self.effect_of(alarm)) for alarm in self._of_sensor]
         return self.pool.names(self.lots, alarms, max(self.state.needed(alarm.driver) for alarm in self._of_sensor))
 
     @cached_property
@@ -119,7 +126,7 @@ class Findings:
         for name in self._named[0]:
             # what is seen as a function of the pose first is named with the effect that it turns out to be
             known = {*name.effects, SHAPE}
-            alarms = [a for a in self._of_sensor if plain(a.driver) in name.drivers and self._effect(a) in known]
+            alarms = [a for a in self._of_sensor if plain(a.driver) in name.drivers and self.effect_of(a) in known]
             if not alarms:
                 continue
             since = min(alarms, key=lambda a: (a.lots, -a.log_e))
@@ -128,7 +135,8 @@ class Findings:
             out.append(Discovery(name, since, drivers, *self._carried(name, since)))
         return sorted(out, key=lambda one: one.since.lots)
 
-    def _effect(self, alarm: Alarm) -> str:
+    def effect_of(self, alarm: Alarm) -> str:
+        """Id of the effect of an alarm."""
         return hypothesis(self.state, alarm.place)[0]
 
     def _places(self, effect: str) -> NDArray[np.intp]:
@@ -192,16 +200,18 @@ class Findings:
 
     def _found(self) -> tuple[list[DiscoveryRow], list[UnexplainedRow]]:
         rows = [self._row(discovery) for discovery in self.discoveries] + [
-            self._station_row(alarm) for alarm in self._of_station
+            station_row(self, alarm) for alarm in self._of_station
         ]
+        rows += [thermometer_row(self)] if self.of_thermometer else []
         for number, row in enumerate(rows, start=1):
             row["id"] = f"D{number}"
         return rows, self._unexplained(named=bool(rows))
 
-    def _day_of(self, alarm: Alarm) -> str:
+    def day_of(self, alarm: Alarm) -> str:
+        """The day of the lot that raised an alarm."""
         return str(self.source.store.head(self.state.order[min(alarm.lots, len(self.state.order)) - 1])["when"])[:10]
 
-    def _floors(self, size: float) -> float | None:
+    def floors(self, size: float) -> float | None:
         """A size over the noise of a dwell of one lot."""
         floor = float(np.median([self.source.store.head(run)["floor"] for run in self.state.order]))
         return size / floor if floor > 0.0 else None
@@ -209,14 +219,15 @@ class Findings:
     def _row(self, found: Discovery) -> DiscoveryRow:
         name = found.name
         size, low, high = size_of(name)
-        scope, because = self._scope(found)
+        of_thermometer = {self.effect_of(alarm) for alarm in self.of_thermometer} & set(name.effects)
+        scope, because = ("thermometer", PROPORTIONAL) if of_thermometer else self._scope(found)
         driver = found.drivers[0] if name.drivers[0] not in found.drivers else name.drivers[0]
         sums = [of for one, of in self.state.sensor.drivers.items() if plain(one) in found.drivers]
         log_e = max(float(of.log_e[self._places(name.effects[0])].max()) for of in sums)
         sizes = by_axis(name)
         row: DiscoveryRow = {
             "id": "",
-            "since": self._day_of(found.since),
+            "since": self.day_of(found.since),
             "lots_then": found.since.lots,
             "effects": list(name.effects),
             "recommended": name.effects[0],
@@ -226,7 +237,7 @@ class Findings:
             "kind": "mean" if driver == MEAN else "slope" if name.labels == ("slope",) else "levels",
             "size_ug": MICRO * size,
             "interval_ug": [MICRO * low, MICRO * high],
-            "size_floors": self._floors(size),
+            "size_floors": self.floors(size),
             "log_e": round(log_e, 2),
             "scope": scope,
             "because": because,
@@ -268,53 +279,19 @@ class Findings:
         best: dict[tuple[str, str], Alarm] = {}
         for alarm in self.open_alarms:
             if alarm.place >= self.state.sensor.count:
-                key = self._effect(alarm), alarm.driver
+                key = self.effect_of(alarm), alarm.driver
                 best[key] = max(best.get(key, alarm), alarm, key=lambda one: one.log_e)
         kept: dict[str, Alarm] = {}
         # columns of one table are nearly the same: the strongest stands for its driver
-        for alarm in sorted(best.values(), key=lambda alarm: -self._log_e(alarm)):
+        for alarm in sorted(best.values(), key=lambda alarm: -self.log_e(alarm)):
             kept.setdefault(alarm.driver, alarm)
         return sorted(kept.values(), key=lambda alarm: alarm.lots)
 
-    def _log_e(self, alarm: Alarm) -> float:
+    def log_e(self, alarm: Alarm) -> float:
+        """Logarithm of the evidence of an alarm's hypothesis now."""
         of_station = alarm.place >= self.state.sensor.count
         evidence = self.state.station if of_station else self.state.sensor
         return float(evidence.drivers[alarm.driver].log_e[alarm.place - (self.state.sensor.count if of_station else 0)])
-
-    def _station_row(self, alarm: Alarm) -> DiscoveryRow:
-        effect, column, _ = hypothesis(self.state, alarm.place)
-        at = alarm.place - self.state.sensor.count
-        station = self.state.station
-        sizes = station_sizes(station, at)
-        of_driver = [a for a in self.open_alarms if a.driver == alarm.driver]
-        alike = [self._effect(a) for a in of_driver if a.place >= self.state.sensor.count]
-        scale = float(station.noise[0][at])
-        values = np.array([value for value, _ in sizes.values()])
-        size, reach = float(np.sqrt(np.mean(values**2))), 2.0 * max(scale * error for _, error in sizes.values())
-        return {
-            "id": "",
-            "since": self._day_of(alarm),
-            "lots_then": alarm.lots,
-            "effects": list(dict.fromkeys([effect, *alike])),
-            "recommended": effect,
-            "axes": [],
-            "driver": alarm.driver,
-            "drivers": [alarm.driver],
-            "kind": "mean" if alarm.driver == MEAN else "slope" if alarm.driver == DATE else "levels",
-            "size_ug": MICRO * size,
-            "interval_ug": [MICRO * max(size - reach, 0.0), MICRO * (size + reach)],
-            "size_floors": self._floors(size),
-            "log_e": round(self._log_e(alarm), 2),
-            "scope": "station",
-            "because": f"the force itself is changed, for all units of a lot alike (column {column + 1} of {effect})",
-            "levels": [
-                {"level": label, "size_ug": MICRO * value, "u_ug": MICRO * error * scale, "units": 0}
-                for label, (value, error) in sizes.items()
-            ],
-            "carried_by": {"lots_for": None, "log_e_without_largest_2_percent": None},
-            "confirmed": None,
-            "next": "check the station's references (level, encoders, fixture), see 'tumbleline audit'",
-        }
 
     def _held(self) -> list[HeldAlarm]:
         reason = "the stations differ or wander in this effect by themselves, and it is the same for a whole lot"
@@ -324,7 +301,7 @@ class Findings:
         for alarm in self.state.alarms:
             if held(self.state, alarm):
                 effect, _, axis = hypothesis(self.state, alarm.place)
-                log_e = round(self._log_e(alarm), 2)
+                log_e = round(self.log_e(alarm), 2)
                 rows.append({"effect": effect, "axis": axis, "driver": alarm.driver, "log_e": log_e, "reason": reason})
         return sorted(rows, key=lambda row: -row["log_e"])
 
@@ -332,9 +309,9 @@ class Findings:
         """Functions of the pose that no effect is; and, where nothing is named, every driver with an alarm."""
         rows = {of.driver: self._map_row(of) for of in self._named[1]}
         if not named:
-            for alarm in sorted(self._of_sensor, key=self._log_e, reverse=True):
+            for alarm in sorted(self._of_sensor, key=self.log_e, reverse=True):
                 effect, _, axis = hypothesis(self.state, alarm.place)
-                log_e, driver = round(self._log_e(alarm), 2), plain(alarm.driver)
+                log_e, driver = round(self.log_e(alarm), 2), plain(alarm.driver)
                 row: UnexplainedRow = {
                     "driver": driver, "level": "", "nearest": effect, "axes": [axis], "map": [], "log_e": log_e,
                 }  # fmt: skip
@@ -347,13 +324,13 @@ class Findings:
         maps = [map_of(force, *fit) for fit in zip(of.size, of.covariance, strict=True)]
         best = int(np.argmax([np.sum(value**2) / np.sum(error**2) for value, error in maps]))
         alarms = [a for a in self._of_sensor if plain(a.driver) == of.driver]
-        strongest = max(alarms, key=self._log_e)
+        strongest = max(alarms, key=self.log_e)
         return {
             "driver": of.driver,
             "level": of.level,
             "axes": ["xyz"[best]],
             "map": np.column_stack([angles_of(force), MICRO * np.column_stack(maps[best])]).tolist(),
-            "log_e": round(self._log_e(strongest), 2),
+            "log_e": round(self.log_e(strongest), 2),
             "nearest": self._nearest(of.driver),
         }
 

@@ -28,6 +28,8 @@ Column = tuple[str, int]
 
 AXES = 3
 SEASON, OPERATOR = "season", "operator"
+OWN_TEMPCO = "own temperature coefficient"
+"""A driver: what a unit's thermometer has wrong, its output has wrong by this."""
 _PLACES = 3  # of a force in g, within which poses are the same
 
 
@@ -142,6 +144,9 @@ class DiscoveryArchive:
             return out
 
         levels, numbers = self._drivers(run)
+        slopes = dict[str, Array]()
+        if run.tempco is not None and np.isfinite(run.tempco).all():
+            slopes[OWN_TEMPCO] = np.repeat(run.tempco, k, axis=1)
         lot = ScoredLot(
             run=run.run,
             station=run.station,
@@ -152,6 +157,7 @@ class DiscoveryArchive:
             information=spread(run.information),
             levels=levels,
             numbers=numbers,
+            slopes=slopes,
         )
         return self._change(lot)
 

@@ -27,6 +27,7 @@ from pipelines.archive.store import Place
 from pipelines.discovery.scored_run import ScoredRun, scored_runs
 from pipelines.parallel import Distributor, map_partitions
 from schemas.errors import ArchiveUnusable
+from schemas.units import MICRO
 
 FOLDER = "discovery"
 VERSION = 4
@@ -170,7 +171,7 @@ def written(runs: Sequence[ScoredRun]) -> bytes:
     columns: dict[str, list[Any]] = {name: [getattr(run, name) for run in runs] for name in TEXTS}
     columns |= {"units": [list(run.units) for run in runs], "slots": [list(run.slots) for run in runs]}
     columns |= {"columns": [_group(run) for run in runs], "floor": [run.floor for run in runs]}
-    for name in ("score", "own", "information", "station_scores"):
+    for name in ("score", "own", "information", "station_scores", "tempco"):
         columns[name] = [_packed(name, run) for run in runs]
     buffer = io.BytesIO()
     arrays = {f"{name}/{key}": v for name, of in products.items() for key, v in of.items()}
@@ -192,6 +193,8 @@ def _packed(name: str, run: ScoredRun) -> bytes:
     """Arrays in few bytes: scores in sixteenths of their standard deviation, information to three digits."""
     if run.left_out or run.score is None or run.own is None or run.information is None or run.station_scores is None:
         return b""
+    if name == "tempco":
+        return b"" if run.tempco is None else (MICRO * run.tempco).astype(np.float16).tobytes()
     if name == "score":
         root = np.sqrt(np.where(run.own > 0.0, run.own, 1.0))
         steps = np.round(_FINE * _LINEAR * np.arcsinh(run.score / (root * _LINEAR))).astype("<i2")
@@ -302,5 +305,6 @@ def _run_of(row: dict[str, Any], names: dict[str, Any]) -> ScoredRun:
         own=own,
         information=information,
         station_scores=np.frombuffer(row["station_scores"], dtype=np.float32).astype(np.float64).reshape(2, -1),
+        tempco=np.frombuffer(row["tempco"], dtype=np.float16).astype(np.float64).reshape(len(units), -1) / MICRO,
         floor=float(row["floor"]),
     )

@@ -26,6 +26,7 @@ class ScoredRun:
     left_out : why it is not pooled; empty where it is · columns : of the sensor, then of the station
     score, own : (units, m·k); information : (m·k,) · station : (2, q), scores and information
     lot, inside : (m, k, k), correlations of the columns · size : (m·k,) · floor : g
+    tempco : (units, m), g/K, of the biases; nan without one
     """
 
     run: str
@@ -46,6 +47,7 @@ class ScoredRun:
     lot: Array | None = None
     inside: Array | None = None
     size: Array | None = None
+    tempco: Array | None = None
     floor: float = 0.0
 
 
@@ -130,5 +132,6 @@ def _kept(head: dict[str, Any], units: tuple[str, ...], slots: dict[str, str], s
         lot=scores.lot,
         inside=scores.inside,
         size=scores.size.reshape(-1),
+        tempco=scores.tempco,
         floor=scores.floor,
     )

@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from demonstrations import wafer_line
 from each import each
@@ -178,3 +179,23 @@ def test_what_no_effect_is_like_is_said_with_its_map(tmp_path: Path, monkeypatch
     assert document_of(*options)["unexplained"] == said["unexplained"]  # as found the night before
     assert "no effect of the catalogue is like it" in page.read_text("utf-8")
     assert "differs by wafer, most in W02" in given(*options)[1]
+
+
+def test_a_thermometer_that_is_off_in_one_soak_is_no_effect_of_the_sensors(tmp_path: Path) -> None:
+    """It reads 0.4 K too much in the cold; the devices' biases follow their temperature by 40 µg/K rms, either way."""
+
+    class Misread(Line):
+        def lot(self, station: str) -> tuple[pd.DataFrame, pd.DataFrame]:
+            dwells, about = super().lot(station)
+            dwells.loc[dwells["chamber_C"] < 0.0, "unit_C"] += 0.4
+            return dwells, about
+
+    made = write_lots(tmp_path, Misread(19, hidden=None), 50)
+    options = ("discover", "--archive", made.folder, "--workers", "1")
+    said = document_of(*options)
+    (row,) = said["discoveries"]
+    assert (row["driver"], row["scope"], row["kind"]) == ("own temperature coefficient", "thermometer", "slope")
+    assert "bias_temperature_quadratic" in row["effects"]
+    # 0.4 K in a third of the dwells, less what the linear coefficient takes of it, times 40 µg/K
+    assert row["interval_ug"][0] < 0.4 * 40.0 * np.sqrt(6.0) / 6.0 / np.sqrt(3.0) < row["interval_ug"][1]
+    assert "of the thermometer" in text_of(*options, "--explain", row["id"])

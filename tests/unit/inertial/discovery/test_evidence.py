@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from inertial.discovery.evidence import FIRST, INSIDE, Evidence, ScoredLot, Sums
+from inertial.discovery.evidence import ALL, FIRST, INSIDE, SLOPE, Evidence, ScoredLot, Sums
 
 UNITS, COUNT = 6, 9
 NEEDED = float(np.log(COUNT * 8 / 0.05))
@@ -150,3 +150,25 @@ def test_the_first_lots_are_held_back() -> None:
     assert made.drivers == {}
     made.add(lots(4, FIRST)[-1])
     assert "mean" in made.drivers
+
+
+def test_a_number_that_differs_by_axis_is_judged_inside_the_lot() -> None:
+    scale = 0.05
+    rng = np.random.default_rng(21)
+
+    def sloped(lot: ScoredLot, _: int) -> ScoredLot:
+        numbers = rng.standard_normal((UNITS, COUNT))
+        return replace(added(lot, scale * numbers[:, 2]), slopes={"number": numbers})
+
+    made = evidence_of(lots(7, 220, sloped))
+    log_e = made.drivers["number" + INSIDE].log_e
+    assert int(np.argmax(log_e)) == 2
+    assert log_e[2] > NEEDED
+    assert np.delete(log_e, 2).max() < NEEDED
+    sums = made.levels["number" + INSIDE]
+    slope, every = sums.place[SLOPE], sums.place[ALL]
+    error = 1.0 / np.sqrt(sums.information[slope, 2])
+    assert sums.score[slope, 2] / sums.information[slope, 2] == pytest.approx(scale, abs=4.0 * error)
+    assert np.sqrt(sums.information[slope] / sums.information[every]) == pytest.approx(
+        np.full(COUNT, np.sqrt(1.0 - 1.0 / UNITS)), rel=0.1
+    )

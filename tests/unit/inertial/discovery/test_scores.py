@@ -101,3 +101,20 @@ def test_a_size_is_the_rms_that_an_effect_leaves_also_in_outputs_that_wander() -
     coefficients = with_it[0] / with_it[1] - before[0] / before[1]
     found = np.abs(coefficients) * sprung.size[:, k]
     np.testing.assert_allclose(found, 1e-6 * FLOOR_UG * np.abs(size), rtol=0.15)
+
+
+def test_the_temperature_coefficient_of_a_bias_is_that_of_the_fit() -> None:
+    lot = lot_of(15)
+    out, warm = np.moveaxis(lot.output, -1, 1), lot.state.temperature[:, None] - 25.0
+    force = np.broadcast_to(lot.state.force, lot.output.shape)
+    columns = np.stack([np.ones_like(warm[:, 0]), *np.moveaxis(force, -1, 0), warm[:, 0]], axis=-1)
+    scores = scores_of(lot, EFFECTS, [catalogue.get("third_order")])
+    for unit in range(8):
+        for axis in range(3):
+            design = np.column_stack([columns[unit], warm[unit, 0] * columns[unit, :, 1 + axis]])
+            plain = np.linalg.lstsq(design, out[unit, axis], rcond=None)[0][4]
+            assert scores.tempco[unit, axis] == pytest.approx(
+                plain, abs=1.5e-6
+            )  # 12 µg of wander over 70 K, of 40 µg/K
+    without = scores_of(lot, ["bias", "scale", "misalignment"], [catalogue.get("third_order")])
+    assert np.isnan(without.tempco).all()

@@ -18,7 +18,8 @@ def made(run: str, size: float, rng: np.random.Generator) -> ScoredRun:
     return ScoredRun(
         run, "2026-03-02T10:00:00+00:00", "line-1", "DEMO", "bias,scale", "", "", tuple("abcd"), tuple("1234"),
         tuple((f"effect{k}", 0) for k in range(K)), (("level", 0),), z * np.sqrt(own), own,
-        own.sum(axis=0) * rng.uniform(0.06, 1.0, 3 * K), np.ones((2, 1)), products, products, np.ones(3 * K), 1e-5,
+        own.sum(axis=0) * rng.uniform(0.06, 1.0, 3 * K), np.ones((2, 1)), products, products, np.ones(3 * K),
+        40e-6 * rng.standard_normal((UNITS, 3)), 1e-5,
     )  # fmt: skip
 
 
@@ -37,4 +38,5 @@ def test_scores_keep_a_thirtieth_of_their_standard_deviation_and_information_a_h
         assert np.all(np.abs(near - exact)[seen] <= 1.0 / 28.0 + 0.006 * np.abs(exact)[seen])
         assert kept.own == pytest.approx(run.own, rel=0.01)
         assert kept.information == pytest.approx(run.information, rel=0.012)
+        assert kept.tempco == pytest.approx(run.tempco, rel=1e-3)
         assert (kept.units, kept.columns, kept.of_station) == (run.units, run.columns, run.of_station)
