@@ -139,7 +139,7 @@ class ArchiveMaker:
             "supplier": tuple(f"s{k}" for k in rng.integers(0, 3, UNITS)),
             "season": (f"month {(number // A_NIGHT // 30) % 12}",) * UNITS,
         }
-        information = np.diagonal(one.lot, axis1=1, axis2=2).reshape(-1)
+        information = np.diagonal(one.lot).copy()
         return ScoredLot(
             f"{number}",
             f"s{station}",
@@ -159,7 +159,8 @@ class ArchiveMaker:
         coefficient = size * self.floor / np.maximum(self.size[:, k], 1e-300)
         mean = coefficient.mean(axis=0)
         inside = np.einsum("ak,ua->uak", one.inside[:, :, k], coefficient - mean)
-        return inside + one.lot[:, :, k] * mean[:, None] / UNITS
+        common = one.lot[:, np.arange(3) * len(self.columns) + k] @ mean
+        return inside + common.reshape(3, -1) / UNITS
 
 
 class _State:

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from inertial import effects as effects_catalogue
 from inertial.arrays import Array, Places
@@ -74,13 +75,13 @@ class Pool:
     ----------
     columns : (k,) effect and number of its column; hypotheses are axes × columns
     size : (h,), rms in a dwell of a coefficient of one, g
-    lot, inside : (m, k, k), correlations of the columns' information in sums of lots, and inside a lot
+    lot : (h, h), correlations of the columns' information in sums of lots · inside : (m, k, k), the same inside a lot
     """
 
     def __init__(self, columns: Sequence[tuple[str, int]], size: Array, lot: Array, inside: Array) -> None:
         self.columns, self.size = tuple(columns), size
         self.lot, self.inside = _correlation(lot), _correlation(inside)
-        self.axes = len(lot)
+        self.axes = len(inside)
 
     def names(
         self, lots: Sequence[ScoredLot], alarms: Iterable[tuple[str, str]], needed: float
@@ -152,17 +153,16 @@ class Pool:
 
     def _fitted(self, driver: str, effect: str, sums: DriverSums) -> tuple[Array, Array]:
         """Sizes (axes, levels, p) of a driver's levels, the columns of an effect together, and their covariances."""
-        at, count = self.places(effect), len(self.columns)
-        centred, products = about_common(driver, sums), self.inside if sums.mixed else self.lot
-        sizes, covariances = list[Array](), list[Array]()
-        for axis in range(self.axes):
-            here = axis * count + at
-            inner = np.linalg.pinv(products[axis][np.ix_(at, at)], rcond=_SEEN, hermitian=True)
-            root = np.sqrt(np.maximum(sums.information[:, here], 0.0))
-            scale = over(np.ones_like(root), root)
-            sizes.append(scale * (over(centred[:, here], root) @ inner))
-            covariances.append(scale[:, :, None] * inner * scale[:, None, :])
-        return np.stack(sizes), np.stack(covariances)
+        here, centred = self._everywhere(effect), about_common(driver, sums)
+        inner = self._inner(sums, effect, _SEEN)
+        root = np.sqrt(np.maximum(sums.information[:, here], 0.0))
+        scale = over(np.ones_like(root), root)
+        sizes = scale * (over(centred[:, here], root) @ inner)
+        whole = (scale[:, :, None] * inner * scale[:, None, :]).reshape(
+            len(root), self.axes, -1, self.axes, here.size // self.axes
+        )
+        covariances = np.stack([whole[:, axis, :, axis] for axis in range(self.axes)])
+        return np.moveaxis(sizes.reshape(len(root), self.axes, -1), 1, 0), covariances
 
     def _in_order(
         self,
@@ -182,7 +182,7 @@ class Pool:
         effect, driver = new.effects[0], new.drivers[0]
         for name in found:
             little = new.score < _REMAINDER * name.score
-            cosines = self.lot[:, self.places(effect)][:, :, self.places(name.effects[0])]
+            cosines = self.lot[np.ix_(self._everywhere(effect), self._everywhere(name.effects[0]))]
             alike = set(new.effects) & set(name.effects) or np.abs(cosines).max() > _ALIKE
             if (alike and (little or driver in {MEAN, name.drivers[0]})) or (little and driver == name.drivers[0]):
                 return True
@@ -284,15 +284,17 @@ class Pool:
         if not weights.any():
             return lot
         score = lot.score.copy()
+        root, everywhere = np.sqrt(np.maximum(lot.information, 0.0)), self._everywhere(effect)
+        in_common: list[Array] = []
         for axis in range(self.axes):
             here, every = axis * count + at, axis * count + np.arange(count)
             of_units = weights @ sizes[axis]  # (units, p)
             own = np.sqrt(np.maximum(lot.own[:, every], 0.0))
             total = np.maximum(lot.own[:, here].sum(axis=0), 1e-300)
-            common = (of_units * lot.own[:, here]).sum(axis=0) / total
-            root = np.sqrt(np.maximum(lot.information[every], 0.0))
-            score[:, every] -= own * (((of_units - common) * own[:, at]) @ self.inside[axis][at])
-            score[:, every] -= root * ((common * root[at]) @ self.lot[axis][at]) / units
+            in_common.append((of_units * lot.own[:, here]).sum(axis=0) / total)
+            score[:, every] -= own * (((of_units - in_common[-1]) * own[:, at]) @ self.inside[axis][at])
+        # errors of the station, which are free, join the axes
+        score -= root * ((np.concatenate(in_common) * root[everywhere]) @ self.lot[everywhere]) / units
         return replace(lot, score=score)
 
     def with_effect(self, lot: ScoredLot, effect: str) -> ScoredLot:
@@ -301,15 +303,10 @@ class Pool:
         sums, share = lot.score.sum(axis=0), lot.own / lot.total
         left, own, information = lot.inside[0].copy(), lot.own.copy(), lot.information.copy()
         for axis in range(self.axes):
-            here, every = axis * count + at, axis * count + np.arange(count)
-            for products, values, info in ((self.inside, left, own), (self.lot, sums[None], information[None])):
-                inner = np.linalg.pinv(products[axis][np.ix_(at, at)], rcond=1e-6, hermitian=True)
-                root = np.sqrt(np.maximum(info[:, every], 0.0))
-                z = over(values[:, every], root)[:, at]
-                values[:, every] -= root * (z @ inner @ products[axis][at])
-                covered = np.einsum("jp,pq,qj->j", products[axis][:, at], inner, products[axis][at])
-                info[:, every] *= np.where(covered > 1.0 - _SEEN, 0.0, np.clip(1.0 - covered, 0.0, 1.0))
-                values[:, here], info[:, here] = 0.0, 0.0
+            every = axis * count + np.arange(count)
+            left[:, every], own[:, every] = _beside(left[:, every], own[:, every], self.inside[axis], at)
+        of_sums = _beside(sums[None], information[None], self.lot, self._everywhere(effect))
+        sums, information = (one[0] for one in of_sums)
         score = np.where(own > 0.0, left + share * sums, 0.0)
         return replace(lot, score=score, own=own, information=information)
 
@@ -317,30 +314,34 @@ class Pool:
         """Columns of an effect, (p,)."""
         return np.array([k for k, (one, _) in enumerate(self.columns) if one == effect], dtype=np.intp)
 
+    def _everywhere(self, effect: str) -> Places:
+        """Hypotheses of an effect, (axes·p,), axis by axis."""
+        return (np.arange(self.axes)[:, None] * len(self.columns) + self.places(effect)).reshape(-1)
+
+    def _inner(self, sums: DriverSums, effect: str, least: float) -> Array:
+        """Inverse of the correlations of an effect's hypotheses, (axes·p, axes·p), for a driver."""
+        at, here = self.places(effect), self._everywhere(effect)
+        if sums.mixed:
+            among = np.asarray(block_diag(*self.inside[:, at[:, None], at]), dtype=np.float64)
+        else:
+            among = self.lot[np.ix_(here, here)]
+        return np.linalg.pinv(among, rcond=least, hermitian=True).astype(np.float64)
+
     def scores(self, name: str, sums: DriverSums) -> dict[str, float]:
         """Score of every effect for a driver."""
         out: dict[str, float] = {}
         for effect in self.effects:
-            at = self.places(effect)
-            drop, rank = self._drop(name, sums, at)
+            drop, rank = self._drop(name, sums, effect)
             k = float(np.sum(rank) - (np.count_nonzero(rank) if name in INSIDE_ONLY else 0))
             out[effect] = max(drop - k * (1.0 + np.log(drop / k)), 0.0) if k > 0.0 and drop > k else 0.0
         return out
 
-    def _drop(self, name: str, sums: DriverSums, at: Places) -> tuple[float, Array]:
-        """Fall of the misfit by an effect's columns, and the number of coefficients of each axis and column."""
-        count = len(self.columns)
-        total, rank = 0.0, np.zeros((self.axes, at.size))
-        products = self.inside if sums.mixed else self.lot
-        centred = about_common(name, sums)
-        for axis in range(self.axes):
-            here = axis * count + at
-            info = sums.information[:, here]
-            rank[axis] = (info > 0.0).sum(axis=0)
-            z = over(centred[:, here], np.sqrt(np.maximum(info, 0.0)))
-            inner = np.linalg.pinv(products[axis][np.ix_(at, at)], rcond=1e-6, hermitian=True)
-            total += float(np.einsum("gp,pq,gq->", z, inner, z))
-        return total, rank
+    def _drop(self, name: str, sums: DriverSums, effect: str) -> tuple[float, Array]:
+        """Fall of the misfit by an effect's columns, and the number of coefficients of each hypothesis."""
+        here = self._everywhere(effect)
+        info = sums.information[:, here]
+        z = over(about_common(name, sums)[:, here], np.sqrt(np.maximum(info, 0.0)))
+        return float(np.einsum("gp,pq,gq->", z, self._inner(sums, effect, 1e-6), z)), (info > 0.0).sum(axis=0)
 
     def _rank(self, effect: str, behind: float, top: float) -> tuple[bool, int, int, float]:
         """Order in a class: of those that inexact columns do not tell apart the simplest is first."""
@@ -382,12 +383,23 @@ def _imitations(names: Sequence[Name], of_pose: Sequence[Mapping[str, float]], n
     return out
 
 
+def _beside(values: Array, information: Array, products: Array, at: Places) -> tuple[Array, Array]:
+    """Scores and information (n, h) beside the columns ``at``, whose coefficients are free, by correlations (h, h)."""
+    inner = np.linalg.pinv(products[np.ix_(at, at)], rcond=1e-6, hermitian=True)
+    root = np.sqrt(np.maximum(information, 0.0))
+    values = values - root * (over(values, root)[:, at] @ inner @ products[at])
+    covered = np.einsum("jp,pq,qj->j", products[:, at], inner, products[at])
+    information = information * np.where(covered > 1.0 - _SEEN, 0.0, np.clip(1.0 - covered, 0.0, 1.0))
+    values[:, at], information[:, at] = 0.0, 0.0
+    return values, information
+
+
 def _of_units(lot: ScoredLot, driver: str, sums: DriverSums) -> Array:
     """Sizes (units, h) that the sums of a driver predict for the units of a lot."""
     return weights_of(lot, driver, sums) @ over(about_common(driver, sums), sums.information)
 
 
 def _correlation(products: Array) -> Array:
-    """Products (m, k, k) over the roots of their diagonals; zero where nothing is seen."""
-    root = np.sqrt(np.maximum(np.diagonal(products, axis1=1, axis2=2), 0.0))
-    return over(products, root[:, :, None] * root[:, None, :])
+    """Products (..., k, k) over the roots of their diagonals; zero where nothing is seen."""
+    root = np.sqrt(np.maximum(np.diagonal(products, axis1=-2, axis2=-1), 0.0))
+    return over(products, root[..., :, None] * root[..., None, :])

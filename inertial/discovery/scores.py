@@ -10,6 +10,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from inertial import effects as catalogue
 from inertial.arrays import Array
@@ -41,7 +42,7 @@ class LotScores:
     columns : (k,) effect and number of its column, of the sensor; station : (q,) the same of the station
     axes : letters' places of the m axes
     score : (units, m, k), errors of the station taken out · own : (units, m, k), information before that
-    lot : (m, k, k), information of the sums over the units, errors of the station taken out
+    lot : (m·k, m·k), information of the sums over the units, errors of the station taken out: they join the axes
     inside : (m, k, k), mean information of a unit before that
     station_score, station_information : (q,), of the columns of the station, each alone
     tempco : (units, m), temperature coefficients of the biases that the model has, g/K; nan without
@@ -136,10 +137,11 @@ def _scored(
     units = len(left) // m
     summed = cross.reshape(units, m, *cross.shape[1:]).sum(axis=0)  # (m, k, q), over the units
     lots = own.reshape(units, m, k, k).sum(axis=0)
-    less = lots - summed @ inverse @ np.swapaxes(summed, -1, -2)
-    before, after = (np.diagonal(each, axis1=1, axis2=2) for each in (lots, less))
-    told = after > LEAST_LEFT * before
-    less = less * (told[:, :, None] & told[:, None, :])
+    joined = summed.reshape(m * k, -1)
+    less = block_diag(*lots) - joined @ inverse @ joined.T
+    before = np.diagonal(lots, axis1=1, axis2=2)
+    told = np.diagonal(less).reshape(m, k) > LEAST_LEFT * before
+    less = less * np.outer(told, told)
     # every dwell with the same weight: what wander takes from the information of a column, it does not take from the output
     plain = np.diagonal(model.even.products(Candidate(local[:, :, None], shared=False)).left[:, 0], axis1=1, axis2=2)
     rms = np.sqrt(np.maximum(plain, 0.0) * visible[:, :k] * problem.covariance.white / problem.n)

@@ -87,13 +87,14 @@ class Findings:
         """The columns and their products, means over the archive."""
         columns, k = self.state.columns, len(self.state.columns)
         place = {column: at for at, column in enumerate(columns)}
-        lot, inside, size = np.zeros((AXES, k, k)), np.zeros((AXES, k, k)), np.zeros((AXES, k))
+        lot, inside, size = np.zeros((AXES * k, AXES * k)), np.zeros((AXES, k, k)), np.zeros((AXES, k))
         weight = np.zeros(k)
         for product in self.source.store.products:
             at = np.array([place[column] for column in product.columns if column in place])
             if at.size != len(product.columns):
                 continue
-            lot[:, at[:, None], at] += product.runs * product.lot
+            here = (np.arange(AXES)[:, None] * k + at).reshape(-1)
+            lot[np.ix_(here, here)] += product.runs * product.lot
             inside[:, at[:, None], at] += product.runs * product.inside
             size[:, at] += product.runs * product.size.reshape(AXES, -1)
             weight[at] += product.runs

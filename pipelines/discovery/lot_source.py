@@ -18,7 +18,7 @@ from pipelines.archive.locks import alone
 from pipelines.archive.store import Place
 from pipelines.certificates.ledger import Ledger
 from pipelines.discovery.attributes import Attributes, as_numbers, known_attributes
-from pipelines.discovery.score_store import FOLDER, ScoreStore
+from pipelines.discovery.score_store import AXES, FOLDER, ScoreStore
 from pipelines.discovery.scored_run import ScoredRun
 from pipelines.parallel import Distributor
 from pipelines.tables.dwells import measured
@@ -26,7 +26,6 @@ from schemas.errors import WrongUse, did_you_mean
 
 Column = tuple[str, int]
 
-AXES = 3
 SEASON, OPERATOR = "season", "operator"
 OWN_TEMPCO = "own temperature coefficient"
 """A driver: what a unit's thermometer has wrong, its output has wrong by this."""

@@ -37,13 +37,15 @@ _SHARE_STEPS = 58.0  # of what the station leaves of the information, an octave:
 _MEAN_STEPS = 256.0  # of information, an octave
 _FINE, _LINEAR = 16.0, 64.0  # steps of a score a standard deviation, up to so many of them; relative ones beyond
 _NOTHING = -(2**15)
+AXES = 3
+_WITHIN, _ACROSS = 2048.0, 256.0  # steps of a correlation of columns of one axis, and of two
 MOST_OPEN = 32  # files whose rows are kept in memory: units that come again were often measured together
 BATCH = 8  # runs that one process scores at a time
 
 
 @dataclass(frozen=True)
 class Products:
-    """Means over the runs of a file: correlations of columns, sums of lots and inside lots (m, k, k), and sizes (m·k,)."""
+    """Means over runs: correlations of columns in sums of lots (m·k, m·k) and inside lots (m, k, k), and sizes (m·k,)."""
 
     columns: tuple[tuple[str, int], ...]
     of_station: tuple[tuple[str, int], ...]
@@ -215,7 +217,7 @@ def _packed(name: str, run: ScoredRun) -> bytes:
 
 def _planes(values: NDArray[np.int16]) -> bytes:
     """Numbers of two bytes, all high ones first: they are nearly the same, and are compressed away."""
-    return values.view(np.uint8).reshape(-1, 2).T[::-1].tobytes()
+    return np.ascontiguousarray(values).view(np.uint8).reshape(-1, 2).T[::-1].tobytes()
 
 
 def _of_planes(data: bytes) -> Array:
@@ -233,15 +235,27 @@ def _of_logarithms(code: NDArray[np.uint8], steps: float, one: int) -> Array:
     return np.where(code > 0, 2.0 ** ((code.astype(np.float64) - one) / steps), 0.0)
 
 
-def _products_of(runs: Sequence[ScoredRun]) -> dict[str, Array]:
+def _products_of(runs: Sequence[ScoredRun]) -> dict[str, NDArray[Any]]:
     arrays = {name: np.mean([getattr(run, name) for run in runs], axis=0) for name in ("lot", "inside", "size")}
-    k = arrays["lot"].shape[-1]
-    upper = np.triu_indices(k)
-    out = {"size": arrays["size"].astype(np.float32)}
-    for name in ("lot", "inside"):
-        root = np.sqrt(np.maximum(np.diagonal(arrays[name], axis1=1, axis2=2), 1e-300))
-        out[name] = (arrays[name] / (root[:, :, None] * root[:, None, :]))[:, upper[0], upper[1]].astype(np.float16)
-    return out
+    k, whole = arrays["inside"].shape[-1], _correlated(arrays["lot"])
+    upper, lot = np.triu_indices(k), whole.reshape(AXES, k, AXES, k)
+    within = np.stack([lot[axis, :, axis] for axis in range(AXES)])
+    across = np.stack([lot[axis, :, axis - 1] for axis in range(AXES)])
+    return {
+        "size": arrays["size"].astype(np.float32),
+        "within": _steps_of(within[:, *upper], _WITHIN),
+        "across": _steps_of(across, _ACROSS),
+        "inside": _steps_of(_correlated(arrays["inside"])[:, *upper], _WITHIN),
+    }
+
+
+def _correlated(products: Array) -> Array:
+    root = np.sqrt(np.maximum(np.diagonal(products, axis1=-2, axis2=-1), 1e-300))
+    return products / (root[..., :, None] * root[..., None, :])
+
+
+def _steps_of(correlations: Array, steps: float) -> NDArray[np.uint8]:
+    return np.frombuffer(_planes(np.round(steps * correlations).astype("<i2")), dtype=np.uint8)
 
 
 class _Content(NamedTuple):
@@ -270,14 +284,18 @@ def _unfolded(
     name: str, columns: tuple[tuple[str, int], ...], station: tuple[tuple[str, int], ...], runs: int, arrays: Any
 ) -> Products:
     k = len(columns)
-    upper, both = np.triu_indices(k), dict[str, Array]()
-    for kind in ("lot", "inside"):
-        flat = arrays[f"{name}/{kind}"].astype(np.float64)
-        square = np.zeros((len(flat), k, k))
-        square[:, upper[0], upper[1]] = flat
-        square[:, upper[1], upper[0]] = flat
-        both[kind] = square
-    return Products(columns, station, both["lot"], both["inside"], arrays[f"{name}/size"].astype(np.float64), runs)
+    upper, lot = np.triu_indices(k), np.zeros((AXES, k, AXES, k))
+    inside, within = np.zeros((2, AXES, k, k))
+    for kind, square in (("inside", inside), ("within", within)):
+        flat = _of_planes(arrays[f"{name}/{kind}"].tobytes()).reshape(AXES, -1) / _WITHIN
+        square[:, *upper] = flat
+        square[:, *upper[::-1]] = flat
+    across = _of_planes(arrays[f"{name}/across"].tobytes()).reshape(AXES, k, k) / _ACROSS
+    for axis in range(AXES):
+        lot[axis, :, axis] = within[axis]
+        lot[axis, :, axis - 1], lot[axis - 1, :, axis] = across[axis], across[axis].T
+    size = arrays[f"{name}/size"].astype(np.float64)
+    return Products(columns, station, lot.reshape(AXES * k, AXES * k), inside, size, runs)
 
 
 def _run_of(row: dict[str, Any], names: dict[str, Any]) -> ScoredRun:

@@ -25,7 +25,7 @@ class ScoredRun:
 
     left_out : why it is not pooled; empty where it is · columns : of the sensor, then of the station
     score, own : (units, m·k); information : (m·k,) · station : (2, q), scores and information
-    lot, inside : (m, k, k), correlations of the columns · size : (m·k,) · floor : g
+    lot : (m·k, m·k), inside : (m, k, k), products of the columns · size : (m·k,) · floor : g
     tempco : (units, m), g/K, of the biases; nan without one
     """
 
@@ -127,7 +127,7 @@ def _kept(head: dict[str, Any], units: tuple[str, ...], slots: dict[str, str], s
         of_station=scores.station,
         score=scores.score.reshape(count, -1),
         own=scores.own.reshape(count, -1),
-        information=np.diagonal(scores.lot, axis1=1, axis2=2).reshape(-1).copy(),
+        information=np.diagonal(scores.lot).copy(),
         station_scores=np.stack([scores.station_score, scores.station_information]),
         lot=scores.lot,
         inside=scores.inside,
