@@ -52,7 +52,7 @@ PARTS = {
     "bias_stability": f"lasting_s = 1000.0\nrate_hz = 2.0\nscale = {SF1500}",
     "warm_up": f"band_ug = 3000.0\noff_s = 60.0\nlasting_s = 120.0\nscale = {SF1500}",
     "turn_on": f"cycles = 3\noff_s = 10.0\nwarm_up_s = 1.0\nwindow_s = 5.0\nscale = {SF1500}",
-    "exposure": f"low_C = 15.0\nhigh_C = 35.0\ncycles = 1\nwindow_s = 2.0\nscale = {SF1500}",
+    "exposure": f'profile = "mil_std_810_altitude"\nwindow_s = 2.0\nscale = {SF1500}',
     "sweep": f"low_hz = 20.0\nhigh_hz = 6000.0\nper_octave = 2\nnominal_scale = {SF1500}\nlevel_g = 2.0\nrecord_s = 0.1",
     "transverse": f"step_deg = 45.0\nrecord_s = 0.1\nscale = {SF1500}",
     "ratiometry": "supplies_V = [12.0, 10.5, 13.0]\ndwell_s = 5.0\nsettle_s = 1.0",
