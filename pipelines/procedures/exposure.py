@@ -13,6 +13,7 @@ from inertial.errors import NotIdentified
 from inertial.frames import force_from_angles
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace, level
 from pipelines.procedures.base import InG, OnEquipment, RecordByRecord, scale_of
+from pipelines.procedures.climate import LEG, ROLE, expose
 from pipelines.procedures.exposure_reduction import Slope, corrected, force_of, in_environment
 from pipelines.procedures.exposure_steps import (
     AFTER,
@@ -20,8 +21,6 @@ from pipelines.procedures.exposure_steps import (
     BETWEEN,
     DRY,
     FACES,
-    LEG,
-    ROLE,
     ExposurePart,
     steps_of,
 )
@@ -100,11 +99,7 @@ class Exposure(InG, OnEquipment, RecordByRecord):
 
     def measure(self, equipment: Any, step: ProcedureStep, slots: Sequence[int]) -> Any:
         """One leg of the profile."""
-        one = step.setting
-        humidity = one["humidity_pct"] or None
-        return equipment.expose(
-            step.temperature_C, humidity, one["pressure_hPa"], one["change_s"], one["hold_s"], slots
-        )
+        return expose(equipment, step, slots)
 
     def points(self, part: ExposurePart, taken: Taken, device: Device) -> list[dict[str, Any]]:
         """Mean of a record in µg with its time, temperature and force, and the noise of its samples; of a leg what it was."""

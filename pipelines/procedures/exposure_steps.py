@@ -1,14 +1,14 @@
 """The part of a recipe for an exposure, and its records: six poses before, during and after, and the legs of the profile."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
 from pipelines.procedures.base import NominalScale
-from pipelines.procedures.recorded import ProcedureStep, at_rest
+from pipelines.procedures.climate import MINUTE_S, Leg, leg_step
+from pipelines.procedures.recorded import ProcedureStep
 from schemas.bounds import Positive
 from schemas.errors import RecipeInvalid
 from schemas.exposure_profile import (
@@ -32,23 +32,9 @@ FACES = {
 BEFORE, BETWEEN, AFTER = "before", "exposure", "after"
 DRY = "dry"
 """Poses at the temperatures of the exposure, in the air of the room before it."""
-LEG = "leg"
 SAME_K = 1.0
 """Within which two temperatures are one."""
-MINUTE_S = 60.0
-ROLE = "climate"
 Celsius = Annotated[float, Field(ge=-100.0, le=200.0)]
-
-
-@dataclass(frozen=True)
-class Leg:
-    """A leg with its levels: °C, % (None: that of the room), hPa, and seconds for the change and the hold."""
-
-    temperature_C: float
-    humidity_pct: float | None
-    pressure_hPa: float
-    change_s: float
-    hold_s: float
 
 
 class ExposurePart(NominalScale):
@@ -157,30 +143,19 @@ def steps_of(part: ExposurePart) -> list[ProcedureStep]:
             for k, (face, (outer, inner)) in enumerate(list(FACES.items()) * times)
         )
 
-    def leg(name: str, one: Leg) -> None:
-        setting = {
-            "humidity_pct": one.humidity_pct or 0.0, "pressure_hPa": one.pressure_hPa,
-            "change_s": one.change_s, "hold_s": one.hold_s,
-        }  # fmt: skip
-        steps.append(
-            ProcedureStep(
-                f"{LEG} {name}", at_rest(ROLE), one.temperature_C, lasting_s=one.change_s + one.hold_s,
-                soak=steps[-1].soak + 1, settled=False, role=ROLE, setting=setting,
-            )
-        )  # fmt: skip
-
     for at in part.dry():
         poses(f"{DRY} {at:g}", at)
     poses(BEFORE, part.temperature_C, part.repeats)
     change_s = MINUTE_S
     for name, stated, one in part.legs():
         if stated.by_unit:
-            leg(name, one)
+            steps.append(leg_step(name, one, steps[-1].soak + 1))
             change_s = max(change_s, one.change_s)
         if stated.measured:
             poses(name, one.temperature_C)
     if part.stated.by_unit:
         hold_s = MINUTE_S * part.stated.recovery_min
-        leg("recovery", Leg(part.temperature_C, None, AMBIENT_HPA, change_s, hold_s))
+        rest = Leg(part.temperature_C, None, AMBIENT_HPA, change_s, hold_s)
+        steps.append(leg_step("recovery", rest, steps[-1].soak + 1))
     poses(AFTER, part.temperature_C, part.repeats)
     return steps

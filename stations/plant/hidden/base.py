@@ -57,6 +57,10 @@ class HiddenEffect:
     def power(self, now: float, *, on: bool) -> None:
         """The supply of the devices is switched at ``now`` s; it is on at the start."""
 
+    def sprung(self, temperature: Array, pressure: float) -> tuple[Array, Array]:
+        """Factors of natural frequency and damping ratio (s,) at °C (s,) and hPa, over those at 25 °C and 1013 hPa."""
+        return np.ones_like(temperature), np.ones_like(temperature)
+
     def output(self, force: Array, block: Block) -> Array | float:
         """Addition to the outputs, (n, s, 3) or (n, 1, 1), g, under ``force`` (n, s, 3)."""
         return 0.0
