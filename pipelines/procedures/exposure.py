@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from inertial.arrays import Array
+from inertial.arrays import Array, Flags
 from inertial.dynamics.exposure import ExposureShift, exposure_shift
 from inertial.dynamics.stability import error_of_mean, short_noise
 from inertial.errors import NotIdentified
@@ -130,7 +130,7 @@ class Exposure(InG, OnEquipment, RecordByRecord):
         texts = dict[str, str]()
         legs = rows[rows["series"] == LEG]
         if len(legs):
-            most = legs.loc[legs["value"].idxmax()]
+            most = legs.iloc[int(legs["value"].to_numpy(dtype=float).argmax())]
             away = f"{most['value']:.0f} µg, axis {most['axis']}"
             texts["in the legs"] = f"largest departure of the output at rest from the beginning of a leg: {away}"
         for axis, own in rows[rows["series"] != LEG].groupby("axis", sort=False):
@@ -209,7 +209,7 @@ def _leg_rows(taken: Taken, output: Array) -> list[dict[str, Any]]:
     )
 
 
-def _shift(part: ExposurePart, rows: pd.DataFrame, values: Array, later: Array, axis: str) -> ExposureShift:
+def _shift(part: ExposurePart, rows: pd.DataFrame, values: Array, later: Flags, axis: str) -> ExposureShift:
     time = rows["setting"].to_numpy(dtype=float)
     window = float(np.ptp(time[~later])) + part.window_s
     apart = float(time[later].mean() - time[~later].mean())
@@ -223,7 +223,7 @@ def _add(
     shift: ExposureShift,
     slope: Slope,
     rows: pd.DataFrame,
-    later: Array,
+    later: Flags,
 ) -> None:
     """The figures of a shift, with the error of the correction for the difference of temperature in U."""
     temperature = rows["temperature"].to_numpy(dtype=float)

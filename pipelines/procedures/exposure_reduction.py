@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from inertial.arrays import Array
+from inertial.arrays import Array, Flags
 from inertial.dynamics.exposure import temperature_slope
 from inertial.errors import NotIdentified
 from pipelines.procedures.exposure_steps import AFTER, BEFORE, BETWEEN, DRY, FACES, SAME_K
@@ -57,13 +57,13 @@ def corrected(rows: pd.DataFrame, *, plain: bool) -> Corrected:
     return Corrected(still, slope.to_one(still, output), slope, "")
 
 
-def in_environment(rows: pd.DataFrame, slope: Slope) -> list[tuple[pd.DataFrame, Array, Array]]:
+def in_environment(rows: pd.DataFrame, slope: Slope) -> list[tuple[pd.DataFrame, Array, Flags]]:
     """For each soak of one axis in the environment its records beside those in the room's air at its temperature.
 
     Values (n,) are at the mean temperature of the soak; flags (n,) say which records are in the environment.
     """
     inside, dry = rows[rows["series"] == BETWEEN], rows[rows["series"].isin([BEFORE, DRY])]
-    pairs: list[tuple[pd.DataFrame, Array, Array]] = []
+    pairs: list[tuple[pd.DataFrame, Array, Flags]] = []
     for start in range(0, len(inside), len(FACES)):
         own = inside.iloc[start : start + len(FACES)]
         at = float(own["temperature"].mean())

@@ -189,6 +189,10 @@ class World:
         self._supplies.factor[list(units)] = factor
         self.physics.devices.supply(self._supplies.factor)
 
+    def set_ripple(self, volt: float, hertz: float) -> None:
+        """Puts a sine of ``volt`` V (peak) at ``hertz`` Hz on the supplies of all units."""
+        self.physics.devices.ripple = (volt / self.preset.supply_V, hertz)
+
     def truth(self, serial: str) -> Truth:
         """The true parameters of a unit; for tests and benchmarks, never for a client."""
         return self._truths[self.serials.index(serial)]

@@ -56,6 +56,7 @@ PARTS = {
     "sweep": f"low_hz = 20.0\nhigh_hz = 6000.0\nper_octave = 2\nnominal_scale = {SF1500}\nlevel_g = 2.0\nrecord_s = 0.1",
     "transverse": f"step_deg = 45.0\nrecord_s = 0.1\nscale = {SF1500}",
     "ratiometry": "supplies_V = [12.0, 10.5, 13.0]\ndwell_s = 5.0\nsettle_s = 1.0",
+    "supply_ripple": f"lasting_s = 2.0\nfrequencies_hz = [100.0, 400.0]\nscale = {SF1500}",
     "step_response": "steps = 8",
     "shock": f"shocks = 1\nwindow_s = 10.0\nsettle_s = 1.0\nscale = {SF1500}",
     "centrifuge": f"record_s = 1.0\nscale = {SF1500}\ndown_again = false",

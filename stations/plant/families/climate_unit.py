@@ -31,9 +31,10 @@ class Unit:
         if line == "STAT?":
             return (f"ABORT,{self._trouble}" if self._trouble else "RUN,-" if running else "DONE,-"), False
         if line == "FILE?":
-            made = self._recorded.get(self._number)
-            there = made is not None and not running
-            return (self._files.write(self._number, lambda: made, self._world.slots, "air") if there else "NONE"), False
+            if running or self._number not in self._recorded:
+                return "NONE", False
+            recorded = self._recorded[self._number]
+            return self._files.write(self._number, lambda: recorded, self._world.slots, "air"), False
         if head in self._set:
             return ("NA:BUSY", False) if running else taken(self._set, head, value)
         if line == "RUN GO":
@@ -69,9 +70,9 @@ class Unit:
             return  # vented before its end
         world, start = self._world, 1e-6 * self._start_us
         count = max(1, int((1e-6 * until_us - start) / RECORD_S))
-        time = start + RECORD_S * (np.arange(count) + 1.0)
+        time = start + RECORD_S * np.arange(1, count + 1, dtype=np.float64)
         world.physics.begin(start, 1.0 / RECORD_S)
-        outputs = world.physics.samples(time, 1.0 / RECORD_S) * world.preset.lsb
+        outputs = world.preset.lsb * world.physics.samples(time, 1.0 / RECORD_S).astype(np.float64)
         fixture = world.fixture
         air = np.column_stack([fixture.air.at(time), fixture.humidity(time), fixture.pressure.at(time)])
         noise = world.bench.stream_at(self._start_us, CHANNEL).standard_normal(air.shape)

@@ -169,7 +169,7 @@ def exposed(profile: str, hidden: Hidden, **keys: Any) -> tuple[Outcome, pd.Data
     )
     config = station_of(preset_overrides=CALM, hidden=[hidden.model_dump()], slot_lag_s=(LAG_S, LAG_S))
     points, device = measured(config, recipe)
-    effect = hidden_effect(hidden.kind, hidden.figures)
+    effect: Any = hidden_effect(hidden.kind, hidden.figures)
     effect.begin(2, stream(lot_of(2).seed, "hidden", 0))
     return outcome(points, device, recipe), points, effect._sign
 
@@ -220,7 +220,8 @@ def test_a_lid_bends_at_altitude_and_what_leaked_out_remains() -> None:
     assert set(points["series"]) == {"dry", "before", "leg", "exposure", "after"}
 
     def bent(difference_hPa: float) -> float:
-        return float(optimize.brentq(lambda w: w + 0.2 * w**3 - 1e-3 * difference_hPa, -2.0, 2.0))
+        root: Any = optimize.brentq(lambda w: w + 0.2 * w**3 - 1e-3 * difference_hPa, -2.0, 2.0)
+        return float(root)
 
     warm = 298.15 / (273.15 + 23.0)
     still = bent(1013.25 * warm - 1013.25)
