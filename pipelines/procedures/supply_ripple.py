@@ -126,10 +126,10 @@ class SupplyRipple(SetsEquipment, InG, RecordByRecord):
         setting = taken.record.step.setting
         output = taken.own.output[:, AXES.index(part.axis)]
         quiet = setting["ripple_V"] == 0.0
-        for hertz in part.frequencies_hz if quiet else [setting["frequency_hz"]]:
+        for k, hertz in enumerate(part.frequencies_hz if quiet else [setting["frequency_hz"]]):
             line = ripple_line(output, taken.own.rate_hz, hertz)
             yield {
-                "unit": taken.unit, "axis": part.axis, "series": "quiet" if quiet else "ripple", "point": taken.number,
+                "unit": taken.unit, "axis": part.axis, "series": "quiet" if quiet else "ripple", "point": taken.number + k,
                 "setting": hertz, "value": line.amplitude, "uncertainty": line.error, "ripple_V": setting["ripple_V"],
                 "scale": float(scale_of(part, device, taken.unit)[AXES.index(part.axis)]),
                 "constant": float(np.ptp(output) == 0.0),

@@ -37,6 +37,7 @@ def outcome(device: str, scale: float, **keys: Any) -> tuple[Outcome, pd.DataFra
     ]
     (part,), made = parts_of(recipe), nominal_device(readings)
     points = RIPPLE.reduce(part, records, made)
+    assert not points.duplicated(["unit", "axis", "series", "point"]).any()
     assert len(RIPPLE.chart(part, points).plots[0].traces) == 2
     return RIPPLE.evaluate(part, points, made), points
 
