@@ -62,7 +62,7 @@ class ExposurePart(NominalScale):
             raise ValueError(
                 f"no exposure profile '{self.profile}', {', '.join(exposure_profiles())} are there; choose one"
             )
-        own = load_exposure_profile(self.profile)
+        own = self.stated
         for key in ("low_C", "high_C", "pressure_hPa"):
             stated, used = getattr(self, key) is not None, key in own.levels()
             if stated and not used:
@@ -82,7 +82,7 @@ class ExposurePart(NominalScale):
     def level(self, key: str) -> float | None:
         """A level of the recipe, or else of the profile."""
         own: float | None = getattr(self, key)
-        return getattr(load_exposure_profile(self.profile), key) if own is None else own
+        return getattr(self.stated, key) if own is None else own
 
     def temperature_of(self, leg: ExposureLeg) -> float:
         """Temperature of a leg, °C."""
