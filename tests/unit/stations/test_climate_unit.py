@@ -1,6 +1,6 @@
 """The climate unit of the simulated station: legs, what it has reached, and what stops it."""
 
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 from typing import Any
 
@@ -18,7 +18,7 @@ ROOM_HPA = 1013.25
 
 
 @contextmanager
-def opened(*faults: FaultOrder) -> Iterator[Any]:
+def opened(*faults: FaultOrder) -> Generator[Any]:
     with open_station(with_faults(load_station(), list(faults)), lot_of(2), roles=["climate"]) as station:
         yield station
 
