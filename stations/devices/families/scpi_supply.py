@@ -26,6 +26,7 @@ class ScpiSupply(Equipment):
         super().__init__(values, clock)
         self._nominal_V = 0.0
         self._changed = True  # the setting after an earlier run is not known
+        self._rippled = False
 
     def set_voltage(self, volt: float) -> float:
         """Sets the voltage, V, and returns its ratio to the nominal one.
@@ -35,6 +36,8 @@ class ScpiSupply(Equipment):
         Raises OperatorNeeded: the measured voltage is not the one that was set.
         """
         self._refuse_beyond(volt, "supplies_V")
+        if self._rippled:
+            self._recall()
         self._changed = True
         self.values.write("voltage", volt)
         self.refuse_error(f"{volt:g} V", REMEDY)
@@ -55,7 +58,8 @@ class ScpiSupply(Equipment):
         Raises OperatorNeeded: the supply does not measure the ripple that was set.
         """
         self._refuse_beyond(self._nominal() + volt, "ripple_V")
-        self._changed = True
+        self.stand_by()  # after records at another voltage, or with another ripple
+        self._changed = self._rippled = True
         self.write_all(ripple_frequency=hertz, ripple=volt)
         self.refuse_error(f"a ripple of {volt:g} V at {hertz:g} Hz", REMEDY)
         self.clock.sleep(SETTLE_S)
@@ -114,7 +118,7 @@ class ScpiSupply(Equipment):
             self.values.write("ripple", 0.0)
         self.write_all(recall=NOMINAL, output="ON")
         self.refuse_error("the nominal setting", REMEDY)
-        self._changed = False
+        self._changed = self._rippled = False
 
     def _forget_errors(self) -> None:
         """Read the errors out that earlier users of the supply left: they are not those of our orders."""
