@@ -37,6 +37,7 @@ SHORT: dict[str, str] = {
     "decision_rates": "--runs 2",
     "noise_verdicts": "verification --records 4",
     "bias_tracking": "--runs 2",
+    "unscented": "--runs 2",
     "recordings": "--runs 4",
     "recording_intervals": "--runs 2",
     "record_faults": "--runs 8",

@@ -25,6 +25,7 @@ KINDS = {
     "centrifuge": "Centrifuges",
     "power_supply": "Power supplies",
     "step_generator": "Generators of steps",
+    "climate": "Climate units",
 }
 MOST_NAMES = 16
 SPACES = {"holding": "", "input": "input register", "coil": "coil", "discrete": "discrete input"}

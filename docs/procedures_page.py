@@ -32,6 +32,7 @@ def page() -> str:
 
 def _section(one: Procedure) -> str:
     roles = ", ".join(f"`{role}`" for role in one.roles) or "table, chamber and reader"
+    roles += "" if type(one).roles_for is Procedure.roles_for else " (`climate` where the part asks for another air)"
     lines = [f"## {one.name}", "", f"{one.title}: {one.states}.", "", f"Source: {one.source}. Station: {roles}.", ""]
     lines += [" ".join((one.part.__doc__ or "").split()), ""]
     if (RECIPES / f"{one.name}.toml").is_file():

@@ -20,7 +20,16 @@ WordOrder = Literal["high_first", "low_first", "high_first_swapped", "low_first_
 RegisterType = Literal["uint16", "int16", "uint32", "int32", "float32", "string", "bit"]
 Space = Literal["holding", "input", "coil", "discrete"]
 Kind = Literal[
-    "axis", "chamber", "reader", "slot", "exciter", "shock_machine", "centrifuge", "power_supply", "step_generator"
+    "axis",
+    "chamber",
+    "reader",
+    "slot",
+    "exciter",
+    "shock_machine",
+    "centrifuge",
+    "power_supply",
+    "step_generator",
+    "climate",
 ]
 Carrier = Literal["tcp", "rtu", "tls", "ascii", "visa"]
 TEXT_CARRIERS: frozenset[Carrier] = frozenset({"ascii", "visa"})

@@ -118,11 +118,13 @@ class Devices(Strict):
     slots: Slots
 
 
-class Equipment(Strict):
+class Equipment(Grown):
     """Equipment for test procedures besides table, chamber and reader, by the role that it has; none where it is left out.
 
     A simulated station has the built-in equipment besides, unless ``built_in`` is false.
     """
+
+    later: ClassVar[frozenset[str]] = frozenset({"climate"})
 
     built_in: bool = True
     exciter: Device | None = None
@@ -130,6 +132,7 @@ class Equipment(Strict):
     centrifuge: Device | None = None
     power_supply: Device | None = None
     step_generator: Device | None = None
+    climate: Device | None = None
 
     def there(self) -> dict[str, Device]:
         """The equipment that the station has, by role."""

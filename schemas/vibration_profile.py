@@ -1,15 +1,13 @@
 """Profiles of random vibration: breakpoints of the density, one file each in ``schemas/vibration``."""
 
-from importlib.resources import files
 from itertools import pairwise
 from typing import Annotated
 
 from pydantic import Field, field_validator
 
 from schemas.bounds import Positive, Text
-from schemas.errors import RecipeInvalid, close_matches, did_you_mean
+from schemas.built_in_profiles import built_in_profile, profile_names
 from schemas.strict import Strict
-from schemas.toml_files import parse_as
 
 
 class VibrationProfile(Strict):
@@ -33,18 +31,9 @@ class VibrationProfile(Strict):
 
 def vibration_profiles() -> list[str]:
     """Names of the built-in profiles, sorted."""
-    folder = files("schemas").joinpath("vibration")
-    return sorted(item.name.removesuffix(".toml") for item in folder.iterdir() if item.name.endswith(".toml"))
+    return profile_names("vibration")
 
 
 def load_vibration_profile(name: str) -> VibrationProfile:
-    """The built-in profile of this name; :class:`RecipeInvalid` names close ones."""
-    known = vibration_profiles()
-    if name not in known:
-        raise RecipeInvalid(
-            f"profile: no vibration profile '{name}'; {did_you_mean(name, known)}",
-            key="profile",
-            close=close_matches(name, known),
-        )
-    text = files("schemas").joinpath("vibration", f"{name}.toml").read_text("utf-8")
-    return parse_as(VibrationProfile, text, f"vibration/{name}.toml")
+    """The built-in profile of this name; :class:`schemas.errors.RecipeInvalid` names close ones."""
+    return built_in_profile("vibration", name, VibrationProfile)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from inertial.dynamics.missing_effects import CLASS_WIDTH, FOLDS, EffectClass, Judged, judge
-from inertial.dynamics.transfer_effects import EFFECTS, Conditions
+from inertial.dynamics.transfer_effects import EFFECTS
 from inertial.dynamics.transfer_model import IDENTIFIED_SHARE, Points, TransferFit, best_of_exchange, fit_transfer
 
 SEPARATED = 10.0
@@ -96,7 +96,7 @@ def diagnose_transfer(
         # mass and low-pass exchanged are another minimum, which breeds further effects
         return best_of_exchange(points, fit)[0] if names[-1] in {"two_pole", "second_order"} else fit
 
-    base = fit_transfer(points, effects)
+    base = best_of_exchange(points, fit_transfer(points, effects))[0]
     judged = judge(
         base,
         effects,
@@ -194,7 +194,7 @@ def _next_frequencies(
     c = points.conditions
     low, top = float(c.frequency.min()), float(c.frequency.max())
     grid = np.geomspace(low, max(highest, top), 200)
-    plan = Conditions(grid, *(np.full(200, np.median(each)) for each in (c.level, c.temperature, c.record_s)))
+    plan = c.along(grid)
     models = [one for one in (extended, *rivals) if all(EFFECTS[name].parameters(plan) for name in one.effects)]
     values = np.stack([np.log(np.maximum(np.abs(model.response(plan)), 1e-300)) for model in models])
     spread = np.ptp(values, axis=0)

@@ -9,7 +9,7 @@ from scipy.optimize import least_squares
 
 from inertial.arrays import Array, Complex, Flags
 from inertial.dynamics.missing_effects import p_value
-from inertial.dynamics.transfer_effects import EFFECTS, Conditions, Parameter
+from inertial.dynamics.transfer_effects import EFFECTS, Conditions, Parameter, TransferEffect
 from inertial.dynamics.transfer_effects.base import Coordinates
 from inertial.errors import NotIdentified
 
@@ -117,12 +117,27 @@ class TransferFit:
 
 def factor(effects: Sequence[str], conditions: Conditions, values: Array) -> Complex:
     """Product of the effects' factors (n,) for parameter values (p,) in order."""
-    out, at = np.ones(len(conditions.frequency), dtype=np.complex128), 0
+    own: list[tuple[TransferEffect, tuple[Parameter, ...], Array]] = []
+    changes: dict[str, Array] = {}
+    at = 0
     for name in effects:
-        count = len(EFFECTS[name].parameters(conditions))
-        out = out * EFFECTS[name].factor(conditions, values[at : at + count])
-        at += count
+        effect, parameters = EFFECTS[name], EFFECTS[name].parameters(conditions)
+        part = values[at : at + len(parameters)]
+        own.append((effect, parameters, part))
+        for parameter, ratio in effect.changes(conditions, part).items():
+            changes[parameter] = changes.get(parameter, np.ones(1)) * ratio
+        at += len(parameters)
+    out = np.ones(len(conditions.frequency), dtype=np.complex128)
+    for effect, parameters, part in own:
+        ratios = [changes.get(p.name, np.ones(1)) for p in parameters]
+        changed = part if all(one.size == 1 for one in ratios) else _times(part, ratios, len(out))
+        out = out * effect.factor(conditions, changed)
     return out
+
+
+def _times(values: Array, ratios: Sequence[Array], count: int) -> Array:
+    """Values (p,) of parameters at each of ``count`` points, (p, count)."""
+    return np.stack([value * ratio * np.ones(count) for value, ratio in zip(values, ratios, strict=True)])
 
 
 def fit_transfer(

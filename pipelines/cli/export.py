@@ -109,6 +109,7 @@ def command(
     from pipelines.certificates.coefficient_remarks import signature_remarks
     from pipelines.certificates.measured import measured_on
     from pipelines.export import FORMATS, ExportSettings, device_ids, export_files, unit_calibrations
+    from pipelines.export.swept_teds import is_sweep, swept_files
     from pipelines.export.teds import data_sheet
     from pipelines.jobs.model_files import use_formulas_of
 
@@ -126,6 +127,10 @@ def command(
     source = Archive(archive).run(run)
     use_formulas_of(source)
     serials = tuple(serial.strip() for serial in units.split(",")) if units else ()
+    if form == "teds" and is_sweep(source):
+        sheet = data_sheet(given.get("teds", ""), measured_on(source))
+        _write(swept_files(source, serials, sheet, **included(include)), output)
+        return
     chosen = unit_calibrations(source, serials, **included(include))
     ids = device_ids(given.get("device_id", ""), [c.unit for c in chosen])
     stated = {key: given[key] for key in ("nominal", "sensor", "arithmetic", "counts_per_g") if key in given}

@@ -148,8 +148,13 @@ Chosen: TypeAlias = "tuple[Sequence[str], dict[str, tuple[str, str]], Mapping[st
 
 
 def _exportable(run: Run, serials: tuple[str, ...], *, failed: bool, revoked: bool) -> Chosen:
-    """The units that were compared with limits, by their outcome."""
+    """The units with coefficients that were compared with limits, by their outcome."""
     refuse_other_procedures(run, "coefficients")
+    return graded_units(run, serials, failed=failed, revoked=revoked)
+
+
+def graded_units(run: Run, serials: tuple[str, ...], *, failed: bool, revoked: bool) -> Chosen:
+    """The units that were compared with limits, by their outcome."""
     table = run.table("grades").set_index("unit")
     _refuse(table, serials, failed=failed)
     allowed = ("pass", "fail") if failed else EXPORTABLE

@@ -3,8 +3,8 @@
 Fields follow one another without gaps, each with its lowest bit first. A page of the memory has 32 bytes; the first makes their
 sum 0 modulo 256. Sources that agree, read in 2026: NI, "An Overview of IEEE 1451.4 Transducer Electronic Data Sheets" (widths of
 basic TEDS; units, ranges and tolerances of template 25); the readers SDLMA-Core ``teds.py`` (fields and widths; the bits of a
-4507 B accelerometer, which settle selectors, polarity and initials) and Zetlab ``TEDS.cpp`` (widths, checksum); L-Card
-``ltedsapi_stdtmpl.h`` (meaning of the enumerations).
+4507 B accelerometer, which settle selectors, polarity, initials, and order and widths of the transfer function) and Zetlab
+``TEDS.cpp`` (widths, checksum); L-Card ``ltedsapi_stdtmpl.h`` (meaning of the enumerations and of the transfer function).
 """
 
 from __future__ import annotations
@@ -68,6 +68,10 @@ SENSITIVITY = ConRelRes("sensitivity", "V/(m/s²)", 5e-7, 1.5e-4, 16)
 HIGH_PASS = ConRelRes("high-pass frequency", "Hz", 0.005, 0.03, 8)
 MASS = ConRelRes("mass", "g", 0.1, 0.1, 6)
 REFERENCE = ConRelRes("reference frequency", "Hz", 0.35, 0.0175, 8)
+POLE = ConRelRes("low-pass frequency", "Hz", 10.0, 0.05, 7)
+RESONANCE = ConRelRes("resonance frequency", "Hz", 100.0, 0.01, 9)
+QUALITY = ConRelRes("quality factor", "1", 0.4, 0.01, 9)
+_NO_SLOPE, _NO_TEMPERATURE = 63, 32  # −6.3 % a decade and −0.8 %/°C are code 0, in steps of 0.1 and 0.025
 
 
 _RANGES = {
@@ -145,8 +149,25 @@ def data_sheet(text: str, measured: str) -> DataSheet:
 
 
 @dataclass(frozen=True)
+class TransferFunction:
+    """1/(1 + jf/pole) · 1/(1 + jf/(Q·resonance) + (jf/resonance)²), without slope and temperature coefficient; Hz."""
+
+    pole_hz: float
+    resonance_hz: float
+    quality: float
+
+    @property
+    def bits(self) -> list[tuple[int, int]]:
+        """Its fields."""
+        return [
+            (POLE.code(self.pole_hz), 7), (RESONANCE.code(self.resonance_hz), 9), (QUALITY.code(self.quality), 9),
+            (_NO_SLOPE, 7), (_NO_TEMPERATURE, 6),
+        ]  # fmt: skip
+
+
+@dataclass(frozen=True)
 class Accelerometer:
-    """What template 25 states of one axis: an accelerometer with fixed sensitivity, without transfer function.
+    """What template 25 states of one axis: an accelerometer with fixed sensitivity.
 
     sensitivity : V/(m/s²), negative where the output falls with the force; axis : 0 to 2; reference_C : 15 to 30 °C
     """
@@ -156,6 +177,7 @@ class Accelerometer:
     high_pass_hz: float = HIGH_PASS.start
     reference_hz: float = REFERENCE.start
     reference_C: float = 25.0
+    transfer: TransferFunction | None = None
 
 
 def page(sheet: DataSheet, serial: int, accelerometer: Accelerometer) -> bytes:
@@ -167,7 +189,8 @@ def page(sheet: DataSheet, serial: int, accelerometer: Accelerometer) -> bytes:
         (0, 1), (0, 1),  # accelerometer, no switching of the sensitivity
         (SENSITIVITY.code(abs(accelerometer.sensitivity)), 16),
         (HIGH_PASS.code(accelerometer.high_pass_hz), 8), (accelerometer.axis, 2),
-        (MASS.code(sheet.mass_g), 6), (int(accelerometer.sensitivity < 0.0), 1), (0, 1),  # no transfer function
+        (MASS.code(sheet.mass_g), 6), (int(accelerometer.sensitivity < 0.0), 1),
+        (int(accelerometer.transfer is not None), 1), *(accelerometer.transfer.bits if accelerometer.transfer else ()),
         (REFERENCE.code(accelerometer.reference_hz), 8), (round(2.0 * (accelerometer.reference_C - 15.0)), 5),
         (sheet.days_after_1998, 16), (_letters(sheet.initials), 15), (sheet.period_days or 0, 12),
         (0, 11),  # place of the measurement

@@ -24,7 +24,7 @@ from pipelines.procedures.transfer_figures import bandwidth_of, diagnosis_text
 from schemas.errors import DataRejected, WrongUse, did_you_mean
 
 NEEDED = ("frequency_hz", "magnitude", "phase_deg", "magnitude_uncertainty_percent", "phase_uncertainty_deg")
-OPTIONAL = {"level_g": 1.0, "temperature_C": np.nan, "record_s": np.nan}
+OPTIONAL = {"level_g": 1.0, "temperature_C": np.nan, "record_s": np.nan, "pressure_hPa": np.nan}
 FEWEST = 8
 
 
@@ -46,13 +46,13 @@ def transfer_points(table: pd.DataFrame, name: str) -> Points:
     columns: dict[str, Any] = {one: np.full(len(table), usual) for one, usual in OPTIONAL.items()}
     given = [one for one in (*NEEDED, *OPTIONAL) if one in table.columns]
     columns |= {one: finite_column(table, one, name, "correct the row") for one in given}
-    for one in ("frequency_hz", "magnitude", "magnitude_uncertainty_percent", "phase_uncertainty_deg"):
-        if not np.all(columns[one] > 0.0):
+    for one in ("frequency_hz", "magnitude", "magnitude_uncertainty_percent", "phase_uncertainty_deg", "pressure_hPa"):
+        if one in given and not np.all(columns[one] > 0.0):
             row = int(np.flatnonzero(columns[one] <= 0.0)[0]) + 1
             raise DataRejected(f"{name}: row {row}, column {one}: a value above 0 is needed; correct the row")
     if len(table) < FEWEST:
         raise DataRejected(f"{name}: {len(table)} points, at least {FEWEST} are needed; measure more frequencies")
-    conditions = Conditions(columns["frequency_hz"], columns["level_g"], columns["temperature_C"], columns["record_s"])
+    conditions = Conditions(columns["frequency_hz"], *(columns[one] for one in OPTIONAL))
     value = columns["magnitude"] * np.exp(1j * np.radians(columns["phase_deg"]))
     error = 1e-2 * columns["magnitude_uncertainty_percent"], np.radians(columns["phase_uncertainty_deg"])
     return Points(conditions, value, *error)
@@ -124,7 +124,7 @@ def _tables(points: Points, unit: str, text: Sequence[tuple[str, str]]) -> dict[
             "unit": unit, "axis": "z", "series": "response", "point": np.arange(len(size)), "setting": c.frequency, "value": size,
             "uncertainty": size * points.magnitude_error, "phase_deg": np.degrees(np.angle(points.value)),
             "phase_uncertainty_deg": np.degrees(points.phase_error), "level_g": c.level, "temperature_C": c.temperature,
-            "record_s": c.record_s,
+            "record_s": c.record_s, "pressure_hPa": c.pressure,
         }
     )  # fmt: skip
     tables = procedure_tables([(0, "sweep", rows, Outcome({}, [Finding(unit, *one) for one in text]))])

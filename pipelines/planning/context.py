@@ -157,7 +157,7 @@ def procedure_rows(recipe: Recipe, station: StationConfig, limits: Limits | None
             "records": len({activity.step.record for activity in own}),
             "minutes": round(spent(own).total, 2),
             "temperatures_C": list(dict.fromkeys(activity.step.temperature for activity in own)),
-            "equipment": list(procedure.roles),
+            "equipment": list(procedure.roles_for(part)),
             "figures": figures,
         }
         rows.append(row)

@@ -153,7 +153,7 @@ def steps_of(recipe: Recipe) -> list[tuple[int, ProcedureStep]]:
 
 def roles_of(recipe: Recipe) -> tuple[str, ...]:
     """The roles that a recipe's procedures need of a station, besides table, chamber and reader."""
-    return tuple(dict.fromkeys(role for part in parts_of(recipe) for role in PROCEDURES[part.kind].roles))
+    return tuple(dict.fromkeys(role for part in parts_of(recipe) for role in PROCEDURES[part.kind].roles_for(part)))
 
 
 def figures_of_recipe(recipe: Recipe) -> dict[str, FigureSpec]:
@@ -178,7 +178,7 @@ def refuse_unusable(recipe: Recipe, station: StationConfig) -> None:
         )
     for number, part in enumerate(parts, start=1):
         procedure = PROCEDURES[part.kind]
-        missing = next((role for role in procedure.roles if role not in station.fitted()), None)
+        missing = next((role for role in procedure.roles_for(part) if role not in station.fitted()), None)
         if missing is not None:
             raise RecipeInvalid(
                 f"recipe: procedures, number {number} ({part.kind}): station {station.name} has no {missing}, one is needed; add "

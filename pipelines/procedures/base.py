@@ -56,6 +56,10 @@ class Procedure(ABC):
     def steps(self, part: Any, recipe: Recipe) -> list[ProcedureStep]:
         """The records of the procedure, in order."""
 
+    def roles_for(self, part: Any) -> tuple[str, ...]:
+        """The equipment that a part needs: that of the procedure, or less of it."""
+        return self.roles
+
     def missing_axes(self, part: Any, letters: Sequence[str]) -> list[str]:
         """The axes that a part measures and that a device with these does not have: here the one that it names."""
         named = [part.axis] if hasattr(part, "axis") else getattr(part, "axes", [])

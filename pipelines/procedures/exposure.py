@@ -1,90 +1,86 @@
-"""Shift of bias and scale by cycles of temperature: six poses, the cycles, the same poses again."""
+"""Shift of bias and scale by an exposure: six poses, a profile of temperature, humidity and pressure, the same poses again."""
 
-from typing import Annotated, Any, Literal, NamedTuple
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
-from pydantic import Field, model_validator
 
-from inertial.arrays import Array
-from inertial.dynamics.exposure import exposure_shift, temperature_slope
+from inertial.arrays import Array, Flags
+from inertial.dynamics.exposure import ExposureShift, exposure_shift
 from inertial.dynamics.stability import error_of_mean, short_noise
 from inertial.errors import NotIdentified
 from inertial.frames import force_from_angles
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace, level
-from pipelines.procedures.base import InG, NominalScale, RecordByRecord, scale_of
-from pipelines.procedures.figures import FigureSpec, FigureValue, UnitOutcome, worst
+from pipelines.procedures.base import InG, OnEquipment, RecordByRecord, scale_of
+from pipelines.procedures.climate import LEG, ROLE, expose
+from pipelines.procedures.exposure_reduction import Slope, corrected, force_of, in_environment
+from pipelines.procedures.exposure_steps import (
+    AFTER,
+    BEFORE,
+    BETWEEN,
+    DRY,
+    FACES,
+    ExposurePart,
+    steps_of,
+)
+from pipelines.procedures.figures import FigureSpec, FigureValue, Texts, UnitOutcome, worst
 from pipelines.procedures.recorded import (
+    REFERENCE,
     Device,
     ProcedureStep,
     Taken,
     noise_columns,
-    numbers,
     point_rows,
     pooled_noise,
 )  # fmt: skip
-from schemas.bounds import Positive
 from schemas.errors import RecipeInvalid
-from schemas.poses import Pose
 from schemas.recipe import Recipe
 from schemas.station import StationConfig
 from schemas.units import AXES, MICRO, axes_among
 
 BIAS, SCALE = "exposure_bias_shift_ug", "exposure_scale_shift_ppm"
-FACES = {
-    "+z": (0.0, 0.0),
-    "-z": (180.0, 0.0),
-    "+y": (90.0, 0.0),
-    "-y": (90.0, 180.0),
-    "+x": (90.0, 90.0),
-    "-x": (90.0, -90.0),
-}
-BEFORE, BETWEEN, AFTER = "before", "exposure", "after"
-Celsius = Annotated[float, Field(ge=-100.0, le=200.0)]
+BIAS_IN, SCALE_IN = "exposure_bias_change_ug", "exposure_scale_change_ppm"
+TAIL = 0.1  # of a leg, over which what the air has reached is the mean
+UNLIKE = (
+    "no records in the room's air at the temperatures of those in the environment; check the thermometers of the units"
+)
+PLAIN = "the profile sets nothing but the temperature, of which the change is no figure of it"
 
 
-class ExposurePart(NominalScale):
-    """``cycles`` from ``low_C`` to ``high_C``, each at least for the recipe's ``soak_min_s``.
-
-    Six poses of ``window_s`` are measured ``repeats`` times before and after, at ``temperature_C``, and once at each extreme.
-    """
-
-    kind: Literal["exposure"]
-    low_C: Celsius
-    high_C: Celsius
-    cycles: Annotated[int, Field(ge=1, le=100)] = 2
-    repeats: Annotated[int, Field(ge=2, le=20)] = 2
-    window_s: Annotated[Positive, Field(ge=2.0, le=600.0)] = 10.0
-    temperature_C: Celsius = 25.0
-
-    @model_validator(mode="after")
-    def _in_order(self) -> "ExposurePart":
-        if not self.low_C < self.high_C:
-            raise ValueError(f"low_C: {self.low_C:g} °C, below high_C ({self.high_C:g} °C) is needed; exchange them")
-        return self
-
-
-class Exposure(InG, RecordByRecord):
-    """Temperature cycles between two measurements in six poses."""
+class Exposure(InG, OnEquipment, RecordByRecord):
+    """A profile of the environment between two measurements in six poses."""
 
     name = "exposure"
-    title = "Exposure to temperature cycles"
+    title = "Exposure to an environment"
     order = 65
-    states = "shift of bias and scale by cycles of temperature, at the same temperature and in the same poses before and after"
-    source = "RTCA DO-160G section 5, temperature variation; the rate of the air is that of the chamber"
+    states = (
+        "shift of bias and scale by cycles or shocks of temperature, damp heat or low pressure, at the same temperature and in "
+        "the same poses before and after; their change in the environment"
+    )
+    source = "IEC 60068-2-13, -2-14, -2-30; MIL-STD-810 methods 500, 503, 507; RTCA DO-160G section 5: schemas/exposure"
+    roles = (ROLE,)
     part = ExposurePart
     figures = (
         FigureSpec(BIAS, "µg", "bias after the exposure minus that before, worst axis"),
         FigureSpec(SCALE, "ppm", "relative change of the scale by the exposure, worst axis"),
+        FigureSpec(
+            BIAS_IN, "µg", "largest change of the bias in damp air or at low pressure from that in the room's air"
+        ),
+        FigureSpec(SCALE_IN, "ppm", "the same change of the scale"),
     )
+
+    def roles_for(self, part: Any) -> tuple[str, ...]:
+        """A climate unit, where the chamber alone cannot carry out the profile."""
+        return self.roles if part.stated.by_unit else ()
 
     def check(self, part: Any, recipe: Recipe, station: StationConfig) -> None:
         """Refuse temperatures and faces outside the limits of the station, and a recipe without a scale."""
         super().check(part, recipe, station)
         limits = station.limits
         wanted = [
-            (key, getattr(part, key), "°C", limits.temperature_C, "temperatures within, or another chamber")
-            for key in ("low_C", "high_C", "temperature_C")
+            (key, value, "°C", limits.temperature_C, "temperatures within, or another chamber")
+            for key, value in part.temperatures().items()
         ]
         for face, (outer, inner) in FACES.items():
             for axis, angle, allowed in (("outer", outer, limits.outer_deg), ("inner", inner, limits.inner_deg)):
@@ -98,30 +94,19 @@ class Exposure(InG, RecordByRecord):
                 )
 
     def steps(self, part: ExposurePart, recipe: Recipe) -> list[ProcedureStep]:
-        """Six poses several times before, once at every extreme, several times after, always in the same order."""
-        ends = [
-            (f"{name} {k + 1}", at)
-            for k in range(part.cycles)
-            for name, at in (("low", part.low_C), ("high", part.high_C))
-        ]
-        still = part.temperature_C, part.repeats
-        series = [(BEFORE, *still), *((name, at, 1) for name, at in ends), (AFTER, *still)]
-        return [
-            ProcedureStep(
-                f"{when} {face}",
-                Pose(name=f"{when.replace(' ', '')}{k}", outer_deg=outer, inner_deg=inner),
-                at,
-                lasting_s=part.window_s,
-                soak=soak,
-            )
-            for soak, (when, at, times) in enumerate(series)
-            for k, (face, (outer, inner)) in enumerate(list(FACES.items()) * times)
-        ]
+        """Six poses several times before, once at every measured leg, several times after; the legs between them."""
+        return steps_of(part)
+
+    def measure(self, equipment: Any, step: ProcedureStep, slots: Sequence[int]) -> Any:
+        """One leg of the profile."""
+        return expose(equipment, step, slots)
 
     def points(self, part: ExposurePart, taken: Taken, device: Device) -> list[dict[str, Any]]:
-        """Mean of a record in µg with its time, temperature and force, and the noise of its samples."""
+        """Mean of a record in µg with its time, temperature and force, and the noise of its samples; of a leg what it was."""
         letters = taken.own.letters
         output = taken.own.output / scale_of(part, device, taken.unit)[: len(letters)] * MICRO
+        if taken.record.step.role:
+            return _leg_rows(taken, output)
         angles = (np.radians(float(taken.reading[name])) for name in ("outer_deg", "inner_deg"))
         force = force_from_angles(*angles)
         noise = [noise_columns(short_noise(output[:, i], taken.own.rate_hz)) for i in range(len(letters))]
@@ -129,7 +114,7 @@ class Exposure(InG, RecordByRecord):
         return point_rows(
             unit=taken.unit,
             axis=letters,
-            series=series if series in {BEFORE, AFTER} else BETWEEN,
+            series=series if series in {BEFORE, AFTER, DRY} else BETWEEN,
             point=taken.number,
             setting=float(taken.own.time.mean()),
             value=[output[:, i].mean() for i in range(len(letters))],
@@ -140,48 +125,61 @@ class Exposure(InG, RecordByRecord):
         )
 
     def of_unit(self, part: ExposurePart, unit: str, rows: pd.DataFrame, device: Device) -> UnitOutcome:
-        """Shifts of the worst axis; a finding where the difference of temperature is not taken out."""
-        bias, scale, texts = list[FigureValue](), list[FigureValue](), dict[str, str]()
-        for axis, own in rows.groupby("axis", sort=False):
-            still, corrected, error, why = _corrected(own)
+        """Shifts and changes of the worst axis; findings on the legs, and where the temperature is not corrected for."""
+        found: dict[str, list[FigureValue]] = {spec.name: [] for spec in self.figures}
+        texts = dict[str, str]()
+        legs = rows[rows["series"] == LEG]
+        if len(legs):
+            most = legs.iloc[int(legs["value"].to_numpy(dtype=float).argmax())]
+            away = f"{most['value']:.0f} µg, axis {most['axis']}"
+            texts["in the legs"] = f"largest departure of the output at rest from the beginning of a leg: {away}"
+        for axis, own in rows[rows["series"] != LEG].groupby("axis", sort=False):
+            still, settled, slope, why = corrected(own, plain=not part.stated.conditioned)
             if why:
                 texts["temperature"] = f"not corrected for, its difference is in both shifts and not in U: {why}"
-            time = still["setting"].to_numpy(dtype=float)
             after = (still["series"] == AFTER).to_numpy()
             if not after.any() or after.all():
                 raise NotIdentified(
                     f"exposure: no records {BEFORE if after.any() else AFTER} it, both are needed; check the unit and its seat"
                 )
-            found = exposure_shift(
-                _force(still),
-                corrected,
-                after,
-                AXES.index(str(axis)),
-                pooled_noise(still),
-                float(np.ptp(time[~after])) + part.window_s,
-                float(time[after].mean() - time[~after].mean()),
-            )
-            of_scale = error[1 + AXES.index(str(axis))]
-            bias.append(FigureValue(BIAS, str(axis), found.bias.value, float(np.hypot(found.bias.u, error[0]))))
-            scale.append(
-                FigureValue(SCALE, str(axis), found.scale.value, float(np.hypot(found.scale.u, of_scale)))
-            )  # µg/g: ppm
-        return [worst(bias), worst(scale)], list(texts.items())
+            _add(found, (BIAS, SCALE), str(axis), _shift(part, still, settled, after, str(axis)), slope, still, after)
+            for during, values, wet in in_environment(own, slope) if part.stated.conditioned else ():
+                shift = _shift(part, during, values, wet, str(axis))
+                _add(found, (BIAS_IN, SCALE_IN), str(axis), shift, slope, during, wet)
+        missing = UNLIKE if part.stated.conditioned else PLAIN
+        figures = [worst(own) if own else FigureValue.not_determined(name, "*", missing) for name, own in found.items()]
+        return figures, list(texts.items())
+
+    def of_lot(self, part: ExposurePart, points: pd.DataFrame) -> Texts:
+        """How far the air was from the profile at the ends of its legs."""
+        legs = points[points["series"] == LEG]
+        if legs.empty:
+            return []
+        first = legs[(legs["unit"] == legs["unit"].iloc[0]) & (legs["axis"] == legs["axis"].iloc[0])]
+        apart = [
+            f"{np.nanmax(np.abs(first[f'reached_{unit}'] - first[f'ordered_{unit}'])):.2g} {text}"
+            for unit, text in (("C", "K"), ("pct", "% of humidity"), ("hPa", "hPa"))
+            if first[f"ordered_{unit}"].notna().any()
+        ]
+        return [
+            ("profile", f"{part.profile}: {len(first)} legs, air at their ends within {', '.join(apart)} of the order")
+        ]
 
     def chart(self, part: ExposurePart, points: pd.DataFrame) -> Chart:
         """Output of every record about that of its pose before the exposure."""
         traces: list[Trace] = []
         number = np.ones(1)
         for axis in axes_among(points["axis"]):
-            still, corrected, *_ = _corrected(points[points["axis"] == axis])
+            own = points[(points["axis"] == axis) & (points["series"] != LEG)]
+            still, settled, *_ = corrected(own, plain=not part.stated.conditioned)
             number = np.arange(1.0, len(still) + 1.0)
             before = (still["series"] == BEFORE).to_numpy()
             if not before.any():
                 continue
-            own = np.column_stack([np.ones(len(still)), _force(still)])
-            fitted = own @ np.linalg.lstsq(own[before], corrected[before], rcond=None)[0]
+            columns = np.column_stack([np.ones(len(still)), force_of(still)])
+            fitted = columns @ np.linalg.lstsq(columns[before], settled[before], rcond=None)[0]
             error = still["uncertainty"].to_numpy(dtype=float)
-            traces.append(Trace(f"axis {axis}", number, corrected - fitted, role=axis, error=error))
+            traces.append(Trace(f"axis {axis}", number, settled - fitted, role=axis, error=error))
         axes = (
             PlotAxis("record; the exposure lies in the middle"),
             PlotAxis("output minus that before the exposure / µg"),
@@ -189,39 +187,51 @@ class Exposure(InG, RecordByRecord):
         return Chart(self.title, (Plot("", *axes, (*traces, level(number, 0.0))),))
 
 
-class _Corrected(NamedTuple):
-    """Records before and after of one axis, their values (n,) at one temperature; standard error (4,) that the correction adds.
-
-    ``why`` they are not corrected; empty where they are.
-    """
-
-    still: pd.DataFrame
-    output: Array
-    error: Array
-    why: str
-
-
-def _corrected(rows: pd.DataFrame) -> _Corrected:
-    """The change of bias and response with temperature, by the extremes and the records before them, taken out of one axis.
-
-    The records after it are left out of the slope: a shift is no change with temperature.
-    """
-    still, known = rows[rows["series"] != BETWEEN], rows[rows["series"] != AFTER]
-    temperature, output = numbers(still, "temperature", "value")
-    at, value = numbers(known, "temperature", "value")
-    after = (still["series"] == AFTER).to_numpy()
-    try:
-        middle = float(temperature.mean()) if temperature.size else float("nan")
-        slope = temperature_slope(_force(known), value, at, middle)
-    except NotIdentified as problem:
-        return _Corrected(still, output, np.zeros(4), str(problem))
-    columns = np.column_stack([np.ones(len(still)), _force(still)])
-    apart = float(temperature[after].mean() - temperature[~after].mean()) if after.any() and not after.all() else 0.0
-    return _Corrected(still, output - columns @ slope.value * (temperature - middle), slope.u * abs(apart), "")
+def _leg_rows(taken: Taken, output: Array) -> list[dict[str, Any]]:
+    """What the air of a leg was at its end beside its order, and how far the outputs (n, m) in µg went from their beginning."""
+    air, step = taken.record.samples[REFERENCE].output, taken.record.step
+    reached = air[-max(1, round(TAIL * len(air))) :].mean(axis=0)
+    humidity = step.setting["humidity_pct"] or np.nan
+    away = np.abs(output - output[0])
+    return point_rows(
+        unit=taken.unit,
+        axis=taken.own.letters,
+        series=LEG,
+        point=taken.number,
+        setting=float(taken.own.time.mean()),
+        value=list(away.max(axis=0)),
+        uncertainty=list(np.std(np.diff(output, axis=0), axis=0)) if len(output) > 1 else np.nan,
+        temperature=float(reached[0]),
+        **dict(zip(("reached_C", "reached_pct", "reached_hPa"), reached.tolist(), strict=True)),
+        ordered_C=step.temperature_C,
+        ordered_pct=humidity,
+        ordered_hPa=step.setting["pressure_hPa"],
+    )
 
 
-def _force(rows: pd.DataFrame) -> Array:
-    return rows[[f"force_{axis}" for axis in AXES]].to_numpy(dtype=float)
+def _shift(part: ExposurePart, rows: pd.DataFrame, values: Array, later: Flags, axis: str) -> ExposureShift:
+    time = rows["setting"].to_numpy(dtype=float)
+    window = float(np.ptp(time[~later])) + part.window_s
+    apart = float(time[later].mean() - time[~later].mean())
+    return exposure_shift(force_of(rows), values, later, AXES.index(axis), pooled_noise(rows), window, apart)
+
+
+def _add(
+    found: dict[str, list[FigureValue]],
+    names: tuple[str, str],
+    axis: str,
+    shift: ExposureShift,
+    slope: Slope,
+    rows: pd.DataFrame,
+    later: Flags,
+) -> None:
+    """The figures of a shift, with the error of the correction for the difference of temperature in U."""
+    temperature = rows["temperature"].to_numpy(dtype=float)
+    apart = abs(float(temperature[later].mean() - temperature[~later].mean())) if slope.u.any() else 0.0
+    for name, one, row in zip(names, (shift.bias, shift.scale), (0, 1 + AXES.index(axis)), strict=True):
+        found[name].append(
+            FigureValue(name, axis, one.value, float(np.hypot(one.u, slope.u[row] * apart)))
+        )  # µg/g: ppm
 
 
 PROCEDURE = Exposure()

@@ -1,6 +1,7 @@
 """Sine comparison: stepped sine on an exciter against a reference sensor; transfer function, its model and its diagnosis."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from inertial.dynamics.transfer_diagnosis import TransferDiagnosis
 from inertial.errors import NotIdentified
 from pipelines.drawing.chart import Chart
 from pipelines.procedures.base import Compares, FromWaveforms, OnEquipment
+from pipelines.procedures.climate import MINUTE_S, ROLE, Leg, expose, leg_step
 from pipelines.procedures.compared import ComparedResult, JudgedCurve, transfer_results
 from pipelines.procedures.figures import FigureSpec, FigureValue, UnitOutcome
 from pipelines.procedures.recorded import (
@@ -35,12 +37,22 @@ from pipelines.procedures.sweep_points import (
 from pipelines.procedures.transfer_chart import bode_chart
 from pipelines.procedures.transfer_figures import diagnosis_text, figures_of_transfer, judged_points, sampling_text
 from schemas.errors import RecipeInvalid
+from schemas.exposure_profile import AMBIENT_HPA
 from schemas.recipe import Recipe
 from schemas.station import StationConfig
 from schemas.units import AXES
 
 SINGLE_TONE = 0.7
 """Share of the power of a record that a stepped sine has in its largest tone; a sweep or random vibration has less."""
+
+
+LAST = 6  # readings of the climate unit at the end of a leg: of a minute
+PRESSURE_S, HOLD_S = 10.0 * MINUTE_S, 30.0 * MINUTE_S
+
+
+def _leg(part: SweepPart, pressure: float) -> Leg:
+    """The way to a pressure, and the time in which the gas in the units follows."""
+    return Leg(part.temperature_C, None, pressure, PRESSURE_S, HOLD_S)
 
 
 class Sweep(OnEquipment, FromWaveforms, Compares):
@@ -53,7 +65,7 @@ class Sweep(OnEquipment, FromWaveforms, Compares):
         "transfer function with uncertainty, natural frequency, damping, −3 dB bandwidth, flatness, missing effects"
     )
     source = "ISO 16063-21 (comparison), ISO 16063-11 method 3 and IEEE Std 1057 (sine fit)"
-    roles = ("exciter",)
+    roles = ("exciter", ROLE)
     part = SweepPart
     figures = (
         FigureSpec(
@@ -74,13 +86,27 @@ class Sweep(OnEquipment, FromWaveforms, Compares):
     )
 
     def steps(self, part: SweepPart, recipe: Recipe) -> list[ProcedureStep]:
-        """One dwell for each point."""
+        """One dwell for each point, at each temperature and then at each pressure; the room's pressure again at the end."""
         axis = float(AXES.index(part.axis))
-        return [
+        dwells = [
             on_equipment("exciter", f"{frequency:.4g} Hz, {level:.3g} g", part, part.lasting(frequency), setting)
             for frequency, level in part.plan()
             for setting in ({"frequency_hz": frequency, "level_g": level, "axis": axis},)
         ]
+        steps = list(dwells)
+        for soak, at in enumerate(part.other_temperatures_C, start=1):
+            steps += [replace(one, name=f"{at:g} °C, {one.name}", temperature_C=at, soak=soak) for one in dwells]
+        for pressure in part.pressures_hPa:
+            steps.append(leg_step(f"{pressure:g} hPa", _leg(part, pressure), steps[-1].soak + 1))
+            soak = steps[-1].soak + 1
+            steps += [replace(one, name=f"{pressure:g} hPa, {one.name}", soak=soak) for one in dwells]
+        if part.pressures_hPa:
+            steps.append(leg_step("room", _leg(part, AMBIENT_HPA), steps[-1].soak + 1))
+        return steps
+
+    def roles_for(self, part: SweepPart) -> tuple[str, ...]:
+        """An exciter; a climate unit for points at other pressures."""
+        return self.roles if part.pressures_hPa else self.roles[:1]
 
     def check(self, part: SweepPart, recipe: Recipe, station: StationConfig) -> None:
         """Refuse a part without a scale to compare the sensitivity with."""
@@ -90,9 +116,19 @@ class Sweep(OnEquipment, FromWaveforms, Compares):
                 "multi_position",
                 key="nominal_scale",
             )
+        low, high = station.limits.temperature_C
+        for at in part.other_temperatures_C:
+            if not low <= at <= high:
+                raise RecipeInvalid(
+                    f"recipe: procedure sweep: other_temperatures_C has {at:g} °C, {low:g} to {high:g} °C is allowed by the "
+                    "station; take temperatures within, or another chamber",
+                    key="other_temperatures_C",
+                )
 
     def measure(self, equipment: Any, step: ProcedureStep, slots: Sequence[int]) -> Any:
         """The dwell on the exciter."""
+        if step.role == ROLE:
+            return expose(equipment, step, slots)
         one = step.setting
         seconds = step.lasting_s or 0.0
         return equipment.sine(one["frequency_hz"], one["level_g"], int(one["axis"]), seconds, slots)
@@ -113,6 +149,12 @@ class Sweep(OnEquipment, FromWaveforms, Compares):
     def reduce(self, part: SweepPart, records: Records, device: Device) -> pd.DataFrame:
         """Magnitude, phase, and their uncertainty at every point; the device's clock is estimated from all points first."""
         axis = AXES.index(part.axis)
+        pressures, now = dict[int, float](), np.nan
+        for record in records:
+            if record.step.role == ROLE:
+                now = float(record.samples[REFERENCE].output[-LAST:, 2].mean())
+            pressures[record.number] = now
+        records = [record for record in records if record.step.role != ROLE]
         broadband = {id(r) for r in records if np.isnan(r.step.setting["frequency_hz"])}
         clocks = clocks_of([r for r in records if id(r) not in broadband], axis)
         rows: list[dict[str, Any]] = []
@@ -123,6 +165,8 @@ class Sweep(OnEquipment, FromWaveforms, Compares):
             else:
                 points = [response_point(part, one.number, one.record.step.setting, pair, axis, clock, device)]
             about = {"unit": one.unit, "temperature_C": float(one.reading["unit_C"])}
+            if part.pressures_hPa:
+                about["pressure_hPa"] = pressures[one.record.number]
             rows += [point | about for point in points]
         return point_table(rows)
 

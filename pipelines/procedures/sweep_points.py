@@ -15,8 +15,10 @@ from inertial.dynamics.transfer_model import Points
 from pipelines.procedures.base import Part, refuse_unknown_effects
 from pipelines.procedures.recorded import REFERENCE, Array, Device, ProcedureRecord, UnitRecord, point_rows
 from schemas.bounds import NotNegative, Positive
+from schemas.exposure_profile import Pressure
 
 FEWEST_POINTS = 8
+Celsius = Annotated[float, Field(ge=-100.0, le=200.0)]
 POINTS_OF_RECORD = 10_000  # numbers of points that belong to one record of many
 
 
@@ -25,7 +27,8 @@ class SweepPart(Part):
 
     Uncertainties are standard ones: ``reference_percent`` is common to all points, ``repeatability_percent`` and
     ``repeatability_deg`` are each point's own. ``transverse_percent`` is the largest transverse sensitivity of the device.
-    ``effects`` is the model to be judged; its diagnosis recommends others where it is not good enough.
+    ``effects`` is the model to be judged; its diagnosis recommends others where it is not good enough. All points are measured
+    again at ``other_temperatures_C``, and at ``pressures_hPa`` by a climate unit about the exciter.
     """
 
     kind: Literal["sweep"]
@@ -39,7 +42,9 @@ class SweepPart(Part):
     axis: Literal["x", "y", "z"] = "z"
     cycles: Annotated[int, Field(ge=3, le=1000)] = 20
     record_s: Annotated[Positive, Field(le=60.0)] = 0.25
-    temperature_C: Annotated[float, Field(ge=-100.0, le=200.0)] = 25.0
+    temperature_C: Celsius = 25.0
+    other_temperatures_C: Annotated[list[Celsius], Field(max_length=20)] = Field(default_factory=list[float])
+    pressures_hPa: Annotated[list[Pressure], Field(max_length=20)] = Field(default_factory=list[float])
     stroke_mm: Positive = 12.0
     velocity_m_s: Positive = 1.4
     reference_percent: NotNegative = 0.25
@@ -228,7 +233,8 @@ def transfer_points(rows: pd.DataFrame) -> Points:
     def column(name: str) -> Array:
         return rows[name].to_numpy(dtype=float)
 
-    conditions = Conditions(column("setting"), column("level_g"), column("temperature_C"), column("record_s"))
+    names = ("setting", "level_g", "temperature_C", "record_s", *(["pressure_hPa"] if "pressure_hPa" in rows else []))
+    conditions = Conditions(*map(column, names))
     turn = np.exp(1j * np.radians(column("phase_deg")))
     value = np.asarray(column("value") * turn, dtype=np.complex128)
     share = column("uncertainty") / column("value")

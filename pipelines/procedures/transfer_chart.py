@@ -6,7 +6,6 @@ import numpy as np
 
 from inertial.arrays import Array, Complex
 from inertial.dynamics.transfer_diagnosis import TransferDiagnosis
-from inertial.dynamics.transfer_effects import Conditions
 from inertial.dynamics.transfer_model import Points, TransferFit
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Role, Trace, level
 
@@ -25,7 +24,7 @@ def bode_chart(points: Points, diagnosis: TransferDiagnosis, coherence: Array) -
     value = points.value[order] * unit
     size_error, phase_error = (COVERAGE * one[order] for one in (points.magnitude_error, points.phase_error))
     fine = np.geomspace(f[0], f[-1], FINE)
-    plan = Conditions(fine, *(np.full(FINE, np.median(one)) for one in (c.level, c.temperature, c.record_s)))
+    plan = c.along(fine)
     name = "measured, U (k = 2)"
     size = [Trace(name, f, np.abs(value), size=4.0, error=size_error * np.abs(value))]
     phase = [Trace(name, f, _degrees(value), size=4.0, error=np.degrees(phase_error))]

@@ -12,6 +12,7 @@ from inertial.counts import degrees_of_freedom
 from inertial.dynamics.spectra import folded_share
 from inertial.dynamics.transfer_diagnosis import TransferDiagnosis, diagnose_transfer
 from inertial.dynamics.transfer_effects import EFFECTS, Conditions
+from inertial.dynamics.transfer_effects.base import AMBIENT_C
 from inertial.dynamics.transfer_model import IDENTIFIED_SHARE, PLAIN, Points, TransferFit, factor
 from pipelines.procedures.figures import FigureValue, probability
 
@@ -22,8 +23,7 @@ _last_judged: dict[str, TransferDiagnosis] = {}
 
 def judged_points(points: Points, effects: Sequence[str], highest_hz: float) -> TransferDiagnosis:
     """The diagnosis of a model on the points of one unit."""
-    c = points.conditions
-    arrays = (c.frequency, c.level, c.temperature, c.record_s, points.value, points.magnitude_error, points.phase_error)
+    arrays = (*points.conditions.columns, points.value, points.magnitude_error, points.phase_error)
     key = f"{' '.join(effects)} {highest_hz} {hash(b''.join(array.tobytes() for array in arrays))}"
     if key not in _last_judged:
         if len(_last_judged) >= MOST_KEPT:
@@ -83,7 +83,7 @@ def bandwidth_of(fit: TransferFit, values: Array, top: float) -> float:
 
     def over(f: Any) -> Any:
         at = np.atleast_1d(np.asarray(f, dtype=np.float64))
-        plain = Conditions(at, np.full(at.size, 1e-9), np.zeros(at.size), np.full(at.size, np.nan))
+        plain = Conditions(at, np.full(at.size, 1e-9), np.full(at.size, AMBIENT_C), np.full(at.size, np.nan))
         names = [name for name in fit.effects if name not in {"temperature", "hum", "own_clock", "amplitude"}]
         owner = np.repeat(fit.effects, [len(EFFECTS[name].parameters(PLAIN)) for name in fit.effects])
         return np.abs(factor(names, plain, values[np.isin(owner, names)])) - np.sqrt(0.5)

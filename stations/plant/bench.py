@@ -5,8 +5,8 @@ stage and a delay, with a nonlinear spring between, sampled by a clock of the de
 """
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any, cast
 
 import numpy as np
@@ -15,6 +15,7 @@ from scipy.fft import next_fast_len
 
 from stations.plant.device import PlantDevices, Truth, stream
 from stations.plant.dynamics import DynamicTruth, Rig, directions, two_pole_behind
+from stations.plant.hidden import HiddenEffect
 from stations.plant.preset import Preset
 
 Array = NDArray[np.float64]
@@ -51,6 +52,10 @@ class Bench:
     station_seed: int
     lot_seed: int
     key: int
+    hidden: Sequence[HiddenEffect] = ()
+    around: Callable[[], tuple[Array, float]] | None = (
+        None  # temperature of the units (s,), °C, and pressure of the air, hPa
+    )
     conditions: set[str] = field(default_factory=set[str])
     cable_off: set[int] = field(default_factory=set[int])
     broken: dict[int, str] = field(default_factory=dict[int, str])
@@ -87,6 +92,19 @@ class Bench:
             quadratic=0.1 * 1e-2 * preset.linearity_pct_fs / preset.range_g * z[3:6],
             mass_offset_m=1e-4 * float(z[6]),
         )
+
+    def units_now(self) -> list[DynamicTruth]:
+        """The units in the air that there is: what it does to spring and damping is in no register."""
+        if self.around is None or not self.hidden:
+            return self.units
+        natural, damping = np.ones(len(self.units)), np.ones(len(self.units))
+        for effect in self.hidden:
+            of_spring, of_damping = effect.sprung(*self.around())
+            natural, damping = natural * of_spring, damping * of_damping
+        return [
+            replace(unit, natural_hz=unit.natural_hz * float(n), damping=unit.damping * float(d))
+            for unit, n, d in zip(self.units, natural, damping, strict=True)
+        ]
 
     @property
     def rate_hz(self) -> float:
@@ -138,7 +156,7 @@ class Bench:
         spectrum = np.fft.rfft(felt, axis=0)
         orders = frequency * np.arange(len(spectrum), dtype=np.float64)
         outputs = np.zeros((round(seconds * rate), len(self.units), 3))
-        for k, (unit, truth) in enumerate(zip(self.units, self.truths, strict=True)):
+        for k, (unit, truth) in enumerate(zip(self.units_now(), self.truths, strict=True)):
             moved = np.fft.irfft(spectrum * unit.mass(orders)[:, None], PERIOD_POINTS, axis=0)
             bent = self._bent(truth, unit, moved)
             late = np.exp(-2j * np.pi * orders * (unit.delay_s + skew / (2.0 * np.pi * max(frequency, 1.0))))
@@ -188,7 +206,7 @@ class Bench:
         outputs = np.zeros((count, len(self.units), 3))
         spectrum = np.fft.rfft(padded, axis=0)
         fine = np.arange(n) / fine_hz
-        for k, (unit, truth) in enumerate(zip(self.units, self.truths, strict=True)):
+        for k, (unit, truth) in enumerate(zip(self.units_now(), self.truths, strict=True)):
             moved = np.fft.irfft(spectrum * unit.mass(f)[:, None] * share[k], whole, axis=0) + rest
             bent = self._bent(truth, unit, moved)
             floor = bent[-1]
@@ -228,7 +246,7 @@ class Bench:
         rng = self.stream_at(tick, 3)
         count = round(seconds * rate_hz)
         outputs = np.zeros((count, len(self.units), 3))
-        for k, (unit, truth) in enumerate(zip(self.units, self.truths, strict=True)):
+        for k, (unit, truth) in enumerate(zip(self.units_now(), self.truths, strict=True)):
             felt = np.zeros((1, 3))
             felt[0, axis] = force[k]
             outputs[:, k] = self._bent(truth, unit, felt)

@@ -15,6 +15,10 @@ Counts = NDArray[np.int64]
 REFERENCE_C = 25.0
 SUPPLY_SHIFT_G = 0.05  # bias of a device that is not ratiometric, for a supply that is gone
 RATIOMETRIC_ERROR = 3e-3  # one sigma: departure of a ratiometric gain, per relative change of the supply
+REGULATOR_HZ, HIGHEST_HZ = (
+    200.0,
+    20e3,
+)  # from which and to which the regulator of a device rejects less and less of a ripple
 REJECTION = 1e-3  # one sigma: relative change of the gain of other outputs, per relative change of the supply
 QUADRATIC_PER_K = 0.003  # quadratic over linear temperature coefficient, one sigma
 
@@ -110,6 +114,8 @@ class PlantDevices:
         self._supply_gain = np.array([t.supply_gain for t in truths])[:, None]
         self._shift = np.zeros((len(truths), 1))
         self._offset_counts = np.zeros((len(truths), 3))
+        self.ripple = (0.0, 0.0)  # on the supply: amplitude over the nominal voltage, and Hz
+        self._regulator_hz = np.array([REGULATOR_HZ * 2.0 ** float(np.tanh(t.supply_gain / REJECTION)) for t in truths])
 
     def output(self, force: Array, temperature: Array) -> Array:
         """Output without noise, (n, s, 3) in g, under force (n, s, 3) in g at ``temperature`` (n, s) in °C."""
@@ -151,11 +157,28 @@ class PlantDevices:
             self._gain = self._ratio * besides
             self._shift = SUPPLY_SHIFT_G * change
 
+    def ripple_response(self, hertz: float) -> NDArray[np.complex128]:
+        """How much of a ripple at ``hertz`` Hz acts as a change of the supply does at rest, (s,), complex.
+
+        The regulator inside loses its gain above a corner; what passes it is filtered by the output stage.
+        """
+        through = (1.0 + 1j * hertz / self._regulator_hz) / (1.0 + 1j * hertz / HIGHEST_HZ)
+        return np.asarray(through / (1.0 + 1j * hertz / self._preset.passband_hz))
+
+    def _ripple(self, time: Array) -> Array:
+        """Change of the supply at instants (n,) as the units feel it, (n, s, 1)."""
+        share, hertz = self.ripple
+        turned = np.exp(2j * np.pi * hertz * np.asarray(time))[:, None] * self.ripple_response(hertz)
+        return np.asarray(share * turned.imag[..., None])
+
     def counts(self, output: Array, time: Array | None = None) -> Counts:
         """What the converter says of outputs (n, s, 3) in g at instants (n,): supply, clipping at range and codes, rounding."""
         preset = self._preset
-        inside = np.clip(output + self._shift, -preset.range_g, preset.range_g)
         drift = 0.0 if time is None else np.asarray(self._supply_drift(time))[..., None]
+        wave = self._ripple(time) if time is not None and self.ripple[0] > 0.0 else 0.0
+        shift = self._shift + (0.0 if preset.ratiometric else SUPPLY_SHIFT_G) * wave
+        inside = np.clip(output + shift, -preset.range_g, preset.range_g)
+        drift = drift + wave
         gain = self._gain * (1.0 + preset.ratiometric * drift)
         raw = np.rint(gain * (preset.zero_level + preset.scale * inside) / self._lsb)
         raw = raw + self._offset_counts

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from schemas.simulation import Simulation
+from stations.plant.climate import AMBIENT_HPA, DAMPER_S, Climate
 from stations.plant.device import stream
 from stations.plant.hidden import HiddenEffect
 
@@ -48,8 +49,11 @@ class Chamber:
     shaken_g: float = 0.0
     seconds: float = 0.0
 
-    def step(self) -> None:
-        """Advances by one second."""
+    def step(self, store: float = math.nan) -> None:
+        """Advances by one second; the dampers of a climate unit let in air of ``store`` °C where that is a number."""
+        if not math.isnan(store):
+            self._follow(store)
+            return
         reach = self.ramp_K_min / 60.0 * STEP_S
         self.working += float(np.clip(self.set_point - self.working, -reach, reach))
         self.seconds += STEP_S
@@ -64,6 +68,13 @@ class Chamber:
         to_wall = (self.wall - self.air) / WALL_S
         self.air += STEP_S * (POWER_K_S * self.power + to_wall + (self.room - self.air) / leak)
         self.wall -= STEP_S * to_wall / WALL_MASS
+
+    def _follow(self, store: float) -> None:
+        """The air follows that of the store; the controller tracks it, and takes over without a jump."""
+        self.air += STEP_S * (store - self.air) / DAMPER_S
+        self.wall -= STEP_S * (self.wall - self.air) / (WALL_S * WALL_MASS)
+        self.working, self.power, self.integral = self.air, 0.0, 0.0
+        self.seconds += STEP_S
 
     def vibration(self) -> float:
         """Vibration of the fixture, g rms, from the building and, in proportion to its cooling power, the compressor."""
@@ -111,14 +122,26 @@ class Fixture:
         self._moisture = moisture
         self.chamber = Chamber(room=sim.room_C, ramp_K_min=3.0, air=sim.room_C, wall=sim.room_C, working=sim.room_C)
         self.chamber.set_point = sim.room_C
+        self.climate = Climate()
+        self.conditioned, self.pressure = Grid(np.array(math.nan)), Grid(np.array(AMBIENT_HPA))
+        self._breathing = [effect for effect in self._hidden if effect.breathes]
         self.temperature = Grid(np.full(len(slots), sim.room_C))
         self.air = Grid(np.array(sim.room_C))
         self.vibration = Grid(np.array(self.chamber.vibration()))
         self.memory = [Grid(np.zeros((len(slots), 3))) for _ in self._hidden]
 
     def humidity(self, time: Array) -> Array:
-        """Relative humidity of the air around the devices at instants (n,), %."""
-        return self._moisture.relative(time, self.air.at(time))
+        """Relative humidity of the air around the devices at instants (n,), %: that of a climate unit, else of the room."""
+        conditioned = self.conditioned.at(time)
+        return np.where(
+            np.isnan(conditioned), self._moisture.relative(time, self.air.at(time)), np.clip(conditioned, 0.0, 100.0)
+        )
+
+    def humidity_now(self) -> float:
+        """Relative humidity of the air at the newest step, %."""
+        now = np.array([(self.temperature.length - 1) * STEP_S])
+        room = self._moisture.relative(now, np.array([self.chamber.air]))[0]
+        return float(room) if math.isnan(self.climate.humidity) else self.climate.humidity
 
     def step_to(self, seconds: float, force: Callable[[float], Array]) -> None:
         """Computes the grid up to the whole second at or after ``seconds``; ``force(t)`` is (s, 3) in g."""
@@ -127,7 +150,10 @@ class Fixture:
             self._step(force)
 
     def _step(self, force: Callable[[float], Array]) -> None:
-        self.chamber.step()
+        self.climate.step(STEP_S)
+        self.chamber.step(self.climate.store)
+        self.conditioned.append(np.array(self.climate.humidity))
+        self.pressure.append(np.array(self.climate.pressure))
         keep = math.exp(-STEP_S / AIR_UNREST_S)
         z = self._air_stream.standard_normal(len(self._unrest))
         self._unrest = keep * self._unrest + AIR_UNREST_K * math.sqrt(1.0 - keep**2) * z
@@ -135,6 +161,10 @@ class Fixture:
         elements = around + (self.temperature.last - around) * self._keep
         if self._hidden:
             before = force((self.temperature.length - 1) * STEP_S)
+            if self._breathing:
+                around_pct = self.humidity_now()
+                for effect in self._breathing:
+                    effect.surround(around_pct, self.climate.pressure)
             for effect, memory in zip(self._hidden, self.memory, strict=True):
                 memory.append(effect.slow(elements, before, STEP_S))
         self.temperature.append(elements)

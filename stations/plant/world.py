@@ -98,7 +98,17 @@ class World:
         self.physics.orthogonality = 0.0 if self.station_errors is None else self.station_errors.orthogonality
         self.flash = [Flash() for _ in self.serials]  # by unit, in any slot
         self.teds = [Eeprom() for _ in self.serials]
-        self.bench = Bench(self.preset, self._truths, self.physics.devices, gravity, sim.seed, lot.seed, self._key)
+        self.bench = Bench(
+            self.preset,
+            self._truths,
+            self.physics.devices,
+            gravity,
+            sim.seed,
+            lot.seed,
+            self._key,
+            effects,
+            self._around,
+        )
         fifo = load_profile(config.devices.slots.profile).fifo
         registers = fifo.registers if fifo is not None else 0
         self.sampler = Sampler(self.physics, len(self.slots), self.preset.packing, registers)
@@ -118,6 +128,11 @@ class World:
     def now(self) -> float:
         """Time since power-on, s."""
         return self.now_us * 1e-6
+
+    def _around(self) -> tuple[Array, float]:
+        """Temperature of the units, °C, and pressure of the air, hPa, now."""
+        now = np.array([self.now])
+        return self.fixture.temperature.at(now)[0], float(self.fixture.pressure.at(now)[0])
 
     def advance(self, microseconds: int) -> None:
         """Advances the time; the result does not depend on the number of calls."""
@@ -173,6 +188,10 @@ class World:
         """Sets the supplies of some units to ``factor`` times their nominal voltage."""
         self._supplies.factor[list(units)] = factor
         self.physics.devices.supply(self._supplies.factor)
+
+    def set_ripple(self, volt: float, hertz: float) -> None:
+        """Puts a sine of ``volt`` V (peak) at ``hertz`` Hz on the supplies of all units."""
+        self.physics.devices.ripple = (volt / self.preset.supply_V, hertz)
 
     def truth(self, serial: str) -> Truth:
         """The true parameters of a unit; for tests and benchmarks, never for a client."""

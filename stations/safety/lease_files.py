@@ -20,9 +20,18 @@ from schemas.station import StationConfig
 from schemas.station_devices import Device, Slots
 
 Part = Literal[
-    "outer", "inner", "chamber", "reader", "exciter", "shock_machine", "centrifuge", "power_supply", "step_generator"
+    "outer",
+    "inner",
+    "chamber",
+    "reader",
+    "exciter",
+    "shock_machine",
+    "centrifuge",
+    "power_supply",
+    "step_generator",
+    "climate",
 ]
-ROLES: tuple[Part, ...] = ("exciter", "shock_machine", "centrifuge", "power_supply", "step_generator")
+ROLES: tuple[Part, ...] = ("exciter", "shock_machine", "centrifuge", "power_supply", "step_generator", "climate")
 PARTS: tuple[Part, ...] = ("outer", "inner", "chamber", "reader")
 
 

@@ -1,7 +1,7 @@
 """What an effect on a transfer function is, and the conditions of the points of a sweep."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
@@ -9,6 +9,9 @@ import numpy as np
 
 from inertial.arrays import Array, Complex, Flags
 from inertial.dynamics.effect_modules import DynamicEffect
+
+AMBIENT_C, AMBIENT_HPA = 25.0, 1013.25
+"""To which parameters refer that another effect changes."""
 
 
 class Parameter(NamedTuple):
@@ -50,20 +53,39 @@ class Conditions:
     """The points of a sweep, all (n,).
 
     frequency : Hz · level : peak g · temperature : °C · record_s : duration of the record of a point, s
+    pressure_hPa : of the air; None where it was not recorded
     """
 
     frequency: Array
     level: Array
     temperature: Array
     record_s: Array
+    pressure_hPa: Array | None = None
+
+    @property
+    def pressure(self) -> Array:
+        """Pressure of the air (n,), hPa; the standard one where it was not recorded."""
+        known = np.full(len(self.frequency), np.nan) if self.pressure_hPa is None else self.pressure_hPa
+        return np.where(np.isnan(known), AMBIENT_HPA, known)
+
+    @property
+    def columns(self) -> tuple[Array, ...]:
+        """Frequency, level, temperature, duration and pressure."""
+        return self.frequency, self.level, self.temperature, self.record_s, self.pressure
 
     def picked(self, rows: Flags) -> "Conditions":
         """Some of the points."""
-        return Conditions(self.frequency[rows], self.level[rows], self.temperature[rows], self.record_s[rows])
+        return Conditions(*(one[rows] for one in self.columns))
+
+    def along(self, frequency: Array) -> "Conditions":
+        """Other frequencies (m,) in the middle of the conditions of these points."""
+        return Conditions(frequency, *(np.full(len(frequency), np.median(one)) for one in self.columns[1:]))
 
 
 class TransferEffect(DynamicEffect, ABC):
-    """A factor of the transfer function, 1 where it does not act. Every module of this package defines one class.
+    """A factor of the transfer function, 1 where it does not act; or what changes parameters of others from point to point.
+
+    Every module of this package defines one class.
 
     in_every_device : a filter that a device has somewhere, if only far beyond the points: what the points say of the sensing
     element must hold beside it, too
@@ -78,6 +100,10 @@ class TransferEffect(DynamicEffect, ABC):
     @abstractmethod
     def factor(self, points: Conditions, values: Array) -> Complex:
         """The factor (n,) at the points, for parameter values (p,)."""
+
+    def changes(self, points: Conditions, values: Array) -> Mapping[str, Array]:
+        """Factors (n,) of parameters of other effects at the points, by their names; none for most effects."""
+        return {}
 
     def seen(self, points: Conditions) -> bool:
         """Whether the points can show the effect at all."""

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from inertial.arrays import Array
+from pipelines.certificates.validity import Calibration
 from pipelines.export.omissions import ACROSS, ACROSS_T, BIAS, BIAS_T, SCALE_T, comment, comment_lines
 from pipelines.export.polynomials import UnitCalibration
 from pipelines.export.settings import ExportSettings
@@ -45,29 +46,38 @@ def write(units: Sequence[UnitCalibration], run: str, settings: ExportSettings) 
     """
     sheet = settings.data_sheet or data_sheet("", "")  # which refuses, as no key is given
     files: dict[str, bytes] = {}
-    owners: dict[int, str] = {}
+    serials = serial_numbers([unit.unit for unit in units])
     for unit in units:
-        serial = _serial(unit.unit)
-        if serial in owners:
-            raise WrongUse(
-                f"export: units {owners[serial]} and {unit.unit}: TEDS hold the digits at the end of a serial number, {serial} "
-                "for both, different ones are needed; export them one by one with --units, with different models"
-            )
-        owners[serial] = unit.unit
-        if unit.out_unit != "V":
-            raise WrongUse(
-                f"export: output of unit {unit.unit} is in {unit.out_unit}, V is needed for TEDS, whose template 25 states "
-                "V/(m/s²); export json, csv or c"
-            )
-        own = _with_period(unit, sheet)
+        serial = serials[unit.unit]
+        refuse_digital(unit.unit, unit.out_unit)
+        own = with_period(unit.unit, unit.certificate, sheet)
         stated = {
             letter: Accelerometer(axis, float(unit.response[0, row, axis]) / STANDARD_GRAVITY_M_S2)
             for row, (axis, letter) in enumerate(zip(unit.axes, unit.letters, strict=True))
         }
         files |= {f"{unit.unit}-{letter}.teds": page(own, serial, one) for letter, one in stated.items()}
-        text = [*_heading(unit, run, own, serial), *_axes(stated), *_left_out(unit, stated)]
+        text = [
+            *heading(unit.unit, unit.certified, run, own, serial),
+            AT_REST,
+            *axis_lines(stated),
+            *_left_out(unit, stated),
+        ]
         files[f"{unit.unit}.txt"] = "".join(f"{comment(line)}\n" for line in text).encode()
     return files
+
+
+def serial_numbers(units: Sequence[str]) -> dict[str, int]:
+    """The digits at the end of each serial number, by unit; two units with the same are refused."""
+    owners: dict[int, str] = {}
+    for unit in units:
+        serial = _serial(unit)
+        if serial in owners:
+            raise WrongUse(
+                f"export: units {owners[serial]} and {unit}: TEDS hold the digits at the end of a serial number, {serial} "
+                "for both, different ones are needed; export them one by one with --units, with different models"
+            )
+        owners[serial] = unit
+    return {unit: serial for serial, unit in owners.items()}
 
 
 def _serial(unit: str) -> int:
@@ -81,31 +91,43 @@ def _serial(unit: str) -> int:
     return int(digits[0])
 
 
-def _with_period(unit: UnitCalibration, sheet: DataSheet) -> DataSheet:
+def refuse_digital(unit: str, out_unit: str) -> None:
+    """Refuse an output that is no voltage."""
+    if out_unit != "V":
+        raise WrongUse(
+            f"export: output of unit {unit} is in {out_unit}, V is needed for TEDS, whose template 25 states V/(m/s²); export "
+            "json, csv or c"
+        )
+
+
+def with_period(unit: str, certificate: Calibration | None, sheet: DataSheet) -> DataSheet:
     """The data sheet with the days to the next calibration: those given, else those of the certificate."""
-    days = sheet.period_days or (unit.certificate.stated_days if unit.certificate else None)
+    days = sheet.period_days or (certificate.stated_days if certificate else None)
     if days is None:
         raise WrongUse(
-            f"export: unit {unit.unit} is not certified, so nothing states its period of calibration, TEDS needs it; add "
+            f"export: unit {unit} is not certified, so nothing states its period of calibration, TEDS needs it; add "
             "period_days=DAYS to --set teds=…, or certify the run"
         )
     return replace(sheet, period_days=days)
 
 
-def _heading(unit: UnitCalibration, run: str, sheet: DataSheet, serial: int) -> list[str]:
-    mass = MASS.stated(sheet.mass_g)
+def heading(unit: str, certified: str, run: str, sheet: DataSheet, serial: int) -> list[str]:
+    """What the page states beside the calibration, for people."""
     return [
-        f"accelerometer {unit.unit}, run {run}: IEEE 1451.4 basic TEDS and template 25, {PAGE_BYTES} bytes for each axis",
-        unit.certified,
+        f"accelerometer {unit}, run {run}: IEEE 1451.4 basic TEDS and template 25, {PAGE_BYTES} bytes for each axis",
+        certified,
         f"manufacturer {sheet.manufacturer}, model {sheet.model}, version {sheet.version}, serial number {serial}",
-        f"mass {mass:.3g} g ({sheet.mass_g:g} g given)",
+        f"mass {MASS.stated(sheet.mass_g):.3g} g ({sheet.mass_g:g} g given)",
         f"calibrated {sheet.measured} by {sheet.initials}, period {sheet.period_days} days",
-        f"reference 25 °C and {REFERENCE.start:g} Hz, high-pass {HIGH_PASS.start:g} Hz: the lowest there is; measured at 0 Hz",
         "template 25 says constant-current supply and AC coupling: an instrument that reads it may switch both on",
     ]
 
 
-def _axes(stated: dict[str, Accelerometer]) -> list[str]:
+AT_REST = f"reference 25 °C and {REFERENCE.start:g} Hz, high-pass {HIGH_PASS.start:g} Hz: the lowest there is; measured at 0 Hz"
+
+
+def axis_lines(stated: dict[str, Accelerometer]) -> list[str]:
+    """The sensitivities as stated beside those that were measured."""
     lines: list[str] = []
     for letter, one in stated.items():
         polarity = "negative" if one.sensitivity < 0.0 else "positive"

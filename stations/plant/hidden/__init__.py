@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import fields
 
 from schemas.errors import RecipeInvalid, did_you_mean
-from stations.plant.hidden import device, table
+from stations.plant.hidden import device, package, spring, table
 from stations.plant.hidden.base import Block, HiddenEffect
 
 __all__ = ["HIDDEN", "Block", "HiddenEffect", "hidden_effect"]
@@ -27,6 +27,11 @@ HIDDEN: Mapping[str, type[HiddenEffect]] = {
     "moisture_swelling": device.MoistureSwelling,
     "stress_relaxation": device.StressRelaxation,
     "step_change": device.StepChange,
+    "yielding_adhesive": package.YieldingAdhesive,
+    "moisture_diffusion": package.MoistureDiffusion,
+    "leaky_lid": package.LeakyLid,
+    "gas_film": spring.GasFilm,
+    "softening_spring": spring.SofteningSpring,
 }
 
 

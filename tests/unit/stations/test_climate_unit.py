@@ -1,0 +1,76 @@
+"""The climate unit of the simulated station: legs, what it has reached, and what stops it."""
+
+from collections.abc import Generator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+import pytest
+from small_station import lot_of
+
+from schemas.errors import OperatorNeeded, StationRefused
+from schemas.fault import FaultOrder
+from schemas.station import load_station, with_faults
+from stations import open_station
+from stations.devices.equipment import RecordingSpoilt
+
+ROOM_HPA = 1013.25
+
+
+@contextmanager
+def opened(*faults: FaultOrder) -> Generator[Any]:
+    with open_station(with_faults(load_station(), list(faults)), lot_of(2), roles=["climate"]) as station:
+        yield station
+
+
+def test_a_leg_goes_to_its_air_on_a_straight_line_and_the_recording_shows_it() -> None:
+    with opened() as station:
+        unit = station.equipment["climate"]
+        made = unit.expose(60.0, 90.0, 500.0, 1200.0, 1800.0, [0, 1])
+        air = made.reference
+        assert air.shape == (300, 3)
+        assert air[-20:].mean(axis=0) == pytest.approx([60.0, 90.0, 500.0], abs=0.3)
+        half = round(600.0 * made.reference_rate_hz)
+        assert air[half, 2] == pytest.approx((ROOM_HPA + 500.0) / 2.0, abs=10.0)
+        assert set(made.outputs) == {0, 1}
+        assert np.ptp(made.outputs[0][:, 2]) > 0.0
+        # humidity and pressure stay when the leg has ended, and the chamber takes the temperature over
+        station.clock.sleep(3600.0)
+        still = unit.expose(60.0, 90.0, 500.0, 1.0, 600.0, [0]).reference
+        assert still[:3, 1:].mean(axis=0) == pytest.approx([90.0, 500.0], abs=0.6)
+        unit.make_safe()
+        room = unit.expose(60.0, None, ROOM_HPA, 1.0, 600.0, [0]).reference
+        assert room[:, 2].mean() == pytest.approx(ROOM_HPA, abs=0.3)
+        assert room[-1, 1] < 30.0
+
+
+def test_a_shock_changes_the_air_within_minutes() -> None:
+    with opened() as station:
+        air = station.equipment["climate"].expose(-40.0, None, ROOM_HPA, 60.0, 900.0, [0]).reference[:, 0]
+        assert air[round(180.0 / 10.0)] < -39.0
+
+
+def test_what_was_not_reached_is_told_and_not_repeated() -> None:
+    with (
+        opened() as station,
+        pytest.raises(OperatorNeeded, match=r"humidity at .* at the end of the leg, 95 ± 5 % was ordered"),
+    ):
+        station.equipment["climate"].expose(25.0, 95.0, ROOM_HPA, 1.0, 30.0, [0])
+
+
+def test_orders_beyond_the_unit_are_refused() -> None:
+    with opened() as station, pytest.raises(StationRefused, match=r"temperature 200\.0; -75\.0 to 180.0"):
+        station.equipment["climate"].expose(200.0, None, ROOM_HPA, 60.0, 60.0, [0])
+
+
+def test_an_abort_needs_the_operator_and_a_missed_trigger_is_taken_again() -> None:
+    with (
+        opened(FaultOrder(kind="controller_abort", at_s=0.0)) as station,
+        pytest.raises(OperatorNeeded, match="door of the climate unit open"),
+    ):
+        station.equipment["climate"].expose(40.0, None, ROOM_HPA, 60.0, 60.0, [0])
+    with (
+        opened(FaultOrder(kind="missed_trigger", at_s=0.0)) as station,
+        pytest.raises(RecordingSpoilt, match="trigger was missed"),
+    ):
+        station.equipment["climate"].expose(40.0, None, ROOM_HPA, 60.0, 60.0, [0])
