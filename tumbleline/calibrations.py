@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pipelines.archive import Archive, Run
 from tumbleline.pictures import Picture, as_html, as_text, rounded_table
-from tumbleline.recordings import Recording
+from tumbleline.recordings import Recording, Source
 
 K = 2.0  # coverage factor of U
 
@@ -145,7 +145,7 @@ class Calibration:
 
 
 def fit(
-    recording: Recording | str | Path | pd.DataFrame,
+    recording: Recording | Source | Sequence[str | Path],
     effects: Sequence[str] | None = None,
     *,
     leave_out: Sequence[str] = (),

@@ -7,6 +7,7 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from pipelines.importers.exchange import is_exchange
 from pipelines.importers.mapping import build
 from pipelines.importers.proposal import FEWEST_OF_NORM, Proposal, has_reference
 from pipelines.importers.recognition import Recognition, recognise
@@ -18,8 +19,14 @@ if TYPE_CHECKING:
 Working = Callable[[str], AbstractContextManager[Any]]
 
 
-def bring_in(paths: list[Path], archive: str | None, working: Working, group: str = "") -> RecordingDocument | None:
+def bring_in(
+    paths: list[Path], archive: str | None, working: Working, group: str = "", join: str = ""
+) -> RecordingDocument | None:
     """The import of a recording as it is recognised; None for a table of dwells, which needs none.
+
+    Parameters
+    ----------
+    paths : files of one recording · join : how several are joined, one after another by default
 
     Raises
     ------
@@ -31,11 +38,13 @@ def bring_in(paths: list[Path], archive: str | None, working: Working, group: st
     from pipelines.diagnosis.import_document import import_document
 
     with working(f"recognising {paths[0].name}"):
-        seen = recognise(paths, group=group)
+        seen = recognise(paths, join=join or ("rows" if len(paths) > 1 else ""), group=group)
         proposal = None if seen.is_exchange else seen.for_fit()
     if seen.is_exchange:
         return None
-    name = paths[0].name
+    name = " + ".join(path.name for path in paths)
+    if len(paths) > 1 and is_exchange(seen.content.table.columns):
+        raise WrongUse(f"{name}: {len(paths)} tables of dwells, one is needed; write their rows into one file")
     if proposal is None:
         raise WrongUse(
             f"{name}: not recognised without doubt: {'; '.join(seen.open)}; complete the command: {seen.import_command}"
