@@ -35,9 +35,10 @@ class Row:
     """What the records of a row have in common: ranges are drawn from.
 
     rate_hz : samples in a second · noise_mg : standard deviation of a sample, white · rest_s, move_s : lengths; a move of 0 s is
-    none in the record · stops : of a record · vibration : frequency in Hz and amplitude in g of a machine, and the part of the
-    rests in which it runs · held : part of the moves that end with some seconds in a steady hand · drift_mg : change of the bias over the record by the temperature · knocks : on the table, per rest
-    counts : the output is in counts of this many per g, with an offset
+        none in the record · stops : of a record
+    vibration : frequency in Hz and amplitude in g of a machine, and the part of the rests in which it runs
+    held : part of the moves that end with some seconds in a steady hand · drift_mg : change of the bias over the record by the
+        temperature · knocks : on the table, per rest · counts : the output is in counts of this many per g, with an offset
     """
 
     rate_hz: tuple[float, ...] = (100.0,)
@@ -238,19 +239,11 @@ def counted(record: Record, spans: Spans) -> tuple[int, int, int]:
         inside = [max(0, min(b, d) - max(a, c)) for c, d in record.rests]
         k = int(np.argmax(inside)) if inside else -1
         allowed = _ALLOWED_G * record.unit + _SIGMAS * record.sd / np.sqrt(b - a)
-        if k < 0 or 2 * inside[k] < b - a:
-            false += 1
-        elif np.abs(record.output[a:b].mean(axis=0) - record.poses[k]).max() > allowed + _own(record, k, a, b):
+        if k < 0 or 2 * inside[k] < b - a or np.abs(record.output[a:b].mean(axis=0) - record.poses[k]).max() > allowed:
             false += 1
         else:
             right.add(k)
     return len(right), len(record.rests) - len(right), false
-
-
-def _own(record: Record, k: int, a: int, b: int) -> float:
-    """What a drift of the bias moves a part of a rest beside the whole: nothing where it is found whole."""
-    c, d = record.rests[k]
-    return 0.05 * _ALLOWED_G * record.unit * (1.0 - (b - a) / (d - c)) if b - a < d - c else 0.0
 
 
 def main() -> None:

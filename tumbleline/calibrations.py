@@ -135,7 +135,10 @@ class Calibration:
         return Picture(Chart(title, (Plot(title, PlotAxis("dwell"), PlotAxis("residual / µg"), traces),)))
 
     def _lines(self) -> list[str]:
-        return [f"{', '.join(self.effects)}; residual {self.rms_ug:.3g} µg rms; U with k = 2; run {self.run.id}"]
+        from pipelines.tables.dwells import lacking
+
+        about = f"{', '.join(self.effects)}; residual {self.rms_ug:.3g} µg rms; U with k = 2; run {self.run.id}"
+        return [about, *filter(None, [lacking(self.recording.dwells)])]
 
     def _repr_html_(self) -> str:
         return as_html("Calibration", self._lines(), rounded_table(self.coefficients))

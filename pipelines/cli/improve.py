@@ -80,7 +80,8 @@ def command(
     """Diagnose a model, ask which of the missing effects to add, write the model file, and judge the change by a fresh run.
 
     A recording of another system is recognised, imported and fitted first; the import that was chosen is printed as a command.
-    Several files are one recording of one sensor: they follow one another, or stand side by side with --set join=columns. Where a column or unit is not certain nothing is imported, and the command to complete is printed.
+    Several files are one recording of one sensor: they follow one another, or stand side by side with --set join=columns.
+    Where a column or unit is not certain nothing is imported, and the command to complete is printed.
 
     One question per effect; effects that these data cannot separate are named in the question. Where DATA is a run and an effect
     was added, the fresh run is one of its archive, or the station measures it: one more question, or --measure. Exit status 0:

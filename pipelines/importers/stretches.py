@@ -34,7 +34,7 @@ _TURN_PER_S, _TURN_SIGMAS, _POSES = 0.01, 4.0, 10.0
 """Change of the mean in a second over gravity, above which a stretch turns: a temperature moves it by a twentieth of that; its
 standard errors that show it; and scatter over which gravity has to stand, in counts the only sign that the sensor was turned."""
 _NEARLY, _CONTAMINATED = 0.94, 3.0
-"""Part of the longest time at rest that a longer window has to find; and its quietest scatter over that of the quietest window."""
+"""Part of the longest time at rest that a longer window has to find; its quietest scatter over that of the quietest window."""
 _ENOUGH = 6
 """Stops from which a longer window is preferred: the faces of a cube."""
 
@@ -142,6 +142,8 @@ def found_stops(output: Array, time: Array, edges: Sequence[int], gravity: float
     clean = [stops for stops in fit if stops.is_clean]
     if clean:
         return _longest(clean)
+    if any(len(stops.found) and not stops.several and stops.rest_s > 0.0 for stops in fit):
+        return max(fit, key=lambda stops: 0.0 if stops.several else stops.rest_s)  # few, and each of one position
     # a hand that rests for a moment shakes little less than one that moves: stricter limits part what it runs together
     strict = [
         _stops(output, time, edges, _SearchOptions(window, window, float(f"{times * sd:.3g}")), gravity)

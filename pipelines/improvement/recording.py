@@ -7,6 +7,7 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from inertial.counts import number_of
 from pipelines.importers.exchange import is_exchange
 from pipelines.importers.mapping import build
 from pipelines.importers.proposal import FEWEST_OF_NORM, Proposal, has_reference
@@ -84,6 +85,10 @@ def _too_little(seen: Recognition, proposal: Proposal) -> str:
         )
     else:
         stops = len(seen.output) if seen.guessed.dwells and seen.output is not None else proposal.stops
-        found, needed = f"{stops} stops in all", f"{FEWEST_OF_NORM} positions at rest for a fit to the norm of gravity"
+        where = "all" if proposal.places in {0, stops} else number_of(proposal.places, "position")
+        found, needed = (
+            f"{stops} stops in {where}",
+            f"{FEWEST_OF_NORM} positions at rest for a fit to the norm of gravity",
+        )
     remedy = "record each position for some seconds, or see its noise with 'tumbleline noise allan'"
     return f"{found}, {needed} are needed; {remedy}"

@@ -8,7 +8,7 @@ from inertial.correction import correct, station_change
 from inertial.design import of_axes
 from pipelines.stages.rms_error import OF_UNITS, rms_columns
 from pipelines.tables.calibration import Calibration, read_calibration
-from pipelines.tables.dwells import LotArrays, LotTables
+from pipelines.tables.dwells import LotArrays, LotTables, joined_parts, own_rows
 from pipelines.tables.frames import empty_table, picked
 from schemas.units import AXES, MICRO
 
@@ -51,6 +51,10 @@ def verify_tables(
     """
     if not np.any(tables.dwells["kind"] == "verification") or coefficients.empty:
         return nothing_verified()
+    if len(tables.parts) > 1 and isinstance(predictions, pd.DataFrame):
+        every = (coefficients, covariance, predictions)
+        parts = [(part, *(own_rows(one, part.dwells) for one in every)) for part in tables.parts]
+        return joined_parts([verify_tables(*part) for part in parts])
     lot, calibration = tables.all_kinds, calibration or read_calibration(coefficients, covariance)
     model, unseen = calibration.effects, lot.of_kind("verification")
     corrected = correct(model, lot.state, lot.output, calibration.coefficients, calibration.nonlinear)

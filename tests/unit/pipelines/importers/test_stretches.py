@@ -1,7 +1,6 @@
 """Which stretches of a record that was turned by hand are rest."""
 
 import numpy as np
-
 import pytest
 
 from benchmarks.rest_and_motion import ROWS, counted, found, made
