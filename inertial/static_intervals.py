@@ -75,7 +75,9 @@ def find(
     slow_sd = np.sqrt(moving_variance(slow, width).sum(axis=-1))
     # of few independent values the quietest is far below the usual: white noise leaves its share of the whole at least
     slow_quiet = max(_quietest(slow_sd, width), gain * quiet)
-    slow_limit = max(_threshold(slow_sd, slow_quiet, _SLOW), _TURNED * size * min(1.0, window_s))
+    slow_limit = max(
+        _threshold(slow_sd, slow_quiet, _SLOW if half > 1 else _WHOLE), _TURNED * size * min(1.0, window_s)
+    )
     limit = max(_threshold(sd, quiet, _WHOLE), _SHAKEN * size) if threshold is None else threshold
     start, stop = _intervals((sd <= limit) & (slow_sd <= slow_limit), width, data, 2.0 * slow_limit)
     shortest, most = max(2, round(shortest_s * rate_hz)), round(0.5 * window_s * rate_hz)

@@ -76,8 +76,8 @@ class Stops:
 
     @property
     def is_clean(self) -> bool:
-        """Whether there are enough stops, each of one position, and more of them than motion."""
-        return not self.several and len(self.found) >= _ENOUGH and self.rest_s > 0.0
+        """Whether there are stops, each of one position, and more of them than motion."""
+        return not self.several and len(self.found) > 0 and self.rest_s > 0.0
 
 
 @dataclass(frozen=True)
@@ -140,17 +140,16 @@ def found_stops(output: Array, time: Array, edges: Sequence[int], gravity: float
     # in a window that is too long for the stops it is never quiet
     fit = [stops for stops in plain if quiet.get(stops.window_s, least) <= _CONTAMINATED * least]
     clean = [stops for stops in fit if stops.is_clean]
-    if clean:
-        return _longest(clean)
-    if any(len(stops.found) and not stops.several and stops.rest_s > 0.0 for stops in fit):
-        return max(fit, key=lambda stops: 0.0 if stops.several else stops.rest_s)  # few, and each of one position
+    best = _longest(clean) if clean else None
+    if best and (len(best.found) >= _ENOUGH or not any(stops.several for stops in fit)):
+        return best
     # a hand that rests for a moment shakes little less than one that moves: stricter limits part what it runs together
     strict = [
         _stops(output, time, edges, _SearchOptions(window, window, float(f"{times * sd:.3g}")), gravity)
         for window, sd in quiet.items()
         for times in STRICT
     ]
-    clean = [stops for stops in strict if stops.is_clean]
+    clean = [stops for stops in strict if stops.is_clean and len(stops.found) >= _ENOUGH]
     if not clean:
         return max(plain, key=lambda stops: len(stops.found) - len(stops.several))
     return _longest(clean)

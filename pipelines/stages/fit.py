@@ -14,8 +14,8 @@ from inertial.population.family import Family
 from pipelines.stages.noisy_fit import NoisyFit, fitted_with_noise
 from pipelines.stages.uncertainty.bias_measurands import COLUMNS, BiasNoise, bias_measurands
 from pipelines.tables.calibration import Calibration, calibration_of, coefficient_rows, covariance_rows, symmetric
-from pipelines.tables.dwells import LotArrays, LotTables, joined_parts
-from pipelines.tables.frames import empty_table, picked
+from pipelines.tables.dwells import LotArrays, LotTables
+from pipelines.tables.frames import empty_table, joined_parts, picked
 from schemas.errors import DataRejected
 from schemas.units import MICRO
 

@@ -8,8 +8,8 @@ from inertial.correction import correct, station_change
 from inertial.design import of_axes
 from pipelines.stages.rms_error import OF_UNITS, rms_columns
 from pipelines.tables.calibration import Calibration, read_calibration
-from pipelines.tables.dwells import LotArrays, LotTables, joined_parts, own_rows
-from pipelines.tables.frames import empty_table, picked
+from pipelines.tables.dwells import LotArrays, LotTables
+from pipelines.tables.frames import empty_table, joined_parts, own_rows, picked
 from schemas.units import AXES, MICRO
 
 

@@ -7,7 +7,7 @@ fitted in :attr:`LotTables.parts`. Both have the same state.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 
@@ -140,21 +140,6 @@ def lacking(dwells: pd.DataFrame) -> str:
     return (
         f"dwells that others have: {'; '.join(told)}; units are fitted with those of the same dwells" if named else ""
     )
-
-
-def own_rows(table: pd.DataFrame, dwells: pd.DataFrame) -> pd.DataFrame:
-    """The rows of the units of some dwells; all of a table without units."""
-    return table[table["unit"].isin(dwells["unit"].unique())] if "unit" in table.columns else table
-
-
-def joined_parts(parts: Sequence[dict[str, pd.DataFrame]]) -> dict[str, pd.DataFrame]:
-    """Tables of the parts of a lot as those of the lot, in order of its units."""
-    if len(parts) == 1:
-        return parts[0]
-    tables = {name: [made[name] for made in parts if len(made[name])] or [parts[0][name]] for name in parts[0]}
-    return {
-        name: pd.concat(rows).sort_values("unit", kind="stable", ignore_index=True) for name, rows in tables.items()
-    }
 
 
 def measured(dwells: pd.DataFrame, history: pd.DataFrame | None = None) -> Measured:

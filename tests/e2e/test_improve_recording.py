@@ -132,9 +132,8 @@ def test_several_files_of_one_sensor_are_one_recording_in_one_command(rng: np.ra
     _, frame = hand_held(rng, stops=28, rate=50.0)
     half = len(frame) // 2
     for name, part in (("a.csv", frame.iloc[:half]), ("b.csv", frame.iloc[half:])):
-        part = part.copy()
-        part.iloc[:, 0] = np.arange(len(part)) / 50.0
-        part.set_axis(["t", "ax", "ay", "az", "gx", "gy", "gz"], axis=1).to_csv(name, index=False)
+        own = part.set_axis(["t", "ax", "ay", "az", "gx", "gy", "gz"], axis=1)
+        own.assign(t=np.arange(len(own)) / 50.0).to_csv(name, index=False)
     document = document_of("improve", "a.csv", "b.csv", status=0)
     one = document["recording"]
     assert one["files"] == ["a.csv", "b.csv"]

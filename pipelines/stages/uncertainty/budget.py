@@ -19,7 +19,8 @@ from pipelines.stages.uncertainty.contributions import DwellConditions, influenc
 from pipelines.stages.uncertainty.measurands import LotBudget, VarianceParts
 from pipelines.stages.uncertainty.tables import empty, tables_of
 from pipelines.tables.calibration import Calibration
-from pipelines.tables.dwells import LotArrays, joined_parts
+from pipelines.tables.dwells import LotArrays
+from pipelines.tables.frames import joined_parts
 from schemas.units import MICRO
 from schemas.validity import Stability
 

@@ -11,7 +11,8 @@ import pandas as pd
 from pipelines.stages.reduce import FollowedSupply
 from pipelines.stages.uncertainty.contributions import merged, reads_own_temperature
 from pipelines.tables.calibration import Calibration, read_calibration
-from pipelines.tables.dwells import LotArrays, LotTables, own_rows
+from pipelines.tables.dwells import LotArrays, LotTables
+from pipelines.tables.frames import own_rows
 from schemas.limits import VALIDITY_MONTHS
 from schemas.recipe import Recipe
 from schemas.reference import Reference
