@@ -92,7 +92,7 @@ def _poses(
     ends = np.cumsum(np.ravel(np.column_stack([rests, moves])))[:-1]
     times = np.concatenate([[0.0], ends])
     time = np.arange(0.0, times[-1], 1.0 / rate)
-    path = Slerp(times, poses[np.repeat(np.arange(len(rests)), 2)])(time)
+    path = Slerp(times, Rotation.from_quat(np.repeat(poses.as_quat(), 2, axis=0)))(time)
     rest = np.searchsorted(times, time, side="right") % 2 == 1
     pushed = shove * _smooth(rng.standard_normal((len(time), 3)), max(1, round(0.15 * rate)))
     world = np.array([0.0, 0.0, 1.0]) + np.where(rest[:, None], 0.0, pushed)
@@ -167,7 +167,7 @@ def desk(rng: np.random.Generator) -> Motion:
 
 def _placed(count: int, rng: np.random.Generator) -> Rotation:
     """Poses with a face or an edge down, as a hand puts them."""
-    about = Rotation.create_group("O")[rng.integers(24, size=count)]
+    about = Rotation.from_quat(Rotation.create_group("O").as_quat()[rng.integers(24, size=count)])
     return Rotation.from_rotvec(rng.choice([0.1, 0.8], (count, 1)) * rng.standard_normal((count, 3))) * about
 
 

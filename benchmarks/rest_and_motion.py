@@ -41,8 +41,8 @@ class Row:
         temperature · knocks : on the table, per rest · counts : the output is in counts of this many per g, with an offset
     """
 
-    rate_hz: tuple[float, ...] = (100.0,)
-    noise_mg: tuple[float, ...] = (1.0,)
+    rate_hz: tuple[float, ...] = (50.0, 100.0, 200.0)
+    noise_mg: tuple[float, ...] = (0.2, 1.0, 5.0)
     rest_s: tuple[float, float] = (2.0, 6.0)
     move_s: tuple[float, float] = (0.7, 2.5)
     stops: int = 20
@@ -55,29 +55,28 @@ class Row:
 
 _RATES = (20.0, 50.0, 100.0, 200.0, 500.0, 1000.0, 2000.0)
 _NOISES = (0.05, 0.2, 1.0, 5.0, 20.0)
-_USUAL = {"rate_hz": (50.0, 100.0, 200.0), "noise_mg": (0.2, 1.0, 5.0)}
 ROWS: dict[str, Row] = {
-    **{f"{rate:g} Hz": Row((rate,), (0.2, 1.0, 5.0)) for rate in _RATES},
-    **{f"noise {noise:g} mg": Row((50.0, 100.0, 200.0), (noise,)) for noise in _NOISES},
-    "rests of 9 samples": Row((10.0,), (0.2, 1.0, 5.0), rest_s=(0.9, 0.9), move_s=(0.4, 0.8)),
-    "rests of 0.6 to 1 s": Row(**_USUAL, rest_s=(0.6, 1.0), move_s=(0.4, 1.0)),
-    "rests of 1 to 2 s": Row(**_USUAL, rest_s=(1.0, 2.0), move_s=(0.5, 1.5)),
-    "rests of 1 to 60 s": Row(**_USUAL, rest_s=(1.0, 60.0)),
-    "slow moves of 4 to 8 s": Row(**_USUAL, move_s=(4.0, 8.0)),
-    "held for 1.5 to 3 s in half of the moves": Row(**_USUAL, held=0.5),
-    "5 Hz 0.05 g in a third of the rests": Row(**_USUAL, vibration=(5.0, 0.05, 0.33)),
-    "5 Hz 0.05 g in all rests": Row(**_USUAL, vibration=(5.0, 0.05, 1.0)),
-    "18 Hz 0.02 g in half of the rests": Row(**_USUAL, vibration=(18.0, 0.02, 0.5)),
-    "50 Hz 0.1 g in half of the rests": Row((200.0, 500.0, 1000.0), (0.2, 1.0, 5.0), vibration=(50.0, 0.1, 0.5)),
-    "warms by 30 mg": Row(**_USUAL, drift_mg=30.0),
-    "knocks on the table": Row(**_USUAL, knocks=0.5),
-    "counts with an offset": Row(**_USUAL, counts=4096.0),
-    "back to back, 9 samples": Row((10.0,), (0.2, 1.0, 5.0), rest_s=(0.8, 1.0), move_s=(0.0, 0.0)),
-    "back to back, 15 to 60 samples": Row((20.0,), (0.2, 1.0, 5.0), rest_s=(0.75, 3.0), move_s=(0.0, 0.0)),
-    "waved": Row(**_USUAL, stops=0),
-    "waved, counts": Row(**_USUAL, stops=0, counts=4096.0),
-    "one rest": Row(**_USUAL, stops=1, rest_s=(20.0, 60.0)),
-    "one rest, 5 Hz 0.05 g": Row(**_USUAL, stops=1, rest_s=(20.0, 60.0), vibration=(5.0, 0.05, 1.0)),
+    **{f"{rate:g} Hz": Row((rate,)) for rate in _RATES},
+    **{f"noise {noise:g} mg": Row(noise_mg=(noise,)) for noise in _NOISES},
+    "rests of 9 samples": Row((10.0,), rest_s=(0.9, 0.9), move_s=(0.4, 0.8)),
+    "rests of 0.6 to 1 s": Row(rest_s=(0.6, 1.0), move_s=(0.4, 1.0)),
+    "rests of 1 to 2 s": Row(rest_s=(1.0, 2.0), move_s=(0.5, 1.5)),
+    "rests of 1 to 60 s": Row(rest_s=(1.0, 60.0)),
+    "slow moves of 4 to 8 s": Row(move_s=(4.0, 8.0)),
+    "held for 1.5 to 3 s in half of the moves": Row(held=0.5),
+    "5 Hz 0.05 g in a third of the rests": Row(vibration=(5.0, 0.05, 0.33)),
+    "5 Hz 0.05 g in all rests": Row(vibration=(5.0, 0.05, 1.0)),
+    "18 Hz 0.02 g in half of the rests": Row(vibration=(18.0, 0.02, 0.5)),
+    "50 Hz 0.1 g in half of the rests": Row((200.0, 500.0, 1000.0), vibration=(50.0, 0.1, 0.5)),
+    "warms by 30 mg": Row(drift_mg=30.0),
+    "knocks on the table": Row(knocks=0.5),
+    "counts with an offset": Row(counts=4096.0),
+    "back to back, 9 samples": Row((10.0,), rest_s=(0.8, 1.0), move_s=(0.0, 0.0)),
+    "back to back, 15 to 60 samples": Row((20.0,), rest_s=(0.75, 3.0), move_s=(0.0, 0.0)),
+    "waved": Row(stops=0),
+    "waved, counts": Row(stops=0, counts=4096.0),
+    "one rest": Row(stops=1, rest_s=(20.0, 60.0)),
+    "one rest, 5 Hz 0.05 g": Row(stops=1, rest_s=(20.0, 60.0), vibration=(5.0, 0.05, 1.0)),
 }
 
 

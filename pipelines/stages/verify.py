@@ -52,9 +52,11 @@ def verify_tables(
     if not np.any(tables.dwells["kind"] == "verification") or coefficients.empty:
         return nothing_verified()
     if len(tables.parts) > 1 and isinstance(predictions, pd.DataFrame):
-        every = (coefficients, covariance, predictions)
-        parts = [(part, *(own_rows(one, part.dwells) for one in every)) for part in tables.parts]
-        return joined_parts([verify_tables(*part) for part in parts])
+        made: list[dict[str, pd.DataFrame]] = []
+        for part in tables.parts:
+            own = [own_rows(one, part.dwells) for one in (coefficients, covariance, predictions)]
+            made.append(verify_tables(part, own[0], own[1], own[2]))
+        return joined_parts(made)
     lot, calibration = tables.all_kinds, calibration or read_calibration(coefficients, covariance)
     model, unseen = calibration.effects, lot.of_kind("verification")
     corrected = correct(model, lot.state, lot.output, calibration.coefficients, calibration.nonlinear)
