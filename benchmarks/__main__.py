@@ -41,6 +41,8 @@ SHORT: dict[str, str] = {
     "recordings": "--runs 4",
     "recording_intervals": "--runs 2",
     "record_faults": "--runs 8",
+    "rest_and_motion": "--runs 1",
+    "field": "--runs 1",
     "worlds": "nulls faults --runs 1",
     "blind": "--runs 40",
     "investigate": "--scene 'cubic on 18' --scene 'pendulum on faces'",

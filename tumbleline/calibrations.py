@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pipelines.archive import Archive, Run
 from tumbleline.pictures import Picture, as_html, as_text, rounded_table
-from tumbleline.recordings import Recording
+from tumbleline.recordings import Recording, Source
 
 K = 2.0  # coverage factor of U
 
@@ -135,7 +135,10 @@ class Calibration:
         return Picture(Chart(title, (Plot(title, PlotAxis("dwell"), PlotAxis("residual / µg"), traces),)))
 
     def _lines(self) -> list[str]:
-        return [f"{', '.join(self.effects)}; residual {self.rms_ug:.3g} µg rms; U with k = 2; run {self.run.id}"]
+        from pipelines.tables.dwells import lacking
+
+        about = f"{', '.join(self.effects)}; residual {self.rms_ug:.3g} µg rms; U with k = 2; run {self.run.id}"
+        return [about, *filter(None, [lacking(self.recording.dwells)])]
 
     def _repr_html_(self) -> str:
         return as_html("Calibration", self._lines(), rounded_table(self.coefficients))
@@ -145,7 +148,7 @@ class Calibration:
 
 
 def fit(
-    recording: Recording | str | Path | pd.DataFrame,
+    recording: Recording | Source | Sequence[str | Path],
     effects: Sequence[str] | None = None,
     *,
     leave_out: Sequence[str] = (),

@@ -11,7 +11,7 @@ import pandas as pd
 
 from tumbleline.calibrations import Calibration
 from tumbleline.pictures import Picture, as_html, as_text
-from tumbleline.recordings import Recording, read
+from tumbleline.recordings import Recording, Source, read
 
 if TYPE_CHECKING:
     from pipelines.diagnosis.diagnose import Examination
@@ -126,7 +126,7 @@ class ModelDiagnosis(JudgedModel):
 
 
 def diagnose(
-    recording: Recording | str | Path | pd.DataFrame,
+    recording: Recording | Source | Sequence[str | Path],
     model: Calibration | Sequence[str] | None = None,
     *,
     leave_out: Sequence[str] = (),

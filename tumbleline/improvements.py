@@ -14,7 +14,7 @@ from pipelines.improvement.improvement import Attendant, ImprovedTables, Improve
 from tumbleline.calibrations import Calibration, fit
 from tumbleline.diagnoses import JudgedModel, ModelDiagnosis
 from tumbleline.pictures import as_html, as_text
-from tumbleline.recordings import Recording, read, session_folder
+from tumbleline.recordings import Recording, Source, read, session_folder
 
 
 @dataclass(frozen=True)
@@ -75,11 +75,11 @@ class ImprovedModel(JudgedModel):
 
 
 def improve(
-    recording: Recording | str | Path | pd.DataFrame,
+    recording: Recording | Source | Sequence[str | Path],
     effects: Sequence[str] | None = None,
     *,
     effect: Sequence[str] | str = (),
-    fresh: Recording | str | Path | pd.DataFrame | None = None,
+    fresh: Recording | Source | Sequence[str | Path] | None = None,
     model_file: str | Path | None = None,
 ) -> ImprovedModel:
     """Diagnose a model, add the effects that are missing, and judge the change, as ``tumbleline improve``.

@@ -95,7 +95,7 @@ class Recording:
 
 
 def read(
-    source: Source,
+    source: Source | Sequence[str | Path],
     *,
     history: Source | None = None,
     columns: Mapping[str, str] | None = None,
@@ -108,8 +108,8 @@ def read(
 
     Parameters
     ----------
-    source : a file in any format of ``tumbleline import``, a table of dwells in the exchange format, a DataFrame of either, or
-        the name of a run of ``archive``
+    source : a file in any format of ``tumbleline import``, several files of one recording that follow one another, a table of
+        dwells in the exchange format, a DataFrame of either, or the name of a run of ``archive``
     history : temperatures against time; that beside a file of dwells by default
     columns, units : meaning → column (``x``, ``y``, ``z``, ``time``, ``temperature``, …) and quantity → unit (``output``,
         ``time``); what is not stated is recognised, and told in :attr:`Recording.told`
@@ -130,9 +130,11 @@ def read(
         if is_exchange(source.columns) and not columns:
             past = history if isinstance(history, pd.DataFrame) else None if history is None else read_history(history)
             return _kept(checked(source, where="DataFrame", foreign=True), past, "DataFrame", archive, units)
-        return replace(_imported(_as_file(source), columns, units, serial or "A", archive, stated), command="")
+        return replace(_imported([_as_file(source)], columns, units, serial or "A", archive, stated), command="")
     from pipelines.importers import files
 
+    if not isinstance(source, str | Path):
+        return _imported([Path(one) for one in source], columns, units, serial, archive, stated)
     if not files.is_file(str(source)):
         return Recording(Archive(None if archive is None else str(archive)).run(str(source)))
     path = Path(source)
@@ -143,7 +145,7 @@ def read(
         dwells, past, _ = dwells_and_history(str(path), str(beside), None)
         past = checked_history(history, "history", foreign=True) if isinstance(history, pd.DataFrame) else past
         return _kept(dwells, past, path.name, archive, units)
-    return _imported(path, columns, units, serial, archive, stated)
+    return _imported([path], columns, units, serial, archive, stated)
 
 
 def _kept(
@@ -174,7 +176,7 @@ def _as_file(table: pd.DataFrame) -> Path:
 
 
 def _imported(
-    path: Path,
+    paths: Sequence[Path],
     columns: Mapping[str, str] | None,
     units: Mapping[str, str] | None,
     serial: str,
@@ -188,7 +190,8 @@ def _imported(
     from pipelines.importers.recognition import recognise
     from schemas.errors import WrongUse
 
-    seen = recognise([path])
+    seen = recognise(paths, join=stated.get("join", "rows" if len(paths) > 1 else ""))
+    name = " + ".join(path.name for path in paths)
     proposal = seen.for_fit()
     found = dict(proposal.keys if proposal is not None else seen.keys or {})
     keys = found | stated
@@ -197,13 +200,13 @@ def _imported(
     keys |= {"unit": serial} if serial else {}
     if open_ := _open(keys, seen, decided=proposal is not None):
         raise WrongUse(
-            f"read: {path.name} does not state {'; '.join(open_)}; state it: columns={{'x': …}}, units={{'output': …}}, "
+            f"read: {name} does not state {'; '.join(open_)}; state it: columns={{'x': …}}, units={{'output': …}}, "
             f"rate_hz=…; recognised: {seen.import_command}"
         )
-    build(keys, path.name)
-    done = import_document([path], keys, path.name, "", _place(archive), None, nullcontext)
+    build(keys, name)
+    done = import_document([*paths], keys, name, "", _place(archive), None, nullcontext)
     run = Archive(_place(archive)).run(done["run"])
-    return Recording(run, _told(seen, proposal, done["remarks"]), Proposal(keys).command([path]))
+    return Recording(run, _told(seen, proposal, done["remarks"]), Proposal(keys).command(paths))
 
 
 def _open(keys: dict[str, Any], seen: Recognition, *, decided: bool) -> list[str]:

@@ -81,18 +81,18 @@ def not_judged(model: Model, rms: float) -> str:
         return ""
     if not np.isfinite(space.rss) or not np.isfinite(rms):
         return "the residuals are undefined: the orientations do not determine the model; add poses in between"
-    lot = model.problem.lot
-    if lot.radial and not lot.recorded and model.noise.shares.walk >= SMOOTH:
-        return (
-            "the residual varies smoothly from dwell to dwell, as in samples of a movement, dwells at rest are needed; "
-            "import the samples to find the stretches at rest, or state sd_x, sd_y, sd_z and n of each dwell"
-        )
     if space.dof < FEWEST_DOF:
         count = model.problem.count
         return (
             f"{number_of(count, 'measurement')} and {number_of(count - space.dof, 'coefficient')} leave "
             f"{degrees_of_freedom(space.dof)}, {FEWEST_DOF} are needed; "
             f"measure {number_of(FEWEST_DOF - space.dof, 'more dwell')}, or judge a smaller model"
+        )
+    lot = model.problem.lot
+    if lot.radial and not lot.recorded and model.noise.shares.walk >= SMOOTH:
+        return (
+            "the residual varies smoothly from dwell to dwell, as in samples of a movement, dwells at rest are needed; "
+            "import the samples to find the stretches at rest, or state sd_x, sd_y, sd_z and n of each dwell"
         )
     return ""
 

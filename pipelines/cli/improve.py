@@ -13,6 +13,7 @@ from pipelines.cli.options import argument, names_in, option
 from pipelines.cli.printing import conclude, error_console, refuse_standard_output, remark, say
 from pipelines.improvement.improvement import Attendant, ImprovedTables, Improvement
 from schemas.errors import WrongUse
+from schemas.foreign import shown
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -28,13 +29,16 @@ CHOICES = "y or Enter adds it, n leaves it out; Ctrl-C stops, and nothing is wri
 UNATTENDED = "improve: standard input ended before an answer, a line is needed; give --yes to run without an operator"
 
 
-GROUP = {"group": options.READING["group"]}
 MEASURES = "y or Enter measures them, n leaves it; Ctrl-C stops, and the same command continues"
 
 
 def command(
-    data: Annotated[
-        str, argument("DATA|RUN", "A recording in any format that import reads, a table of dwells, or a run.")
+    sources: Annotated[
+        list[str],
+        argument(
+            "DATA…|RUN",
+            "A recording in any format that import reads, in one file or several; a table of dwells; or a run.",
+        ),
     ],
     effects: options.EffectsOption = "",
     model: Annotated[
@@ -53,7 +57,7 @@ def command(
     leave_out: options.LeaveOutOption = "",
     who: options.WhoOption = "",
     effect_file: options.EffectFileOption = None,
-    setting: Annotated[list[str] | None, options.set_option(GROUP)] = None,
+    setting: Annotated[list[str] | None, options.set_option(options.READING)] = None,
     archive: options.ArchiveOption = None,
     *,
     yes: Annotated[
@@ -76,6 +80,7 @@ def command(
     """Diagnose a model, ask which of the missing effects to add, write the model file, and judge the change by a fresh run.
 
     A recording of another system is recognised, imported and fitted first; the import that was chosen is printed as a command.
+    Several files are one recording of one sensor: they follow one another, or stand side by side with --set join=columns.
     Where a column or unit is not certain nothing is imported, and the command to complete is printed.
 
     One question per effect; effects that these data cannot separate are named in the question. Where DATA is a run and an effect
@@ -91,13 +96,17 @@ def command(
     from pipelines.importers.files import is_file
     from pipelines.improvement.recording import bring_in
 
-    group = options.settings(setting, GROUP, "improve").get("group", "")
+    reading = options.settings(setting, options.READING, "improve")
     add_effects(effect_file)
-    recording = None
+    recording, data = None, sources[0]
+    if runs := [source for source in sources if len(sources) > 1 and not is_file(source)]:
+        raise WrongUse(
+            f"improve: {len(sources)} sources, of which '{shown(runs[0])}' is no file; give one run, or files only"
+        )
     if is_file(data):
         limited.start()
-        recording = bring_in([Path(data)], archive, error_console().status, group)  # None for a table of dwells
-    data = data if recording is None else recording["run"]
+        recording = bring_in([Path(source) for source in sources], archive, error_console().status, **reading)
+    data = data if recording is None else recording["run"]  # a table of dwells is read as it is
     yes = yes or (recording is not None and not attended())
     judged = judged_effects(data, archive, effects, model, "improve")
     target = _target(model, output)

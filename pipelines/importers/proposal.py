@@ -26,6 +26,8 @@ ASSUMED_HZ = 100.0
 """Rate of samples without a clock: it decides how long a stop is, and nothing else of a fit to its means."""
 FEWEST_OF_NORM = 10
 """Positions for bias, scale and the angles between the axes, and one that judges."""
+_APART = 0.02
+"""Distance of positions over the radius of their sphere, about a degree, below which they are one."""
 _BLOCKS, _SHORTEST_BLOCK_S = 60, 1.0
 _UP = 0.9
 """Part of the size along an axis from which the face of a still record is known: 25° of a hand."""
@@ -39,13 +41,17 @@ _KEYS = (
 
 @dataclass(frozen=True)
 class Proposal:
-    """Keys of the mapping of an import, and the fit (empty: none); what was assumed, and remarks; count of stops or positions."""
+    """Keys of the mapping of an import, and the fit (empty: none); what was assumed, and remarks; count of stops.
+
+    places : positions that lie apart, up to what a fit needs
+    """
 
     keys: dict[str, Any]
     fit: str = ""
     assumed: tuple[str, ...] = ()
     remarks: tuple[str, ...] = ()
     stops: int = 0
+    places: int = 0
 
     def command(self, paths: Sequence[Path]) -> str:
         """The import as a line for a shell; a value that nothing states is in capitals."""
@@ -139,13 +145,26 @@ def for_fit(
     sphere = guessed.triad.sphere
     if sphere is not None and sphere.still and duration_s is not None:
         return _still(keys | own, means, duration_s, heat, [*assumed, gravity])
-    if means is not None and len(means) >= FEWEST_OF_NORM:
+    places = 0 if means is None else positions(means)
+    if places >= FEWEST_OF_NORM:
         return Proposal(keys | own, "norm", (*assumed, gravity))
     poses = {} if means is None or sphere is None else _six_faces(means, labels, sphere.centre)
     if poses:
         told = "six faces taken as vertical: a tilt of 1° is 17 mg in the bias"
         return Proposal(keys | {"poses": poses} | own, "faces", (*assumed, gravity, told))
-    return Proposal(keys, "", tuple(assumed), (), 0 if means is None else len(means))
+    return Proposal(keys, "", tuple(assumed), (), 0 if means is None else len(means), places)
+
+
+def positions(means: Array) -> int:
+    """How many of the stops (k, 3) lie apart, at most as many as a fit needs: a pose that comes again adds no shape."""
+    size = 0.5 * float(np.linalg.norm(np.ptp(means, axis=0)))
+    apart: list[Array] = []
+    for mean in means:
+        if all(np.linalg.norm(mean - one) > _APART * size for one in apart):
+            apart.append(mean)
+        if len(apart) == FEWEST_OF_NORM:
+            break
+    return len(apart)
 
 
 def has_reference(keys: dict[str, Any]) -> bool:

@@ -30,7 +30,11 @@ blocks over what noise leaves: 1 of white noise or a vibration, below 2 of flick
 one that also shakes."""
 _BLOCK_S, _PARTS = 0.2, 4
 """Block of such a mean, s, which a vibration of a machine leaves nearly without a trace; and the parts that tell its noise."""
-_NEARLY = 0.9
+_TURN_PER_S, _TURN_SIGMAS, _POSES = 0.01, 4.0, 10.0
+"""Change of the mean in a second over gravity, above which a stretch turns: a temperature moves it by a twentieth of that; its
+standard errors that show it; and scatter over which gravity has to stand, in counts the only sign that the sensor was turned."""
+_NEARLY, _CONTAMINATED = 0.94, 3.0
+"""Part of the longest time at rest that a longer window has to find; its quietest scatter over that of the quietest window."""
 _ENOUGH = 6
 """Stops from which a longer window is preferred: the faces of a cube."""
 
@@ -60,13 +64,20 @@ class Stretches:
 class Stops:
     """Stops of a record: the window by which they were found, s; the numbers of those that hold several positions.
 
-    threshold : scatter of a window that means motion; None: found in the record
+    threshold : scatter of a window that means motion; None: found in the record · rest_s : time at rest with what was
+        taken off the ends, less that which was motion
     """
 
     window_s: float
     found: Stretches
     several: tuple[int, ...]
     threshold: float | None = None
+    rest_s: float = 0.0
+
+    @property
+    def is_clean(self) -> bool:
+        """Whether there are stops, each of one position, and more of them than motion."""
+        return not self.several and len(self.found) > 0 and self.rest_s > 0.0
 
 
 @dataclass(frozen=True)
@@ -123,35 +134,50 @@ def found_stops(output: Array, time: Array, edges: Sequence[int], gravity: float
     edges : 0, the samples before which some are missing, and their number
     gravity : in the unit of the output; None of counts
     """
+    quiet = _quiet(output, time)
+    least = min(quiet.values(), default=0.0)
     plain = [_stops(output, time, edges, _SearchOptions(window, window, None), gravity) for window in WINDOWS_S]
-    for stops in plain:
-        if not stops.several and len(stops.found) >= _ENOUGH:
-            return stops
+    # in a window that is too long for the stops it is never quiet
+    fit = [stops for stops in plain if quiet.get(stops.window_s, least) <= _CONTAMINATED * least]
+    clean = [stops for stops in fit if stops.is_clean]
+    best = _longest(clean) if clean else None
+    if best and (len(best.found) >= _ENOUGH or not any(stops.several for stops in fit)):
+        return best
     # a hand that rests for a moment shakes little less than one that moves: stricter limits part what it runs together
-    quiet = _limits(output, time)
     strict = [
         _stops(output, time, edges, _SearchOptions(window, window, float(f"{times * sd:.3g}")), gravity)
-        for window, sd in quiet
+        for window, sd in quiet.items()
         for times in STRICT
     ]
-    clean = [stops for stops in strict if not stops.several and len(stops.found) >= _ENOUGH]
+    clean = [stops for stops in strict if stops.is_clean and len(stops.found) >= _ENOUGH]
     if not clean:
         return max(plain, key=lambda stops: len(stops.found) - len(stops.several))
-    nearly = _NEARLY * max(len(stops.found) for stops in clean)
-    return next(stops for stops in clean if len(stops.found) >= nearly)  # the longest window that finds nearly all
+    return _longest(clean)
+
+
+def _longest(clean: Sequence[Stops]) -> Stops:
+    """The longest window that finds nearly all of the time at rest; what a short one finds in a motion beside it is brief."""
+    nearly = _NEARLY * max(stops.rest_s for stops in clean)
+    return next(stops for stops in clean if stops.rest_s >= nearly)
 
 
 def _stops(output: Array, time: Array, edges: Sequence[int], how: _SearchOptions, gravity: float | None) -> Stops:
-    found = _at_rest(_searched(output, time, edges, how), output, time, gravity)
+    searched = _searched(output, time, edges, how)
+    found = _at_rest(searched, output, time, gravity)
     several = tuple(k for k, (a, b) in enumerate(found.spans) if change_of_level.several_levels(output[a:b]) > 1)
-    return Stops(how.window_s, found, several, how.threshold)
+    rest = 2.0 * _time_of(found, time, how.window_s) - _time_of(searched, time, how.window_s)
+    return Stops(how.window_s, found, several, how.threshold, rest)
 
 
-def _limits(output: Array, time: Array) -> list[tuple[float, float]]:
-    """The windows of the search, s, and the scatter in the quietest stretch of each."""
+def _time_of(found: Stretches, time: Array, window_s: float) -> float:
+    return float(sum(time[b - 1] - time[a] + window_s for a, b in found.spans))
+
+
+def _quiet(output: Array, time: Array) -> dict[float, float]:
+    """The windows of the search that the record is long enough for, s, and the scatter in the quietest stretch of each."""
     rate = (len(time) - 1) / float(time[-1] - time[0])
     usable = [window for window in WINDOWS_S if _has_windows(len(output), window, rate)]
-    return [(window, static_intervals.find(output, rate, window_s=window).quiet_sd) for window in usable]
+    return {window: static_intervals.quiet_sd(output, rate, window) for window in usable}
 
 
 def _by_labels(labels: Sequence[str], edges: list[int]) -> Stretches:
@@ -246,6 +272,11 @@ def _at_rest(intervals: Stretches, output: Array, time: Array, gravity: float | 
     ]
     if len(kept) == len(intervals):
         return intervals
+    samples = np.array([b - a for a, b in intervals.spans])
+    if (
+        2 * samples[kept].sum() <= samples.sum()
+    ):  # the limit divides nothing: what is left is the calmer part of a motion
+        kept = []
     remark = f"{len(intervals) - len(kept)} of {len(intervals)} stretches are no rest and were left out: more scatter than noise"
     return replace(intervals.only(kept), remarks=(*intervals.remarks, remark))
 
@@ -258,6 +289,8 @@ def _is_motion(x: Array, duration_s: float, size: float, *, is_gravity: bool) ->
     size : gravity, or the spread of the positions of the record, which is small where there is one: there a drift in minutes is
         told from motion by the steps between neighbouring blocks
     """
+    if _turns(x, duration_s, size):
+        return True
     part_s = min(_BLOCK_S, duration_s / _PARTS) / _PARTS
     parts = _means(x, max(1, int(part_s / duration_s * (len(x) - 1))) if duration_s > 0.0 else 1)
     few = len(parts) < _PARTS**2
@@ -271,6 +304,17 @@ def _is_motion(x: Array, duration_s: float, size: float, *, is_gravity: bool) ->
         slow > _MOTION * size and slow > _BEYOND_NOISE * noise and (is_gravity or _steps(blocks) > _UNSTEADY * noise)
     )
     return moving and change_of_level.several_levels(x) == 1  # several positions back to back are told as such
+
+
+def _turns(x: Array, duration_s: float, size: float) -> bool:
+    """Whether the mean of a stretch moves through it, faster than a temperature moves it and than its scatter allows."""
+    place = np.linspace(-0.5, 0.5, len(x))
+    slope = 12.0 * (place @ x) / (len(x) + 2)  # over the stretch; Σ place² = n/12 within 1/n
+    left = x - x.mean(axis=0) - place[:, None] * slope
+    scatter = float(np.sqrt(np.sum(np.mean(left**2, axis=0))))
+    turned = float(np.linalg.norm(slope))
+    clear = turned > _TURN_SIGMAS * scatter * np.sqrt(12.0 / len(x))
+    return clear and turned > _TURN_PER_S * size * duration_s and size > _POSES * scatter
 
 
 def _means(x: Array, samples: int) -> Array:

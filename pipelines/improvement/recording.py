@@ -7,6 +7,8 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from inertial.counts import number_of
+from pipelines.importers.exchange import is_exchange
 from pipelines.importers.mapping import build
 from pipelines.importers.proposal import FEWEST_OF_NORM, Proposal, has_reference
 from pipelines.importers.recognition import Recognition, recognise
@@ -18,8 +20,14 @@ if TYPE_CHECKING:
 Working = Callable[[str], AbstractContextManager[Any]]
 
 
-def bring_in(paths: list[Path], archive: str | None, working: Working, group: str = "") -> RecordingDocument | None:
+def bring_in(
+    paths: list[Path], archive: str | None, working: Working, group: str = "", join: str = ""
+) -> RecordingDocument | None:
     """The import of a recording as it is recognised; None for a table of dwells, which needs none.
+
+    Parameters
+    ----------
+    paths : files of one recording · join : how several are joined, one after another by default
 
     Raises
     ------
@@ -31,11 +39,13 @@ def bring_in(paths: list[Path], archive: str | None, working: Working, group: st
     from pipelines.diagnosis.import_document import import_document
 
     with working(f"recognising {paths[0].name}"):
-        seen = recognise(paths, group=group)
+        seen = recognise(paths, join=join or ("rows" if len(paths) > 1 else ""), group=group)
         proposal = None if seen.is_exchange else seen.for_fit()
     if seen.is_exchange:
         return None
-    name = paths[0].name
+    name = " + ".join(path.name for path in paths)
+    if len(paths) > 1 and is_exchange(seen.content.table.columns):
+        raise WrongUse(f"{name}: {len(paths)} tables of dwells, one is needed; write their rows into one file")
     if proposal is None:
         raise WrongUse(
             f"{name}: not recognised without doubt: {'; '.join(seen.open)}; complete the command: {seen.import_command}"
@@ -75,6 +85,10 @@ def _too_little(seen: Recognition, proposal: Proposal) -> str:
         )
     else:
         stops = len(seen.output) if seen.guessed.dwells and seen.output is not None else proposal.stops
-        found, needed = f"{stops} stops in all", f"{FEWEST_OF_NORM} positions at rest for a fit to the norm of gravity"
+        where = "all" if proposal.places in {0, stops} else number_of(proposal.places, "position")
+        found, needed = (
+            f"{stops} stops in {where}",
+            f"{FEWEST_OF_NORM} positions at rest for a fit to the norm of gravity",
+        )
     remedy = "record each position for some seconds, or see its noise with 'tumbleline noise allan'"
     return f"{found}, {needed} are needed; {remedy}"

@@ -11,6 +11,7 @@ from pipelines.diagnosis.sentences import evidence_text, verdict
 from pipelines.importers.plane import plane_answer
 from pipelines.rerun.documents import ImportedFitDocument
 from pipelines.rerun.import_steps import gravity_of_import, has_poses
+from pipelines.tables.dwells import lacking
 from pipelines.tables.frames import rows_of
 from schemas.units import AXES
 
@@ -46,4 +47,8 @@ def _known_poses(dwells: pd.DataFrame, past: pd.DataFrame | None, effects: list[
     document = diagnose(dwells, past, effects)
     document["units"] = list(dict.fromkeys(dwells["unit"].astype(str)))
     missing = [group["effects"] for group in document["classes"] if group["scope"] != "data"]
-    return {**document, "missing": missing, "lines": [verdict(document), *filter(None, [evidence_text(document)])]}
+    return {
+        **document,
+        "missing": missing,
+        "lines": [verdict(document), *filter(None, [evidence_text(document), lacking(dwells)])],
+    }

@@ -35,7 +35,7 @@ from pipelines.rerun.import_steps import (
 from pipelines.stages.figures import UNITS
 from pipelines.stages.grade import refuse_limits_without_figures
 from pipelines.stages.uncertainty.budget_terms import archived_terms
-from pipelines.tables.leave_out import Dwells, leave_out, of_every_unit
+from pipelines.tables.leave_out import Dwells, leave_out
 from schemas.errors import DataRejected, WrongUse
 from schemas.limits import limits_of
 from schemas.lot import Lot
@@ -165,8 +165,6 @@ def _imported(run: Run, change: ModelChange, left_out: Dwells) -> Plan:
     """Fit, verification and, where limits are known, grades of dwells that were imported."""
     about = run.about
     dwells = _fit_for_a_fit(run)
-    if has_poses(dwells):
-        left_out = of_every_unit(dwells, left_out)
     dwells = leave_out(dwells, left_out)
     data = imported(run, dwells)
     across = None if change.effects or about.get("recipe", {}).get("effects") else axis_of_plane(dwells)

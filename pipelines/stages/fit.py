@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
+from inertial import design
 from inertial.arrays import Array
 from inertial.errors import InertialError
 from inertial.fits.wander import student
@@ -14,7 +15,7 @@ from pipelines.stages.noisy_fit import NoisyFit, fitted_with_noise
 from pipelines.stages.uncertainty.bias_measurands import COLUMNS, BiasNoise, bias_measurands
 from pipelines.tables.calibration import Calibration, calibration_of, coefficient_rows, covariance_rows, symmetric
 from pipelines.tables.dwells import LotArrays, LotTables
-from pipelines.tables.frames import empty_table, picked
+from pipelines.tables.frames import empty_table, joined_parts, picked
 from schemas.errors import DataRejected
 from schemas.units import MICRO
 
@@ -29,7 +30,8 @@ def fit(
     The white-noise error sd/√n of a dwell is a lower bound. Wander between dwells is estimated with the coefficients
     (method ``wander``); where there are too few dwells for that, the covariance is scaled by χ²/ν (method ``birge``: Birge
     ratio squared). The table ``wander`` says which; ``prior`` what the family of the devices adds. Tables without rows come back
-    where no unit was accepted.
+    where no unit was accepted. Units that lack dwells which others have are fitted on theirs, with the noise of the units that
+    have the same ones.
 
     Parameters
     ----------
@@ -44,6 +46,18 @@ def fit_tables(tables: LotTables, effects: Sequence[str], family: Family | None 
     """:func:`fit` of tables that other stages read as well."""
     if not np.any(tables.dwells["kind"] == "dwell"):
         return _nothing()
+    parts = tables.parts if not _shared(effects, tables) else (tables,)
+    return joined_parts([_fit_part(part, effects, family) for part in parts])
+
+
+def _shared(effects: Sequence[str], tables: LotTables) -> bool:
+    """Whether all units have values of the model in common, so that they are fitted together or not at all."""
+    sensor, station = design.split(effects)
+    state = tables.parts[0].fitted_kinds.state
+    return len(tables.parts) > 1 and bool(station or any(effect.parameters(state) for effect in sensor))
+
+
+def _fit_part(tables: LotTables, effects: Sequence[str], family: Family | None) -> dict[str, pd.DataFrame]:
     lot = tables.fitted_kinds
     fitted = _fitted(lot, effects, family)
     return {**_rows(lot, fitted), "predictions": _prediction_rows(lot, fitted)}

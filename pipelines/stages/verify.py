@@ -9,7 +9,7 @@ from inertial.design import of_axes
 from pipelines.stages.rms_error import OF_UNITS, rms_columns
 from pipelines.tables.calibration import Calibration, read_calibration
 from pipelines.tables.dwells import LotArrays, LotTables
-from pipelines.tables.frames import empty_table, picked
+from pipelines.tables.frames import empty_table, joined_parts, own_rows, picked
 from schemas.units import AXES, MICRO
 
 
@@ -51,6 +51,12 @@ def verify_tables(
     """
     if not np.any(tables.dwells["kind"] == "verification") or coefficients.empty:
         return nothing_verified()
+    if len(tables.parts) > 1 and isinstance(predictions, pd.DataFrame):
+        made: list[dict[str, pd.DataFrame]] = []
+        for part in tables.parts:
+            own = [own_rows(one, part.dwells) for one in (coefficients, covariance, predictions)]
+            made.append(verify_tables(part, own[0], own[1], own[2]))
+        return joined_parts(made)
     lot, calibration = tables.all_kinds, calibration or read_calibration(coefficients, covariance)
     model, unseen = calibration.effects, lot.of_kind("verification")
     corrected = correct(model, lot.state, lot.output, calibration.coefficients, calibration.nonlinear)

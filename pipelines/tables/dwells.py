@@ -1,7 +1,8 @@
 """Dwells as the arrays that the science works on: the one reader for fit, verification, diagnosis, comparison and rerun.
 
 :func:`measured` takes dwells as they are: units may lack some, and the reference may be angles or nothing. :func:`lot_arrays`
-needs every dwell of every unit and a reference force, as a fit in the output's own unit does. Both have the same state.
+needs every dwell of every unit and a reference force, as a fit in the output's own unit does: a lot that lacks some is
+fitted in :attr:`LotTables.parts`. Both have the same state.
 """
 
 from __future__ import annotations
@@ -98,6 +99,18 @@ class LotTables:
     history: pd.DataFrame | None
 
     @cached_property
+    def parts(self) -> tuple[LotTables, ...]:
+        """The lot in parts whose units have the same dwells: itself where no unit lacks one that another has."""
+        sets = dwells_of_units(self.dwells)
+        if len(set(sets.values())) <= 1:
+            return (self,)
+        alike: dict[frozenset[int], list[str]] = {}
+        for unit, own in sets.items():
+            alike.setdefault(own, []).append(unit)
+        units = self.dwells["unit"].astype(str)
+        return tuple(LotTables(self.dwells[units.isin(own)], self.history) for own in alike.values())
+
+    @cached_property
     def fitted_kinds(self) -> LotArrays:
         """The dwells of :data:`KINDS`."""
         return lot_arrays(self.dwells, self.history, KINDS)
@@ -108,6 +121,25 @@ class LotTables:
         if self.dwells["kind"].isin(list(KINDS)).all():
             return self.fitted_kinds
         return lot_arrays(self.dwells, self.history)
+
+
+def dwells_of_units(dwells: pd.DataFrame) -> dict[str, frozenset[int]]:
+    """The numbers of the dwells of every unit."""
+    return {str(unit): frozenset(own.tolist()) for unit, own in dwells.groupby("unit", sort=False)["dwell"]}
+
+
+def lacking(dwells: pd.DataFrame) -> str:
+    """A sentence on the dwells that units lack and others have; empty where there are none."""
+    sets = dwells_of_units(dwells)
+    every = frozenset[int]().union(*sets.values())
+    named = {unit: sorted(every - own) for unit, own in sets.items() if own != every}
+    told = (
+        f"{unit} lacks {', '.join(map(str, missing[:_SHOWN]))}{' …' if len(missing) > _SHOWN else ''}"
+        for unit, missing in named.items()
+    )
+    return (
+        f"dwells that others have: {'; '.join(told)}; units are fitted with those of the same dwells" if named else ""
+    )
 
 
 def measured(dwells: pd.DataFrame, history: pd.DataFrame | None = None) -> Measured:

@@ -91,3 +91,18 @@ def _made(texts: str, numbers: str, whole: str, flags: str) -> pd.DataFrame:
 def rows_of(table: pd.DataFrame) -> list[dict[str, Any]]:
     """One dictionary per row, by column name."""
     return [{str(name): value for name, value in row.items()} for row in table.to_dict("records")]
+
+
+def own_rows(table: pd.DataFrame, dwells: pd.DataFrame) -> pd.DataFrame:
+    """The rows of the units of some dwells; all of a table without units."""
+    return table[table["unit"].isin(dwells["unit"].unique())] if "unit" in table.columns else table
+
+
+def joined_parts(parts: Sequence[dict[str, pd.DataFrame]]) -> dict[str, pd.DataFrame]:
+    """Tables of the parts of a lot as those of the lot, in order of its units."""
+    if len(parts) == 1:
+        return parts[0]
+    tables = {name: [made[name] for made in parts if len(made[name])] or [parts[0][name]] for name in parts[0]}
+    return {
+        name: pd.concat(rows).sort_values("unit", kind="stable", ignore_index=True) for name, rows in tables.items()
+    }

@@ -50,14 +50,3 @@ def leave_out(dwells: pd.DataFrame, named: Sequence[tuple[str, int]]) -> pd.Data
             )
         gone |= own
     return dwells[~gone].reset_index(drop=True)
-
-
-def of_every_unit(dwells: pd.DataFrame, named: Sequence[tuple[str, int]]) -> Dwells:
-    """The named dwells and those of their numbers that other units have: a fit of a lot takes the dwells that all its units have.
-
-    The table stays the judge of what is not there (:func:`leave_out`).
-    """
-    numbers = {dwell for _, dwell in named}
-    others = dwells.loc[dwells["dwell"].isin(numbers), ["unit", "dwell"]]
-    pairs = zip(others["unit"].astype(str), others["dwell"].astype(int), strict=True)
-    return tuple(dict.fromkeys([*named, *pairs]))

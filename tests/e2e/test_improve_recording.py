@@ -125,3 +125,25 @@ def test_a_changed_model_is_not_shown_with_the_coefficients_of_the_import(rng: n
     run = Archive(None).runs()[-1].id
     assert f"tumbleline fit {run} --model model.toml" in said
     assert "scale 0.1031" in given("fit", run, "--model", "model.toml")[1]  # 1.012 over 9.80665
+
+
+def test_several_files_of_one_sensor_are_one_recording_in_one_command(rng: np.random.Generator) -> None:
+    """Two sessions with a clock that restarts; a run beside a file, and two tables of dwells, are refused."""
+    _, frame = hand_held(rng, stops=28, rate=50.0)
+    half = len(frame) // 2
+    for name, part in (("a.csv", frame.iloc[:half]), ("b.csv", frame.iloc[half:])):
+        own = part.set_axis(["t", "ax", "ay", "az", "gx", "gy", "gz"], axis=1)
+        own.assign(t=np.arange(len(own)) / 50.0).to_csv(name, index=False)
+    document = document_of("improve", "a.csv", "b.csv", status=0)
+    one = document["recording"]
+    assert one["files"] == ["a.csv", "b.csv"]
+    assert "--set join=rows" in one["command"]
+    assert 26 <= one["dwells"] <= 30
+    assert document_of(*shlex.split(one["command"])[1:], status=0)["run"] == one["run"]
+    assert "'latest' is no file; give one run, or files only" in refused("improve", "latest", "a.csv")
+    tables = pd.DataFrame(
+        {"unit": ["A"], "dwell": [0], "time_s": [0.0], "out_x": [0.0], "out_y": [0.0], "out_z": [1.0]}
+    )
+    for name in ("d1.csv", "d2.csv"):
+        tables.to_csv(name, index=False)
+    assert "2 tables of dwells, one is needed" in refused("improve", "d1.csv", "d2.csv")

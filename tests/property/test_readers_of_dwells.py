@@ -15,6 +15,7 @@ from pipelines.diagnosis import compare, diagnose
 from pipelines.rerun import lot_comparison
 from pipelines.stages import fit, noisy_fit, verify
 from pipelines.tables import sound_lot
+from pipelines.tables.dwells import LotTables
 from schemas.errors import DataRejected
 
 MODEL = ["bias", "scale", "misalignment"]
@@ -177,12 +178,13 @@ def test_every_reader_hands_on_the_same_state(lot):
 
 @slowly
 @given(lots(gaps=True))
-def test_where_units_lack_dwells_a_fit_is_refused_and_the_others_read_alike(lot):
+def test_where_units_lack_dwells_a_lot_is_fitted_in_parts_and_the_others_read_alike(lot):
     dwells, history = lot
     if len(dwells) != dwells["unit"].nunique() * dwells["dwell"].nunique():
-        for reader in WHOLE.values():
-            with pytest.raises(DataRejected, match="every unit needs every dwell"):
-                reader(dwells, history)
+        with pytest.raises(DataRejected, match="every unit needs every dwell"):
+            by_rerun(dwells, history)
+        first = LotTables(dwells, history).parts[0].dwells
+        assert_same(*(state_by(by_fit, table, history) for table in (dwells, first)))
     assert_same(*(state_by(reader, dwells, history) for reader in LENIENT.values()))
 
 

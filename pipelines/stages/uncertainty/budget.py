@@ -20,6 +20,7 @@ from pipelines.stages.uncertainty.measurands import LotBudget, VarianceParts
 from pipelines.stages.uncertainty.tables import empty, tables_of
 from pipelines.tables.calibration import Calibration
 from pipelines.tables.dwells import LotArrays
+from pipelines.tables.frames import joined_parts
 from schemas.units import MICRO
 from schemas.validity import Stability
 
@@ -33,7 +34,9 @@ def budget(tables: BudgetTables, terms: BudgetTerms) -> dict[str, pd.DataFrame]:
     """
     if terms.stated is None:
         return empty()
-    made = empty() if tables.coefficients.empty else tables_of(lot_budget(tables, terms), sources(terms.stated))
+    known = sources(terms.stated)
+    made = [tables_of(lot_budget(part, terms), known) for part in tables.parts()]
+    made = joined_parts(made) if made else empty()
     if tables.results is None or tables.results.empty:
         return made
     compared = {name: rows for name, rows in compared_tables(tables.results, terms).items() if len(rows)}

@@ -1,7 +1,9 @@
 """Inputs of a budget: the tables of a run, and the statements of station, device and certificate."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import pandas as pd
@@ -10,6 +12,7 @@ from pipelines.stages.reduce import FollowedSupply
 from pipelines.stages.uncertainty.contributions import merged, reads_own_temperature
 from pipelines.tables.calibration import Calibration, read_calibration
 from pipelines.tables.dwells import LotArrays, LotTables
+from pipelines.tables.frames import own_rows
 from schemas.limits import VALIDITY_MONTHS
 from schemas.recipe import Recipe
 from schemas.reference import Reference
@@ -45,6 +48,19 @@ class BudgetTables:
     def arrays(self) -> LotArrays:
         """The dwells of fit and verification."""
         return (self.lot or LotTables(self.dwells, self.history)).fitted_kinds
+
+    def parts(self) -> list[BudgetTables]:
+        """Those of units with the same dwells; none where no unit was fitted."""
+        lots = (self.lot or LotTables(self.dwells, self.history)).parts
+        if self.coefficients.empty or len(lots) == 1:
+            return [] if self.coefficients.empty else [self]
+        tables = {one.name: value for one in fields(self) if isinstance(value := getattr(self, one.name), pd.DataFrame)}
+        return [
+            replace(
+                self, lot=lot, calibration=None, **{name: own_rows(table, lot.dwells) for name, table in tables.items()}
+            )
+            for lot in lots
+        ]
 
     def calibrated(self) -> Calibration:
         """The coefficients with their covariance."""

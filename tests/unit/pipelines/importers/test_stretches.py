@@ -1,7 +1,9 @@
 """Which stretches of a record that was turned by hand are rest."""
 
 import numpy as np
+import pytest
 
+from benchmarks.rest_and_motion import ROWS, counted, found, made
 from pipelines.importers import stretches
 
 
@@ -19,3 +21,26 @@ def test_a_rest_beside_a_machine_is_a_rest_and_a_hand_in_motion_is_none_in_any_u
     waved += 4e-3 * rng.standard_normal(waved.shape)
     assert kept(waved, 50.0, 1.0) == 0
     assert kept(np.round(32768.0 + 8192.0 * waved), 50.0, None) == 0
+
+
+@pytest.mark.parametrize(
+    "row",
+    [
+        "5 Hz 0.05 g in a third of the rests", "50 Hz 0.1 g in half of the rests", "rests of 9 samples",
+        "back to back, 9 samples", "noise 20 mg", "held for 1.5 to 3 s in half of the moves", "waved, counts",
+    ],
+)  # fmt: skip
+def test_stops_made_by_mechanics_are_found_and_motion_is_none(row: str) -> None:
+    for seed in (11, 12):
+        record = made(ROWS[row], np.random.default_rng(seed))
+        right, missed, false = counted(record, found(record))
+        assert (missed, false) == (0, 0), f"{row}: {right} right"
+
+
+def test_a_knock_does_not_part_a_rest_and_two_positions_without_a_move_are_two() -> None:
+    """A rest that a loud moment interrupts is one stop where its mean stays; positions that touch are parted by their means."""
+    rng, t = np.random.default_rng(5), np.arange(0.0, 12.0, 0.02)
+    still = np.array([0.0, 0.0, 1.0]) + 1e-3 * rng.standard_normal((len(t), 3))
+    assert kept(still, 50.0, 1.0) == 1
+    parted = np.where((t < 6.0)[:, None], still, still[:, [2, 0, 1]])
+    assert kept(parted, 50.0, 1.0) == 2

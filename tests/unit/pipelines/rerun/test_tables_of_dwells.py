@@ -16,8 +16,10 @@ from pipelines.diagnosis.import_document import import_document
 from pipelines.importers.keep import complete_table
 from pipelines.integrity import verify
 from pipelines.jobs.model_change import ModelChange
+from pipelines.rerun.imported_fit import fit_document
 from pipelines.rerun.rerun import again
 from pipelines.stages.fit import fit
+from pipelines.stages.verify import verify as verified
 from schemas.errors import ArchiveUnusable, DataRejected, WrongUse
 
 Array = NDArray[np.float64]
@@ -98,8 +100,8 @@ def test_a_curve_over_temperature_that_the_model_has_is_no_noise() -> None:
     assert 0.6 < np.std(ratios) < 1.5  # three deviations of 36 values
 
 
-def test_a_bad_dwell_of_one_unit_is_left_out_of_the_lot(tmp_path: Path) -> None:
-    """As a diagnosis advises: the fit of a lot takes the dwells that every unit has."""
+def test_a_bad_dwell_of_one_unit_is_left_out_of_it_alone(tmp_path: Path) -> None:
+    """As a diagnosis advises: the other units keep theirs, and their coefficients."""
     dwells = table(np.random.default_rng(5))
     dwells.loc[(dwells["unit"] == "B") & (dwells["dwell"] == 7), "out_y"] += 0.004
     path = tmp_path / "lot.csv"
@@ -114,17 +116,37 @@ def test_a_bad_dwell_of_one_unit_is_left_out_of_the_lot(tmp_path: Path) -> None:
     ]
     assert abs(bias[0] - BIAS_G) > 5e-5 > abs(bias[1] - BIAS_G)
     kept = archive.run(without.new)
-    assert set(kept.about["left_out"]) == {"A:7", "B:7", "C:7"}
-    assert 7 not in set(kept.table("dwells")["dwell"])
+    assert set(kept.about["left_out"]) == {"B:7"}
+    assert set(kept.table("dwells").query("dwell == 7")["unit"]) == {"A", "C"}
+    assert "B lacks 7; units are fitted" in "".join(fit_document(kept, whole.new)["lines"])
 
 
-def test_a_lot_with_a_gap_names_the_dwell_and_the_option() -> None:
+def test_units_of_a_lot_with_gaps_are_fitted_on_what_they_have() -> None:
+    """Those with the same dwells together, as a lot of their own; verified on the dwells that they have."""
+    dwells = complete_table(table(np.random.default_rng(6)))[0]
+    dwells.loc[dwells["dwell"].isin([3, 9]), "kind"] = "verification"
+    gap = dwells[~((dwells["unit"] == "C") & dwells["dwell"].isin([3, 4]))]
+    made = fit(gap, None, PLAIN)
+    for units in (["A", "B"], ["C"]):
+        alone = fit(gap[gap["unit"].isin(units)], None, PLAIN)
+        for name in ("coefficients", "covariance", "residuals", "wander"):
+            own = made[name][made[name]["unit"].isin(units)].reset_index(drop=True)
+            pd.testing.assert_frame_equal(own, alone[name])
+    checked = verified(gap, None, *(made[name] for name in ("coefficients", "covariance", "predictions")))[
+        "verification"
+    ]
+    assert checked.groupby("unit")["dwell"].agg(list).to_dict() == {"A": [3, 9], "B": [3, 9], "C": [9]}
+    errors = checked["error_ug"].abs() / checked["uncertainty_ug"]
+    assert errors.max() < 4.0
+
+
+def test_a_model_with_values_that_all_units_share_names_the_dwell_and_the_option() -> None:
     dwells = complete_table(table(np.random.default_rng(6)))[0]
     gap = dwells[~((dwells["unit"] == "C") & (dwells["dwell"] == 4))]
     with pytest.raises(
         DataRejected, match=r"not all have dwell 4\); fit without these dwells \(of an import with --leave-out\)"
     ):
-        fit(gap, None, PLAIN)
+        fit(gap, None, [*PLAIN, "level_error"])
 
 
 def test_a_table_is_completed_with_the_unit_that_its_outputs_show() -> None:
