@@ -5,6 +5,7 @@ Colours are names of roles (``role:before``) that the page replaces by those of 
 
 import base64
 from dataclasses import replace
+from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,9 @@ GAP_X, GAP_PX = 0.078, 92.0
 SPHERE_GAP_X, SPHERE_GAP_PX = 0.012, 26.0
 DECADES = 100.0  # a logarithmic axis that spans more has a label at each decade
 ENTRY_PX = 22  # room for an entry of the legend
-NOTE_PX = 22  # room for the line below
+NOTE_PX = 22  # room for a line below
+NARROW_LETTERS = 36  # of such a line on a narrow screen
+NARROW_SPHERE_PX = 220  # twice as wide as high, as its outline is
 MOST_NAMES = 40  # names along the width of a figure
 NARROW_D = 20.0  # closer dates get a margin
 CONFIG = {
@@ -48,9 +51,11 @@ def plotly_figure(chart: Chart, *, webgl: bool = True) -> dict[str, Any]:
                 data[-1]["type"] = "scatter"
             shown.add(trace.name)
     figure = {"data": data, "layout": _layout(chart), "config": CONFIG}
-    if chart.columns == 1:
+    spheres = all(plot.sphere for plot in chart.plots)
+    if chart.columns == 1 and not chart.note and not spheres:
         return figure
-    narrow = _layout(replace(chart, columns=1))
+    height = min(chart.height, NARROW_SPHERE_PX) if spheres else chart.height
+    narrow = _layout(replace(chart, columns=1, height=height, note=fill(chart.note, NARROW_LETTERS)))
     narrow["height"] += ENTRY_PX * sum(one["showlegend"] for one in data)  # the legend has one entry a line there
     return figure | {"narrow": narrow}
 
@@ -76,12 +81,12 @@ def _layout(chart: Chart) -> dict[str, Any]:
         layout["margin"] |= {"l": 8, "b": 8, "t": 34}
         layout["height"] = chart.height * chart.rows + 20
     if chart.note:
-        below = layout["margin"]["b"]
-        layout["margin"]["b"] += NOTE_PX
-        layout["height"] += NOTE_PX
+        lines, below = chart.note.split("\n"), layout["margin"]["b"]
+        layout["margin"]["b"] += NOTE_PX * len(lines)
+        layout["height"] += NOTE_PX * len(lines)
         layout["annotations"].append({
-            "text": _safe(chart.note), "x": 0, "y": 0, "xref": "paper", "yref": "paper", "xanchor": "left",
-            "yanchor": "top", "showarrow": False, "yshift": -below,
+            "text": "<br>".join(_safe(line) for line in lines), "align": "left", "x": 0, "y": 0, "xref": "paper",
+            "yref": "paper", "xanchor": "left", "yanchor": "top", "showarrow": False, "yshift": -below,
         })  # fmt: skip
     return layout
 
@@ -195,6 +200,7 @@ def _points(trace: Trace, colour: str) -> dict[str, Any]:
         marker |= {"color": packed(trace.colour), "coloraxis": "coloraxis", "line": {"width": 0.7, "color": "role:ink"}}
     kind = "scattergl" if trace.x.size > MANY else "scatter"
     out: dict[str, Any] = {"type": kind, "mode": "markers", "marker": marker}
+    out |= {"cliponaxis": False} if kind == "scatter" else {}  # a point at the edge is whole
     if trace.error is not None:
         out["error_y"] = {"type": "data", "array": packed(trace.error), "color": colour, "thickness": 1, "width": 0}
     if trace.texts:

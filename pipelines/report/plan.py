@@ -99,7 +99,18 @@ def sphere_chart(context: PlanContext) -> Chart:
         outer, inner = np.radians(np.array([(a.step.pose.outer_deg, a.step.pose.inner_deg) for a in first])).T
         x, y = project(force_from_angles(outer, inner))
         numbers = tuple(str(k + 1) for k in range(len(first)))
-        traces.append(Trace("order in the first soak", x, y - 0.085, "labels", "ink", texts=numbers, legend=False))
+        traces.append(
+            Trace(
+                "order in the first soak",
+                x + 0.03,
+                y,
+                "labels",
+                "ink",
+                texts=numbers,
+                legend=False,
+                anchors=("top right",) * len(numbers),
+            )
+        )
     return Chart(
         "Poses of the plan: where specific force points in the fixture", (sphere("", tuple(traces)),), height=420
     )
