@@ -24,7 +24,7 @@ ENTRY_PX = 22  # room for an entry of the legend
 NOTE_PX = 22  # room for a line below
 NARROW_LETTERS = 36  # of such a line on a narrow screen
 NARROW_SPHERE_PX = 220  # twice as wide as high, as its outline is
-MOST_NAMES = 40  # names along the width of a figure
+MOST_NAMES, NARROW_NAMES = 40, 14  # names along the width of a figure
 NARROW_D = 20.0  # closer dates get a margin
 CONFIG = {
     "displaylogo": False,
@@ -55,12 +55,12 @@ def plotly_figure(chart: Chart, *, webgl: bool = True) -> dict[str, Any]:
     if chart.columns == 1 and not chart.note and not spheres:
         return figure
     height = min(chart.height, NARROW_SPHERE_PX) if spheres else chart.height
-    narrow = _layout(replace(chart, columns=1, height=height, note=fill(chart.note, NARROW_LETTERS)))
+    narrow = _layout(replace(chart, columns=1, height=height, note=fill(chart.note, NARROW_LETTERS)), NARROW_NAMES)
     narrow["height"] += ENTRY_PX * sum(one["showlegend"] for one in data)  # the legend has one entry a line there
     return figure | {"narrow": narrow}
 
 
-def _layout(chart: Chart) -> dict[str, Any]:
+def _layout(chart: Chart, most_names: int = MOST_NAMES) -> dict[str, Any]:
     above = 1.0 + 30.0 / (chart.height * chart.rows)
     layout: dict[str, Any] = {
         "height": chart.height * chart.rows + 40,
@@ -73,7 +73,7 @@ def _layout(chart: Chart) -> dict[str, Any]:
         "meta": {"title": _safe(chart.title)},
     }
     for number, plot in enumerate(chart.plots):
-        _place(layout, plot, number, chart)
+        _place(layout, plot, number, chart, most_names)
     if chart.scale is not None:
         layout["coloraxis"] = _colour_axis(chart.scale)
         layout["margin"]["r"] = 78
@@ -96,7 +96,7 @@ def _axis_names(number: int) -> tuple[str, str]:
     return f"x{end}", f"y{end}"
 
 
-def _place(layout: dict[str, Any], plot: Plot, number: int, chart: Chart) -> None:
+def _place(layout: dict[str, Any], plot: Plot, number: int, chart: Chart, most_names: int) -> None:
     """The axes of a plot at its place in the grid, with its title above."""
     row, column = divmod(number, chart.columns)
     beside, below = (SPHERE_GAP_X, SPHERE_GAP_PX) if plot.sphere else (GAP_X, GAP_PX)
@@ -110,7 +110,7 @@ def _place(layout: dict[str, Any], plot: Plot, number: int, chart: Chart) -> Non
         (plot.y, along, (top - height, top), across),
     ):
         layout[name.replace("x", "xaxis").replace("y", "yaxis")] = {
-            **_axis(axis, plot, name[0], chart.columns),
+            **_axis(axis, plot, name[0], most_names // chart.columns),
             "domain": [max(domain[0], 0.0), min(domain[1], 1.0)],
             "anchor": other,
         }
@@ -125,7 +125,7 @@ def _place(layout: dict[str, Any], plot: Plot, number: int, chart: Chart) -> Non
         })  # fmt: skip
 
 
-def _axis(axis: PlotAxis, plot: Plot, side: str, columns: int) -> dict[str, Any]:
+def _axis(axis: PlotAxis, plot: Plot, side: str, most_names: int) -> dict[str, Any]:
     title = {"text": _safe(axis.label), "standoff": 8, "font": {"size": 13}}
     out: dict[str, Any] = {"title": title, "automargin": True, "zeroline": False}
     if plot.sphere:
@@ -144,7 +144,7 @@ def _axis(axis: PlotAxis, plot: Plot, side: str, columns: int) -> dict[str, Any]
         if days.size and np.ptp(days) < NARROW_D:
             out["range"] = [DAY_MS * (float(days.min()) - NARROW_D), DAY_MS * (float(days.max()) + NARROW_D)]
     if axis.names:
-        every = -(-len(axis.names) * columns // MOST_NAMES) if side == "x" else 1
+        every = -(-len(axis.names) // most_names) if side == "x" else 1
         places = list(range(0, len(axis.names), every))
         out |= {"tickvals": places, "ticktext": [_safe(shortened(axis.names[k])) for k in places]}
     if axis.step is not None:

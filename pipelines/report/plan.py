@@ -7,7 +7,7 @@ import numpy as np
 from inertial.arrays import Array
 from inertial.frames import force_from_angles
 from inertial.planning.visibility import confounding
-from pipelines.drawing import svg_text
+from pipelines.drawing import still, svg_text
 from pipelines.drawing.chart import Chart, ColourScale, Plot, PlotAxis, Role, Symbol, Trace
 from pipelines.drawing.mollweide import project, sphere
 from pipelines.planning.context import PlanContext
@@ -49,10 +49,10 @@ def pictures(document: dict[str, Any], context: PlanContext) -> dict[str, str]:
     """The pictures of a plan by name, as SVG: poses, temperatures, remaining fractions, confounded effects."""
     aliases = alias_chart(context)
     return {
-        "sphere": svg_text(sphere_chart(context)),
-        "temperature": svg_text(temperature_chart(context)),
-        "sights": svg_text(sight_chart(document["effects"])),
-        "aliases": "" if aliases is None else svg_text(aliases),
+        "sphere": still(svg_text(sphere_chart(context))),
+        "temperature": still(svg_text(temperature_chart(context))),
+        "sights": still(svg_text(sight_chart(document["effects"]))),
+        "aliases": "" if aliases is None else still(svg_text(aliases)),
         "budget": _budget(document.get("uncertainty")),
     }
 
