@@ -52,10 +52,13 @@ def plotly_figure(chart: Chart, *, webgl: bool = True) -> dict[str, Any]:
             shown.add(trace.name)
     figure = {"data": data, "layout": _layout(chart), "config": CONFIG}
     spheres = all(plot.sphere for plot in chart.plots)
-    if chart.columns == 1 and not chart.note and not spheres:
+    longest = max(len(text) for text in (chart.note, *(plot.x.label for plot in chart.plots)))
+    if chart.columns == 1 and not spheres and longest <= NARROW_LETTERS:
         return figure
     height = min(chart.height, NARROW_SPHERE_PX) if spheres else chart.height
-    narrow = _layout(replace(chart, columns=1, height=height, note=fill(chart.note, NARROW_LETTERS)), NARROW_NAMES)
+    plots = tuple(replace(one, x=replace(one.x, label=fill(one.x.label, NARROW_LETTERS))) for one in chart.plots)
+    note = fill(chart.note, NARROW_LETTERS)
+    narrow = _layout(replace(chart, plots=plots, columns=1, height=height, note=note), NARROW_NAMES)
     narrow["height"] += ENTRY_PX * sum(one["showlegend"] for one in data)  # the legend has one entry a line there
     return figure | {"narrow": narrow}
 
@@ -81,11 +84,11 @@ def _layout(chart: Chart, most_names: int = MOST_NAMES) -> dict[str, Any]:
         layout["margin"] |= {"l": 8, "b": 8, "t": 34}
         layout["height"] = chart.height * chart.rows + 20
     if chart.note:
-        lines, below = chart.note.split("\n"), layout["margin"]["b"]
-        layout["margin"]["b"] += NOTE_PX * len(lines)
-        layout["height"] += NOTE_PX * len(lines)
+        lines, below = chart.note.count("\n") + 1, layout["margin"]["b"]
+        layout["margin"]["b"] += NOTE_PX * lines
+        layout["height"] += NOTE_PX * lines
         layout["annotations"].append({
-            "text": "<br>".join(_safe(line) for line in lines), "align": "left", "x": 0, "y": 0, "xref": "paper",
+            "text": _safe(chart.note), "align": "left", "x": 0, "y": 0, "xref": "paper",
             "yref": "paper", "xanchor": "left", "yanchor": "top", "showarrow": False, "yshift": -below,
         })  # fmt: skip
     return layout
@@ -227,5 +230,5 @@ def packed(values: NDArray[np.float64], *, dates: bool = False) -> dict[str, str
 
 
 def _safe(text: str) -> str:
-    """A text without markup for Plotly."""
-    return text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
+    """A text for Plotly, without markup but for the ends of its lines."""
+    return text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;").replace("\n", "<br>")
