@@ -22,6 +22,7 @@ SPHERE_GAP_X, SPHERE_GAP_PX = 0.012, 26.0
 DECADES = 100.0  # a logarithmic axis that spans more has a label at each decade
 ENTRY_PX = 22  # room for an entry of the legend
 NOTE_PX = 22  # room for a line below
+LABEL_PX = 18  # room for a further line of a label
 NARROW_LETTERS = 36  # of such a line on a narrow screen
 NARROW_SPHERE_PX = 220  # twice as wide as high, as its outline is
 MOST_NAMES, NARROW_NAMES = 40, 14  # names along the width of a figure
@@ -103,6 +104,7 @@ def _place(layout: dict[str, Any], plot: Plot, number: int, chart: Chart, most_n
     """The axes of a plot at its place in the grid, with its title above."""
     row, column = divmod(number, chart.columns)
     beside, below = (SPHERE_GAP_X, SPHERE_GAP_PX) if plot.sphere else (GAP_X, GAP_PX)
+    below += LABEL_PX * max(one.x.label.count("\n") for one in chart.plots)
     width = (1.0 - beside * (chart.columns - 1)) / chart.columns
     gap = below / (chart.height * chart.rows)
     height = (1.0 - gap * (chart.rows - 1)) / chart.rows
