@@ -108,10 +108,9 @@ def headline(row: DiscoveryRow) -> str:
     what = "is common to all lots" if row["kind"] == "mean" else f"{_KINDS[row['kind']]} {' or '.join(row['drivers'])}"
     low, high = row["interval_ug"]
     axes = f" on {', '.join(row['axes'])}" if row["axes"] and len(row["axes"]) < 3 else ""
-    size = (
-        f"{short(row['size_ug'])} µg rms (95 %: {short(low)} to {short(high)}), "
-        f"{short(100.0 * row['size_floors'], 2)} % of the noise of a dwell"
-    )
+    floors = row["size_floors"]
+    share = "" if floors is None else f", {short(100.0 * floors, 2)} % of the noise of a dwell"
+    size = f"{short(row['size_ug'])} µg rms (95 %: {short(low)} to {short(high)}){share}"
     return f"{row['id']}  {effects} {what}{axes}: {size}; found on {row['since']}, with lot {row['lots_then']}"
 
 
