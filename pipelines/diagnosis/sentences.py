@@ -294,5 +294,5 @@ def brings(row: dict[str, Any]) -> str:
             f"χ² of a coefficient of typical size: {row['separation_before']:.1f} now, {row['separation_after']:.0f} expected"
         )
     after = ", ".join(f"{chi:.0f} if {name} is true" for name, chi in expected.items())
-    text += f"difference of their χ²: {row['separation_before']:.1f} now, expected then {after}"
+    text += f"difference of their χ²: {row['separation_before']:.1f} now, expected {after}"
     return text + (f"; not separated from the first: {', '.join(row['not_parted'])}" if row.get("not_parted") else "")
