@@ -45,6 +45,9 @@ ENGINE = (
     ("inertial/next_measurement/aims.py", "", "what the next measurement has to separate"),
 )
 GLOSSARY = (
+    ("run", "one measurement of a lot by a recipe, with everything that was computed from it"),
+    ("recipe", "what is measured and how: units, poses, temperatures, model, limits"),
+    ("plan", "the poses and temperatures of a recipe, and what they can determine"),
     ("unit", "one accelerometer, known by its serial number"),
     ("lot", "the units of one run, measured at the same times"),
     ("slot", "a seat of the fixture"),
@@ -52,6 +55,10 @@ GLOSSARY = (
     ("dwell", "the time in one pose whose samples become one mean"),
     ("pose", "an orientation of the fixture, by the angles of the table"),
     ("record", "what one dwell, or one static measurement, stored: samples and readings of the surroundings"),
+    ("effect", "a physical cause with its columns in the model, such as `third_order`"),
+    ("adequate", "of a model: it leaves no more than the noise of the measurement (p at least 0.05)"),
+    ("fresh run", "another run of the same units, which no fit has used"),
+    ("driver", "a recorded quantity, or an attribute such as the wafer, that a residual follows"),
     ("block", "the dwells of one unit and axis"),
     ("share", "variance of a kind of noise over that of the white part"),
     ("floor", "the residual that the noise of the measurement alone leaves"),

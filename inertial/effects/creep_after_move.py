@@ -20,7 +20,7 @@ class CreepAfterMove(SensorEffect):
 
     id = "creep_after_move"
     symbol = "kC"
-    equation = "kC·ΣΔfi·exp(−s/τ), over all moves so far, and the way of the table if way = 1"
+    equation = "kC·ΣΔfi·exp(−s/τ), over all moves so far; way = 1: over all steps of the table between two poses"
     coefficients = ("kC",)
     source = "mechanism: viscoelastic hinge or adhesive (one Maxwell element)"
     typical_ug = (10.0, 5000.0)

@@ -11,7 +11,7 @@ from pipelines.audit.audit import Audit
 from pipelines.audit.calibrations import date_of
 from pipelines.audit.due import uncertified
 from pipelines.audit.finding import WHO, AuditFinding, some
-from pipelines.audit.parameters import unit_text
+from pipelines.audit.parameters import parameter_text, unit_text
 from pipelines.audit.station_findings import of_stations
 from pipelines.audit.unit_findings import of_units
 from pipelines.report.numbers import significant
@@ -132,7 +132,8 @@ def _odd(audit: Audit) -> Iterator[AuditFinding]:
         what = f"lot of run {odd.run} ({number_of(odd.units, 'unit')})" if odd.kind == "lot" else f"unit {odd.name}"
         text = unit_text(odd.parameter)
         message = (
-            f"{odd.device}: {what} of {date_of(odd.day)} is an outlier in {odd.parameter}: {significant(odd.value, 4)} {text}, "
+            f"{odd.device}: {what} of {date_of(odd.day)} is an outlier in {parameter_text(odd.parameter)}: "
+            f"{significant(odd.value, 4)} {text}, "
             f"{odd.z:+.1f} σ from its kind; look for a change in its production"
         )
         evidence = {"run": odd.run, "station": odd.station, "parameter": odd.parameter, "value": odd.value, "z": odd.z}

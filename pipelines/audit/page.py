@@ -12,7 +12,7 @@ from pipelines.audit.finding import WHO, AuditFinding, date_or
 from pipelines.audit.parameters import unit_text
 from pipelines.audit.stations_over_time import StationSeries
 from pipelines.audit.unit_drifts import UnitDrift
-from pipelines.drawing import svg_text
+from pipelines.drawing import still, svg_text
 from pipelines.report.numbers import THIN, significant
 from pipelines.report.templates import template
 
@@ -36,12 +36,12 @@ def render(audit: Audit, listed: list[AuditFinding], archive: str) -> str:
         overdue=audit.overdue.size,
         valid=int(audit.due.valid.sum()),
         rules=audit.rules,
-        series_svg="".join(svg_text(drawn.series_chart(one)) for one in series),
-        charts_svg="".join(svg_text(drawn.control_chart(one)) for one in charts),
+        series_svg="".join(still(svg_text(drawn.series_chart(one))) for one in series),
+        charts_svg="".join(still(svg_text(drawn.control_chart(one))) for one in charts),
         chart_count=len(audit.charts),
-        yield_svg=svg_text(drawn.yield_chart(months)) if len(months) > 1 else "",
-        due_svg=svg_text(drawn.due_chart(audit)) if audit.due.row.size else "",
-        drift_svg="".join(svg_text(drawn.drift_chart(audit, drift)) for drift in drifts),
+        yield_svg=still(svg_text(drawn.yield_chart(months))) if len(months) > 1 else "",
+        due_svg=still(svg_text(drawn.due_chart(audit))) if audit.due.row.size else "",
+        drift_svg="".join(still(svg_text(drawn.drift_chart(audit, drift))) for drift in drifts),
         shares=[share for share in audit.yields if share.of in {"device", "station"}],
         kinds=audit.kinds,
         furthest=furthest(audit, MOST_ROWS),

@@ -43,6 +43,16 @@ def unit_text(name: str) -> str:
     return FAMILIES[FAMILY_OF[name]].unit
 
 
+def parameter_text(name: str) -> str:
+    """A parameter for people: ``bias over temperature, axis x``; a name that is none stays as it is."""
+    family, axes = FAMILY_OF.get(name), name.rpartition("_")[2]
+    if family is None:
+        return name
+    if family == "square":
+        return f"angle between {axes[0]} and {axes[1]}"
+    return f"rotation about {axes}" if family == "rotation" else f"{family.replace('_', ' over ')}, axis {axes}"
+
+
 _CYCLE = ((1, 2), (2, 0), (0, 1))  # the two axes that a rotation about x, y, z mixes
 
 

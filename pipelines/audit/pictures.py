@@ -11,7 +11,7 @@ from pipelines.audit.audit import Audit
 from pipelines.audit.drifts import OWN
 from pipelines.audit.finding import AuditFinding
 from pipelines.audit.pairs import YEAR_D
-from pipelines.audit.parameters import NAMES, unit_text
+from pipelines.audit.parameters import NAMES, parameter_text, unit_text
 from pipelines.audit.stations_over_time import ControlChart, StationSeries
 from pipelines.audit.unit_drifts import UnitDrift
 from pipelines.drawing import Chart, Plot, PlotAxis, Trace
@@ -49,13 +49,13 @@ def due_chart(audit: Audit) -> Chart:
     ahead = np.bincount(np.floor(months[(months >= 0.0) & (months < MONTHS)]).astype(int), minlength=MONTHS)
     late = int(np.count_nonzero(months < 0.0))
     bars = Trace("units due", np.arange(MONTHS, dtype=np.float64) + 0.5, ahead.astype(float), "bars")
-    more = f" ({number_of(late, 'overdue unit')} not shown)" if late else ""
+    note = f"{number_of(late, 'overdue unit')} not shown" if late else ""
     most = max(1.05 * float(ahead.max()), 1.0)
     axes = (
-        PlotAxis(f"months ahead{more}", step=3.0),
+        PlotAxis("months ahead", step=3.0),
         PlotAxis("units due", low=0.0, high=most, step=1.0 if most < 8.0 else None),
     )
-    return Chart("Re-calibrations due", (Plot("", *axes, (bars,)),), height=260)
+    return Chart("Re-calibrations due", (Plot("", *axes, (bars,)),), height=260, note=note)
 
 
 def control_chart(chart: ControlChart) -> Chart:
@@ -71,8 +71,9 @@ def control_chart(chart: ControlChart) -> Chart:
         told = tuple(texts[rows])
         traces.append(Trace(name, chart.day[rows], chart.value[rows], "points", role, symbol, size, texts=told))
     alarms = f"{number_of(chart.alarms, 'alarm')}, {chart.expected:.1f} expected by chance"
-    title = f"{chart.station}: {chart.standard}, {chart.parameter}: {alarms}"
-    plot = Plot(title, PlotAxis("date", dates=True), PlotAxis(f"{chart.parameter} / {chart.unit_text}"), tuple(traces))
+    name = parameter_text(chart.parameter)
+    title = f"{chart.station}: {chart.standard}, {name}: {alarms}"
+    plot = Plot(title, PlotAxis("date", dates=True), PlotAxis(f"{name} / {chart.unit_text}"), tuple(traces))
     return Chart(f"Control chart of {chart.standard} on {chart.station}", (plot,), height=280)
 
 
@@ -93,8 +94,9 @@ def series_chart(series: StationSeries) -> Chart:
         traces.append(between(when, low, high, "interval of the change", "limit"))
         day = np.full(2, series.day[change.first])
         traces.append(Trace("change", day, np.array([low, high]), "line", "limit", dashed=True))
-    title = f"{series.station}: {series.where}, {series.parameter}"
-    label = f"{series.parameter} / {series.unit_text}" if series.unit_text else series.parameter
+    name = parameter_text(series.parameter)
+    title = f"{series.station}: {series.where}, {name}"
+    label = f"{name} / {series.unit_text}" if series.unit_text else name
     plot = Plot(title, PlotAxis("date", dates=True), PlotAxis(label, low=low, high=high), tuple(traces))
     return Chart(title, (plot,), height=260)
 
@@ -119,10 +121,10 @@ def drift_chart(audit: Audit, drift: UnitDrift) -> Chart:
         traces += [level(ahead, edge, "limit", "tolerance") for edge in (low, high)]
         if np.isfinite(drift.leaves):
             window = np.array([max(drift.soonest, day[-1]), min(drift.latest, end)])
-            traces.append(between(window, low, high, "leaves its tolerance", "before"))
-    label = f"{drift.parameter} / {unit_text(drift.parameter)}"
-    plot = Plot(f"{drift.unit}: {drift.parameter}", PlotAxis("date", dates=True), PlotAxis(label), tuple(traces))
-    return Chart(f"Drift of {drift.unit}: {drift.parameter}, E_n {drift.e_n:.2f}", (plot,), height=260)
+            traces.append(between(window, low, high, "leaves its tolerance", "fourth"))
+    label = f"{parameter_text(drift.parameter)} / {unit_text(drift.parameter)}"
+    plot = Plot("", PlotAxis("date", dates=True), PlotAxis(label), tuple(traces))
+    return Chart(f"Drift of {drift.unit}: {parameter_text(drift.parameter)}, E_n {drift.e_n:.2f}", (plot,), height=260)
 
 
 def _years_to(drift: UnitDrift) -> float:

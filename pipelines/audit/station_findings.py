@@ -10,6 +10,7 @@ from inertial.uncertainty.rounding import equal
 from pipelines.audit.audit import Audit
 from pipelines.audit.calibrations import date_of
 from pipelines.audit.finding import AuditFinding
+from pipelines.audit.parameters import parameter_text
 from pipelines.audit.stations_over_time import StationSeries
 
 
@@ -54,7 +55,8 @@ def _moved(audit: Audit, series: StationSeries, change: ChangePoint, kind: str) 
     )
     until = f" until {date_of(end)}" if np.isfinite(end) else ""
     message = (
-        f"{series.station}: {series.where} ({series.parameter}) moved by {change.shift:+.0f} ± {2 * change.error:.0f} "
+        f"{series.station}: {series.where} ({parameter_text(series.parameter)}) moved by {change.shift:+.0f} "
+        f"± {2 * change.error:.0f} "
         f"{series.unit_text} on {date_of(first)} (between {date_of(low)} and {date_of(high)}, 95 %); "
         f"{number_of(len(units), 'unit')} in {number_of(runs, 'run')} measured there since{until}: {remedy}"
     )
@@ -80,7 +82,7 @@ def _standards(audit: Audit) -> Iterator[AuditFinding]:
         if not chart.in_control:
             first = int(np.argmax(chart.hit))
             message = (
-                f"{chart.station}: check standard {chart.standard}, {chart.parameter}: "
+                f"{chart.station}: check standard {chart.standard}, {parameter_text(chart.parameter)}: "
                 f"{number_of(chart.alarms, 'alarm')} on the control chart "
                 f"since {date_of(chart.day[first])}, {chart.expected:.1f} expected by chance "
                 f"(p {equal(chart.p_value)}); measure the standard on another station to find which of the two has changed"
@@ -97,7 +99,7 @@ def _gauges(audit: Audit) -> Iterator[AuditFinding]:
     bad = [s for s in audit.studies if np.isfinite(s.of_tolerance) and s.of_tolerance > most]
     for runs in dict.fromkeys(study.runs for study in bad):
         own = sorted((study for study in bad if study.runs == runs), key=lambda study: -study.of_tolerance)
-        shares = ", ".join(f"{study.parameter} {study.of_tolerance:.0f} %" for study in own)
+        shares = ", ".join(f"{parameter_text(study.parameter)} {study.of_tolerance:.0f} %" for study in own)
         message = (
             f"{own[0].device}: repeated seating takes more than the allowed {most:g} % of the tolerance: {shares} "
             f"(study of {date_of(own[0].first_day)}, {number_of(len(runs), 'run')}); measure longer, or widen the tolerance"

@@ -10,7 +10,7 @@ from pipelines.audit.audit import Audit
 from pipelines.audit.calibrations import Calibrations, date_of
 from pipelines.audit.finding import AuditFinding, date_or_never
 from pipelines.audit.pairs import YEAR_D
-from pipelines.audit.parameters import unit_text
+from pipelines.audit.parameters import parameter_text, unit_text
 from pipelines.audit.unit_drifts import UnitDrift
 
 
@@ -69,7 +69,7 @@ def _out_of_tolerance(audit: Audit) -> Iterator[AuditFinding]:
         drift = max(outside, key=lambda d: (abs(d.change) - _expanded(d)) / d.tolerance)
         text = unit_text(drift.parameter)
         message = (
-            f"{drift.unit}: {drift.parameter} changed by {drift.change:+.4g} {text} in {_after(drift)}, "
+            f"{drift.unit}: {parameter_text(drift.parameter)} changed by {drift.change:+.4g} {text} in {_after(drift)}, "
             f"tolerance {drift.tolerance:g} {text}, U {_expanded(drift):.3g}, E_n {drift.e_n:+.1f}{_besides(outside)}; its "
             f"measurements since {date_of(drift.day - YEAR_D * drift.years)} are doubtful: inform its users"
         )
@@ -92,7 +92,7 @@ def _leaving(audit: Audit) -> Iterator[AuditFinding]:
         text, others = unit_text(drift.parameter), list(dict.fromkeys(one[3].parameter for one in leavings))
         moves = f"drifts {_signed(drift.slope)} {text} a year" if np.isfinite(drift.slope) else "drifts like its kind"
         message = (
-            f"{drift.unit}: {drift.parameter} {moves} and leaves its {what} of {bound:g} {text} "
+            f"{drift.unit}: {parameter_text(drift.parameter)} {moves} and leaves its {what} of {bound:g} {text} "
             f"about {date_or_never(days[0])} ({date_or_never(days[1])} to {date_or_never(days[2])})"
             f"{_besides(others)}, before it is due on {date_of(due)}; recall it"
         )
@@ -141,7 +141,7 @@ def _unlike_their_kind(audit: Audit) -> Iterator[AuditFinding]:
             text = unit_text(worst.parameter)
             when = f"{_when(worst)}: give it a shorter interval, or take it out of use"
             message = (
-                f"{worst.unit}: {worst.parameter} drifts {_signed(worst.slope)} {text} a year over "
+                f"{worst.unit}: {parameter_text(worst.parameter)} drifts {_signed(worst.slope)} {text} a year over "
                 f"{worst.calibrations} calibrations, {abs(worst.odd):.1f} σ from its kind, and {when}"
             )
             yield AuditFinding("quality", "drifts", worst.unit, message, (worst.unit,), _numbers(worst))

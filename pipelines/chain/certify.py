@@ -24,6 +24,7 @@ from pipelines.chain.certifiable import (
     refuse_unsound,
     refuse_unstated,
 )
+from pipelines.report.templates import plain_reason
 from pipelines.tables.frames import rows_of
 from schemas.errors import WrongUse, did_you_mean
 
@@ -162,7 +163,7 @@ def _why_not(run: Run, serial: str, row: Mapping[str, Any], *, named: bool) -> s
         refuse_unproved(run.archive.root, serial)
     if half or row["outcome"] == "pass":
         return half
-    why = f"{row['outcome']}: {row['reasons']}"
+    why = f"{row['outcome']}: {plain_reason(str(row['reasons']))}"
     if named:
         raise WrongUse(f"certify: unit {serial} of run {run.id} did not pass ({why}); only what passed is certified")
     return why

@@ -64,10 +64,12 @@ def clock(document: LineDocument, minutes: float) -> str:
 
 def _print(document: LineDocument, *, everything: bool) -> None:
     lots, alone = len(document["lots"]), document["one_after_another"]
-    least = "" if document["proven"] else f" than {document['bound_min']:.0f} min"
+    least = (
+        "this is the shortest schedule" if document["proven"] else f"none has less than {document['bound_min']:.0f} min"
+    )
     say(
         f"{document['line']}: {lots} lots in {document['makespan_min']:.0f} min, {document['minutes_per_lot']:.1f} min per lot, "
-        f"{document['lots_per_day']:.1f} lots a day; no schedule with a change before each stay is shorter{least}"
+        f"{document['lots_per_day']:.1f} lots a day; {least} with a change before each stay"
     )
     this = ": this is the schedule" if alone["makespan_min"] == document["makespan_min"] else ""
     say(f"one after the other: {alone['makespan_min']:.0f} min, {alone['minutes_per_lot']:.1f} min per lot{this}")

@@ -22,8 +22,8 @@ EXAMPLES = ("tumbleline show latest coefficients", "tumbleline show SN1 --at 202
 MANY = 40
 NOTES = {
     "coefficients": (
-        "standard_error: k = 1, of the value that wander moves about; of the bias as the mean of this record: bias_record_u_ug "
-        "of the table wander"
+        "standard_error: k = 1, of the value about which slow noise moves the coefficient; u of the bias as the mean over this "
+        "measurement: bias_record_u_ug of the table wander"
     )
 }
 """What the columns of a table mean where their names alone mislead."""

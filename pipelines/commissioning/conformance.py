@@ -6,7 +6,7 @@ from pydantic import TypeAdapter
 
 from pipelines.commissioning.documents import ConformanceDocument, Platform
 from pipelines.commissioning.frames import timeline
-from pipelines.drawing import svg_text
+from pipelines.drawing import still, svg_text
 from pipelines.report.templates import template
 from schemas.errors import DataRejected
 from schemas.foreign import foreign
@@ -70,7 +70,7 @@ def conformance_page(document: ConformanceDocument, recording: Path | None) -> s
     chart = ""
     if recording is not None and recording.is_file():
         content = read_frames(recording)
-        chart = svg_text(timeline(content)) if content.exchanges else ""
+        chart = still(svg_text(timeline(content))) if content.exchanges else ""
     sections = [("What differs", [point for point in document["points"] if point.verdict == "differs"])]
     for title, part in SECTIONS.items():
         sections.append((title, [point for point in document["points"] if point.part == part]))

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from pipelines.commissioning.documents import FrameRow, FramesDocument, RecordedDeviceRow
-from pipelines.drawing import Chart, Plot, PlotAxis, Trace, svg_text
+from pipelines.drawing import Chart, Plot, PlotAxis, Trace, still, svg_text
 from pipelines.drawing.chart import Role, Symbol
 from pipelines.report.templates import template
 from stations.links.frames import EXCEPTION
@@ -131,7 +131,7 @@ def frames_document(recording: FrameFile, limit: int | None = None) -> FramesDoc
 def frames_page(recording: FrameFile) -> str:
     """The recording as one page that needs no network: its time line, its devices and its last frames."""
     document = frames_document(recording, MOST_ROWS)
-    chart = svg_text(timeline(recording)) if recording.exchanges else ""
+    chart = still(svg_text(timeline(recording))) if recording.exchanges else ""
     return template("frames.html").render(document=document, chart=chart, total=len(recording.exchanges))
 
 

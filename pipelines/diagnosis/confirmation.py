@@ -84,7 +84,7 @@ def _by_left_out(before: LeftOut, after: LeftOut, doubt: Callable[[], str | None
     if gain is None:
         against = "no judgement is possible"
     elif not gain > LEFT_OUT:  # a nan is no gain
-        against = f"log density {gain:+.1f}, more than {LEFT_OUT:g} is needed"
+        against = f"their log likelihood changes by {gain:+.1f}, more than {LEFT_OUT:g} is needed"
     else:
         rises = _rise("the error on dwells left out", *both)
         # the search for a fault of the run is the longest part: only where it decides
@@ -113,7 +113,7 @@ def _disagreement(gains: Mapping[Kind, float], falls: Mapping[Kind, tuple[float,
         if not fall > CONFIRMED * error:
             return f"{left} {fall_of(MICRO * fall, known(MICRO * error))}, no clear fall"
         if gain <= LEFT_OUT:
-            return f"{left} the log density changes by {gain:+.1f}, more than {LEFT_OUT:g} is needed"
+            return f"{left} the log likelihood changes by {gain:+.1f}, more than {LEFT_OUT:g} is needed"
     return None
 
 
@@ -231,13 +231,16 @@ def text_of(row: dict[str, Any], progress: dict[str, Any] | None) -> str:
         return _told_by_fresh(progress, fall)
     gain = progress["log_density"]
     if progress["confirmed"]:
-        return f"confirmed on stretches of time left out (log density +{gain:.1f}), and the run shows no fault; {fall}"
+        return (
+            f"confirmed on stretches of time left out (log likelihood +{gain:.1f}), and the run shows no fault; {fall}"
+        )
     why = progress.get("reason") or "no judgement is possible"
     told = why if fall in why else f"{why}; {fall}"
     decides = "a fresh run of the same units decides"
     if gain is not None and gain > LEFT_OUT:
         return (
-            f"holds on stretches of time left out (log density +{gain:.1f}), not decided by this run: {told}; {decides}"
+            f"not decided by this run alone: stretches of time left out confirm it (log likelihood "
+            f"+{gain:.1f}), but {told}; {decides}"
         )
     return f"not decided by dwells left out: {told}; {decides}"
 

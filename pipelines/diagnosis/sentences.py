@@ -126,8 +126,10 @@ def undetected(document: dict[str, Any]) -> str:
     smallest = evidence["smallest_cubic_ug"]
     if smallest is None and "third_order" in document.get("effects", ()):
         return "few dwells" if few_dwells(document) else ""  # the model has a cubic term: none is missing
-    seen = f"below {short(smallest)} µg/g³" if smallest is not None else "of any size"
-    return f"{'few dwells: ' if few_dwells(document) else ''}a cubic term {seen} is not detected (probability 0.5)"
+    few = "few dwells: " if few_dwells(document) else ""
+    if smallest is None:
+        return f"{few}a cubic term of any size is not detected"
+    return f"{few}a cubic term is detected from {short(smallest)} µg/g³ on, with a probability of one half"
 
 
 def influences(document: dict[str, Any], most: int | None = NAMED_DWELLS) -> list[str]:
@@ -221,8 +223,8 @@ def why_recommended(document: dict[str, Any]) -> list[str]:
 def not_listed(document: dict[str, Any]) -> str:
     """How many effects this plan cannot show, or only in part; empty where it shows all."""
     part = len({row["effect"] for row in document.get("unseen_in_part", ())})
-    counts = (("cannot show", len(document["unseen"])), ("shows only in part", part))
-    told = [f"{what} {number_of(count, 'effect')}" for what, count in counts if count]
+    counts = (("cannot show {}", len(document["unseen"])), ("shows {} only in part", part))
+    told = [what.format(number_of(count, "effect")) for what, count in counts if count]
     return f"This plan {' and '.join(told)}" if told else ""
 
 
@@ -289,8 +291,8 @@ def brings(row: dict[str, Any]) -> str:
     expected = row.get("separation_if")
     if not expected:
         return text + (
-            f"χ² of a coefficient of typical size {row['separation_before']:.1f} now, {row['separation_after']:.0f} expected"
+            f"χ² of a coefficient of typical size: {row['separation_before']:.1f} now, {row['separation_after']:.0f} expected"
         )
     after = ", ".join(f"{chi:.0f} if {name} is true" for name, chi in expected.items())
-    text += f"χ² between the two {row['separation_before']:.1f} now, expected {after}"
+    text += f"difference of their χ²: {row['separation_before']:.1f} now, expected {after}"
     return text + (f"; not separated from the first: {', '.join(row['not_parted'])}" if row.get("not_parted") else "")

@@ -104,14 +104,14 @@ _SCOPES = {
 
 def headline(row: DiscoveryRow) -> str:
     """What, by what, how large, since when."""
-    effects = " | ".join(row["effects"][:3]) + (" | …" if len(row["effects"]) > 3 else "")
-    what = "is common to all lots" if row["kind"] == "mean" else f"{_KINDS[row['kind']]} {' | '.join(row['drivers'])}"
+    effects = " or ".join(row["effects"][:3]) + (" or …" if len(row["effects"]) > 3 else "")
+    what = "is common to all lots" if row["kind"] == "mean" else f"{_KINDS[row['kind']]} {' or '.join(row['drivers'])}"
     low, high = row["interval_ug"]
     axes = f" on {', '.join(row['axes'])}" if row["axes"] and len(row["axes"]) < 3 else ""
-    size = (
-        f"rms {short(row['size_ug'])} µg [{short(low)}, {short(high)}], {short(row['size_floors'])} of a dwell's noise"
-    )
-    return f"{row['id']}  {effects} {what}{axes}: {size}; since {row['since']} (lot {row['lots_then']})"
+    floors = row["size_floors"]
+    share = "" if floors is None else f", {short(100.0 * floors, 2)} % of the noise of a dwell"
+    size = f"{short(row['size_ug'])} µg rms (95 %: {short(low)} to {short(high)}){share}"
+    return f"{row['id']}  {effects} {what}{axes}: {size}; found on {row['since']}, with lot {row['lots_then']}"
 
 
 def scope_text(row: DiscoveryRow) -> str:

@@ -395,7 +395,7 @@ class Findings:
             out.append(f"no lot can be used: {counted}")
         elif lots < FIRST:
             out.append(
-                f"{number_of(lots, 'lot')}; the earliest discovery is possible at {FIRST}, of drivers at about 60"
+                f"{number_of(lots, 'lot')}: a discovery needs at least {FIRST}, one that follows an attribute about 60"
             )
         for device, count in self.source.other_devices.items():
             out.append(

@@ -9,7 +9,7 @@ from inertial.uncertainty.rounding import short
 from pipelines.discovery.documents import DiscoverDocument, DiscoveryRow, UnexplainedRow
 from pipelines.discovery.figures_of_name import headline, scope_text, unexplained_text
 from pipelines.discovery.findings import Findings
-from pipelines.drawing import Chart, Plot, PlotAxis, Trace, svg_text
+from pipelines.drawing import Chart, Plot, PlotAxis, Trace, still, svg_text
 from pipelines.drawing.chart import Role, level, symmetric
 from pipelines.drawing.mollweide import project, sphere
 from pipelines.report.templates import template
@@ -27,8 +27,8 @@ def render(findings: Findings, document: DiscoverDocument, archive: str) -> str:
             "headline": headline(row),
             "scope": scope_text(row),
             "row": row,
-            "levels": svg_text(levels_chart(row)) if row["kind"] == "levels" and row["levels"] else "",
-            "grown": svg_text(grown[f"grown-{row['id']}"]) if f"grown-{row['id']}" in grown else "",
+            "levels": still(svg_text(levels_chart(row))) if row["kind"] == "levels" and row["levels"] else "",
+            "grown": still(svg_text(grown[f"grown-{row['id']}"])) if f"grown-{row['id']}" in grown else "",
         }
         for row in document["discoveries"]
     ]
@@ -37,10 +37,11 @@ def render(findings: Findings, document: DiscoverDocument, archive: str) -> str:
         document=document,
         shown=shown,
         unexplained=[
-            (unexplained_text(row), svg_text(map_chart(row)) if row["map"] else "") for row in document["unexplained"]
+            (unexplained_text(row), still(svg_text(map_chart(row))) if row["map"] else "")
+            for row in document["unexplained"]
         ],
-        strongest="" if (strongest := strongest_chart(findings)) is None else svg_text(strongest),
-        reach=svg_text(reach_chart(document, len(findings.state.order))) if document["reach"] else "",
+        strongest="" if (strongest := strongest_chart(findings)) is None else still(svg_text(strongest)),
+        reach=still(svg_text(reach_chart(document, len(findings.state.order)))) if document["reach"] else "",
         short=short,
     )
 

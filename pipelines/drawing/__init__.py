@@ -3,6 +3,6 @@
 from pipelines.drawing.chart import Chart, ColourScale, Plot, PlotAxis, Trace
 from pipelines.drawing.picture import csv_text
 from pipelines.drawing.plotly_figure import plotly_figure
-from pipelines.drawing.vector import svg_text
+from pipelines.drawing.vector import still, svg_text
 
-__all__ = ["Chart", "ColourScale", "Plot", "PlotAxis", "Trace", "csv_text", "plotly_figure", "svg_text"]
+__all__ = ["Chart", "ColourScale", "Plot", "PlotAxis", "Trace", "csv_text", "plotly_figure", "still", "svg_text"]

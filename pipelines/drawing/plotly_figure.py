@@ -5,6 +5,7 @@ Colours are names of roles (``role:before``) that the page replaces by those of 
 
 import base64
 from dataclasses import replace
+from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -20,8 +21,11 @@ GAP_X, GAP_PX = 0.078, 92.0
 SPHERE_GAP_X, SPHERE_GAP_PX = 0.012, 26.0
 DECADES = 100.0  # a logarithmic axis that spans more has a label at each decade
 ENTRY_PX = 22  # room for an entry of the legend
-NOTE_PX = 22  # room for the line below
-MOST_NAMES = 40  # names along the width of a figure
+NOTE_PX = 22  # room for a line below
+LABEL_PX = 18  # room for a further line of a label
+NARROW_LETTERS = 36  # of such a line on a narrow screen
+NARROW_SPHERE_PX = 220  # twice as wide as high, as its outline is
+MOST_NAMES, NARROW_NAMES = 40, 14  # names along the width of a figure
 NARROW_D = 20.0  # closer dates get a margin
 CONFIG = {
     "displaylogo": False,
@@ -48,14 +52,19 @@ def plotly_figure(chart: Chart, *, webgl: bool = True) -> dict[str, Any]:
                 data[-1]["type"] = "scatter"
             shown.add(trace.name)
     figure = {"data": data, "layout": _layout(chart), "config": CONFIG}
-    if chart.columns == 1:
+    spheres = all(plot.sphere for plot in chart.plots)
+    longest = max(len(text) for text in (chart.note, *(plot.x.label for plot in chart.plots)))
+    if chart.columns == 1 and not spheres and longest <= NARROW_LETTERS:
         return figure
-    narrow = _layout(replace(chart, columns=1))
+    height = min(chart.height, NARROW_SPHERE_PX) if spheres else chart.height
+    plots = tuple(replace(one, x=replace(one.x, label=fill(one.x.label, NARROW_LETTERS))) for one in chart.plots)
+    note = fill(chart.note, NARROW_LETTERS)
+    narrow = _layout(replace(chart, plots=plots, columns=1, height=height, note=note), NARROW_NAMES)
     narrow["height"] += ENTRY_PX * sum(one["showlegend"] for one in data)  # the legend has one entry a line there
     return figure | {"narrow": narrow}
 
 
-def _layout(chart: Chart) -> dict[str, Any]:
+def _layout(chart: Chart, most_names: int = MOST_NAMES) -> dict[str, Any]:
     above = 1.0 + 30.0 / (chart.height * chart.rows)
     layout: dict[str, Any] = {
         "height": chart.height * chart.rows + 40,
@@ -68,7 +77,7 @@ def _layout(chart: Chart) -> dict[str, Any]:
         "meta": {"title": _safe(chart.title)},
     }
     for number, plot in enumerate(chart.plots):
-        _place(layout, plot, number, chart)
+        _place(layout, plot, number, chart, most_names)
     if chart.scale is not None:
         layout["coloraxis"] = _colour_axis(chart.scale)
         layout["margin"]["r"] = 78
@@ -76,12 +85,12 @@ def _layout(chart: Chart) -> dict[str, Any]:
         layout["margin"] |= {"l": 8, "b": 8, "t": 34}
         layout["height"] = chart.height * chart.rows + 20
     if chart.note:
-        below = layout["margin"]["b"]
-        layout["margin"]["b"] += NOTE_PX
-        layout["height"] += NOTE_PX
+        lines, below = chart.note.count("\n") + 1, layout["margin"]["b"]
+        layout["margin"]["b"] += NOTE_PX * lines
+        layout["height"] += NOTE_PX * lines
         layout["annotations"].append({
-            "text": _safe(chart.note), "x": 0, "y": 0, "xref": "paper", "yref": "paper", "xanchor": "left",
-            "yanchor": "top", "showarrow": False, "yshift": -below,
+            "text": _safe(chart.note), "align": "left", "x": 0, "y": 0, "xref": "paper",
+            "yref": "paper", "xanchor": "left", "yanchor": "top", "showarrow": False, "yshift": -below,
         })  # fmt: skip
     return layout
 
@@ -91,10 +100,11 @@ def _axis_names(number: int) -> tuple[str, str]:
     return f"x{end}", f"y{end}"
 
 
-def _place(layout: dict[str, Any], plot: Plot, number: int, chart: Chart) -> None:
+def _place(layout: dict[str, Any], plot: Plot, number: int, chart: Chart, most_names: int) -> None:
     """The axes of a plot at its place in the grid, with its title above."""
     row, column = divmod(number, chart.columns)
     beside, below = (SPHERE_GAP_X, SPHERE_GAP_PX) if plot.sphere else (GAP_X, GAP_PX)
+    below += LABEL_PX * max(one.x.label.count("\n") for one in chart.plots)
     width = (1.0 - beside * (chart.columns - 1)) / chart.columns
     gap = below / (chart.height * chart.rows)
     height = (1.0 - gap * (chart.rows - 1)) / chart.rows
@@ -105,7 +115,7 @@ def _place(layout: dict[str, Any], plot: Plot, number: int, chart: Chart) -> Non
         (plot.y, along, (top - height, top), across),
     ):
         layout[name.replace("x", "xaxis").replace("y", "yaxis")] = {
-            **_axis(axis, plot, name[0], chart.columns),
+            **_axis(axis, plot, name[0], most_names // chart.columns),
             "domain": [max(domain[0], 0.0), min(domain[1], 1.0)],
             "anchor": other,
         }
@@ -120,7 +130,7 @@ def _place(layout: dict[str, Any], plot: Plot, number: int, chart: Chart) -> Non
         })  # fmt: skip
 
 
-def _axis(axis: PlotAxis, plot: Plot, side: str, columns: int) -> dict[str, Any]:
+def _axis(axis: PlotAxis, plot: Plot, side: str, most_names: int) -> dict[str, Any]:
     title = {"text": _safe(axis.label), "standoff": 8, "font": {"size": 13}}
     out: dict[str, Any] = {"title": title, "automargin": True, "zeroline": False}
     if plot.sphere:
@@ -139,7 +149,7 @@ def _axis(axis: PlotAxis, plot: Plot, side: str, columns: int) -> dict[str, Any]
         if days.size and np.ptp(days) < NARROW_D:
             out["range"] = [DAY_MS * (float(days.min()) - NARROW_D), DAY_MS * (float(days.max()) + NARROW_D)]
     if axis.names:
-        every = -(-len(axis.names) * columns // MOST_NAMES) if side == "x" else 1
+        every = -(-len(axis.names) // most_names) if side == "x" else 1
         places = list(range(0, len(axis.names), every))
         out |= {"tickvals": places, "ticktext": [_safe(shortened(axis.names[k])) for k in places]}
     if axis.step is not None:
@@ -195,6 +205,7 @@ def _points(trace: Trace, colour: str) -> dict[str, Any]:
         marker |= {"color": packed(trace.colour), "coloraxis": "coloraxis", "line": {"width": 0.7, "color": "role:ink"}}
     kind = "scattergl" if trace.x.size > MANY else "scatter"
     out: dict[str, Any] = {"type": kind, "mode": "markers", "marker": marker}
+    out |= {"cliponaxis": False} if kind == "scatter" else {}  # a point at the edge is whole
     if trace.error is not None:
         out["error_y"] = {"type": "data", "array": packed(trace.error), "color": colour, "thickness": 1, "width": 0}
     if trace.texts:
@@ -221,5 +232,5 @@ def packed(values: NDArray[np.float64], *, dates: bool = False) -> dict[str, str
 
 
 def _safe(text: str) -> str:
-    """A text without markup for Plotly."""
-    return text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
+    """A text for Plotly, without markup but for the ends of its lines."""
+    return text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;").replace("\n", "<br>")

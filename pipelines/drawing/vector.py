@@ -23,6 +23,7 @@ BAR = 84.0
 SPHERE_TOP = 26.0
 MOST_NAMES = 26
 LONGEST_TURNED = 14
+SINE = 0.62  # of the 38° by which they are turned
 LEGEND_MARK = 7.0  # as large for all, as Plotly has it
 GRID, FRAME, TEXT, QUIET = "#e4e4e4", "#8a8f98", "#1d1f23", "#55585f"
 
@@ -50,12 +51,16 @@ def svg_text(chart: Chart) -> str:
     head = max(HEAD, LINE * len(lines) + 6.0)
     wide = WIDTH - (BAR if chart.scale is not None else 0.0)
     each = (wide - GAP * (chart.columns - 1)) / chart.columns
-    tall = float(chart.height)
-    scaled = [_scaled(plot, each, tall) for plot in chart.plots]
+    scaled = [_scaled(plot, each, float(chart.height)) for plot in chart.plots]
     left = [
         max((_left(chart, k, scaled[k][1]) for k in range(column, len(chart.plots), chart.columns)), default=0.0)
         for column in range(chart.columns)
     ]
+    feet = [
+        0.0 if plot.sphere else _foot(scaled[k][0].ticks, each - left[k % chart.columns] - 6.0)
+        for k, plot in enumerate(chart.plots)
+    ]
+    tall = chart.height + max(feet, default=0.0)
     parts = [
         f'<g transform="translate({x:.1f} {LINE * row + 10.0:.1f})">{mark}{text_at(14.0, 4.0, name)}</g>'
         for row, line in enumerate(lines)
@@ -67,9 +72,9 @@ def svg_text(chart: Chart) -> str:
         if plot.sphere:
             place = _sphere_place(plot, x, y, each, tall)
         else:
-            wide_each, tall_each = each - left[column] - 6.0, tall - TOP - BOTTOM
+            wide_each, tall_each = each - left[column] - 6.0, tall - TOP - BOTTOM - feet[number]
             place = Place(x + left[column], y + TOP, wide_each, tall_each, *(one.at for one in scaled[number]))
-            parts.append(_axes(plot, place, scaled[number], labelled=_labelled(chart, number)))
+            parts.append(_axes(plot, place, scaled[number], feet[number], labelled=_labelled(chart, number)))
         parts += [DRAW[trace.style](trace, place, chart.scale) for trace in plot.traces]
         parts.append(text_at(place.left, y + TOP - 9.0, plot.title, 'font-weight="600"') if plot.title else "")
     height = head + tall * chart.rows
@@ -79,6 +84,11 @@ def svg_text(chart: Chart) -> str:
     if chart.scale is not None:
         parts.append(_bar(chart.scale, wide + 16.0, head + 0.12 * (height - head), 0.76 * (height - head)))
     return part(chart.title, height, "".join(parts))
+
+
+def still(picture: str) -> str:
+    """A picture for a page, which is moved under a narrow window in place of letters that nobody can read."""
+    return f'<div class="still">{picture}</div>'
 
 
 def part(title: str, height: float, content: str) -> str:
@@ -134,7 +144,15 @@ def _left(chart: Chart, number: int, scaled: _Scaled) -> float:
     return LETTER * longest + 12.0 + (23.0 if _labelled(chart, number) and scaled.axis.label else 0.0)
 
 
-def _axes(plot: Plot, place: Place, scaled: tuple[_Scaled, _Scaled], *, labelled: bool) -> str:
+def _foot(ticks: Ticks, wide: float) -> float:
+    """Room that names need below level ones where they are turned because they would not stand side by side; else 0."""
+    texts = [text for _, text in ticks]
+    if sum(len(text) + 2 for text in texts) * LETTER <= wide:
+        return 0.0
+    return SINE * LETTER * min(max(map(len, texts)), LONGEST_TURNED) - 4.0
+
+
+def _axes(plot: Plot, place: Place, scaled: tuple[_Scaled, _Scaled], foot: float, *, labelled: bool) -> str:
     """Grid, ticks, labels and the lines of the two axes."""
     across, along = scaled
     base = place.top + place.height
@@ -144,7 +162,7 @@ def _axes(plot: Plot, place: Place, scaled: tuple[_Scaled, _Scaled], *, labelled
     grid += "".join(f"M{place.left:.1f} {y:.1f}h{place.width:.1f}" for y, _ in y_ticks)
     frame = f"M{place.left:.1f} {place.top:.1f}v{place.height:.1f}h{place.width:.1f}"
     parts = [f'<path d="{grid}" stroke="{GRID}" fill="none"/><path d="{frame}" stroke="{FRAME}" fill="none"/>']
-    turned = sum(len(text) + 2 for _, text in x_ticks) * LETTER > place.width
+    turned = foot > 0.0
     for x, text in x_ticks:
         turn = (
             f'text-anchor="end" transform="rotate(-38 {x:.1f} {base + 13:.1f})"' if turned else 'text-anchor="middle"'
@@ -152,7 +170,7 @@ def _axes(plot: Plot, place: Place, scaled: tuple[_Scaled, _Scaled], *, labelled
         at = x if turned else min(x, WIDTH - 0.5 * LETTER * len(text))  # the last one ends inside
         parts.append(text_at(at, base + 15.0, _cut(text) if turned else text, f'{turn} fill="{QUIET}"'))
     parts += [text_at(place.left - 6.0, y + 4.0, text, f'text-anchor="end" fill="{QUIET}"') for y, text in y_ticks]
-    middle, below = place.left + 0.5 * place.width, base + (43.0 if turned else 34.0)
+    middle, below = place.left + 0.5 * place.width, base + 34.0 + foot
     parts.append(text_at(middle, below, plot.x.label, 'text-anchor="middle"'))
     if labelled and plot.y.label:
         x = place.left - LETTER * max((len(text) for _, text in y_ticks), default=0) - 19.0

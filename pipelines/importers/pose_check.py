@@ -18,8 +18,8 @@ _MISFIT = 0.1
 """Largest unexplained part of gravity for a response of exchanged axes."""
 CHECK_AXIS = "CHECK AXIS"
 ONE_POSE = (
-    "one pose whose force is not known: its noise by 'tumbleline noise allan'; for the bias and what drives it give the face "
-    "that is up (--set face=+x … -z) and --set block_s=S, with the output in g; scale and misalignment need more poses"
+    "one pose whose force is not known: 'tumbleline noise allan' gives its noise; the bias, and what it follows, need the face "
+    "that is up (--set face=+x … -z), --set block_s=S and an output in g; scale and misalignment need more poses"
 )
 OUT, FORCE = list(OUTPUT_COLUMNS), list(FORCE_COLUMNS)
 

@@ -150,12 +150,12 @@ def unseen(judged: ReferencesDocument) -> str:
     """From which size on this run would show an error, and which errors it cannot show."""
     told = [f"{LABELS[one['entry']]} {_from(one)}" for one in judged["seen"] if one["told_from"] is not None]
     none = [LABELS[one["entry"]] for one in judged["seen"] if one["told_from"] is None]
-    none += [f"{LABELS[name]} (it looks like {IMITATED[name]})" for name in judged["not_seen"]]
-    parts = [f"this run would show, with 90 % probability, {', '.join(told)}"] if told else []
+    none += [f"{LABELS[name]} (acts as {IMITATED[name]})" for name in judged["not_seen"]]
+    parts = [f"with 90 % probability this run would have shown: {', '.join(told)}"] if told else []
     parts += [f"it cannot show: {', '.join(none)}"] if none else []
     return "; ".join(parts) or "it shows nothing of the table"
 
 
 def _from(reference: SeenReference) -> str:
     unit = UNITS.get(reference["unit"], reference["unit"])
-    return f"from u = {_digits(reference['told_from'] or 0.0, 2)} {unit} (stated {_digits(reference['stated'])})"
+    return f"if its u were {_digits(reference['told_from'] or 0.0, 2)} {unit} or more (stated: {_digits(reference['stated'])})"

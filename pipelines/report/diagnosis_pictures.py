@@ -210,9 +210,9 @@ def slot_chart(table: ResidualTable) -> Chart | None:
 
 
 LADDER: tuple[tuple[str, str, Role, Symbol], ...] = (
-    ("fitted_ug", "fitted to this run", "before", "circle"),
+    ("fitted_ug", "fitted to this run", "muted", "circle"),
     ("heldout_ug", "dwells left out", "ink", "square"),
-    ("fresh_ug", "fresh run, not fitted", "after", "diamond"),
+    ("fresh_ug", "fresh run, not fitted", "fourth", "diamond"),
 )
 ASIDE = (-0.03, 0.0, 0.03)  # equal errors would cover each other
 

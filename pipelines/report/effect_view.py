@@ -25,6 +25,7 @@ FOLLOWED = 0.8
 FINE = 0.01  # of a range: nearer values are the same one
 FEW = 8
 MOST_VIEWS = 3
+CONTRIBUTION = "the contribution of"  # the quantity of an effect that follows no recorded one
 FAN = 40  # units whose curves are drawn
 TOO_FINE = 8.0  # residuals so many times smaller are a straight line on the scale of the others
 BOTH_SIDES = 2.0  # standard deviations of the band of noise
@@ -69,8 +70,10 @@ class EffectView:
     @property
     def title(self) -> str:
         """What the picture shows."""
-        what = f"what {self.effect} depends on" if self.effect else self.quantity
-        return f"Residual of the model against {what}"
+        depends = (
+            f", on which {self.effect} depends" if self.effect and not self.quantity.startswith(CONTRIBUTION) else ""
+        )
+        return f"Residual against {self.quantity.partition(' / ')[0]}{depends}"
 
     def largest(self, side: str) -> float:
         """Half of the range of a side's axis, µg."""
@@ -128,7 +131,7 @@ def _view(
     shown, axis = (int(k) for k in np.unravel_index(int(np.argmax(fallen)), fallen.shape))
     quantity = next(
         (one for one in _quantities(problem, term, axis) if followed(one.values[shown], adds[shown, axis]) > FOLLOWED),
-        DriverValues("", f"contribution of {term.effect.id} / µg", adds[:, axis]),
+        DriverValues("", f"{CONTRIBUTION} {term.effect.id} / µg", adds[:, axis]),
     )
     return EffectView(
         term.effect.id, quantity.label, axes_of(problem)[axis], units, shown, quantity.values, before[:, axis],

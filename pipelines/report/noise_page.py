@@ -5,7 +5,7 @@ from typing import Any, cast
 import numpy as np
 
 from pipelines.drawing.chart import SEVERAL, Chart, Plot, PlotAxis, Role, Trace, measured_curve
-from pipelines.drawing.vector import svg_text
+from pipelines.drawing.vector import still, svg_text
 from pipelines.report.numbers import significant
 from pipelines.report.templates import template
 from schemas.units import AXES
@@ -26,7 +26,7 @@ def noise_page(document: dict[str, Any]) -> str:
         title=title,
         document={"terms": [], "spectra": [], "notes": [], **document},
         unit=document["unit"] or "unit",
-        picture=svg_text(noise_chart(document)),
+        picture=still(svg_text(noise_chart(document))),
         number=significant,
     )
 
@@ -43,7 +43,9 @@ def _curves(document: dict[str, Any]) -> Chart:
     for k, curve in enumerate(document["curves"]):
         tau, deviation, low, high = (np.array(curve[key], dtype=float) for key in ("tau_s", "deviation", "low", "high"))
         channel, fitted = curve["channel"], curve["fitted"]
-        names = f"{channel}: interval", channel, f"{channel}: terms"
+        # of many units the colour tells the axis alone, and so does the legend
+        shown = f"axis {channel[-1:]}" if len(document["curves"]) > len(SEVERAL) and channel[-1:] in AXES else channel
+        names = f"{channel}: interval", shown, f"{channel}: terms"
         terms = None if fitted is None else np.array(fitted)
         traces += measured_curve(names, _role(channel, k), tau, deviation, (low, high), terms)
     name = document["statistic_name"]

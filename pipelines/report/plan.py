@@ -7,7 +7,7 @@ import numpy as np
 from inertial.arrays import Array
 from inertial.frames import force_from_angles
 from inertial.planning.visibility import confounding
-from pipelines.drawing import svg_text
+from pipelines.drawing import still, svg_text
 from pipelines.drawing.chart import Chart, ColourScale, Plot, PlotAxis, Role, Symbol, Trace
 from pipelines.drawing.mollweide import project, sphere
 from pipelines.planning.context import PlanContext
@@ -49,10 +49,10 @@ def pictures(document: dict[str, Any], context: PlanContext) -> dict[str, str]:
     """The pictures of a plan by name, as SVG: poses, temperatures, remaining fractions, confounded effects."""
     aliases = alias_chart(context)
     return {
-        "sphere": svg_text(sphere_chart(context)),
-        "temperature": svg_text(temperature_chart(context)),
-        "sights": svg_text(sight_chart(document["effects"])),
-        "aliases": "" if aliases is None else svg_text(aliases),
+        "sphere": still(svg_text(sphere_chart(context))),
+        "temperature": still(svg_text(temperature_chart(context))),
+        "sights": still(svg_text(sight_chart(document["effects"]))),
+        "aliases": "" if aliases is None else still(svg_text(aliases)),
         "budget": _budget(document.get("uncertainty")),
     }
 
@@ -99,7 +99,18 @@ def sphere_chart(context: PlanContext) -> Chart:
         outer, inner = np.radians(np.array([(a.step.pose.outer_deg, a.step.pose.inner_deg) for a in first])).T
         x, y = project(force_from_angles(outer, inner))
         numbers = tuple(str(k + 1) for k in range(len(first)))
-        traces.append(Trace("order in the first soak", x, y - 0.085, "labels", "ink", texts=numbers, legend=False))
+        traces.append(
+            Trace(
+                "order in the first soak",
+                x + 0.03,
+                y,
+                "labels",
+                "ink",
+                texts=numbers,
+                legend=False,
+                anchors=("top right",) * len(numbers),
+            )
+        )
     return Chart(
         "Poses of the plan: where specific force points in the fixture", (sphere("", tuple(traces)),), height=420
     )

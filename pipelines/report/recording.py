@@ -3,7 +3,7 @@
 import numpy as np
 
 from inertial.arrays import Array
-from pipelines.drawing import Chart, Plot, PlotAxis, Trace, svg_text
+from pipelines.drawing import Chart, Plot, PlotAxis, Trace, still, svg_text
 from pipelines.drawing.chart import Role, between
 from pipelines.importers.inspection import Inspection
 from pipelines.report.templates import template
@@ -58,4 +58,6 @@ def _envelope(time: Array, x: Array) -> tuple[Array, Array]:
 def page(inspection: Inspection) -> str:
     """The content of a recording as one HTML text that needs no other file."""
     chart = chart_of(inspection)
-    return template("recording.html").render(one=inspection.document, picture="" if chart is None else svg_text(chart))
+    return template("recording.html").render(
+        one=inspection.document, picture="" if chart is None else still(svg_text(chart))
+    )

@@ -278,8 +278,8 @@ def station_chart(history: pd.DataFrame, readings: pd.DataFrame, events: pd.Data
     own = readings.drop_duplicates("record").sort_values("start_s")
     start = own["start_s"].to_numpy(float) / 3600.0
     angles = (
-        Trace("outer", start, own["outer_deg"].to_numpy(float), role="x", size=4.0),
-        Trace("inner", start, own["inner_deg"].to_numpy(float), role="y", symbol="square", size=4.0),
+        Trace("outer", start, own["outer_deg"].to_numpy(float), role="z", size=4.0),
+        Trace("inner", start, own["inner_deg"].to_numpy(float), role="fourth", symbol="square", size=4.0),
     )
     span = PlotAxis("station time / h", low=0.0, high=float(max(hours[-1], start[-1])))
     plots = (

@@ -248,7 +248,7 @@ def _decided(
         if not known and _good_enough(best, BEST_OF_NOISE):
             best = BEST_OF_NOISE
         if limits.grade != NO_GRADE and not _good_enough(best, limits.grade):
-            reasons.append(f"grade {best}{_why(figure, best, basis)}: grade {limits.grade} is needed")
+            reasons.append(f"grade reached: {best}{_why(figure, best, basis)}, grade required: {limits.grade}")
     return _grade_row(verdict, "fail" if reasons else "pass", best, "; ".join(reasons), risk)
 
 

@@ -38,3 +38,14 @@ def test_every_stop_every_room_and_every_module_that_the_guides_of_the_code_name
     assert [
         name for guide in guides for name in named.findall(guide.read_text("utf-8")) if not (ROOT / name).exists()
     ] == []
+
+
+def test_the_words_of_the_product_are_few_and_linked_from_where_a_reader_begins() -> None:
+    words = [word for word, _ in architecture_page.GLOSSARY]
+    assert len(words) == len(set(words)) <= 25
+    link = re.compile(r"\[([\w ]+)\]\([\w/.]*explanation/architecture\.md#words\)")
+    for page in [ROOT / "README.md", *sorted((ROOT / "docs" / "tutorial").glob("*.md"))]:
+        linked = link.findall(page.read_text(encoding="utf-8"))
+        assert linked, f"{page.name} links no word of the glossary"
+        known = {word for word in linked if re.sub(r"(ss)es$|s$", r"\1", word) in words or word in words}
+        assert set(linked) == known, page.name

@@ -81,7 +81,7 @@ def test_diagnose_names_what_is_missing_in_text_document_and_report(cubic: Path,
     lot, report = (cubic / "dwells.parquet", "--temperatures", cubic / "history.parquet"), tmp_path / "report.html"
     printed = text_of("diagnose", *lot, status=1)
     for part in (
-        "NOT ADEQUATE", "against what third_order depends on", "third_order (K3)", "This plan cannot show", "Next:",
+        "NOT ADEQUATE", "on which third_order depends", "third_order (K3)", "This plan cannot show", "Next:",
         "tumbleline extend model.toml third_order --effects bias,scale,misalignment",
     ):  # fmt: skip
         assert part in printed

@@ -115,7 +115,7 @@ def test_few_lots_are_told_and_a_full_folder_is_refused(tmp_path: Path, folder: 
     made = write_lots(tmp_path, Line(6, units=2), 3)
     status, out, err = given("discover", "--archive", made.folder)
     assert status == 0, err
-    assert "3 lots; the earliest discovery is possible at 30" in " ".join(out.split())
+    assert "3 lots: a discovery needs at least 30" in " ".join(out.split())
     document = document_of("discover", "--archive", made.folder)
     assert document["pooled"]["lots"] == 3
     assert document["reach"] == []

@@ -291,7 +291,7 @@ def test_one_pose_says_what_it_shows_and_is_not_told_to_fit_a_scale() -> None:
     frame = pd.DataFrame(output, columns=["ax", "ay", "az"]).assign(t=time, temp=25.0 + 5.0 * np.sin(time / 20.0))
     told = text_of("import", written(frame), *MAPPED, status=0)
     assert "12000 samples, 1 dwell in LSB" in told
-    assert "one pose whose force is not known: its noise by 'tumbleline noise allan'" in told
+    assert "one pose whose force is not known: 'tumbleline noise allan' gives its noise" in told
     assert "--set face=+x … -z" in told
     mapped = (
         "--map",

@@ -87,7 +87,7 @@ def test_plan_marks_what_would_have_to_be_larger_than_it_ever_is_and_adds_up_its
     rows = [row for row in document["effects"] if row["seen"]]
     faint = {row["effect"] for row in rows if row["floor_size_ug"] > row["typical_ug"][1]}
     assert "scale_aging" in faint
-    assert f"floor above the typical size: {', '.join(sorted(faint))}" in text_of("plan", "production")
+    assert f"seen only where larger than usual: {', '.join(sorted(faint))}" in text_of("plan", "production")
     parts = [document["minutes"][k] for k in ("soaks", "moves", "dwells", "static_record")]
     assert document["minutes"]["total"] == pytest.approx(sum(parts), abs=0.05)
 

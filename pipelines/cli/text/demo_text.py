@@ -68,7 +68,7 @@ def print_discovery_demo(document: DiscoveryDemo) -> None:
         say("\n2. The effect is added to the model of every lot.", style="bold cyan")
     for one in document["compared"]:
         confirmed = next(row["confirmed"] for row in document["discoveries"] if row["id"] == one["id"])
-        later = "too few lots came since"
+        later = "too few lots were measured since it was found"
         if confirmed is not None:
             later = f"lots after that night {'confirm' if confirmed else 'do not confirm'} it"
         say(

@@ -36,8 +36,8 @@ def print_discoveries(document: DiscoverDocument, again: Sequence[str] = (), *, 
     _beside(document)
     if control["log_e_needed"] is not None:
         say(
-            f"a discovery needs evidence of e^{short(control['log_e_needed'])}: where nothing is hidden, the probability that "
-            f"one ever appears is at most {100.0 * control['alpha']:g} %, however often it is looked at",
+            f"a discovery needs a likelihood ratio of e^{short(control['log_e_needed'])}: where nothing is hidden, the "
+            f"probability that one ever appears is at most {100.0 * control['alpha']:g} %, however often one looks",
             style="dim",
         )
     for text in document["warnings"]:
@@ -85,10 +85,10 @@ def print_explained(row: DiscoveryRow) -> None:
     say(f"    {scope_text(row)}")
     others = [name for name in row["effects"] if name != row["recommended"]]
     if others:
-        say(f"    the lots do not tell it from {', '.join(others)}")
+        say(f"    the lots do not separate it from {', '.join(others)}")
     other_drivers = [name for name in row["drivers"] if name != row["driver"]]
     if other_drivers:
-        say(f"    nor its driver from {', '.join(other_drivers)}")
+        say(f"    nor {row['driver']} from {', '.join(other_drivers)}")
     carried = row["carried_by"]
     if carried["lots_for"] is not None:
         less = short(carried["log_e_without_largest_2_percent"])
@@ -96,9 +96,11 @@ def print_explained(row: DiscoveryRow) -> None:
             f"    {short(100.0 * carried['lots_for'])} % of the lots speak for it; e^{less} without the 2 % that speak most"
         )
     if row["confirmed"] is None:
-        say("    fewer than 20 lots came since; later ones will confirm it or not")
+        say("    not confirmed yet: fewer than 20 lots were measured since it was found")
     else:
-        say(f"    later lots {'show' if row['confirmed'] else 'do not show'} what earlier ones predict")
+        say(
+            f"    the lots since it was found {'show' if row['confirmed'] else 'do not show'} what the earlier ones predict"
+        )
     if row["kind"] == "levels":
         lines = [
             [level["level"], short(level["size_ug"]), short(level["u_ug"]), str(level["units"] or "")]

@@ -27,7 +27,7 @@ def print_view(view: EffectView) -> None:
     sides = len(view.sides)
     beside = (width - GAP * (sides - 1)) // sides
     drawn = [_side(view, name, beside if beside >= LEAST else width) for name, _ in view.sides]
-    say(f"{view.title}; {view.where}; residual in µg, line: {_line_is(view)}", style="bold")
+    say(f"{view.title}: {view.where}, in µg; line: {_line_is(view)}", style="bold")
     if beside >= LEAST:
         for parts in zip_longest(*(one.split("\n") for one in drawn)):
             line = parts[0].copy()
@@ -45,7 +45,7 @@ def _line_is(view: EffectView) -> str:
     others = " (thin: the other units)" if len(view.units) > 1 else ""
     if not view.effect:
         return "a smooth curve" if view.curve is not None else "zero"
-    return f"what {view.effect} adds{others}"
+    return f"what {view.effect} explains{others}"
 
 
 def _side(view: EffectView, name: str, width: int) -> Text:

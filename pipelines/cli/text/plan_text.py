@@ -35,8 +35,8 @@ def print_plan(document: dict[str, Any]) -> None:
             "no repeatability is stated" if bias["switch_on_u_ug"] is None else f"{short(bias['switch_on_u_ug'])} µg"
         )
         say(
-            f"bias, 1σ of the worst axis: as the mean of the record {short(bias['record_u_ug'])} µg, of the day after it "
-            f"{short(bias['long_u_ug'])} µg; after the next switch-on: {again}"
+            f"standard uncertainty of the bias, worst axis: {short(bias['record_u_ug'])} µg as the mean over the measurement, "
+            f"{short(bias['long_u_ug'])} µg on the day after it; after the next switch-on: {again}"
         )
     print_reach(document.get("uncertainty"))
     seen = [row for row in document["effects"] if row["seen"]]
@@ -48,7 +48,7 @@ def print_plan(document: dict[str, Any]) -> None:
         print_table(["visible effect", "confounded with"], alike)
     faint = [row["effect"] for row in seen if row["faint"]]
     if faint:
-        say(f"* floor above the typical size: {', '.join(faint)}")
+        say(f"* seen only where larger than usual: {', '.join(faint)}")
     say(
         "v: fraction of the effect's column that remains after the model; 1/v²: variance inflation; floor: smallest detectable "
         "contribution to a dwell (3σ, RMS), and its coefficient; =: identical under this plan",
@@ -58,7 +58,7 @@ def print_plan(document: dict[str, Any]) -> None:
     if raised:
         raised.sort(key=lambda r: -r["floor_size_ug"] / r["floor_white_ug"])
         lines = [[r["effect"], short(r["floor_size_ug"]), short(r["floor_white_ug"]), r["breaker"]] for r in raised[:5]]
-        heads = ["raised by slow noise", "floor\nµg", "white only\nµg", "what lowers it"]
+        heads = ["floor raised by slow noise", "floor\nµg", "white only\nµg", "what lowers it"]
         print_table(heads, lines)
     in_part = [
         [row["effect"], "; ".join(r["text"] for r in row["unseen_ranges"])] for row in seen if row["unseen_ranges"]
@@ -172,7 +172,7 @@ def print_reach(reach: dict[str, Any] | None) -> None:
     lines = [
         [
             TITLES[name],
-            axis_word(row["axis"]),
+            "" if name == LARGEST_ERROR else axis_word(row["axis"]),
             short(row["u"]),
             "" if name in of_period else short(row["expanded"]),
             row["unit"],
@@ -189,7 +189,7 @@ def print_reach(reach: dict[str, Any] | None) -> None:
         say("references: assumed values, which allow no certificate")
     for name, rules in reach["not_stated"].items():
         say(f"not stated: {name} (dominates {rules})")
-    for line in (*reach["remarks"], *(f"cannot be met: {plain_reason(one)}" for one in reach["unreachable"])):
+    for line in (*reach["remarks"], *(f"limit out of reach: {plain_reason(one)}" for one in reach["unreachable"])):
         say(line)
 
 

@@ -57,6 +57,6 @@ def print_references(judged: ReferencesDocument | None) -> None:
     if judged["worse"] is None:
         text = f"CANNOT BE JUDGED: {judged['reason']}"
     else:
-        told = f"CONTRADICTED: {contradiction(judged)}" if judged["worse"] else "not contradicted by the residuals"
+        told = f"CONTRADICTED: {contradiction(judged)}" if judged["worse"] else "the residuals agree with them"
         text = f"{told}; {unseen(judged)}"
     say(f"stated references   {text}", style="bold red" if judged["worse"] else "")

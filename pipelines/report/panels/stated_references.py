@@ -37,11 +37,12 @@ def render(report: ReportContext) -> str | None:
     judged = references_of(report.run)
     if judged is None:
         return None
+    shown = unseen(judged)
     return fill(
         TEMPLATE,
         judged=judged,
         told=contradiction(judged),
-        unseen=unseen(judged).capitalize(),
+        unseen=shown[:1].upper() + shown[1:],
         labels=LABELS,
         units=UNITS,
         number=significant,

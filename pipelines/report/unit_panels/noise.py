@@ -16,7 +16,7 @@ NAMES = {
     "N": "N, velocity random walk (two-sided, IEEE 952)",
     "n_d": "n_d = N·√2, noise density (one-sided, data sheets)",
     "B": "B, bias instability",
-    "K": "K, rate random walk",
+    "K": "K, acceleration random walk",
     "Q": "Q, quantisation",
     "R": "R, ramp",
     "stability_1h": "bias stability over the last hour, standard deviation of 100 s means",

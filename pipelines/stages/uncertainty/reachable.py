@@ -183,7 +183,7 @@ def unreachable(reaches: Sequence[Reach], limits: Limits, months: int) -> list[s
         reached = factor * (one.u if period else limits.coverage_factor * one.u)
         if reached > needed:
             unit = limits.figures[figure].unit if figure in limits.figures else one.unit
-            what = f"95 % bound of the error over {months} months" if period else f"U (k = {limits.coverage_factor:g})"
+            what = f"expected over {months} months" if period else f"U (k = {limits.coverage_factor:g})"
             shares = [(name, share) for name, share in one.shares.items() if share >= LEAST_SHARE][:3]
             rulers = ", ".join(f"{LABELS[name]} {100.0 * share:.0f} %" for name, share in shares)
             out.append(f"{figure}: limit {shown(needed)} {unit}, {what} {shown(reached)} {unit} ({rulers})")

@@ -17,7 +17,7 @@ from schemas.stated import Entry
 
 NOISE, PRIOR = "noise", "prior"
 BEYOND = {
-    "run": "figure of the run",
+    "run": "error found in the run",
     "budget": "references, as far as verification cannot show them",
     "flicker": "flicker to the due date",
     "switch_on": "bias from one switch-on to the next",

@@ -13,6 +13,7 @@ from pipelines.drawing import Chart
 from pipelines.report import run_pictures
 from pipelines.report.numbers import axis_word, side_by_side, with_uncertainty
 from pipelines.report.unit_panels.budget import NAMES
+from pipelines.report.unit_panels.noise import NAMES as NOISE_TERMS
 from pipelines.rerun.diff import coverage_of
 from pipelines.stages.figures import figure_label
 from pipelines.stages.judge import verdict_of
@@ -70,7 +71,7 @@ def unit(request: Request) -> Response:
         before=units[place - 1] if place else "", after=units[place + 1] if place + 1 < len(units) else "",
         coefficients=side_by_side(own.get("coefficients", []), _expanded), parameters=parameters,
         coverage=coverage_of(run.about),
-        names=NAMES, axis_word=axis_word, figure_label=figure_label,
+        names=NAMES, noise_terms=NOISE_TERMS, axis_word=axis_word, figure_label=figure_label,
         certificates=Ledger(bench.archive).calibrations(state.unit)[-CERTIFICATES:][::-1],
     )  # fmt: skip
 

@@ -61,6 +61,7 @@ async function paint(place, library) {
   const style = getComputedStyle(document.documentElement), { data, config } = place.figure;
   await library.react(place, themed(data, style), dressed(arranged(place.figure), style), config);
   place.dataset.drawn = place.dataset.figure;
+  place.style.minHeight = "0";  // the figure is as high as it needs to be
   if (place.dataset.drag && !place.dataset.listens) dragged(place);
   if (place.tabIndex < 0) byKeyboard(place, library);
   if (!place.dataset.pick || place.dataset.listens) return;

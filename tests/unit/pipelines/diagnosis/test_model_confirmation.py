@@ -79,7 +79,9 @@ def test_all_kinds_of_dwells_left_out_that_can_judge_have_to_agree(density: floa
     after = LeftOut({**narrow.missed, "poses": narrow.missed["blocks of time"]}, {**narrow.density, "poses": density})
     evidence = confirmation._by_left_out(before, after)
     assert evidence["confirmed"] is confirmed
-    assert ("with poses left out the log density changes by +3.0" in (evidence["reason"] or "")) is (confirmed is None)
+    assert ("with poses left out the log likelihood changes by +3.0" in (evidence["reason"] or "")) is (
+        confirmed is None
+    )
 
 
 def test_a_run_that_may_have_a_fault_confirms_nothing_by_itself() -> None:
@@ -93,7 +95,9 @@ def test_a_run_that_may_have_a_fault_confirms_nothing_by_itself() -> None:
     assert asked == []  # no search where the dwells left out do not decide
     evidence = confirmation._by_left_out(missed(1e-4, 100.0), missed(0.5e-4, 150.0), doubt)
     assert (evidence["confirmed"], evidence["reason"], asked) == (None, doubt(), ["searched", "searched"])
-    assert "holds on stretches of time left out (log density +50.0), not decided by this run" in text_of(ROW, evidence)
+    assert "not decided by this run alone: stretches of time left out confirm it (log likelihood +50.0)" in text_of(
+        ROW, evidence
+    )
 
 
 def rising(rise: float, density: float) -> LeftOut:

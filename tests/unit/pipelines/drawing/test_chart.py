@@ -131,3 +131,29 @@ def test_plots_stand_one_under_the_other_in_the_layout_of_narrow_screens() -> No
     assert narrow["yaxis"]["domain"][0] > narrow["yaxis2"]["domain"][1]
     assert narrow["height"] > wide["height"] + chart().height
     assert "narrow" not in plotly_figure(replace(chart(), columns=1))
+
+
+def test_on_narrow_screens_long_lines_are_divided_names_are_fewer_and_a_sphere_is_as_high_as_its_outline() -> None:
+    axes = PlotAxis("a" * 30 + " b / µg", names=tuple(f"p{k}" for k in range(40))), PlotAxis("y")
+    plot = Plot("", *axes, (Trace("", np.arange(40.0), np.arange(40.0)),))
+    figure = plotly_figure(Chart("", (plot,), note="word " * 20))
+    wide, narrow = figure["layout"], figure["narrow"]
+    assert narrow["xaxis"]["title"]["text"].count("<br>") == 1 > wide["xaxis"]["title"]["text"].count("<br>")
+    assert narrow["annotations"][0]["text"].count("<br>") > 1
+    assert len(narrow["xaxis"]["tickvals"]) <= 14 < len(wide["xaxis"]["tickvals"])
+    assert plotly_figure(Chart("", (sphere("", ()),), height=420))["narrow"]["height"] < 300
+    assert "narrow" not in plotly_figure(Chart("", (replace(plot, x=PlotAxis("time / s")),)))
+
+
+def test_turned_names_are_whole_inside_the_picture() -> None:
+    names = tuple(f"effect_{'x' * 9}{k:02d}" for k in range(20))
+    text = svg_text(
+        Chart(
+            "",
+            (Plot("", PlotAxis("", names=names), PlotAxis("y"), (Trace("", np.arange(20.0), np.arange(20.0)),)),),
+            height=200,
+        )
+    )
+    height = float(re.search(r'viewBox="0 0 [\d.]+ ([\d.]+)"', text)[1])  # type: ignore[index]
+    lowest = max(float(y) for y in re.findall(r"rotate\(-38 [\d.]+ ([\d.]+)\)", text))
+    assert lowest + 14 * 6.9 * np.sin(np.radians(38.0)) < height

@@ -117,7 +117,7 @@ def test_a_run_on_a_worse_table_says_what_is_stated_and_what_was_found_and_one_a
     assert "CONTRADICTED: the table is worse than stated (p < 0.001)" in text
     assert "repeatability of the poses: stated u 50 µrad, found " in text
     told = " ".join(text.split()).partition("; it cannot show: ")[2]
-    assert "seat of the fixture (it looks like the misalignment of each unit), local gravity" in told
+    assert "seat of the fixture (acts as the misalignment of each unit), local gravity" in told
     html = stated_references.render(ReportContext(runs[200.0], {}))
     assert html is not None
     assert "the table is worse than stated" in html

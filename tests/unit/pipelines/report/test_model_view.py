@@ -56,7 +56,7 @@ def test_where_the_model_leaves_more_than_the_linear_fit_its_own_residual_is_dra
     assert np.array_equal(view.before[0], worse[worse["axis"] == "y"].sort_values("dwell")["residual_ug"])
     (plot,) = effect_chart(view).plots
     assert "residual" in [trace.name for trace in plot.traces]
-    assert effect_chart(view).title.startswith("Residual of the model against")
+    assert effect_chart(view).title.startswith("Residual against")
 
 
 def test_residuals_that_follow_the_rate_of_the_temperature_are_drawn_against_it(unit) -> None:

@@ -17,7 +17,7 @@ from pipelines.stages.figures import FIGURES
 
 
 def test_a_figure_has_its_label_and_other_reasons_stay() -> None:
-    said = " fail: 1200 ± 3 µg, limit 1000 µg, margin -200 µg; grade none: grade consumer is needed"
+    said = " fail: 1200 ± 3 µg, limit 1000 µg, margin -200 µg; grade reached: none, grade required: consumer"
     for name in FIGURES:
         shown = plain_reason(name + said)
         assert name not in shown.split()

@@ -151,7 +151,7 @@ def test_two_models_stand_side_by_side_with_verdicts_residuals_on_one_scale_and_
     assert abs(scale["over_a"]) > 2.0  # what the cubic gave to the scale factor
     change, expanded = with_uncertainty(scale["change"], 2.0 * scale["u_b"])
     assert f"{change}<br><small>± {expanded}</small>" in text
-    assert "noise alone exceeds it in up to one row of twenty" in text
+    assert "By chance, up to one row in twenty exceeds it" in text
     assert client.get("/two-models/coefficients.csv?" + state.query()).text.count("\n") == len(rows) + 1
     chart = client.get(state.figure("residuals")).json()
     ranges = {str(chart["layout"][name]["range"]) for name in ("yaxis", "yaxis2")}
