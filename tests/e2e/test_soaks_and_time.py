@@ -36,10 +36,10 @@ def test_refuses_waits_that_are_not_as_many_as_the_poses():
 LEFT = re.compile(r"(?:(\d+) h )?(?:(\d+) min|(\d+) s) of station time left(?:, about [^,]+ here)?$")
 
 
-def told_and_true(recipe, config):
+def told_and_true(recipe, config, units=1):
     """Pairs (station time, seconds left as told), when the run was over, and the seconds of its soaks."""
     told, soaks = [], []
-    with open_station(config, lot_of(2)) as station:
+    with open_station(config, lot_of(units)) as station:
         inner = station.soak
 
         def progress(_done, _total, note):
@@ -54,7 +54,7 @@ def told_and_true(recipe, config):
 
         watched = dataclasses.replace(station)
         object.__setattr__(watched, "soak", soak)
-        capture(watched, recipe, lot_of(2), MemorySink(), progress=progress)
+        capture(watched, recipe, lot_of(units), MemorySink(), progress=progress)
         return told, station.clock.now(), sum(soaks)
 
 
@@ -81,7 +81,7 @@ def after_first_soak(told):
 )
 def test_the_time_that_is_left_is_right_within_a_tenth_after_the_first_soak(temperatures, changes):
     recipe, config = short_recipe(poses=6, static_s=300.0, temperatures=temperatures), station_of(**changes)
-    told, end, soaks = told_and_true(recipe, config)
+    told, end, soaks = told_and_true(recipe, config, units=2)
     if temperatures == (25.0, 60.0, -10.0):
         planned_as_taken(recipe, config, end, soaks)
     judged = [(now, left, end - now) for now, left, _ in after_first_soak(told) if end - now > 600.0]

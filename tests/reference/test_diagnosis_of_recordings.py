@@ -31,6 +31,7 @@ def _as_dwells(table):
 
 
 def test_a_lag_fitted_per_axis_takes_the_chamber_cycle_to_the_published_residuals(chamber):
+    chamber = chamber.iloc[::2].assign(dwell=range(len(chamber.iloc[::2])))  # at 1 Hz a lag of minutes is as well seen
     before = compare(chamber, CUBIC)["by_axis"]
     assert [MM_S2 * before[a] for a in "xyz"] == pytest.approx([6.4, 17.3, 44.2], rel=0.01)
     comparison = compare(chamber, [*CUBIC, "thermal_lag"])

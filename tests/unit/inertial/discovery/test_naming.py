@@ -33,8 +33,8 @@ HIDDEN = [
 
 @cache
 def archive(effect: str, driver: str) -> Result:
-    """Sixty lots with an effect of 0.3 of the noise of a dwell."""
-    return maker().archive(31, 60, Hidden(effect, driver, 0.3), Setting(), NEEDED, keep=True)
+    """Forty lots with an effect of 0.3 of the noise of a dwell."""
+    return maker().archive(31, 40, Hidden(effect, driver, 0.3), Setting(), NEEDED, keep=True)
 
 
 @pytest.mark.parametrize(("effect", "driver"), mostly_slow(HIDDEN, ("third_order", "wafer")))
@@ -47,8 +47,8 @@ def test_effect_and_driver_are_named_and_nothing_else(effect: str, driver: str) 
     assert effect in name.effects
     assert len(name.effects) <= 4
     assert name.drivers[0] == driver
-    factor, error, able = pool().confirmed(result.lots[:30], result.lots[30:], driver, effect)
-    assert able == 30
+    factor, error, able = pool().confirmed(result.lots[:20], result.lots[20:], driver, effect)
+    assert able == 20
     assert factor == pytest.approx(1.0, abs=max(5.0 * error, 0.2))
     assert float(np.mean(pool().carried(result.lots, driver, effect) > 0.0)) > 0.6
 

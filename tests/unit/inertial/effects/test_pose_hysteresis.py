@@ -21,8 +21,8 @@ def dragged(turns: np.ndarray, axis: int) -> np.ndarray:
     held, out = 0.0, []
     before = turns[:, 0]
     for pose in turns.T:
-        for part in np.linspace(0.0, 1.0, FINE):
-            force = frames.force_from_angles(*(before + part * (pose - before)))[axis]
+        way = before[:, None] + np.linspace(0.0, 1.0, FINE) * (pose - before)[:, None]
+        for force in frames.force_from_angles(*way)[:, axis].tolist():
             held = min(max(held, force - WIDTH), force + WIDTH)
         out.append((frames.force_from_angles(*pose)[axis] - held) / WIDTH)
         before = pose

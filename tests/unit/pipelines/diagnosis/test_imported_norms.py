@@ -18,6 +18,8 @@ from pipelines.tables.dwells import measured
 from pipelines.tables.leave_out import leave_out
 from schemas.errors import DataRejected
 
+pytestmark = pytest.mark.usefixtures("no_next_measurement")
+
 PLAIN = ("bias", "scale", "misalignment")
 
 
@@ -57,7 +59,7 @@ def test_few_dwells_cannot_be_judged_and_nothing_is_named_but_a_gross_misfit_is_
 
 def test_samples_of_a_movement_are_not_judged_and_name_nothing() -> None:
     rng = np.random.default_rng(0)
-    n = 178
+    n = 100
     turned = Rotation.from_rotvec(np.cumsum(0.15 * rng.standard_normal((n, 3)), axis=0)).apply([0.0, 0.0, 1.0])
     out = turned + 0.08 * np.cumsum(rng.standard_normal((n, 3)), axis=0) / np.sqrt(20.0)
     frame = pd.DataFrame(out, columns=["out_x", "out_y", "out_z"])
