@@ -95,6 +95,9 @@ class Queue:
             return float(self.codes.pop(0)) if self.codes else 0.0
         return self.set
 
+    def has(self, name: str) -> bool:
+        return name != "ripple"
+
     def write(self, name: str, value: object) -> None:
         if name == "voltage":
             self.set = float(str(value))
