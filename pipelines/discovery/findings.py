@@ -11,11 +11,12 @@ from scipy import stats
 from inertial.arrays import Array
 from inertial.counts import number_of
 from inertial.discovery.evidence import DATE, FIRST, INSIDE, MEAN, SLOT, STATION, UNIT, ScoredLot
-from inertial.discovery.naming import Name, Pool, Unnamed
+from inertial.discovery.naming import Name, Unnamed
 from inertial.discovery.pose_shape import SHAPE, angles_of, map_of
 from pipelines.discovery import documents
+from pipelines.discovery.alarms import Alarms
 from pipelines.discovery.documents import DiscoveryRow, DriverRow, HeldAlarm, ReachRow, UnexplainedRow
-from pipelines.discovery.evidence_state import ALPHA, Alarm, Evidences, hypothesis
+from pipelines.discovery.evidence_state import ALPHA, Alarm, hypothesis
 from pipelines.discovery.figures_of_name import (
     Scope,
     by_axis,
@@ -25,7 +26,7 @@ from pipelines.discovery.figures_of_name import (
     size_of,
     without_largest,
 )
-from pipelines.discovery.lot_source import AXES, OWN_TEMPCO, SEASON, DiscoveryArchive
+from pipelines.discovery.lot_source import AXES, OWN_TEMPCO, SEASON
 from pipelines.discovery.nights import held
 from pipelines.discovery.reference_rows import PROPORTIONAL, station_row, thermometer_row
 from schemas.units import MICRO
@@ -53,16 +54,8 @@ class Discovery:
     confirmed: tuple[float, float] | None
 
 
-class Findings:
+class Findings(Alarms):
     """The findings of the evidence of one kind of device."""
-
-    def __init__(self, source: DiscoveryArchive, state: Evidences) -> None:
-        self.source, self.state = source, state
-
-    @cached_property
-    def open_alarms(self) -> list[Alarm]:
-        """Alarms that are discoveries."""
-        return [alarm for alarm in self.state.alarms if not held(self.state, alarm)]
 
     def _spread(self, most: int) -> NDArray[np.intp]:
         """Places of lots that are evenly spread over the order of arrival, at most so many."""
@@ -83,34 +76,10 @@ class Findings:
         return self._lots(MOST_NAMED)
 
     @cached_property
-    def pool(self) -> Pool:
-        """The columns and their products, means over the archive."""
-        columns, k = self.state.columns, len(self.state.columns)
-        place = {column: at for at, column in enumerate(columns)}
-        lot, inside, size = np.zeros((AXES * k, AXES * k)), np.zeros((AXES, k, k)), np.zeros((AXES, k))
-        weight = np.zeros(k)
-        for product in self.source.store.products:
-            at = np.array([place[column] for column in product.columns if column in place])
-            if at.size != len(product.columns):
-                continue
-            here = (np.arange(AXES)[:, None] * k + at).reshape(-1)
-            lot[np.ix_(here, here)] += product.runs * product.lot
-            inside[:, at[:, None], at] += product.runs * product.inside
-            size[:, at] += product.runs * product.size.reshape(AXES, -1)
-            weight[at] += product.runs
-        return Pool(columns, (size / np.maximum(weight, 1.0)).reshape(-1), lot, inside)
-
-    @cached_property
     def _of_sensor(self) -> list[Alarm]:
         """Open alarms of the devices' effects and of functions of the pose; those of the thermometer stand apart."""
         of_devices = (alarm for alarm in self.open_alarms if alarm.place < self.state.sensor.count)
         return [alarm for alarm in of_devices if plain(alarm.driver) != OWN_TEMPCO]
-
-    @cached_property
-    def of_thermometer(self) -> list[Alarm]:
-        """Alarms of what is proportional to a unit's own temperature coefficient, the strongest first."""
-        alarms = (alarm for alarm in self.open_alarms if plain(alarm.driver) == OWN_TEMPCO)
-        return sorted(alarms, key=lambda alarm: -self.log_e(alarm))
 
     @cached_property
     def _named(self) -> tuple[list[Name], list[Unnamed]]:
@@ -135,10 +104,6 @@ class Findings:
             drivers = tuple(driver for driver in name.drivers if driver in raised) or (name.drivers[0],)
             out.append(Discovery(name, since, drivers, *self._carried(name, since)))
         return sorted(out, key=lambda one: one.since.lots)
-
-    def effect_of(self, alarm: Alarm) -> str:
-        """Id of the effect of an alarm."""
-        return hypothesis(self.state, alarm.place)[0]
 
     def _places(self, effect: str) -> NDArray[np.intp]:
         """Places of the hypotheses of an effect, of every axis."""
@@ -207,15 +172,6 @@ class Findings:
         for number, row in enumerate(rows, start=1):
             row["id"] = f"D{number}"
         return rows, self._unexplained(named=bool(rows))
-
-    def day_of(self, alarm: Alarm) -> str:
-        """The day of the lot that raised an alarm."""
-        return str(self.source.store.head(self.state.order[min(alarm.lots, len(self.state.order)) - 1])["when"])[:10]
-
-    def floors(self, size: float) -> float | None:
-        """A size over the noise of a dwell of one lot."""
-        floor = float(np.median([self.source.store.head(run)["floor"] for run in self.state.order]))
-        return size / floor if floor > 0.0 else None
 
     def _row(self, found: Discovery) -> DiscoveryRow:
         name = found.name
@@ -287,12 +243,6 @@ class Findings:
         for alarm in sorted(best.values(), key=lambda alarm: -self.log_e(alarm)):
             kept.setdefault(alarm.driver, alarm)
         return sorted(kept.values(), key=lambda alarm: alarm.lots)
-
-    def log_e(self, alarm: Alarm) -> float:
-        """Logarithm of the evidence of an alarm's hypothesis now."""
-        of_station = alarm.place >= self.state.sensor.count
-        evidence = self.state.station if of_station else self.state.sensor
-        return float(evidence.drivers[alarm.driver].log_e[alarm.place - (self.state.sensor.count if of_station else 0)])
 
     def _held(self) -> list[HeldAlarm]:
         reason = "the stations differ or wander in this effect by themselves, and it is the same for a whole lot"

@@ -1,41 +1,35 @@
 """Discoveries that are of the references and not of the devices: the station's own columns, and its thermometer."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from inertial.discovery.evidence import ALL, DATE, INSIDE, MEAN, SLOPE
 from inertial.discovery.station_wander import over
+from pipelines.discovery.alarms import Alarms
 from pipelines.discovery.documents import DiscoveryRow
 from pipelines.discovery.evidence_state import Alarm, hypothesis
 from pipelines.discovery.figures_of_name import station_sizes
 from pipelines.discovery.lot_source import AXES, OWN_TEMPCO
 from schemas.units import MICRO
 
-if TYPE_CHECKING:
-    from pipelines.discovery.findings import Findings
-
 PROPORTIONAL = (
     "it is proportional to each unit's own temperature coefficient: the temperature that is read is off in some soaks"
 )
 
 
-def station_row(findings: Findings, alarm: Alarm) -> DiscoveryRow:
+def station_row(known: Alarms, alarm: Alarm) -> DiscoveryRow:
     """What changes the force itself, for all units of a lot alike."""
-    effect, column, _ = hypothesis(findings.state, alarm.place)
-    at = alarm.place - findings.state.sensor.count
-    station = findings.state.station
+    effect, column, _ = hypothesis(known.state, alarm.place)
+    at = alarm.place - known.state.sensor.count
+    station = known.state.station
     sizes = station_sizes(station, at)
-    of_driver = [a for a in findings.open_alarms if a.driver == alarm.driver]
-    alike = [findings.effect_of(a) for a in of_driver if a.place >= findings.state.sensor.count]
+    of_driver = [a for a in known.open_alarms if a.driver == alarm.driver]
+    alike = [known.effect_of(a) for a in of_driver if a.place >= known.state.sensor.count]
     scale = float(station.noise[0][at])
     values = np.array([value for value, _ in sizes.values()])
     size, reach = float(np.sqrt(np.mean(values**2))), 2.0 * max(scale * error for _, error in sizes.values())
     return {
         "id": "",
-        "since": findings.day_of(alarm),
+        "since": known.day_of(alarm),
         "lots_then": alarm.lots,
         "effects": list(dict.fromkeys([effect, *alike])),
         "recommended": effect,
@@ -45,8 +39,8 @@ def station_row(findings: Findings, alarm: Alarm) -> DiscoveryRow:
         "kind": "mean" if alarm.driver == MEAN else "slope" if alarm.driver == DATE else "levels",
         "size_ug": MICRO * size,
         "interval_ug": [MICRO * max(size - reach, 0.0), MICRO * (size + reach)],
-        "size_floors": findings.floors(size),
-        "log_e": round(findings.log_e(alarm), 2),
+        "size_floors": known.floors(size),
+        "log_e": round(known.log_e(alarm), 2),
         "scope": "station",
         "because": f"the force itself is changed, for all units of a lot alike (column {column + 1} of {effect})",
         "levels": [
@@ -59,25 +53,25 @@ def station_row(findings: Findings, alarm: Alarm) -> DiscoveryRow:
     }
 
 
-def thermometer_row(findings: Findings) -> DiscoveryRow:
+def thermometer_row(known: Alarms) -> DiscoveryRow:
     """What an error of the thermometer does to every unit by its own temperature coefficient."""
-    alarms, k = findings.of_thermometer, len(findings.state.columns)
-    effect = findings.effect_of(alarms[0])
-    sums = findings.state.sensor.levels[OWN_TEMPCO + INSIDE]
+    alarms, k = known.of_thermometer, len(known.state.columns)
+    effect = known.effect_of(alarms[0])
+    sums = known.state.sensor.levels[OWN_TEMPCO + INSIDE]
     slope, every = (sums.place[label] for label in (SLOPE, ALL))
     information = sums.information[slope]
     # rms over the units: of the coefficient, of its error by the scatter inside lots
-    spread = np.sqrt(over(information, sums.information[every])) * findings.pool.size
+    spread = np.sqrt(over(information, sums.information[every])) * known.pool.size
     size = over(sums.score[slope], information) * spread
-    error = np.where(information > 0.0, findings.state.sensor.noise[1], 0.0) * over(spread, np.sqrt(information))
-    here = np.array([axis * k + findings.pool.places(effect)[0] for axis in range(AXES)])
+    error = np.where(information > 0.0, known.state.sensor.noise[1], 0.0) * over(spread, np.sqrt(information))
+    here = np.array([axis * k + known.pool.places(effect)[0] for axis in range(AXES)])
     rms, wide = (float(np.sqrt(np.mean(of[here] ** 2))) for of in (size, error))
     sizes = np.abs(size[here])
     return {
         "id": "",
-        "since": findings.day_of(min(alarms, key=lambda alarm: alarm.lots)),
+        "since": known.day_of(min(alarms, key=lambda alarm: alarm.lots)),
         "lots_then": min(alarm.lots for alarm in alarms),
-        "effects": list(dict.fromkeys(findings.effect_of(alarm) for alarm in alarms)),
+        "effects": list(dict.fromkeys(known.effect_of(alarm) for alarm in alarms)),
         "recommended": effect,
         "axes": [a for a, of_axis in zip("xyz", sizes, strict=True) if of_axis > 0.25 * sizes.max()],
         "driver": OWN_TEMPCO,
@@ -85,8 +79,8 @@ def thermometer_row(findings: Findings) -> DiscoveryRow:
         "kind": "slope",
         "size_ug": MICRO * rms,
         "interval_ug": [MICRO * max(rms - 2.0 * wide, 0.0), MICRO * (rms + 2.0 * wide)],
-        "size_floors": findings.floors(rms),
-        "log_e": round(findings.log_e(alarms[0]), 2),
+        "size_floors": known.floors(rms),
+        "log_e": round(known.log_e(alarms[0]), 2),
         "scope": "thermometer",
         "because": PROPORTIONAL,
         "levels": [],
