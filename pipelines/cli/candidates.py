@@ -123,6 +123,7 @@ SOURCES: dict[tuple[str, str], Callable[[Context], Iterable[str]]] = {
     ("dwells", "DWELLS"): _data,
     ("data", "RUN"): _data,
     ("source", "RUN"): _data,
+    ("sources", "RUN"): _data,
     ("fresh", "DWELLS2"): _data,
     ("units", "SN"): _units,
     ("serial", "SERIAL"): _units,

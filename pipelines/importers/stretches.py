@@ -354,7 +354,7 @@ def _of_one_position(
     worst = max(several, key=lambda k: counts[k])
     a, b = intervals.spans[worst]
     stops = found_stops(output, time, edges, gravity)
-    if len(stops.found) and not stops.several:
+    if not stops.several and 2 * len(stops.found) > counts[worst]:
         offer = f"{options_of(stops)} finds {len(stops.found)} stops, one position in each"
     elif (total := change_of_level.several_levels(output)) > 1:
         offer = f"--set positions={total} divides the record at the changes"

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from html import escape
 
-from pipelines.drawing.vector import LETTER, WIDTH, part, still, text_at
+from pipelines.drawing.vector import LETTER, WIDTH, part, text_at
 
 SMALLEST = 0.01
 COLOURS = (
@@ -53,4 +53,4 @@ def shares_plot(shares: Mapping[str, Mapping[str, float]]) -> str:
         x, y = RIGHT + across * (number % COLUMNS), bottom + 54.0 + ENTRY * (number // COLUMNS)
         parts.append(f'<path d="M{x:.1f} {y:.1f}h18v10h-18z" fill="{colour}"/>{text_at(x + 26.0, y + 9.5, name)}')
     height = bottom + 58.0 + ENTRY * -(-len(colours) // COLUMNS)
-    return still(part("shares of the contributions to u²", height, "".join(parts)))
+    return part("shares of the contributions to u²", height, "".join(parts))

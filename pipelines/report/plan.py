@@ -41,7 +41,7 @@ def render_plan(document: dict[str, Any], context: PlanContext) -> str:
         axis_word=axis_word,
         seen=[row for row in document["effects"] if row["seen"]],
         unseen=[row for row in document["effects"] if not row["seen"]],
-        **pictures(document, context),
+        **{name: picture and still(picture) for name, picture in pictures(document, context).items()},
     )
 
 
@@ -49,10 +49,10 @@ def pictures(document: dict[str, Any], context: PlanContext) -> dict[str, str]:
     """The pictures of a plan by name, as SVG: poses, temperatures, remaining fractions, confounded effects."""
     aliases = alias_chart(context)
     return {
-        "sphere": still(svg_text(sphere_chart(context))),
-        "temperature": still(svg_text(temperature_chart(context))),
-        "sights": still(svg_text(sight_chart(document["effects"]))),
-        "aliases": "" if aliases is None else still(svg_text(aliases)),
+        "sphere": svg_text(sphere_chart(context)),
+        "temperature": svg_text(temperature_chart(context)),
+        "sights": svg_text(sight_chart(document["effects"])),
+        "aliases": "" if aliases is None else svg_text(aliases),
         "budget": _budget(document.get("uncertainty")),
     }
 

@@ -137,8 +137,7 @@ def test_dwells_left_out_of_one_run_do_not_confirm_what_imitates_its_fault(units
     assert evidence["confirmed"] is None
     assert re.search(reason, evidence["reason"]), evidence["reason"]
     text = text_of({"removed": []}, evidence)
-    assert text.startswith("holds on stretches of time left out")
-    assert "not decided by this run" in text
+    assert text.startswith("not decided by this run alone: stretches of time left out confirm it")
     assert "a fresh run of the same units decides" in text
 
 

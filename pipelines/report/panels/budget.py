@@ -3,6 +3,7 @@
 import numpy as np
 import pandas as pd
 
+from pipelines.drawing import still
 from pipelines.report.budget_plots import shares_plot
 from pipelines.report.context import ReportContext
 from pipelines.report.numbers import significant
@@ -59,7 +60,7 @@ def render(report: ReportContext) -> str:
         unit=first,
         frame=str(sums["frame"].iloc[0]) if len(sums) else "",
         source=str(entries.get("grade_source", "assumed")).replace("_", " "),
-        plot=shares_plot(_shares(report.tables["budget"], first)) if len(sums) else "",
+        plot=still(shares_plot(_shares(report.tables["budget"], first))) if len(sums) else "",
         missing=missing if len(sums) else {},
         references=[{**NO_REFERENCE, **one} for one in station.get("reference", [])],
         seen=_seen(sums),

@@ -160,7 +160,7 @@ def test_plan_refuses_a_limit_that_cannot_be_reached_and_says_where_nothing_is_s
     (tmp_path / "nav.toml").write_text(recipe.replace("qa700.limits.toml", "navigation"), encoding="utf-8")
     planned = CliRunner().invoke(app, ["plan", str(tmp_path / "nav.toml")])
     assert planned.exit_code == 1
-    said = "the end of the period of validity: limit 50 µg, 95 % bound of the error over 12 months"
+    said = "the end of the period of validity: limit 50 µg, expected over 12 months"
     assert said in planned.output.replace("\n", " ")
     words = ["run", str(tmp_path / "nav.toml"), "--archive", str(tmp_path / "archive")]
     assert isinstance(CliRunner().invoke(app, words).exception, RecipeInvalid)
