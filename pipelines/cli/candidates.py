@@ -121,7 +121,6 @@ SOURCES: dict[tuple[str, str], Callable[[Context], Iterable[str]]] = {
     ("target", "UNIT|RUN"): _runs_and_units,
     ("selection", "SELECTION"): lambda ctx: ["all", *_runs(ctx)],
     ("dwells", "DWELLS"): _data,
-    ("data", "RUN"): _data,
     ("source", "RUN"): _data,
     ("sources", "RUN"): _data,
     ("fresh", "DWELLS2"): _data,
