@@ -19,18 +19,9 @@ from schemas.strict import Strict
 WordOrder = Literal["high_first", "low_first", "high_first_swapped", "low_first_swapped"]
 RegisterType = Literal["uint16", "int16", "uint32", "int32", "float32", "string", "bit"]
 Space = Literal["holding", "input", "coil", "discrete"]
-Kind = Literal[
-    "axis",
-    "chamber",
-    "reader",
-    "slot",
-    "exciter",
-    "shock_machine",
-    "centrifuge",
-    "power_supply",
-    "step_generator",
-    "climate",
-]
+Equipment = Literal["exciter", "shock_machine", "centrifuge", "power_supply", "step_generator", "climate"]
+"""What a procedure borrows beside the table: one role of a station each."""
+Kind = Literal["axis", "chamber", "reader", "slot", Equipment]
 Carrier = Literal["tcp", "rtu", "tls", "ascii", "visa"]
 TEXT_CARRIERS: frozenset[Carrier] = frozenset({"ascii", "visa"})
 Adapter = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")]  # the family, a module in stations/devices/families

@@ -30,6 +30,10 @@ _INEXACT = 0.02
 
 _SEEN = 1e-3  # share of its information that a column keeps beside another one, below which it is the same
 
+_OF_POSE = 0.5
+"""Part of a name's score that a function of the pose loses with it where the name is one: all of a static effect's, and next to
+nothing of an effect of temperature or time."""
+
 _ALIKE = 0.8  # cosine from which on columns are taken for each other where one of them is known to a few per cent
 
 _REMAINDER = 0.03
@@ -117,7 +121,8 @@ class Pool:
                 break
             found.append(name)
             lots = self._fitted_out(lots, name.drivers[0], name.effects[0])
-        kept = [name for at, name in enumerate(found) if at not in _imitations(found, of_pose, needed)]
+        imitations = _imitations(found, of_pose, needed)
+        kept = [name for at, name in enumerate(found) if at not in imitations]
         if len(kept) < len(found):
             lots = every
             for name in kept:
@@ -376,7 +381,7 @@ def _imitations(names: Sequence[Name], of_pose: Sequence[Mapping[str, float]], n
     for driver in {name.drivers[0] for name in names}:
         before = [scores.get(driver, 0.0) for scores in of_pose]
         own = [at for at, name in enumerate(names) if name.drivers[0] == driver]
-        parts = [at for at in own if before[at] - before[at + 1] > 0.5 * names[at].score]
+        parts = [at for at in own if before[at] - before[at + 1] > _OF_POSE * names[at].score]
         explained = sum(names[at].score for at in parts)
         if parts and before[-1] > max(needed, _REMAINDER * explained):
             out |= set(parts) if before[parts[0]] > explained * (1.0 + _INEXACT) + CLASS_WIDTH else set()

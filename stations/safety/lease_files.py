@@ -12,26 +12,16 @@ import uuid
 from dataclasses import asdict, dataclass, fields
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Literal
+from typing import Literal, get_args
 
 from schemas.host import opened_folder
+from schemas.profile import Equipment
 from schemas.safety import SAFE_WITHIN_S
 from schemas.station import StationConfig
 from schemas.station_devices import Device, Slots
 
-Part = Literal[
-    "outer",
-    "inner",
-    "chamber",
-    "reader",
-    "exciter",
-    "shock_machine",
-    "centrifuge",
-    "power_supply",
-    "step_generator",
-    "climate",
-]
-ROLES: tuple[Part, ...] = ("exciter", "shock_machine", "centrifuge", "power_supply", "step_generator", "climate")
+Part = Literal["outer", "inner", "chamber", "reader", Equipment]
+ROLES: tuple[Equipment, ...] = get_args(Equipment)
 PARTS: tuple[Part, ...] = ("outer", "inner", "chamber", "reader")
 
 

@@ -1,6 +1,7 @@
 """The package of a device in its environment: adhesive that yields, moisture that diffuses, a lid that leaks."""
 
 import math
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from typing import ClassVar
 
@@ -17,7 +18,7 @@ NODES = 12  # through half the thickness of the plate
 
 
 @dataclass
-class PackageEffect(HiddenEffect):
+class PackageEffect(HiddenEffect, ABC):
     """An inner state (s,) that acts on the bias by ``_bias`` g and on the scale by ``_scale``, per unit of the state."""
 
     breathes: ClassVar[bool] = True
@@ -31,9 +32,9 @@ class PackageEffect(HiddenEffect):
     def surround(self, humidity: float, pressure: float) -> None:
         self.humidity, self.pressure = humidity / 100.0, pressure
 
+    @abstractmethod
     def acting(self) -> tuple[float, float]:
         """Bias in g and relative scale that the state of 1 gives."""
-        raise NotImplementedError
 
     def output(self, force: Array, block: Block) -> Array:
         bias, scale = self.acting()
