@@ -85,6 +85,7 @@ class Judged(Generic[AnyFit]):
     adequate : None where it cannot be judged, with ``reason``
     fit : of the judged model; extended : with one effect of each class, the same where none is named
     classes : effects that make the model adequate, one class after the other
+    alone : the point that departs alone, where that is more likely than any effect; None for none, or where not looked for
     left_out : rms weighted residual of left-out points before and after; near 1 for a right model
     """
 
@@ -93,6 +94,7 @@ class Judged(Generic[AnyFit]):
     fit: AnyFit
     extended: AnyFit
     classes: tuple[EffectClass, ...]
+    alone: int | None
     left_out: tuple[float, float]
 
     @property
@@ -121,6 +123,7 @@ def judge(
     *,
     remedy: str,
     residuals: int = 0,
+    without_worst: Callable[[AnyFit], tuple[AnyFit, int]] | None = None,
 ) -> Judged[AnyFit]:
     """The verdict on a model, with the classes of effects that make it adequate.
 
@@ -132,22 +135,41 @@ def judge(
     left_out : rms weighted residual of points that a fit of this model has not seen
     remedy : what gives more degrees of freedom
     residuals : number of residuals, for the price of a parameter; the degrees of freedom of the smaller model where 0
+    without_worst : the fit of a model without the point that departs most, and which that is: it contends with the effects
     """
-    classes, best, reason = list[EffectClass](), base, ""
+    classes, best, reason, alone = list[EffectClass](), base, "", None
     good = adequate(base) if base.dof >= FEWEST_DOF else None
     if good is None:
         reason = f"{degrees_of_freedom(base.dof)}, at least {FEWEST_DOF} are needed; {remedy}"
     current = list(effects)
     while good is False and len(classes) < MOST_ADDED and adequate(best) is False:
         left = {name: extended_fit([*current, name], best) for name in candidates if name not in current}
-        next_class = _best_class(best, left, float(np.log(residuals or max(best.dof, 2))), left_out)
-        if next_class is None:
+        price = float(np.log(residuals or max(best.dof, 2)))
+        next_class = _best_class(best, left, price, left_out)
+        if without_worst:
+            rest, worst = without_worst(best)
+            named = left[next_class.effects[0]] if next_class else None
+            alone = worst if _alone(best, rest) and (not named or _score(rest, price) < _score(named, price)) else None
+        if next_class is None or alone is not None:
             break
         classes.append(next_class)
         current.append(next_class.effects[0])
         best = left[next_class.effects[0]]
     before = left_out(base)
-    return Judged(good, reason, base, best, tuple(classes), (before, left_out(best) if classes else before))
+    return Judged(good, reason, base, best, tuple(classes), alone, (before, left_out(best) if classes else before))
+
+
+def _score(fit: Fitted, price: float) -> float:
+    """χ² with the price of the parameters, up to a constant; a point that is left out pays as two of them."""
+    return fit.chi_square - price * fit.dof
+
+
+def _alone(fit: Fitted, rest: Fitted) -> bool:
+    """Whether a point, the worst of all, departs by more than the scatter of the rest."""
+    scatter = max(1.0, rest.chi_square / max(rest.dof, 1))
+    left_out = fit.dof - rest.dof
+    points = fit.dof / left_out
+    return bool(points * chi2_tail((fit.chi_square - rest.chi_square) / scatter, left_out) < ADDED_P)
 
 
 def _best_class(
@@ -160,19 +182,16 @@ def _best_class(
     others.
     """
 
-    def score(fit: Fitted) -> float:
-        return fit.chi_square - price * fit.dof
-
     def added_p(fit: Fitted) -> float:
         gain, parameters = max(0.0, best.chi_square - fit.chi_square), max(1, best.dof - fit.dof)
         return float(min(1.0, len(fits) * chi2_tail(gain, parameters)))
 
-    real = sorted((name for name in fits if added_p(fits[name]) < ADDED_P), key=lambda name: score(fits[name]))
+    real = sorted((name for name in fits if added_p(fits[name]) < ADDED_P), key=lambda name: _score(fits[name], price))
     before = left_out(best) if real else float("nan")
     first = next((name for name in real if not left_out(fits[name]) >= before), None)  # nan: no points can be left out
     if first is None:
         return None
     top = fits[first]
     width = CLASS_WIDTH * max(1.0, top.chi_square / max(top.dof, 1))  # further missing effects blur the comparison
-    others = (name for name in real if name != first and abs(score(fits[name]) - score(top)) < width)
+    others = (name for name in real if name != first and abs(_score(fits[name], price) - _score(top, price)) < width)
     return EffectClass((first, *others), added_p(top), top.chi_square, top.dof)

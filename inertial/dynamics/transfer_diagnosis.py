@@ -1,7 +1,7 @@
 """Whether a model of a transfer function is good enough, where it fails, which effects are missing, what to measure next."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,6 +11,10 @@ from inertial.dynamics.transfer_model import IDENTIFIED_SHARE, Points, TransferF
 
 SEPARATED = 10.0
 """Uncertainties of a point by which rival models must differ at a frequency that is proposed: several of their errors as well."""
+
+
+FEWEST_TO_ONE_ALONE = 10
+"""Points of a sweep to one that may depart alone; a scatter that more of them have is no fault of points."""
 
 
 @dataclass(frozen=True)
@@ -43,6 +47,7 @@ class StatedParameter:
 class TransferDiagnosis(Judged[TransferFit]):
     """The verdict on a model of a transfer function.
 
+    alone_hz : frequencies of points that depart alone, left out of ``extended`` and ``classes``: to be measured again
     where : parts of the frequency range with more than their share of χ²; empty for an adequate model
     error_percent, extended_percent : rms of the relative complex residual
     rivals : models that describe the points as well as ``extended``: another effect of a class, a filter that every device has,
@@ -50,12 +55,18 @@ class TransferDiagnosis(Judged[TransferFit]):
     next_hz : the frequencies to measure next; highest_hz : of the points
     """
 
+    alone_hz: tuple[float, ...]
     where: tuple[Failure, ...]
     error_percent: float
     extended_percent: float
     rivals: tuple[TransferFit, ...]
     next_hz: tuple[float, ...]
     highest_hz: float
+
+    @property
+    def unexplained(self) -> bool:
+        """Whether the model is not adequate with the named effects either, or a point departs alone."""
+        return bool(self.alone_hz) or super().unexplained
 
     def parameter(self, name: str) -> StatedParameter:
         """A parameter of the extended model, as far as every model that the points do not exclude agrees."""
@@ -90,33 +101,55 @@ def diagnose_transfer(
     effects : of the model to judge
     highest_hz : to which the exciter reaches, for the next frequencies; the points' highest where None
     """
+    n = len(points.value)
+    kept = np.ones(n, dtype=bool)
+    first = judged = _judged(points, effects)
+    while judged.alone is not None:
+        kept[np.flatnonzero(kept)[judged.alone]] = False
+        if FEWEST_TO_ONE_ALONE * (n - kept.sum()) > n:  # no single points, but all are worse than was stated
+            kept[:], judged = True, replace(first, alone=None)
+            break
+        judged = _judged(points.picked(kept), effects)
+    rest, alone = points.picked(kept), points.conditions.frequency[~kept]
+    top = float(points.conditions.frequency.max())
+    open_end = first.adequate is None or judged.unexplained or alone.size > 0
+    rivals = () if open_end else _rivals(points, judged.extended, judged.classes)
+    further = _next_frequencies(rest, judged.extended, rivals, highest_hz or top)
+    return TransferDiagnosis(
+        **vars(replace(judged, adequate=first.adequate, fit=first.fit)),
+        alone_hz=tuple(sorted(map(float, alone))),
+        where=_where(points, first.fit) if first.adequate is False else (),
+        error_percent=_error(points, first.fit),
+        extended_percent=_error(rest, judged.extended),
+        rivals=rivals,
+        next_hz=tuple(sorted(map(float, alone))) or further,
+        highest_hz=top,
+    )
+
+
+def _judged(points: Points, effects: Sequence[str]) -> Judged[TransferFit]:
+    """The verdict on a model on all of the points."""
 
     def extended_fit(names: list[str], best: TransferFit) -> TransferFit:
         fit = fit_transfer(points, names, best.known)
         # mass and low-pass exchanged are another minimum, which breeds further effects
         return best_of_exchange(points, fit)[0] if names[-1] in {"two_pole", "second_order"} else fit
 
+    def without_worst(fit: TransferFit) -> tuple[TransferFit, int]:
+        n = len(points.value)
+        worst = int(np.argmax(fit.residual[:n] ** 2 + fit.residual[n:] ** 2))
+        return fit_transfer(points.picked(np.arange(n) != worst), fit.effects, fit.known, only_near=True), worst
+
     base = best_of_exchange(points, fit_transfer(points, effects))[0]
-    judged = judge(
+    return judge(
         base,
         effects,
         [name for name, one in EFFECTS.items() if one.seen(points.conditions)],
         extended_fit,
-        lambda fit: _left_out(points, fit.effects),
+        lambda fit: _left_out(points, fit),
         remedy="sweep more frequencies",
         residuals=len(base.residual),
-    )
-    top = float(points.conditions.frequency.max())
-    open_end = judged.adequate is None or judged.unexplained
-    rivals = () if open_end else _rivals(points, judged.extended, judged.classes)
-    return TransferDiagnosis(
-        **vars(judged),
-        where=_where(points, base) if judged.adequate is False else (),
-        error_percent=_error(points, base),
-        extended_percent=_error(points, judged.extended),
-        rivals=rivals,
-        next_hz=_next_frequencies(points, judged.extended, rivals, highest_hz or top),
-        highest_hz=top,
+        without_worst=without_worst,
     )
 
 
@@ -168,23 +201,30 @@ def _where(points: Points, fit: TransferFit) -> tuple[Failure, ...]:
     return tuple(sorted((failure for failure in failures if failure.share > 1.0 / 6.0), key=lambda one: -one.share))
 
 
-def _left_out(points: Points, effects: Sequence[str]) -> float:
-    """Rms weighted residual of points that a fit has not seen, every fifth left out in turn."""
+def _left_out(points: Points, fit: TransferFit) -> float:
+    """Root of the mean predictive deviance of points that a fit has not seen, every fifth left out in turn.
+
+    A narrow mode cannot be predicted at its peak by the other points, but on its skirts: each deviation counts over its own
+    uncertainty and that of the prediction, and a vague prediction pays by its logarithm.
+    """
     n = len(points.value)
-    if 2 * n * (FOLDS - 1) // FOLDS < 3 * len(effects) + 4 or n < 2 * FOLDS:
+    if 2 * n * (FOLDS - 1) // FOLDS < 3 * len(fit.effects) + 4 or n < 2 * FOLDS:
         return float("nan")
     place = np.argsort(np.argsort(points.conditions.frequency))
-    squares = 0.0
-    near = fit_transfer(points, effects).known
+    deviance = 0.0
     for fold in range(FOLDS):
         out = place % FOLDS == fold
         seen, unseen = points.picked(~out), points.picked(out)
-        if not all(EFFECTS[name].seen(seen.conditions) for name in effects):
+        if not all(EFFECTS[name].seen(seen.conditions) for name in fit.effects):
             continue
-        ratio = unseen.value / fit_transfer(seen, effects, near, only_near=True).response(unseen.conditions)
-        squares += float(np.sum((np.log(np.abs(ratio)) / unseen.magnitude_error) ** 2))
-        squares += float(np.sum((np.angle(ratio) / unseen.phase_error) ** 2))
-    return float(np.sqrt(squares / (2 * n)))
+        predicted, *vague = fit_transfer(seen, fit.effects, fit.known, only_near=True).predicted(unseen.conditions)
+        ratio = unseen.value / predicted
+        for off, error, own in zip(
+            (np.log(np.abs(ratio)), np.angle(ratio)), (unseen.magnitude_error, unseen.phase_error), vague, strict=True
+        ):
+            wider = 1.0 + (own / error) ** 2
+            deviance += float(np.sum((off / error) ** 2 / wider + np.log(wider)))
+    return float(np.sqrt(deviance / (2 * n)))
 
 
 def _next_frequencies(

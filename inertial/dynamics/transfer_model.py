@@ -1,6 +1,6 @@
 """Fit of a transfer function: sensitivity times effects, each point weighted by its own uncertainty in magnitude and phase."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
 
@@ -18,6 +18,8 @@ SCREENED = 6  # of them that are searched from, those with the least residual
 POLISHED = 2  # of them that are carried to the end
 PLAIN = Conditions(np.ones(2), np.ones(2), np.array([0.0, 1.0]), np.ones(2))
 """Points at which every effect has its parameters."""
+PREDICTION_STEP = 1e-6
+"""Of a coordinate, for the central differences of a prediction: near the cube root of the machine's precision."""
 IDENTIFIED_SHARE = 0.2
 """Largest relative standard uncertainty at which a frequency or damping counts as identified."""
 
@@ -95,6 +97,22 @@ class TransferFit:
     def response(self, conditions: Conditions) -> Complex:
         """The model at some points, output per g."""
         return self.sensitivity * factor(self.effects, conditions, self.values)
+
+    def predicted(self, conditions: Conditions) -> tuple[Complex, Array, Array]:
+        """The model at some points, and the standard uncertainty of its log magnitude and of its phase there, all (n,)."""
+        coordinates = Coordinates(self.parameters)
+        at, middle = coordinates.of(self.values), self.response(conditions)
+
+        def logarithm(x: Array) -> Complex:
+            with np.errstate(all="ignore"):
+                return np.log(self.sensitivity * factor(self.effects, conditions, coordinates.values(x)) / middle)
+
+        steps = np.diag(PREDICTION_STEP * np.maximum(1.0, np.abs(at)))
+        slopes = [np.ones(len(middle), dtype=np.complex128)]
+        slopes += [(logarithm(at + h) - logarithm(at - h)) / (2.0 * h.max()) for h in steps]
+        jacobian = np.nan_to_num(np.stack(slopes, axis=1))
+        magnitude, phase = (np.einsum("np,pq,nq->n", j, self.covariance, j) for j in (jacobian.real, jacobian.imag))
+        return middle, np.sqrt(np.maximum(magnitude, 0.0)), np.sqrt(np.maximum(phase, 0.0))
 
     def logarithmic(self, name: str) -> bool:
         """Whether a parameter is positive and fitted by its logarithm."""
@@ -180,10 +198,14 @@ def fit_transfer(
         return np.clip(deviation(x) / error, -1e6, 1e6)
 
     level = float(np.log(np.median(np.abs(points.value[low_end]))))
-    values = _starts(parameters, near or {}, only_near=only_near)
-    starts = [np.append(level, coordinates.of(start)) for start in values]
+    known, every = (
+        [np.append(level, coordinates.of(start)) for start in _starts(parameters, near or {}, only_near=alone)]
+        for alone in (True, False)
+    )
     # far from the solution all points are off by many of their uncertainties: starts are compared by the deviation itself
-    screened = sorted(starts, key=lambda x: float(np.sum(deviation(x) ** 2)))[:SCREENED]
+    screened = [] if only_near else sorted(every, key=lambda x: float(np.sum(deviation(x) ** 2)))[:SCREENED]
+    # beside a known model by what a step leaves: a narrow mode is seen where its frequency is right, whatever its size
+    screened += sorted(known, key=lambda x: _after_a_step(residual, x))[:SCREENED] if near else []
     tried = sorted(
         (least_squares(residual, x, bounds=bounds, max_nfev=12, x_scale="jac") for x in screened),
         key=lambda one: one.cost,
@@ -208,6 +230,13 @@ def fit_transfer(
         left,
         covariance,
     )
+
+
+def _after_a_step(residual: Callable[[Array], Array], start: Array) -> float:
+    """Sum of squares that a linear step from a start is expected to leave."""
+    left = residual(start)
+    jacobian = np.stack([(residual(start + h) - left) / h.max() for h in np.diag(np.full(len(start), 1e-5))], axis=1)
+    return float(np.sum((left - jacobian @ np.linalg.lstsq(jacobian, left, rcond=1e-10)[0]) ** 2))
 
 
 def exchanged(points: Points, fit: TransferFit) -> TransferFit | None:

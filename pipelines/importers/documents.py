@@ -114,6 +114,9 @@ class TransferImport(TypedDict):
     classes: list[TransferClass]
     recommended: list[str]
     unexplained: bool
+    alone_hz: Annotated[
+        list[float], "frequencies of points that depart alone: no effect explains them, to be measured again"
+    ]
     sensitivity: Annotated[float, "output per g"]
     bandwidth_hz: Annotated[float | None, "−3 dB frequency of the model; null: it does not fall by 3 dB"]
     parameters: dict[str, TransferParameter]

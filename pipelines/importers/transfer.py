@@ -108,6 +108,7 @@ def import_transfer(
         "classes": [{"effects": list(one.effects), "p_value": one.p_value} for one in diagnosis.classes],
         "recommended": list(diagnosis.recommended),
         "unexplained": diagnosis.unexplained,
+        "alone_hz": list(diagnosis.alone_hz),
         "sensitivity": fit.sensitivity,
         "bandwidth_hz": bandwidth,
         "parameters": parameters,

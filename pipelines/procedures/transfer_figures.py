@@ -53,7 +53,11 @@ def figures_of_model(axis: str, diagnosis: TransferDiagnosis, points: Points, te
     """Bandwidth, natural frequency and damping; ``test``: how the names of its figures begin."""
     names = [f"{test}_{figure}" for figure in ("bandwidth_hz", "natural_hz", "damping")]
     if diagnosis.adequate is None or diagnosis.unexplained:
-        why = diagnosis.reason or "the model, also with the effects found, does not describe the points"
+        why = (
+            diagnosis.reason
+            or alone_text(diagnosis).replace("alone", "points depart alone", 1)
+            or "the model, also with the effects found, does not describe the points"
+        )
         return [FigureValue.not_determined(name, axis, why) for name in names]
     return [
         replace(_bandwidth(axis, diagnosis, points), figure=names[0]),
@@ -155,6 +159,20 @@ def _sensitivity(part: Any, fit: TransferFit, static: Array | None) -> FigureVal
     return FigureValue("sweep_sensitivity_percent", part.axis, value, error)
 
 
+def alone_text(diagnosis: TransferDiagnosis) -> str:
+    """What is said of points that depart alone; empty without any."""
+    where = ", ".join(f"{f:.4g} Hz" for f in diagnosis.alone_hz)
+    return f"alone, and not as any effect would: {where}; measure there again" if where else ""
+
+
+def _remains(diagnosis: TransferDiagnosis) -> list[tuple[str, str]]:
+    """What no effect explains: single points, or a deviation of many."""
+    if diagnosis.alone_hz:
+        return [("departs", alone_text(diagnosis))]
+    text = "a significant deviation remains that no effect of the catalogue describes"
+    return [("unexplained", text)] if diagnosis.unexplained else []
+
+
 def diagnosis_text(diagnosis: TransferDiagnosis) -> list[tuple[str, str]]:
     """Subject and text of the findings of the diagnosis on one unit."""
     fit = diagnosis.fit
@@ -186,8 +204,7 @@ def diagnosis_text(diagnosis: TransferDiagnosis) -> list[tuple[str, str]]:
             f"left out, in standard uncertainties: {before:.2g} → {after:.2g}"
         )
         out.append(("after extension", text))
-    if diagnosis.unexplained:
-        out.append(("unexplained", "a significant deviation remains that no effect of the catalogue describes"))
+    out += _remains(diagnosis)
     for p in diagnosis.extended.parameters:
         one = diagnosis.parameter(p.name)
         if p.log and not one.identified:

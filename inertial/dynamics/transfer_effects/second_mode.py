@@ -13,7 +13,9 @@ class SecondMode(TransferEffect):
 
     def parameters(self, points: Conditions) -> tuple[Parameter, ...]:
         top = float(points.frequency.max())
-        starts = tuple(float(top * share) for share in np.geomspace(0.1, 0.98, 14))
+        starts = tuple(
+            float(top * share) for share in np.geomspace(0.1, 0.98, 40)
+        )  # apart by twice the width of a mode
         return (
             Parameter("mode_hz", "Hz", 0.05 * top, 2.0 * top, starts, log=True),
             Parameter("mode_damping", "1", 2e-3, 0.3, (0.03,), log=True),

@@ -53,6 +53,56 @@ def test_a_hidden_low_pass_is_named_and_the_error_falls(kind: str, rng: np.rando
     assert diagnosis.where[0].high_hz == pytest.approx(5000.0)
 
 
+@pytest.mark.parametrize("mode", mostly_slow([1166.0, 2865.0, 1910.0], 1166.0))
+def test_a_mode_so_narrow_that_one_point_meets_it_is_named_by_its_skirts(mode: float, rng: np.random.Generator) -> None:
+    """Points are 12 % apart and the mode is 6 % wide: at its peak no other point predicts it."""
+    f = np.geomspace(5.0, 5000.0, 60)
+    h = transfer(f, 2500.0, 0.62) * (1.0 - signal.freqs([0.0043, 0, 0], [1, 0.06, 1], f / mode)[1])
+    diagnosis = diagnose_transfer(points(f, h, 2e-3, 2e-3, rng))
+    assert diagnosis.recommended == ("second_mode",)
+    assert diagnosis.alone_hz == ()
+    assert diagnosis.extended.of("mode_hz")[0] == pytest.approx(mode, rel=0.02)
+    before, after = diagnosis.left_out
+    assert after == pytest.approx(1.0, abs=0.25)
+    assert before > 1.6 * after
+
+
+@pytest.mark.parametrize("seed", mostly_slow([1, 2, 3, 4, 5, 6], 2, 3))
+def test_a_point_that_is_off_is_a_bad_point_and_no_effect(seed: int) -> None:
+    rng = np.random.default_rng([seed, 817])
+    f = np.geomspace(5.0, 5000.0, 60)
+    one = points(f, transfer(f, 2300.0, 0.65) * np.exp(-2j * np.pi * f * 2e-5), 2e-3, 2e-3, rng)
+    value, bad = one.value.copy(), int(rng.integers(60))
+    value[bad] *= np.exp(rng.uniform(16e-3, 80e-3) * np.exp(2j * np.pi * rng.uniform()))
+    diagnosis = diagnose_transfer(Points(one.conditions, value, one.magnitude_error, one.phase_error))
+    assert diagnosis.adequate is False
+    assert diagnosis.classes == ()
+    assert diagnosis.unexplained
+    assert diagnosis.next_hz == diagnosis.alone_hz == (pytest.approx(f[bad]),)
+
+
+def test_a_hidden_low_pass_is_named_beside_a_bad_point(rng: np.random.Generator) -> None:
+    f = np.geomspace(5.0, 5000.0, 60)
+    b, a = signal.butter(1, 2.0 * np.pi * 9000.0, analog=True)
+    h = transfer(f, 2300.0, 0.62) * signal.freqs(b, a, 2.0 * np.pi * f)[1]
+    one = points(f, h, 2e-3, 2e-3, rng)
+    value = one.value.copy()
+    value[20] *= 1.08
+    diagnosis = diagnose_transfer(Points(one.conditions, value, one.magnitude_error, one.phase_error))
+    assert diagnosis.alone_hz == (pytest.approx(f[20]),)
+    assert "one_pole" in diagnosis.classes[0].effects
+
+
+@pytest.mark.parametrize("scale", mostly_slow([2.0, 3.0], 2.0))
+def test_uncertainties_that_are_too_small_make_no_points_bad(scale: float, rng: np.random.Generator) -> None:
+    f = np.geomspace(5.0, 5000.0, 60)
+    one = points(f, transfer(f, 2300.0, 0.65), 2e-3, 2e-3, rng)
+    stated = Points(one.conditions, one.value, one.magnitude_error / scale, one.phase_error / scale)
+    diagnosis = diagnose_transfer(stated)
+    assert diagnosis.adequate is False
+    assert diagnosis.alone_hz == ()
+
+
 @pytest.mark.parametrize("sweeps", mostly_slow([1, 5], 1))
 def test_nothing_is_named_where_nothing_is_missing_and_few_points_cannot_be_judged(
     sweeps: int, rng: np.random.Generator
