@@ -8,7 +8,7 @@ import numpy as np
 from inertial.arrays import Array
 from inertial.dynamics.centrifuge import radii_as_observed
 from inertial.dynamics.centrifuge_effects import EFFECTS, Spins
-from inertial.dynamics.missing_effects import FOLDS, Judged, breakers_of, judge
+from inertial.dynamics.missing_effects import FOLDS, Judged, breakers_of, judge, judge_points
 from inertial.errors import NotIdentified
 
 DEFAULT = ("second_order", "third_order")
@@ -87,19 +87,32 @@ def fit_spins(points: Spins, output: Array, error: Array, effects: Sequence[str]
 
 def diagnose_spins(points: Spins, output: Array, error: Array, effects: Sequence[str] = DEFAULT) -> SpinDiagnosis:
     """The verdict on bias, scale and ``effects``, with the classes of effects that make the model adequate."""
+    judged, _ = judge_points(len(output), lambda kept: _judged(points.picked(kept), output[kept], error[kept], effects))
+    before, after = (float(np.sqrt(np.mean(fit.residuals**2))) for fit in (judged.fit, judged.extended))
+    again = tuple(f"measure {points.acceleration[k]:+.4g} g again: it departs alone" for k in judged.alone)
+    return SpinDiagnosis(
+        **vars(judged), error_g=before, extended_g=after, next_steps=again + breakers_of(judged.classes, EFFECTS)
+    )
+
+
+def _judged(points: Spins, output: Array, error: Array, effects: Sequence[str]) -> Judged[SpinFit]:
+    """The verdict on a model on all of the points."""
     seen = [name for name, one in EFFECTS.items() if one.seen(points)]
     names = [name for name in effects if name in seen]
-    judged = judge(
+
+    def without_worst(fit: SpinFit) -> tuple[SpinFit, int]:
+        worst = int(np.argmax(np.abs(fit.residuals / error)))
+        rest = np.arange(len(output)) != worst
+        return fit_spins(points.picked(rest), output[rest], error[rest], fit.effects), worst
+
+    return judge(
         fit_spins(points, output, error, names),
         names,
         seen,
         lambda more, _: fit_spins(points, output, error, more),
         lambda fit: _left_out(points, output, error, fit.effects),
         remedy="add speeds, or measure the other mounting too",
-    )
-    before, after = (float(np.sqrt(np.mean(fit.residuals**2))) for fit in (judged.fit, judged.extended))
-    return SpinDiagnosis(
-        **vars(judged), error_g=before, extended_g=after, next_steps=breakers_of(judged.classes, EFFECTS)
+        without_worst=without_worst,
     )
 
 

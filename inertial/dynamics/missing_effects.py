@@ -1,12 +1,12 @@
 """The verdict on the model of a dynamic test: whether it is adequate, and which effects are missing, in classes."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 
-from inertial.arrays import Array
+from inertial.arrays import Array, Flags
 from inertial.counts import degrees_of_freedom
 from inertial.distributions import chi2_tail
 from inertial.dynamics.effect_modules import DynamicEffect
@@ -20,6 +20,8 @@ CLASS_WIDTH = 9.0
 """Effects whose fits differ by less than this in χ² (with a parameter's price) are not separated: three standard deviations."""
 MOST_ADDED = 3
 FEWEST_DOF = 6
+FEWEST_TO_ONE_ALONE = 10
+"""Points of a test to one that may depart alone; a scatter that more of them have is no fault of points."""
 FOLDS = 5
 """Every so many points are left out in turn."""
 
@@ -85,7 +87,7 @@ class Judged(Generic[AnyFit]):
     adequate : None where it cannot be judged, with ``reason``
     fit : of the judged model; extended : with one effect of each class, the same where none is named
     classes : effects that make the model adequate, one class after the other
-    alone : the point that departs alone, where that is more likely than any effect; None for none, or where not looked for
+    alone : points that depart alone, where that is more likely than any effect; ``extended`` and ``classes`` are without them
     left_out : rms weighted residual of left-out points before and after; near 1 for a right model
     """
 
@@ -94,13 +96,13 @@ class Judged(Generic[AnyFit]):
     fit: AnyFit
     extended: AnyFit
     classes: tuple[EffectClass, ...]
-    alone: int | None
+    alone: tuple[int, ...]
     left_out: tuple[float, float]
 
     @property
     def unexplained(self) -> bool:
-        """Whether the model is not adequate with the named effects either."""
-        return self.adequate is False and not adequate(self.extended)
+        """Whether the model is not adequate with the named effects either, or points depart alone."""
+        return self.adequate is False and (bool(self.alone) or not adequate(self.extended))
 
     @property
     def recommended(self) -> tuple[str, ...]:
@@ -137,7 +139,7 @@ def judge(
     residuals : number of residuals, for the price of a parameter; the degrees of freedom of the smaller model where 0
     without_worst : the fit of a model without the point that departs most, and which that is: it contends with the effects
     """
-    classes, best, reason, alone = list[EffectClass](), base, "", None
+    classes, best, reason, alone = list[EffectClass](), base, "", tuple[int, ...]()
     good = adequate(base) if base.dof >= FEWEST_DOF else None
     if good is None:
         reason = f"{degrees_of_freedom(base.dof)}, at least {FEWEST_DOF} are needed; {remedy}"
@@ -148,9 +150,9 @@ def judge(
         next_class = _best_class(best, left, price, left_out)
         if without_worst:
             rest, worst = without_worst(best)
-            named = left[next_class.effects[0]] if next_class else None
-            alone = worst if _alone(best, rest) and (not named or _score(rest, price) < _score(named, price)) else None
-        if next_class is None or alone is not None:
+            rival = left[next_class.effects[0]] if next_class else best
+            alone = (worst,) if _departs_alone(best, rest, _score(rival, price), price) else ()
+        if next_class is None or alone:
             break
         classes.append(next_class)
         current.append(next_class.effects[0])
@@ -159,17 +161,42 @@ def judge(
     return Judged(good, reason, base, best, tuple(classes), alone, (before, left_out(best) if classes else before))
 
 
+def judge_points(count: int, verdict_on: Callable[[Flags], Judged[AnyFit]]) -> tuple[Judged[AnyFit], Flags]:
+    """The verdict on a model of points of which some may depart alone, and the points (n,) that do not.
+
+    Parameters
+    ----------
+    count : of points
+    verdict_on : the verdict on some of them, which names at most one that departs alone
+    """
+    kept = np.ones(count, dtype=bool)
+    first = judged = verdict_on(kept)
+    while judged.alone:
+        kept[np.flatnonzero(kept)[list(judged.alone)]] = False
+        if FEWEST_TO_ONE_ALONE * (count - kept.sum()) > count:  # no single points: all are worse than was stated
+            return replace(first, alone=()), np.ones(count, dtype=bool)
+        judged = verdict_on(kept)
+    alone = tuple(np.flatnonzero(~kept).tolist())
+    return replace(judged, adequate=first.adequate, fit=first.fit, alone=alone), kept
+
+
 def _score(fit: Fitted, price: float) -> float:
     """χ² with the price of the parameters, up to a constant; a point that is left out pays as two of them."""
     return fit.chi_square - price * fit.dof
 
 
-def _alone(fit: Fitted, rest: Fitted) -> bool:
-    """Whether a point, the worst of all, departs by more than the scatter of the rest."""
-    scatter = max(1.0, rest.chi_square / max(rest.dof, 1))
-    left_out = fit.dof - rest.dof
-    points = fit.dof / left_out
-    return bool(points * chi2_tail((fit.chi_square - rest.chi_square) / scatter, left_out) < ADDED_P)
+def _departs_alone(fit: Fitted, rest: Fitted, rival: float, price: float) -> bool:
+    """Whether a point, the worst of all, departs by more than the scatter of the rest, and more likely than by an effect.
+
+    ``rival``: score of the best effect. The point is one of many, where an effect is at its own place.
+    """
+    values = fit.dof - rest.dof  # of the point
+    if values <= 0:
+        return False
+    places = fit.dof / values
+    gain = (fit.chi_square - rest.chi_square) / max(1.0, rest.chi_square / max(rest.dof, 1))
+    score = _score(rest, price) + 2.0 * float(np.log(places))
+    return bool(places * chi2_tail(gain, values) < ADDED_P) and score < rival
 
 
 def _best_class(

@@ -1,20 +1,16 @@
 """Whether a model of a transfer function is good enough, where it fails, which effects are missing, what to measure next."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from inertial.dynamics.missing_effects import CLASS_WIDTH, FOLDS, EffectClass, Judged, judge
+from inertial.dynamics.missing_effects import CLASS_WIDTH, FOLDS, EffectClass, Judged, judge, judge_points
 from inertial.dynamics.transfer_effects import EFFECTS
 from inertial.dynamics.transfer_model import IDENTIFIED_SHARE, Points, TransferFit, best_of_exchange, fit_transfer
 
 SEPARATED = 10.0
 """Uncertainties of a point by which rival models must differ at a frequency that is proposed: several of their errors as well."""
-
-
-FEWEST_TO_ONE_ALONE = 10
-"""Points of a sweep to one that may depart alone; a scatter that more of them have is no fault of points."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +43,7 @@ class StatedParameter:
 class TransferDiagnosis(Judged[TransferFit]):
     """The verdict on a model of a transfer function.
 
-    alone_hz : frequencies of points that depart alone, left out of ``extended`` and ``classes``: to be measured again
+    alone_hz : frequencies of the points that depart alone
     where : parts of the frequency range with more than their share of χ²; empty for an adequate model
     error_percent, extended_percent : rms of the relative complex residual
     rivals : models that describe the points as well as ``extended``: another effect of a class, a filter that every device has,
@@ -62,11 +58,6 @@ class TransferDiagnosis(Judged[TransferFit]):
     rivals: tuple[TransferFit, ...]
     next_hz: tuple[float, ...]
     highest_hz: float
-
-    @property
-    def unexplained(self) -> bool:
-        """Whether the model is not adequate with the named effects either, or a point departs alone."""
-        return bool(self.alone_hz) or super().unexplained
 
     def parameter(self, name: str) -> StatedParameter:
         """A parameter of the extended model, as far as every model that the points do not exclude agrees."""
@@ -101,28 +92,19 @@ def diagnose_transfer(
     effects : of the model to judge
     highest_hz : to which the exciter reaches, for the next frequencies; the points' highest where None
     """
-    n = len(points.value)
-    kept = np.ones(n, dtype=bool)
-    first = judged = _judged(points, effects)
-    while judged.alone is not None:
-        kept[np.flatnonzero(kept)[judged.alone]] = False
-        if FEWEST_TO_ONE_ALONE * (n - kept.sum()) > n:  # no single points, but all are worse than was stated
-            kept[:], judged = True, replace(first, alone=None)
-            break
-        judged = _judged(points.picked(kept), effects)
-    rest, alone = points.picked(kept), points.conditions.frequency[~kept]
+    judged, kept = judge_points(len(points.value), lambda kept: _judged(points.picked(kept), effects))
+    rest, alone = points.picked(kept), tuple(sorted(points.conditions.frequency[~kept].tolist()))
     top = float(points.conditions.frequency.max())
-    open_end = first.adequate is None or judged.unexplained or alone.size > 0
+    open_end = judged.adequate is None or judged.unexplained
     rivals = () if open_end else _rivals(points, judged.extended, judged.classes)
-    further = _next_frequencies(rest, judged.extended, rivals, highest_hz or top)
     return TransferDiagnosis(
-        **vars(replace(judged, adequate=first.adequate, fit=first.fit)),
-        alone_hz=tuple(sorted(map(float, alone))),
-        where=_where(points, first.fit) if first.adequate is False else (),
-        error_percent=_error(points, first.fit),
+        **vars(judged),
+        alone_hz=alone,
+        where=_where(points, judged.fit) if judged.adequate is False else (),
+        error_percent=_error(points, judged.fit),
         extended_percent=_error(rest, judged.extended),
         rivals=rivals,
-        next_hz=tuple(sorted(map(float, alone))) or further,
+        next_hz=alone or _next_frequencies(rest, judged.extended, rivals, highest_hz or top),
         highest_hz=top,
     )
 

@@ -74,3 +74,18 @@ def test_a_single_mounting_cannot_be_judged_for_what_it_does_not_show() -> None:
     diagnosis = diagnose_spins(few, few.acceleration, np.full(6, 1e-5))
     assert diagnosis.adequate is None
     assert "add speeds" in diagnosis.reason
+
+
+@pytest.mark.parametrize("radii", [(0.5,), (0.3, 0.5)])
+def test_a_point_that_is_off_is_measured_again_and_names_no_effect(radii: tuple[float, ...]) -> None:
+    points = spins(radii, radius_error=0.0)
+    for k in range(20):
+        rng = np.random.default_rng([33, k])
+        out, error, _ = spun(points, {}, rng, floor_g=2e-5, share=0.0)
+        bad = int(rng.integers(len(out)))
+        out[bad] += rng.choice([-1.0, 1.0]) * rng.uniform(8.0, 40.0) * error[bad]
+        diagnosis = diagnose_spins(points, out, error)
+        assert diagnosis.alone == (bad,)
+        assert diagnosis.classes == ()
+        assert diagnosis.unexplained
+        assert f"{points.acceleration[bad]:+.4g} g" in diagnosis.next_steps[0]
