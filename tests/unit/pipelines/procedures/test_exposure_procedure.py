@@ -240,11 +240,13 @@ def test_a_lid_bends_at_altitude_and_what_leaked_out_remains() -> None:
 def test_damp_heat_swells_the_moulding_and_it_has_not_dried_after_the_recovery() -> None:
     hidden = Hidden(kind="moisture_diffusion", figures={"swelling": 0.02, "scale": 0.005})
     made, _, sign = exposed("iec_60068_2_30_db", hidden, cycles=1)
-    # at 55 °C the plate is full within 12 h (time constant 1.4 h): 93 % less the 45 % of the room, apart from what it lacked
+    # at 55 °C the plate is full within 12 h (time constant 1.4 h). For the dry poses there it has lost water for less than an
+    # hour: the room's air (45 % at 23 °C, vapour pressure 28.1 of 157.6 hPa) holds 8 % there
+    driest = 0.08 + (0.45 - 0.08) * np.exp(-1.0 / 1.4)
     for row, figures in zip(sign, made.figures.values(), strict=True):
         change, shift = one_of(figures, BIAS_IN), one_of(figures, BIAS)
-        full = 1e6 * 0.02 * (0.93 - 0.45) * row["xyz".index(change.axis)]
-        assert change.value == pytest.approx(full, rel=0.15)
+        saturated = change.value / (1e6 * 0.02 * row["xyz".index(change.axis)])
+        assert 0.93 - 0.45 < saturated < 0.93 - driest
         assert 0.3 < shift.value / change.value < 1.0
 
 
