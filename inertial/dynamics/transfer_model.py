@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import product
+from itertools import product as combinations
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -101,11 +101,12 @@ class TransferFit:
     def predicted(self, conditions: Conditions) -> tuple[Complex, Array, Array]:
         """The model at some points, and the standard uncertainty of its log magnitude and of its phase there, all (n,)."""
         coordinates = Coordinates(self.parameters)
-        at, middle = coordinates.of(self.values), self.response(conditions)
+        at, factor_at = coordinates.of(self.values), factor_of(self.effects, conditions)
+        middle = self.sensitivity * factor_at(self.values)
 
         def logarithm(x: Array) -> Complex:
             with np.errstate(all="ignore"):
-                return np.log(self.sensitivity * factor(self.effects, conditions, coordinates.values(x)) / middle)
+                return np.log(self.sensitivity * factor_at(coordinates.values(x)) / middle)
 
         steps = np.diag(PREDICTION_STEP * np.maximum(1.0, np.abs(at)))
         slopes = [np.ones(len(middle), dtype=np.complex128)]
@@ -135,22 +136,32 @@ class TransferFit:
 
 def factor(effects: Sequence[str], conditions: Conditions, values: Array) -> Complex:
     """Product of the effects' factors (n,) for parameter values (p,) in order."""
-    own: list[tuple[TransferEffect, tuple[Parameter, ...], Array]] = []
-    changes: dict[str, Array] = {}
-    at = 0
+    return factor_of(effects, conditions)(values)
+
+
+def factor_of(effects: Sequence[str], conditions: Conditions) -> Callable[[Array], Complex]:
+    """The product of the effects' factors (n,) at some points, as a function of the parameter values (p,) in order."""
+    owned: list[tuple[TransferEffect, tuple[str, ...], slice]] = []
+    at, count = 0, len(conditions.frequency)
     for name in effects:
-        effect, parameters = EFFECTS[name], EFFECTS[name].parameters(conditions)
-        part = values[at : at + len(parameters)]
-        own.append((effect, parameters, part))
-        for parameter, ratio in effect.changes(conditions, part).items():
-            changes[parameter] = changes.get(parameter, np.ones(1)) * ratio
-        at += len(parameters)
-    out = np.ones(len(conditions.frequency), dtype=np.complex128)
-    for effect, parameters, part in own:
-        ratios = [changes.get(p.name, np.ones(1)) for p in parameters]
-        changed = part if all(one.size == 1 for one in ratios) else _times(part, ratios, len(out))
-        out = out * effect.factor(conditions, changed)
-    return out
+        names = tuple(p.name for p in EFFECTS[name].parameters(conditions))
+        owned.append((EFFECTS[name], names, slice(at, at + len(names))))
+        at += len(names)
+
+    def product(values: Array) -> Complex:
+        changes: dict[str, Array] = {}
+        for effect, _, part in owned:
+            for parameter, ratio in effect.changes(conditions, values[part]).items():
+                changes[parameter] = changes.get(parameter, np.ones(1)) * ratio
+        out = np.ones(count, dtype=np.complex128)
+        for effect, names, part in owned:
+            changed = values[part]
+            if changes and any(name in changes for name in names):
+                changed = _times(changed, [changes.get(name, np.ones(1)) for name in names], count)
+            out = out * effect.factor(conditions, changed)
+        return out
+
+    return product
 
 
 def _times(values: Array, ratios: Sequence[Array], count: int) -> Array:
@@ -182,14 +193,14 @@ def fit_transfer(
         )
     low_end = np.argsort(conditions.frequency)[: max(3, len(points.value) // 5)]
     sign = -1.0 if np.median(np.abs(np.angle(points.value[low_end]))) > 0.5 * np.pi else 1.0
-    coordinates = Coordinates(parameters)
+    coordinates, factor_at = Coordinates(parameters), factor_of(effects, conditions)
     bounds = np.append(-np.inf, coordinates.low), np.append(np.inf, coordinates.high)
     error = np.concatenate([points.magnitude_error, points.phase_error])
 
     def deviation(x: Array) -> Array:
         values = coordinates.values(x[1:])
         with np.errstate(all="ignore"):
-            ratio = points.value / (sign * np.exp(x[0]) * factor(effects, conditions, values))
+            ratio = points.value / (sign * np.exp(x[0]) * factor_at(values))
             return np.nan_to_num(
                 np.concatenate([np.log(np.abs(ratio)), np.angle(ratio)]), nan=1e6, posinf=1e6, neginf=-1e6
             )
@@ -266,7 +277,7 @@ def _starts(parameters: Sequence[Parameter], near: Mapping[str, float], *, only_
         ((near[p.name],) if only_near else (near[p.name], *p.starts)) if p.name in near else p.starts
         for p in parameters
     ]
-    every = list(product(*choices))
+    every = list(combinations(*choices))
     low = np.array([p.low * (1.0 + 1e-9) if p.log else p.low for p in parameters])
     high = np.array([p.high for p in parameters])
     step = max(1, -(-len(every) // MOST_STARTS))
