@@ -233,7 +233,10 @@ class CentrifugeTest(InG, OnEquipment, RecordByRecord):
                         f"reads {ends} beside rω²; U of its reading {2.0 * (part.reference_ppm or 0.0):g} ppm",
                     ),
                 ]
-        return figures, [*texts, *diagnosis_text(judged(part, rows))]
+        diagnosis = judged(part, rows)
+        if diagnosis.alone:  # coefficients would follow the bad point
+            figures = self.nothing(part, "; ".join(diagnosis.next_steps[: len(diagnosis.alone)]), axis)
+        return figures, [*texts, *diagnosis_text(diagnosis)]
 
     def chart(self, part: CentrifugePart, points: pd.DataFrame) -> Chart:
         """Departure from the straight line over the acceleration, with the polynomial; each radius has a line of its own."""

@@ -25,15 +25,16 @@ CENTRIFUGE: Any = PROCEDURES["centrifuge"]
 
 @pytest.mark.parametrize("axis", ["x", "z"])
 @pytest.mark.parametrize("radii", [None, [0.5, 0.3]])
-@pytest.mark.parametrize("broken", [False, True])
+@pytest.mark.parametrize("fault", ["", "clipped", "one point off"])
 def test_figures_have_the_axis_of_the_points(
-    axis: str, radii: list[float] | None, rng: np.random.Generator, *, broken: bool
+    axis: str, radii: list[float] | None, rng: np.random.Generator, fault: str
 ) -> None:
     points = spins(tuple(radii or (0.5,)))
     value, error, _ = spun(points, {}, rng)
+    value[9] += 40.0 * error[9] * (fault == "one point off")
     rows = pd.DataFrame(
         {"unit": "A1", "axis": axis, "series": "output", "point": np.arange(value.size), "setting": points.acceleration,
-         "value": np.nan if broken else value, "uncertainty": error, "spread": 1e-4, "radius_m": points.radius_m}
+         "value": np.nan if fault == "clipped" else value, "uncertainty": error, "spread": 1e-4, "radius_m": points.radius_m}
     )  # fmt: skip
     content = {"kind": "centrifuge", "forces_g": sorted({*np.abs(points.acceleration).tolist()}), "full_scale_g": 30.0}
     content |= {"radii_m": radii} if radii else {"radius_m": 0.5}
@@ -41,6 +42,9 @@ def test_figures_have_the_axis_of_the_points(
     figures = CENTRIFUGE.evaluate(part, rows, Device({}, {}, 30.0, "g")).figures["A1"]
     assert len(figures) == len(CENTRIFUGE.figures)
     assert {one.axis for one in figures} == {axis}
+    assert any(one.identified for one in figures) == (not fault)
+    if fault == "one point off":
+        assert {one.note for one in figures} == {f"measure {points.acceleration[9]:+.4g} g again: it departs alone"}
 
 
 RADIUS_M, SENSOR_M = 0.5, 0.4
