@@ -11,6 +11,7 @@ import pytest
 from hypothesis import settings
 from once import begin, end
 from orchestrator import LOG, errors_in
+from threadpoolctl import threadpool_limits
 
 from inertial import effects
 
@@ -25,6 +26,7 @@ def fsync(fd: object) -> None:
 
 
 os.fsync = fsync
+threadpool_limits(1)  # small matrices take six times as long where the threads of several workers wait for each other
 pytest_plugins = ("left_open",)
 settings.register_profile("busy", deadline=None)  # other work on the machine decides how long a case takes
 settings.load_profile("busy")
