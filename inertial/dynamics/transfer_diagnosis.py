@@ -7,7 +7,14 @@ import numpy as np
 
 from inertial.dynamics.missing_effects import CLASS_WIDTH, FOLDS, EffectClass, Judged, judge, judge_points
 from inertial.dynamics.transfer_effects import EFFECTS
-from inertial.dynamics.transfer_model import IDENTIFIED_SHARE, Points, TransferFit, best_of_exchange, fit_transfer
+from inertial.dynamics.transfer_model import (
+    A_FEW,
+    IDENTIFIED_SHARE,
+    Points,
+    TransferFit,
+    best_of_exchange,
+    fit_transfer,
+)
 
 SEPARATED = 10.0
 """Uncertainties of a point by which rival models must differ at a frequency that is proposed: several of their errors as well."""
@@ -120,7 +127,9 @@ def _judged(points: Points, effects: Sequence[str]) -> Judged[TransferFit]:
     def without_worst(fit: TransferFit) -> tuple[TransferFit, int]:
         n = len(points.value)
         worst = int(np.argmax(fit.residual[:n] ** 2 + fit.residual[n:] ** 2))
-        return fit_transfer(points.picked(np.arange(n) != worst), fit.effects, fit.known, only_near=True), worst
+        return fit_transfer(
+            points.picked(np.arange(n) != worst), fit.effects, fit.known, only_near=True, steps=A_FEW
+        ), worst
 
     base = best_of_exchange(points, fit_transfer(points, effects))[0]
     return judge(
@@ -199,7 +208,9 @@ def _left_out(points: Points, fit: TransferFit) -> float:
         seen, unseen = points.picked(~out), points.picked(out)
         if not all(EFFECTS[name].seen(seen.conditions) for name in fit.effects):
             continue
-        predicted, *vague = fit_transfer(seen, fit.effects, fit.known, only_near=True).predicted(unseen.conditions)
+        predicted, *vague = fit_transfer(seen, fit.effects, fit.known, only_near=True, steps=A_FEW).predicted(
+            unseen.conditions
+        )
         ratio = unseen.value / predicted
         for off, error, own in zip(
             (np.log(np.abs(ratio)), np.angle(ratio)), (unseen.magnitude_error, unseen.phase_error), vague, strict=True

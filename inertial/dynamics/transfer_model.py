@@ -1,8 +1,8 @@
 """Fit of a transfer function: sensitivity times effects, each point weighted by its own uncertainty in magnitude and phase."""
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import product as combinations
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -16,6 +16,7 @@ from inertial.errors import NotIdentified
 MOST_STARTS = 1200  # combinations whose residual is looked at: it costs less than a step of a search
 SCREENED = 6  # of them that are searched from, those with the least residual
 POLISHED = 2  # of them that are carried to the end
+A_FEW, TO_THE_END = 12, 150  # steps
 PLAIN = Conditions(np.ones(2), np.ones(2), np.array([0.0, 1.0]), np.ones(2))
 """Points at which every effect has its parameters."""
 PREDICTION_STEP = 1e-6
@@ -170,7 +171,12 @@ def _times(values: Array, ratios: Sequence[Array], count: int) -> Array:
 
 
 def fit_transfer(
-    points: Points, effects: Sequence[str], near: Mapping[str, float] | None = None, *, only_near: bool = False
+    points: Points,
+    effects: Sequence[str],
+    near: Mapping[str, float] | None = None,
+    *,
+    only_near: bool = False,
+    steps: int = TO_THE_END,
 ) -> TransferFit:
     """The best fit of a model over several starts.
 
@@ -179,6 +185,7 @@ def fit_transfer(
     effects : ids of the effects; the sensitivity is always fitted
     near : values of parameters at which the search starts, by name, as those of a smaller model
     only_near : whether these parameters start there alone: the model describes the points already
+    steps : most of the last search; few will do for some of the points that gave ``near``
 
     Raises
     ------
@@ -209,20 +216,22 @@ def fit_transfer(
         return np.clip(deviation(x) / error, -1e6, 1e6)
 
     level = float(np.log(np.median(np.abs(points.value[low_end]))))
-    known, every = (
-        [np.append(level, coordinates.of(start)) for start in _starts(parameters, near or {}, only_near=alone)]
-        for alone in (True, False)
-    )
+
+    def starts(*, alone: bool) -> list[Array]:
+        return [np.append(level, coordinates.of(start)) for start in _starts(parameters, near or {}, only_near=alone)]
+
     # far from the solution all points are off by many of their uncertainties: starts are compared by the deviation itself
-    screened = [] if only_near else sorted(every, key=lambda x: float(np.sum(deviation(x) ** 2)))[:SCREENED]
+    screened = (
+        [] if only_near else sorted(starts(alone=False), key=lambda x: float(np.sum(deviation(x) ** 2)))[:SCREENED]
+    )
     # beside a known model by what a step leaves: a narrow mode is seen where its frequency is right, whatever its size
-    screened += sorted(known, key=lambda x: _after_a_step(residual, x))[:SCREENED] if near else []
+    screened += sorted(starts(alone=True), key=lambda x: _after_a_step(residual, x))[:SCREENED] if near else []
     tried = sorted(
-        (least_squares(residual, x, bounds=bounds, max_nfev=12, x_scale="jac") for x in screened),
+        (least_squares(residual, x, bounds=bounds, max_nfev=A_FEW, x_scale="jac") for x in screened),
         key=lambda one: one.cost,
     )
     done = [
-        least_squares(residual, one.x, bounds=bounds, max_nfev=150, x_scale="jac", xtol=1e-8, ftol=1e-8)
+        least_squares(residual, one.x, bounds=bounds, max_nfev=steps, x_scale="jac", xtol=1e-8, ftol=1e-8)
         for one in tried[:POLISHED]
     ]
     best = min(done, key=lambda one: one.cost)
@@ -277,8 +286,12 @@ def _starts(parameters: Sequence[Parameter], near: Mapping[str, float], *, only_
         ((near[p.name],) if only_near else (near[p.name], *p.starts)) if p.name in near else p.starts
         for p in parameters
     ]
-    every = list(combinations(*choices))
+    if not choices:
+        return [np.zeros(0)]
+    sizes = [len(choice) for choice in choices]
+    count = math.prod(sizes)
+    chosen = np.unravel_index(np.arange(0, count, max(1, -(-count // MOST_STARTS))), sizes)
     low = np.array([p.low * (1.0 + 1e-9) if p.log else p.low for p in parameters])
     high = np.array([p.high for p in parameters])
-    step = max(1, -(-len(every) // MOST_STARTS))
-    return [np.minimum(np.maximum(start, low), high) for start in every[::step]]
+    every = np.stack([np.array(choice)[at] for choice, at in zip(choices, chosen, strict=True)], axis=1)
+    return list(np.minimum(np.maximum(every, low), high))
