@@ -15,7 +15,7 @@ def test_amplitudes_near_the_noise_are_right_on_average_in_power_and_their_error
     true = 8.0 * sigma * np.sqrt(2.0 / COUNT)
     lines = [
         ripple_line(0.3 + true * np.sin(2.0 * np.pi * 123.0 * TIME + 1.0) + rng.normal(0.0, sigma, COUNT), RATE, 123.0)
-        for _ in range(400)
+        for _ in range(120)
     ]
     amplitude = np.array([one.amplitude for one in lines])
     assert np.sqrt(np.mean(amplitude**2)) == pytest.approx(true, rel=0.03)
@@ -26,7 +26,7 @@ def test_noise_that_is_louder_at_low_frequencies_makes_no_line() -> None:
     rng = np.random.default_rng(3)
     f = np.fft.rfftfreq(COUNT, 1.0 / RATE)
     found = []
-    for _ in range(200):
+    for _ in range(100):
         spectrum = (rng.standard_normal(f.size) + 1j * rng.standard_normal(f.size)) / np.sqrt(np.maximum(f, 0.1))
         line = ripple_line(np.fft.irfft(spectrum, COUNT), RATE, 20.0)
         found.append(line.amplitude > 4.0 * line.error)

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from long_suites import mostly_slow
 from numpy.typing import NDArray
 from scipy import optimize, signal
 from small_station import captured, lot_of, short_recipe, station_of
@@ -199,7 +200,9 @@ def largest_lag(change_K: float, over_s: float) -> float:
     return float(np.max(die - shell))
 
 
-@pytest.mark.parametrize("profile", ["mil_std_810_temperature_shock", "temperature_variation"])
+@pytest.mark.parametrize(
+    "profile", mostly_slow(["mil_std_810_temperature_shock", "temperature_variation"], "mil_std_810_temperature_shock")
+)
 def test_adhesive_yields_in_shocks_of_cold_and_not_in_slow_cycles(profile: str) -> None:
     shock = profile != "temperature_variation"
     hidden = Hidden(kind="yielding_adhesive", figures={"gain": 100e-6, "scale": 50e-6})
@@ -214,6 +217,7 @@ def test_adhesive_yields_in_shocks_of_cold_and_not_in_slow_cycles(profile: str) 
         assert made.findings[-1].text.startswith(f"{profile}: 3 legs, air at their ends within")
 
 
+@pytest.mark.slow
 def test_a_lid_bends_at_altitude_and_what_leaked_out_remains() -> None:
     hidden = Hidden(kind="leaky_lid", figures={"leak_h": 10.0, "deflection": 0.05, "scale": 0.01})
     made, points, sign = exposed("iec_60068_2_13_m", hidden)

@@ -55,6 +55,7 @@ def test_damping_that_follows_the_viscosity_of_its_gas_is_recognised_and_its_sha
     assert error < 0.05
 
 
+@pytest.mark.slow
 def test_a_spring_that_softens_is_recognised_in_the_natural_frequency() -> None:
     found = judged(swept({"kind": "softening_spring", "figures": {"times": 5.0}}, **WARM))
     assert found.adequate is False
