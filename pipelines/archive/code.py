@@ -17,8 +17,8 @@ _ENGINE = (
     *("inertial.estimation", "inertial.noise"),
 )
 _NOISE = (
-    *(*_TABLES, *_MODEL, "inertial.distributions", "inertial.dynamics", "inertial.noise"),
-    *("pipelines.stages.noise", "pipelines.stages.static_record"),
+    *(*_TABLES, *_MODEL, "inertial.distributions", "inertial.disturbances", "inertial.dynamics", "inertial.noise"),
+    *("inertial.record_faults", "pipelines.stages.noise", "pipelines.stages.static_record"),
 )
 _BUDGET = (
     *(*_TABLES, *_MODEL, "schemas", "inertial.correction", "inertial.distributions", "inertial.noise"),

@@ -1,6 +1,6 @@
 """The JSON documents of noise: Allan deviation and spectrum."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, NotRequired
 
 from typing_extensions import TypedDict
 
@@ -45,6 +45,17 @@ class NavigationRow(TypedDict):
     position_m: Annotated[list[float], "likewise"]
 
 
+class DisturbanceRow(TypedDict):
+    """What no noise explains in a channel of a record."""
+
+    channel: str
+    kind: Literal["spikes", "loud", "stuck", "jump"]
+    start_s: float
+    stop_s: Annotated[float, "behind the last sample; of a jump where it is"]
+    count: Annotated[int, "spikes, or samples"]
+    size: Annotated[float, "largest spike, change of the mean or standard deviation, in `unit`; 0 of a stuck output"]
+
+
 class AllanDocument(TypedDict):
     """``noise allan --json``: the overlapping Allan deviation of a record, or another statistic, and the noise terms."""
 
@@ -60,6 +71,9 @@ class AllanDocument(TypedDict):
     curves: list[AllanChannel]
     terms: Annotated[list[NoiseTermRow], "of the overlapping Allan deviation"]
     navigation: Annotated[list[NavigationRow], "empty where the unit is none of acceleration"]
+    disturbances: NotRequired[
+        Annotated[list[DisturbanceRow], "their channels have limits alone; of a captured run in `notes`"]
+    ]
     notes: list[str]
 
 
@@ -84,3 +98,4 @@ class PsdDocument(TypedDict):
     segment: Annotated[int, "samples of a segment"]
     frequency_hz: list[float]
     spectra: list[SpectrumChannel]
+    notes: list[str]

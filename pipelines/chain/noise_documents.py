@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from inertial.disturbances import disturbances
 from inertial.noise import terms as noise_terms
 from inertial.noise.allan import CONFIDENCE, overlapping
 from inertial.noise.navigation import TIMES_S, TO_M_S2, navigation_error
@@ -12,7 +13,15 @@ from inertial.noise.terms import NAMES, NoiseTerms, fit_terms, model_deviation
 from pipelines.archive import Run
 from pipelines.chain.documents import NavigationRow
 from pipelines.importers.series import EvenSeries
-from pipelines.stages.noise import FEWEST, UNEXPLAINED_P, alike, limits_where_unexplained, static_record
+from pipelines.stages.noise import (
+    FEWEST,
+    UNEXPLAINED_P,
+    alike,
+    disturbance_texts,
+    limits_where_unexplained,
+    static_record,
+    without_disturbed,
+)
 from pipelines.tables.frames import rows_of
 from schemas.errors import DataRejected, WrongUse
 
@@ -44,14 +53,18 @@ def allan_document(series: EvenSeries, spacing: str = "octave", statistic: str =
             f"{series.where}: no channel ever changes, noise is needed; check the channels and the digits"
         )
     curve = overlapping(series.values[alive], series.rate_hz, "decade" if spacing == "decade" else "octave")
-    fitted = fit_terms(curve)
+    disturbed = [disturbances(series.values[k]) for k in alive]
+    fitted = without_disturbed(fit_terms(curve), disturbed)
     terms = limits_where_unexplained(curve, fitted)
     explained = fitted.p_value >= UNEXPLAINED_P
     names = [series.names[k] for k in alive]
-    notes = [f"{series.names[k]}: the output never changes" for k in range(len(series.names)) if k not in alive]
+    told = [disturbance_texts(found, series.rate_hz, series.unit) for found in disturbed]
+    notes = [series.recognised] if series.recognised else []
+    notes += [f"{series.names[k]}: the output never changes" for k in range(len(series.names)) if k not in alive]
     notes += [
-        f"{name}: no mixture of the five terms explains the curve; the limits are what the whole curve allows"
-        for name, known in zip(names, explained, strict=True)
+        f"{name}: {', '.join(texts) if texts else 'no mixture of the five terms explains the curve'}; the limits are what the "
+        "whole curve allows"
+        for name, known, texts in zip(names, explained, told, strict=True)
         if not known
     ]
     shown, unit, about, model = curve, series.unit, ALLAN, model_deviation(terms, curve.tau)
@@ -83,8 +96,15 @@ def allan_document(series: EvenSeries, spacing: str = "octave", statistic: str =
         ],
         "terms": (rows := [row for k, name in enumerate(names) for row in _term_rows(name, terms, k, series.unit)]),
         "navigation": _navigation_rows(rows, series.unit),
+        "disturbances": [
+            {
+                "channel": name, "kind": one.kind, "start_s": one.start / series.rate_hz, "stop_s": one.stop / series.rate_hz,
+                "count": one.count, "size": one.size,
+            }
+            for name, found in zip(names, disturbed, strict=True) for one in found
+        ],
         "notes": notes,
-    }
+    }  # fmt: skip
 
 
 def _navigation_rows(terms: list[dict[str, Any]], unit: str) -> list[NavigationRow]:
@@ -244,4 +264,12 @@ def psd_document(series: EvenSeries, segment: int | None = None) -> dict[str, An
         "segment": length,
         "frequency_hz": spectrum.frequency.tolist(),
         "spectra": rows,
+        "notes": [
+            *filter(None, [series.recognised]),
+            *(
+                f"{name}: {', '.join(texts)}"
+                for name, own in zip(series.names, series.values, strict=True)
+                if (texts := disturbance_texts(disturbances(own), series.rate_hz, series.unit))
+            ),
+        ],
     }

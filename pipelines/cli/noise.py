@@ -203,6 +203,8 @@ def _print_psd(document: dict[str, Any]) -> None:
         for tau, derived, direct in zip(row["tau_s"], row["deviation_from_density"], row["deviation"], strict=True)
     ]
     print_table(["channel", "τ\ns", f"σ from the density\n{unit}", f"σ of the samples\n{unit}"], lines)
+    for note in document["notes"]:
+        say(note, style="yellow")
 
 
 def even_series(
@@ -225,7 +227,7 @@ def even_series(
             raise WrongUse(f"--unit-of: found '{more[0]}', output or time is needed; correct it")
         with error_console().status(f"reading {Path(source).name}"):
             return series_of_file(
-                Path(source), named, time=time, time_unit=units.get("time", "s"), rate_hz=rate, unit=units.get("output", "")
+                Path(source), named, time=time, time_unit=units.get("time", ""), rate_hz=rate, unit=units.get("output", "")
             )  # fmt: skip
     if columns or rate is not None or unit_of:
         raise WrongUse(f"{source}: --map, --rate and --unit-of are for files, and there is no such file; correct one")

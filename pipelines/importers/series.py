@@ -11,7 +11,7 @@ import pandas as pd
 
 from inertial.arrays import Array
 from pipelines.archive import Run
-from pipelines.importers import files
+from pipelines.importers import files, guesses
 from pipelines.importers.mapping import TIME_UNITS
 from pipelines.importers.values import finite_column
 from schemas.errors import DataRejected, WrongUse
@@ -33,6 +33,7 @@ class EvenSeries:
     """Evenly spaced samples.
 
     names : of the channels; values : (channels, n), in ``unit``; where : the file or run, for messages
+    recognised : what was not stated and how it was taken; empty where all was
     """
 
     names: tuple[str, ...]
@@ -40,6 +41,7 @@ class EvenSeries:
     rate_hz: float
     unit: str
     where: str
+    recognised: str = ""
 
 
 def series_of_file(
@@ -50,18 +52,27 @@ def series_of_file(
     Parameters
     ----------
     columns : names, or numbers from 1 for a text file without a header; all columns of numbers but the time where none is given
-    time : column of the time, in ``time_unit``; rate_hz : Hz; one of the two is needed
+    time : column of the time, in ``time_unit``; rate_hz : Hz; without both the columns are recognised, with their units
     unit : of the output, for printed results
 
     Raises
     ------
     WrongUse
-        Neither a time nor a rate, or both.
+        Both a time and a rate, or neither and no column is recognised as the time.
     DataRejected
         A column is not there or not of numbers, a value is not finite, or the samples are not evenly spaced.
     """
-    if bool(time) == (rate_hz is not None):
+    if time and rate_hz is not None:
         raise WrongUse(f"{path.name}: one of --map time=COLUMN and --rate HZ is needed; give one of the two")
+    recognised = ""
+    if not time and rate_hz is None:
+        time, found, columns, known_unit = _recognised(path, columns)
+        time_unit, unit = time_unit or found, unit or known_unit
+        listed = ", ".join(shown(name) for name in columns)
+        recognised = (
+            f"recognised: time '{shown(time)}' in {time_unit}, {listed} in {unit or 'an unknown unit'}; else --map"
+        )
+    time_unit = time_unit or "s"
     if time_unit not in TIME_UNITS:
         raise WrongUse(
             f"--unit-of: time: found '{shown(time_unit)}', one of {', '.join(TIME_UNITS)} is needed; correct it"
@@ -73,7 +84,21 @@ def series_of_file(
     values = np.stack([finite_column(table, name, path.name) for name in chosen])
     _refuse_clock(chosen, values, path.name, named=bool(columns), timed=bool(time))
     rate = rate_hz or _rate(TIME_UNITS[time_unit] * finite_column(table, time, path.name), path.name)
-    return EvenSeries(tuple(chosen), values, float(rate), unit, path.name)
+    return EvenSeries(tuple(chosen), values, float(rate), unit, path.name, recognised)
+
+
+def _recognised(path: Path, columns: Sequence[str]) -> tuple[str, str, Sequence[str], str]:
+    """Column of the time and its unit, those of the outputs where none are named, and their unit, as an import takes them."""
+    content, _ = files.read_content(path)
+    known = guesses.guesses(content)
+    time = known.column("time")
+    if not time:
+        found = ", ".join(shown(str(name)) for name in content.table.columns)
+        raise WrongUse(
+            f"{path.name}: none of the columns {found} is recognised as the time; give --map time=COLUMN or --rate HZ"
+        )
+    axes = [name for axis in AXES if (name := known.column(axis))]
+    return time, known.time_unit.meaning or "s", columns or axes, known.output.meaning if axes else ""
 
 
 def series_of_run(run: Run, record: int | None) -> EvenSeries:

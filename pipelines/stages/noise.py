@@ -1,6 +1,6 @@
 """Noise of the static record: Allan deviation with its intervals, and the noise terms that explain it."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -8,6 +8,7 @@ import pandas as pd
 
 from inertial.arrays import Array
 from inertial.distributions import chi2_upper
+from inertial.disturbances import Disturbance, disturbances
 from inertial.noise.allan import AllanCurve, overlapping
 from inertial.noise.flicker import FLICKER_FLOOR
 from inertial.noise.terms import NoiseTerms, fit_terms, model_deviation
@@ -89,8 +90,8 @@ def noise(record: StaticRecord | None) -> dict[str, pd.DataFrame]:
     data sheets; ``B_bound`` = min σ/0.664 is only an upper bound of B. Records longer than 2¹⁸ samples are read table by table
     and averaged to that length, so that their curves begin at a longer averaging time. The response of the output to the
     temperature of the record, by the model's tempco, is subtracted first. The rounding of coarse digits is subtracted from N if
-    possible. A channel that is silent, too short or not finite has rows without a value. The column ``note`` states each of
-    these.
+    possible. A channel that is silent, too short or not finite has rows without a value, one with spikes, a louder stretch or a
+    jump has upper limits alone. The column ``note`` states each of these.
     """
     if record is None:
         return _nothing()
@@ -98,10 +99,15 @@ def noise(record: StaticRecord | None) -> dict[str, pd.DataFrame]:
     curves, rows = list[pd.DataFrame](), list[tuple[object, ...]]()
     for group in alike(channels):
         curve = overlapping(np.stack([one.record for one in group]), rate / size)
-        terms = limits_where_unexplained(curve, fit_terms(curve))
+        disturbed = [disturbances(one.record) for one in group]
+        terms = limits_where_unexplained(curve, without_disturbed(fit_terms(curve), disturbed))
         terms = without_digits(terms, [one.digits for one in group], rate)
         curves.append(_curve_rows(group, curve, terms))
-        rows += [row for place, one in enumerate(group) for row in _term_rows(one, terms, place)]
+        noted = [
+            replace(one, warmth="; ".join(filter(None, [*disturbance_texts(found, rate / size, "µg"), one.warmth])))
+            for one, found in zip(group, disturbed, strict=True)
+        ]
+        rows += [row for place, one in enumerate(noted) for row in _term_rows(one, terms, place)]
         for one in group:
             stability = bias_stability(one.record, rate / size)
             if stability is not None:
@@ -211,6 +217,30 @@ def alike(channels: list[StaticChannel]) -> list[list[StaticChannel]]:
 def _sorted(curves: pd.DataFrame, order: dict[tuple[str, str], int]) -> pd.DataFrame:
     place = [order[key] for key in zip(curves["unit"], curves["axis"], strict=True)]
     return curves.iloc[np.argsort(place, kind="stable")].reset_index(drop=True)
+
+
+def without_disturbed(terms: NoiseTerms, disturbed: Sequence[Sequence[Disturbance]]) -> NoiseTerms:
+    """The terms of channels of which some hold what no noise explains: no mixture of terms describes these."""
+    return replace(terms, chi2=np.where([bool(found) for found in disturbed], np.inf, terms.chi2))
+
+
+def disturbance_texts(found: Sequence[Disturbance], rate_hz: float, unit: str) -> list[str]:
+    """What is said of the disturbances of a channel, the first of each kind in full."""
+    texts: list[str] = []
+    for kind, own in (
+        (kind, [one for one in found if one.kind == kind]) for kind in dict.fromkeys(one.kind for one in found)
+    ):
+        first, more = own[0], f" (and {len(own) - 1} more)" if len(own) > 1 else ""
+        start, stop, size = first.start / rate_hz, first.stop / rate_hz, f"{first.size:+.3g} {unit}".strip()
+        texts.append(
+            {
+                "spikes": f"{first.count} spikes between {start:.6g} and {stop:.6g} s, the largest {size}",
+                "stuck": f"the output repeats itself from {start:.6g} to {stop:.6g} s{more}",
+                "loud": f"the noise is louder from {start:.6g} to {stop:.6g} s{more}",
+                "jump": f"the mean jumps by {size} at {start:.6g} s{more}",
+            }[kind]
+        )
+    return texts
 
 
 def limits_where_unexplained(curve: AllanCurve, terms: NoiseTerms) -> NoiseTerms:

@@ -122,8 +122,10 @@ def test_a_wrong_name_a_gap_a_missing_rate_and_a_dead_channel_are_refused_or_tol
     message = refused("noise", "allan", record, "--map", "time=t", "--statistic", "hadamart")
     assert "--statistic: found 'hadamart', one of allan, modified, hadamard" in message
     assert "did you mean hadamard" in message
-    assert "one of --map time=COLUMN and --rate HZ is needed" in refused("noise", "allan", record)
     table = pd.read_csv(record)
+    table[["ax", "ay"]].to_csv(tmp_path / "no_time.csv", index=False)
+    message = refused("noise", "allan", tmp_path / "no_time.csv")
+    assert "none of the columns ax, ay is recognised as the time; give --map time=COLUMN or --rate HZ" in message
     table.drop(index=700).to_csv(tmp_path / "gap.csv", index=False)
     assert "after row 700 the time steps by 0.02 s" in refused(
         "noise", "allan", tmp_path / "gap.csv", "--map", "time=t"

@@ -1,0 +1,140 @@
+"""What is no noise in a record at rest: spikes, louder and stuck stretches, jumps. Terms of noise do not describe them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import median_filter
+
+from inertial.arrays import Array, Flags, Index, runs_of
+from inertial.record_faults import frozen
+
+NORMAL = 0.6745  # median of the magnitude of a standard normal value
+NEIGHBOURS = 7  # samples of the running median
+FAR = 8.0
+"""Standard deviations of a sample or of a block's variance that are no chance: 1e-15 of normal ones."""
+BESIDE, MANY = 32, 8  # samples between those of a burst, at most, and those of the shortest burst
+MATERIAL = 0.05
+"""Share of the white variance from which on spikes or a louder stretch count: N is 2.5 % larger by it."""
+BLOCKS, SHORTEST_BLOCK = 128, 64
+LOUDER = 1.5  # of the variance of a block over the usual one
+JUMP = 7.0
+"""Standard deviations of a change of the mean: 3e-12 of normal ones, with the spread known to a fifth."""
+SHORTEST, FEWEST = 16, 32  # samples of a mean, and means of a record by whose changes their spread is known
+SHARP = 2.0
+"""Growth of the change over four times the span below which it is a jump: a drift grows four times, a jump not at all."""
+
+
+@dataclass(frozen=True)
+class Disturbance:
+    """A part of a record that its noise does not explain.
+
+    kind : ``spikes``, ``loud``, ``stuck`` or ``jump``
+    start, stop : samples, from the first to behind the last; of a jump where it is
+    count : of spikes, or of samples · size : largest spike, change of the mean, or standard deviation; unit of the record
+    """
+
+    kind: str
+    start: int
+    stop: int
+    count: int
+    size: float
+
+
+def disturbances(record: Array) -> list[Disturbance]:
+    """Spikes, louder stretches and jumps of a record (n,) at rest, each by what is usual in the rest of it.
+
+    Noise of any colour whose steps are normal has none of them, nor a drift or a slow wave. Spikes and loud stretches count only
+    where they change the white noise.
+    """
+    quick = record - median_filter(record, NEIGHBOURS, mode="nearest")
+    spread = max(_spread(quick), _spread(np.diff(record)) / np.sqrt(2.0))
+    far = np.abs(quick) > FAR * spread if spread > 0.0 else np.zeros(record.size, dtype=bool)  # 0: coarse digits
+    rest = np.where(far, 0.0, quick)
+    found = [Disturbance("stuck", one.start, one.stop, one.count, 0.0) for one in frozen(record[:, None])]
+    found += _louder(_bursts(far) | _loud(rest), quick)
+    within: Flags = np.zeros(record.size, dtype=bool)
+    for one in found:
+        within[max(one.start - BESIDE, 0) : one.stop + BESIDE] = True
+    rows = np.flatnonzero(far & ~within)
+    if float(np.sum(quick[rows] ** 2)) > MATERIAL * float(np.sum(rest**2)):
+        worst = float(quick[rows[np.argmax(np.abs(quick[rows]))]])
+        found.insert(0, Disturbance("spikes", int(rows[0]), int(rows[-1]) + 1, rows.size, worst))
+    return found + [one for one in _jumps(record - np.where(far, quick, 0.0)) if not within[one.start]]
+
+
+def _louder(loud: Flags, quick: Array) -> list[Disturbance]:
+    """The louder stretches (n,) of a record's quick part."""
+    return [
+        Disturbance("loud", int(a), int(b), int(b - a), float(np.std(quick[a:b])))
+        for a, b in zip(*runs_of(loud), strict=True)
+    ]
+
+
+def _bursts(far: Flags) -> Flags:
+    """Stretches of many samples that are far off, close to each other."""
+    places, burst = np.flatnonzero(far), np.zeros(far.size, dtype=bool)
+    for own in np.split(places, np.flatnonzero(np.diff(places) > BESIDE) + 1):
+        if own.size >= MANY:
+            burst[own[0] : own[-1] + 1] = True
+    return burst
+
+
+def _spread(values: Array) -> float:
+    """Standard deviation of values (n,) by the median of their magnitudes about their median."""
+    return float(np.median(np.abs(values - np.median(values)))) / NORMAL
+
+
+def _loud(quick: Array) -> Flags:
+    """Blocks whose quick noise is far above that of the others, and their neighbours, which may be loud in part."""
+    loud = np.zeros(quick.size, dtype=bool)
+    size = max(quick.size // BLOCKS, SHORTEST_BLOCK)
+    count = quick.size // size
+    if count < FEWEST:
+        return loud
+    power = (quick[: count * size].reshape(count, size) ** 2).mean(axis=1)
+    usual = float(np.median(power))
+    scatter = max(_spread(power), usual * np.sqrt(2.0 / size))
+    own = (power > LOUDER * usual) & (power - usual > FAR * scatter)
+    if float(np.sum(power[own] - usual)) > MATERIAL * count * usual:
+        loud[: count * size] = np.repeat(np.convolve(own, np.ones(3), "same") > 0, size)
+    return loud
+
+
+def _jumps(record: Array) -> list[Disturbance]:
+    """Changes of the mean that are as sudden as can be told, the largest first."""
+    sums = np.concatenate([[0.0], np.cumsum(record - record.mean())])
+    found: list[tuple[float, Disturbance]] = []
+    taken: Flags = np.zeros(record.size, dtype=bool)
+    digits, counts = np.unique(record, return_counts=True)
+    changing = 1.0 - float(counts.max()) / record.size if digits.size > 1 else 1.0
+    span = 2 ** int(np.ceil(np.log2(SHORTEST / changing)))  # of coarse digits, as long as means of them are normal
+    while FEWEST * span <= record.size:
+        at = np.arange(span, record.size - span + 1, max(span // 4, 1))
+        change = _changes(sums, at, span)
+        middle, spread = float(np.median(change)), _spread(change)
+        far = np.flatnonzero(np.abs(change - middle) > JUMP * spread) if spread > 0.0 else np.zeros(0, dtype=int)
+        for places in np.split(far, np.flatnonzero(np.diff(far) > 8) + 1):
+            if not places.size:
+                continue
+            best = int(places[np.argmax(np.abs(change[places] - middle))])
+            place, size = int(at[best]), float(change[best] - middle)
+            if taken[max(place - span, 0) : place + span].any() or not _sharp(sums, place, span, size, spread):
+                continue
+            taken[max(place - span, 0) : place + span] = True
+            found.append((abs(size) / spread, Disturbance("jump", place, place, 1, size)))
+        span *= 2
+    return [one for _, one in sorted(found, key=lambda pair: -pair[0])]
+
+
+def _changes(sums: Array, at: Index, span: int) -> Array:
+    """Mean of ``span`` samples from each place on, less that of as many before it."""
+    return (sums[at + span] - 2.0 * sums[at] + sums[at - span]) / span
+
+
+def _sharp(sums: Array, place: int, span: int, size: float, spread: float) -> bool:
+    """Whether a change has hardly grown over four times the span."""
+    wide = min(4 * span, place, sums.size - 1 - place)
+    if wide < 2 * span:
+        return False
+    whole = float(_changes(sums, np.array([place]), wide)[0])
+    return abs(whole) < SHARP * abs(size) * (wide / span) / 4.0 + 3.0 * spread
