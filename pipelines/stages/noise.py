@@ -108,7 +108,7 @@ def noise(record: StaticRecord | None) -> dict[str, pd.DataFrame]:
             for one, found in zip(group, disturbed, strict=True)
         ]
         rows += [row for place, one in enumerate(noted) for row in _term_rows(one, terms, place)]
-        for one in group:
+        for one in noted:
             stability = bias_stability(one.record, rate / size)
             if stability is not None:
                 rows.append((one.unit, one.axis, TERM, *stability, True, "µg", one.warmth))

@@ -67,6 +67,20 @@ def test_a_short_record_and_one_that_is_not_finite_refuse_nobody_else(calibratio
     assert table[(table["unit"] == "U001") & (table["term"] == "N")]["identified"].all()
 
 
+def test_a_jump_in_one_channel_leaves_limits_there_and_terms_elsewhere(calibration: dict) -> None:
+    values = white(np.random.default_rng(5_150_905))
+    values[1, 2500:, 1] += 400.0
+    table = terms(calibration, values)
+    struck = table.loc["U001", "y"]
+    assert not struck["identified"].any()
+    assert struck["note"].drop("B_bound").str.startswith("the mean jumps by +").all()
+    at = float(struck["note"]["N"].removesuffix(" s").rpartition(" ")[2])
+    assert at == pytest.approx(250.0, abs=2.0)
+    assert np.isfinite(struck["high"]).all()
+    others = table.drop(index=[("U001", "y", t) for t in struck.index]).xs("N", level="term")
+    assert others["identified"].all()
+
+
 def test_the_known_tempco_of_a_drifting_room_is_taken_out_of_a_record_and_told(calibration: dict) -> None:
     rng = np.random.default_rng(5_150_904)
     n = 36_000
