@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from inertial.counts import number_of
 from inertial.data_errors.faults.fault import Fault, Look
 from inertial.data_errors.readings import Readings
 
@@ -24,7 +25,7 @@ def dropped(readings: Readings) -> Iterator[Fault]:
     for unit, row in enumerate(readings.count / np.maximum(expected, 1e-9)):
         places = np.flatnonzero(row < 0.85)
         if places.size:
-            evidence = f"{places.size} dwells hold as little as {float(np.nanmin(row)):.0%} of the samples"
+            evidence = f"{number_of(places.size, 'dwell')} hold as little as {float(np.nanmin(row)):.0%} of the samples"
             yield Fault("dropped_samples", unit, tuple(places.tolist()), evidence)
 
 

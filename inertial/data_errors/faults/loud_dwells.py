@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from inertial.arrays import Flags
+from inertial.counts import number_of
 from inertial.data_errors.faults.fault import Fault, Look
 from inertial.data_errors.readings import Readings
 
@@ -33,7 +34,7 @@ def noisy(readings: Readings) -> Iterator[Fault]:
             name,
             unit,
             tuple(places.tolist()),
-            f"scatter up to {worst:.0f} times the unit's own in {places.size} dwells",
+            f"scatter up to {worst:.0f} times the unit's own in {number_of(places.size, 'dwell')}",
         )
 
 

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from inertial.counts import number_of
 from inertial.data_errors.faults.fault import Fault, Look
 from inertial.data_errors.readings import Readings
 
@@ -18,7 +19,9 @@ def outliers(readings: Readings) -> Iterator[Fault]:
     for unit, row in enumerate(np.asarray(out)):
         places = np.flatnonzero(row)
         if 0 < places.size <= 0.1 * row.size:
-            yield Fault("spikes", unit, tuple(places.tolist()), f"{places.size} dwells far from the others")
+            yield Fault(
+                "spikes", unit, tuple(places.tolist()), f"{number_of(places.size, 'dwell')} far from the others"
+            )
 
 
 LOOK = Look(outliers, ("spikes",), order=120)

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from inertial.arrays import Places
+from inertial.counts import number_of
 from inertial.data_errors.faults.fault import Fault, Look
 from inertial.data_errors.readings import Readings
 
@@ -14,7 +15,9 @@ def stuck(readings: Readings) -> Iterator[Fault]:
     for unit, out in enumerate(readings.output):
         still = _still(readings, unit)
         if still.size:
-            evidence = f"an axis is constant in {still.size} dwells: it has no scatter, unlike in the others"
+            evidence = (
+                f"an axis is constant in {number_of(still.size, 'dwell')}: it has no scatter, unlike in the others"
+            )
             yield Fault("stuck_output", unit, tuple(still.tolist()), evidence)
             continue
         moved = np.linalg.norm(np.diff(readings.force[unit], axis=0), axis=-1) > 0.05
@@ -25,7 +28,7 @@ def stuck(readings: Readings) -> Iterator[Fault]:
                 "stuck_output",
                 unit,
                 tuple(places.tolist()),
-                f"output repeats exactly in {places.size} dwells of new poses",
+                f"output repeats exactly in {number_of(places.size, 'dwell')} of new poses",
             )
 
 
