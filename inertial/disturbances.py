@@ -1,5 +1,6 @@
 """What is no noise in a record at rest: spikes, louder and stuck stretches, jumps. Terms of noise do not describe them."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -60,6 +61,25 @@ def disturbances(record: Array) -> list[Disturbance]:
         worst = float(quick[rows[np.argmax(np.abs(quick[rows]))]])
         found.insert(0, Disturbance("spikes", int(rows[0]), int(rows[-1]) + 1, rows.size, worst))
     return found + [one for one in _jumps(record - np.where(far, quick, 0.0)) if not within[one.start]]
+
+
+def disturbance_texts(found: Sequence[Disturbance], rate_hz: float, unit: str) -> list[str]:
+    """What is said of the disturbances of a channel sampled at ``rate_hz``, a text for each kind; ``unit``: of the record."""
+    texts: list[str] = []
+    for kind, own in (
+        (kind, [one for one in found if one.kind == kind]) for kind in dict.fromkeys(one.kind for one in found)
+    ):
+        first, more = own[0], f" (and {len(own) - 1} more)" if len(own) > 1 else ""
+        start, stop, size = first.start / rate_hz, first.stop / rate_hz, f"{first.size:+.3g} {unit}".strip()
+        texts.append(
+            {
+                "spikes": f"{first.count} spikes between {start:.6g} and {stop:.6g} s, the largest {size}",
+                "stuck": f"the output repeats itself from {start:.6g} to {stop:.6g} s{more}",
+                "loud": f"the noise is louder from {start:.6g} to {stop:.6g} s{more}",
+                "jump": f"the mean jumps by {size} at {start:.6g} s{more}",
+            }[kind]
+        )
+    return texts
 
 
 def _louder(loud: Flags, quick: Array) -> list[Disturbance]:

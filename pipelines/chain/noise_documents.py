@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from inertial.disturbances import disturbances
+from inertial.disturbances import disturbance_texts, disturbances
 from inertial.noise import terms as noise_terms
 from inertial.noise.allan import CONFIDENCE, overlapping
 from inertial.noise.navigation import TIMES_S, TO_M_S2, navigation_error
@@ -17,7 +17,6 @@ from pipelines.stages.noise import (
     FEWEST,
     UNEXPLAINED_P,
     alike,
-    disturbance_texts,
     limits_where_unexplained,
     static_record,
     without_disturbed,

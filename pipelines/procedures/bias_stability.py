@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 from pydantic import Field
 
+from inertial.disturbances import disturbance_texts, disturbances
 from inertial.dynamics.stability import StabilityFigures, block_means, stability
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace
 from pipelines.procedures.base import InG, NominalScale, RecordByRecord, scale_of
@@ -75,7 +76,13 @@ class BiasStability(InG, RecordByRecord):
         }
         names = zip(self.figures, ("sd_100s", "drift_h", "allan_100s"), strict=True)
         figures = [worst([_figure(spec.name, key, axis, one) for axis, one in by_axis.items()]) for spec, key in names]
-        return figures, [("definitions of bias stability", _text(axis, one)) for axis, one in by_axis.items()]
+        texts = [("definitions of bias stability", _text(axis, one)) for axis, one in by_axis.items()]
+        for axis, own in rows.groupby("axis", sort=False):
+            if told := disturbance_texts(disturbances(own["value"].to_numpy(dtype=float)), rate, "µg"):
+                texts.append(
+                    ("disturbed record", f"axis {axis}: {', '.join(told)}; the figures hold it, measure again")
+                )
+        return figures, texts
 
     def chart(self, part: BiasStabilityPart, points: pd.DataFrame) -> Chart:
         """Means of 10 s and of 100 s of every axis over time, each about its mean."""

@@ -8,7 +8,7 @@ import pandas as pd
 
 from inertial.arrays import Array
 from inertial.distributions import chi2_upper
-from inertial.disturbances import Disturbance, disturbances
+from inertial.disturbances import Disturbance, disturbance_texts, disturbances
 from inertial.noise.allan import AllanCurve, overlapping
 from inertial.noise.flicker import FLICKER_FLOOR
 from inertial.noise.terms import NoiseTerms, fit_terms, model_deviation
@@ -222,25 +222,6 @@ def _sorted(curves: pd.DataFrame, order: dict[tuple[str, str], int]) -> pd.DataF
 def without_disturbed(terms: NoiseTerms, disturbed: Sequence[Sequence[Disturbance]]) -> NoiseTerms:
     """The terms of channels of which some hold what no noise explains: no mixture of terms describes these."""
     return replace(terms, chi2=np.where([bool(found) for found in disturbed], np.inf, terms.chi2))
-
-
-def disturbance_texts(found: Sequence[Disturbance], rate_hz: float, unit: str) -> list[str]:
-    """What is said of the disturbances of a channel, the first of each kind in full."""
-    texts: list[str] = []
-    for kind, own in (
-        (kind, [one for one in found if one.kind == kind]) for kind in dict.fromkeys(one.kind for one in found)
-    ):
-        first, more = own[0], f" (and {len(own) - 1} more)" if len(own) > 1 else ""
-        start, stop, size = first.start / rate_hz, first.stop / rate_hz, f"{first.size:+.3g} {unit}".strip()
-        texts.append(
-            {
-                "spikes": f"{first.count} spikes between {start:.6g} and {stop:.6g} s, the largest {size}",
-                "stuck": f"the output repeats itself from {start:.6g} to {stop:.6g} s{more}",
-                "loud": f"the noise is louder from {start:.6g} to {stop:.6g} s{more}",
-                "jump": f"the mean jumps by {size} at {start:.6g} s{more}",
-            }[kind]
-        )
-    return texts
 
 
 def limits_where_unexplained(curve: AllanCurve, terms: NoiseTerms) -> NoiseTerms:
