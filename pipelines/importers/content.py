@@ -43,10 +43,16 @@ class Content:
         return f"row {index + 1}"
 
 
+_ENDINGS = {one: one for one in ("s", "ms", "us", "µs", "ns", "g", "mg", "V", "mV", "LSB")}
+_ENDINGS |= dict.fromkeys(("m_s2", "m_s_2", "mps2"), "m/s^2")
+
+
 def unit_in(name: str) -> str:
-    """The unit in brackets at the end of a column's name; empty if there is none."""
+    """The unit at the end of a column's name, in brackets or behind an underscore (``time_ms``, ``out_g``); empty for none."""
     match = _BRACKETS.search(name)
-    return match[1] if match else ""
+    if match:
+        return match[1]
+    return next((unit for ending, unit in _ENDINGS.items() if name.endswith(f"_{ending}")), "")
 
 
 def begins_with(magic: bytes) -> Callable[[bytes], bool]:
