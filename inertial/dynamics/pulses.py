@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import butter, lfilter, sosfiltfilt
 
-from inertial.arrays import Array
+from inertial.arrays import Array, Index
 from inertial.dynamics.spectra import STANDARD_GRAVITY
 from inertial.errors import NotIdentified
 
@@ -111,8 +111,35 @@ HALF_WIDTH = 2.0 / 3.0
 """Part of a half sine's duration between the points at half of its peak."""
 CUT = 6.0
 """Corner of the low-pass behind which a pulse is measured, over its duration: it takes 0.3 % off a half sine."""
+FINE, CLOSE = 24.0, 12
+"""Samples of a pulse from which on a lone one shows, and those about it that are smooth."""
 _ALIKE = 0.15
 _SETTLED = 0.02
+
+
+def lone_samples(record: Array, rate_hz: float, duration_s: float) -> Index:
+    """Samples (m,) of a record (n,) that depart alone, by a tenth of its range and far above the noise: faults of a data line.
+
+    A sample that is off by g has a second difference of −2·g and its neighbours one of g each; a pulse has nearly the same
+    everywhere, and a ringing changes it from sample to sample. None where a pulse has few samples, and kinks as sharp.
+    """
+    if rate_hz * duration_s < FINE or record.size < 2 * CLOSE:
+        return np.zeros(0, dtype=np.intp)
+    bent = np.diff(record, 2)
+    off = np.zeros(record.size)
+    off[2:-2] = (bent[:-2] - 2.0 * bent[1:-1] + bent[2:]) / 6.0
+    size = np.abs(off)
+    limit = max(0.1 * float(np.ptp(record)), 12.0 * float(np.median(size)))
+    return np.array(
+        [
+            k
+            for k in np.flatnonzero(size > limit)
+            if size[k] == size[max(k - 2, 0) : k + 3].max()
+            and max(size[max(k - CLOSE, 0) : max(k - 2, 0)].max(initial=0.0), size[k + 3 : k + CLOSE].max(initial=0.0))
+            < 0.25 * size[k]
+        ],
+        dtype=np.intp,
+    )
 
 
 def low_passed(record: Array, rate_hz: float, duration_s: float) -> Array:

@@ -169,8 +169,10 @@ class ShockTest(InG, OnEquipment, FromWaveforms, Compares):
             pair = shock_records.filtered_pair(
                 in_g if alone else one.record.samples[REFERENCE], one.own, axis, scale[axis], duration
             )
+            both = [one.own] if alone else [one.own, one.record.samples[REFERENCE]]
+            lone_s = shock_records.lone_sample(both, axis, duration)
             of_shock = shock_records.rows_of(
-                one.number, direction, one.own.output[:, axis], pair, before_s, device, alone=alone
+                one.number, direction, one.own.output[:, axis], pair, before_s, device, alone=alone, lone_s=lone_s
             )
             names = ("unit",) if alone else ("reference", "unit")
             if not alone:

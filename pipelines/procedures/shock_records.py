@@ -74,6 +74,16 @@ def waves(number: int, pair: Pair, direction: float, part: Any, noise_g: float) 
     )
 
 
+def lone_sample(records: Sequence[UnitRecord], axis: int, duration: float) -> float:
+    """Time of the first sample of the records that departs alone, s from their begin; nan for none."""
+    found = [
+        float(one.time[k] - one.time[0])
+        for one in records
+        for k in pulses.lone_samples(one.output[:, axis], one.rate_hz, duration)[:1]
+    ]
+    return min(found, default=np.nan)
+
+
 def judged(rows: pd.DataFrame, part: Any) -> ShockDiagnosis | None:
     """The diagnosis of the first shock in each direction; None where no waveforms are kept."""
     kept = rows[rows["series"] == "compared"]
@@ -160,13 +170,15 @@ def rows_of(
     device: Device,
     *,
     alone: bool = False,
+    lone_s: float = np.nan,
 ) -> list[dict[str, Any]]:
-    """The pulses of reference and unit and their ratio; no value where the unit shows no pulse or clips.
+    """The pulses of reference and unit and their ratio; no value where the unit shows no pulse or clips, or a sample is off.
 
     Parameters
     ----------
     raw : (n,), output of the unit as recorded; pair : both channels in g behind their low-pass
     alone : no reference was recorded; the first of the pair is not looked at
+    lone_s : time of a sample of either that departs alone; nan for none
     """
     (reference, rate), (unit, unit_rate) = pair
     about = {"point": number, "setting": direction}
@@ -179,7 +191,7 @@ def rows_of(
     clipped = device.at_end(raw) + device.at_end(raw - still) + at_extreme(raw)[2] > 0
     ratio = error = under = noise = np.nan
     with suppress(NotIdentified):
-        if not clipped:
+        if not clipped and np.isnan(lone_s):
             answer = pulses.measured_pulse(unit, unit_rate, before_s=before_s)
             noise = answer.noise
             rows.append(about | {"series": "pulse"} | _columns(answer, unit, unit_rate))
@@ -187,7 +199,7 @@ def rows_of(
                 ratio = answer.peak / drive.peak
                 error = abs(ratio) * float(np.hypot(answer.peak_error / answer.peak, drive.peak_error / drive.peak))
                 under = 100.0 * (answer.undershoot - drive.undershoot)
-    compared = {"value": ratio, "uncertainty": error, "undershoot_percent": under, "noise_g": noise}
+    compared = {"value": ratio, "uncertainty": error, "undershoot_percent": under, "noise_g": noise, "lone_s": lone_s}
     return [*rows, about | {"series": "ratio", "clipped": float(clipped), "alone": float(alone)} | compared]
 
 
@@ -265,6 +277,12 @@ def _without(ratio: pd.DataFrame, good: int) -> str:
     clipped = int((ratio["clipped"] > 0.0).sum())
     if clipped:
         return f"{clipped} of {len(ratio)} shocks clip the output; lower the peak, or choose a wider range"
+    lone = ratio["lone_s"].dropna() if "lone_s" in ratio else ratio["value"].iloc[:0]
+    if len(lone):
+        return (
+            f"{len(lone)} of {len(ratio)} shocks {'has' if len(lone) == 1 else 'have'} a sample that departs alone, at "
+            f"{lone.iloc[0]:.6g} s of its record; check the data line, shock again"
+        )
     if "alone" in ratio and bool((ratio["alone"] > 0.0).any()):
         return "recorded without a reference, which a comparison needs; record one beside the unit"
     return (
