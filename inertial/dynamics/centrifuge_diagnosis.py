@@ -8,7 +8,7 @@ import numpy as np
 from inertial.arrays import Array
 from inertial.dynamics.centrifuge import radii_as_observed
 from inertial.dynamics.centrifuge_effects import EFFECTS, Spins
-from inertial.dynamics.missing_effects import FOLDS, Judged, breakers_of, judge, judge_points
+from inertial.dynamics.missing_effects import FOLDS, BadPoint, Judged, breakers_of, judge, judge_points
 from inertial.errors import NotIdentified
 
 DEFAULT = ("second_order", "third_order")
@@ -112,7 +112,7 @@ def _judged(points: Spins, output: Array, error: Array, effects: Sequence[str]) 
         lambda more, _: fit_spins(points, output, error, more),
         lambda fit: _left_out(points, output, error, fit.effects),
         remedy="add speeds, or measure the other mounting too",
-        without_worst=without_worst,
+        bad_point=BadPoint(without_worst),
     )
 
 

@@ -1,6 +1,6 @@
 """The verdict on the model of a dynamic test: whether it is adequate, and which effects are missing, in classes."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Generic, Protocol, TypeVar
 
@@ -110,6 +110,18 @@ class Judged(Generic[AnyFit]):
         return tuple(one.effects[0] for one in self.classes)
 
 
+@dataclass(frozen=True)
+class BadPoint(Generic[AnyFit]):
+    """A point that departs alone, as a cause of a misfit.
+
+    without : the fit of the same model without the point that departs most, and which that is
+    located : effects that may sit at any point, as a mode does: beside a bad point they pay for their place, too
+    """
+
+    without: Callable[[AnyFit], tuple[AnyFit, int]]
+    located: Collection[str] = ()
+
+
 def breakers_of(classes: Sequence[EffectClass], effects: Mapping[str, DynamicEffect]) -> tuple[str, ...]:
     """The measurements that separate the first two members of each class of several effects."""
     open_classes = [one for one in classes if len(one.effects) > 1]
@@ -125,7 +137,7 @@ def judge(
     *,
     remedy: str,
     residuals: int = 0,
-    without_worst: Callable[[AnyFit], tuple[AnyFit, int]] | None = None,
+    bad_point: BadPoint[AnyFit] | None = None,
 ) -> Judged[AnyFit]:
     """The verdict on a model, with the classes of effects that make it adequate.
 
@@ -137,7 +149,7 @@ def judge(
     left_out : rms weighted residual of points that a fit of this model has not seen
     remedy : what gives more degrees of freedom
     residuals : number of residuals, for the price of a parameter; the degrees of freedom of the smaller model where 0
-    without_worst : the fit of a model without the point that departs most, and which that is: it contends with the effects
+    bad_point : how a point that departs alone contends with the effects; None where none is looked for
     """
     classes, best, reason, alone = list[EffectClass](), base, "", tuple[int, ...]()
     good = adequate(base) if base.dof >= FEWEST_DOF else None
@@ -148,10 +160,11 @@ def judge(
         left = {name: extended_fit([*current, name], best) for name in candidates if name not in current}
         price = float(np.log(residuals or max(best.dof, 2)))
         next_class = _best_class(best, left, price, left_out)
-        if without_worst:
-            rest, worst = without_worst(best)
+        if bad_point:
+            rest, worst = bad_point.without(best)
             rival = left[next_class.effects[0]] if next_class else best
-            alone = (worst,) if _departs_alone(best, rest, _score(rival, price), price) else ()
+            sought = next_class is not None and next_class.effects[0] in bad_point.located
+            alone = (worst,) if _departs_alone(best, rest, rival, price, sought=sought) else ()
         if next_class is None or alone:
             break
         classes.append(next_class)
@@ -185,18 +198,19 @@ def _score(fit: Fitted, price: float) -> float:
     return fit.chi_square - price * fit.dof
 
 
-def _departs_alone(fit: Fitted, rest: Fitted, rival: float, price: float) -> bool:
+def _departs_alone(fit: Fitted, rest: Fitted, rival: Fitted, price: float, *, sought: bool) -> bool:
     """Whether a point, the worst of all, departs by more than the scatter of the rest, and more likely than by an effect.
 
-    ``rival``: score of the best effect. The point is one of many, where an effect is at its own place.
+    ``rival``: fit with the best effect. The point is one of many; so is the place of an effect that was ``sought`` among them.
     """
     values = fit.dof - rest.dof  # of the point
     if values <= 0:
         return False
-    places = fit.dof / values
+    points = fit.dof / values
+    place = 2.0 * float(np.log(points))
     gain = (fit.chi_square - rest.chi_square) / max(1.0, rest.chi_square / max(rest.dof, 1))
-    score = _score(rest, price) + 2.0 * float(np.log(places))
-    return bool(places * chi2_tail(gain, values) < ADDED_P) and score < rival
+    ahead = _score(rest, price) + place < _score(rival, price) + place * sought
+    return bool(points * chi2_tail(gain, values) < ADDED_P) and ahead
 
 
 def _best_class(

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from inertial.dynamics.missing_effects import CLASS_WIDTH, FOLDS, EffectClass, Judged, judge, judge_points
+from inertial.dynamics.missing_effects import CLASS_WIDTH, FOLDS, BadPoint, EffectClass, Judged, judge, judge_points
 from inertial.dynamics.transfer_effects import EFFECTS
 from inertial.dynamics.transfer_model import (
     A_FEW,
@@ -131,6 +131,7 @@ def _judged(points: Points, effects: Sequence[str]) -> Judged[TransferFit]:
             points.picked(np.arange(n) != worst), fit.effects, fit.known, only_near=True, steps=A_FEW
         ), worst
 
+    located = [name for name, one in EFFECTS.items() if any(p.unit == "Hz" for p in one.parameters(points.conditions))]
     base = best_of_exchange(points, fit_transfer(points, effects))[0]
     return judge(
         base,
@@ -140,7 +141,7 @@ def _judged(points: Points, effects: Sequence[str]) -> Judged[TransferFit]:
         lambda fit: _left_out(points, fit),
         remedy="sweep more frequencies",
         residuals=len(base.residual),
-        without_worst=without_worst,
+        bad_point=BadPoint(without_worst, located),
     )
 
 
