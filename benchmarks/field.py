@@ -3,9 +3,10 @@
 Each log is made by mechanics: a wrist that rests and moves and breathes, a pilot who lays a vehicle on its sides and then flies
 it, a telephone that is put down at the stops of a ride. A sensor with bias, scale factors, angles between its axes, their run
 with temperature, white and 1/f noise reads it. The log is given to the recognition and fit of `tumbleline improve` as a file,
-and nothing is said of it. Prints for each kind how many logs gave coefficients, and which part of the biases and
-scale factors lies within U (k = 2) of the truth, all and by quantity, and the median U of each in 10⁻⁶ (µg, ppm). Kinds that do not determine the axes (level flight, a
-telephone in its holder, a logger on a desk) have to be refused: their row counts scale factors that were stated.
+and nothing is said of it. Prints for each kind how many logs gave coefficients, which part of the biases and scale factors lies
+within U (k = 2) of the truth, all and by quantity, and the median U of each in 10⁻⁶ (µg, ppm). Kinds that do not determine the
+axes (level flight, a telephone in its holder, a logger on a desk) have to be refused: their row counts scale factors that were
+stated.
 """
 
 from __future__ import annotations
@@ -249,7 +250,12 @@ def main() -> None:
             for quantity, values in own.items():
                 errors[quantity] += values.tolist()
             if given.verbose:
-                print(k, {quantity: np.round(values[:, 0], 2).tolist() for quantity, values in own.items()}, said, flush=True)
+                print(
+                    k,
+                    {quantity: np.round(values[:, 0], 2).tolist() for quantity, values in own.items()},
+                    said,
+                    flush=True,
+                )
         if name in UNSEEN:
             print(f"{name}: {given.runs} logs, scale factors stated in {gave}", flush=True)
             continue

@@ -98,7 +98,7 @@ def _bias(done: FittedNorms) -> Array:
 
 
 def _holds_at(done: FittedNorms) -> float | None:
-    """Temperature, °C, at which values without terms in temperature hold: the mean of the first unit's dwells, if all have one."""
+    """Temperature, °C, at which values without terms in temperature hold: the mean of the first unit's dwells, if known."""
     heat = done.measured.readings.temperature
     mean = np.nan if heat is None else float(np.mean(heat[0, done.measured.readings.there[0]]))
     return mean if np.isfinite(mean) else None
