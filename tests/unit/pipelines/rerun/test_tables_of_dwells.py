@@ -159,6 +159,7 @@ def test_values_that_all_units_share_are_fitted_where_units_lack_dwells() -> Non
     )
     whole, found = (fit(one, None, model)["coefficients"] for one in (dwells, dwells[~lacks]))
     offset = found.query("effect == 'outer_encoder_offset'")
+    np.testing.assert_allclose(np.linalg.norm(dwells[["force_x", "force_y", "force_z"]], axis=1), 1.0)  # at the angles
     assert len(set(offset["value"])) == 1
     np.testing.assert_allclose(offset["value"], 2e-4, atol=2.5 * offset["standard_error"].iloc[0])
     both = found.merge(whole, on=["unit", "axis", "effect", "name"], suffixes=("", "_whole"))
