@@ -137,9 +137,10 @@ def _askew(up: Array, down: Array, response: Array) -> str:
     if apart[odd] > _ODD * np.sort(apart)[1]:
         return ""
     lean = np.degrees(np.linalg.norm(sums[odd] - 0.5 * (sums[odd - 1] + sums[odd - 2])))
+    pair = f"+{AXES[odd]} and -{AXES[odd]}"
     return (
-        f"CHECK THE FACES: +{AXES[odd]} and -{AXES[odd]} disagree with the other faces: one of the two leans by about {lean:.1f}°; stand the "
-        "device against a right angle, or record 10 positions, whose fit needs no face"
+        f"CHECK THE FACES: {pair} disagree with the other faces: one of the two leans by about {lean:.1f}°; stand the device "
+        "against a right angle, or record 10 positions, whose fit needs no face"
     )
 
 

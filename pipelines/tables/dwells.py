@@ -225,7 +225,7 @@ def lot_arrays(
         if {*table.spreads, "n"} <= set(dwells.columns)
         else _untold_error(dwells, table.shape),
         out_unit=out_units[0],
-        missing=None if table.whole else np.isnan(table.by_axis(table.outputs)).any(axis=-1),
+        missing=None if table.whole else np.asarray(np.isnan(table.by_axis(table.outputs)).any(axis=-1)),
     )
 
 
