@@ -2,7 +2,7 @@
 
 :func:`measured` takes dwells as they are: units may lack some, and the reference may be angles or nothing. :func:`lot_arrays`
 needs every dwell of every unit and a reference force, as a fit in the output's own unit does: a lot that lacks some is
-fitted in :attr:`LotTables.parts`. Both have the same state.
+fitted in :attr:`LotTables.parts`, or, for values that all units share, as :attr:`LotTables.with_gaps`. All have the same state.
 """
 
 from __future__ import annotations
