@@ -3,9 +3,10 @@
 Each log is made by mechanics: a wrist that rests and moves and breathes, a pilot who lays a vehicle on its sides and then flies
 it, a telephone that is put down at the stops of a ride. A sensor with bias, scale factors, angles between its axes, their run
 with temperature, white and 1/f noise reads it. The log is given to the recognition and fit of `tumbleline improve` as a file,
-and nothing is said of it. Prints for each kind how many logs gave coefficients, and which part of the biases and
-scale factors lies within U (k = 2) of the truth, all and by quantity. Kinds that do not determine the axes (level flight, a
-telephone in its holder, a logger on a desk) have to be refused: their row counts scale factors that were stated.
+and nothing is said of it. Prints for each kind how many logs gave coefficients, which part of the biases and scale factors lies
+within U (k = 2) of the truth, all and by quantity, and the median U of each in 10⁻⁶ (µg, ppm). Kinds that do not determine the
+axes (level flight, a telephone in its holder, a logger on a desk) have to be refused: their row counts scale factors that were
+stated.
 """
 
 from __future__ import annotations
@@ -203,7 +204,7 @@ def coefficients(motion: Motion, output: Floats, folder: Path) -> tuple[pd.DataF
 
 
 def pulls(table: pd.DataFrame, sensor: Sensor, warm: float | None) -> dict[str, Floats]:
-    """Errors over U (k = 2) of the biases and scale factors, by quantity; K is zero below its diagonal.
+    """Errors over U, and U (k = 2), of the biases and scale factors, (n, 2) by quantity; K is zero below its diagonal.
 
     warm : °C at the rests, where the model has no terms in temperature, so that its values are those there; None elsewhere
     """
@@ -213,9 +214,10 @@ def pulls(table: pd.DataFrame, sensor: Sensor, warm: float | None) -> dict[str, 
     truth = {("bias", axis): sensor.bias[k] + theta * sensor.bias_K[k] for k, axis in enumerate("xyz")}
     truth |= {("scale", axis): upper[k, k] for k, axis in enumerate("xyz")}
     rows = table[table["effect"].isin(["bias", "scale"])]
-    found: dict[str, list[float]] = {"bias": [], "scale": []}
+    found: dict[str, list[tuple[float, float]]] = {"bias": [], "scale": []}
     for row in rows.to_dict("records"):
-        found[row["effect"]].append((row["value"] - truth[row["effect"], row["axis"]]) / (2.0 * row["standard_error"]))
+        wide = 2.0 * row["standard_error"]
+        found[row["effect"]].append(((row["value"] - truth[row["effect"], row["axis"]]) / wide, wide))
     return {name: np.array(values) for name, values in found.items()}
 
 
@@ -248,13 +250,22 @@ def main() -> None:
             for quantity, values in own.items():
                 errors[quantity] += values.tolist()
             if given.verbose:
-                print(k, {quantity: np.round(values, 2).tolist() for quantity, values in own.items()}, said, flush=True)
+                print(
+                    k,
+                    {quantity: np.round(values[:, 0], 2).tolist() for quantity, values in own.items()},
+                    said,
+                    flush=True,
+                )
         if name in UNSEEN:
             print(f"{name}: {given.runs} logs, scale factors stated in {gave}", flush=True)
             continue
-        within = {quantity: np.abs(values) <= 1.0 for quantity, values in errors.items()}
+        found = {quantity: np.array(values) for quantity, values in errors.items() if values}
+        within = {quantity: np.abs(values[:, 0]) <= 1.0 for quantity, values in found.items()}
         every = np.concatenate([*within.values()])
-        said = ", ".join(f"{quantity} {interval(int(w.sum()), len(w))}" for quantity, w in within.items() if len(w))
+        said = ", ".join(
+            f"{quantity} {interval(int(w.sum()), len(w))} (median U {1e6 * np.median(found[quantity][:, 1]):.0f})"
+            for quantity, w in within.items()
+        )
         print(
             f"{name}: {given.runs} logs, coefficients of {gave}; within U {100.0 * every.mean():.1f} %: {said}",
             flush=True,

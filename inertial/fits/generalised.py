@@ -11,7 +11,7 @@ from itertools import product
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from inertial.arrays import Array
+from inertial.arrays import Array, Flags, Index
 
 _STEP = 10.0
 SHARES = (0.0, *(0.1 * _STEP ** np.arange(7)).tolist())
@@ -45,7 +45,7 @@ class Solved:
 
 
 class Series:
-    """The series of a lot.
+    """The series of a lot; ``dof`` (..., 3) has the degrees of freedom of each.
 
     Parameters
     ----------
@@ -54,9 +54,25 @@ class Series:
     z : (..., 3, n), measurements
     profile : (n,), white standard deviation of each dwell, about one
     kernels : covariances (n, n) of the kinds of wander, of variance one
+    missing : (..., n), measurements that a block lacks, whatever stands in their place; None where all have all. A coefficient of
+        its own for each of them takes it out of coefficients, squares and restricted likelihood exactly
     """
 
-    def __init__(self, h: Array, s: Array, z: Array, profile: Array, kernels: tuple[Array, ...]) -> None:
+    def __init__(
+        self,
+        h: Array,
+        s: Array,
+        z: Array,
+        profile: Array,
+        kernels: tuple[Array, ...],
+        missing: Flags | None = None,
+    ) -> None:
+        self._own = h.shape[-1]
+        lacking = 0 if missing is None else np.count_nonzero(missing, axis=-1)[..., None]
+        self.dof: Index = np.broadcast_to(h.shape[-2] - h.shape[-1] - lacking, z.shape[:-1]).astype(np.int64)
+        self._gaps = missing is not None and bool(missing.any())
+        if missing is not None and self._gaps:
+            h = np.concatenate([np.broadcast_to(h, (*z.shape, self._own)), _indicators(missing, z.shape)], axis=-1)
         scale = np.sqrt(np.mean(h**2, axis=-2, keepdims=True))
         self._scale = np.where(scale > 0.0, scale, 1.0)
         self._h, self._z, self.kernels = h / self._scale, z, kernels
@@ -66,11 +82,6 @@ class Series:
         self.white = np.diag(profile**2)
         self.sound = np.ones(z.shape[:-1], dtype=bool)
         self._grids: dict[bytes, Restricted] = {}
-
-    @property
-    def dof(self) -> int:
-        """Degrees of freedom of one block."""
-        return self._z.shape[-1] - self._h.shape[-1]
 
     def covariance(self, shares: Sequence[float]) -> Array:
         """Covariance (n, n) of a series over the variance of its white part."""
@@ -82,6 +93,9 @@ class Series:
         whiten = solve_triangular(root, np.eye(len(root)), lower=True)
         h = np.matmul(whiten, self._h)
         gram = np.swapaxes(h, -1, -2) @ h
+        if self._gaps:  # blocks with fewer gaps than others have columns of zeros
+            empty = np.diagonal(gram, axis1=-2, axis2=-1) == 0.0
+            gram = gram + np.where(empty, 1.0, 0.0)[..., None] * np.eye(gram.shape[-1])
         inverse = np.linalg.inv(gram)
         gain = inverse @ np.swapaxes(h, -1, -2)
         z = np.matmul(self._z, whiten.T)
@@ -95,11 +109,12 @@ class Series:
         theta = np.matmul(gain, z[..., None])[..., 0]
         squares = np.sum((z - np.matmul(h, theta[..., None])[..., 0]) ** 2, axis=-1)
         variance, deviance = self._restricted(squares, root, gram, shared_inverse)
-        size = self._scale[..., 0, :]
+        own = self._own
+        size = self._scale[..., 0, :own]
         return Solved(
-            theta=theta / size,
-            inverse=inverse / (size[..., :, None] * size[..., None, :]),
-            gain=(gain @ whiten) / size[..., None],
+            theta=theta[..., :own] / size,
+            inverse=inverse[..., :own, :own] / (size[..., :, None] * size[..., None, :]),
+            gain=(gain[..., :own, :] @ whiten) / size[..., None],
             shared=shared / self._size,
             shared_inverse=shared_inverse / np.outer(self._size, self._size),
             squares=squares,
@@ -110,7 +125,7 @@ class Series:
     def _restricted(self, squares: Array, root: Array, gram: Array, shared_inverse: Array) -> tuple[float, float]:
         """Variance of the white part and restricted deviance of the sound blocks."""
         blocks = int(self.sound.sum())
-        dof = blocks * self.dof - len(shared_inverse)
+        dof = int(self.dof[self.sound].sum()) - len(shared_inverse)
         variance = float(np.sum(squares[self.sound])) / dof
         logdet = np.broadcast_to(np.linalg.slogdet(gram)[1], squares.shape)[self.sound].sum()
         if len(shared_inverse):
@@ -121,7 +136,7 @@ class Series:
 
     def deviances(self, first: Array, second: Array) -> Array:
         """Restricted deviance of the sound blocks, (k, l), for shares (k,) of the first kernel and (l,) of the second."""
-        if self._s.shape[-1]:
+        if self._s.shape[-1] or self._gaps:
             grid = [self.solve(pair).deviance for pair in product(first.tolist(), second.tolist())]
             return np.reshape(grid, (len(first), len(second)))
         blocks = self.sound.tobytes()
@@ -151,6 +166,13 @@ class Series:
         weight = belief * np.exp(-0.5 * (deviance - deviance.min()))
         weight = weight / weight.sum()
         return float(weight.sum(axis=1) @ flicker**2), float(weight.sum(axis=0) @ walk**2)
+
+
+def _indicators(missing: Flags, shape: tuple[int, ...]) -> Array:
+    """Columns (..., 3, n, k) of one at a gap of the block each, zeros behind them, for k gaps at most in a block."""
+    place = np.cumsum(missing, axis=-1) - 1
+    columns = (place[..., None] == np.arange(int(place.max()) + 1)) & missing[..., None]
+    return np.broadcast_to(columns[..., None, :, :], (*shape, columns.shape[-1])).astype(np.float64)
 
 
 def _around(shares: Array) -> Array:

@@ -2,7 +2,8 @@
 
 The residual |f| − g of a dwell is fᵀ/|f| times the three axes' errors. Axes that wander alike and independently therefore give
 cov(ρ) = s²·(diag(e²) + (F·K_F + W·K_W) ∘ (u·uᵀ)) with the directions u of the force, flicker K_F and random walk K_W. Both
-shares and s² are estimated with the coefficients' columns projected out (restricted likelihood).
+shares and s² are estimated with the coefficients' columns projected out (restricted likelihood). A run of bias and scale with
+temperature that the model lacks is noise too, of a standard deviation that is stated.
 """
 
 from collections.abc import Sequence
@@ -11,13 +12,20 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from inertial.arrays import Array
+from inertial.arrays import Array, Flags
 from inertial.fits.wander import student
 from inertial.noise.flicker import flicker_kernel
 from inertial.noise.measurands import walk_kernel
 
 _SHARES = np.concatenate([[0.0], 10.0 ** np.arange(-1.0, 5.0)])
 _FINER = (10.0**0.5, 10.0**0.25)
+
+RUN_PER_K = {"bias_temperature": 500e-6, "scale_temperature": 100e-6}
+"""Standard deviation of the run with temperature of a bias, g/K, and of a scale factor, 1/K, of which nothing is known.
+
+Data sheets of sensors of telephones and autopilots state 0.1 to 1.2 mg/K and 0.01 to 0.03 %/K. Of flights that warm by 4 K
+(`benchmarks/field.py`) half and twice these values change the median U of a bias by 7 %, of a scale factor by 18 %, at most.
+"""
 
 
 def whitener_of_norms(residual: Array, rows: Array, direction: Array, time: Array, error: Array) -> Array:
@@ -49,6 +57,33 @@ def whitener_of_norms(residual: Array, rows: Array, direction: Array, time: Arra
         near = [(f * a, w * b) for a in (1.0 / step, 1.0, step) for b in (1.0 / step, 1.0, step)]
         best = min([best, *((deviance(one), one) for one in dict.fromkeys(near))], key=lambda one: one[0])
     return np.asarray(solve_triangular(root(*best[1]), np.eye(time.size), lower=True))
+
+
+def runs_left_out(effects: Sequence[str], temperature: Array | None, direction: Array, there: Flags) -> Array:
+    """What the runs with temperature that a model lacks add to the norms, (units, n, k), g: standard deviations by column.
+
+    Coefficients of a fit with this noise hold at the mean temperature of the dwells. A dwell shows the run of an axis as far as
+    the force points along it.
+
+    Parameters
+    ----------
+    temperature : (units, n), °C; direction : (units, n, 3), unit vectors of the force
+    there : (units, n), dwells of the fit; the columns of a unit with an unknown temperature among them are zero
+    """
+    if temperature is None:
+        return np.zeros((*direction.shape[:2], 0))
+    mean = np.mean(temperature, axis=1, where=there, keepdims=True)  # no number where one of the temperatures is none
+    rise = np.nan_to_num(temperature - mean)[..., None]
+    columns = {"bias_temperature": direction, "scale_temperature": direction**2}
+    lacking = [RUN_PER_K[name] * rise * own for name, own in columns.items() if name not in effects]
+    return np.concatenate([np.zeros((*direction.shape[:2], 0)), *lacking], axis=-1)
+
+
+def with_runs(whiten: Array, columns: Array) -> Array:
+    """A whitener (units, n, n), lower triangular, of noise to which columns (units, n, k) with unit variance are added."""
+    white = whiten @ columns
+    root = np.linalg.cholesky(np.eye(white.shape[-2]) + white @ np.swapaxes(white, -1, -2))
+    return np.asarray(np.linalg.solve(root, whiten), dtype=np.float64)
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from inertial.arrays import Array, Flags
+from inertial.arrays import Array, Flags, Index
 from inertial.design import Values
 from inertial.distributions import chi2_quantile, chi2_upper, normal_tail, student_upper
 from inertial.errors import NotIdentified
@@ -107,7 +107,7 @@ def _kept_kernels(times: bytes, used: bytes) -> tuple[Array, Array]:
     return kernels
 
 
-def fit_lot_with_wander(
+def fit_lot_with_wander(  # noqa: PLR0913 - what a fit needs, and what of it is known already
     effects: Sequence[str],
     state: State,
     output: Array,
@@ -116,6 +116,7 @@ def fit_lot_with_wander(
     nonlinear: Values | None = None,
     used: Flags | None = None,
     plain: LotFit | None = None,
+    missing: Flags | None = None,
     believed: Callable[[Array, Array], Combined] | None = None,
 ) -> WanderFit:
     """Generalised least-squares fit of a model to the dwells of a lot.
@@ -129,6 +130,7 @@ def fit_lot_with_wander(
     nonlinear : values of nonlinear parameters that were found on the same dwells; their errors enter those of the coefficients
     used : (n,), the dwells that are fitted; the others only have residuals. All where None
     plain : the fit of these dwells under white noise alone, where it is known
+    missing : (units, n), dwells that a unit lacks, with any finite outputs and errors; None where all have all
     believed : combines coefficients (..., 3, p) and their covariance with a prior
 
     Raises
@@ -143,7 +145,8 @@ def fit_lot_with_wander(
     error = np.broadcast_to(standard_error, output.shape)
     there = np.ones(output.shape[-2], dtype=bool) if used is None else used
     if plain is None:
-        plain = fit_lot(effects, state, output, np.where(there[:, None], error, np.inf), nonlinear=nonlinear)
+        known = there if missing is None else there & ~missing
+        plain = fit_lot(effects, state, output, np.where(known[..., None], error, np.inf), nonlinear=nonlinear)
     if np.any(plain.dof <= 0):
         raise NotIdentified(
             f"wander: {int(there.sum())} dwells for {plain.coefficients.shape[-1]} coefficients per axis leave nothing to "
@@ -157,7 +160,10 @@ def fit_lot_with_wander(
     kernels = wander_kernels(time, there)
     cut = tuple(k[np.ix_(there, there)] for k in kernels)
     shared = columns.shared / level[..., None]
-    series = Series(columns.local[..., there, :], shared[..., there, :], (z / level)[..., there], profile[there], cut)
+    gaps = None if missing is None else missing[..., there]
+    series = Series(
+        columns.local[..., there, :], shared[..., there, :], (z / level)[..., there], profile[there], cut, gaps
+    )
     shares, solved = _solve(series)
     stretch = lack_of_fit(solved.squares / solved.variance, series.dof)
     covariance = np.diag(profile**2) + sum(s * k for s, k in zip(shares, kernels, strict=True))
@@ -169,9 +175,9 @@ def fit_lot_with_wander(
     wide = np.sqrt(solved.variance * stretch)[..., None] * level
     known = _known(series, shares, solved)
     own = _covariance(shared[..., there, :], solved) * (known * wide[..., None]) ** 2
-    apart = _apart(((z - inside) / level)[..., there])
+    apart = _apart(((z - inside) / level)[..., there], gaps)
     if apart is not None:
-        alone = Series(columns.local[..., there, :], shared[..., there, :0], apart, profile[there], cut)
+        alone = Series(columns.local[..., there, :], shared[..., there, :0], apart, profile[there], cut, gaps)
         alone.sound = series.sound
         own = own * _widening(alone, solved.gain, own / level[..., None] ** 2)
     of_prior = None
@@ -209,7 +215,7 @@ def fit_lot_with_wander(
     )
 
 
-def _apart(residuals: Array) -> Array | None:
+def _apart(residuals: Array, gaps: Flags | None) -> Array | None:
     """The residuals (units, 3, n) without what the units have in common, where that is more than noise; None elsewhere.
 
     Errors of the station are alike in all units. Larger than the noise of quiet devices they are taken for its white part, and
@@ -218,6 +224,9 @@ def _apart(residuals: Array) -> Array | None:
     units = residuals.shape[0] if residuals.ndim > 2 else 1
     if units == 1:
         return None
+    if gaps is not None:  # of the units that have the dwell
+        residuals = np.where(gaps[:, None, :], np.nan, residuals)
+        residuals = np.where(np.isnan(residuals), np.nanmean(residuals, axis=0), residuals)
     common = residuals.mean(axis=0)
     apart = (residuals - common) * np.sqrt(units / (units - 1))
     return apart if units * np.mean(common**2) > _COMMON * np.mean(apart**2) else None
@@ -237,10 +246,16 @@ def _widening(alone: Series, gain: Array, covariance: Array) -> Array:
     return np.asarray(wider[..., :, None] * wider[..., None, :])
 
 
-def lack_of_fit(chi2: Array, dof: int) -> Array:
+def lack_of_fit(chi2: Array, dof: Index | int) -> Array:
     """Birge ratio squared of every block, where its scatter is more than noise of the lot's size makes; one elsewhere."""
-    far = _exceeded(_LACKING / chi2.size, dof)
+    far = _quantiles(lambda one: _exceeded(_LACKING / chi2.size, one), dof)
     return np.where(chi2 <= far, 1.0, chi2 / dof)  # what is no number stays none
+
+
+def _quantiles(of: Callable[[int], float], dof: Index | int) -> Array:
+    """A number of the χ² of each block; most blocks have equal degrees of freedom."""
+    every, where = np.unique(dof, return_inverse=True)
+    return np.array([of(one) for one in every.tolist()])[where].reshape(np.shape(dof))
 
 
 def _solve(series: Series) -> tuple[tuple[float, float], Solved]:
@@ -249,8 +264,8 @@ def _solve(series: Series) -> tuple[tuple[float, float], Solved]:
     The scatter of the samples is a lower bound: where less than it is left, the fit is the weighted one.
     """
     shares, solved = _prudent(series, series.best_shares())
-    middle = float(chi2_quantile(0.5, series.dof)) / np.median(solved.squares)
-    lacking = lack_of_fit(solved.squares * middle, series.dof) > 1.0
+    middle = np.median(solved.squares / _quantiles(lambda one: float(chi2_quantile(0.5, one)), series.dof))
+    lacking = lack_of_fit(solved.squares / middle, series.dof) > 1.0
     if lacking.any() and not lacking.all():
         series.sound = ~lacking
         shares, solved = _prudent(series, series.best_shares())
@@ -288,7 +303,7 @@ def _prudent(series: Series, shares: tuple[float, float]) -> tuple[tuple[float, 
 
 def _scattered(series: Series, solved: Solved) -> bool:
     """Whether the dwells of the sound blocks scatter by more than their own samples show."""
-    dof = int(series.sound.sum()) * series.dof
+    dof = int(series.dof[series.sound].sum())
     return solved.variance * dof > _exceeded(_LACKING, dof)
 
 
@@ -302,7 +317,7 @@ def _known(series: Series, shares: tuple[float, float], solved: Solved) -> float
     """What errors are widened by where the noise is known from the scatter of a few dwells; one where the samples give it."""
     if not any(shares) and not _scattered(series, solved):
         return 1.0
-    return student(int(series.sound.sum()) * series.dof - solved.shared.size)
+    return student(int(series.dof[series.sound].sum()) - solved.shared.size)
 
 
 @lru_cache(maxsize=1024)

@@ -26,6 +26,8 @@ GROSS = 0.05
 """Smallest part of gravity along a face placed by hand: cos 18° is 0.95."""
 _OWN = 0.9
 """Share of its own axis in the response of an output: 25° of a hand."""
+_ODD = 0.5
+"""Distance of the sums of two pairs of faces, over those of the third from both, below which the third is the odd one."""
 _NOISELESS = 1e-6
 """Noise over gravity that is put in for means without a recorded one: far below any scatter, which alone counts then."""
 
@@ -73,6 +75,8 @@ def six_faces(data: Imported, mapping: Mapping) -> FitAnswer:
     lines = [_line(k, (bias[k], bias_u[k], float(published.bias[k])), plain, data.out_unit) for k in range(3)]
     lines += [f"data fault {one['fault']}: {one['evidence']}" for one in verdict["blocked_by"]]
     lines += [why] if why else []
+    if verdict["adequate"] is False and share <= GROSS and (askew := _askew(up, down, plain.response * gravity)):
+        lines.append(askew)
     rows = [{str(name): value for name, value in row.items()} for row in tables.pop("coefficients").to_dict("records")]
     tables["verdict"] = verdict_table(told_by(verdict, 1), MODEL)
     return FitAnswer("faces", verdict["adequate"], document, tuple(lines), rows, MODEL, tables)
@@ -116,6 +120,28 @@ def _exchanged(up: Array, down: Array, gravity: float) -> str:
         if float(np.max(fit.rms / (size * gravity))) < GROSS and float(np.min(own)) > _OWN:
             agreeing.append(f"{names[one]} and {names[other]}")
     return f"; with {agreeing[0]} exchanged they agree" if len(agreeing) == 1 else ""
+
+
+def _askew(up: Array, down: Array, response: Array) -> str:
+    """The pair of faces of which one leans; empty where the three pairs disagree alike.
+
+    The outputs of a pair add up to twice the bias; a face that leans by an angle adds the force of that angle, across it.
+
+    Parameters
+    ----------
+    response : (3, 3), output for gravity
+    """
+    sums = (up + down) @ np.linalg.inv(response).T
+    apart = np.array([np.linalg.norm(sums[k - 1] - sums[k - 2]) for k in range(3)])  # of the two other pairs
+    odd = int(np.argmin(apart))
+    if apart[odd] > _ODD * np.sort(apart)[1]:
+        return ""
+    lean = np.degrees(np.linalg.norm(sums[odd] - 0.5 * (sums[odd - 1] + sums[odd - 2])))
+    pair = f"+{AXES[odd]} and -{AXES[odd]}"
+    return (
+        f"CHECK THE FACES: {pair} disagree with the other faces: one of the two leans by about {lean:.1f}°; stand the device "
+        "against a right angle, or record 10 positions, whose fit needs no face"
+    )
 
 
 def _by_face(dwells: pd.DataFrame, mapping: Mapping) -> tuple[Array, Array, Array]:

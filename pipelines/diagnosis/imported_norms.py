@@ -10,6 +10,7 @@ from threadpoolctl import threadpool_limits
 
 from inertial.arrays import Array
 from inertial.counts import degrees_of_freedom
+from inertial.fits.norm_noise import RUN_PER_K
 from inertial.state import T_REFERENCE
 from inertial.uncertainty.rounding import equal
 from pipelines.diagnosis.diagnose import default_model, diagnose
@@ -96,6 +97,13 @@ def _bias(done: FittedNorms) -> Array:
     return np.stack([done.fit.fit.coefficients[:, axis, k] for axis, k in enumerate(place)], axis=1)
 
 
+def _holds_at(done: FittedNorms) -> float | None:
+    """Temperature, °C, at which values without terms in temperature hold: the mean of the first unit's dwells, if known."""
+    heat = done.measured.readings.temperature
+    mean = np.nan if heat is None else float(np.mean(heat[0, done.measured.readings.there[0]]))
+    return mean if np.isfinite(mean) else None
+
+
 def _document(done: FittedNorms, smaller: FittedNorms | None, verdict: dict[str, Any]) -> dict[str, Any]:
     left = done.fit.left[done.measured.readings.there] / done.gravity
     spread = bias_uncertainty(done)
@@ -125,7 +133,7 @@ def _document(done: FittedNorms, smaller: FittedNorms | None, verdict: dict[str,
         "response_per_g": done.fit.fit.response()[0].tolist(),
         "scale_per_m_s2": (done.scale[0] / STANDARD_GRAVITY_M_S2).tolist(),
         "temperature_offset_per_C": None if heat is None else [float(value) for value in heat],
-        "reference_C": None if heat is None else T_REFERENCE,
+        "reference_C": _holds_at(done) if heat is None else T_REFERENCE,
     }
 
 
@@ -146,6 +154,13 @@ def _lines(done: FittedNorms, smaller: FittedNorms | None, verdict: dict[str, An
     spread = bias_uncertainty(done)
     units = range(len(done.measured.units))
     lines += [_axis_line(done, spread, (unit, k), out_unit) for unit in units for k in range(3)]
+    warm = _holds_at(done)
+    if warm is not None and TEMPERATURE not in done.fit.fit.effects:
+        runs = (MICRO * RUN_PER_K[name] for name in (TEMPERATURE, "scale_temperature"))
+        lines.append(
+            "at {:.1f} °C, the mean of the dwells; U allows a run of bias and scale by {:.0f} µg and {:.0f} ppm per K, as far as "
+            "the dwells leave it open".format(warm, *runs)
+        )
     share = _bias(done)[0] / done.scale[0]
     if out_unit in {"g", "m/s^2"}:  # the zero of counts and volts may lie anywhere
         lines += [

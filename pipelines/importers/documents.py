@@ -213,7 +213,7 @@ class ImportDocument(TypedDict):
     across: NotRequired[Annotated[str, "of `plane`: the axis across the plane"]]
     open: NotRequired[Annotated[list[str], "of `plane`: what the plane does not show"]]
     temperature_offset_per_C: NotRequired[Annotated[list[float] | None, "of `norm`: change of the bias, µg/K"]]
-    reference_C: NotRequired[float | None]
+    reference_C: NotRequired[Annotated[float | None, "at which the values hold"]]
     coefficients: NotRequired[Annotated[list[list[float]], "of `temperature`: cubic of each axis"]]
     residual_rms: NotRequired[Annotated[list[float], "of `temperature`, in `out_unit`"]]
     noise: NotRequired[Annotated[list[float], "of `temperature`, in `out_unit`"]]

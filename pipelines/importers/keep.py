@@ -18,6 +18,7 @@ from pipelines.importers.files import SourceFile
 from pipelines.importers.judged import FitAnswer
 from pipelines.importers.mapping import OUTPUT_UNITS, Mapping
 from pipelines.importers.record import Imported
+from pipelines.importers.record_dwells import turned
 from pipelines.importers.unit_check import DOUBT, size_of, unit_of
 from pipelines.tables.dwell_table import output_axes
 from schemas.errors import WrongUse
@@ -82,7 +83,7 @@ def keep_table_of_dwells(
 
 
 def complete_table(dwells: pd.DataFrame, unit: str = "") -> tuple[pd.DataFrame, tuple[str, ...]]:
-    """A table of dwells with the kind, pose and output unit that it does not have, and what was assumed, as sentences.
+    """A table of dwells with the kind, pose, output unit and force that it does not have, and what was assumed, as sentences.
 
     Parameters
     ----------
@@ -107,7 +108,7 @@ def complete_table(dwells: pd.DataFrame, unit: str = "") -> tuple[pd.DataFrame, 
     for column, value in (("kind", "dwell"), ("pose", "dwell " + dwells["dwell"].astype(str)), ("slot", 0)):
         if column not in dwells.columns:
             dwells[column] = value
-    return dwells, tuple(told)
+    return turned(dwells), tuple(told)
 
 
 def keep(

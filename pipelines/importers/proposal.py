@@ -148,11 +148,11 @@ def for_fit(
     places = 0 if means is None else positions(means)
     if places >= FEWEST_OF_NORM:
         return Proposal(keys | own, "norm", (*assumed, gravity))
-    poses = {} if means is None or sphere is None else _six_faces(means, labels, sphere.centre)
+    poses, askew = ({}, "") if means is None or sphere is None else _six_faces(means, labels, sphere.centre)
     if poses:
         told = "six faces taken as vertical: a tilt of 1° is 17 mg in the bias"
         return Proposal(keys | {"poses": poses} | own, "faces", (*assumed, gravity, told))
-    return Proposal(keys, "", tuple(assumed), (), 0 if means is None else len(means), places)
+    return Proposal(keys, "", tuple(assumed), (askew,) if askew else (), 0 if means is None else len(means), places)
 
 
 def positions(means: Array) -> int:
@@ -172,14 +172,26 @@ def has_reference(keys: dict[str, Any]) -> bool:
     return "face" in keys or any(set(names) <= set(keys["columns"]) for names in (FORCE_COLUMNS, ("outer", "inner")))
 
 
-def _six_faces(means: Array, labels: Sequence[str], centre: Array) -> dict[str, str]:
-    """Label of a dwell → face that is up, where there are six positions and each face is up once; else empty."""
+def _six_faces(means: Array, labels: Sequence[str], centre: Array) -> tuple[dict[str, str], str]:
+    """Label of a dwell → face that is up, where each of six faces is up once; else which of them lean too far, in words."""
     along = (means - centre) / np.linalg.norm(means - centre, axis=1, keepdims=True)
     axes = np.argmax(np.abs(along), axis=1)
     faces = [f"{'+' if row[k] > 0.0 else '-'}{'xyz'[k]}" for row, k in zip(along, axes.tolist(), strict=True)]
-    clear = bool(np.all(np.abs(along).max(axis=1) > _UP)) and not any(re.search(r"[,=]", label) for label in labels)
-    six = len(faces) == len(set(faces)) == len(set(labels)) == 6
-    return dict(zip(labels, faces, strict=True)) if clear and six else {}
+    if not len(faces) == len(set(faces)) == len(set(labels)) == 6 or any(re.search(r"[,=]", label) for label in labels):
+        return {}, ""
+    upright = np.abs(along).max(axis=1)
+    lean = [
+        f"{face} by {np.degrees(np.arccos(cosine)):.0f}°"
+        for face, cosine in zip(faces, upright.tolist(), strict=True)
+        if cosine <= _UP
+    ]
+    if lean:
+        limit = np.degrees(np.arccos(_UP))
+        return (
+            {},
+            f"six faces, of which {', '.join(lean)} lean more than {limit:.0f}°: stand them against a right angle",
+        )
+    return dict(zip(labels, faces, strict=True)), ""
 
 
 def _still(

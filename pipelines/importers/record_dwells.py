@@ -92,7 +92,7 @@ def finished(frame: pd.DataFrame, mapping: Mapping) -> pd.DataFrame:
     if TILT in frame.columns:
         return _tilted(frame, mapping)
     if not (mapping.poses or mapping.face):
-        return _turned(frame, mapping)
+        return turned(frame, _gravity(mapping))
     if mapping.norm_g is None:
         raise WrongUse(
             "import: poses are stated, local gravity is needed with them; give --set local_gravity_m_s2=M/S2"
@@ -104,17 +104,21 @@ def finished(frame: pd.DataFrame, mapping: Mapping) -> pd.DataFrame:
     return frame
 
 
-def _turned(frame: pd.DataFrame, mapping: Mapping) -> pd.DataFrame:
-    """The force at the angles of a table, as that of a station, where the file has angles and no force."""
+def turned(frame: pd.DataFrame, gravity: float = 1.0) -> pd.DataFrame:
+    """The dwells with the force, g, at the angles of a table, as that of a station, where they have angles and no force."""
     if not set(ANGLE_COLUMNS) <= set(frame.columns) or set(FORCE_COLUMNS) & set(frame.columns):
         return frame
     outer, inner = np.radians(frame[[*ANGLE_COLUMNS]].to_numpy(dtype=np.float64)).T
-    return _with_force(frame, frames.force_from_angles(outer, inner), mapping)
+    return _with_force(frame, frames.force_from_angles(outer, inner), gravity)
 
 
-def _with_force(frame: pd.DataFrame, force: Array, mapping: Mapping) -> pd.DataFrame:
-    """The dwells with a force (n, 3), in units of local gravity; that is the standard value where it is not given."""
-    gravity = 1.0 if mapping.norm_g is None else mapping.norm_g
+def _gravity(mapping: Mapping) -> float:
+    """Local gravity, g; the standard value where it is not given."""
+    return 1.0 if mapping.norm_g is None else mapping.norm_g
+
+
+def _with_force(frame: pd.DataFrame, force: Array, gravity: float) -> pd.DataFrame:
+    """The dwells with a force (n, 3), in units of local gravity, g."""
     return frame.assign(**{name: gravity * force[:, k] for k, name in enumerate(FORCE_COLUMNS)})
 
 
@@ -122,7 +126,7 @@ def _tilted(frame: pd.DataFrame, mapping: Mapping) -> pd.DataFrame:
     """The force of a single axis turned in one plane: g·sin of its angle above the horizontal along it, g·cos of it across."""
     angle = np.radians(frame[TILT].to_numpy(dtype=np.float64))
     force = frames.without_rounding(np.stack([np.sin(angle), np.cos(angle), 0.0 * angle], axis=-1))
-    return _with_force(frame.drop(columns=TILT), force, mapping)
+    return _with_force(frame.drop(columns=TILT), force, _gravity(mapping))
 
 
 def _held_out_count(text: str, dwells: int) -> int:

@@ -33,6 +33,9 @@ _BLOCK_S, _PARTS = 0.2, 4
 _TURN_PER_S, _TURN_SIGMAS, _POSES = 0.01, 4.0, 10.0
 """Change of the mean in a second over gravity, above which a stretch turns: a temperature moves it by a twentieth of that; its
 standard errors that show it; and scatter over which gravity has to stand, in counts the only sign that the sensor was turned."""
+_HELD_S, _HELD_SHARE, _HELD_G = 1.0, 0.5, 0.1
+"""Time to the next stop, s, length over that of it, and distance of their means over gravity, below which a stretch is the end of
+a slow move, in a hand: the same position, before the sensor is put down."""
 _NEARLY, _CONTAMINATED = 0.94, 3.0
 """Part of the longest time at rest that a longer window has to find; its quietest scatter over that of the quietest window."""
 _ENOUGH = 6
@@ -121,7 +124,9 @@ def stretches(
     else:
         how = _SearchOptions(mapping.window_s or 1.0, mapping.shortest_s or 1.0, mapping.threshold)
         gravity = GRAVITY.get(mapping.units.output)
-        intervals = _at_rest(_searched(output, time, edges, how), output, time, gravity)
+        intervals = _put_down(
+            _at_rest(_searched(output, time, edges, how), output, time, gravity), output, time, gravity
+        )
         intervals = _of_one_position(intervals, output, time, edges, where, gravity)
     return _named(intervals, mapping, where)
 
@@ -134,6 +139,11 @@ def found_stops(output: Array, time: Array, edges: Sequence[int], gravity: float
     edges : 0, the samples before which some are missing, and their number
     gravity : in the unit of the output; None of counts
     """
+    stops = _best_stops(output, time, edges, gravity)
+    return replace(stops, found=_put_down(stops.found, output, time, gravity)) if stops.is_clean else stops
+
+
+def _best_stops(output: Array, time: Array, edges: Sequence[int], gravity: float | None) -> Stops:
     quiet = _quiet(output, time)
     least = min(quiet.values(), default=0.0)
     plain = [_stops(output, time, edges, _SearchOptions(window, window, None), gravity) for window in WINDOWS_S]
@@ -279,6 +289,21 @@ def _at_rest(intervals: Stretches, output: Array, time: Array, gravity: float | 
         kept = []
     remark = f"{len(intervals) - len(kept)} of {len(intervals)} stretches are no rest and were left out: more scatter than noise"
     return replace(intervals.only(kept), remarks=(*intervals.remarks, remark))
+
+
+def _put_down(found: Stretches, output: Array, time: Array, gravity: float | None) -> Stretches:
+    """The stretches without those in a hand that has the position of the next one, before it puts the sensor down."""
+    if len(found) < 2:
+        return found
+    means = np.array([output[a:b].mean(axis=0) for a, b in found.spans])
+    size = float(np.linalg.norm(means.std(axis=0))) if gravity is None else gravity
+    held = [
+        b - a < _HELD_SHARE * (d - c)
+        and time[c] - time[b - 1] < _HELD_S
+        and float(np.linalg.norm(means[k + 1] - means[k])) < _HELD_G * size
+        for k, ((a, b), (c, d)) in enumerate(pairwise(found.spans))
+    ]
+    return found.only([k for k in range(len(found)) if k == len(held) or not held[k]])
 
 
 def _is_motion(x: Array, duration_s: float, size: float, *, is_gravity: bool) -> bool:

@@ -90,5 +90,9 @@ def _too_little(seen: Recognition, proposal: Proposal) -> str:
             f"{stops} stops in {where}",
             f"{FEWEST_OF_NORM} positions at rest for a fit to the norm of gravity",
         )
-    remedy = "record each position for some seconds, or see its noise with 'tumbleline noise allan'"
-    return f"{found}, {needed} are needed; {remedy}"
+    remedies = [
+        *proposal.remarks,
+        "record each position for some seconds",
+        "see its noise with 'tumbleline noise allan'",
+    ]
+    return f"{found}, {needed} are needed; {', or '.join(remedies)}"

@@ -18,7 +18,7 @@ from pipelines.rerun.selection import SelectedRun, entry_of
 from pipelines.rerun.steps import archived_job
 from pipelines.stages.grade import grade
 from pipelines.tables.calibration import Calibration, read_calibration
-from pipelines.tables.dwells import KINDS, LotTables, lot_arrays
+from pipelines.tables.dwells import LotArrays, LotTables
 from pipelines.tables.frames import ByUnit
 from schemas.errors import DataRejected, TumblelineError
 from schemas.units import MICRO
@@ -139,8 +139,12 @@ def applied(calibration: Calibration, units: Sequence[str], dwells: pd.DataFrame
 
     The norm needs no angle, so a unit that sits in another slot of another station is judged by it, too.
     """
-    known = [unit for unit in units if unit in calibration.units]
-    lot = lot_arrays(dwells[dwells["unit"].isin(known)], history, KINDS)
+    own = dwells[dwells["unit"].isin(set(units) & set(calibration.units))]
+    lots = (part.fitted_kinds for part in LotTables(own, history).parts)
+    return {unit: sums for lot in lots for unit, sums in _applied(calibration, lot).items()}
+
+
+def _applied(calibration: Calibration, lot: LotArrays) -> Sums:
     order = [calibration.units.index(unit) for unit in lot.units]
     state = replace(lot.state, memory={})
     force = correct(

@@ -13,7 +13,14 @@ from inertial.fits.wander import student
 from inertial.population.family import Family
 from pipelines.stages.noisy_fit import NoisyFit, fitted_with_noise
 from pipelines.stages.uncertainty.bias_measurands import COLUMNS, BiasNoise, bias_measurands
-from pipelines.tables.calibration import Calibration, calibration_of, coefficient_rows, covariance_rows, symmetric
+from pipelines.tables.calibration import (
+    Calibration,
+    calibration_of,
+    coefficient_rows,
+    covariance_rows,
+    read_calibration,
+    symmetric,
+)
 from pipelines.tables.dwells import LotArrays, LotTables
 from pipelines.tables.frames import empty_table, joined_parts, picked
 from schemas.errors import DataRejected
@@ -30,8 +37,8 @@ def fit(
     The white-noise error sd/√n of a dwell is a lower bound. Wander between dwells is estimated with the coefficients
     (method ``wander``); where there are too few dwells for that, the covariance is scaled by χ²/ν (method ``birge``: Birge
     ratio squared). The table ``wander`` says which; ``prior`` what the family of the devices adds. Tables without rows come back
-    where no unit was accepted. Units that lack dwells which others have are fitted on theirs, with the noise of the units that
-    have the same ones.
+    where no unit was accepted. Units that lack dwells which others have are fitted on theirs: with the noise of the units that
+    have the same ones, or, where the model has values that all units share, in one fit of the lot.
 
     Parameters
     ----------
@@ -46,32 +53,33 @@ def fit_tables(tables: LotTables, effects: Sequence[str], family: Family | None 
     """:func:`fit` of tables that other stages read as well."""
     if not np.any(tables.dwells["kind"] == "dwell"):
         return _nothing()
-    parts = tables.parts if not _shared(effects, tables) else (tables,)
-    return joined_parts([_fit_part(part, effects, family) for part in parts])
+    return joined_parts([_tables(lot, _fitted(lot, effects, family)) for lot in _lots(tables, effects)])
 
 
-def _shared(effects: Sequence[str], tables: LotTables) -> bool:
-    """Whether all units have values of the model in common, so that they are fitted together or not at all."""
+def _lots(tables: LotTables, effects: Sequence[str]) -> list[LotArrays]:
+    """What is fitted together: units with the same dwells, or all where the model has values that they share."""
+    if len(tables.parts) == 1:
+        return [tables.fitted_kinds]
     sensor, station = design.split(effects)
     state = tables.parts[0].fitted_kinds.state
-    return len(tables.parts) > 1 and bool(station or any(effect.parameters(state) for effect in sensor))
+    if station or any(effect.parameters(state) for effect in sensor):
+        return [tables.with_gaps]
+    return [part.fitted_kinds for part in tables.parts]
 
 
-def _fit_part(tables: LotTables, effects: Sequence[str], family: Family | None) -> dict[str, pd.DataFrame]:
-    lot = tables.fitted_kinds
-    fitted = _fitted(lot, effects, family)
+def _tables(lot: LotArrays, fitted: NoisyFit) -> dict[str, pd.DataFrame]:
     return {**_rows(lot, fitted), "predictions": _prediction_rows(lot, fitted)}
 
 
 class FittedLot(NamedTuple):
     """A fit for stages that follow in memory.
 
-    tables : those of :func:`fit` without ``predictions``; expected : its covariances, (units, 3, m, m), µg², for the m dwells for
-    verification; calibration : None where no unit was fitted
+    tables : those of :func:`fit`; expected : its ``predictions``, as covariances (units, 3, m, m), µg², for the m dwells for
+    verification where all units have all dwells; calibration : None where no unit was fitted
     """
 
     tables: dict[str, pd.DataFrame]
-    expected: Array
+    expected: Array | pd.DataFrame
     calibration: Calibration | None
 
 
@@ -79,6 +87,9 @@ def fit_in_memory(tables: LotTables, effects: Sequence[str], family: Family | No
     """:func:`fit_tables` with what the stages after it read as arrays: the same numbers."""
     if not np.any(tables.dwells["kind"] == "dwell"):
         return FittedLot(_nothing(), np.zeros((0, 3, 0, 0)), None)
+    if len(tables.parts) > 1:
+        made = fit_tables(tables, effects, family)
+        return FittedLot(made, made["predictions"], read_calibration(made["coefficients"], made["covariance"]))
     lot = tables.fitted_kinds
     fitted = _fitted(lot, effects, family)
     made = _rows(lot, fitted)
@@ -145,6 +156,7 @@ def _residual_rows(lot: LotArrays, fitted: NoisyFit) -> pd.DataFrame:
     scale = fitted.per_g[:, None, :]
     force = np.broadcast_to(lot.state.force[..., lot.state.axes], lot.output.shape)[:, used]
     u, n, a = np.indices(force.shape).reshape(3, -1)
+    has = np.ones(u.size, dtype=bool) if lot.missing is None else ~lot.missing[:, used][u, n]
     temperature = lot.state.temperature
     return pd.DataFrame(
         {
@@ -158,7 +170,7 @@ def _residual_rows(lot: LotArrays, fitted: NoisyFit) -> pd.DataFrame:
             "expected_ug": (MICRO * fitted.expected / scale)[:, used].ravel(),
             "unit_C": np.full(u.size, np.nan) if temperature is None else temperature[:, used][u, n],
         }
-    )
+    )[has].reset_index(drop=True)
 
 
 def _prediction_rows(lot: LotArrays, fitted: NoisyFit) -> pd.DataFrame:
@@ -167,6 +179,10 @@ def _prediction_rows(lot: LotArrays, fitted: NoisyFit) -> pd.DataFrame:
     row, column = np.tril_indices(dwells.size)
     u, a, k = np.indices((len(lot.units), len(lot.letters), row.size)).reshape(3, -1)
     values = _predicted(fitted)
+    lacks = (
+        np.zeros((len(lot.units), dwells.size), bool) if lot.missing is None else lot.missing[:, ~lot.of_kind("dwell")]
+    )
+    has = ~(lacks[u, row[k]] | lacks[u, column[k]])
     return pd.DataFrame(
         {
             "unit": picked(lot.units, u),
@@ -175,7 +191,7 @@ def _prediction_rows(lot: LotArrays, fitted: NoisyFit) -> pd.DataFrame:
             "other": dwells[column][k],
             "covariance_ug2": values[..., row, column].ravel(),
         }
-    )
+    )[has].reset_index(drop=True)
 
 
 def _predicted(fitted: NoisyFit) -> Array:

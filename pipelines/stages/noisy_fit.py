@@ -66,9 +66,15 @@ def fitted_with_noise(lot: LotArrays, effects: Sequence[str], family: Family | N
     family : of the lot's devices, whose coefficients are a prior of these
     """
     used = lot.of_kind("dwell")
+    there = used if lot.missing is None else used & ~lot.missing
+    error = np.where(there[..., None], lot.standard_error, np.inf)
+    if lot.missing is not None:
+        # what has no weight may be any number, but one that is near costs no digits
+        _refuse_short(lot, effects, there)
+        near = fit_lot(effects, lot.state, lot.output, error)
+        lot = replace(lot, output=np.where(lot.missing[..., None], lot.output - near.residuals, lot.output))
     lot = replace(lot, state=replace(lot.state, felt=_felt(lot, used), memory={}))
-    values = profiled(lot, effects, used)
-    error = np.where(used[:, None], lot.standard_error, np.inf)
+    values = profiled(lot, effects, there)
     plain = fit_lot(effects, lot.state, lot.output, error, nonlinear=values)
     better = own_axes(lot.state, plain.response())
     if better is not None:
@@ -87,9 +93,29 @@ def fitted_with_noise(lot: LotArrays, effects: Sequence[str], family: Family | N
         nonlinear=values,
         used=used,
         plain=plain,
+        missing=lot.missing,
         believed=believed,
     )
     return replace(_by_wander(lot, fitted, used), prior=believed and believed.prior, of_prior=fitted.of_prior)
+
+
+def _refuse_short(lot: LotArrays, effects: Sequence[str], there: Flags) -> None:
+    """Refuse a unit with fewer dwells than coefficients on an axis, by its name.
+
+    Raises
+    ------
+    DataRejected
+        There is such a unit.
+    """
+    sensor, _ = design.split(effects)
+    values = design.starting_values(sensor, lot.state)
+    least = max(len(design.local_names(sensor, axis, values)) for axis in lot.state.axes)
+    for unit, count in zip(lot.units, there.sum(axis=1).tolist(), strict=True):
+        if count < least:
+            raise DataRejected(
+                f"fit: unit {unit} has {count} dwells, at least {least} are needed for its coefficients on an axis, in a model "
+                "with values that all units share; leave the unit out, or measure it again"
+            )
 
 
 class _Belief:
@@ -194,7 +220,7 @@ def profiled(lot: LotArrays, effects: Sequence[str], used: Flags) -> dict[str, d
 
     Parameters
     ----------
-    used : (n,), the dwells that are fitted
+    used : (n,) or (units, n), the dwells that are fitted
     """
     model = catalogue.get_all(effects)
     if not any(effect.parameters(lot.state) for effect in model):
@@ -204,14 +230,14 @@ def profiled(lot: LotArrays, effects: Sequence[str], used: Flags) -> dict[str, d
 
 def _in_g(lot: LotArrays, used: Flags) -> Lot:
     """The lot in g, over the nominal scale of each unit and axis; dwells that are not fitted count as missing."""
-    plain = fit_lot(PLAIN, lot.state, lot.output, np.where(used[:, None], lot.standard_error, np.inf))
+    plain = fit_lot(PLAIN, lot.state, lot.output, np.where(used[..., None], lot.standard_error, np.inf))
     scale = np.abs(plain.scale())
     scale = np.where(scale > 0.0, scale, 1.0)
     error = lot.standard_error / scale[:, None, :]
     error = np.where(error > 0.0, error, np.median(error))
     return Lot(
         lot.state,
-        np.where(used[:, None], lot.output / scale[:, None, :], 0.0),
-        np.where(used[:, None], error, np.inf),
+        np.where(used[..., None], lot.output / scale[:, None, :], 0.0),
+        np.where(used[..., None], error, np.inf),
         plain.response() / of_every_axis(scale[..., None], lot.state.axes, 1.0),
     )

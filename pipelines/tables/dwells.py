@@ -2,7 +2,7 @@
 
 :func:`measured` takes dwells as they are: units may lack some, and the reference may be angles or nothing. :func:`lot_arrays`
 needs every dwell of every unit and a reference force, as a fit in the output's own unit does: a lot that lacks some is
-fitted in :attr:`LotTables.parts`. Both have the same state.
+fitted in :attr:`LotTables.parts`, or, for values that all units share, as :attr:`LotTables.with_gaps`. All have the same state.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ class Measured:
 
 @dataclass(frozen=True)
 class LotArrays:
-    """Dwells of a lot without gaps.
+    """Dwells of a lot, measured at the same times by all units.
 
     units : serials, in order; dwells : (n,) numbers; poses, kinds : (n,) names
     output, standard_error : (units, n, 3), output unit; the error is that of white noise, sd/√n; where no samples tell it,
@@ -77,6 +77,8 @@ class LotArrays:
     output: NDArray[np.float64]
     standard_error: NDArray[np.float64]
     out_unit: str
+    missing: NDArray[np.bool_] | None = None
+    """(units, n), dwells that a unit lacks: all that stands there is a median of the other units; None where all have all."""
 
     @property
     def letters(self) -> tuple[str, ...]:
@@ -116,6 +118,11 @@ class LotTables:
         return lot_arrays(self.dwells, self.history, KINDS)
 
     @cached_property
+    def with_gaps(self) -> LotArrays:
+        """The same of units that lack dwells which others have, together."""
+        return lot_arrays(self.dwells, self.history, KINDS, gaps=True)
+
+    @cached_property
     def all_kinds(self) -> LotArrays:
         """All dwells, since an effect with memory depends on the dwell before."""
         if self.dwells["kind"].isin(list(KINDS)).all():
@@ -137,9 +144,7 @@ def lacking(dwells: pd.DataFrame) -> str:
         f"{unit} lacks {', '.join(map(str, missing[:_SHOWN]))}{' …' if len(missing) > _SHOWN else ''}"
         for unit, missing in named.items()
     )
-    return (
-        f"dwells that others have: {'; '.join(told)}; units are fitted with those of the same dwells" if named else ""
-    )
+    return f"dwells that others have: {'; '.join(told)}; units are fitted on the dwells that they have" if named else ""
 
 
 def measured(dwells: pd.DataFrame, history: pd.DataFrame | None = None) -> Measured:
@@ -172,7 +177,11 @@ def measured(dwells: pd.DataFrame, history: pd.DataFrame | None = None) -> Measu
 
 
 def lot_arrays(
-    dwells: pd.DataFrame, history: pd.DataFrame | None = None, kinds: Collection[str] | None = None
+    dwells: pd.DataFrame,
+    history: pd.DataFrame | None = None,
+    kinds: Collection[str] | None = None,
+    *,
+    gaps: bool = False,
 ) -> LotArrays:
     """The dwells of a lot as arrays, for units that were all measured in the same dwells.
 
@@ -181,14 +190,15 @@ def lot_arrays(
     dwells : of all kinds, so that what an effect remembers of the dwell before is there
     history : temperatures between the dwells
     kinds : of the dwells that are wanted; all where None
+    gaps : whether units may lack dwells that others have
 
     Raises
     ------
     DataRejected
-        A unit lacks a dwell that others have, units differ in the unit of their output, or there is no reference.
+        A unit lacks a dwell that others have and may not, units differ in the unit of their output, or there is no reference.
     """
     table = DwellTable(dwells, kinds)
-    if not table.units or not table.whole:
+    if not table.units or not (table.whole or gaps):
         raise DataRejected(
             f"dwells: {table.rows} rows for {table.shape[0]} units and {table.shape[1]} dwells, every unit needs every dwell"
             f"{_lacking(table)}; fit without these dwells (of an import with --leave-out), remove the units, or measure again"
@@ -210,11 +220,12 @@ def lot_arrays(
         poses=table.per_dwell("pose"),
         kinds=np.asarray(table.per_dwell("kind"), dtype=np.str_),
         state=state,
-        output=table.by_axis(table.outputs),
-        standard_error=table.by_axis(table.spreads) / np.sqrt(table.grid("n"))[..., None]
+        output=table.by_axis(table.outputs, filled=True),
+        standard_error=table.by_axis(table.spreads, filled=True) / np.sqrt(table.filled("n"))[..., None]
         if {*table.spreads, "n"} <= set(dwells.columns)
         else _untold_error(dwells, table.shape),
         out_unit=out_units[0],
+        missing=None if table.whole else np.asarray(np.isnan(table.by_axis(table.outputs)).any(axis=-1)),
     )
 
 

@@ -8,6 +8,7 @@ import pandas as pd
 import pytest
 from hand import G, Hand, sensed
 from in_process import document_of, given, refused
+from scipy.spatial.transform import Rotation
 
 from pipelines.archive import Archive
 
@@ -45,6 +46,33 @@ def test_a_hand_held_record_is_recognised_fitted_and_judged_on_one_screen(rng: n
     assert one["command"] in " ".join(text.split())
     assert lines[-1].split()[:2] == ["tumbleline", "export"]
     assert any(line.lstrip().startswith("not recorded: temperature (") for line in lines)
+
+
+def six_faces(rng: np.random.Generator, lean_deg: float) -> pd.DataFrame:
+    """A telephone on each of its faces for 4 s, turned in 0.8 s between; on +y it leans, on the others by 0.3°."""
+    up = np.concatenate([np.eye(3), -np.eye(3)])
+    parts: list[np.ndarray] = []
+    for k, face in enumerate(up):
+        about = np.cross(face, rng.standard_normal(3))
+        angle = np.radians(lean_deg if k == 1 else 0.3)
+        rest = Rotation.from_rotvec(angle * about / np.linalg.norm(about)).apply(face)
+        way = rest + np.linspace(0.0, 1.0, 80)[:, None] * (up[(k + 1) % 6] - rest)
+        parts += [np.tile(rest, (400, 1)), way / np.linalg.norm(way, axis=1)[:, None]]
+    output = 1.01 * np.concatenate(parts) + [0.02, -0.01, 0.03]
+    output += 1e-3 * rng.standard_normal(output.shape)
+    return pd.DataFrame(output, columns=["acc_x", "acc_y", "acc_z"]).assign(time_s=np.arange(len(output)) / 100.0)
+
+
+def test_a_face_that_stands_askew_is_named_with_its_angle(rng: np.random.Generator) -> None:
+    six_faces(rng, 5.0).to_csv("leans.csv", index=False)
+    lines = document_of("improve", "leans.csv", status=1)["recording"]["lines"]
+    told = next(line for line in lines if line.startswith("CHECK THE FACES"))
+    assert "+y and -y disagree with the other faces: one of the two leans by about" in told
+    assert 4.0 < float(told.split("about ")[1].split("°")[0]) < 6.0
+    six_faces(rng, 30.0).to_csv("falls.csv", index=False)
+    assert "of six faces these lean by more than 26°: +y by 30°; stand them against" in refused("improve", "falls.csv")
+    six_faces(rng, 0.3).to_csv("stands.csv", index=False)
+    assert not any("CHECK" in line for line in document_of("improve", "stands.csv", status=1)["recording"]["lines"])
 
 
 def test_a_still_record_is_blocks_of_one_pose_without_the_hand_at_its_ends(rng: np.random.Generator) -> None:

@@ -84,6 +84,22 @@ def test_the_answers_are_those_of_the_commands(lot: tl.Example, tmp_path: Path) 
     assert better.ladder["confirmed"].iloc[-1] is True or bool(better.ladder["confirmed"].iloc[-1])
 
 
+def test_files_of_one_record_are_read_one_after_another(turned: pd.DataFrame, tmp_path: Path) -> None:
+    """A logger that begins a file each minute, with a clock that begins anew; no dwell goes from one file into the next."""
+    samples = turned.drop(columns="turn")
+    parts = [samples.iloc[a:b] for a, b in ((0, 2700), (2700, 5250), (5250, 7200))]
+    paths = [tmp_path / f"{k}.csv" for k in range(len(parts))]
+    for path, part in zip(paths, parts, strict=True):
+        part.assign(t=part["t"] - part["t"].iloc[0]).to_csv(path, index=False)
+    run = tl.read(paths, units={"output": "g"})
+    # the second file ends in the middle of a position: it is a dwell in each of the two files
+    assert len(run.dwells) == 25
+    assert np.all(np.diff(run.dwells["time_s"]) > 0.0)
+    assert len(tl.read([paths[0]], units={"output": "g"}).dwells) == 9
+    with pytest.raises(tl.TumblelineError, match=r"absent\.csv"):
+        tl.read([paths[0], tmp_path / "absent.csv"])
+
+
 @pytest.mark.usefixtures("no_next_measurement")
 def test_objects_draw_themselves_and_export(turned: pd.DataFrame, tmp_path: Path) -> None:
     run = tl.read(turned.drop(columns="turn"), units={"output": "g"}, serial="SN7")

@@ -1,5 +1,7 @@
 """The uncertainty budget of a lot as far as decisions read it, without its tables: quantities are computed when they are read."""
 
+from __future__ import annotations
+
 from collections.abc import Iterator, Mapping
 
 import numpy as np
@@ -27,17 +29,27 @@ class DecisionBudget:
     """
 
     def __init__(self, tables: BudgetTables, terms: BudgetTerms) -> None:
-        self._lot = lot_budget(tables, terms)
-        self._places = {unit: place for place, unit in enumerate(self._lot.calibration.units)}
-        self._groups = groups_of(self._lot.variances)
-        self._known: dict[str, dict[Key, list[BudgetRow]]] = {}
-        whole = symmetric(self._lot.variances.fit.covariance())
-        self.covariance: Array = np.broadcast_to(whole, (len(self._places), *whole.shape[-2:]))
+        parts = [_PartBudget(part, terms) for part in tables.parts()]
+        self._parts = {unit: (part, place) for part in parts for place, unit in enumerate(part.units)}
+        every = np.concatenate([part.covariance for part in parts])
+        order = list(self._parts)
+        self.covariance: Array = every[[order.index(unit) for unit in tables.calibrated().units]]
 
     def of(self, unit: str) -> Mapping[Key, BudgetRow]:
         """The quantities of a unit by name and axis; none for an unknown unit."""
-        place = self._places.get(unit)
-        return {} if place is None else _UnitBudget(self, place)
+        return _UnitBudget(*self._parts[unit]) if unit in self._parts else {}
+
+
+class _PartBudget:
+    """The budget of units with the same dwells; covariance as in :class:`DecisionBudget`."""
+
+    def __init__(self, tables: BudgetTables, terms: BudgetTerms) -> None:
+        self._lot = lot_budget(tables, terms)
+        self.units = self._lot.calibration.units
+        self._groups = groups_of(self._lot.variances)
+        self._known: dict[str, dict[Key, list[BudgetRow]]] = {}
+        whole = symmetric(self._lot.variances.fit.covariance())
+        self.covariance: Array = np.broadcast_to(whole, (len(self.units), *whole.shape[-2:]))
 
     def rows(self, name: str) -> Mapping[Key, list[BudgetRow]]:
         """The quantities of the part of the budget with a name, for every unit in order; none for an unknown name."""
@@ -52,9 +64,9 @@ class DecisionBudget:
 
 
 class _UnitBudget(Mapping[Key, BudgetRow]):
-    """The quantities of the unit at a place of the lot."""
+    """The quantities of the unit at a place of its part of the lot."""
 
-    def __init__(self, lot: DecisionBudget, place: int) -> None:
+    def __init__(self, lot: _PartBudget, place: int) -> None:
         self._lot, self._place = lot, place
 
     def __getitem__(self, key: Key) -> BudgetRow:

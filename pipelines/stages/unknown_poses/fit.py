@@ -14,10 +14,11 @@ from inertial.estimation.model import Model
 from inertial.estimation.noise_shares import LONGEST
 from inertial.estimation.problem import Problem
 from inertial.estimation.refinement import terms_of
+from inertial.fits.norm_noise import PlausibleNoise, runs_left_out, with_runs
 from inertial.fits.wander import student
 from inertial.noise.flicker import SLOWEST_DIAGNOSED, flicker_kernel
 from inertial.noise.measurands import DAY_S, instability, of_a_day, walk_kernel
-from inertial.norm_fit import NormFit, PlausibleNoise, fit_norms
+from inertial.norm_fit import NormFit, fit_norms
 from pipelines.stages.uncertainty.bias_measurands import COLUMNS
 from pipelines.tables.calibration import coefficient_rows, covariance_rows
 from pipelines.tables.dwells import Measured, lot_of, measured
@@ -28,6 +29,9 @@ from schemas.units import AXES, MICRO
 
 FEW_DWELLS = 300
 """Dwells up to which standard errors are averaged over the plausible shares of wander."""
+
+_RUN, _SPARE = "bias_temperature", 6
+"""The run that the noise is estimated beside, and degrees of freedom that are left to the noise then."""
 
 NORM = "norm"
 """The axis of a residual of the norm."""
@@ -75,7 +79,8 @@ def norms_fitted(
         measurement = measured(fitted_dwells(dwells), history)
         lot = lot_of(measurement, square="misalignment" not in effects)
         problem = Problem(lot)
-        model = Model(problem, terms_of(catalogue.get_all(effects), problem))
+        runs = runs_left_out(effects, lot.state.temperature, lot.state.force, measurement.readings.there)
+        model = _with_run(Model(problem, terms_of(catalogue.get_all(effects), problem)), effects, runs)
         values = {t.effect.id: t.keywords for t in model.terms if t.keywords}
         filled = np.where(
             measurement.readings.there[..., None], measurement.readings.output, _typical(measurement.readings.output)
@@ -87,11 +92,11 @@ def norms_fitted(
             effects,
             lot.state,
             filled,
-            whitener(model),
+            whitener(model, runs),
             start,
             norm=gravity,
             nonlinear=values,
-            plausible=plausible_noises(model),
+            plausible=plausible_noises(model, runs),
             weights=measurement.readings.duration,
         )
     except InertialError as problem_found:
@@ -109,14 +114,29 @@ def norms_fitted(
     )
 
 
-def whitener(model: Model) -> Array:
-    """Inverse roots of the covariances of the units' norms, (units, n, n), g⁻¹; (units, n) for records too long for them."""
+def _with_run(model: Model, effects: Sequence[str], runs: Array) -> Model:
+    """The model with the run of its bias with temperature beside it, where it lacks it and the dwells can bear its coefficients.
+
+    Else a drift with the temperature passes for a random walk, and the bias of each axis is that of another temperature.
+    """
+    problem = model.problem
+    free = float(model.at(problem.covariance.white_noise()).by_block.min())
+    if not runs.any() or _RUN in effects or free < len(AXES) + _SPARE:
+        return model
+    return Model(problem, [*model.terms, *terms_of([catalogue.get(_RUN)], problem)])
+
+
+def whitener(model: Model, runs: Array) -> Array:
+    """Inverse roots of the covariances of the units' norms, (units, n, n), g⁻¹; (units, n) for records too long for them.
+
+    ``runs`` are those of :func:`inertial.fits.norm_noise.runs_left_out`; such long records have them in no covariance.
+    """
     covariance, noise, n = model.problem.covariance, model.noise, model.problem.n
     if n > LONGEST:
         error = model.problem.error
         return np.where(np.isfinite(error), 1.0 / np.where(np.isfinite(error), error, 1.0), 0.0)
     eye = np.broadcast_to(np.eye(n), (model.problem.blocks, n, n))
-    return covariance.whiten(eye, noise.shares) / noise.scale[:, None, None]
+    return with_runs(covariance.whiten(eye, noise.shares) / noise.scale[:, None, None], runs)
 
 
 def fitted_dwells(dwells: pd.DataFrame) -> pd.DataFrame:
@@ -124,7 +144,7 @@ def fitted_dwells(dwells: pd.DataFrame) -> pd.DataFrame:
     return dwells[dwells["kind"] == "dwell"] if "kind" in dwells.columns else dwells
 
 
-def plausible_noises(model: Model) -> Iterator[PlausibleNoise]:
+def plausible_noises(model: Model, runs: Array) -> Iterator[PlausibleNoise]:
     """The noises that the residuals do not rule out.
 
     None for long records: their shares of wander are known well.
@@ -138,7 +158,8 @@ def plausible_noises(model: Model) -> Iterator[PlausibleNoise]:
     for shares, weight in model.plausible_shares():
         square = model.noise_at(shares).scale[:, None, None] ** 2
         slow = white * (shares.flicker * kernels[0] + shares.walk * kernels[1])
-        yield PlausibleNoise(weight, problem.covariance.whiten(eye, shares) / np.sqrt(square), square * slow)
+        whiten = with_runs(problem.covariance.whiten(eye, shares) / np.sqrt(square), runs)
+        yield PlausibleNoise(weight, whiten, square * slow)
 
 
 def fit_of_norms(

@@ -9,6 +9,7 @@ import pandas as pd
 from inertial.arrays import Array
 from inertial.correction import correct
 from inertial.fits.linear import force_along_axes, response_matrix
+from inertial.fits.norm_noise import runs_left_out
 from inertial.fits.wander import student
 from inertial.noise.flicker import flicker_kernel
 from inertial.noise.measurands import walk_kernel
@@ -88,7 +89,8 @@ def _one(
     profile = profile / np.sqrt(np.mean(profile[used] ** 2))
     time = readings.time[0]
     kernel = flicker**2 * flicker_kernel(time) + walk**2 * walk_kernel(time)
-    noise = np.diag((white * profile) ** 2) + kernel * (direction @ direction.T)
+    runs = runs_left_out(calibration.effects, state.temperature, direction[None], used[None])[0]
+    noise = np.diag((white * profile) ** 2) + kernel * (direction @ direction.T) + runs @ runs.T
     model = MeasurementModel(calibration.effects, calibration.coefficients, calibration.nonlinear)
     lot = LotArrays(
         units=calibration.units,

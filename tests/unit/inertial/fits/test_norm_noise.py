@@ -1,10 +1,12 @@
 """Intervals of a fit by the norm of gravity: noise that few dwells leave open is averaged over, the record has its own error."""
 
 import numpy as np
+import pandas as pd
+from scipy.spatial.transform import Rotation
 
 from benchmarks.made_recordings import Recording, make
 from benchmarks.recording_intervals import pulls
-from inertial.fits.norm_noise import SolvedNorms
+from inertial.fits.norm_noise import SolvedNorms, runs_left_out, with_runs
 from pipelines.stages.unknown_poses.fit import bias_uncertainty, norms_fitted
 
 PLAIN = ("bias", "scale", "misalignment")
@@ -64,3 +66,46 @@ def test_the_record_has_an_error_of_its_own_and_the_axes_one_covariance() -> Non
     assert done.fit.covariance.shape == (1, 9, 9)
     variances = np.diagonal(done.fit.covariance[0])
     np.testing.assert_allclose(np.sqrt(variances[:1]), done.fit.fit.standard_errors[0, 0, :1])
+
+
+def test_a_run_with_temperature_that_the_model_lacks_is_noise_of_a_stated_size(rng: np.random.Generator) -> None:
+    """Whitened draws of runs and white noise have variance one; a unit with an unknown temperature has no run."""
+    direction = rng.standard_normal((2, 12, 3))
+    direction /= np.linalg.norm(direction, axis=-1, keepdims=True)
+    heat = np.linspace(20.0, 24.0, 12) + np.zeros((2, 12))
+    heat[1, 3] = np.nan
+    there = np.ones((2, 12), dtype=bool)
+    runs = runs_left_out(("bias", "scale"), heat, direction, there)
+    assert not runs[1].any()
+    assert runs_left_out(("bias", "bias_temperature", "scale_temperature"), heat, direction, there).shape[-1] == 0
+    root = np.tril(rng.standard_normal((12, 12))) + 4.0 * np.eye(12)
+    white = np.linalg.inv(1e-4 * root)[None]
+    whiten = with_runs(white, runs[:1])[0]
+    np.testing.assert_array_equal(np.triu(whiten, 1), 0.0)
+    slopes = rng.standard_normal((20_000, 6)) * np.repeat([500e-6, 100e-6], 3)
+    rise = (heat[0] - heat[0].mean())[:, None]
+    drawn = slopes @ np.concatenate([rise * direction[0], rise * direction[0] ** 2], axis=1).T
+    drawn += 1e-4 * rng.standard_normal((20_000, 12)) @ root.T
+    np.testing.assert_allclose(np.cov(whiten @ drawn.T), np.eye(12), atol=0.05)
+
+
+def test_biases_of_a_sensor_that_warms_hold_at_the_mean_temperature_of_its_dwells(rng: np.random.Generator) -> None:
+    """20 stops in 140 s, one more on its feet at the end; a bias that warmed by 4 K passed for a walk, and z was off by 1 K."""
+    off: list[float] = []
+    for _ in range(12):
+        time = np.append(np.sort(rng.uniform(0.0, 140.0, 20)), 340.0)
+        heat = 30.0 + 6.0 * (1.0 - np.exp(-time / 300.0))
+        force = Rotation.random(21, rng=rng).apply([0.0, 0.0, 1.0])
+        force[-1] = (0.0, 0.0, 1.0)
+        slope = 600e-6 * np.array([1.0, -1.0, 1.0])
+        noise = 100e-6 * rng.standard_normal((21, 3))
+        output = force + (heat - heat.mean())[:, None] * slope + noise
+        table = pd.DataFrame(output, columns=["out_x", "out_y", "out_z"]).assign(
+            unit="F", dwell=range(21), time_s=time, unit_C=heat, kind="dwell", out_unit="g", n=400
+        )
+        table[["sd_x", "sd_y", "sd_z"]] = 2e-3
+        fit = norms_fitted(table, None, PLAIN).fit.fit
+        off += (fit.coefficients[0, :, 0] / (2.0 * fit.standard_errors[0, :, 0])).tolist()
+        assert np.median(fit.standard_errors[0, :, 0]) < 400e-6
+    assert np.mean(np.abs(off) <= 1.0) >= 0.9
+    assert abs(np.median(off[2::3])) < 0.5

@@ -70,3 +70,37 @@ def test_shares_are_those_of_the_likelihood_worked_out_pair_by_pair(rng, monkeyp
     monkeypatch.setattr(Series, "deviances", pair_by_pair)
     assert own.best_shares() == pytest.approx(shares, rel=1e-8)
     assert min(shares) > 0.0
+
+
+def test_a_measurement_that_a_block_lacks_is_as_if_it_had_never_been(rng: np.random.Generator) -> None:
+    """Coefficients, shared ones, squares, variance and likelihood of one unit without two dwells, whatever stands there."""
+    n, shares = 30, (2.0, 0.7)
+    time, kept = np.cumsum(rng.uniform(10.0, 40.0, n)), np.ones(n, dtype=bool)
+    kept[[4, 17]] = False
+    h, s, z = rng.normal(size=(1, 3, n, 4)), rng.normal(size=(1, 3, n, 1)), rng.normal(size=(1, 3, n))
+    z[..., ~kept] = 100.0
+    profile, kernels = rng.uniform(0.9, 1.1, n), wander_kernels(time)
+    cut = tuple(kernel[np.ix_(kept, kept)] for kernel in kernels)
+    without = Series(h[:, :, kept], s[:, :, kept], z[..., kept], profile[kept], cut).solve(shares)
+    gaps = Series(h, s, z, profile, kernels, ~kept[None])
+    found = gaps.solve(shares)
+    assert gaps.dof.tolist() == [[24, 24, 24]]
+    for name in ("theta", "inverse", "shared", "shared_inverse", "squares", "variance"):
+        np.testing.assert_allclose(getattr(found, name), getattr(without, name), rtol=1e-7, err_msg=name)
+    np.testing.assert_allclose(found.gain[..., kept], without.gain, rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(found.gain[..., ~kept], 0.0, atol=1e-9)
+    other = (0.0, 3.0)
+    apart = Series(h[:, :, kept], s[:, :, kept], z[..., kept], profile[kept], cut).solve(other).deviance
+    assert gaps.solve(other).deviance - found.deviance == pytest.approx(apart - without.deviance, abs=1e-6)
+
+
+def test_blocks_without_gaps_are_untouched_by_those_with_gaps(rng: np.random.Generator) -> None:
+    own = series(rng, blocks=2)
+    missing = np.zeros((2, 40), dtype=bool)
+    missing[1, [3, 30]] = True
+    beside = Series(own._h * own._scale, own._s, own._z, np.sqrt(np.diagonal(own.white)), own.kernels, missing)
+    one, other = own.solve((1.0, 2.0)), beside.solve((1.0, 2.0))
+    assert beside.dof.tolist() == [[36] * 3, [34] * 3]
+    for name in ("theta", "inverse", "squares"):
+        np.testing.assert_allclose(getattr(other, name)[0], getattr(one, name)[0], rtol=1e-9, err_msg=name)
+        assert not np.allclose(getattr(other, name)[1], getattr(one, name)[1], rtol=1e-9), name

@@ -78,6 +78,7 @@ def test_what_a_fit_hands_on_is_what_its_tables_hold(run: Run, more: tuple[str, 
     tables, (made, expected, calibration) = fit_tables(lot, effects), fit_in_memory(lot, effects)
     for name, own in made.items():
         pd.testing.assert_frame_equal(own, tables[name], check_exact=True)
+    assert isinstance(expected, np.ndarray)
     assert {*tables} - {*made} == {"predictions"}
     read = read_calibration(tables["coefficients"], tables["covariance"])
     assert calibration is not None
@@ -88,6 +89,42 @@ def test_what_a_fit_hands_on_is_what_its_tables_hold(run: Run, more: tuple[str, 
     of_tables = verify_tables(lot, tables["coefficients"], tables["covariance"], tables["predictions"])
     for name, own in of_tables.items():
         pd.testing.assert_frame_equal(verified[name], own, check_exact=True)
+
+
+@pytest.mark.parametrize("more", [(), ("level_error",), ("thermal_lag",)], ids=["own", "station", "nonlinear"])
+def test_a_lot_with_gaps_is_decided_in_memory_as_by_its_tables(
+    run: Run, given: tuple[ArchivedJob, BudgetTables, BudgetTerms], more: tuple[str, ...]
+) -> None:
+    """The last unit lacks a dwell of the fit and one for verification; a station effect is fitted over all units at once."""
+    _, known, terms = given
+    dwells, history = run.table("dwells"), run.table("history")
+    last = dwells["unit"] == dwells["unit"].max()
+    gone = dwells[last].groupby("kind")["dwell"].nth(1)
+    lot = LotTables(dwells[~(last & dwells["dwell"].isin(gone))], history)
+    effects = (*run.about["recipe"]["effects"], *more)
+    tables, handed = fit_tables(lot, effects), fit_in_memory(lot, effects)
+    made = handed.tables | verify_tables(
+        lot, tables["coefficients"], tables["covariance"], handed.expected, handed.calibration
+    )
+    assert not set(made["residuals"].loc[made["residuals"]["unit"] == dwells["unit"].max(), "dwell"]) & set(gone)
+    shared = made["coefficients"].query("axis == '*'").groupby("name")["value"].nunique()
+    assert shared.tolist() == [1] * len(shared)
+    assert len(shared) == {"level_error": 2, "thermal_lag": 1}.get("".join(more), 0)
+    names = ("coefficients", "covariance", "wander", "verification", "verification_poses")
+    found = BudgetTables(lot.dwells, history, noise=known.noise, **{name: made[name] for name in names})
+    rows = budget(found, terms)["uncertainties"]
+    decisions = DecisionBudget(replace(found, lot=lot, calibration=handed.calibration), terms)
+    for row in rows.to_dict("records"):
+        numbers = BudgetRow(*(row[name] for name in ("value", "u_a", "u_b", "u")))
+        np.testing.assert_array_equal(decisions.of(row["unit"])[row["quantity"], row["axis"]], numbers)
+    assert set(rows["unit"]) == set(dwells["unit"])
+    whole = fit_tables(LotTables(dwells, history), effects)["coefficients"]
+    errors = [
+        one.query("effect == 'bias'").set_index(["unit", "axis"])["standard_error"]
+        for one in (made["coefficients"], whole)
+    ]
+    assert (errors[0] / errors[1]).between(0.6, 2.0).all()
+    assert len(decisions.covariance) == dwells["unit"].nunique()
 
 
 def test_nothing_is_handed_on_where_nothing_was_fitted(run: Run) -> None:

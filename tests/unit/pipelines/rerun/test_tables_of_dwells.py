@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 from numpy.typing import NDArray
 
+from inertial.frames import force_from_angles
 from inertial.noise.flicker import flicker_kernel
 from inertial.noise.measurands import walk_kernel
 from pipelines.archive import Archive
@@ -140,13 +141,47 @@ def test_units_of_a_lot_with_gaps_are_fitted_on_what_they_have() -> None:
     assert errors.max() < 4.0
 
 
-def test_a_model_with_values_that_all_units_share_names_the_dwell_and_the_option() -> None:
-    dwells = complete_table(table(np.random.default_rng(6)))[0]
-    gap = dwells[~((dwells["unit"] == "C") & (dwells["dwell"] == 4))]
-    with pytest.raises(
-        DataRejected, match=r"not all have dwell 4\); fit without these dwells \(of an import with --leave-out\)"
-    ):
-        fit(gap, None, [*PLAIN, "level_error"])
+def test_values_that_all_units_share_are_fitted_where_units_lack_dwells() -> None:
+    """An encoder that is off by 0.2 mrad, found from all units; a unit without dwells has larger errors, and others theirs."""
+    rng = np.random.default_rng(6)
+    outer, inner = rng.uniform(-180.0, 180.0, (2, 40))
+    force = force_from_angles(np.radians(outer) + 2e-4, np.radians(inner))
+    angles = {"time_s": 40.0 * np.arange(40), "unit_C": 25.0, "outer_deg": outer, "inner_deg": inner}
+    made: list[pd.DataFrame] = []
+    for unit in "ABCD":
+        out = GAIN * force + BIAS_G + SPREAD_G * rng.normal(size=force.shape)
+        outputs = {f"out_{axis}": out[:, k] for k, axis in enumerate("xyz")}
+        made.append(pd.DataFrame({"unit": unit, "dwell": range(40), **angles, **outputs}))
+    dwells = complete_table(pd.concat(made, ignore_index=True))[0]
+    model = (*PLAIN, "outer_encoder_offset")
+    lacks = (dwells["unit"] == "C") & dwells["dwell"].isin([4, 11, 20]) | (dwells["unit"] == "A") & (
+        dwells["dwell"] == 7
+    )
+    whole, found = (fit(one, None, model)["coefficients"] for one in (dwells, dwells[~lacks]))
+    offset = found.query("effect == 'outer_encoder_offset'")
+    np.testing.assert_allclose(np.linalg.norm(dwells[["force_x", "force_y", "force_z"]], axis=1), 1.0)  # at the angles
+    assert len(set(offset["value"])) == 1
+    np.testing.assert_allclose(offset["value"], 2e-4, atol=2.5 * offset["standard_error"].iloc[0])
+    both = found.merge(whole, on=["unit", "axis", "effect", "name"], suffixes=("", "_whole"))
+    both["step"] = (both["value"] - both["value_whole"]) / both["standard_error"]
+    steps = both.groupby("unit")["step"].agg(lambda one: float(np.sqrt(np.mean(one**2))))
+    assert steps[["B", "D"]].max() < 0.05 < steps["A"] < steps["C"] < 1.0
+    wider = both.query("effect == 'bias'").groupby("unit")[["standard_error", "standard_error_whole"]].mean()
+    ratio = wider["standard_error"] / wider["standard_error_whole"]
+    assert 1.02 < ratio["C"] < 1.12
+    assert ratio[["B", "D"]].between(0.98, 1.02).all()
+
+
+def test_a_model_that_a_unit_does_not_determine_is_named(rng: np.random.Generator) -> None:
+    outer, inner = rng.uniform(-180.0, 180.0, (2, 20))
+    force = force_from_angles(np.radians(outer), np.radians(inner))
+    outputs = {f"out_{axis}": force[:, k] for k, axis in enumerate("xyz")}
+    one = pd.DataFrame(
+        {"dwell": range(20), "time_s": 40.0 * np.arange(20), "outer_deg": outer, "inner_deg": inner} | outputs
+    )
+    dwells = complete_table(pd.concat([one.assign(unit="A"), one.iloc[:3].assign(unit="B")]))[0]
+    with pytest.raises(DataRejected, match=r"unit B has 3 dwells, at least 4 are needed .*; leave the unit out"):
+        fit(dwells, None, [*PLAIN, "outer_encoder_offset"])
 
 
 def test_a_table_is_completed_with_the_unit_that_its_outputs_show() -> None:
