@@ -169,9 +169,10 @@ class Findings(Alarms):
             station_row(self, alarm) for alarm in self._of_station
         ]
         rows += [thermometer_row(self)] if self.of_thermometer else []
-        for number, row in enumerate(rows, start=1):
+        unexplained = self._unexplained(named=bool(rows))
+        for number, row in enumerate((*rows, *unexplained), start=1):
             row["id"] = f"D{number}"
-        return rows, self._unexplained(named=bool(rows))
+        return rows, unexplained
 
     def _row(self, found: Discovery) -> DiscoveryRow:
         name = found.name
@@ -259,31 +260,36 @@ class Findings(Alarms):
     def _unexplained(self, *, named: bool) -> list[UnexplainedRow]:
         """Functions of the pose that no effect is; and, where nothing is named, every driver with an alarm."""
         rows = {of.driver: self._map_row(of) for of in self._named[1]}
-        if not named:
-            for alarm in sorted(self._of_sensor, key=self.log_e, reverse=True):
-                effect, _, axis = hypothesis(self.state, alarm.place)
-                log_e, driver = round(self.log_e(alarm), 2), plain(alarm.driver)
-                row: UnexplainedRow = {
-                    "driver": driver, "level": "", "nearest": effect, "axes": [axis], "map": [], "log_e": log_e,
-                }  # fmt: skip
-                rows.setdefault(driver, row)
+        for alarm in [] if named else sorted(self._of_sensor, key=self.log_e, reverse=True):
+            effect, _, axis = hypothesis(self.state, alarm.place)
+            rows.setdefault(plain(alarm.driver), self._unnamed_row(plain(alarm.driver), axis, effect))
         return list(rows.values())
+
+    def _unnamed_row(self, driver: str, axis: str, nearest: str) -> UnexplainedRow:
+        """What differs by a driver without a map of it."""
+        alarms = [a for a in self._of_sensor if plain(a.driver) == driver]
+        since = min(alarms, key=lambda a: a.lots)
+        return {
+            "id": "",
+            "since": self.day_of(since),
+            "lots_then": since.lots,
+            "driver": driver,
+            "level": "",
+            "axes": [axis],
+            "map": [],
+            "log_e": round(max(map(self.log_e, alarms)), 2),
+            "nearest": nearest,
+        }
 
     def _map_row(self, of: Unnamed) -> UnexplainedRow:
         """What is left by a driver over the poses of the newest lot, on the axis where it stands out most."""
         force = self.source.poses(self.state.order[-1])
         maps = [map_of(force, *fit) for fit in zip(of.size, of.covariance, strict=True)]
         best = int(np.argmax([np.sum(value**2) / np.sum(error**2) for value, error in maps]))
-        alarms = [a for a in self._of_sensor if plain(a.driver) == of.driver]
-        strongest = max(alarms, key=self.log_e)
-        return {
-            "driver": of.driver,
-            "level": of.level,
-            "axes": ["xyz"[best]],
-            "map": np.column_stack([angles_of(force), MICRO * np.column_stack(maps[best])]).tolist(),
-            "log_e": round(self.log_e(strongest), 2),
-            "nearest": self._nearest(of.driver),
-        }
+        row = self._unnamed_row(of.driver, "xyz"[best], self._nearest(of.driver))
+        row["level"] = of.level
+        row["map"] = np.column_stack([angles_of(force), MICRO * np.column_stack(maps[best])]).tolist()
+        return row
 
     def _nearest(self, driver: str) -> str:
         """The effect of the catalogue with the largest evidence by a driver."""

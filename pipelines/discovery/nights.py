@@ -161,6 +161,7 @@ def _text_of(state: Evidences, place: int) -> str:
     return f"{effect}.{column}" + (f".{axis}" if axis else "")
 
 
+_VERSION = 2  # of what is kept of a look: of another one nothing is read
 _GROWN = 1.05  # more lots than this factor: the names are found again
 
 
@@ -177,15 +178,16 @@ def found_before(source: DiscoveryArchive, state: Evidences) -> tuple[list[Disco
     before = _found(source.folder())
     if before is None or before["alarms"] != alarm_key(state) or len(state.order) > _GROWN * before["lots"]:
         return None
-    return (before["discoveries"], before["unexplained"]) if "unexplained" in before else None
+    return before["discoveries"], before["unexplained"]
 
 
 def discovered_before(archive: Archive) -> list[tuple[str, int]]:
-    """Kinds of devices with discoveries of an earlier look, and their number; nothing is judged."""
+    """Kinds of devices with discoveries of an earlier look, named or not, and their number; nothing is judged."""
     top = archive.root / FOLDER
     places = sorted(top.iterdir(), key=lambda path: path.name) if top.is_dir() else []
     found = {place.name: _found(place) for place in places if place.name not in {"scores", "lock"}}
-    return [(name, len(stored["discoveries"])) for name, stored in found.items() if stored and stored["discoveries"]]
+    counts = {name: len(stored["discoveries"]) + len(stored["unexplained"]) for name, stored in found.items() if stored}
+    return [(name, count) for name, count in counts.items() if count]
 
 
 def _found(folder: Place) -> dict[str, Any] | None:
@@ -194,34 +196,47 @@ def _found(folder: Place) -> dict[str, Any] | None:
     if not place.is_file():
         return None
     data, standing = derived.unframed(place)
-    return json.loads(data) if standing == derived.SOUND else None
+    found = json.loads(data) if standing == derived.SOUND else {}
+    return found if found.get("version") == _VERSION else None
 
 
 def remembered(source: DiscoveryArchive, state: Evidences, document: DiscoverDocument) -> DiscoverDocument:
-    """Keep a document beside the evidence, so that discoveries have the same ids the next time."""
-    stored = _found(source.folder()) or {"discoveries": [], "lots": 0}
-    before: list[dict[str, Any]] = stored["discoveries"]
-    used, free = {row["id"] for row in before}, list(before)
-    numbers = (f"D{n}" for n in range(1, 10_000))
-    for row in document["discoveries"]:
-        same = next(
-            (old for old in free if old["driver"] == row["driver"] and set(old["effects"]) & set(row["effects"])), None
-        )
-        if same is not None:
-            free.remove(same)
-            row["id"], row["since"], row["lots_then"] = same["id"], same["since"], same["lots_then"]
-        else:
-            row["id"] = next(number for number in numbers if number not in used)
-            used.add(row["id"])
-    known = {row["id"] for row in before}
-    document["new"] = [row["id"] for row in document["discoveries"] if row["id"] not in known]
+    """Keep a document beside the evidence, so that discoveries have the same ids the next time, and new ones are known."""
+    stored = _found(source.folder()) or {"discoveries": [], "unexplained": [], "lots": 0, "ids": 0}
+    known: list[dict[str, Any]] = [*stored["discoveries"], *stored["unexplained"]]
+    rows = [*document["discoveries"], *document["unexplained"]]
+    left = list(known)
+    document["new"] = []
+    for row in rows:
+        row["id"] = ""
+    # the same effects first; then what was unexplained and has a name now, or the other way round
+    for alike in (_effects_in_common, lambda old, new: not _effects(old) or not _effects(new)):
+        for row in (row for row in rows if not row["id"]):
+            same = next((old for old in left if old["driver"] == row["driver"] and alike(old, row)), None)
+            if same is not None:
+                left.remove(same)
+                row["id"], row["since"], row["lots_then"] = same["id"], same["since"], same["lots_then"]
+    for row in (row for row in rows if not row["id"]):
+        row["id"] = f"D{stored['ids'] + len(document['new']) + 1}"
+        document["new"].append(row["id"])
     kept = {
+        "version": _VERSION,
         "discoveries": document["discoveries"],
         "unexplained": document["unexplained"],
         "lots": len(state.order),
+        "ids": stored["ids"] + len(document["new"]),
         "alarms": alarm_key(state),
         "when": datetime.now(UTC).isoformat(timespec="seconds"),
     }
-    if "unexplained" not in stored or stored.get("alarms") != kept["alarms"] or kept["lots"] > _GROWN * stored["lots"]:
+    if stored.get("alarms") != kept["alarms"] or kept["lots"] > _GROWN * stored["lots"]:
         files.publish(source.folder() / "found", derived.framed(json.dumps(json_value(kept), sort_keys=True).encode()))
     return document
+
+
+def _effects(row: Mapping[str, Any]) -> set[str]:
+    """The class of effects of a discovery; none of what is unexplained."""
+    return set(row.get("effects", ()))
+
+
+def _effects_in_common(old: Mapping[str, Any], new: Mapping[str, Any]) -> bool:
+    return bool(_effects(old) & _effects(new)) or _effects(old) == _effects(new)

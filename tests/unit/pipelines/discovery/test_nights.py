@@ -4,6 +4,8 @@ import json
 import logging
 import shutil
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -16,7 +18,7 @@ from pipelines.demo.archive_lots import Line, write_lots
 from pipelines.discovery.attributes import add_attributes
 from pipelines.discovery.discover import Look, discovered
 from pipelines.discovery.lot_source import DiscoveryArchive
-from pipelines.discovery.nights import brought_up
+from pipelines.discovery.nights import brought_up, remembered
 from pipelines.discovery.score_store import ScoreStore
 
 LOTS, FEW = 44, 6
@@ -176,6 +178,31 @@ def test_two_populations_in_a_coefficient_are_told_with_their_means(
     assert (row["figure"], row["kind"], row["detail"]["units"]) == ("bias_y", "two_populations", units)
     assert row["detail"]["share"] == pytest.approx(0.15, abs=0.02)
     assert row["detail"]["means"][0] == pytest.approx(5.0, abs=0.5)
+
+
+def told(source: DiscoveryArchive, lots: int, named: dict[str, str], unexplained: tuple[str, ...]) -> str:
+    """Ids of the rows of a document that is remembered, by effect and driver and by driver alone, then of those that are new."""
+    since = {"since": "2026-01-01", "lots_then": 9}
+    made: Any = {
+        "discoveries": [{"effects": [effect], "driver": driver, **since} for effect, driver in named.items()],
+        "unexplained": [{"driver": driver, **since} for driver in unexplained],
+    }
+    state: Any = SimpleNamespace(alarms=[], order=[""] * lots)
+    document = remembered(source, state, made)
+    rows = (*document["discoveries"], *document["unexplained"])
+    return " ".join([*(row["id"] for row in rows), "new", *document["new"]])
+
+
+def test_what_is_unexplained_is_new_once_and_keeps_its_id_when_it_has_a_name(archive: Archive) -> None:
+    source = DiscoveryArchive(archive)
+    assert told(source, 40, {}, ("wafer",)) == "D1 new D1"
+    assert told(source, 60, {}, ("wafer",)) == "D1 new"
+    assert told(source, 80, {}, ("wafer", "slot")) == "D1 D2 new D2"
+    assert told(source, 100, {"third_order": "wafer"}, ("slot",)) == "D1 D2 new"
+    assert told(source, 120, {"third_order": "wafer"}, ("wafer", "slot")) == "D1 D3 D2 new D3"
+    assert told(source, 140, {"magnetic": "slot", "second_order": "wafer"}, ()) == "D2 D3 new"
+    # another effect by the same driver is another discovery
+    assert told(source, 160, {"magnetic": "slot", "fifth_order": "wafer"}, ()) == "D2 D4 new D4"
 
 
 def test_a_damaged_run_is_told_and_pooled_once_it_is_restored(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
