@@ -64,11 +64,10 @@ def levels_of(name: Name) -> list[DiscoveredLevel]:
 def station_sizes(station: Any, at: int) -> dict[str, tuple[float, float]]:
     """Size of a column at each station and its standard error at the stated noise."""
     table = station.levels[STATION]
-    centre = station.score[at] / max(station.information[at], 1e-300)
     out: dict[str, tuple[float, float]] = {}
     for label, place in table.place.items():
         information = max(float(table.information[place, at]), 1e-300)
-        out[label] = float(table.score[place, at] / information + centre), float(1.0 / np.sqrt(information))
+        out[label] = float(table.score[place, at] / information), float(1.0 / np.sqrt(information))
     return out
 
 

@@ -78,7 +78,7 @@ class Findings(Alarms):
     @cached_property
     def _of_sensor(self) -> list[Alarm]:
         """Open alarms of the devices' effects and of functions of the pose; those of the thermometer stand apart."""
-        of_devices = (alarm for alarm in self.open_alarms if alarm.place < self.state.sensor.count)
+        of_devices = (alarm for alarm in self.open_alarms if alarm.place < self.state.sensor.size)
         return [alarm for alarm in of_devices if plain(alarm.driver) != OWN_TEMPCO]
 
     @cached_property
@@ -87,7 +87,8 @@ class Findings(Alarms):
         if not self._of_sensor:
             return [], []
         alarms = [(alarm.driver, self.effect_of(alarm)) for alarm in self._of_sensor]
-        return self.pool.names(self.lots, alarms, max(self.state.needed(alarm.driver) for alarm in self._of_sensor))
+        needed = max(float(self.state.needed(alarm.driver).min()) for alarm in self._of_sensor)
+        return self.pool.names(self.lots, alarms, needed)
 
     @cached_property
     def discoveries(self) -> list[Discovery]:
@@ -147,8 +148,8 @@ class Findings(Alarms):
             "device": source.device,
             "error_control": {
                 "alpha": ALPHA,
-                "hypotheses": len(state.sensor.drivers) * state.sensor.count,
-                "log_e_needed": round(state.needed(MEAN), 2) if state.sensor.count else None,
+                "hypotheses": len(state.sensor.drivers) * state.sensor.size,
+                "log_e_needed": round(state.least_needed, 2) if state.sensor.count else None,
                 "valid": "every night",
             },
             "discoveries": rows,
@@ -181,7 +182,8 @@ class Findings(Alarms):
         scope, because = ("thermometer", PROPORTIONAL) if of_thermometer else self._scope(found)
         driver = found.drivers[0] if name.drivers[0] not in found.drivers else name.drivers[0]
         sums = [of for one, of in self.state.sensor.drivers.items() if plain(one) in found.drivers]
-        log_e = max(float(of.log_e[self._places(name.effects[0])].max()) for of in sums)
+        places = [*self._places(name.effects[0]), self.state.sensor.count + self.pool.effects.index(name.effects[0])]
+        log_e = max(float(of.log_e[places].max()) for of in sums)
         sizes = by_axis(name)
         row: DiscoveryRow = {
             "id": "",
@@ -236,7 +238,7 @@ class Findings(Alarms):
         """Alarms of the station's own columns, the strongest of each effect and driver."""
         best: dict[tuple[str, str], Alarm] = {}
         for alarm in self.open_alarms:
-            if alarm.place >= self.state.sensor.count:
+            if alarm.place >= self.state.sensor.size:
                 key = self.effect_of(alarm), alarm.driver
                 best[key] = max(best.get(key, alarm), alarm, key=lambda one: one.log_e)
         kept: dict[str, Alarm] = {}
@@ -275,7 +277,7 @@ class Findings(Alarms):
             "lots_then": since.lots,
             "driver": driver,
             "level": "",
-            "axes": [axis],
+            "axes": [axis] if axis else list("xyz"),
             "map": [],
             "log_e": round(max(map(self.log_e, alarms)), 2),
             "nearest": nearest,
@@ -304,7 +306,7 @@ class Findings(Alarms):
             return []
         between, within = state.sensor.noise
         own = np.mean([lot.own.sum(axis=0) for lot in self.some], axis=0) * lots
-        times = np.sqrt(2.0 * (state.needed(MEAN) + 0.5 * np.log1p(0.03 * lots))) + stats.norm.ppf(0.95)
+        times = np.sqrt(2.0 * (state.least_needed + 0.5 * np.log1p(0.03 * lots))) + stats.norm.ppf(0.95)
         rows: list[ReachRow] = []
         for driver, information, noise in ((MEAN, state.sensor.information, between), ("inside lots", own, within)):
             seen = information > 0.0

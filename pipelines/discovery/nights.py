@@ -14,22 +14,33 @@ from typing import Any
 import numpy as np
 
 from inertial.discovery.evidence import INSIDE, MEAN, SLOT, STATION, UNIT, Evidence
-from inertial.discovery.station_wander import WALK_FROM
+from inertial.discovery.station_wander import WALK_FROM, over
 from pipelines.archive import Archive, derived, files
 from pipelines.archive.locks import alone
 from pipelines.archive.store import Place
 from pipelines.discovery.documents import DiscoverDocument, DiscoveryRow, UnexplainedRow
-from pipelines.discovery.evidence_state import STATION_DRIVERS, Alarm, Evidences, hypothesis, state_bytes, stored_state
+from pipelines.discovery.evidence_state import (
+    STATION_DRIVERS,
+    Alarm,
+    Evidences,
+    hypothesis,
+    numbered,
+    state_bytes,
+    stored_state,
+)
 from pipelines.discovery.lot_source import AXES, DiscoveryArchive
 from pipelines.discovery.score_store import FOLDER
 from pipelines.tables.json_values import json_value
+
+
+_MOST_HELD = 0.2
 
 
 def fresh(source: DiscoveryArchive) -> Evidences:
     """Evidence without a lot."""
     sensor, station = source.columns
     order: list[str] = []
-    made = Evidence(AXES * len(sensor), source.earlier(order))
+    made = Evidence(AXES * len(sensor), source.earlier(order), numbered(sensor))
     return Evidences(source.device, sensor, station, made, Evidence(len(station)), order)
 
 
@@ -56,24 +67,28 @@ def _beyond(state: Evidences) -> list[Alarm]:
             if of_station and driver not in STATION_DRIVERS:
                 continue
             log_e = sums.log_e
-            for place in np.flatnonzero(log_e >= state.needed(driver)):
-                at = int(place) + (state.sensor.count if of_station else 0)
+            for place in np.flatnonzero(log_e >= state.needed(driver, of_station=of_station)):
+                at = int(place) + (state.sensor.size if of_station else 0)
                 out.append(Alarm(driver, at, state.night, len(state.order), float(log_e[place])))
     return out
 
 
 def held(state: Evidences, alarm: Alarm) -> bool:
     """Whether an alarm may be the station's own: the same for a whole lot, of an effect that wanders or differs with stations."""
-    if alarm.place >= state.sensor.count or alarm.driver.endswith(INSIDE) or alarm.driver in {SLOT, UNIT}:
-        return False
+    sensor, wander = state.sensor, state.sensor.wander
+    if alarm.place >= sensor.size or alarm.driver.endswith(INSIDE) or alarm.driver in {SLOT, UNIT, STATION}:
+        return False  # of a station, for good or by wander: stations differ
     if alarm.driver == MEAN:
-        shared = bool(state.sensor.shared_by_stations()[alarm.place])
-        return not shared or bool(state.sensor.guarded[alarm.place])
-    if alarm.driver == STATION:
-        return False  # for good or by wander: stations differ
-    wander = state.sensor.wander
-    walk = wander.gained if len(wander.stations) < 2 else wander.gained_beside(alarm.driver)
-    return bool(walk[alarm.place] > WALK_FROM)
+        of_station = ~sensor.shared_by_stations() | sensor.guarded
+    else:
+        walk = wander.gained if len(wander.stations) < 2 else wander.gained_beside(alarm.driver)
+        of_station = walk > WALK_FROM
+    if alarm.place < sensor.count or sensor.effects is None:
+        return bool(of_station[alarm.place])
+    # of an effect as a whole: where columns and axes that would be held back carry more than a fifth
+    own, sums = sensor.effects == alarm.place - sensor.count, sensor.drivers[alarm.driver]
+    carried = own * over(sums.s[: sensor.count] ** 2, sums.v[: sensor.count])
+    return float(carried[of_station].sum()) > _MOST_HELD * float(carried.sum())
 
 
 def brought_up(source: DiscoveryArchive) -> Evidences:
@@ -116,7 +131,7 @@ def _replayed(source: DiscoveryArchive, nights: Sequence[Mapping[str, Any]]) -> 
         state = grown_by_days(source, state, runs)
     state.taken_out = [run for night in nights for run in night["taken_out"]]
     # an alarm that was raised stays, also where a run that carried it was taken out since
-    place = {_text_of(state, at): at for at in range(state.sensor.count + state.station.count)}
+    place = {_text_of(state, at): at for at in range(state.sensor.size + state.station.count)}
     state.alarms += state.unknown(
         Alarm(told["driver"], place[told["column"]], night["night"], told["lots"], told["log_e"])
         for night in nights
@@ -142,7 +157,7 @@ def _write(
         "runs": list(new),
         "taken_out": list(gone),
         "lots": len(state.order),
-        "hypotheses": len(state.sensor.drivers) * state.sensor.count + len(STATION_DRIVERS) * state.station.count,
+        "hypotheses": len(state.sensor.drivers) * state.sensor.size + len(STATION_DRIVERS) * state.station.count,
         "alarms": [
             {"driver": a.driver, "column": _text_of(state, a.place), "lots": a.lots, "log_e": round(a.log_e, 2)}
             for a in state.alarms
@@ -158,7 +173,7 @@ def _write(
 
 def _text_of(state: Evidences, place: int) -> str:
     effect, column, axis = hypothesis(state, place)
-    return f"{effect}.{column}" + (f".{axis}" if axis else "")
+    return f"{effect}.{column}" + (f".{axis}" if axis else "") if column >= 0 else effect
 
 
 _VERSION = 2  # of what is kept of a look: of another one nothing is read
