@@ -106,7 +106,8 @@ class Sums:
         if self.effects is not None:
             # of two signs: times what earlier lots predict
             own = x * self.s[: x.size] / (self.v[: x.size] + FIRST) if self.two_sided else x
-            x = np.concatenate([x, np.bincount(self.effects, own, self.s.size - x.size)])
+            wholes = np.bincount(self.effects, own, self.s.size - x.size)
+            x = np.concatenate([x, np.asarray(wholes, dtype=np.float64)])
         self.s += x
         self.v += x**2
 

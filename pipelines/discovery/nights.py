@@ -32,7 +32,6 @@ from pipelines.discovery.lot_source import AXES, DiscoveryArchive
 from pipelines.discovery.score_store import FOLDER
 from pipelines.tables.json_values import json_value
 
-
 _MOST_HELD = 0.2
 
 
