@@ -175,7 +175,7 @@ def _text_of(state: Evidences, place: int) -> str:
     return f"{effect}.{column}" + (f".{axis}" if axis else "") if column >= 0 else effect
 
 
-_VERSION = 2  # of what is kept of a look: of another one nothing is read
+_VERSION = 2  # of what is kept of a look: of an earlier one the discoveries alone are read, and all is found again
 _GROWN = 1.05  # more lots than this factor: the names are found again
 
 
@@ -210,8 +210,13 @@ def _found(folder: Place) -> dict[str, Any] | None:
     if not place.is_file():
         return None
     data, standing = derived.unframed(place)
-    found = json.loads(data) if standing == derived.SOUND else {}
-    return found if found.get("version") == _VERSION else None
+    if standing != derived.SOUND:
+        return None
+    found: dict[str, Any] = json.loads(data)
+    if found.get("version") == _VERSION:
+        return found
+    numbers = [int(row["id"][1:]) for row in found["discoveries"]]
+    return {**found, "unexplained": [], "lots": 0, "alarms": None, "ids": max(numbers, default=0)}
 
 
 def remembered(source: DiscoveryArchive, state: Evidences, document: DiscoverDocument) -> DiscoverDocument:

@@ -13,7 +13,7 @@ import pandas as pd
 import pytest
 from demonstrations import wafer_line
 
-from pipelines.archive import Archive
+from pipelines.archive import Archive, derived, files
 from pipelines.audit.calibrations import Calibrations
 from pipelines.demo.archive_lots import Line, write_lots
 from pipelines.discovery.attributes import add_attributes
@@ -205,6 +205,14 @@ def test_what_is_unexplained_is_new_once_and_keeps_its_id_when_it_has_a_name(arc
     assert told(source, 140, {"magnetic": "slot", "second_order": "wafer"}, ()) == "D2 D3 new"
     # another effect by the same driver is another discovery
     assert told(source, 160, {"magnetic": "slot", "fifth_order": "wafer"}, ()) == "D2 D4 new D4"
+
+
+def test_discoveries_that_an_earlier_version_kept_have_their_ids(archive: Archive) -> None:
+    source = DiscoveryArchive(archive)
+    row = {"id": "D7", "effects": ["third_order"], "driver": "wafer", "since": "2025-01-01", "lots_then": 31}
+    kept = {"discoveries": [row], "alarms": ["wafer 1"], "lots": 40}
+    files.publish(source.folder() / "found", derived.framed(json.dumps(kept).encode()))
+    assert told(source, 40, {"third_order": "wafer"}, ("slot",)) == "D7 D8 new D8"
 
 
 def test_the_shares_of_all_hypotheses_add_up_to_the_probability_of_an_error(archive: Archive) -> None:
