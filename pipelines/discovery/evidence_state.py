@@ -21,8 +21,8 @@ STATION_DRIVERS = {MEAN, STATION, "date"}
 """Drivers of the station's own columns."""
 
 _MOST_COLUMNS = 5
-"""Of an effect that is judged as a whole. A bad lot displaces the past of all columns at once, by a little: in a sum over the 63 of
-any function of the pose that made 6 of 47 archives false, with one lot in a hundred of twenty times the noise."""
+"""Of an effect that is judged as a whole. A bad lot displaces the past of all columns at once, by a little: in a sum over the 63
+of any function of the pose that made 6 of 47 archives false, with one lot in a hundred of twenty times the noise."""
 
 _LAYOUT = 2  # of the state on disk
 
