@@ -73,13 +73,16 @@ class ArchiveView:
     def discoveries(self, device: str = "") -> pd.DataFrame:
         """What the lots of the archive show together, one row per discovery: as ``tumbleline discover`` of the same archive.
 
+        What no effect of the catalogue is like has no effects and no size.
+
         Parameters
         ----------
         device : kind of device; that of most runs if empty
         """
         from pipelines.discovery.discover import Look, discovered
 
-        rows = discovered(self.store, Look(device=device)).document["discoveries"]
+        document = discovered(self.store, Look(device=device)).document
+        rows = [*document["discoveries"], *document["unexplained"]]
         kept = (
             "id",
             "since",
@@ -93,7 +96,7 @@ class ArchiveView:
             "effects",
             "drivers",
         )
-        return pd.DataFrame([{name: row[name] for name in kept} for row in rows], columns=list(kept))
+        return pd.DataFrame([{name: row.get(name) for name in kept} for row in rows], columns=list(kept))
 
     def plot(self, unit: str, effect: str = "bias") -> Picture:
         """Change of a unit's coefficients of an effect since they were measured first, with U (k = 2) as bars, by day."""

@@ -22,7 +22,6 @@ from benchmarks.discovery.cost import cost
 from benchmarks.discovery.lots import WORLDS, World, bank
 from inertial.discovery.naming import Name, Pool, Unnamed
 
-NEEDED = 11.5  # of 14 drivers with 177 hypotheses each, in the first generation, at 5 %
 BANK = 120
 SETTINGS = (
     ("stations stay", Setting()),
@@ -94,7 +93,7 @@ def null(given: argparse.Namespace) -> None:
 
 def _null(part: tuple[World, int, int, Setting]) -> list[str]:
     world, seed, own, setting = part
-    first = _maker(world, seed).archive(own, 2000, Hidden(), setting, NEEDED).first
+    first = _maker(world, seed).archive(own, 2000, Hidden(), setting).first
     # a station whose references are wrong does differ from the others
     return [name for name in first if not (setting.wander and name == "station")]
 
@@ -114,7 +113,7 @@ def power(given: argparse.Namespace) -> None:
 def _power(part: tuple[World, int, int, Hidden]) -> float:
     world, seed, own, hidden = part
     count = 1200
-    first = _maker(world, seed).archive(own, count, hidden, Setting(), NEEDED, until=hidden.driver).first
+    first = _maker(world, seed).archive(own, count, hidden, Setting(), until=hidden.driver).first
     found = [lots for name, lots in first.items() if name.split(",")[0] == hidden.driver]
     if not found:
         return float("inf")
@@ -155,12 +154,11 @@ def _told(part: tuple[int, int, Hidden]) -> tuple[list[Name], list[Unnamed]] | N
     """Names of an archive, and functions of the pose that none of them is; None where nothing was found."""
     seed, own, hidden = part
     maker = _maker(WORLDS[1], seed)
-    result = maker.archive(own, 1000, hidden, Setting(), NEEDED, keep=True)
+    result = maker.archive(own, 1000, hidden, Setting(), keep=True)
     if not result.first:
         return None
     pool = Pool(maker.columns, maker.size.reshape(-1), *maker.products)
-    alarms = [(name, maker.columns[place % len(maker.columns)][0]) for name, place in result.alarms]
-    return pool.names(result.lots, alarms, NEEDED)
+    return pool.names(result.lots, result.alarms, maker.state_of(result.evidence).least_needed)
 
 
 def unexplained(given: argparse.Namespace) -> None:

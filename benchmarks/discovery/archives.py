@@ -7,7 +7,7 @@ calibration leaves of it, over the noise of a dwell.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 from benchmarks.discovery.lots import Lots, World
 from inertial.discovery.evidence import Evidence, ScoredLot
 from inertial.discovery.scores import LotScores
+from pipelines.discovery.evidence_state import Alarm, Evidences, hypothesis, numbered
+from pipelines.discovery.nights import held
 
 Array = NDArray[np.float64]
 UNITS, A_NIGHT = 8, 20
@@ -47,12 +49,12 @@ class Setting:
 
 @dataclass
 class Result:
-    """An archive's evidence, and the number of lots at the first alarm of each driver."""
+    """An archive's evidence, the number of lots at the first alarm of each driver, and the effects of all alarms."""
 
     evidence: Evidence
     lots: list[ScoredLot] = field(default_factory=list[ScoredLot])
     first: dict[str, int] = field(default_factory=dict[str, int])
-    alarms: set[tuple[str, int]] = field(default_factory=set[tuple[str, int]])
+    alarms: set[tuple[str, str]] = field(default_factory=set[tuple[str, str]])
 
 
 class ArchiveMaker:
@@ -70,14 +72,13 @@ class ArchiveMaker:
         count: int,
         hidden: Hidden,
         setting: Setting,
-        needed: float,
         *,
         keep: bool = False,
         until: str = "",
     ) -> Result:
         """An archive night by night, to its end or until a driver has been found."""
         rng = np.random.default_rng([seed, 4111])
-        result = Result(Evidence(3 * len(self.columns)))
+        result = Result(Evidence(3 * len(self.columns), columns=numbered(self.columns)))
         state, own = _State(rng, setting.stations), Lots(self._world, seed)
         for number in range(count):
             lot = self._lot(rng, state, own, number, count, hidden, setting)
@@ -85,23 +86,25 @@ class ArchiveMaker:
             if keep:
                 result.lots.append(lot)
             if number % A_NIGHT == A_NIGHT - 1 and number >= 29:
-                for name, sums in result.evidence.drivers.items():
-                    places = self._alarmed(result.evidence, name, sums.log_e, needed)
-                    result.alarms |= {(name, place) for place in places}
-                    if places:
-                        result.first.setdefault(name, number + 1)
+                for name, effect in self._alarmed(result.evidence):
+                    result.alarms.add((name, effect))
+                    result.first.setdefault(name, number + 1)
                 if until and any(name.split(",")[0] == until for name in result.first):
                     break
         return result
 
-    @staticmethod
-    def _alarmed(evidence: Evidence, name: str, log_e: Array, needed: float) -> list[int]:
-        """Hypotheses of a driver with an alarm that is not held, as the product decides."""
-        from pipelines.discovery.evidence_state import Alarm, Evidences
-        from pipelines.discovery.nights import held
+    def state_of(self, evidence: Evidence) -> Evidences:
+        """The evidence as the product has it: all drivers are of the first night."""
+        generations = dict.fromkeys(evidence.drivers, 0)
+        return Evidences("", self.columns, self.bank[0].station, evidence, Evidence(0), generations=generations)
 
-        state = Evidences("", tuple(("", k) for k in range(evidence.count // 3)), (), evidence, Evidence(0))
-        return [int(p) for p in np.flatnonzero(log_e > needed) if not held(state, Alarm(name, int(p), 0, 0, 0.0))]
+    def _alarmed(self, evidence: Evidence) -> Iterator[tuple[str, str]]:
+        """Drivers and effects with an alarm that is not held, as the product decides."""
+        state = self.state_of(evidence)
+        for name, sums in evidence.drivers.items():
+            for place in map(int, np.flatnonzero(sums.log_e >= state.needed(name))):
+                if not held(state, Alarm(name, place, 0, 0, 0.0)):
+                    yield name, hypothesis(state, place)[0]
 
     def _lot(
         self,
@@ -170,9 +173,7 @@ class _State:
         self._rng = np.random.default_rng(rng.integers(2**63))
         fixed = rng.standard_normal(3)
         self._fixed = fixed / np.sqrt(np.mean(fixed**2))
-        self._stations = rng.standard_normal((stations, 3))
-        slots = rng.standard_normal((UNITS, 3))
-        self._slots = slots - slots.mean(axis=0)
+        self._stations, self._slots = (_of_levels(rng.standard_normal((count, 3))) for count in (stations, UNITS))
         self._wafers: dict[int, Array] = {}
         self._walk = rng.standard_normal((stations, 3))
         self._seen: list[str] = []
@@ -201,3 +202,9 @@ class _State:
             out.append(old if old and old not in out else f"{number}-{k}")
         self._seen = [*self._seen, *out][-4000:]
         return tuple(out)
+
+
+def _of_levels(drawn: Array) -> Array:
+    """Sizes (levels, 3) of rms one about their mean; of one level as they are."""
+    about = drawn - drawn.mean(axis=0)
+    return about / np.sqrt(np.mean(about**2)) if len(drawn) > 1 else drawn

@@ -3,6 +3,8 @@
 Each lot gives each hypothesis one number x that is symmetric about zero where there is nothing, given all earlier lots. Then
 exp(λS − λ²V/2) with S = Σx and V = Σx² is a supermartingale for any λ (de la Peña 1999; de la Peña, Klass, Lai 2004), and the
 probability that its mean over some λ ever exceeds m/α is at most α/m (Ville). Nothing is assumed of the size of the noise.
+Beside every column on every axis stands each effect as a whole: the increments of its columns add, as the scores of a lot are
+symmetric together.
 """
 
 from collections.abc import Callable, Mapping
@@ -12,9 +14,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import logsumexp
+from scipy.special import chdtrc, logsumexp, stdtr
 
-from inertial.arrays import Array, Flags
+from inertial.arrays import Array, Flags, Places
 from inertial.discovery.station_wander import WALK_FROM, Innovation, Wander, over
 
 FIRST = 30
@@ -32,6 +34,10 @@ INSIDE = ", inside lots"
 
 SHARED: float = float(np.log(300.0))
 """Logarithm of the odds from which on a mean is taken to be of the sensors, and not of the stations' references."""
+
+_SHARED_ON_AXES, _SHARED_ON_ONE = 0.005, 0.1
+"""Probabilities, of references that differ at random between stations, that they agree so well on all axes of a column together,
+and on the axis itself: four stations reach the odds above on one axis with 0.6 %."""
 
 SLOPE, ALL = "slope", "all"
 """Sums of a number that differs by axis: what its slope is estimated from, and the information of all units."""
@@ -79,32 +85,43 @@ class ScoredLot:
 
 @dataclass
 class Sums:
-    """Evidence of one driver for every effect: Σx, Σx², number of lots that said anything."""
+    """Evidence of one driver for every hypothesis, then for every effect as a whole: Σx, Σx².
+
+    effects : (h,), number of the effect of each hypothesis; None where none stands for several
+    """
 
     s: Array
     v: Array
-    n: Array
     two_sided: bool
+    effects: Places | None = None
 
     @classmethod
-    def of(cls, count: int, *, two_sided: bool) -> "Sums":
+    def of(cls, count: int, *, two_sided: bool, effects: Places | None = None) -> "Sums":
         """Sums without a lot."""
-        return cls(np.zeros(count), np.zeros(count), np.zeros(count), two_sided)
+        size = count + (0 if effects is None else int(effects.max(initial=-1)) + 1)
+        return cls(np.zeros(size), np.zeros(size), two_sided, effects)
 
     def add(self, x: Array) -> None:
         """Add the increments (h,) of a lot."""
+        if self.effects is not None:
+            # of two signs: times what earlier lots predict
+            own = x * self.s[: x.size] / (self.v[: x.size] + FIRST) if self.two_sided else x
+            wholes = np.bincount(self.effects, own, self.s.size - x.size)
+            x = np.concatenate([x, np.asarray(wholes, dtype=np.float64)])
         self.s += x
         self.v += x**2
-        self.n += x != 0.0
 
     @property
     def log_e(self) -> Array:
-        """Logarithm of the evidence, (h,)."""
-        s, v = self.s, self.v
+        """Logarithm of the evidence, (h + effects,)."""
+        rates = _RATES[:, None]
+        out = logsumexp(rates * self.s - 0.5 * rates**2 * self.v, axis=0) - np.log(_RATES.size)
         if self.two_sided:
-            grown = 1.0 + _MIXED[:, None] * v
-            return logsumexp(-0.5 * np.log(grown) + 0.5 * _MIXED[:, None] * s**2 / grown, axis=0) - np.log(_MIXED.size)
-        return logsumexp(_RATES[:, None] * s - 0.5 * _RATES[:, None] ** 2 * v, axis=0) - np.log(_RATES.size)
+            own = slice(None) if self.effects is None else slice(self.effects.size)
+            s, grown = self.s[own], 1.0 + _MIXED[:, None] * self.v[own]
+            each = -0.5 * np.log(grown) + 0.5 * _MIXED[:, None] * s**2 / grown
+            out[own] = logsumexp(each, axis=0) - np.log(_MIXED.size)
+        return out
 
 
 class Levels:
@@ -175,10 +192,18 @@ class Evidence:
     ----------
     count : number of effects' columns and axes, h
     earlier : scores and information (h,) inside its lots of a unit's measurements among the first n lots; None without one
+    columns : (k,), number of the effect of each column; hypotheses are axes × columns. None: each stands for itself
     """
 
-    def __init__(self, count: int, earlier: Callable[[str, int], tuple[Array, Array] | None] | None = None) -> None:
+    def __init__(
+        self,
+        count: int,
+        earlier: Callable[[str, int], tuple[Array, Array] | None] | None = None,
+        columns: Places | None = None,
+    ) -> None:
         self.count, self.lots, self._taken = count, 0, 0
+        self.axes = 1 if columns is None or not columns.size else count // columns.size
+        self.effects = None if columns is None else np.tile(columns, self.axes)
         self.drivers: dict[str, Sums] = {}
         self.levels: dict[str, Levels] = {}
         self.wander = Wander(count)
@@ -200,6 +225,11 @@ class Evidence:
         self._add(lot)
 
     @property
+    def size(self) -> int:
+        """Number of hypotheses with the effects as wholes, which come last."""
+        return self.count + (0 if self.effects is None else int(self.effects.max(initial=-1)) + 1)
+
+    @property
     def guarded(self) -> Flags:
         """Effects (h,) for which the stations wander by themselves: what is constant in a lot may be that."""
         return self.wander.gained > WALK_FROM
@@ -212,10 +242,11 @@ class Evidence:
         return next(both), next(both)
 
     def shared_by_stations(self) -> Flags:
-        """Effects (h,) that stations share, by three hundred to one, rather than differ in.
+        """Effects (h,) that stations share rather than differ in.
 
         The references of each station may have an error of their own for good. Stations about a common mean are compared with
         stations about zero, at the same scatter: k/2·ln(1 + mean²/s²), where s is their scatter, or the noise if that is larger.
+        Three hundred to one on the axis are enough, or Student's t of the stations on all axes of a column (Fisher's sum).
         """
         table, count = self.levels.get(STATION), len(self.wander.stations)
         if table is None or count < 2 or "between" not in self._scales:
@@ -224,10 +255,14 @@ class Evidence:
         information = table.information[:n]
         seen = information > 0.0
         safe = np.where(seen, information, 1.0)
-        size = np.where(seen, table.score[:n] / safe, 0.0) + self._centre()
+        size = np.where(seen, table.score[:n] / safe, 0.0)
         noise = self._scales["between"].rms ** 2 * np.mean(1.0 / safe, axis=0)
-        odds = 0.5 * n * np.log1p(size.mean(axis=0) ** 2 / np.maximum(size.var(axis=0), noise))
-        return seen.all(axis=0) & (odds > SHARED)
+        ratio = size.mean(axis=0) ** 2 / np.maximum(size.var(axis=0), noise)
+        odds = 0.5 * n * np.log1p(ratio)
+        p = np.where(seen.all(axis=0), 2.0 * stdtr(n - 1, -np.sqrt((n - 1) * ratio)), 1.0)
+        fisher = -2.0 * np.log(np.maximum(p, 1e-300)).reshape(self.axes, -1).sum(axis=0)
+        on_axes = np.tile(chdtrc(2.0 * self.axes, fisher) < _SHARED_ON_AXES, self.axes)
+        return seen.all(axis=0) & ((odds > SHARED) | (on_axes & (p < _SHARED_ON_ONE)))
 
     def _begin(self) -> None:
         """Scales from the medians of the first lots; then these lots as if they came now."""
@@ -249,7 +284,7 @@ class Evidence:
             self._add(lot)
 
     def _sums(self, name: str, *, two_sided: bool) -> Sums:
-        return self.drivers.setdefault(name, Sums.of(self.count, two_sided=two_sided))
+        return self.drivers.setdefault(name, Sums.of(self.count, two_sided=two_sided, effects=self.effects))
 
     def _add(self, lot: ScoredLot) -> None:
         total, info = lot.score.sum(axis=0), lot.information
@@ -289,12 +324,14 @@ class Evidence:
     def _stations(self, lot: ScoredLot, size: Array, safe: Array, seen: Flags) -> None:
         """Stations that differ for good: each lot against what its station's earlier ones predict."""
         table = self.levels.setdefault(STATION, Levels(self.count))
-        predicted = table.predicted((lot.station,), SHRUNK * self._typical)[0][0]
+        prior, centre = SHRUNK * self._typical, self._centre()
+        (whole,), (behind,) = table.predicted((lot.station,), prior)
+        predicted = whole - centre * over(behind, behind + prior)
         scale = self._scales["between"]
-        left = scale.bounded(np.where(seen, (size - self._centre()) * np.sqrt(safe), 0.0))
+        left = scale.bounded(np.where(seen, (size - centre) * np.sqrt(safe), 0.0))
         x = left / scale.rms * np.clip(predicted * np.sqrt(safe) / scale.rms, -BOUND, BOUND)
         self._sums(STATION, two_sided=False).add(np.where(seen, x, 0.0))
-        score = np.where(seen, left * np.sqrt(safe), 0.0)
+        score = np.where(seen, centre * safe + left * np.sqrt(safe), 0.0)
         table.add((lot.station,), score[None], np.where(seen, safe, 0.0)[None])
 
     def _between(self, lot: ScoredLot, found: Innovation) -> None:
@@ -401,7 +438,7 @@ class Evidence:
         out: dict[str, NDArray[Any]] = {"score": self.score, "information": self.information}
         out["counts"] = np.array([self.lots, self._taken], dtype=np.float64)
         for name, sums in self.drivers.items():
-            out[f"driver/{name}"] = np.stack([sums.s, sums.v, sums.n, np.full(self.count, float(sums.two_sided))])
+            out[f"driver/{name}"] = np.stack([sums.s, sums.v, np.full(self.size, float(sums.two_sided))])
         for name, levels in self.levels.items():
             n = len(levels.place)
             out[f"levels/{name}"] = np.stack([levels.score[:n], levels.information[:n]])
@@ -414,16 +451,20 @@ class Evidence:
 
     @classmethod
     def restored(
-        cls, count: int, arrays: Mapping[str, NDArray[Any]], earlier: Callable[[str, int], tuple[Array, Array] | None]
+        cls,
+        count: int,
+        arrays: Mapping[str, NDArray[Any]],
+        earlier: Callable[[str, int], tuple[Array, Array] | None],
+        columns: Places | None = None,
     ) -> "Evidence":
         """The evidence of a state."""
-        new = cls(count, earlier)
+        new = cls(count, earlier, columns)
         new.score, new.information = arrays["score"].copy(), arrays["information"].copy()
         new.lots, new._taken = (int(value) for value in arrays["counts"])
         for key, value in arrays.items():
             kind, _, name = key.partition("/")
             if kind == "driver":
-                new.drivers[name] = Sums(*value[:3].copy(), two_sided=bool(value[3].any()))
+                new.drivers[name] = Sums(*value[:2].copy(), two_sided=bool(value[2].any()), effects=new.effects)
             elif kind == "levels":
                 levels = new.levels[name] = Levels(count)
                 levels.score, levels.information = value.copy()

@@ -20,7 +20,6 @@ from inertial.discovery.pose_shape import COUNT, SHAPE, harmonics
 from inertial.effects.base import AnyEffect
 from inertial.errors import MissingInput
 from inertial.estimation.bases import SEEN
-from inertial.estimation.candidate import Candidate
 from inertial.estimation.model import Model, refuse_without_freedom
 from inertial.estimation.problem import Lot, Problem
 from inertial.estimation.refinement import terms_of
@@ -84,13 +83,14 @@ def scores_of(lot: Lot, effects: Sequence[str], tried: Iterable[AnyEffect] | Non
     all_tried = [e for e in (catalogue.built_in().values() if tried is None else tried) if e.id not in known]
     local, names = _columns(problem, [e for e in all_tried if e.scope == "sensor"])
     if tried is None:
-        local, names = np.concatenate([local, _free(problem)], axis=-1), (*names, *((SHAPE, k) for k in range(COUNT)))
+        local.append(np.repeat(harmonics(np.moveaxis(forces_along(problem), 1, -1)), problem.per_unit, axis=0))
+        names += [(SHAPE, k) for k in range(COUNT)]
     shared, station = _columns(problem, [e for e in all_tried if e.scope == "station"])
-    return _scored(model, local, names, shared, station)
+    return _scored(model, [*local, *shared], tuple(names), tuple(station))
 
 
-def _columns(problem: Problem, effects: Sequence[AnyEffect]) -> tuple[Array, tuple[tuple[str, int], ...]]:
-    """Columns (blocks, n, k) of effects at the middle of their grids, with their names; without those that lack a quantity."""
+def _columns(problem: Problem, effects: Sequence[AnyEffect]) -> tuple[list[Array], list[tuple[str, int]]]:
+    """Columns, (blocks, n, p) each, of effects at the middle of their grids, and names; without those that lack a quantity."""
     made: list[Array] = []
     names: list[tuple[str, int]] = []
     for effect in effects:
@@ -99,65 +99,64 @@ def _columns(problem: Problem, effects: Sequence[AnyEffect]) -> tuple[Array, tup
         except MissingInput:
             continue
         own = own[..., : effect.primary]
-        if not own.shape[-1] or not np.isfinite(own).all():
-            continue
-        made.append(np.broadcast_to(own, (problem.blocks, problem.n, own.shape[-1])))
-        names += [(effect.id, column) for column in range(own.shape[-1])]
-    if not made:
-        return np.zeros((problem.blocks, problem.n, 0)), ()
-    return np.concatenate(made, axis=-1), tuple(names)
-
-
-def _free(problem: Problem) -> Array:
-    """Free functions of the pose, the same columns for every axis of a unit, (blocks, n, 21)."""
-    of_units = harmonics(np.moveaxis(forces_along(problem), 1, -1))
-    return np.repeat(of_units, problem.per_unit, axis=0)
+        if own.shape[-1] and np.isfinite(own).all():
+            made.append(own)
+            names += [(effect.id, column) for column in range(own.shape[-1])]
+    return made, names
 
 
 def _scored(
     model: Model,
-    local: Array,
+    columns: Sequence[Array],
     names: tuple[tuple[str, int], ...],
-    shared: Array,
     station: tuple[tuple[str, int], ...],
 ) -> LotScores:
-    """Scores from one pass of all columns through the whitened space of the model."""
-    problem, space = model.problem, model.space
-    k, m = len(names), problem.per_unit
-    columns = np.concatenate([local, shared], axis=-1)
-    found = space.products(Candidate(columns[:, :, None], shared=False))
-    left, whole, score = found.left[:, 0], found.squares[:, 0], found.inside[:, 0, :, 0]
-    visible = np.diagonal(left, axis1=1, axis2=2) > SEEN**2 * whole
-    left = left * (visible[:, :, None] & visible[:, None, :])
+    """Scores from one pass of all columns, those of the sensor before those of the station, through the whitened space."""
+    problem, space, even, covariance = model.problem, model.space, model.even, model.problem.covariance
+    k, m, every = len(names), problem.per_unit, slice(0, problem.blocks)
+    units = problem.blocks // m
+    rows, at = np.empty((problem.blocks, k + len(station), problem.n)), 0
+    for own in columns:
+        rows[:, at : at + own.shape[-1]] = np.swapaxes(own, -1, -2)
+        at += own.shape[-1]
+    # every dwell with the same weight: what wander takes from the information of a column, it does not take from the output
+    plain = covariance.white_rows(rows[:, :k].copy(), even.noise.shares, every)
+    squares = np.einsum("bkn,bkn->bk", plain, plain) - np.sum((plain @ even.q) ** 2, axis=-1)
+    plain = squares / (covariance.level * even.noise.scale)[:, None] ** 2
+    rows = covariance.white_rows(rows, space.noise.shares, every)
+    rows /= (covariance.level * space.noise.scale)[:, None, None]
+    whole, score = np.einsum("bkn,bkn->bk", rows, rows), (rows @ space.targets[..., :1])[..., 0]
+    rows -= (rows @ space.q) @ np.swapaxes(space.q, -1, -2)
+    visible = np.einsum("bkn,bkn->bk", rows, rows) > SEEN**2 * whole
+    rows *= visible[..., None]
     score = score * visible
-    cross, own = left[:, :k, k:], left[:, :k, :k]
-    of_station, station_score = left[:, k:, k:].sum(axis=0), score[:, k:].sum(axis=0)
-    inverse = _inverse(of_station)
+    of_sensor, of_station = rows[:, :k], rows[:, k:]
+    own = np.einsum("bkn,bkn->bk", of_sensor, of_sensor)
+    cross = of_sensor @ np.swapaxes(of_station, -1, -2)
+    station_score = score[:, k:].sum(axis=0)
+    between = np.tensordot(of_station, of_station, ((0, 2), (0, 2)))
+    inverse = _inverse(between)
     free = score[:, :k] - cross @ (inverse @ station_score)
-    units = len(left) // m
-    summed = cross.reshape(units, m, *cross.shape[1:]).sum(axis=0)  # (m, k, q), over the units
-    lots = own.reshape(units, m, k, k).sum(axis=0)
+    summed = cross.reshape(units, m, k, len(station)).sum(axis=0)  # (m, k, q), over the units
+    lots = np.stack([np.tensordot(of_sensor[a::m], of_sensor[a::m], ((0, 2), (0, 2))) for a in range(m)])
     joined = summed.reshape(m * k, -1)
     less = block_diag(*lots) - joined @ inverse @ joined.T
-    before = np.diagonal(lots, axis1=1, axis2=2)
-    told = np.diagonal(less).reshape(m, k) > LEAST_LEFT * before
+    told = np.diagonal(less).reshape(m, k) > LEAST_LEFT * np.diagonal(lots, axis1=1, axis2=2)
     less = less * np.outer(told, told)
-    # every dwell with the same weight: what wander takes from the information of a column, it does not take from the output
-    plain = np.diagonal(model.even.products(Candidate(local[:, :, None], shared=False)).left[:, 0], axis1=1, axis2=2)
-    rms = np.sqrt(np.maximum(plain, 0.0) * visible[:, :k] * problem.covariance.white / problem.n)
+    rms = np.sqrt(np.maximum(plain, 0.0) * visible[:, :k] * covariance.white / problem.n)
     return LotScores(
         columns=names,
         station=station,
         axes=tuple(problem.axes),
-        score=free.reshape(-1, m, k) * told,
-        own=np.diagonal(own, axis1=1, axis2=2).reshape(-1, m, k).copy(),
+        score=free.reshape(units, m, k) * told,
+        own=own.reshape(units, m, k),
         lot=less,
-        inside=own.reshape(-1, m, k, k).mean(axis=0),
+        inside=lots / units,
         station_score=station_score,
-        station_information=np.diagonal(of_station).copy(),
-        tempco=_tempco(model).reshape(-1, m),
+        station_information=np.diagonal(between).copy(),
+        tempco=_tempco(model).reshape(units, m),
         floor=model.floor(),
-        size=rms.reshape(-1, m, k).mean(axis=0),
+        size=rms.reshape(units, m, k).mean(axis=0),
     )
 
 
@@ -168,9 +167,8 @@ def _tempco(model: Model) -> Array:
     if place is None:
         return np.full(problem.blocks, np.nan)
     shared = model.shared @ space.shared_sizes if model.shared.shape[-1] else np.zeros_like(problem.y)
-    target = space.whiten((problem.y - shared)[..., None])[..., 0]
-    fits = zip(space.local, target, strict=True)
-    return np.array([np.linalg.lstsq(columns, own, rcond=None)[0][place] for columns, own in fits])
+    white = space.whiten(np.concatenate([model.local, (problem.y - shared)[..., None]], axis=-1))
+    return np.array([np.linalg.lstsq(own[:, :-1], own[:, -1], rcond=None)[0][place] for own in white])
 
 
 def _inverse(information: Array) -> Array:

@@ -3,6 +3,7 @@
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -43,14 +44,22 @@ class Nonlinear:
         return every[(every > low) & (every < high)]
 
     def grid(self) -> Array:
-        """Starting values, (points,), in ``unit``."""
-        if self.choices:
-            return np.array(self.choices)
-        if self.scale == "log":
-            return np.geomspace(self.low, self.high, self.points)
-        if self.scale == "inverse":
-            return 1.0 / np.linspace(1.0 / self.high, 1.0 / self.low, self.points)
-        return np.linspace(self.low, self.high, self.points)
+        """Starting values, (points,), in ``unit``; made once, and not to be written to."""
+        return _grid(self)
+
+
+@lru_cache(maxsize=256)
+def _grid(of: Nonlinear) -> Array:
+    if of.choices:
+        made = np.array(of.choices)
+    elif of.scale == "log":
+        made = np.geomspace(of.low, of.high, of.points)
+    elif of.scale == "inverse":
+        made = 1.0 / np.linspace(1.0 / of.high, 1.0 / of.low, of.points)
+    else:
+        made = np.linspace(of.low, of.high, of.points)
+    made.setflags(write=False)
+    return made
 
 
 MECHANISM, CONVERTER = 0.0, 1.0

@@ -346,7 +346,7 @@ def refuse_without_freedom(model: Model) -> None:
     NotIdentified
         No degree of freedom is left.
     """
-    if model.at(model.problem.covariance.white_noise()).dof < 1:
+    if model.even.dof < 1:
         count, series = model.problem.count, model.problem.blocks
         raise NotIdentified(
             f"model: {count // series} dwells a unit leave no degree of freedom to judge the model, more dwells than its "

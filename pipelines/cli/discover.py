@@ -63,7 +63,7 @@ def command(
     """Pool the lots of an archive: effects that differ by wafer, station, slot, firmware or date, or that all lots have.
 
     It may be repeated after every night's runs: the probability of a false discovery does not grow.
-    Exit status 1: there is a new discovery.
+    Exit status 1: there is a new discovery, named or unexplained.
     """
     from pipelines.cli.text.discovery_text import print_discoveries, print_explained
     from pipelines.discovery.discover import Look, discovered, explained

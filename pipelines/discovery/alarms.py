@@ -61,6 +61,6 @@ class Alarms:
 
     def log_e(self, alarm: Alarm) -> float:
         """Logarithm of the evidence of an alarm's hypothesis now."""
-        of_station = alarm.place >= self.state.sensor.count
+        of_station = alarm.place >= self.state.sensor.size
         evidence = self.state.station if of_station else self.state.sensor
-        return float(evidence.drivers[alarm.driver].log_e[alarm.place - (self.state.sensor.count if of_station else 0)])
+        return float(evidence.drivers[alarm.driver].log_e[alarm.place - (self.state.sensor.size if of_station else 0)])

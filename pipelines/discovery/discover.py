@@ -10,7 +10,7 @@ from inertial import effects as catalogue
 from inertial.discovery.evidence import INSIDE
 from pipelines.archive import Archive
 from pipelines.discovery.coefficient_populations import populations
-from pipelines.discovery.documents import ComparedAlarm, DiscoverDocument, DiscoveryRow
+from pipelines.discovery.documents import ComparedAlarm, DiscoverDocument, DiscoveryRow, UnexplainedRow
 from pipelines.discovery.figures_of_name import size_of
 from pipelines.discovery.findings import Findings
 from pipelines.discovery.lot_source import DiscoveryArchive
@@ -137,22 +137,24 @@ def _of_drivers(document: DiscoverDocument, drivers: Sequence[str]) -> DiscoverD
         if known and driver not in known:
             raise WrongUse(f"discover: no driver is called '{driver}'; {did_you_mean(driver, known)}")
     document["discoveries"] = [row for row in document["discoveries"] if set(row["drivers"]) & set(drivers)]
+    document["unexplained"] = [row for row in document["unexplained"] if row["driver"] in drivers]
     document["held"] = [row for row in document["held"] if row["driver"].removesuffix(INSIDE) in drivers]
     document["drivers"] = [row for row in document["drivers"] if row["name"] in drivers]
     return document
 
 
-def explained(document: DiscoverDocument, name: str) -> DiscoveryRow:
-    """One discovery by its id.
+def explained(document: DiscoverDocument, name: str) -> DiscoveryRow | UnexplainedRow:
+    """One discovery by its id, or what is unexplained.
 
     Raises
     ------
     WrongUse
         There is none of that id.
     """
-    found = next((row for row in document["discoveries"] if row["id"].lower() == name.lower()), None)
+    rows = [*document["discoveries"], *document["unexplained"]]
+    found = next((row for row in rows if row["id"].lower() == name.lower()), None)
     if found is None:
-        ids = [row["id"] for row in document["discoveries"]]
+        ids = [row["id"] for row in rows]
         hint = did_you_mean(name, ids) if ids else "there is none in this archive"
         raise WrongUse(f"discover: no discovery is called '{name}'; {hint}")
     return found

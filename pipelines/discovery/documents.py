@@ -87,8 +87,11 @@ class HeldAlarm(TypedDict):
 
 
 class UnexplainedRow(TypedDict):
-    """Evidence by a driver that no effect of the catalogue accounts for."""
+    """Evidence by a driver that no effect of the catalogue accounts for: a discovery without a name."""
 
+    id: Annotated[str, "as of a discovery, which it becomes when an effect turns out to be it"]
+    since: Annotated[str, "day of the first night on which it was beyond the threshold"]
+    lots_then: int
     driver: str
     level: Annotated[str, "of the driver, which the map is of: the one that departs most; empty where it has none"]
     axes: list[str]
@@ -166,12 +169,16 @@ class DiscoverDocument(TypedDict):
         list[ComparedAlarm],
         "with --model: discoveries of the sensors before and after its effects are in every lot's model",
     ]
-    new: Annotated[list[str], "ids of discoveries that were not there the time before"]
+    new: Annotated[list[str], "ids of discoveries, and of what is unexplained, that were not there the time before"]
     looking_back: bool
 
 
 class ExplainedDiscovery(DiscoveryRow):
     """``discover --explain ID --json``: one discovery."""
+
+
+class ExplainedRemainder(UnexplainedRow):
+    """``discover --json --explain ID``: one that no effect of the catalogue accounts for."""
 
 
 class AddedAttributes(TypedDict):

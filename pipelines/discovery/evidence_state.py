@@ -1,7 +1,6 @@
 """The evidence of a kind of device after some nights, its alarms, and its file."""
 
 import io
-import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -9,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from inertial.arrays import Array, Places
 from inertial.discovery.evidence import FIRST, MEAN, STATION, Evidence
 from pipelines.archive import derived, files
 from pipelines.archive.store import Place
@@ -20,10 +20,19 @@ ALPHA = 0.05
 STATION_DRIVERS = {MEAN, STATION, "date"}
 """Drivers of the station's own columns."""
 
+_MOST_COLUMNS = 5
+"""Of an effect that is judged as a whole. A bad lot displaces the past of all columns at once, by a little: in a sum over the 63
+of any function of the pose that made 6 of 47 archives false, with one lot in a hundred of twenty times the noise."""
+
+_LAYOUT = 2  # of the state on disk
+
 
 @dataclass(frozen=True)
 class Alarm:
-    """Evidence beyond the threshold: driver, place of the hypothesis, night of the first time."""
+    """Evidence beyond the threshold: driver, place of the hypothesis, night of the first time.
+
+    place : axes × columns of the sensor, then its effects as wholes, then columns of the station
+    """
 
     driver: str
     place: int
@@ -57,13 +66,36 @@ class Evidences:
         known = {(alarm.driver, alarm.place) for alarm in self.alarms}
         return [alarm for alarm in alarms if (alarm.driver, alarm.place) not in known]
 
-    def needed(self, driver: str) -> float:
-        """Logarithm of the evidence from which on a hypothesis of a driver counts; infinite where no lot gives hypotheses."""
+    def needed(self, driver: str, *, of_station: bool = False) -> Array:
+        """Logarithm of the evidence from which on each hypothesis of a driver counts.
+
+        The drivers of a generation share its probability of an error equally, and so do the effects of a driver: half of it is
+        the effect's as a whole, half that of its columns on each axis. An effect of many columns, as any function of the pose,
+        takes no more from the others than one of a single column; as a whole it never counts.
+        """
         generation = self.generations.get(driver, 0)
-        drivers = Counter(self.generations.values())[generation] or 1
-        of_station = len(STATION_DRIVERS) * len(self.of_station) if generation == 0 else 0
-        hypotheses = drivers * AXES * len(self.columns) + of_station
-        return math.inf if not hypotheses else float(np.log(hypotheses / (ALPHA * 0.5 ** (generation + 1))))
+        drivers = (Counter(self.generations.values())[generation] or 1) + (
+            len(STATION_DRIVERS) if generation == 0 else 0
+        )
+        share = ALPHA * 0.5 ** (generation + 1) / drivers
+        if of_station:
+            return np.full(len(self.of_station), np.log(len(self.of_station) / share))
+        of_column = numbered(self.columns)
+        columns = np.bincount(of_column)
+        whole = np.where(columns > _MOST_COLUMNS, 0.0, 0.5)
+        each = np.concatenate([np.tile(((1.0 - whole) / (AXES * columns))[of_column], AXES), whole])
+        return np.where(each > 0.0, np.log(columns.size / share) - np.log(np.where(each > 0.0, each, 1.0)), np.inf)
+
+    @property
+    def least_needed(self) -> float:
+        """The smallest of them."""
+        return float(self.needed(MEAN).min(initial=np.inf))
+
+
+def numbered(columns: Sequence[Column]) -> Places:
+    """Number of the effect of each column, (k,)."""
+    number = {effect: at for at, effect in enumerate(dict.fromkeys(effect for effect, _ in columns))}
+    return np.array([number[effect] for effect, _ in columns], dtype=np.intp)
 
 
 def below(parts: Mapping[str, Any], prefix: str) -> dict[str, Any]:
@@ -72,10 +104,12 @@ def below(parts: Mapping[str, Any], prefix: str) -> dict[str, Any]:
 
 
 def hypothesis(state: Evidences, place: int) -> tuple[str, int, str]:
-    """Effect, column and axis of a hypothesis; no axis for one of the station."""
-    if place >= state.sensor.count:
-        effect, column = state.of_station[place - state.sensor.count]
+    """Effect, column and axis of a hypothesis; no axis for one of the station, and no column (-1) for an effect as a whole."""
+    if place >= state.sensor.size:
+        effect, column = state.of_station[place - state.sensor.size]
         return effect, column, ""
+    if place >= state.sensor.count:
+        return list(dict.fromkeys(name for name, _ in state.columns))[place - state.sensor.count], -1, ""
     axis, at = divmod(place, len(state.columns))
     effect, column = state.columns[at]
     return effect, column, "xyz"[axis]
@@ -93,6 +127,7 @@ def state_bytes(state: Evidences) -> bytes:
         "alarm_drivers": np.array([a.driver for a in state.alarms], dtype=np.str_),
         "alarms": np.array([(a.place, a.night, a.lots, a.log_e) for a in state.alarms], dtype=float).reshape(-1, 4),
         "night": np.array(state.night),
+        "layout": np.array(_LAYOUT),
     }
     parts = {f"about/{name}": value for name, value in about.items()}
     for kind, evidence in (("sensor", state.sensor), ("station", state.station)):
@@ -118,6 +153,8 @@ def stored_state(source: DiscoveryArchive, folder: Place, nights: Sequence[Mappi
         parts = {str(name): loaded[str(n)] for n, name in enumerate(loaded["names"])}
     about = below(parts, "about/")
     sensor, station = source.columns
+    if "layout" not in about or about["layout"] != _LAYOUT:
+        return None
     if [f"{name} {column}" for name, column in (*sensor, *station)] != [*about["columns"], *about["of_station"]]:
         return None
     if any(str(run) not in source.store.place for run in about["order"]):
@@ -127,7 +164,7 @@ def stored_state(source: DiscoveryArchive, folder: Place, nights: Sequence[Mappi
         device=source.device,
         columns=sensor,
         of_station=station,
-        sensor=Evidence.restored(AXES * len(sensor), below(parts, "sensor/"), source.earlier(order)),
+        sensor=Evidence.restored(AXES * len(sensor), below(parts, "sensor/"), source.earlier(order), numbered(sensor)),
         station=Evidence.restored(len(station), below(parts, "station/"), lambda _, __: None),
         order=order,
         taken_out=[str(run) for run in about["taken_out"]],

@@ -64,11 +64,10 @@ def levels_of(name: Name) -> list[DiscoveredLevel]:
 def station_sizes(station: Any, at: int) -> dict[str, tuple[float, float]]:
     """Size of a column at each station and its standard error at the stated noise."""
     table = station.levels[STATION]
-    centre = station.score[at] / max(station.information[at], 1e-300)
     out: dict[str, tuple[float, float]] = {}
     for label, place in table.place.items():
         information = max(float(table.information[place, at]), 1e-300)
-        out[label] = float(table.score[place, at] / information + centre), float(1.0 / np.sqrt(information))
+        out[label] = float(table.score[place, at] / information), float(1.0 / np.sqrt(information))
     return out
 
 
@@ -126,16 +125,15 @@ def scope_text(row: DiscoveryRow) -> str:
 def unexplained_text(row: UnexplainedRow) -> str:
     """A sentence on what differs by a driver and is no effect of the catalogue."""
     what = "a function of the pose" if row["map"] else "something"
-    if row["driver"] == MEAN:
-        text = f"unexplained: {what} is common to all lots, and no effect of the catalogue is like it"
-    else:
-        most = f", most in {row['level']}" if row["level"] else ""
-        text = f"unexplained: {what} differs by {row['driver']}{most}, and no effect of the catalogue is like it"
-    if not row["map"]:
-        return text
-    size, error = np.array(row["map"])[:, 2:].T
-    largest = int(np.argmax(np.abs(size)))
-    return f"{text}; up to {short(abs(float(size[largest])))} ± {short(2.0 * float(error[largest]))} µg in axis {row['axes'][0]}"
+    most = f", most in {row['level']}" if row["level"] else ""
+    how = "is common to all lots" if row["driver"] == MEAN else f"differs by {row['driver']}{most}"
+    text = f"{row['id']}  unexplained: {what} {how}, and no effect of the catalogue is like it"
+    if row["map"]:
+        size, error = np.array(row["map"])[:, 2:].T
+        largest = int(np.argmax(np.abs(size)))
+        value = f"{short(abs(float(size[largest])))} ± {short(2.0 * float(error[largest]))} µg"
+        text += f"; up to {value} in axis {row['axes'][0]}"
+    return f"{text}; found on {row['since']}, with lot {row['lots_then']}"
 
 
 def _signed(value: float) -> str:

@@ -78,7 +78,7 @@ class Findings(Alarms):
     @cached_property
     def _of_sensor(self) -> list[Alarm]:
         """Open alarms of the devices' effects and of functions of the pose; those of the thermometer stand apart."""
-        of_devices = (alarm for alarm in self.open_alarms if alarm.place < self.state.sensor.count)
+        of_devices = (alarm for alarm in self.open_alarms if alarm.place < self.state.sensor.size)
         return [alarm for alarm in of_devices if plain(alarm.driver) != OWN_TEMPCO]
 
     @cached_property
@@ -87,7 +87,8 @@ class Findings(Alarms):
         if not self._of_sensor:
             return [], []
         alarms = [(alarm.driver, self.effect_of(alarm)) for alarm in self._of_sensor]
-        return self.pool.names(self.lots, alarms, max(self.state.needed(alarm.driver) for alarm in self._of_sensor))
+        needed = max(float(self.state.needed(alarm.driver).min()) for alarm in self._of_sensor)
+        return self.pool.names(self.lots, alarms, needed)
 
     @cached_property
     def discoveries(self) -> list[Discovery]:
@@ -147,8 +148,8 @@ class Findings(Alarms):
             "device": source.device,
             "error_control": {
                 "alpha": ALPHA,
-                "hypotheses": len(state.sensor.drivers) * state.sensor.count,
-                "log_e_needed": round(state.needed(MEAN), 2) if state.sensor.count else None,
+                "hypotheses": len(state.sensor.drivers) * state.sensor.size,
+                "log_e_needed": round(state.least_needed, 2) if state.sensor.count else None,
                 "valid": "every night",
             },
             "discoveries": rows,
@@ -169,9 +170,10 @@ class Findings(Alarms):
             station_row(self, alarm) for alarm in self._of_station
         ]
         rows += [thermometer_row(self)] if self.of_thermometer else []
-        for number, row in enumerate(rows, start=1):
+        unexplained = self._unexplained(named=bool(rows))
+        for number, row in enumerate((*rows, *unexplained), start=1):
             row["id"] = f"D{number}"
-        return rows, self._unexplained(named=bool(rows))
+        return rows, unexplained
 
     def _row(self, found: Discovery) -> DiscoveryRow:
         name = found.name
@@ -180,7 +182,8 @@ class Findings(Alarms):
         scope, because = ("thermometer", PROPORTIONAL) if of_thermometer else self._scope(found)
         driver = found.drivers[0] if name.drivers[0] not in found.drivers else name.drivers[0]
         sums = [of for one, of in self.state.sensor.drivers.items() if plain(one) in found.drivers]
-        log_e = max(float(of.log_e[self._places(name.effects[0])].max()) for of in sums)
+        places = [*self._places(name.effects[0]), self.state.sensor.count + self.pool.effects.index(name.effects[0])]
+        log_e = max(float(of.log_e[places].max()) for of in sums)
         sizes = by_axis(name)
         row: DiscoveryRow = {
             "id": "",
@@ -235,7 +238,7 @@ class Findings(Alarms):
         """Alarms of the station's own columns, the strongest of each effect and driver."""
         best: dict[tuple[str, str], Alarm] = {}
         for alarm in self.open_alarms:
-            if alarm.place >= self.state.sensor.count:
+            if alarm.place >= self.state.sensor.size:
                 key = self.effect_of(alarm), alarm.driver
                 best[key] = max(best.get(key, alarm), alarm, key=lambda one: one.log_e)
         kept: dict[str, Alarm] = {}
@@ -259,31 +262,36 @@ class Findings(Alarms):
     def _unexplained(self, *, named: bool) -> list[UnexplainedRow]:
         """Functions of the pose that no effect is; and, where nothing is named, every driver with an alarm."""
         rows = {of.driver: self._map_row(of) for of in self._named[1]}
-        if not named:
-            for alarm in sorted(self._of_sensor, key=self.log_e, reverse=True):
-                effect, _, axis = hypothesis(self.state, alarm.place)
-                log_e, driver = round(self.log_e(alarm), 2), plain(alarm.driver)
-                row: UnexplainedRow = {
-                    "driver": driver, "level": "", "nearest": effect, "axes": [axis], "map": [], "log_e": log_e,
-                }  # fmt: skip
-                rows.setdefault(driver, row)
+        for alarm in [] if named else sorted(self._of_sensor, key=self.log_e, reverse=True):
+            effect, _, axis = hypothesis(self.state, alarm.place)
+            rows.setdefault(plain(alarm.driver), self._unnamed_row(plain(alarm.driver), axis, effect))
         return list(rows.values())
+
+    def _unnamed_row(self, driver: str, axis: str, nearest: str) -> UnexplainedRow:
+        """What differs by a driver without a map of it."""
+        alarms = [a for a in self._of_sensor if plain(a.driver) == driver]
+        since = min(alarms, key=lambda a: a.lots)
+        return {
+            "id": "",
+            "since": self.day_of(since),
+            "lots_then": since.lots,
+            "driver": driver,
+            "level": "",
+            "axes": [axis] if axis else list("xyz"),
+            "map": [],
+            "log_e": round(max(map(self.log_e, alarms)), 2),
+            "nearest": nearest,
+        }
 
     def _map_row(self, of: Unnamed) -> UnexplainedRow:
         """What is left by a driver over the poses of the newest lot, on the axis where it stands out most."""
         force = self.source.poses(self.state.order[-1])
         maps = [map_of(force, *fit) for fit in zip(of.size, of.covariance, strict=True)]
         best = int(np.argmax([np.sum(value**2) / np.sum(error**2) for value, error in maps]))
-        alarms = [a for a in self._of_sensor if plain(a.driver) == of.driver]
-        strongest = max(alarms, key=self.log_e)
-        return {
-            "driver": of.driver,
-            "level": of.level,
-            "axes": ["xyz"[best]],
-            "map": np.column_stack([angles_of(force), MICRO * np.column_stack(maps[best])]).tolist(),
-            "log_e": round(self.log_e(strongest), 2),
-            "nearest": self._nearest(of.driver),
-        }
+        row = self._unnamed_row(of.driver, "xyz"[best], self._nearest(of.driver))
+        row["level"] = of.level
+        row["map"] = np.column_stack([angles_of(force), MICRO * np.column_stack(maps[best])]).tolist()
+        return row
 
     def _nearest(self, driver: str) -> str:
         """The effect of the catalogue with the largest evidence by a driver."""
@@ -298,7 +306,7 @@ class Findings(Alarms):
             return []
         between, within = state.sensor.noise
         own = np.mean([lot.own.sum(axis=0) for lot in self.some], axis=0) * lots
-        times = np.sqrt(2.0 * (state.needed(MEAN) + 0.5 * np.log1p(0.03 * lots))) + stats.norm.ppf(0.95)
+        times = np.sqrt(2.0 * (state.least_needed + 0.5 * np.log1p(0.03 * lots))) + stats.norm.ppf(0.95)
         rows: list[ReachRow] = []
         for driver, information, noise in ((MEAN, state.sensor.information, between), ("inside lots", own, within)):
             seen = information > 0.0

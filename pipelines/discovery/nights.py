@@ -14,22 +14,32 @@ from typing import Any
 import numpy as np
 
 from inertial.discovery.evidence import INSIDE, MEAN, SLOT, STATION, UNIT, Evidence
-from inertial.discovery.station_wander import WALK_FROM
+from inertial.discovery.station_wander import WALK_FROM, over
 from pipelines.archive import Archive, derived, files
 from pipelines.archive.locks import alone
 from pipelines.archive.store import Place
 from pipelines.discovery.documents import DiscoverDocument, DiscoveryRow, UnexplainedRow
-from pipelines.discovery.evidence_state import STATION_DRIVERS, Alarm, Evidences, hypothesis, state_bytes, stored_state
+from pipelines.discovery.evidence_state import (
+    STATION_DRIVERS,
+    Alarm,
+    Evidences,
+    hypothesis,
+    numbered,
+    state_bytes,
+    stored_state,
+)
 from pipelines.discovery.lot_source import AXES, DiscoveryArchive
 from pipelines.discovery.score_store import FOLDER
 from pipelines.tables.json_values import json_value
+
+_MOST_HELD = 0.2
 
 
 def fresh(source: DiscoveryArchive) -> Evidences:
     """Evidence without a lot."""
     sensor, station = source.columns
     order: list[str] = []
-    made = Evidence(AXES * len(sensor), source.earlier(order))
+    made = Evidence(AXES * len(sensor), source.earlier(order), numbered(sensor))
     return Evidences(source.device, sensor, station, made, Evidence(len(station)), order)
 
 
@@ -56,24 +66,28 @@ def _beyond(state: Evidences) -> list[Alarm]:
             if of_station and driver not in STATION_DRIVERS:
                 continue
             log_e = sums.log_e
-            for place in np.flatnonzero(log_e >= state.needed(driver)):
-                at = int(place) + (state.sensor.count if of_station else 0)
+            for place in np.flatnonzero(log_e >= state.needed(driver, of_station=of_station)):
+                at = int(place) + (state.sensor.size if of_station else 0)
                 out.append(Alarm(driver, at, state.night, len(state.order), float(log_e[place])))
     return out
 
 
 def held(state: Evidences, alarm: Alarm) -> bool:
     """Whether an alarm may be the station's own: the same for a whole lot, of an effect that wanders or differs with stations."""
-    if alarm.place >= state.sensor.count or alarm.driver.endswith(INSIDE) or alarm.driver in {SLOT, UNIT}:
-        return False
+    sensor, wander = state.sensor, state.sensor.wander
+    if alarm.place >= sensor.size or alarm.driver.endswith(INSIDE) or alarm.driver in {SLOT, UNIT, STATION}:
+        return False  # of a station, for good or by wander: stations differ
     if alarm.driver == MEAN:
-        shared = bool(state.sensor.shared_by_stations()[alarm.place])
-        return not shared or bool(state.sensor.guarded[alarm.place])
-    if alarm.driver == STATION:
-        return False  # for good or by wander: stations differ
-    wander = state.sensor.wander
-    walk = wander.gained if len(wander.stations) < 2 else wander.gained_beside(alarm.driver)
-    return bool(walk[alarm.place] > WALK_FROM)
+        of_station = ~sensor.shared_by_stations() | sensor.guarded
+    else:
+        walk = wander.gained if len(wander.stations) < 2 else wander.gained_beside(alarm.driver)
+        of_station = walk > WALK_FROM
+    if alarm.place < sensor.count or sensor.effects is None:
+        return bool(of_station[alarm.place])
+    # of an effect as a whole: where columns and axes that would be held back carry more than a fifth
+    own, sums = sensor.effects == alarm.place - sensor.count, sensor.drivers[alarm.driver]
+    carried = own * over(sums.s[: sensor.count] ** 2, sums.v[: sensor.count])
+    return float(carried[of_station].sum()) > _MOST_HELD * float(carried.sum())
 
 
 def brought_up(source: DiscoveryArchive) -> Evidences:
@@ -116,7 +130,7 @@ def _replayed(source: DiscoveryArchive, nights: Sequence[Mapping[str, Any]]) -> 
         state = grown_by_days(source, state, runs)
     state.taken_out = [run for night in nights for run in night["taken_out"]]
     # an alarm that was raised stays, also where a run that carried it was taken out since
-    place = {_text_of(state, at): at for at in range(state.sensor.count + state.station.count)}
+    place = {_text_of(state, at): at for at in range(state.sensor.size + state.station.count)}
     state.alarms += state.unknown(
         Alarm(told["driver"], place[told["column"]], night["night"], told["lots"], told["log_e"])
         for night in nights
@@ -142,7 +156,7 @@ def _write(
         "runs": list(new),
         "taken_out": list(gone),
         "lots": len(state.order),
-        "hypotheses": len(state.sensor.drivers) * state.sensor.count + len(STATION_DRIVERS) * state.station.count,
+        "hypotheses": len(state.sensor.drivers) * state.sensor.size + len(STATION_DRIVERS) * state.station.count,
         "alarms": [
             {"driver": a.driver, "column": _text_of(state, a.place), "lots": a.lots, "log_e": round(a.log_e, 2)}
             for a in state.alarms
@@ -158,9 +172,10 @@ def _write(
 
 def _text_of(state: Evidences, place: int) -> str:
     effect, column, axis = hypothesis(state, place)
-    return f"{effect}.{column}" + (f".{axis}" if axis else "")
+    return f"{effect}.{column}" + (f".{axis}" if axis else "") if column >= 0 else effect
 
 
+_VERSION = 2  # of what is kept of a look: of an earlier one the discoveries alone are read, and all is found again
 _GROWN = 1.05  # more lots than this factor: the names are found again
 
 
@@ -177,15 +192,16 @@ def found_before(source: DiscoveryArchive, state: Evidences) -> tuple[list[Disco
     before = _found(source.folder())
     if before is None or before["alarms"] != alarm_key(state) or len(state.order) > _GROWN * before["lots"]:
         return None
-    return (before["discoveries"], before["unexplained"]) if "unexplained" in before else None
+    return before["discoveries"], before["unexplained"]
 
 
 def discovered_before(archive: Archive) -> list[tuple[str, int]]:
-    """Kinds of devices with discoveries of an earlier look, and their number; nothing is judged."""
+    """Kinds of devices with discoveries of an earlier look, named or not, and their number; nothing is judged."""
     top = archive.root / FOLDER
     places = sorted(top.iterdir(), key=lambda path: path.name) if top.is_dir() else []
     found = {place.name: _found(place) for place in places if place.name not in {"scores", "lock"}}
-    return [(name, len(stored["discoveries"])) for name, stored in found.items() if stored and stored["discoveries"]]
+    counts = {name: len(stored["discoveries"]) + len(stored["unexplained"]) for name, stored in found.items() if stored}
+    return [(name, count) for name, count in counts.items() if count]
 
 
 def _found(folder: Place) -> dict[str, Any] | None:
@@ -194,34 +210,52 @@ def _found(folder: Place) -> dict[str, Any] | None:
     if not place.is_file():
         return None
     data, standing = derived.unframed(place)
-    return json.loads(data) if standing == derived.SOUND else None
+    if standing != derived.SOUND:
+        return None
+    found: dict[str, Any] = json.loads(data)
+    if found.get("version") == _VERSION:
+        return found
+    numbers = [int(row["id"][1:]) for row in found["discoveries"]]
+    return {**found, "unexplained": [], "lots": 0, "alarms": None, "ids": max(numbers, default=0)}
 
 
 def remembered(source: DiscoveryArchive, state: Evidences, document: DiscoverDocument) -> DiscoverDocument:
-    """Keep a document beside the evidence, so that discoveries have the same ids the next time."""
-    stored = _found(source.folder()) or {"discoveries": [], "lots": 0}
-    before: list[dict[str, Any]] = stored["discoveries"]
-    used, free = {row["id"] for row in before}, list(before)
-    numbers = (f"D{n}" for n in range(1, 10_000))
-    for row in document["discoveries"]:
-        same = next(
-            (old for old in free if old["driver"] == row["driver"] and set(old["effects"]) & set(row["effects"])), None
-        )
-        if same is not None:
-            free.remove(same)
-            row["id"], row["since"], row["lots_then"] = same["id"], same["since"], same["lots_then"]
-        else:
-            row["id"] = next(number for number in numbers if number not in used)
-            used.add(row["id"])
-    known = {row["id"] for row in before}
-    document["new"] = [row["id"] for row in document["discoveries"] if row["id"] not in known]
+    """Keep a document beside the evidence, so that discoveries have the same ids the next time, and new ones are known."""
+    stored = _found(source.folder()) or {"discoveries": [], "unexplained": [], "lots": 0, "ids": 0}
+    known: list[dict[str, Any]] = [*stored["discoveries"], *stored["unexplained"]]
+    rows = [*document["discoveries"], *document["unexplained"]]
+    left = list(known)
+    document["new"] = []
+    for row in rows:
+        row["id"] = ""
+    # the same effects first; then what was unexplained and has a name now, or the other way round
+    for alike in (_effects_in_common, lambda old, new: not _effects(old) or not _effects(new)):
+        for row in (row for row in rows if not row["id"]):
+            same = next((old for old in left if old["driver"] == row["driver"] and alike(old, row)), None)
+            if same is not None:
+                left.remove(same)
+                row["id"], row["since"], row["lots_then"] = same["id"], same["since"], same["lots_then"]
+    for row in (row for row in rows if not row["id"]):
+        row["id"] = f"D{stored['ids'] + len(document['new']) + 1}"
+        document["new"].append(row["id"])
     kept = {
+        "version": _VERSION,
         "discoveries": document["discoveries"],
         "unexplained": document["unexplained"],
         "lots": len(state.order),
+        "ids": stored["ids"] + len(document["new"]),
         "alarms": alarm_key(state),
         "when": datetime.now(UTC).isoformat(timespec="seconds"),
     }
-    if "unexplained" not in stored or stored.get("alarms") != kept["alarms"] or kept["lots"] > _GROWN * stored["lots"]:
+    if stored.get("alarms") != kept["alarms"] or kept["lots"] > _GROWN * stored["lots"]:
         files.publish(source.folder() / "found", derived.framed(json.dumps(json_value(kept), sort_keys=True).encode()))
     return document
+
+
+def _effects(row: Mapping[str, Any]) -> set[str]:
+    """The class of effects of a discovery; none of what is unexplained."""
+    return set(row.get("effects", ()))
+
+
+def _effects_in_common(old: Mapping[str, Any], new: Mapping[str, Any]) -> bool:
+    return bool(_effects(old) & _effects(new)) or _effects(old) == _effects(new)

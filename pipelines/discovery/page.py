@@ -7,6 +7,7 @@ from inertial.discovery.evidence import INSIDE, MEAN, STATION, Sums
 from inertial.frames import force_from_angles
 from inertial.uncertainty.rounding import short
 from pipelines.discovery.documents import DiscoverDocument, DiscoveryRow, UnexplainedRow
+from pipelines.discovery.evidence_state import hypothesis
 from pipelines.discovery.figures_of_name import headline, scope_text, unexplained_text
 from pipelines.discovery.findings import Findings
 from pipelines.drawing import Chart, Plot, PlotAxis, Trace, still, svg_text
@@ -85,7 +86,7 @@ def growth_charts(findings: Findings, document: DiscoverDocument) -> dict[str, C
             continue
         x = carried / max(float(np.sqrt(np.mean(carried**2))), 1e-300)
         evidence = [
-            float(Sums(np.array([s]), np.array([v]), np.ones(1), two_sided=False).log_e[0])
+            float(Sums(np.array([s]), np.array([v]), two_sided=False).log_e[0])
             for s, v in zip(np.cumsum(x), np.cumsum(x**2), strict=True)
         ]
         lots = np.arange(1, x.size + 1, dtype=np.float64)
@@ -108,14 +109,14 @@ def strongest_chart(findings: Findings) -> Chart | None:
     drivers.sort(key=lambda name: (name not in {MEAN, STATION}, name))
     grid = np.zeros((len(effects), len(drivers)))
     for name, sums in state.sensor.drivers.items():
-        log_e = sums.log_e.reshape(3, -1).max(axis=0)
         column = drivers.index(name.removesuffix(INSIDE))
-        for k, (effect, _) in enumerate(state.columns):
-            row = effects.index(effect)
-            grid[row, column] = max(grid[row, column], log_e[k] / np.log(10.0))
+        # what counts from more evidence on is drawn by as much less
+        for place, log_e in enumerate(sums.log_e - state.needed(name) + state.least_needed):
+            row = effects.index(hypothesis(state, place)[0])
+            grid[row, column] = max(grid[row, column], log_e / np.log(10.0))
     if grid.max(initial=0.0) <= FAINT:
         return None
-    needed = state.needed(MEAN) / np.log(10.0)
+    needed = state.least_needed / np.log(10.0)
     traces: list[Trace] = []
     shown: tuple[tuple[str, Role, NDArray[np.bool_]], ...] = (
         ("beyond the threshold", "before", grid >= needed),

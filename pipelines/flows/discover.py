@@ -11,7 +11,7 @@ from inertial.counts import number_of
 from pipelines.archive.files import ELSEWHERE, json_bytes, publish
 from pipelines.discovery.discover import Look, discovered
 from pipelines.discovery.documents import DiscoverDocument
-from pipelines.discovery.figures_of_name import headline, scope_text
+from pipelines.discovery.figures_of_name import headline, scope_text, unexplained_text
 from pipelines.discovery.page import render
 from pipelines.orchestrator.archive_address import archive_of
 from pipelines.tables.json_values import json_value
@@ -40,6 +40,7 @@ def discover_in_archive(archive: str | None = None, device: str = "", pages: str
     """
     document = look(archive, device, Path(pages), workers)
     rows = [f"- {headline(row)}. {scope_text(row)}" for row in document["discoveries"]]
+    rows += [f"- {unexplained_text(row)}" for row in document["unexplained"]]
     title = f"# {number_of(len(rows), 'discovery', 'discoveries')} in {number_of(document['pooled']['lots'], 'lot')}"
     create_markdown_artifact(key=KEY, markdown="\n".join([title, "", *(rows or ["Nothing is beyond chance."])]))
     return len(document["new"])

@@ -119,10 +119,13 @@ def _of_stations(snapshot: Snapshot) -> Iterator[Alert]:
 
 def _of_discoveries(folder: Path, now: datetime) -> Iterator[Alert]:
     """Discoveries of the newest night; each is posted once."""
-    for row in _newest(folder, "discover", "discoveries", now):
+    named, unexplained = (_newest(folder, "discover", key, now) for key in ("discoveries", "unexplained"))
+    for row in (*named, *unexplained):
         effects, drivers = (" | ".join(map(str, row.get(key, ()))) for key in ("effects", "drivers"))
-        size = float(row.get("size_ug") or 0.0)
-        text = f"discovery {row.get('id')}: {effects} by {drivers}, rms {size:.2g} µg; {row.get('because')}"
+        what = f"{effects} by {drivers}, rms {float(row.get('size_ug') or 0.0):.2g} µg; {row.get('because')}"
+        if not effects:
+            what = f"unexplained by {row.get('driver')}, no effect of the catalogue is like it"
+        text = f"discovery {row.get('id')}: {what}"
         yield _alert("discovery", f"{row.get('id')} {row.get('since')}", str(row.get("driver", "")), text, now)
 
 

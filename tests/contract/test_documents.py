@@ -148,6 +148,7 @@ ELSEWHERE = {
     "plan order --json": "e2e/test_run_that_ends.py",
     "discover --explain ID --json": "e2e/test_discover.py",
     "demo --lots N --json": "e2e/test_discover.py",
+    "discover --json --explain ID": "e2e/test_discover.py",
     "certificate write --json": "unit/pipelines/certificates/document/test_compose.py",
     "verify FILE… --json": "unit/pipelines/certificates/document/test_file_check.py",
     "certificate issue --json": "contract/test_documents.py",

@@ -165,9 +165,10 @@ def test_what_no_effect_is_like_is_said_with_its_map(tmp_path: Path, monkeypatch
     text_of("attributes", "add", made.units, "--archive", made.folder)
     page = tmp_path / "d.html"
     options = ("discover", "--archive", made.folder, "--workers", "1")
-    said = document_of(*options, "--html", page)
+    said = document_of(*options, "--html", page, status=1)
     (row,) = said["unexplained"]
     assert (said["discoveries"], row["driver"], row["level"]) == ([], "wafer", "W02")
+    assert said["new"] == [row["id"]]  # an alarm as that of any other discovery
     outer, inner, left, error = np.array(row["map"]).T
     force = force_from_angles(np.radians(outer), np.radians(inner))
     function = 150.0 * force**2 * np.roll(force, -1, axis=1)
@@ -176,9 +177,15 @@ def test_what_no_effect_is_like_is_said_with_its_map(tmp_path: Path, monkeypatch
     share = float(left @ expected / (expected @ expected))  # less what the mean of all wafers has of it
     assert 0.6 < share < 1.1
     assert np.sqrt(np.mean(((left - share * expected) / error) ** 2)) < 2.0
-    assert document_of(*options)["unexplained"] == said["unexplained"]  # as found the night before
+    again = document_of(*options, status=0)
+    assert (again["unexplained"], again["new"]) == (said["unexplained"], [])  # as found the night before
     assert "no effect of the catalogue is like it" in page.read_text("utf-8")
-    assert "differs by wafer, most in W02" in given(*options)[1]
+    (line,) = printed_commands(text := given(*options)[1])
+    assert "differs by wafer, most in W02" in text
+    assert "has the largest evidence" in text_of(*line, status=0)
+    assert document_of(*line, status=0) == row
+    assert document_of(*options, "--driver", "slot")["unexplained"] == []
+    assert discovered_before(Archive(str(made.folder))) == [("DEMO", 1)]
 
 
 def test_a_thermometer_that_is_off_in_one_soak_is_no_effect_of_the_sensors(tmp_path: Path) -> None:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from inertial.counts import number_of
 from pipelines.cli.next_commands import command_line, print_next
 from pipelines.cli.printing import print_table, say, short
-from pipelines.discovery.documents import DiscoverDocument, DiscoveryRow, PopulationRow
+from pipelines.discovery.documents import DiscoverDocument, DiscoveryRow, PopulationRow, UnexplainedRow
 from pipelines.discovery.figures_of_name import headline, scope_text, unexplained_text
 
 _SHOWN_HELD, _SHOWN_LEVELS, _SHOWN_OUT, _SHOWN_REACH = 3, 12, 3, 40
@@ -42,8 +42,9 @@ def print_discoveries(document: DiscoverDocument, again: Sequence[str] = (), *, 
         )
     for text in document["warnings"]:
         say(text, style="yellow")
-    if document["discoveries"] and not document["looking_back"]:
-        print_next([command_line("discover", *again, "--explain", document["discoveries"][0]["id"])])
+    rows = [*document["discoveries"], *document["unexplained"]]
+    if rows and not document["looking_back"]:
+        print_next([command_line("discover", *again, "--explain", rows[0]["id"])])
     if reach:
         _reach(document)
 
@@ -51,7 +52,7 @@ def print_discoveries(document: DiscoverDocument, again: Sequence[str] = (), *, 
 def _beside(document: DiscoverDocument) -> None:
     """What is no discovery: unexplained evidence, what a model leaves, what may be the station's own wander."""
     for found in document["unexplained"]:
-        say(unexplained_text(found), style="yellow")
+        say(unexplained_text(found), style="yellow" if found["id"] in document["new"] else "")
     for one in document["compared"]:
         sizes = f"{short(one['size_ug_before'])} → {short(one['size_ug_after'])} µg"
         evidence = f"evidence e^{short(one['log_e_before'])} → e^{short(one['log_e_after'])}"
@@ -79,8 +80,13 @@ def _of_population(finding: PopulationRow) -> str:
     return f"two populations in {finding['figure']} of {detail['units']} units: {means} {detail['unit']}; {share}"
 
 
-def print_explained(row: DiscoveryRow) -> None:
+def print_explained(row: DiscoveryRow | UnexplainedRow) -> None:
     """The screen of ``discover --explain``."""
+    if "nearest" in row:
+        say(unexplained_text(row))
+        say(f"    of all effects {row['nearest']} has the largest evidence, and does not account for it")
+        say("next: look at its map (--output), and write an effect of your own")
+        return
     say(headline(row))
     say(f"    {scope_text(row)}")
     others = [name for name in row["effects"] if name != row["recommended"]]

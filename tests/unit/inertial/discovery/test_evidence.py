@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from inertial.discovery.evidence import ALL, FIRST, INSIDE, SLOPE, Evidence, ScoredLot, Sums
+from inertial.discovery.evidence import ALL, FIRST, INSIDE, SLOPE, Evidence, Levels, Scale, ScoredLot, Sums
 
 UNITS, COUNT = 6, 9
 NEEDED = float(np.log(COUNT * 8 / 0.05))
@@ -70,6 +70,50 @@ def test_one_lot_multiplies_the_evidence_by_1_65_at_most(rng: np.random.Generato
             before = float(sums.log_e[0])
             sums.add(np.array([x]))
             assert float(sums.log_e[0]) <= before + 0.5 + 1e-9 or before < 0.0
+
+
+def test_an_effect_as_a_whole_is_found_before_its_parts_and_in_noise_is_silent() -> None:
+    """Nine hypotheses are three columns on three axes; the last column is an effect of its own."""
+    columns = np.array([0, 0, 1])
+
+    def spread(lot: ScoredLot, _: int) -> ScoredLot:
+        score = lot.score.copy()
+        score[:, [0, 1, 3, 4, 6, 7]] += 0.016 * lot.own[:, [0, 1, 3, 4, 6, 7]]
+        return replace(lot, score=score)
+
+    made = Evidence(COUNT, columns=columns)
+    for lot in lots(15, 150, spread):
+        made.add(lot)
+    assert (made.axes, made.size) == (3, COUNT + 2)
+    log_e = made.drivers["mean"].log_e
+    assert log_e.size == made.size
+    assert log_e[COUNT] > log_e[:COUNT].max() + 3.0
+    assert log_e[COUNT + 1] < NEEDED
+    assert log_e[:COUNT] == pytest.approx(evidence_of(lots(15, 150, spread)).drivers["mean"].log_e)
+    state = Evidence.restored(COUNT, made.arrays(), lambda _, __: None, columns)
+    assert state.drivers["mean"].log_e == pytest.approx(log_e)
+
+
+def test_stations_share_what_all_axes_show_alike_and_not_an_error_of_their_own(rng: np.random.Generator) -> None:
+    columns = np.array([0, 1, 2])
+
+    def shares(sizes: np.ndarray) -> np.ndarray:
+        """Whether stations (k, 9) of these sizes, well known, share them."""
+        made = Evidence(COUNT, columns=columns)
+        made.levels["station"] = table = Levels(COUNT)
+        for k, size in enumerate(sizes):
+            table.add((f"s{k}",), 1e6 * size[None], np.full((1, COUNT), 1e6))
+            made.wander.level(f"s{k}")
+        made._scales = {"between": Scale(np.ones(COUNT))}
+        return made.shared_by_stations()
+
+    alike = 1.0 + 0.35 * np.array([-1.0, -0.6, 0.6, 1.0])[:, None] * np.ones(COUNT)
+    alone = alike.copy()
+    alone[:, 1:] = rng.standard_normal((4, COUNT - 1)) * np.array([1.0, -1.0, 1.0, -1.0])[:, None]
+    assert shares(alike).all()
+    assert not shares(alone)[0]  # on one axis alone that is not enough
+    false = sum(bool(shares(rng.standard_normal((4, COUNT))).any()) for _ in range(200))
+    assert false <= 14  # three columns at 0.5 % together, nine hypotheses at 0.6 %: 7 % at most
 
 
 def test_a_bad_lot_is_no_discovery() -> None:

@@ -34,15 +34,13 @@ HIDDEN = [
 @cache
 def archive(effect: str, driver: str) -> Result:
     """Forty lots with an effect of 0.3 of the noise of a dwell."""
-    return maker().archive(31, 40, Hidden(effect, driver, 0.3), Setting(), NEEDED, keep=True)
+    return maker().archive(31, 40, Hidden(effect, driver, 0.3), Setting(), keep=True)
 
 
 @pytest.mark.parametrize(("effect", "driver"), mostly_slow(HIDDEN, ("third_order", "wafer")))
 def test_effect_and_driver_are_named_and_nothing_else(effect: str, driver: str) -> None:
     result = archive(effect, driver)
-    columns = maker().columns
-    alarms = [(name, columns[place % len(columns)][0]) for name, place in result.alarms]
-    (name,), unnamed = pool().names(result.lots, alarms, NEEDED)
+    (name,), unnamed = pool().names(result.lots, result.alarms, NEEDED)
     assert unnamed == []
     assert effect in name.effects
     assert len(name.effects) <= 4

@@ -3,20 +3,24 @@
 import json
 import logging
 import shutil
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
 from demonstrations import wafer_line
 
-from pipelines.archive import Archive
+from pipelines.archive import Archive, derived, files
 from pipelines.audit.calibrations import Calibrations
 from pipelines.demo.archive_lots import Line, write_lots
 from pipelines.discovery.attributes import add_attributes
 from pipelines.discovery.discover import Look, discovered
+from pipelines.discovery.evidence_state import ALPHA, STATION_DRIVERS, Alarm
 from pipelines.discovery.lot_source import DiscoveryArchive
-from pipelines.discovery.nights import brought_up
+from pipelines.discovery.nights import brought_up, held, remembered
 from pipelines.discovery.score_store import ScoreStore
 
 LOTS, FEW = 44, 6
@@ -176,6 +180,70 @@ def test_two_populations_in_a_coefficient_are_told_with_their_means(
     assert (row["figure"], row["kind"], row["detail"]["units"]) == ("bias_y", "two_populations", units)
     assert row["detail"]["share"] == pytest.approx(0.15, abs=0.02)
     assert row["detail"]["means"][0] == pytest.approx(5.0, abs=0.5)
+
+
+def told(source: DiscoveryArchive, lots: int, named: dict[str, str], unexplained: tuple[str, ...]) -> str:
+    """Ids of the rows of a document that is remembered, by effect and driver and by driver alone, then of those that are new."""
+    since = {"since": "2026-01-01", "lots_then": 9}
+    made: Any = {
+        "discoveries": [{"effects": [effect], "driver": driver, **since} for effect, driver in named.items()],
+        "unexplained": [{"driver": driver, **since} for driver in unexplained],
+    }
+    state: Any = SimpleNamespace(alarms=[], order=[""] * lots)
+    document = remembered(source, state, made)
+    rows = (*document["discoveries"], *document["unexplained"])
+    return " ".join([*(row["id"] for row in rows), "new", *document["new"]])
+
+
+def test_what_is_unexplained_is_new_once_and_keeps_its_id_when_it_has_a_name(archive: Archive) -> None:
+    source = DiscoveryArchive(archive)
+    assert told(source, 40, {}, ("wafer",)) == "D1 new D1"
+    assert told(source, 60, {}, ("wafer",)) == "D1 new"
+    assert told(source, 80, {}, ("wafer", "slot")) == "D1 D2 new D2"
+    assert told(source, 100, {"third_order": "wafer"}, ("slot",)) == "D1 D2 new"
+    assert told(source, 120, {"third_order": "wafer"}, ("wafer", "slot")) == "D1 D3 D2 new D3"
+    assert told(source, 140, {"magnetic": "slot", "second_order": "wafer"}, ()) == "D2 D3 new"
+    # another effect by the same driver is another discovery
+    assert told(source, 160, {"magnetic": "slot", "fifth_order": "wafer"}, ()) == "D2 D4 new D4"
+
+
+def test_discoveries_that_an_earlier_version_kept_have_their_ids(archive: Archive) -> None:
+    source = DiscoveryArchive(archive)
+    row = {"id": "D7", "effects": ["third_order"], "driver": "wafer", "since": "2025-01-01", "lots_then": 31}
+    kept = {"discoveries": [row], "alarms": ["wafer 1"], "lots": 40}
+    files.publish(source.folder() / "found", derived.framed(json.dumps(kept).encode()))
+    assert told(source, 40, {"third_order": "wafer"}, ("slot",)) == "D7 D8 new D8"
+
+
+def test_the_shares_of_all_hypotheses_add_up_to_the_probability_of_an_error(archive: Archive) -> None:
+    """Of every night that a driver comes in; an effect of many columns takes no more than one of a single column."""
+    state = brought_up(DiscoveryArchive(archive))
+    state.generations["later"] = 1
+    shares = [np.exp(-state.needed(driver)).sum() for driver in state.generations]
+    shares += [np.exp(-state.needed(driver, of_station=True)).sum() for driver in STATION_DRIVERS]
+    assert sum(shares) == pytest.approx(ALPHA * (0.5 + 0.25))
+    of_effect = np.bincount(
+        [*state.sensor.effects, *range(state.sensor.size - state.sensor.count)], np.exp(-state.needed("mean"))
+    )
+    assert of_effect == pytest.approx(of_effect[0])
+
+
+def test_an_effect_as_a_whole_is_held_back_with_the_axes_that_carry_it(archive: Archive) -> None:
+    state = brought_up(DiscoveryArchive(archive))
+    sensor, sums = state.sensor, state.sensor.drivers["mean"]
+    effect = state.columns.index(("third_order", 0))
+    assert sensor.effects is not None
+    place = sensor.count + int(sensor.effects[effect])
+    axes = np.arange(3) * len(state.columns) + effect
+    alarm = Alarm("mean", place, 1, 40, 20.0)
+    for strengths, is_held in (((9.0, 0.1, 0.1), False), ((1.0, 9.0, 0.1), True)):
+        sums.s[axes], sums.v[axes] = strengths, 1.0
+        with pytest.MonkeyPatch.context() as patch:
+            shared = np.isin(np.arange(sensor.count), axes[[0, 2]])
+            patch.setattr(type(sensor), "shared_by_stations", lambda _, flags=shared: flags)
+            patch.setattr(type(sensor), "guarded", np.zeros(sensor.count, dtype=bool))
+            assert held(state, alarm) is is_held
+            assert held(state, replace(alarm, place=int(axes[1])))
 
 
 def test_a_damaged_run_is_told_and_pooled_once_it_is_restored(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:

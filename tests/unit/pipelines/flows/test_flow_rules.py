@@ -1,5 +1,6 @@
 """Flows without a server: the start of a deployed run, runs of a schedule that come too late, and what a night tells."""
 
+import json
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from types import SimpleNamespace
@@ -81,12 +82,13 @@ def test_a_night_writes_page_and_document_and_a_discovery_is_an_alert(
         "size_ug": 0.4,
         "since": "2026-01-01",
     }
-    found = document.read_text("utf-8").replace(
-        '"discoveries": []', f'"discoveries": [{str(row).replace(chr(39), chr(34))}]'
-    )
-    document.write_text(found, encoding="utf-8")
+    unknown = {"id": "D2", "driver": "slot", "since": "2026-01-02", "map": [], "nearest": "magnetic"}
+    content = json.loads(document.read_text("utf-8")) | {"discoveries": [row], "unexplained": [unknown]}
+    document.write_text(json.dumps(content), encoding="utf-8")
     snapshot = type("Empty", (), {"when": datetime.now(UTC), "runs": [], "stations": None, "late": []})()
     monkeypatch.setattr("pipelines.monitoring.alerts._of_runs", lambda _: [])
-    (alert,) = alerts_of(snapshot, tmp_path / "pages")
+    alert, other = alerts_of(snapshot, tmp_path / "pages")
     assert (alert["kind"], alert["subject"]) == ("discovery", "wafer")
     assert "third_order by wafer, rms 0.4 µg" in alert["text"]
+    assert (other["kind"], other["subject"]) == ("discovery", "slot")
+    assert other["text"] == "discovery D2: unexplained by slot, no effect of the catalogue is like it"
