@@ -43,8 +43,10 @@ class Content:
         return f"row {index + 1}"
 
 
-_ENDINGS = {one: one for one in ("s", "ms", "us", "µs", "ns", "g", "mg", "V", "mV", "LSB")}
-_ENDINGS |= dict.fromkeys(("m_s2", "m_s_2", "mps2"), "m/s^2")
+_ENDINGS = {
+    **{one: one for one in ("s", "ms", "us", "µs", "ns", "g", "mg", "V", "mV", "LSB")},
+    **dict.fromkeys(("m_s2", "m_s_2", "mps2"), "m/s^2"),
+}
 
 
 def unit_in(name: str) -> str:
