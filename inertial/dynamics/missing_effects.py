@@ -18,6 +18,8 @@ ADDED_P = 1e-3
 """Largest p-value of an added effect of a model that is not adequate, times the number of candidates."""
 CLASS_WIDTH = 9.0
 """Effects whose fits differ by less than this in χ² (with a parameter's price) are not separated: three standard deviations."""
+HELD_SHARE = 0.25
+"""Share of the relative gain of the fitted points that those left out have, at least; about 1 where an effect is real."""
 MOST_ADDED = 3
 FEWEST_DOF = 6
 FEWEST_TO_ONE_ALONE = 10
@@ -156,15 +158,15 @@ def judge(
     if good is None:
         reason = f"{degrees_of_freedom(base.dof)}, at least {FEWEST_DOF} are needed; {remedy}"
     current = list(effects)
+    if good and bad_point:  # one value of many hardly moves their sum
+        alone = _bad(bad_point, best, best, float(np.log(residuals or best.dof)))
     while good is False and len(classes) < MOST_ADDED and adequate(best) is False:
         left = {name: extended_fit([*current, name], best) for name in candidates if name not in current}
         price = float(np.log(residuals or max(best.dof, 2)))
         next_class = _best_class(best, left, price, left_out)
         if bad_point:
-            rest, worst = bad_point.without(best)
-            rival = left[next_class.effects[0]] if next_class else best
-            sought = next_class is not None and next_class.effects[0] in bad_point.located
-            alone = (worst,) if _departs_alone(best, rest, rival, price, sought=sought) else ()
+            name = next_class.effects[0] if next_class else ""
+            alone = _bad(bad_point, best, left.get(name, best), price, sought=name in bad_point.located)
         if next_class is None or alone:
             break
         classes.append(next_class)
@@ -198,6 +200,14 @@ def _score(fit: Fitted, price: float) -> float:
     return fit.chi_square - price * fit.dof
 
 
+def _bad(
+    bad_point: BadPoint[AnyFit], fit: AnyFit, rival: AnyFit, price: float, *, sought: bool = False
+) -> tuple[int, ...]:
+    """The point that departs alone, as a contender of the fit with the best effect; empty for none."""
+    rest, worst = bad_point.without(fit)
+    return (worst,) if _departs_alone(fit, rest, rival, price, sought=sought) else ()
+
+
 def _departs_alone(fit: Fitted, rest: Fitted, rival: Fitted, price: float, *, sought: bool) -> bool:
     """Whether a point, the worst of all, departs by more than the scatter of the rest, and more likely than by an effect.
 
@@ -218,18 +228,22 @@ def _best_class(
 ) -> EffectClass | None:
     """The effects that reduce the residual of a fit most; None where none is significant.
 
-    An effect is named only where it improves the model with a p-value below 10⁻³, times the number of candidates, and where
-    points that were left out gain by it: what only follows the fitted points, or their too small uncertainties, predicts no
-    others.
+    An effect is named only where it improves the model with a p-value below 10⁻³, times the number of candidates, over the
+    scatter that it leaves, and where points that were left out gain by it as the fitted ones do: what only follows the fitted
+    points, or their too small uncertainties, predicts no others.
     """
 
     def added_p(fit: Fitted) -> float:
-        gain, parameters = max(0.0, best.chi_square - fit.chi_square), max(1, best.dof - fit.dof)
-        return float(min(1.0, len(fits) * chi2_tail(gain, parameters)))
+        gain = max(0.0, best.chi_square - fit.chi_square) / max(1.0, fit.chi_square / max(fit.dof, 1))
+        return float(min(1.0, len(fits) * chi2_tail(gain, max(1, best.dof - fit.dof))))
+
+    def predicts(fit: AnyFit) -> bool:
+        fitted, unseen = fit.chi_square / best.chi_square, (left_out(fit) / before) ** 2
+        return not unseen > 1.0 - HELD_SHARE * (1.0 - fitted)  # nan: no points can be left out
 
     real = sorted((name for name in fits if added_p(fits[name]) < ADDED_P), key=lambda name: _score(fits[name], price))
     before = left_out(best) if real else float("nan")
-    first = next((name for name in real if not left_out(fits[name]) >= before), None)  # nan: no points can be left out
+    first = next((name for name in real if predicts(fits[name])), None)
     if first is None:
         return None
     top = fits[first]

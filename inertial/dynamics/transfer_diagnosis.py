@@ -103,7 +103,7 @@ def diagnose_transfer(
     rest, alone = points.picked(kept), tuple(sorted(points.conditions.frequency[~kept].tolist()))
     top = float(points.conditions.frequency.max())
     open_end = judged.adequate is None or judged.unexplained
-    rivals = () if open_end else _rivals(points, judged.extended, judged.classes)
+    rivals = () if open_end else _rivals(rest, judged.extended, judged.classes)
     return TransferDiagnosis(
         **vars(judged),
         alone_hz=alone,

@@ -12,8 +12,12 @@ class Delay(TransferEffect):
     breaker = "a shared trigger edge on both channels"
 
     def parameters(self, points: Conditions) -> tuple[Parameter, ...]:
-        reach = 2.0 / float(points.frequency.max())
-        return (Parameter("delay_s", "s", -reach, 10.0 * reach, (0.0, 0.05 * reach)),)
+        period = 1.0 / float(points.frequency.max())
+        starts = (
+            0.1 * period,
+            *(0.4 * period * np.arange(21)).tolist(),
+        )  # phases turn: a start has to be within half a turn
+        return (Parameter("delay_s", "s", -2.0 * period, 20.0 * period, starts),)
 
     def factor(self, points: Conditions, values: Array) -> Complex:
         return np.asarray(np.exp(-2j * np.pi * points.frequency * values[0]), dtype=np.complex128)

@@ -93,7 +93,7 @@ def test_a_hidden_low_pass_is_named_beside_a_bad_point(rng: np.random.Generator)
     assert "one_pole" in diagnosis.classes[0].effects
 
 
-@pytest.mark.parametrize("scale", mostly_slow([2.0, 3.0], 2.0))
+@pytest.mark.parametrize("scale", mostly_slow([2.0, 3.0, 5.5], 5.5))
 def test_uncertainties_that_are_too_small_make_no_points_bad(scale: float, rng: np.random.Generator) -> None:
     f = np.geomspace(5.0, 5000.0, 60)
     one = points(f, transfer(f, 2300.0, 0.65), 2e-3, 2e-3, rng)
@@ -101,6 +101,7 @@ def test_uncertainties_that_are_too_small_make_no_points_bad(scale: float, rng: 
     diagnosis = diagnose_transfer(stated)
     assert diagnosis.adequate is False
     assert diagnosis.alone_hz == ()
+    assert diagnosis.classes == ()
 
 
 @pytest.mark.parametrize("sweeps", mostly_slow([1, 5], 1))
@@ -184,3 +185,35 @@ def test_a_resonance_far_below_the_highest_frequency_is_found(natural: float, da
     fit = fit_transfer(points(f, transfer(f, natural, damping), 1e-3, 1e-3), ("second_order", "delay"))
     assert fit.of("natural_hz")[0] == pytest.approx(natural, rel=1e-4)
     assert fit.of("damping")[0] == pytest.approx(damping, rel=1e-3)
+
+
+@pytest.mark.parametrize("delay", mostly_slow([3e-4, 5e-4, 1e-3, 1.8e-3], 1e-3))
+def test_a_delay_of_several_turns_of_the_phase_is_found(delay: float, rng: np.random.Generator) -> None:
+    """The group delay of a converter's filter: the phase turns four times up to 4 kHz."""
+    f = np.geomspace(5.0, 4000.0, 45)
+    h = transfer(f, 1500.0, 0.62) * np.exp(-2j * np.pi * f * delay)
+    diagnosis = diagnose_transfer(points(f, h, 2e-3, 2e-3, rng))
+    assert diagnosis.adequate is True
+    value, error, *_ = diagnosis.extended.of("delay_s")
+    assert abs(value - delay) < 4.0 * error
+
+
+def test_a_point_that_is_off_beside_an_adequate_sum_is_told(rng: np.random.Generator) -> None:
+    f = np.geomspace(5.0, 4000.0, 60)
+    one = points(f, transfer(f, 1500.0, 0.62), 2e-3, 2e-3, rng)
+    value = one.value.copy()
+    value[22] *= 1.0 + 7.0 * 2e-3
+    diagnosis = diagnose_transfer(Points(one.conditions, value, one.magnitude_error, one.phase_error))
+    assert diagnosis.alone_hz == (pytest.approx(f[22]),)
+    assert not diagnosis.unexplained
+    assert diagnosis.parameter("damping").identified
+
+
+def test_two_points_that_are_off_are_two_bad_points(rng: np.random.Generator) -> None:
+    f = np.geomspace(5.0, 4000.0, 45)
+    one = points(f, transfer(f, 1500.0, 0.62), 1e-3, 1e-3, rng)
+    value = one.value.copy()
+    value[[20, 36]] *= [1.03, 0.96]
+    diagnosis = diagnose_transfer(Points(one.conditions, value, one.magnitude_error, one.phase_error))
+    assert diagnosis.alone_hz == (pytest.approx(f[20]), pytest.approx(f[36]))
+    assert diagnosis.classes == ()
