@@ -62,7 +62,7 @@ def measured_pulse(record: Array, rate_hz: float, *, before_s: float) -> Pulse:
     quiet = record[: int(before_s * rate_hz)]
     if quiet.size < 8:
         raise NotIdentified(
-            f"shock: {quiet.size} samples before the pulse, 8 or more are needed for the baseline; trigger later"
+            f"shock: {quiet.size} samples before the pulse, 8 or more are needed for the baseline; begin the record earlier"
         )
     baseline, noise = float(quiet.mean()), float(quiet.std(ddof=1))
     y = record - baseline

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from inertial.arrays import Array
 from inertial.disturbances import disturbance_texts, disturbances
 from inertial.noise import terms as noise_terms
 from inertial.noise.allan import CONFIDENCE, overlapping
@@ -21,6 +22,7 @@ from pipelines.stages.noise import (
     static_record,
     without_disturbed,
 )
+from pipelines.stages.static_record import Coarse, Digits, remark, without_digits
 from pipelines.tables.frames import rows_of
 from schemas.errors import DataRejected, WrongUse
 
@@ -54,12 +56,18 @@ def allan_document(series: EvenSeries, spacing: str = "octave", statistic: str =
     curve = overlapping(series.values[alive], series.rate_hz, "decade" if spacing == "decade" else "octave")
     disturbed = [disturbances(series.values[k]) for k in alive]
     fitted = without_disturbed(fit_terms(curve), disturbed)
-    terms = limits_where_unexplained(curve, fitted)
+    coarse = [_coarse(series.values[k]) for k in alive]
+    terms = without_digits(limits_where_unexplained(curve, fitted), coarse, series.rate_hz)
     explained = fitted.p_value >= UNEXPLAINED_P
     names = [series.names[k] for k in alive]
     told = [disturbance_texts(found, series.rate_hz, series.unit) for found in disturbed]
     notes = [series.recognised] if series.recognised else []
     notes += [f"{series.names[k]}: the output never changes" for k in range(len(series.names)) if k not in alive]
+    notes += [
+        f"{name}: {text}"
+        for name, own in zip(names, coarse, strict=True)
+        if (text := remark(own, series.unit or "of the output's unit"))
+    ]
     notes += [
         f"{name}: {', '.join(texts) if texts else 'no mixture of the five terms explains the curve'}; the limits are what the "
         "whole curve allows"
@@ -104,6 +112,13 @@ def allan_document(series: EvenSeries, spacing: str = "octave", statistic: str =
         ],
         "notes": notes,
     }  # fmt: skip
+
+
+def _coarse(values: Array) -> Coarse:
+    """The digits of a channel (n,)."""
+    digits = Digits()
+    digits.add(values)
+    return Coarse.of(digits, 1.0)
 
 
 def _navigation_rows(terms: list[dict[str, Any]], unit: str) -> list[NavigationRow]:

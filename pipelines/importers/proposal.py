@@ -189,7 +189,7 @@ def _six_faces(means: Array, labels: Sequence[str], centre: Array) -> tuple[dict
         limit = np.degrees(np.arccos(_UP))
         return (
             {},
-            f"six faces, of which {', '.join(lean)} lean more than {limit:.0f}°: stand them against a right angle",
+            f"of six faces these lean by more than {limit:.0f}°: {', '.join(lean)}; stand them against a right angle",
         )
     return dict(zip(labels, faces, strict=True)), ""
 

@@ -68,7 +68,7 @@ def series_of_file(
     if not time and rate_hz is None:
         time, found, columns, known_unit = _recognised(path, columns)
         time_unit, unit = time_unit or found, unit or known_unit
-        listed = ", ".join(shown(name) for name in columns)
+        listed = ", ".join(shown(name) for name in columns) or "all other columns"
         recognised = (
             f"recognised: time '{shown(time)}' in {time_unit}, {listed} in {unit or 'an unknown unit'}; else --map"
         )
@@ -81,6 +81,11 @@ def series_of_file(
     chosen = list(columns) or [n for n in table.columns if n != time and pd.api.types.is_numeric_dtype(table[n])]
     if not chosen:
         raise DataRejected(f"{path.name}: no column of numbers, one at least is needed; name one with --map")
+    if rate_hz is not None and not columns:
+        clocks = [name for name in chosen if _is_clock(finite_column(table, name, path.name))]
+        if clocks and len(clocks) < len(chosen):
+            chosen = [name for name in chosen if name not in clocks]
+            recognised = f"{', '.join(map(shown, clocks))} rises evenly and is no output"
     values = np.stack([finite_column(table, name, path.name) for name in chosen])
     _refuse_clock(chosen, values, path.name, named=bool(columns), timed=bool(time))
     rate = rate_hz or _rate(TIME_UNITS[time_unit] * finite_column(table, time, path.name), path.name)
@@ -139,12 +144,18 @@ def _refuse_clock(names: Sequence[str], values: Array, where: str, *, named: boo
         steps = np.diff(column)
         if steps.size < FEWEST_STEPS or not bool(np.all(steps > 0.0)):
             continue
-        if not named or float(np.ptp(steps)) < EVEN * float(steps.mean()):
+        if not named or _is_clock(column):
             instead = "" if timed else f"give --map time={shown(name)} instead of --rate, or "
             raise DataRejected(
                 f"{where}: column '{shown(name)}' rises in every row (from {column[0]:g} to {column[-1]:g}) as a time or a "
                 f"counter does, the output of a sensor at rest is needed; {instead}name the channels with --map"
             )
+
+
+def _is_clock(column: Array) -> bool:
+    """Whether a column (n,) rises evenly."""
+    steps = np.diff(column)
+    return steps.size >= FEWEST_STEPS and steps.min() > 0.0 and float(np.ptp(steps)) < EVEN * float(steps.mean())
 
 
 def _rate(time: Array, where: str) -> float:
@@ -159,7 +170,7 @@ def _rate(time: Array, where: str) -> float:
     if off.size:
         raise DataRejected(
             f"{where}: after row {off[0] + 1} the time steps by {time[off[0] + 1] - time[off[0]]:.6g} s, {step:.6g} s is the "
-            f"step elsewhere ({off.size} such places), evenly spaced samples are needed; cut the record there, or give --rate "
-            "with --rate alone if only the time stamps are late"
+            f"step elsewhere ({off.size} such places), evenly spaced samples are needed; cut the record there, or give --rate HZ "
+            "in place of the time if only its stamps are late"
         )
     return 1.0 / float(typical)

@@ -21,7 +21,7 @@ from schemas.units import MICRO
 TERM = "stability_1h"
 HOUR_S = 3600.0
 MEAN_S = 100.0
-_TAIL = 0.025
+_TAIL, ONE_SIDED = 0.025, 0.05
 PARTS = 100
 """Of a mean, by whose differences its white noise is known."""
 
@@ -227,9 +227,12 @@ def without_disturbed(terms: NoiseTerms, disturbed: Sequence[Sequence[Disturbanc
 def limits_where_unexplained(curve: AllanCurve, terms: NoiseTerms) -> NoiseTerms:
     """The terms, with mere upper limits for channels whose curve no mixture of the five terms explains.
 
-    Each term alone can be no larger than the whole curve anywhere: N ≤ min σ·√τ, B ≤ min σ/0.664, K ≤ min σ·√(3/τ), …
+    Each term alone can be no larger than the whole curve anywhere: N ≤ min σ·√τ, B ≤ min σ/0.664, K ≤ min σ·√(3/τ), … The least
+    of many uncertain limits is too low: each is that of 95 % over the number of averaging times (Bonferroni).
     """
-    tau, sigma = curve.tau, curve.high
+    tau = curve.tau
+    tail = 1.0 - ONE_SIDED / tau.size
+    sigma = curve.deviation * np.sqrt(curve.edf / chi2_upper(tail, curve.edf))
     ceilings = {
         "Q": sigma * tau / np.sqrt(3.0),
         "N": sigma * np.sqrt(tau),

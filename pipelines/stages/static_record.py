@@ -195,11 +195,11 @@ class Coarse:
         return self.spread >= FINE * self.step
 
 
-def remark(digits: Coarse) -> str:
-    """The remark about N if the digits are coarse; else empty."""
+def remark(digits: Coarse, unit: str = "µg") -> str:
+    """The remark about N if the digits, in ``unit``, are coarse; else empty."""
     if not digits.matters:
         return ""
-    step = f"the last digit is {digits.step:.3g} µg"
+    step = f"the last digit is {digits.step:.3g} {unit}"
     if digits.correctable:
         return (
             f"{step}, {digits.step / digits.spread:.2g} of a sample's noise: its q²/12 is subtracted from N (Sheppard)"

@@ -137,13 +137,16 @@ def test_a_wrong_name_a_gap_a_missing_rate_and_a_dead_channel_are_refused_or_tol
 
 
 @each(["allan", "psd"])
-def test_a_time_taken_for_an_output_is_refused(command: str, record: Path) -> None:
+def test_a_time_is_taken_for_no_output(command: str, record: Path, tmp_path: Path) -> None:
     words = ("noise", command, record, "--rate", 100)
-    message = refused(*words)
-    assert "column 't' rises in every row (from 0 to 399.99)" in message
+    assert "t rises evenly and is no output" in text_of(*words, status=0)
+    assert "column 't' rises in every row (from 0 to 399.99)" in refused(*words, "--map", "t,ax")
+    assert "rises evenly" not in text_of(*words, "--map", "ax", status=0)
+    table = pd.read_csv(record)
+    late = np.cumsum(np.random.default_rng(3).uniform(0.005, 0.015, len(table)))
+    table.assign(t=late).to_csv(tmp_path / "late.csv", index=False)
+    message = refused("noise", command, tmp_path / "late.csv", "--rate", 100)
     assert "give --map time=t instead of --rate, or name the channels with --map" in message
-    assert "column 't' rises" in refused(*words, "--map", "t,ax")
-    text_of(*words, "--map", "ax", status=0)
 
 
 def test_flicker_made_by_fractional_summation_is_found(tmp_path: Path) -> None:
