@@ -117,8 +117,8 @@ _ALIKE = 0.15
 _SETTLED = 0.02
 
 
-def lone_samples(record: Array, rate_hz: float, duration_s: float) -> Index:
-    """Samples (m,) of a record (n,) that depart alone, by a tenth of its range and far above the noise: faults of a data line.
+def lone_samples(record: Array, rate_hz: float, duration_s: float, share: float = 0.1) -> Index:
+    """Samples (m,) of a record (n,) that depart alone, by a ``share`` of its range and above the noise: a faulty data line.
 
     A sample that is off by g has a second difference of −2·g and its neighbours one of g each; a pulse has nearly the same
     everywhere, and a ringing changes it from sample to sample. None where a pulse has few samples, and kinks as sharp.
@@ -129,12 +129,13 @@ def lone_samples(record: Array, rate_hz: float, duration_s: float) -> Index:
     off = np.zeros(record.size)
     off[2:-2] = (bent[:-2] - 2.0 * bent[1:-1] + bent[2:]) / 6.0
     size = np.abs(off)
-    limit = max(0.1 * float(np.ptp(record)), 12.0 * float(np.median(size)))
+    limit = max(share * float(np.ptp(record)), 12.0 * float(np.median(size)))
     return np.array(
         [
             k
             for k in np.flatnonzero(size > limit)
             if size[k] == size[max(k - 2, 0) : k + 3].max()
+            and abs(record[min(k + 2, record.size - 1)] - record[max(k - 2, 0)]) < 0.5 * size[k]  # an edge stays
             and max(size[max(k - CLOSE, 0) : max(k - 2, 0)].max(initial=0.0), size[k + 3 : k + CLOSE].max(initial=0.0))
             < 0.25 * size[k]
         ],

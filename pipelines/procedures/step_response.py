@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 from pydantic import Field
 
+from inertial.dynamics.pulses import lone_samples
 from inertial.dynamics.step_record import RISE_POINTS, StepFigures, aligned, step_figures
 from inertial.errors import NotIdentified
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace, between
@@ -180,6 +181,7 @@ def axis_figures(part: StepPart, rows: pd.DataFrame) -> StepFigures:
 FAULTS: Mapping[int, str] = {
     1: "no step in the output; check the self-test input, the cable and the drive",
     2: "the output is clipped; lower volts",
+    3: "a sample departs alone; check the data line, step again",
 }
 
 
@@ -215,6 +217,8 @@ def _averaged(
         fault = 2
     elif not abs(step) > 10.0 * noise / np.sqrt(len(final[0])) or noise == 0.0:
         fault, step = 1, step or 1.0
+    elif any(lone_samples(one, rate, hold, 0.01 * part.band_percent).size for one in outputs):
+        fault = 3
     shares = [(output - first) / step for output, first in zip(outputs, base, strict=True)]
     time = np.concatenate(times if fault else aligned(times, shares))
     share = np.concatenate(shares)
