@@ -28,6 +28,8 @@ _CLEARLY = 4
 _SINGLE = 1.5
 _SAME_STEP = 1e-9  # relative: that of whole numbers stays whole
 _AT_LIMIT = 4
+_FEW_DIGITS, _FEWEST_QUIET, _MOSTLY = 6.0, 5, 0.9
+"""Digits that noise spans in a quiet block, at most; blocks from which it is known; share of them that are alike."""
 _MEDIAN = 15  # samples of the running median: it follows a hand, and one sample in ten does not move it
 _CALM = 3.0
 """Times the spread of the quieter blocks, up to which a block is quiet."""
@@ -119,8 +121,8 @@ def frozen(x: ArrayLike) -> list[Frozen]:
 
     A run of equal samples counts when chance makes so long a one once in a million records. How often neighbours are equal by
     chance is measured in blocks of the same axis, and the least lively of those that are not still decides. An axis whose
-    neighbours are nearly always equal is too coarse to judge; one that never changes at all is a stretch of the whole record
-    where another axis does.
+    neighbours are nearly always equal is too coarse to judge, and so is one whose noise reaches the next digit only near the
+    middle between two; one that never changes at all is a stretch of the whole record where another axis does.
     """
     data = np.asarray(x, dtype=np.float64)
     n, axes = data.shape
@@ -133,12 +135,27 @@ def frozen(x: ArrayLike) -> list[Frozen]:
             continue
         equal = np.diff(data[:, axis]) == 0.0
         usual = _usual_share(equal)
-        if usual is None:
+        if usual is None or _between_two_digits(data[:, axis]):
             continue
         shortest = max(_SHORTEST_RUN, int(np.ceil(np.log(_CHANCE / n) / np.log(usual))))
         start, stop = runs_of(equal)
         stretches += [Frozen(axis, int(a), int(b) + 1) for a, b in zip(start, stop, strict=True) if b - a >= shortest]
     return stretches
+
+
+def _between_two_digits(x: Array) -> bool:
+    """Whether nearly all quiet blocks of an axis (n,) that change at all hold two neighbouring digits: its noise is below one.
+
+    Elsewhere between two digits such an axis stands still for minutes, and nothing is wrong with it.
+    """
+    step = resolution(x)
+    if step is None:
+        return False
+    size = min(_BLOCK, max(8, x.size // 4))
+    blocks = x[: x.size // size * size].reshape(-1, size)
+    span = np.rint(np.ptp(blocks, axis=1) / step)
+    quiet = span[(span > 0.0) & (span <= _FEW_DIGITS)]
+    return quiet.size >= _FEWEST_QUIET and float(np.mean(quiet == 1.0)) > _MOSTLY
 
 
 def _usual_share(equal: Flags) -> float | None:

@@ -103,3 +103,17 @@ def test_samples_at_the_end_of_a_range_are_counted_and_a_largest_sample_of_noise
     low, high, count = clipped(cut)
     assert (low, high) == (-1500.0, 1500.0)
     assert count == pytest.approx(np.count_nonzero(np.abs(wave) >= 1500.0), rel=0.1)
+
+
+def test_an_axis_whose_noise_is_a_tenth_of_a_digit_is_not_stuck_where_it_stands_between_two() -> None:
+    """Twenty positions of 8 s at 100 Hz, 256 LSB/g: the output stands still unless gravity is near the middle between two digits."""
+    rng = np.random.default_rng(55)
+    up = rng.standard_normal((20, 3))
+    force = 256.0 * np.repeat(up / np.linalg.norm(up, axis=1, keepdims=True), 800, axis=0)
+    fine, coarse = (np.round(force + sigma * rng.standard_normal(force.shape)) for sigma in (0.6, 0.1))
+    assert frozen(coarse) == []
+    assert frozen(fine) == []
+    fine[4100:4700, 1] = fine[4100, 1]
+    (one,) = frozen(fine)
+    assert (one.axis, one.start) == (1, 4100)
+    assert 4700 <= one.stop < 4720
