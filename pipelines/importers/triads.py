@@ -124,6 +124,9 @@ def triad(columns: Mapping[str, Array], units: Mapping[str, str]) -> Triad:
     fits = [(names, sphere) for names, sphere in plain if sphere is not None and _shows_gravity(sphere, columns, names)]
     if fits:
         return _one_of(fits, "its name, and its size is that of gravity")
+    dead = [names for names in groups.values() if _one_is_dead(columns, names, live)]
+    if len(dead) == 1:
+        return Triad(dead[0], "its name, though one of the three never changes", sphere_of(columns, dead[0]))
     free = [name for name in live if name not in of_other and not any(name in names for names in usable.values())]
     return _unnamed(columns, free, units)
 
@@ -270,6 +273,13 @@ def may_be_output(name: str, unit: str) -> bool:
 def _changes(numbers: Array) -> bool:
     there = numbers[np.isfinite(numbers)]
     return there.size > 1 and bool(np.ptp(there) > 0.0)
+
+
+def _one_is_dead(columns: Mapping[str, Array], names: Sequence[str], live: Sequence[str]) -> bool:
+    """Whether two of three axes move by as much as each other, and the third never changes."""
+    moving = [float(np.nanmax(columns[name]) - np.nanmin(columns[name])) for name in names if name in live]
+    still = sum(not _changes(columns[name]) for name in names)
+    return len(moving) == 2 and still == 1 and min(moving) > _MOVES * max(moving) and not OTHER.search("".join(names))
 
 
 def is_row_number(numbers: Array) -> bool:

@@ -106,7 +106,7 @@ def test_samples_at_the_end_of_a_range_are_counted_and_a_largest_sample_of_noise
 
 
 def test_an_axis_whose_noise_is_a_tenth_of_a_digit_is_not_stuck_where_it_stands_between_two() -> None:
-    """Twenty positions of 8 s at 100 Hz, 256 LSB/g: the output stands still unless gravity is near the middle between two digits."""
+    """Twenty positions of 8 s, 256 LSB/g: the output stands still unless gravity is near the middle between two digits."""
     rng = np.random.default_rng(55)
     up = rng.standard_normal((20, 3))
     force = 256.0 * np.repeat(up / np.linalg.norm(up, axis=1, keepdims=True), 800, axis=0)

@@ -457,3 +457,14 @@ def test_means_of_counts_close_to_gravity_in_mg_are_asked_about(rng: Rng, tmp_pa
         seen = recognise([tmp_path / "lot.csv"])
         assert [one for one in seen.open if "means of counts are closer to 1024" in one] or not doubt
         assert bool(seen.open) == doubt
+
+
+@each(["ax", "ay", "az"])
+def test_an_axis_that_never_changes_is_recognised_and_told(axis: str, tmp_path: Path, rng: Rng) -> None:
+    hand = Hand(rng)
+    columns = {"t": hand.time}
+    named(columns, "gx gy gz", np.rint(sensed(rng, hand.rate, 1880.0, (0.02, -0.03, -0.02), 8.0)))
+    named(columns, "ax ay az", np.rint(accelerations(rng, hand.force, 16384.0)))
+    columns[axis] = np.full_like(columns[axis], 3698.0)
+    document = inspect([csv(tmp_path / "a.csv", columns)]).document
+    assert [(one["fault"], one["axis"]) for one in document["faults"]] == [("stuck_output", axis[1])]
