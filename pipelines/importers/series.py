@@ -11,7 +11,7 @@ import pandas as pd
 
 from inertial.arrays import Array
 from pipelines.archive import Run
-from pipelines.importers import files, guesses
+from pipelines.importers import clocks, files, guesses
 from pipelines.importers.mapping import TIME_UNITS
 from pipelines.importers.values import finite_column
 from schemas.errors import DataRejected, WrongUse
@@ -82,13 +82,13 @@ def series_of_file(
     if not chosen:
         raise DataRejected(f"{path.name}: no column of numbers, one at least is needed; name one with --map")
     if rate_hz is not None and not columns:
-        clocks = [name for name in chosen if _is_clock(finite_column(table, name, path.name))]
-        if clocks and len(clocks) < len(chosen):
-            chosen = [name for name in chosen if name not in clocks]
-            recognised = f"{', '.join(map(shown, clocks))} rises evenly and is no output"
+        even = [name for name in chosen if _is_clock(finite_column(table, name, path.name))]
+        if even and len(even) < len(chosen):
+            chosen = [name for name in chosen if name not in even]
+            recognised = f"{', '.join(map(shown, even))} rises evenly and is no output"
     values = np.stack([finite_column(table, name, path.name) for name in chosen])
     _refuse_clock(chosen, values, path.name, named=bool(columns), timed=bool(time))
-    rate = rate_hz or _rate(TIME_UNITS[time_unit] * finite_column(table, time, path.name), path.name)
+    rate = rate_hz or _rate(_seconds(table, time, time_unit, path.name), path.name)
     return EvenSeries(tuple(chosen), values, float(rate), unit, path.name, recognised)
 
 
@@ -150,6 +150,13 @@ def _refuse_clock(names: Sequence[str], values: Array, where: str, *, named: boo
                 f"{where}: column '{shown(name)}' rises in every row (from {column[0]:g} to {column[-1]:g}) as a time or a "
                 f"counter does, the output of a sensor at rest is needed; {instead}name the channels with --map"
             )
+
+
+def _seconds(table: pd.DataFrame, name: str, unit: str, where: str) -> Array:
+    """Times (n,) of a column, s: of numbers in a unit, or of dates."""
+    if name in table.columns and clocks.is_stamps(table[name]):
+        return clocks.stamps(table[name], where)
+    return TIME_UNITS[unit] * finite_column(table, name, where)
 
 
 def _is_clock(column: Array) -> bool:

@@ -149,6 +149,15 @@ def test_a_time_is_taken_for_no_output(command: str, record: Path, tmp_path: Pat
     assert "give --map time=t instead of --rate, or name the channels with --map" in message
 
 
+def test_dates_are_a_time(record: Path, tmp_path: Path) -> None:
+    table = pd.read_csv(record)
+    dates = pd.Timestamp("2026-03-01T00:00:00") + pd.to_timedelta(table["t"], unit="s")
+    table.assign(t=dates.dt.strftime("%Y-%m-%dT%H:%M:%S.%f")).to_csv(tmp_path / "dates.csv", index=False)
+    document = document_of("noise", "allan", tmp_path / "dates.csv", "--unit-of", "output=g")
+    assert document["rate_hz"] == pytest.approx(RATE)
+    assert document["terms"] == document_of("noise", "allan", record, *OF_G)["terms"]
+
+
 def test_flicker_made_by_fractional_summation_is_found(tmp_path: Path) -> None:
     rng = np.random.default_rng(8)
     x = 1e-3 * fractional(rng, 1, 60_000)[0] + 1e-4 * rng.standard_normal(60_000)
