@@ -9,7 +9,7 @@ from inertial.disturbances import disturbance_texts, disturbances
 from inertial.noise import terms as noise_terms
 from inertial.noise.allan import CONFIDENCE, overlapping
 from inertial.noise.navigation import TIMES_S, TO_M_S2, navigation_error
-from inertial.noise.psd import allan_variance, one_sided
+from inertial.noise.psd import Spectrum, allan_variance, one_sided, spectral_lines
 from inertial.noise.terms import NAMES, NoiseTerms, fit_terms, model_deviation
 from pipelines.archive import Run
 from pipelines.chain.documents import NavigationRow
@@ -284,6 +284,11 @@ def psd_document(series: EvenSeries, segment: int | None = None) -> dict[str, An
                 f"{name}: {', '.join(texts)}"
                 for name, own in zip(series.names, series.values, strict=True)
                 if (texts := disturbance_texts(disturbances(own), series.rate_hz, series.unit))
+            ),
+            *(
+                f"{name}: a line at {frequency:.5g} Hz, {rms:.3g} {series.unit} rms".rstrip()
+                for k, name in enumerate(series.names)
+                for frequency, rms in spectral_lines(Spectrum(spectrum.frequency, spectrum.density[k]), n)
             ),
         ],
     }
