@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from inertial.arrays import Array
-from inertial.discovery.evidence import FIRST, Scale, Sums
+from inertial.discovery.running_sums import FIRST, Scale, Sums
 from inertial.discovery.station_wander import over
 
 

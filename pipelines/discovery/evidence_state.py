@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from inertial.arrays import Array, Places
-from inertial.discovery.evidence import FIRST, MEAN, STATION, Evidence
+from inertial.discovery.evidence import MEAN, STATION, Evidence
+from inertial.discovery.running_sums import FIRST
 from pipelines.archive import derived, files
 from pipelines.archive.store import Place
 from pipelines.discovery.lot_source import AXES, Column, DiscoveryArchive

@@ -6,8 +6,9 @@ from typing import Any, Literal
 import numpy as np
 
 from inertial.arrays import Array
-from inertial.discovery.evidence import INSIDE, MEAN, SLOT, STATION, Sums
+from inertial.discovery.evidence import INSIDE, MEAN, SLOT, STATION
 from inertial.discovery.naming import Name
+from inertial.discovery.running_sums import Sums
 from inertial.uncertainty.rounding import short
 from pipelines.discovery.documents import DiscoveredLevel, DiscoveryRow, UnexplainedRow
 from schemas.units import MICRO

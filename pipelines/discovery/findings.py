@@ -10,9 +10,10 @@ from scipy import stats
 
 from inertial.arrays import Array
 from inertial.counts import number_of
-from inertial.discovery.evidence import DATE, FIRST, INSIDE, MEAN, SLOT, STATION, UNIT, ScoredLot
+from inertial.discovery.evidence import DATE, INSIDE, MEAN, SLOT, STATION, UNIT, ScoredLot
 from inertial.discovery.naming import Name, Unnamed
 from inertial.discovery.pose_shape import SHAPE, angles_of, map_of
+from inertial.discovery.running_sums import FIRST
 from pipelines.discovery import documents
 from pipelines.discovery.alarms import Alarms
 from pipelines.discovery.documents import DiscoveryRow, DriverRow, HeldAlarm, ReachRow, UnexplainedRow

@@ -3,7 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.discovery.evidence import INSIDE, MEAN, STATION, Sums
+from inertial.discovery.evidence import INSIDE, MEAN, STATION
+from inertial.discovery.running_sums import Sums
 from inertial.frames import force_from_angles
 from inertial.uncertainty.rounding import short
 from pipelines.discovery.documents import DiscoverDocument, DiscoveryRow, UnexplainedRow

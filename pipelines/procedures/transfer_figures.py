@@ -55,7 +55,7 @@ def figures_of_model(axis: str, diagnosis: TransferDiagnosis, points: Points, te
     if diagnosis.adequate is None or diagnosis.unexplained:
         why = (
             diagnosis.reason
-            or alone_text(diagnosis).replace("alone", "points depart alone", 1)
+            or alone_text(diagnosis)
             or "the model, also with the effects found, does not describe the points"
         )
         return [FigureValue.not_determined(name, axis, why) for name in names]
@@ -162,13 +162,13 @@ def _sensitivity(part: Any, fit: TransferFit, static: Array | None) -> FigureVal
 def alone_text(diagnosis: TransferDiagnosis) -> str:
     """What is said of points that depart alone; empty without any."""
     where = ", ".join(f"{f:.4g} Hz" for f in diagnosis.alone_hz)
-    return f"alone, and not as any effect would: {where}; measure there again" if where else ""
+    return f"a point departs alone, and not as any effect would, at {where}; measure there again" if where else ""
 
 
 def _remains(diagnosis: TransferDiagnosis) -> list[tuple[str, str]]:
     """What no effect explains: single points, or a deviation of many."""
     if diagnosis.alone_hz:
-        return [("departs", alone_text(diagnosis))]
+        return [("bad point", alone_text(diagnosis))]
     text = "a significant deviation remains that no effect of the catalogue describes"
     return [("unexplained", text)] if diagnosis.unexplained else []
 

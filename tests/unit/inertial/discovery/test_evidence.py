@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from inertial.discovery.evidence import ALL, FIRST, INSIDE, SLOPE, Evidence, Levels, Scale, ScoredLot, Sums
+from inertial.discovery.evidence import ALL, INSIDE, SLOPE, Evidence, ScoredLot
+from inertial.discovery.running_sums import FIRST, Levels, Scale, Sums
 
 UNITS, COUNT = 6, 9
 NEEDED = float(np.log(COUNT * 8 / 0.05))

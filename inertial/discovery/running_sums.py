@@ -1,0 +1,124 @@
+"""What earlier lots say, as running sums: the evidence of a driver, sizes of its levels, the scale of what comes.
+
+Each increment x is symmetric about zero where there is nothing, given all earlier lots. Then exp(λS − λ²V/2) with S = Σx and
+V = Σx² is a supermartingale for any λ (de la Peña 1999; de la Peña, Klass, Lai 2004).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import logsumexp
+
+from inertial.arrays import Array, Places
+from inertial.discovery.station_wander import over
+
+FIRST = 30
+"""Lots that are held back: their medians bound what one of them can do. One lot multiplies evidence by 1.65 at most."""
+
+BOUND = 5.0
+"""Largest number of standard deviations that a lot counts for."""
+
+_MIXED = np.array([0.3, 0.03, 0.003])
+_RATES: Array = np.exp2(np.arange(1.0, -15.0, -1.0))
+
+
+@dataclass
+class Sums:
+    """Evidence of one driver for every hypothesis, then for every effect as a whole: Σx, Σx².
+
+    effects : (h,), number of the effect of each hypothesis; None where none stands for several
+    """
+
+    s: Array
+    v: Array
+    two_sided: bool
+    effects: Places | None = None
+
+    @classmethod
+    def of(cls, count: int, *, two_sided: bool, effects: Places | None = None) -> "Sums":
+        """Sums without a lot."""
+        size = count + (0 if effects is None else int(effects.max(initial=-1)) + 1)
+        return cls(np.zeros(size), np.zeros(size), two_sided, effects)
+
+    def add(self, x: Array) -> None:
+        """Add the increments (h,) of a lot."""
+        if self.effects is not None:
+            # of two signs: times what earlier lots predict
+            own = x * self.s[: x.size] / (self.v[: x.size] + FIRST) if self.two_sided else x
+            wholes = np.bincount(self.effects, own, self.s.size - x.size)
+            x = np.concatenate([x, np.asarray(wholes, dtype=np.float64)])
+        self.s += x
+        self.v += x**2
+
+    @property
+    def log_e(self) -> Array:
+        """Logarithm of the evidence, (h + effects,)."""
+        rates = _RATES[:, None]
+        out = logsumexp(rates * self.s - 0.5 * rates**2 * self.v, axis=0) - np.log(_RATES.size)
+        if self.two_sided:
+            own = slice(None) if self.effects is None else slice(self.effects.size)
+            s, grown = self.s[own], 1.0 + _MIXED[:, None] * self.v[own]
+            each = -0.5 * np.log(grown) + 0.5 * _MIXED[:, None] * s**2 / grown
+            out[own] = logsumexp(each, axis=0) - np.log(_MIXED.size)
+        return out
+
+
+class Levels:
+    """What earlier lots say of every level of a driver: sums of scores and of information, (levels, h)."""
+
+    def __init__(self, count: int) -> None:
+        self.place: dict[str, int] = {}
+        self.score, self.information = np.zeros((0, count)), np.zeros((0, count))
+
+    def predicted(self, labels: tuple[str, ...], prior: Array, without: "Levels | None" = None) -> tuple[Array, Array]:
+        """Predicted sizes (units, h), drawn towards zero by a prior information (h,), and the information behind them.
+
+        Parameters
+        ----------
+        without : a part of the lots that is left out
+        """
+        sizes, behind = np.zeros((2, len(labels), self.score.shape[1]))
+        for unit, label in enumerate(labels):
+            at = self.place.get(label, -1)
+            if at < 0:
+                continue
+            score, information = self.score[at], self.information[at]
+            less = -1 if without is None else without.place.get(label, -1)
+            if without is not None and less >= 0:
+                score, information = score - without.score[less], information - without.information[less]
+            sizes[unit], behind[unit] = over(score, information + prior), information
+        return sizes, behind
+
+    def add(self, labels: tuple[str, ...], score: Array, information: Array) -> None:
+        """Add scores and information (units, h)."""
+        for unit, label in enumerate(labels):
+            if not label:
+                continue
+            at = self.place.setdefault(label, len(self.place))
+            if at >= len(self.score):
+                more = np.zeros((max(16, len(self.score)), self.score.shape[1]))
+                self.score, self.information = np.vstack([self.score, more]), np.vstack([self.information, more])
+            self.score[at] += score[unit]
+            self.information[at] += information[unit]
+
+
+class Scale:
+    """Root mean square of what came before, bounded at each step; a median of the first lots begins it."""
+
+    def __init__(self, start: Array) -> None:
+        self.squares, self.n = 10.0 * start**2, np.full(start.size, 10.0)
+
+    @property
+    def rms(self) -> Array:
+        """(h,)."""
+        return np.sqrt(self.squares / self.n)
+
+    def bounded(self, value: Array) -> Array:
+        """A value (h,) that counts for five standard deviations at most."""
+        limit = BOUND * self.rms
+        return np.clip(value, -limit, limit)
+
+    def add(self, value: Array) -> None:
+        """Take a bounded value in; zero says nothing."""
+        self.squares += value**2
+        self.n += value != 0.0
