@@ -128,24 +128,27 @@ def truths_of(preset: Preset, units: int, seed: int) -> list[Truth]:
     return drawn
 
 
-def measured(course: Course, preset: Preset, truths: list[Truth], seed: int) -> tuple[State, Array, Array]:
-    """State, means and their white errors (units, n, 3) in g, of units measured with a plan."""
+def measured(course: Course, preset: Preset, truths: list[Truth], seed: int) -> tuple[State, Array, Array, Array]:
+    """State, means and their white errors (units, n, 3), and mean of the random walk over the dwells (units, 3), in g.
+
+    A fit states the bias with the walk counted from that mean: the bias at switch-on is no truth of it.
+    """
     parts = [_chunk(course, preset, truths[k : k + CHUNK], seed, k) for k in range(0, len(truths), CHUNK)]
     mean, sd = (np.concatenate([part[k] for part in parts]) / preset.scale for k in (0, 1))
-    heat = np.concatenate([part[2] for part in parts])
+    heat, walk = (np.concatenate([part[k] for part in parts]) for k in (2, 3))
     lsb = preset.lsb / preset.scale
     n = round(course.rate * course.duration)
     error = np.sqrt(sd**2 / n + np.where(sd < lsb, lsb**2 / 12.0, 0.0))
     force = force_from_angles(np.radians(course.outer), np.radians(course.inner))
     time = np.broadcast_to(course.start + course.duration / 2.0, heat.shape)
-    return State(force=np.broadcast_to(force, (*heat.shape, 3)), time=time, temperature=heat), mean, error
+    return State(force=np.broadcast_to(force, (*heat.shape, 3)), time=time, temperature=heat), mean, error, walk
 
 
-def _chunk(course: Course, preset: Preset, truths: list[Truth], seed: int, place: int) -> tuple[Array, Array, Array]:
-    """Means and standard deviations (units, n, 3), and what the thermometers say (units, n)."""
+def _chunk(course: Course, preset: Preset, truths: list[Truth], seed: int, place: int) -> tuple[Array, ...]:
+    """Means and standard deviations (units, n, 3), what the thermometers say (units, n), and the walk's mean (units, 3)."""
     devices = PlantDevices(preset, truths)
     noise = UnitNoise(preset, [stream(seed, t.serial, "noise") for t in truths])
-    n, before, means, sds = round(course.rate * course.duration), 0.0, [], []
+    n, before, means, sds, walk = round(course.rate * course.duration), 0.0, [], [], []
     heat = heat_of(course, len(truths), seed, place)
     part = np.minimum(np.arange(n) * PARTS // n, PARTS - 1)
     lsb = float(np.float32(preset.lsb))
@@ -154,16 +157,21 @@ def _chunk(course: Course, preset: Preset, truths: list[Truth], seed: int, place
         turned = np.repeat(np.stack([t.slot_rotation @ f for t in truths])[None], PARTS, axis=0)
         clean = devices.output(turned, own.T)[part]
         noise.jump(start - before)
+        begun = noise.walk
         counts = devices.counts(clean + noise.sample(n, course.rate)) * lsb
         before = start + course.duration
         means.append(counts.mean(axis=0) - preset.zero_level)
         sds.append(counts.std(axis=0, ddof=1))
+        walk.append(0.5 * (begun + noise.walk))
     shown = heat.mean(axis=2) + THERMOMETER_K * np.random.default_rng([seed, place, 1]).standard_normal(heat.shape[:2])
-    return np.stack(means, axis=1), np.stack(sds, axis=1), shown
+    return np.stack(means, axis=1), np.stack(sds, axis=1), shown, np.mean(walk, axis=0)
 
 
-def truth_of(truths: list[Truth], names: Names) -> Array:
-    """True coefficients (units, 3, p) of the standard thermal model in g, for forces in the fixture's frame."""
+def truth_of(truths: list[Truth], names: Names, walk: Array) -> Array:
+    """True coefficients (units, 3, p) of the standard thermal model in g, for forces in the fixture's frame.
+
+    walk : (units, 3), g, mean of the random walk over the record
+    """
     out = np.zeros((len(truths), 3, len(names[0])))
     for u, truth in enumerate(truths):
         matrix = truth.matrix
@@ -171,7 +179,7 @@ def truth_of(truths: list[Truth], names: Names) -> Array:
             across = iter(((axis + 1) % 3, (axis + 2) % 3))
             for c, (effect, _) in enumerate(names[axis]):
                 out[u, axis, c] = {
-                    "bias": lambda a=axis, t=truth: t.bias_g[a],
+                    "bias": lambda a=axis, t=truth, w=walk[u]: t.bias_g[a] + w[a],
                     "scale": lambda a=axis, m=matrix: m[a, a],
                     "misalignment": lambda a=axis, m=matrix, it=across: m[a, next(it)],
                     "bias_temperature": lambda a=axis, t=truth: t.bias_tempco[a],
@@ -282,7 +290,7 @@ class Looked:
         course = course_of(plan)
         if preset.noise_bandwidth_hz == 0.0:  # the mean has the same noise as at the recipe's rate
             course = replace(course, rate=RATE_HZ)
-        state, mean, error = measured(course, preset, truths, seed)
+        state, mean, error, walk = measured(course, preset, truths, seed)
         dwells = [one for one in plan.activities if one.kind == "dwell"]
         self.beyond = np.zeros((len(truths), *required.shape), dtype=bool)
         counts = look_counts(plan.activities, plan.station, plan.recipe)
@@ -297,7 +305,7 @@ class Looked:
             fit = fit_lot_with_wander(plan.recipe.effects, part, mean[:, :count], error[:, :count]).fit
             spread = np.sqrt(np.diagonal(fit.covariance, axis1=-2, axis2=-1))
             guard = noise_guard(int(fit.dof.sum()), len(counts))
-            off = fit.coefficients - truth_of(truths, fit.names)
+            off = fit.coefficients - truth_of(truths, fit.names, walk)
             self.beyond = self.beyond | (np.abs(off) > over_looks(2.0, len(counts)) * guard * spread)
             if count < len(dwells) and np.all(guard * spread <= required):
                 break
@@ -328,9 +336,9 @@ def rms_of(looked: list[Looked], effect: str) -> float:
 def squared_errors(course: PlanContext, preset: Preset, options: argparse.Namespace) -> tuple[Names, Array, float]:
     """Names, squared errors (units, 3, p) in g of fits to units drawn from the physics of the plant, share within 2 σ."""
     truths = truths_of(preset, options.units, options.seed)
-    state, mean, error = measured(course_of(course), preset, truths, options.seed)
+    state, mean, error, walk = measured(course_of(course), preset, truths, options.seed)
     fit = fit_lot_with_wander(course.recipe.effects, state, mean, error).fit
-    off = fit.coefficients - truth_of(truths, fit.names)
+    off = fit.coefficients - truth_of(truths, fit.names, walk)
     inside = np.abs(off) <= 2.0 * np.sqrt(np.diagonal(fit.covariance, axis1=-2, axis2=-1))
     return fit.names, off**2, float(inside.mean())
 

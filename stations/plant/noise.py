@@ -48,6 +48,11 @@ class UnitNoise:
         self._walk: Array = np.zeros((len(self._streams), 3))
         self._filtered: Array = np.zeros_like(self._walk)  # white noise behind the output filter at the last sample
 
+    @property
+    def walk(self) -> Array:
+        """The random walk at this moment, (units, 3), g; zero when the device was switched on."""
+        return self._walk
+
     def jump(self, gap: float) -> None:
         """Advances the slow processes over ``gap`` seconds without sampling; exact, in one step."""
         keep = np.exp(-gap / self._tau)
