@@ -84,7 +84,7 @@ class Measured:
     def __init__(self, course: Course, preset: Preset, truths: list[Truth], seed: int) -> None:
         if preset.noise_bandwidth_hz == 0.0:
             course = replace(course, rate=RATE_HZ)
-        state, mean, error, walk = measured(course, preset, truths, seed)
+        state, mean, error, slow = measured(course, preset, truths, seed)
         heat = np.asarray(state.temperature)
         self.serials = [truth.serial for truth in truths]
         fits = []
@@ -95,7 +95,7 @@ class Measured:
         self.coefficients = np.concatenate([fit.coefficients for fit in fits])
         self.covariance = np.concatenate([fit.covariance for fit in fits])
         self.effects = [effect for effect, _ in fits[0].names[0]]
-        self.off = self.coefficients - truth_of(truths, fits[0].names, walk)
+        self.off = self.coefficients - truth_of(truths, fits[0].names, slow.walk)
 
     def family(self) -> Family:
         """Their family."""

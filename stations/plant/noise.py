@@ -53,6 +53,11 @@ class UnitNoise:
         """The random walk at this moment, (units, 3), g; zero when the device was switched on."""
         return self._walk
 
+    @property
+    def slow(self) -> Array:
+        """Random walk and flicker at this moment, (units, 3), g."""
+        return self._walk + self._flicker.sum(axis=-1)
+
     def jump(self, gap: float) -> None:
         """Advances the slow processes over ``gap`` seconds without sampling; exact, in one step."""
         keep = np.exp(-gap / self._tau)
