@@ -1,6 +1,7 @@
 """A curve of one driver with the same shape for every unit and axis: the sign of an effect that the catalogue lacks."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -8,10 +9,14 @@ from inertial.arrays import Array
 from inertial.criticism.drivers import Driver
 from inertial.estimation.candidate import Candidate
 from inertial.estimation.model import Model
+from inertial.estimation.noise_shares import Noise
 from inertial.estimation.penalty import PER_COEFFICIENT, cost_of_model
 from inertial.estimation.space import Space
 
 _TURNS = 8  # alternating estimates of sizes and shape
+
+_BEHIND, _SHARE_BEHIND = 60.0, 0.25
+"""Cost, and share of what the best curve gains, above the best at given noises from which the noise of a curve is not sought."""
 
 
 @dataclass(frozen=True)
@@ -29,18 +34,53 @@ class CurveFit:
     cost: float
 
 
-def fit_curve(model: Model, driver: Driver) -> CurveFit:
-    """The best common curve of a driver added to a model, with the noise estimated again."""
+def fit_curves(model: Model, drivers: Sequence[Driver], noises: Sequence[Noise] = ()) -> list[CurveFit]:
+    """The best common curve of every driver added to a model, with the noise estimated again.
+
+    Drivers of the same columns, such as time and time since power-on of one run, have one fit.
+
+    Parameters
+    ----------
+    noises : at which the curves are compared first; those far behind the best there keep that fit, an upper limit of their cost,
+        since the search for the noise of one costs as much as all of these comparisons
+    """
+    first = [next(j for j, other in enumerate(drivers) if _same(other, driver)) for driver in drivers]
+    alone = dict.fromkeys(first)
+    fits: dict[int, CurveFit] = {}
+    for noise in noises if len(alone) > 1 else ():
+        for k in alone:
+            fit = _with_curve(model, drivers[k], noise, held=True)
+            fits[k] = min(fit, fits.get(k, fit), key=lambda one: one.cost)
+    best = min((fit.cost for fit in fits.values()), default=0.0)
+    within = best + max(_BEHIND, _SHARE_BEHIND * (cost_of_model(model) - best))
+    for k in alone:
+        if k not in fits or fits[k].cost < within:
+            fits[k] = _fitted(model, drivers[k])
+    return [replace(fits[k], driver=driver) for k, driver in zip(first, drivers, strict=True)]
+
+
+def _same(driver: Driver, other: Driver) -> bool:
+    one, two = driver.candidate, other.candidate
+    alike = driver.ways == other.ways and one.shared == two.shared and one.of_blocks.shape == two.of_blocks.shape
+    return alike and bool(np.array_equal(one.of_blocks, two.of_blocks))
+
+
+def _fitted(model: Model, driver: Driver) -> CurveFit:
+    """The best common curve of a driver: at the noise of the model, then at the noise beside the first curve."""
+    fit = _with_curve(model, driver, model.noise)
+    return fit if driver.candidate.shared else _with_curve(model, driver, fit.model.noise)
+
+
+def _with_curve(model: Model, driver: Driver, noise: Noise, *, held: bool = False) -> CurveFit:
+    """The common curve of a driver that is best at a noise; with the noise beside it as estimated, or held."""
     candidate = driver.candidate
     if candidate.shared:
-        fitted = model.with_shared_curves(candidate.of_blocks[:, :, 0, :])
-        return CurveFit(driver, fitted, fitted.space.shared_rank, cost_of_model(fitted))
-    noise, fitted, rank = model.noise, model, 0
-    for _ in range(2):
+        fitted, rank, shape = model.with_shared_curves(candidate.of_blocks[:, :, 0, :]), 0, 0
+    else:
         columns, rank = _curve(model.at(noise), candidate, driver.ways)
-        fitted = model.with_curves(columns)
-        noise = fitted.noise
-    shape = rank - driver.ways * model.problem.blocks
+        fitted, shape = model.with_curves(columns), rank - driver.ways * model.problem.blocks
+    fitted = fitted.held_at(noise.shares) if held else fitted
+    rank = fitted.space.shared_rank if candidate.shared else rank
     return CurveFit(driver, fitted, rank, cost_of_model(fitted) + PER_COEFFICIENT * shape)
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from inertial import decisions, frames
 from inertial.arrays import Array
-from inertial.criticism.curves import CurveFit, fit_curve
+from inertial.criticism.curves import CurveFit, fit_curves
 from inertial.criticism.drivers import (
     Driver,
     Part,
@@ -25,6 +25,7 @@ from inertial.estimation.alternative import by_block, of_outputs, rotated_force
 from inertial.estimation.candidate import Candidate
 from inertial.estimation.likelihood import shared_noise
 from inertial.estimation.model import Model
+from inertial.estimation.noise_shares import Noise
 from inertial.estimation.penalty import PER_COEFFICIENT, PER_COLUMN, cost_of_model, log_p_value
 from inertial.estimation.problem import Problem
 from inertial.estimation.term import Term
@@ -120,16 +121,16 @@ def wide_suspects(problem: Problem) -> list[Driver]:
 def better_curve(base: Model, chosen: Sequence[Term], field: Sequence[Driver]) -> tuple[CurveFit, list[Term]] | None:
     """The curve that explains a lot better than the chosen effects, with the effects that remain; None if there is none."""
     held = {t.effect.id.removeprefix(COVARIATE_PREFIX) for t in chosen}
-    whole = cost_of_model(Model(base.problem, [*base.terms, *chosen], near=base.noise))
-    bare = cost_of_model(base)
+    full = Model(base.problem, [*base.terms, *chosen], near=base.noise)
+    whole, bare = cost_of_model(full), cost_of_model(base)
     every = _promising(base, field)
     promising = [s for s in every if s.name not in held]
-    fits = [(fit_curve(base, s), s) for s in promising]
+    fits = list(zip(fit_curves(base, promising, [*_noises(base), full.noise]), promising, strict=True))
     fits += [(f, s) for s in promising[:_SHARPEST] if (f := _sharp(base, s)) is not None]
     if not fits:
         return None
     best, suspect = min(fits, key=lambda pair: pair[0].cost)
-    if any(fit_curve(base, s).cost <= best.cost for s in every if s.name in held):
+    if any(fit.cost <= best.cost for fit in fit_curves(base, [s for s in every if s.name in held])):
         return None  # the recorded column that the effects hold already, in a shape of its own
     kept: list[Term] = []
     if len(chosen) > 1:
@@ -159,7 +160,7 @@ def curve_in_noise(base: Model, field: Sequence[Driver]) -> CurveFit | None:
     A tide that all units share is no random walk, and what each move leaves is no louder noise; but beside a model without it the
     noise is estimated so that it can be, and no test at that noise sees it.
     """
-    fits = [fit_curve(base, s) for s in _promising(base, field)]
+    fits = fit_curves(base, _promising(base, field), _noises(base))
     if not fits:
         return None
     best = _tuned(base, min(fits, key=lambda f: f.cost))
@@ -178,12 +179,17 @@ def unexplained_by(base: Model, fit: CurveFit, looks: int) -> Unexplained:
     return Unexplained(driver.name, "curve", log_p, driver.part, fit.model.floor(), fit.model, driver.period)
 
 
+def _noises(base: Model) -> list[Noise]:
+    """The noise of a model, and one with less wander, which may have absorbed a curve."""
+    less = base.noise.shares.times(decisions.LESS_FLICKER, decisions.LESS_WALK)
+    return [base.noise] if less == base.noise.shares else [base.noise, base.noise_at(less)]
+
+
 def _promising(base: Model, field: Sequence[Driver]) -> list[Driver]:
     """The suspects whose own curves, block by block, reduce the residual most, at the noise of a model and with less wander."""
-    less = base.noise.shares.times(decisions.LESS_FLICKER, decisions.LESS_WALK)
-    spaces = [base.space] if less == base.noise.shares else [base.space, base.at(base.noise_at(less))]
     picked: dict[int, Driver] = {}
-    for space in spaces:
+    for noise in _noises(base):
+        space = base.at(noise)
         worth = [float(np.max(space.gain(s.candidate).drop)) for s in field]
         picked |= {int(i): field[i] for i in np.argsort(worth)[::-1][:_PROMISING] if worth[i] > 0.0}
     return list(picked.values())
@@ -198,7 +204,7 @@ def _with_others(
         if _function_of(base, term, suspect[0]):
             continue
         beside = Model(base.problem, [*base.terms, *kept, term], near=base.noise)
-        tried = [fit_curve(beside, s) for s in suspect]
+        tried = fit_curves(beside, suspect)
         tried += [f for s in suspect[:1] if (f := _sharp(beside, s)) is not None]
         again = min(tried, key=lambda f: f.cost)
         if again.cost < best.cost - worth:
@@ -311,7 +317,7 @@ def _tuned(base: Model, fit: CurveFit) -> CurveFit:
         near = [_swing(base.problem, whole / (cycles + step * reach)) for step in (-2, -1, 0, 1, 2)]
         worth = [float(space.gain(suspect.candidate).drop[0]) for suspect in near]
         cycles += (int(np.argmax(worth)) - 2) * reach
-    tuned = fit_curve(base, _swing(base.problem, whole / cycles))
+    (tuned,) = fit_curves(base, [_swing(base.problem, whole / cycles)])
     tuned = replace(tuned, rank=tuned.rank + 1, cost=tuned.cost + PER_COEFFICIENT)
     return tuned if tuned.cost < fit.cost else fit
 

@@ -325,6 +325,12 @@ class Model:
         """The model with the columns (blocks, n, d) of a driver, sized by block."""
         return self._variant(self.terms, curves=columns)
 
+    def held_at(self, shares: Shares) -> "Model":
+        """The model with the noise of given shares, as it is and not estimated."""
+        own, common = self._curves, self._shared_curves
+        known = [self.noise_at(shares)]
+        return Model(self.problem, self.terms, near=self._near, curves=own, shared_curves=common, known=known)
+
     def with_shared_curves(self, columns: Array) -> "Model":
         """The model with the columns (blocks, n, d) of a driver, whose coefficients all blocks share."""
         return self._variant(self.terms, shared_curves=columns)

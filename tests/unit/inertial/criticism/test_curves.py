@@ -6,7 +6,7 @@ from each import each
 from made_worlds import BASE, World, make, run_of
 
 from inertial import effects
-from inertial.criticism.curves import fit_curve
+from inertial.criticism.curves import fit_curves
 from inertial.criticism.drivers import across, curve, forces_along, transfer
 from inertial.criticism.examination import ExaminedRun
 from inertial.criticism.unknown import curve_in_noise, suspects, wide_suspects
@@ -25,10 +25,10 @@ def test_a_curve_across_the_axes_has_the_shape_of_the_truth() -> None:
     model = run.model()
     time = run.lot.state.time
     suspect = next(s for s in wide_suspects(model.problem) if s.name == "time_s" and s.ways == 2)
-    fit = fit_curve(model, suspect)
+    (fit,) = fit_curves(model, [suspect])
     # two sizes for each block; of the shape's columns those that the times of the soaks part
     assert 2 <= fit.rank - 2 * model.problem.blocks + 1 <= curve(time, 6).shape[-1]
-    bias_only = fit_curve(model, next(s for s in wide_suspects(model.problem) if s.ways == 1))
+    (bias_only,) = fit_curves(model, [next(s for s in wide_suspects(model.problem) if s.ways == 1)])
     assert fit.cost < bias_only.cost - 1000.0
     # with the truth itself as the only column the cost is the same, within the price of the shape
     course = np.exp(-time / 1500.0)[..., None]
