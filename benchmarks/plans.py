@@ -75,6 +75,14 @@ class Course:
     rate: float
 
 
+class ApartNoise(UnitNoise):
+    """Noise that keeps the white part of the last samples apart."""
+
+    def _white(self, z: Array, rate: float) -> Array:
+        self.white = super()._white(z, rate).copy()
+        return self.white.copy()
+
+
 class Slow(NamedTuple):
     """Slow noise of units, (units, 3) each, g.
 
@@ -161,7 +169,7 @@ def measured(course: Course, preset: Preset, truths: list[Truth], seed: int) -> 
 def _chunk(course: Course, preset: Preset, truths: list[Truth], seed: int, place: int) -> tuple[Array, ...]:
     """Means and standard deviations (units, n, 3), what the thermometers say (units, n), slow noise (3, units, 3)."""
     devices = PlantDevices(preset, truths)
-    noise = UnitNoise(preset, [stream(seed, t.serial, "noise") for t in truths])
+    noise = ApartNoise(preset, [stream(seed, t.serial, "noise") for t in truths])
     n, before, means, sds, slow = round(course.rate * course.duration), 0.0, [], [], []
     heat = heat_of(course, len(truths), seed, place)
     part = np.minimum(np.arange(n) * PARTS // n, PARTS - 1)
@@ -171,12 +179,12 @@ def _chunk(course: Course, preset: Preset, truths: list[Truth], seed: int, place
         turned = np.repeat(np.stack([t.slot_rotation @ f for t in truths])[None], PARTS, axis=0)
         clean = devices.output(turned, own.T)[part]
         noise.jump(start - before)
-        begun = np.stack([noise.walk, noise.slow])
-        counts = devices.counts(clean + noise.sample(n, course.rate)) * lsb
+        begun, drawn = noise.walk, noise.sample(n, course.rate)
+        counts = devices.counts(clean + drawn) * lsb
         before = start + course.duration
         means.append(counts.mean(axis=0) - preset.zero_level)
         sds.append(counts.std(axis=0, ddof=1))
-        slow.append(0.5 * (begun + np.stack([noise.walk, noise.slow])))
+        slow.append(np.stack([0.5 * (begun + noise.walk), (drawn - noise.white).mean(axis=0)]))
     shown = heat.mean(axis=2) + THERMOMETER_K * np.random.default_rng([seed, place, 1]).standard_normal(heat.shape[:2])
     later = []
     for _ in range(DAY_STEPS):
