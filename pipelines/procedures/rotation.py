@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 from threadpoolctl import threadpool_limits
 
-from inertial.dynamics.rotation import PLACE_M, RotationFit
+from inertial.dynamics.rotation import PLACE_M, RotationData, RotationFit
 from inertial.dynamics.rotation_diagnosis import RotationDiagnosis, diagnose_rotation
 from inertial.dynamics.rotation_effects import EFFECTS
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Role, Trace, level
@@ -34,6 +34,7 @@ from stations.profile_files import profile_of
 MILLI = 1e3
 SETTLING_S = 3.0  # of a turn besides its angle at the rate: running up and down, and in position
 REACTION_S = 0.1  # in which the axis still settles at its rate
+GAIN = "rate_gain"
 SCATTER_DEG = 0.1  # largest scatter of the encoder's readings: then 300 of them know an angle to 0.1 mrad
 
 
@@ -60,6 +61,7 @@ class Rotation(InG, Evaluated):
         FigureSpec("rotation_second_order_ug_g2", "µg/g²", "K2 within 1 g, worst axis"),
         FigureSpec("rotation_third_order_ug_g3", "µg/g³", "K3 within 1 g, worst axis"),
         FigureSpec("rotation_delay_ms", "ms", "by which the readings of the encoder are later than the samples"),
+        FigureSpec("rotation_response_percent", "%", "gain at the fastest turn less that at rest, worst axis"),
         FigureSpec("rotation_radius_mm", "mm", "of the proof masses about the inner axis of the table"),
     )
 
@@ -160,6 +162,7 @@ class Rotation(InG, Evaluated):
                     if n.startswith("delay_")
                 ]
             ),
+            _response(data, fit),
             _radius(fit),
         ]
         return figures, [*_coefficients(fit, letters), *_drive(part, rows), *_open(part), *_diagnosis(diagnosis)]
@@ -212,6 +215,18 @@ def _effect(figure: str, effect: str, fit: RotationFit, axis: str) -> FigureValu
 def _felt(fit: RotationFit) -> list[str]:
     """Directions in which the test shows the place of the proof masses, not only what is possible."""
     return [a for a in "xyz" if fit.of(f"place_{a}")[1] < 0.5 * PLACE_M]
+
+
+def _response(data: RotationData, fit: RotationFit) -> FigureValue:
+    """Of the model with such a gain, whether or not the model that is judged has it."""
+    model = data.model
+    if not model.seen(GAIN):
+        return FigureValue.not_determined(
+            "rotation_response_percent", "*", "no axis turns in gravity at a rate and stands"
+        )
+    beside = model.fit([*dict.fromkeys([*fit.effects, GAIN])])
+    axes = [(name.rsplit("_", 1)[1], beside.of(name)) for name in beside.of_effect(GAIN)]
+    return worst([_figure("rotation_response_percent", axis, gain, 100.0) for axis, gain in axes])
 
 
 def _radius(fit: RotationFit) -> FigureValue:

@@ -118,6 +118,28 @@ def test_both_directions_tell_a_delay_from_an_angle_that_is_off() -> None:
     assert fit.of("delay_inner")[1] < 1e-4
 
 
+def test_a_low_pass_shows_as_gain_over_the_rate_and_as_delay() -> None:
+    """Gravity turns as one phasor: of a time constant τ its gain is 1/√(1 + (ωτ)²), its phase −arctan(ωτ)."""
+    lag, rates = 0.05, (0.4 * RATE, RATE)
+    points, rng = rotations(planes=["xy", "yz"], rates=rates), np.random.default_rng(41)
+    late = np.arctan(points.rate * lag)
+    own = points.inner_turns > 0
+    moved = replace(
+        points, outer=points.outer - np.where(own, 0.0, late), inner=points.inner - np.where(own, late, 0.0)
+    )
+    gain = 1.0 / np.sqrt(1.0 + (points.rate * lag) ** 2)
+    output = BIAS + (gain[:, None] * mean(Nodes.of(moved).force)) @ MATRIX.T
+    made = diagnose_rotation(data(points, output, rng))
+    assert not made.adequate
+    assert "rate_gain" in made.classes[0].effects
+    fit = data(points, output, rng).model.fit(("second_order", "third_order", "rate_gain"))
+    for axis in "xyz":
+        value, u = fit.of(f"rate_gain_{axis}")
+        assert abs(value - (1.0 / np.sqrt(1.0 + (RATE * lag) ** 2) - 1.0)) < 4.0 * u
+        assert u < 2e-5
+    assert abs(fit.of("delay_inner")[0] + lag) < 4.0 * fit.of("delay_inner")[1]
+
+
 def test_parts_of_a_turn_of_unequal_length_are_no_noise() -> None:
     """Bins of 41 and 42 samples average a wave by 60 µg more or less, which is thirty times this noise."""
     points = rotations()
