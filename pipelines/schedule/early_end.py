@@ -70,7 +70,8 @@ def early_end(run: Run) -> EarlyEnd | None:
     missing = [step for step in plan if step.record not in taken]
     soaks = {step.soak for step in plan if step.record in taken}
     left = {step.soak: step.temperature for step in missing if step.soak not in soaks}
-    reasons = [str(event["reason"]) for event in events if event["kind"] == "known"]
+    by = f" (by run {about['rerun_of']}, which measured it)" if about.get("rerun_of") else ""
+    reasons = [f"{event['reason']}{by}" for event in events if event["kind"] == "known"]
     fails = {str(event["action"]).split()[1]: str(event["reason"]) for event in events if event["kind"] == "fails"}
     grades = run.table("grades") if "grades" in run.tables() else None
     passed = set[str]() if grades is None else set(grades.loc[grades["outcome"] == "pass", "unit"])

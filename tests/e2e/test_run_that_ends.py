@@ -56,6 +56,11 @@ def test_a_run_that_ends_early_says_so_everywhere(tmp_path: Path) -> None:
     assert any(sentence in line for line in about)
     assert end["not_reached"] == []
     text_of("rerun", found["run"], "--archive", root, "--check")
+    # by another model the lot might not have ended: the look was that of the first run
+    effects = "bias,scale,misalignment,second_order"
+    again = document_of("rerun", found["run"], "--effects", effects, "--archive", root)
+    shown = text_of("show", again["runs"][0]["new"], "--archive", root)
+    assert f"(by run {found['run']}, which measured it)" in shown
 
 
 @pytest.mark.usefixtures("no_next_measurement")
