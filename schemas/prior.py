@@ -13,13 +13,15 @@ class PriorTerms(Grown):
     archive : address of the archive with the earlier calibrations; empty: that of the run
     since : first day of their runs
     full : recipe with the full plan, which a lot goes on with where it, or one of its units, does not fit the family
+    attribute : of the units, such as ``wafer``: a unit leans on earlier units with the same value; empty: on the family alone
     """
 
-    later: ClassVar[frozenset[str]] = frozenset({"archive", "since", "full"})
+    later: ClassVar[frozenset[str]] = frozenset({"archive", "since", "full", "attribute"})
 
     archive: Text = ""
     since: date | None = None
     full: Text = ""
+    attribute: Text = ""
 
 
 class StoredOwn(Strict):
@@ -33,6 +35,7 @@ class StoredFamily(Strict):
     """A family (:class:`inertial.population.family.Family`) with what it was made from: what a re-run reads.
 
     effects : of the p columns; runs : whose calibrations it is made of; the others as in the family
+    groups : by serial number, what a unit has its prior from in place of earlier calibrations of its own, such as ``wafer W07``
     """
 
     effects: list[str]
@@ -45,3 +48,4 @@ class StoredFamily(Strict):
     lots: int
     tails: list[list[float]]
     own: dict[str, StoredOwn] = {}
+    groups: dict[str, str] = {}

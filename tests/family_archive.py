@@ -14,10 +14,17 @@ LSB = 256000.0
 LOTS, UNITS = 12, 4
 
 
-def family_archive(root: Path, recipe: str, spread: float, *, lots: int = LOTS, **changes: Any) -> Archive:
+def wafer_of(lot: int, k: int) -> str:
+    """The wafer of a unit: the dice of one go into several lots."""
+    return f"W{(lot + k) % LOTS:02d}"
+
+
+def family_archive(
+    root: Path, recipe: str, spread: float, *, lots: int = LOTS, wafers: float = 0.0, **changes: Any
+) -> Archive:
     """Lots of simulated units whose coefficients spread by so much, g, about a bias of zero and the nominal scale.
 
-    changes : of the archived recipe
+    wafers : spread between wafers, g; changes : of the archived recipe
     """
     archive, own = Archive(root), load_recipe(recipe).model_copy(update=changes)
     archive.prepare()
@@ -26,6 +33,9 @@ def family_archive(root: Path, recipe: str, spread: float, *, lots: int = LOTS, 
     for lot in range(lots):
         rng = np.random.default_rng([7, lot])
         values = middle + LSB * spread * rng.standard_normal((UNITS, *middle.shape))
+        for k in range(UNITS):
+            own_wafer = np.random.default_rng([8, int(wafer_of(lot, k)[1:])])
+            values[k] += LSB * wafers * own_wafer.standard_normal(middle.shape)
         error = np.broadcast_to((LSB * 1e-6) ** 2 * np.eye(middle.shape[1]), (*values.shape, middle.shape[1]))
         fit = LotFit(
             tuple(own.effects), values, error, names, np.zeros(0), np.zeros((0, 0)), (), {}, values, values, values

@@ -56,7 +56,7 @@ def summary(run: Run) -> dict[str, Any]:
         "failed": outcomes.count("fail"),
         "refused": outcomes.count("refused"),
         "yield": outcomes.count("pass") / len(units),
-        "prior": prior_document(run.table("prior")) if "prior" in run.tables() else None,
+        "prior": prior_document(run.table("prior"), run.about) if "prior" in run.tables() else None,
         "early_end": early_end(run),
         "interruptions": interruptions(run),
         "report": str(run.report),

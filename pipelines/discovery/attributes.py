@@ -1,13 +1,8 @@
-"""What is known of units and runs beside the measurement: wafer, supplier, batch, firmware, operator, date of assembly.
-
-Append-only, one file for each time that something was added, with its source, its author and its date; a changed value is a new
-row, and the newest one counts.
-"""
+"""Attributes of units and runs, added to an archive: append-only, with source, author and date; and listed."""
 
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, cast
 
@@ -16,6 +11,7 @@ import pandas as pd
 
 from inertial.counts import number_of
 from pipelines.archive import Archive, files
+from pipelines.archive.attributes import FOLDER, attribute_files, known_attributes
 from pipelines.archive.locks import alone
 from pipelines.archive.provenance import provenance
 from pipelines.discovery.documents import AddedAttributes, KnownAttribute, ListedAttributes
@@ -23,42 +19,11 @@ from schemas.errors import WrongUse, did_you_mean
 
 By = Literal["serial", "run"]
 
-FOLDER = "attributes"
 NOT_DRIVERS = {"grade", "outcome", "pass", "passed", "fail", "failed", "yield", "certificate"}
 """Columns that follow from the result: units selected by them would show an effect where there is none."""
 
 _SHOWN = 5
 _DAY = re.compile(r"\d{4}-\d{2}-\d{2}")
-
-
-@dataclass(frozen=True)
-class Attributes:
-    """The newest values: by serial and by run, name → value as text."""
-
-    serial: Mapping[str, Mapping[str, str]]
-    run: Mapping[str, Mapping[str, str]]
-    entries: int
-
-    def names(self) -> list[str]:
-        """Names of all attributes, in order of appearance."""
-        every = (name for known in (self.serial, self.run) for values in known.values() for name in values)
-        return list(dict.fromkeys(every))
-
-    def of(self, serial: str, run: str, name: str) -> str:
-        """The value of a unit in a run: its own, or that of the run; empty where neither is known."""
-        own = self.serial.get(serial, {}).get(name, "")
-        return own or self.run.get(run, {}).get(name, "")
-
-
-def known_attributes(archive: Archive) -> Attributes:
-    """All attributes of an archive."""
-    known: dict[str, dict[str, dict[str, str]]] = {"serial": {}, "run": {}}
-    places = _places(archive)
-    for place in places:
-        content = files.read_json(place)
-        for key, values in content.get("values", {}).items():
-            known[content["by"]].setdefault(key, {}).update({name: str(value) for name, value in values.items()})
-    return Attributes(known["serial"], known["run"], len(places))
 
 
 def add_attributes(archive: Archive, table: pd.DataFrame, by: By, source: str) -> AddedAttributes:
@@ -114,17 +79,10 @@ def as_numbers(values: Sequence[str]) -> dict[str, float] | None:
     return numbers if finite and any(not number.is_integer() for number in numbers.values()) else None
 
 
-def _places(archive: Archive) -> list[Any]:
-    folder = archive.root / FOLDER
-    if not folder.is_dir():
-        return []
-    return sorted((path for path in folder.iterdir() if path.name.endswith(".json")), key=lambda one: one.name)
-
-
 def _append(archive: Archive, content: Mapping[str, Any]) -> str:
     """Write the next file, and its name; of two processes one waits."""
     with alone(archive.root / FOLDER, wait=True):
-        place = archive.root / FOLDER / f"{len(_places(archive)) + 1:06d}.json"
+        place = archive.root / FOLDER / f"{len(attribute_files(archive)) + 1:06d}.json"
         files.publish(place, files.manifest_bytes(content))
     return place.name
 

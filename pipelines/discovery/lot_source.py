@@ -14,10 +14,11 @@ import numpy as np
 from inertial.arrays import Array
 from inertial.discovery.evidence import MEAN, SLOT, STATION, UNIT, ScoredLot
 from pipelines.archive import Archive, Run
+from pipelines.archive.attributes import Attributes, known_attributes
 from pipelines.archive.locks import alone
 from pipelines.archive.store import Place
 from pipelines.certificates.ledger import Ledger
-from pipelines.discovery.attributes import Attributes, as_numbers, known_attributes
+from pipelines.discovery.attributes import as_numbers
 from pipelines.discovery.score_store import AXES, FOLDER, ScoreStore
 from pipelines.discovery.scored_run import ScoredRun
 from pipelines.parallel import Distributor

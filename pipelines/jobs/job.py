@@ -118,7 +118,11 @@ class Job:
     @property
     def _prior_but_its_age(self) -> dict[str, Any] | None:
         """The prior without what widens as time passes, so that a capture which was killed is gone on with."""
-        return None if self.prior is None else self.prior.model_dump(exclude={"own": {"__all__": {"covariance"}}})
+        return (
+            None
+            if self.prior is None
+            else self.prior.model_dump(exclude={"own": {"__all__": {"covariance"}}, "groups": True})
+        )
 
     @cached_property  # read when the job is made: later edits of a file do not change the run
     def own_files(self) -> dict[str, str]:

@@ -8,14 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from inertial.arrays import Array
+from inertial.arrays import Array, Index
 from inertial.errors import NotIdentified
 from inertial.fits.prior import combined
 from inertial.population.family import PAIRS, Family, change_of, family_of
+from inertial.population.groups import groups_of
 from pipelines.archive import Archive, Run
+from pipelines.archive.attributes import known_attributes
 from pipelines.tables.calibration import read_calibration
 from schemas.bounds import DAY_S
-from schemas.errors import RecipeInvalid
+from schemas.errors import RecipeInvalid, did_you_mean
 from schemas.prior import StoredFamily
 from schemas.recipe import Recipe
 
@@ -24,10 +26,11 @@ READ = ("coefficients", "covariance")
 
 @dataclass(frozen=True)
 class _Calibrated:
-    """One calibration of one unit: number of its run, when, coefficients (m, p) with their covariance (m, p, p)."""
+    """One calibration of one unit: number of its run, when, value of the attribute, coefficients with their covariance."""
 
     run: int
     day: float
+    group: str
     values: Array
     covariance: Array
 
@@ -37,6 +40,9 @@ class _Archived:
 
     def __init__(self, recipe: Recipe, archive: Archive, since: str, kind: str) -> None:
         self.device = recipe.device
+        self.attribute = "" if recipe.prior is None else recipe.prior.attribute
+        self.attributes = known_attributes(archive)
+        self.groups: dict[str, str] = {}
         self.runs: list[str] = []
         self.effects: list[str] = []
         self.units: dict[str, list[_Calibrated]] = {}
@@ -56,7 +62,8 @@ class _Archived:
             return
         self.effects = [effect for effect, _ in calibration.names[0]]
         for unit, *numbers in zip(calibration.units, calibration.coefficients, calibration.covariance, strict=True):
-            self.units.setdefault(unit, []).append(_Calibrated(len(self.runs), day, *numbers))
+            group = self.attributes.of(unit, name, self.attribute)
+            self.units.setdefault(unit, []).append(_Calibrated(len(self.runs), day, group, *numbers))
         self.runs.append(name)
 
     def family(self, lot: set[str]) -> Family:
@@ -70,17 +77,35 @@ class _Archived:
                 f"prior: no calibration of {self.device} with this model; leave [prior] out until there are some"
             )
         number = np.unique([one.run for one in first], return_inverse=True)[1].astype(np.int64)
-        found = family_of(np.stack([one.values for one in first]), np.stack([one.covariance for one in first]), number)
+        known = np.stack([one.values for one in first]), np.stack([one.covariance for one in first]), number
+        found = family_of(*known)
+        of_groups = self._of_groups(found, known, [one.group for one in first], lot)
         pairs = [pair for many in self.units.values() for pair in pairwise(many)]
         if len(pairs) < PAIRS:
-            return found
+            return replace(found, own=of_groups)
         days = np.array([b.day - a.day for a, b in pairs])
         both = np.stack([a.covariance + b.covariance for a, b in pairs])
         change = change_of(np.stack([b.values - a.values for a, b in pairs]), both)
-        own = {
-            unit: self._own(found, many[-1], change, days.mean()) for unit, many in self.units.items() if unit in lot
-        }
-        return replace(found, own=own)
+        again = [unit for unit in self.units if unit in lot]
+        self.groups = {unit: group for unit, group in self.groups.items() if unit not in again}
+        own = {unit: self._own(found, self.units[unit][-1], change, days.mean()) for unit in again}
+        return replace(found, own={**of_groups, **own})
+
+    def _of_groups(
+        self, found: Family, known: tuple[Array, Array, Index], group: list[str], lot: set[str]
+    ) -> dict[str, tuple[Array, Array]]:
+        """Priors of the units of the lot by what earlier units with the same value of the attribute were."""
+        if not self.attribute:
+            return {}
+        if self.attribute not in (names := self.attributes.names()):
+            raise NotIdentified(
+                f"prior: the archive knows no attribute '{self.attribute}'; add it with 'tumbleline attributes add', or correct "
+                f"the name: {did_you_mean(self.attribute, names)}"
+            )
+        groups = groups_of(found, *known, group)
+        named = {unit: self.attributes.of(unit, "", self.attribute) for unit in sorted(lot)}
+        self.groups = {unit: f"{self.attribute} {name}" for unit, name in named.items() if name in groups.shift}
+        return {unit: groups.of(named[unit]) for unit in self.groups}
 
     @staticmethod
     def _own(found: Family, last: _Calibrated, change: Array, days: float) -> tuple[Array, Array]:
@@ -95,7 +120,7 @@ def stored_family(recipe: Recipe, own: Archive, units: set[str], kind: str) -> S
 
     Every other unit counts once, with its first calibration by the same model; calibrations with a prior say nothing new of the
     family. Units of the lot with earlier calibrations have a prior of their own, where the archive has pairs of calibrations
-    that show how a unit changes.
+    that show how a unit changes; the others that of their wafer, or other attribute, where ``[prior]`` names one.
 
     Parameters
     ----------
@@ -124,7 +149,9 @@ def stored_family(recipe: Recipe, own: Archive, units: set[str], kind: str) -> S
         if field.name != "own"
     }
     alone = {unit: {"mean": m.tolist(), "covariance": c.tolist()} for unit, (m, c) in found.own.items()}
-    return StoredFamily.model_validate({**numbers, "effects": archived.effects, "runs": archived.runs, "own": alone})
+    return StoredFamily.model_validate(
+        {**numbers, "effects": archived.effects, "runs": archived.runs, "own": alone, "groups": archived.groups}
+    )
 
 
 def planned_precision(recipe: Recipe, archive: str | None, kind: str) -> Array | None:

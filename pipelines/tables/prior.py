@@ -1,6 +1,7 @@
 """What the table ``prior`` of a run says: how much earlier calibrations count, and where they do not."""
 
-from typing import Annotated
+from collections.abc import Mapping
+from typing import Annotated, Any
 
 import pandas as pd
 from typing_extensions import TypedDict
@@ -17,13 +18,14 @@ class PriorDocument(TypedDict):
         dict[str, float], "factor of its standard deviation where the lot differs from the family, by effect"
     ]
     own: Annotated[list[str], "units whose own earlier calibrations count"]
+    groups: Annotated[dict[str, str], "units that lean on earlier ones with the same attribute, with its value"]
     foreign: Annotated[
         dict[str, float], "units that do not fit the family and have no prior, with the probability of that"
     ]
 
 
-def prior_document(table: pd.DataFrame) -> PriorDocument | None:
-    """The prior of the rows of a table; None where there are none."""
+def prior_document(table: pd.DataFrame, about: Mapping[str, Any]) -> PriorDocument | None:
+    """The prior of the rows of a table of a run, and what the run is about; None where there are none."""
     if table.empty:
         return None
     document: PriorDocument = {
@@ -31,15 +33,18 @@ def prior_document(table: pd.DataFrame) -> PriorDocument | None:
         "shares": {},
         "widened": {},
         "own": [],
+        "groups": {},
         "foreign": {},
     }
-    shares = document["shares"]
+    shares, groups = document["shares"], (about.get("prior") or {}).get("groups", {})
     for row in rows_of(table):
         effect, unit = str(row["effect"]), str(row["unit"])
         shares[effect] = max(shares.get(effect, 0.0), float(row["share"]))
         if row["widened"] > 1.0:
             document["widened"][effect] = float(row["widened"])
-        if row["own"] and unit not in document["own"]:
+        if unit in groups:
+            document["groups"][unit] = groups[unit]
+        elif row["own"] and unit not in document["own"]:
             document["own"].append(unit)
         if not row["fits"]:
             document["foreign"][unit] = float(row["p_value"])
@@ -55,6 +60,9 @@ def prior_sentence(prior: PriorDocument) -> str:
     parts = [f"prior of {prior['units']} units: {', '.join(told) or 'below 1 % of every variance'}"]
     if prior["own"]:
         parts.append(f"own earlier calibrations of {', '.join(prior['own'])} count")
+    for group in dict.fromkeys(prior["groups"].values()):
+        units = [unit for unit, own in prior["groups"].items() if own == group]
+        parts.append(f"earlier units of {group} count for {', '.join(units)}")
     if prior["widened"]:
         wide = ", ".join(f"{name} {factor:.1f} times" for name, factor in prior["widened"].items())
         parts.append(f"the lot differs from its family, the prior is widened: {wide}")

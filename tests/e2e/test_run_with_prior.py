@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 from capture_double import BRIEF, recipe_file
-from family_archive import LOTS, UNITS, family_archive
+from family_archive import LOTS, UNITS, family_archive, wafer_of
 from in_process import document_of, refused, text_of
 
 from pipelines.archive import Archive
@@ -37,6 +37,21 @@ def test_a_lot_of_the_family_is_fitted_with_its_prior(tmp_path: Path) -> None:
     assert run.manifest("coefficients")["parameters"]["prior"]["units"] == LOTS * UNITS
     assert [other.recipe for other in Archive(root).runs() if other.recipe == "full"] == []
     text_of("rerun", run.id, "--archive", root, "--check")
+
+
+@pytest.mark.usefixtures("no_next_measurement")
+def test_a_unit_whose_wafer_is_known_leans_on_it(tmp_path: Path) -> None:
+    recipe, root = with_prior(tmp_path, 'attribute = "wafer"'), tmp_path / "archive"
+    family_archive(root, recipe_file(tmp_path, *BRIEF), 5e-3)
+    rows = [f"E{lot:02d}-{k},{wafer_of(lot, k)}" for lot in range(LOTS) for k in range(UNITS)]
+    wafers = tmp_path / "wafers.csv"
+    wafers.write_text("\n".join(["serial,wafer", *rows, "U1,W03"]) + "\n", encoding="utf-8")
+    text_of("attributes", "add", wafers, "--archive", root)
+    found = document_of("run", recipe, "--direct", "--archive", root, "--units", "U1,U2")
+    assert found["prior"]["groups"] == {"U1": "wafer W03"}
+    assert found["prior"]["own"] == []
+    assert "earlier units of wafer W03 count for U1" in text_of("show", found["run"], "--archive", root)
+    text_of("rerun", found["run"], "--archive", root, "--check")
 
 
 @pytest.mark.usefixtures("no_next_measurement")

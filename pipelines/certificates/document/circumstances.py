@@ -126,7 +126,7 @@ def _static_method(run: Run, recipe: dict[str, Any], lengths: str) -> str:
 def _of_earlier_calibrations(run: Run, serial: str) -> Iterator[str]:
     """What earlier calibrations add to those of a unit; nothing without a prior."""
     table = run.table("prior") if "prior" in run.tables() else None
-    prior = None if table is None else prior_document(table[table["unit"] == serial])
+    prior = None if table is None else prior_document(table[table["unit"] == serial], run.about)
     if prior is not None:
         yield f"Earlier calibrations: {prior_sentence(prior).replace('_', ' ')}."
 

@@ -7,7 +7,8 @@ import pytest
 from each import each
 
 from pipelines.archive import Archive
-from pipelines.discovery.attributes import add_attributes, as_numbers, known_attributes, sentences
+from pipelines.archive.attributes import known_attributes
+from pipelines.discovery.attributes import add_attributes, as_numbers, sentences
 from schemas.errors import WrongUse
 
 

@@ -4,11 +4,13 @@ from datetime import date
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from capture_double import BRIEF, recipe_file
-from family_archive import LOTS, LSB, UNITS, family_archive
+from family_archive import LOTS, LSB, UNITS, family_archive, wafer_of
 
 from pipelines.archive import Archive
+from pipelines.discovery.attributes import add_attributes
 from pipelines.jobs.priors import family, planned_precision, stored_family
 from pipelines.jobs.recipes import load_recipe
 from pipelines.tables.calibration import column_names
@@ -65,6 +67,29 @@ def test_units_that_were_calibrated_before_have_a_prior_of_their_own(
     assert of_family is not None
     assert of_units is not None
     assert np.all(np.diagonal(of_units, axis1=-2, axis2=-1) > 100.0 * np.diagonal(of_family, axis1=-2, axis2=-1))
+
+
+def test_a_unit_leans_on_its_wafer(recipe: Recipe, tmp_path: Path) -> None:
+    wafers = 5.0 * SPREAD
+    archive = family_archive(tmp_path / "wafers", recipe_file(tmp_path, *BRIEF), SPREAD, wafers=wafers)
+    known = [(f"E{lot:02d}-{k}", wafer_of(lot, k)) for lot in range(LOTS) for k in range(UNITS)]
+    table = pd.DataFrame([*known, ("new", "W03"), ("other", "W99")], columns=["serial", "wafer"])
+    add_attributes(archive, table, "serial", "map.csv")
+    leaning = recipe.model_copy(update={"prior": PriorTerms(attribute="wafer")})
+    stored = stored_family(leaning, archive, {"new", "other", "unknown"}, "simulated")
+    found = family(stored)
+    assert stored is not None
+    assert found is not None
+    assert stored.groups == {"new": "wafer W03"}
+    mean, covariance = found.own["new"]
+    middle = np.array([[effect == "scale" for effect, _ in axis] for axis in column_names(recipe.effects)])
+    true = LSB * (middle + wafers * np.random.default_rng([8, 3]).standard_normal(middle.shape))
+    u = np.sqrt(np.diagonal(covariance, axis1=-2, axis2=-1))
+    assert np.mean(np.abs(mean - true) < 2.0 * u) > 0.8
+    whole = np.sqrt(np.diagonal(found.within + found.between, axis1=-2, axis2=-1))
+    assert np.mean(u / whole) < 0.8
+    with pytest.raises(RecipeInvalid, match=r"no attribute 'wafre'.* did you mean wafer\?"):
+        stored_family(recipe.model_copy(update={"prior": PriorTerms(attribute="wafre")}), archive, set(), "simulated")
 
 
 def test_a_recipe_without_a_prior_reads_nothing(recipe: Recipe, tmp_path: Path) -> None:
