@@ -26,6 +26,7 @@ sys.path.insert(0, str(ROOT))
 
 import numpy as np  # noqa: E402
 
+from benchmarks.slow_noise import ApartNoise  # noqa: E402
 from inertial.fits.known import noise_guard, over_looks  # noqa: E402
 from inertial.fits.wander import fit_lot_with_wander  # noqa: E402
 from inertial.frames import force_from_angles  # noqa: E402
@@ -48,7 +49,6 @@ from schemas.simulation import Simulation  # noqa: E402
 from schemas.station import load_station  # noqa: E402
 from stations.plant.device import PlantDevices, Truth, draw_truth, rotation, stream  # noqa: E402
 from stations.plant.fixture import STEP_S, Chamber  # noqa: E402
-from stations.plant.noise import UnitNoise  # noqa: E402
 from stations.plant.preset import Preset, load_preset  # noqa: E402
 
 Array = np.ndarray
@@ -73,14 +73,6 @@ class Course:
     start: Array
     duration: float
     rate: float
-
-
-class ApartNoise(UnitNoise):
-    """Noise that keeps the white part of the last samples apart."""
-
-    def _white(self, z: Array, rate: float) -> Array:
-        self.white = super()._white(z, rate).copy()
-        return self.white.copy()
 
 
 class Slow(NamedTuple):
