@@ -5,7 +5,7 @@ from itertools import count
 
 from pipelines.planning.documents import LineActivity, LineDocument, LineLot, LineRate, LineResource
 from pipelines.planning.line_lots import Phase, phases_of
-from pipelines.planning.line_schedule import STEP_S, Placed, Shortest, shortest, stays, step_count
+from pipelines.planning.line_schedule import STEP_S, NoSchedule, Placed, Shortest, shortest, stays, step_count
 from schemas.line import DAY_MIN, FIXTURES, OPERATOR, Line, staffed
 from schemas.recipe import Recipe
 from schemas.station import StationConfig
@@ -22,13 +22,7 @@ def plan_line(line: Line, station: StationConfig, recipe_named: Callable[[str], 
     phases = [own for recipe, number in recipes for own in [phases_of(recipe, station)] * number]
     counters = {recipe.name: count(1) for recipe, _ in recipes}
     names = [recipe.name for recipe, number in recipes for _ in range(number)]
-    used, best = line, shortest(line, phases)
-    bound = best.bound
-    single = line.model_copy(update={"fixtures": line.fixtures[:1]})
-    alone = best if len(line.fixtures) == 1 else shortest(single, phases)
-    if alone.makespan < best.makespan:
-        # changes take longer than the soaks that they make use of: one fixture needs none
-        used, best = single, alone
+    used, best, alone, bound = _best(line, phases)
     spans = [(placed.load, placed.unload + step_count(60.0 * line.unload_min)) for placed in best.lots]
     fixtures = [line.fixtures[k] for k in free_places(spans)]
     labels = [f"{name}-{next(counters[name])}" for name in names]
@@ -56,6 +50,29 @@ def plan_line(line: Line, station: StationConfig, recipe_named: Callable[[str], 
             activities, key=lambda activity: (activity["begin_min"], activity["end_min"], activity["lot"])
         ),
     }
+
+
+def _best(line: Line, phases: Sequence[Sequence[Phase]]) -> tuple[Line, Shortest, Shortest, int]:
+    """The line as it is used, its shortest schedule, that of one lot after the other in one fixture, and the bound of all.
+
+    One fixture needs no changes: they may take longer than the soaks that they make use of, or find no place in the shifts.
+    """
+    if len(line.fixtures) == 1:
+        alone = shortest(line, phases)
+        return line, alone, alone, alone.bound
+    single = line.model_copy(update={"fixtures": line.fixtures[:1]})
+    try:
+        best = shortest(line, phases)
+    except NoSchedule as refused:
+        try:
+            alone = shortest(single, phases)
+        except NoSchedule:
+            raise refused from None
+        return single, alone, alone, alone.bound
+    alone = shortest(single, phases)
+    if alone.makespan < best.makespan:
+        return single, alone, alone, min(best.bound, alone.bound)
+    return line, best, alone, best.bound
 
 
 def free_places(spans: Sequence[tuple[int, int]]) -> list[int]:

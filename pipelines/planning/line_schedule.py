@@ -31,6 +31,10 @@ LONGEST_DAYS = 14  # for each lot: a line with shifts too short for its lots is 
 _DAY = round(DAY_S / STEP_S)
 
 
+class NoSchedule(RecipeInvalid):
+    """No schedule keeps every rule."""
+
+
 @dataclass(frozen=True)
 class Stay:
     """Names of the shared resources that a phase holds, of those among them that it keeps from the phase before, and of the new.
@@ -101,8 +105,10 @@ def shortest(line: Line, lots: Sequence[Sequence[Phase]]) -> Shortest:
     ------
     WrongUse
         OR-tools is not installed.
+    NoSchedule
+        There is none within two weeks for each lot.
     RecipeInvalid
-        There is none within two weeks for each lot, or the search finds none.
+        The search finds none in its time.
     """
     cp = library("ortools.sat.python.cp_model", "schedule", f"line {line.name}: the shortest schedule")
     model = _Model(cp, line, lots)
@@ -113,7 +119,7 @@ def shortest(line: Line, lots: Sequence[Sequence[Phase]]) -> Shortest:
     model.cp.minimize(model.makespan)
     status = solver.solve(model.cp)
     if status == cp.INFEASIBLE:
-        raise RecipeInvalid(
+        raise NoSchedule(
             f"line {line.name}: no schedule keeps longest_wait_min {line.longest_wait_min:g} with these shifts; lengthen a shift "
             "or the wait, or let the change of a shared resource be automatic"
         )

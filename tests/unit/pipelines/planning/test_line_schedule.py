@@ -10,7 +10,7 @@ from pipelines.jobs.recipes import load_recipe
 from pipelines.planning import line_schedule
 from pipelines.planning.line_document import free_places, plan_line
 from pipelines.planning.line_lots import Phase, phases_of
-from pipelines.planning.line_schedule import shortest
+from pipelines.planning.line_schedule import NoSchedule, shortest
 from pipelines.schedule.steps import steps
 from pipelines.schedule.timing import minutes
 from schemas.errors import RecipeInvalid
@@ -148,11 +148,24 @@ def test_one_lot_after_the_other_is_the_schedule_where_changes_take_longer_than_
     table = {"name": "table", "needed_for": ["measure", "static"], "change_min": 40, "by_hand": True}
     line = line_of(2, 4, shared=[table], load_min=6, unload_min=4)
     found = plan_line(line, load_station(), lambda name: load_recipe("quick"))
-    assert found["makespan_min"] == found["one_after_another"]["makespan_min"] < found["bound_min"]
+    assert found["makespan_min"] == found["one_after_another"]["makespan_min"] == found["bound_min"]
     assert found["proven"]
     assert {lot["fixture"] for lot in found["lots"]} == {"F0"}
     assert "change" not in {one["activity"] for one in found["activities"]}
     assert max(lot["unloaded_min"] for lot in found["lots"]) == pytest.approx(found["makespan_min"])
+
+
+def test_one_lot_after_the_other_is_the_schedule_where_no_shift_has_time_for_a_change() -> None:
+    """The shift is long enough to load and to unload, a day apart, and ends before the soak that the change follows."""
+    table = {"name": "table", "needed_for": ["measure", "static"], "change_min": 5, "by_hand": True}
+    keys = {"shared": [table], "operators": {"shifts": ["06:00-06:12"]}, "start": "06:00", "longest_wait_min": 1}
+    line = line_of(2, 2, load_min=6, unload_min=4, **keys)
+    with pytest.raises(NoSchedule):
+        shortest(line, [phases_of(load_recipe("production"), load_station())] * 2)
+    found = plan_line(line, load_station(), lambda name: load_recipe("production"))
+    assert found["makespan_min"] == found["one_after_another"]["makespan_min"]
+    assert found["proven"]
+    assert "change" not in {one["activity"] for one in found["activities"]}
 
 
 @pytest.mark.parametrize(
