@@ -227,12 +227,15 @@ class RotationModel:
         # the noise is estimated too: its own scatter widens χ², so that both laws agree where a model is refused
         wide = float(f.isf(ADEQUATE_P, dof, total) * dof / chi2.isf(ADEQUATE_P, dof))
         student = float(t.ppf(0.975, self.data.noise_dof) / norm.ppf(0.975))
+        left = max(squares, 0.0) / (variance * wide)
+        # slow waves hold more noise than flicker that is known from fast ones: a walk, or what the model lacks
+        birge = max(left / max(dof, 1), 1.0)
         return RotationFit(
             tuple(names),
             value + self._offset(names),
-            inverse * max(variance, 1.0) * student**2,
+            inverse * max(variance, 1.0) * student**2 * birge,
             self.data.output - columns @ value,
-            max(squares, 0.0) / (variance * wide),
+            left,
             dof,
             tuple(effects),
         )
