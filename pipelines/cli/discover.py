@@ -83,6 +83,7 @@ def command(
         effects=() if model is None else tuple(chosen_effects("", model, "discover") or ()),
         looking_back=looking_back,
         populations=populations,
+        explained=bool(explain),
         workers=count,
         distribute=on_dask(dask, count),
     )

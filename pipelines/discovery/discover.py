@@ -28,6 +28,7 @@ class Look:
     drivers : only discoveries of these; all if empty · effects : in the model of every lot beside its own
     looking_back : judge all lots again with every attribute that is known now; nothing is kept then
     populations : look for two populations in each coefficient, and for coefficients that correlate
+    explained : one discovery is asked for; what is new is for the next look to tell
     workers, distribute : processes, or other machines, that score new runs
     """
 
@@ -37,6 +38,7 @@ class Look:
     effects: tuple[str, ...] = ()
     looking_back: bool = False
     populations: bool = False
+    explained: bool = False
     workers: int = 1
     distribute: Distributor | None = None
 
@@ -63,7 +65,8 @@ def discovered(archive: Archive, look: Look) -> Looked:
         source.score(look.workers, look.distribute)
         state = brought_up(source)
         findings = Findings(source, state)
-        document = remembered(source, state, findings.document(found_before(source, state)))
+        keep = not (look.since or look.looking_back or look.effects or look.drivers or look.explained)
+        document = remembered(source, state, findings.document(found_before(source, state)), keep=keep)
         if look.since or look.looking_back:
             findings = _in_memory(source, look)
             document = findings.document(looking_back=True)
@@ -138,6 +141,8 @@ def _of_drivers(document: DiscoverDocument, drivers: Sequence[str]) -> DiscoverD
             raise WrongUse(f"discover: no driver is called '{driver}'; {did_you_mean(driver, known)}")
     document["discoveries"] = [row for row in document["discoveries"] if set(row["drivers"]) & set(drivers)]
     document["unexplained"] = [row for row in document["unexplained"] if row["driver"] in drivers]
+    shown = {row["id"] for row in [*document["discoveries"], *document["unexplained"]]}
+    document["new"] = [name for name in document["new"] if name in shown]
     document["held"] = [row for row in document["held"] if row["driver"].removesuffix(INSIDE) in drivers]
     document["drivers"] = [row for row in document["drivers"] if row["name"] in drivers]
     return document

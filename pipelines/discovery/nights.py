@@ -219,8 +219,13 @@ def _found(folder: Place) -> dict[str, Any] | None:
     return {**found, "unexplained": [], "lots": 0, "alarms": None, "ids": max(numbers, default=0)}
 
 
-def remembered(source: DiscoveryArchive, state: Evidences, document: DiscoverDocument) -> DiscoverDocument:
-    """Keep a document beside the evidence, so that discoveries have the same ids the next time, and new ones are known."""
+def remembered(
+    source: DiscoveryArchive, state: Evidences, document: DiscoverDocument, *, keep: bool
+) -> DiscoverDocument:
+    """The document with the ids that discoveries had before, and with those that are new.
+
+    keep : beside the evidence, so that what is new is known the next time; a look at a part leaves it for the night to tell
+    """
     stored = _found(source.folder()) or {"discoveries": [], "unexplained": [], "lots": 0, "ids": 0}
     known: list[dict[str, Any]] = [*stored["discoveries"], *stored["unexplained"]]
     rows = [*document["discoveries"], *document["unexplained"]]
@@ -247,6 +252,8 @@ def remembered(source: DiscoveryArchive, state: Evidences, document: DiscoverDoc
         "alarms": alarm_key(state),
         "when": datetime.now(UTC).isoformat(timespec="seconds"),
     }
+    if not keep:
+        return document
     if stored.get("alarms") != kept["alarms"] or kept["lots"] > _GROWN * stored["lots"]:
         files.publish(source.folder() / "found", derived.framed(json.dumps(json_value(kept), sort_keys=True).encode()))
     return document

@@ -182,7 +182,9 @@ def test_two_populations_in_a_coefficient_are_told_with_their_means(
     assert row["detail"]["means"][0] == pytest.approx(5.0, abs=0.5)
 
 
-def told(source: DiscoveryArchive, lots: int, named: dict[str, str], unexplained: tuple[str, ...]) -> str:
+def told(
+    source: DiscoveryArchive, lots: int, named: dict[str, str], unexplained: tuple[str, ...], *, keep: bool = True
+) -> str:
     """Ids of the rows of a document that is remembered, by effect and driver and by driver alone, then of those that are new."""
     since = {"since": "2026-01-01", "lots_then": 9}
     made: Any = {
@@ -190,13 +192,15 @@ def told(source: DiscoveryArchive, lots: int, named: dict[str, str], unexplained
         "unexplained": [{"driver": driver, **since} for driver in unexplained],
     }
     state: Any = SimpleNamespace(alarms=[], order=[""] * lots)
-    document = remembered(source, state, made)
+    document = remembered(source, state, made, keep=keep)
     rows = (*document["discoveries"], *document["unexplained"])
     return " ".join([*(row["id"] for row in rows), "new", *document["new"]])
 
 
 def test_what_is_unexplained_is_new_once_and_keeps_its_id_when_it_has_a_name(archive: Archive) -> None:
     source = DiscoveryArchive(archive)
+    # a look at a part, as with --model, --since or --explain, leaves what is new to the night
+    assert told(source, 40, {}, ("wafer",), keep=False) == "D1 new D1"
     assert told(source, 40, {}, ("wafer",)) == "D1 new D1"
     assert told(source, 60, {}, ("wafer",)) == "D1 new"
     assert told(source, 80, {}, ("wafer", "slot")) == "D1 D2 new D2"
