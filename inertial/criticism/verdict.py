@@ -85,7 +85,7 @@ class Verdict:
 
     @property
     def found(self) -> bool:
-        """Whether something is found that the model lacks or the data spoils: in noise in three of a thousand lots, by its bound."""
+        """Whether something is found that the model lacks or the data spoils: in noise in 0.3 % of lots, by its bound."""
         spoilt = bool(self.run.handled) or any(not dwell.tail for dwell in self.removed)
         return spoilt or bool(self.result.added) or self.unexplained is not None
 
