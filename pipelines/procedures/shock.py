@@ -166,13 +166,14 @@ class ShockTest(InG, OnEquipment, FromWaveforms, Compares):
             direction = one.record.step.setting["direction"]
             alone = REFERENCE not in one.record.samples
             in_g = UnitRecord(one.own.time, one.own.output / scale)
-            pair = shock_records.filtered_pair(
-                in_g if alone else one.record.samples[REFERENCE], one.own, axis, scale[axis], duration
-            )
-            both = [one.own] if alone else [one.own, one.record.samples[REFERENCE]]
-            lone_s = shock_records.lone_sample(both, axis, duration)
-            of_shock = shock_records.rows_of(
-                one.number, direction, one.own.output[:, axis], pair, before_s, device, alone=alone, lone_s=lone_s
+            drive = in_g if alone else one.record.samples[REFERENCE]
+            end_s, earlier, others = shock_records.single_pulse(one.number, drive, axis, duration)
+            own, drive = (shock_records.until(wave, end_s) for wave in (one.own, drive))
+            pair = shock_records.filtered_pair(drive, own, axis, scale[axis], duration)
+            lone_s = shock_records.lone_sample([own] if alone else [own, drive], axis, duration)
+            found = shock_records.Found(alone, lone_s, earlier)
+            of_shock = others + shock_records.rows_of(
+                one.number, direction, (own, drive), axis, pair, (before_s, duration), device, found
             )
             names = ("unit",) if alone else ("reference", "unit")
             if not alone:
@@ -191,9 +192,9 @@ class ShockTest(InG, OnEquipment, FromWaveforms, Compares):
         if len(bias) and bool((bias.loc[bias["setting"] > 0.0, "uncertainty"] <= STUCK).any()):
             texts.append(("survival", "the output is constant after the shocks: the unit has not survived"))
         pulse = rows[rows["series"] == "pulse"]
-        texts += shock_records.texts_of(reference, pulse)
+        texts += shock_records.texts_of(reference, pulse, rows[rows["series"] == "other"])
         apart = shock_records.no_comparison(good, reference, pulse)
-        if len(good) and not apart:
+        if shock_records.comparable(rows):
             texts += shock_records.diagnosis_text(rows, part)
         compared = shock_records.ratio_figures(part, ratio, good, apart)
         return [*compared, bias_shift(bias), *shock_records.pulse_figures(part.axis, pulse, ratio)], texts
@@ -203,6 +204,10 @@ class ShockTest(InG, OnEquipment, FromWaveforms, Compares):
     ) -> tuple[list[ComparedResult], list[JudgedCurve]]:
         """Sensitivity by comparison, and the figures that it bears out; none without a comparison."""
         return compared_results(part, figures, int((rows["series"] == "ratio").sum())), []
+
+    def verdict(self, part: ShockPart, rows: pd.DataFrame) -> str:
+        """The verdict on the comparison of the waveforms; none without a comparison."""
+        return shock_records.verdict(rows, part) if (rows["series"] == "compared").any() else ""
 
     def chart(self, part: ShockPart, points: pd.DataFrame) -> Chart:
         """First shock of reference and unit, and their shock response spectra."""
@@ -260,7 +265,8 @@ def bias_shift(bias: pd.DataFrame) -> FigureValue:
         note = "the output is constant after the shocks: the unit has not survived" if stuck else ""
         shifts.append(FigureValue("shock_bias_shift_ug", str(axis), value, error, identified=not stuck, note=note))
     if not shifts:
-        return FigureValue.not_determined("shock_bias_shift_ug", "*", "no bias before or after")
+        note = "no record at rest before and after the shocks; a recipe with shocks takes both"
+        return FigureValue.not_measured("shock_bias_shift_ug", "*", note)
     return worst(shifts)
 
 

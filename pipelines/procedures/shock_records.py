@@ -2,19 +2,20 @@
 
 from collections.abc import Sequence
 from contextlib import suppress
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 from scipy.interpolate import CubicSpline
 
-from inertial.dynamics import pulses
+from inertial.dynamics import pulse_faults, pulses
 from inertial.dynamics.pulses import Pulse
 from inertial.dynamics.shock_diagnosis import ShockDiagnosis, ShockRecord, Waves, diagnose_shock
 from inertial.dynamics.shock_effects import EFFECTS
 from inertial.dynamics.wander import stated_error
 from inertial.errors import NotIdentified
 from inertial.record_faults import clipped as at_extreme
+from pipelines.procedures.compared import verdict_word
 from pipelines.procedures.figures import FigureSpec, FigureValue, diagnosis_texts, with_uncertainty
 from pipelines.procedures.recorded import Device, UnitRecord, numbers, point_rows
 from schemas.units import STANDARD_GRAVITY_M_S2
@@ -74,14 +75,51 @@ def waves(number: int, pair: Pair, direction: float, part: Any, noise_g: float) 
     )
 
 
+def until(record: UnitRecord, end_s: float) -> UnitRecord:
+    """A record up to a time from its begin, s."""
+    count = min(len(record.time), max(int(end_s * record.rate_hz), 1)) if np.isfinite(end_s) else len(record.time)
+    return UnitRecord(record.time[:count], record.output[:count])
+
+
+def single_pulse(
+    number: int, drive: UnitRecord, axis: int, duration: float
+) -> tuple[float, bool, list[dict[str, Any]]]:
+    """Time before the pulse behind the largest, s, whether one is before the largest, and the rows of both.
+
+    A rebound behind the pulse is left out; one before it lies in the baseline of its figures.
+    """
+    earlier, later = pulse_faults.other_pulses(drive.output[:, axis], drive.rate_hz, duration)
+    rows = [
+        {
+            "point": MOST_SAMPLES * number + k, "series": "other", "setting": one.at_s, "value": one.peak, "shock": float(number),
+        }
+        for k, one in enumerate((*earlier, *later))
+    ]  # fmt: skip
+    end_s = later[0].begins_s - 0.5 * duration if later else np.inf
+    return end_s, bool(earlier), rows
+
+
 def lone_sample(records: Sequence[UnitRecord], axis: int, duration: float) -> float:
     """Time of the first sample of the records that departs alone, s from their begin; nan for none."""
     found = [
         float(one.time[k] - one.time[0])
         for one in records
-        for k in pulses.lone_samples(one.output[:, axis], one.rate_hz, duration)[:1]
+        for k in pulse_faults.lone_samples(one.output[:, axis], one.rate_hz, duration)[:1]
     ]
     return min(found, default=np.nan)
+
+
+def verdict(rows: pd.DataFrame, part: Any) -> str:
+    """The verdict on the comparison; not judged where the pulses cannot be compared."""
+    diagnosis = None
+    if comparable(rows):
+        with suppress(NotIdentified):
+            diagnosis = judged(rows, part)
+    return verdict_word(None if diagnosis is None else diagnosis.adequate)
+
+
+_last_judged: dict[bytes, ShockDiagnosis] = {}
+"""The diagnosis that was made last: its sentences and its verdict are asked for one after the other."""
 
 
 def judged(rows: pd.DataFrame, part: Any) -> ShockDiagnosis | None:
@@ -95,7 +133,15 @@ def judged(rows: pd.DataFrame, part: Any) -> ShockDiagnosis | None:
         reference, unit, error = numbers(own, "reference_g", "value", "uncertainty")
         shocks.append(Waves(reference, unit, error))
         before = -float(own["setting"].iloc[0])
-    return diagnose_shock(ShockRecord(rate, duration, before, tuple(shocks)), part.effects) if shocks else None
+    if not shocks:
+        return None
+    key = repr((part.effects, rate, duration, before)).encode()
+    key += b"".join(array.tobytes() for one in shocks for array in (one.reference, one.unit, one.error))
+    if key not in _last_judged:
+        made = diagnose_shock(ShockRecord(rate, duration, before, tuple(shocks)), part.effects)
+        _last_judged.clear()
+        _last_judged[key] = made
+    return _last_judged[key]
 
 
 def diagnosis_text(rows: pd.DataFrame, part: Any) -> list[tuple[str, str]]:
@@ -161,37 +207,49 @@ APART = 0.3
 """Departure of peak or duration from the reference's above which the two were not mounted on each other."""
 
 
+class Found(NamedTuple):
+    """Whether a shock has no reference, time of a sample that departs alone (nan: none), whether a pulse precedes the largest."""
+
+    alone: bool
+    lone_s: float
+    earlier: bool
+
+
 def rows_of(
     number: int,
     direction: float,
-    raw: np.ndarray,
+    channels: tuple[UnitRecord, UnitRecord],
+    axis: int,
     pair: Pair,
-    before_s: float,
+    times: tuple[float, float],
     device: Device,
-    *,
-    alone: bool = False,
-    lone_s: float = np.nan,
+    found: Found,
 ) -> list[dict[str, Any]]:
     """The pulses of reference and unit and their ratio; no value where the unit shows no pulse or clips, or a sample is off.
 
     Parameters
     ----------
-    raw : (n,), output of the unit as recorded; pair : both channels in g behind their low-pass
-    alone : no reference was recorded; the first of the pair is not looked at
-    lone_s : time of a sample of either that departs alone; nan for none
+    channels : unit and reference as recorded; pair : reference and unit in g behind their low-pass
+    times : before the pulse, and its duration, s
+    found : in the records; without a reference the first of the pair is not looked at
     """
-    (reference, rate), (unit, unit_rate) = pair
+    alone, lone_s, earlier = found
+    ((reference, rate), (unit, unit_rate)), before_s = pair, times[0]
     about = {"point": number, "setting": direction}
     rows: list[dict[str, Any]] = []
     drive = None if alone else pulses.measured_pulse(reference, rate, before_s=before_s)
     if drive is not None:
         rows.append(about | {"series": "reference"} | _columns(drive, reference, rate))
+    raw = channels[0].output[:, axis]
     still = np.median(raw[: int(before_s * unit_rate)])
     # a rail of the unit itself, below the range of the data sheet, shows as an extreme at which it stands still
     clipped = device.at_end(raw) + device.at_end(raw - still) + at_extreme(raw)[2] > 0
+    flat = [_flat(one, axis, times) for one in channels[: 1 if alone else 2]]
+    if len(set(flat)) > 1 or (alone and flat[0]):  # a machine may make a flat pulse, two channels do not clip alike
+        clipped = CLIPS.index("the output" if flat[0] else "the reference")
     ratio = error = under = noise = np.nan
     with suppress(NotIdentified):
-        if not clipped and np.isnan(lone_s):
+        if not clipped and np.isnan(lone_s) and not earlier:
             answer = pulses.measured_pulse(unit, unit_rate, before_s=before_s)
             noise = answer.noise
             rows.append(about | {"series": "pulse"} | _columns(answer, unit, unit_rate))
@@ -200,7 +258,21 @@ def rows_of(
                 error = abs(ratio) * float(np.hypot(answer.peak_error / answer.peak, drive.peak_error / drive.peak))
                 under = 100.0 * (answer.undershoot - drive.undershoot)
     compared = {"value": ratio, "uncertainty": error, "undershoot_percent": under, "noise_g": noise, "lone_s": lone_s}
-    return [*rows, about | {"series": "ratio", "clipped": float(clipped), "alone": float(alone)} | compared]
+    flags = {"clipped": float(clipped), "alone": float(alone), "earlier": float(earlier)}
+    return [*rows, about | {"series": "ratio"} | flags | compared]
+
+
+CLIPS = ("", "the output", "the reference")
+"""What clips, by the column ``clipped``."""
+
+
+def _flat(record: UnitRecord, axis: int, times: tuple[float, float]) -> bool:
+    """Whether the top of a channel's pulse is cut off flat."""
+    wave, (before_s, duration) = record.output[:, axis], times
+    quiet = wave[: int(before_s * record.rate_hz)]
+    if quiet.size < 2:
+        return False
+    return pulse_faults.flat_top(wave, record.rate_hz, duration, float(quiet.std(ddof=1)), float(quiet.mean())) > 0
 
 
 def _columns(pulse: Pulse, wave: np.ndarray, rate_hz: float) -> dict[str, float]:
@@ -221,8 +293,8 @@ def _columns(pulse: Pulse, wave: np.ndarray, rate_hz: float) -> dict[str, float]
     }
 
 
-def texts_of(reference: pd.DataFrame, pulse: pd.DataFrame) -> list[tuple[str, str]]:
-    """Peak, duration and velocity change of the reference, or of the unit where it was recorded alone."""
+def texts_of(reference: pd.DataFrame, pulse: pd.DataFrame, others: pd.DataFrame) -> list[tuple[str, str]]:
+    """Peak, duration and velocity change of the reference, or of the unit where it was recorded alone; other pulses."""
     own, name = (reference, "reference") if len(reference) else (pulse, "unit")
     if own.empty:
         return []
@@ -231,7 +303,19 @@ def texts_of(reference: pd.DataFrame, pulse: pd.DataFrame) -> list[tuple[str, st
         f"{name} {peak:.4g} g, {1e3 * lasting:.3g} ms, velocity change {float(own['velocity_m_s'].abs().mean()):.3g} m/s "
         f"(half sine: {pulses.velocity_change(peak, lasting):.3g} m/s; IEC 60068-2-27 allows ± 15 %)"
     )
-    return [("pulse", text)]
+    of_others = numbers(others, "setting", "value", "shock") if len(others) else ([], [], [])
+    found = [
+        f"{peak:.3g} g at {at:.4g} s of record {number + 1:.0f}" for at, peak, number in zip(*of_others, strict=True)
+    ]
+    left_out = f"{', '.join(found)}; the figures are those of the largest pulse, up to the next one"
+    return [("pulse", text), *([("another pulse", left_out)] if found else [])]
+
+
+def comparable(rows: pd.DataFrame) -> bool:
+    """Whether a shock has a ratio of two sensors on each other."""
+    ratio, reference, pulse = (rows[rows["series"] == name] for name in ("ratio", "reference", "pulse"))
+    good = ratio[np.isfinite(ratio["value"])]
+    return len(good) > 0 and not no_comparison(good, reference, pulse)
 
 
 def no_comparison(good: pd.DataFrame, reference: pd.DataFrame, pulse: pd.DataFrame) -> str:
@@ -240,6 +324,8 @@ def no_comparison(good: pd.DataFrame, reference: pd.DataFrame, pulse: pd.DataFra
         return ""
     peak = float(good["value"].mean())
     lasting = float(pulse["duration_s"].mean()) / float(reference["duration_s"].mean())
+    if abs(peak + 1.0) < APART:
+        return f"the peak is {peak:.3g} times that of the reference: its sign is turned over; correct the sign of one channel"
     for what, ratio in (("the peak", peak), ("the duration", lasting)):
         if not abs(ratio - 1.0) < APART:
             return (
@@ -252,6 +338,9 @@ def no_comparison(good: pd.DataFrame, reference: pd.DataFrame, pulse: pd.DataFra
 def ratio_figures(part: Any, ratio: pd.DataFrame, good: pd.DataFrame, apart: str) -> list[FigureValue]:
     """Sensitivity and undershoot by comparison; ``apart``: why there is no comparison."""
     names = ("shock_sensitivity_percent", "shock_undershoot_percent")
+    if len(ratio) and "alone" in ratio and bool((ratio["alone"] > 0.0).any()):
+        note = "recorded without a reference, which a comparison needs; record one beside the unit"
+        return [FigureValue.not_measured(name, part.axis, note) for name in names]
     note = apart or _without(ratio, len(good))
     if note:
         return [FigureValue.not_determined(name, part.axis, note) for name in names]
@@ -276,15 +365,18 @@ def _without(ratio: pd.DataFrame, good: int) -> str:
         return "0 of 0 shocks show no pulse; check cable and mounting"
     clipped = int((ratio["clipped"] > 0.0).sum())
     if clipped:
-        return f"{clipped} of {len(ratio)} shocks clip the output; lower the peak, or choose a wider range"
+        what = CLIPS[int(ratio["clipped"].max())]
+        return f"{clipped} of {len(ratio)} shocks clip {what}; lower the peak, or choose a wider range"
+    if "earlier" in ratio and bool((ratio["earlier"] > 0.0).any()):
+        return (
+            "another pulse lies before the largest, in its baseline; give a file that begins after it, or shock again"
+        )
     lone = ratio["lone_s"].dropna() if "lone_s" in ratio else ratio["value"].iloc[:0]
     if len(lone):
         return (
             f"{len(lone)} of {len(ratio)} shocks {'has' if len(lone) == 1 else 'have'} a sample that departs alone, at "
             f"{lone.iloc[0]:.6g} s of its record; check the data line, shock again"
         )
-    if "alone" in ratio and bool((ratio["alone"] > 0.0).any()):
-        return "recorded without a reference, which a comparison needs; record one beside the unit"
     return (
         f"{len(ratio) - good} of {len(ratio)} shocks show no pulse; check cable and mounting"
         if good < len(ratio)

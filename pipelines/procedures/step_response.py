@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 from pydantic import Field
 
-from inertial.dynamics.pulses import lone_samples
+from inertial.dynamics.pulse_faults import lone_samples
 from inertial.dynamics.step_record import RISE_POINTS, StepFigures, aligned, step_figures
 from inertial.errors import NotIdentified
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace, between
@@ -32,6 +32,7 @@ SETTLING, OVERSHOOT, RISE = "step_settling_ms", "step_overshoot_percent", "step_
 BEFORE_SHARE = 0.25  # of the step's duration, recorded before the edge
 FINAL_SHARE = 0.3  # of the step's duration, at its end: the final value
 BINS = 2  # points of the averaged response for each sample interval
+MOST_EDGES = 16  # of the drive in a record: noise alone crosses its middle at every other sample
 WIDTHS = (3.0, 1.9, 0.8)  # axes that agree still show one above the other
 
 
@@ -186,13 +187,16 @@ FAULTS: Mapping[int, str] = {
 
 
 def _edge(reference: UnitRecord) -> float:
-    """Time of the rising edge of the drive, s from the beginning of the record."""
+    """Time of the first edge of the drive, rising or falling, s from the beginning of the record."""
     drive = reference.output[:, 0]
     half = 0.5 * (drive.min() + drive.max())
-    above = int(np.argmax(drive > half))
-    if above == 0:
-        msg = "step: no rising edge in the recorded drive; check the trigger"
+    crossings = np.flatnonzero(np.diff(drive > half)) + 1
+    if not 0 < crossings.size <= MOST_EDGES:
+        msg = (
+            f"step: the recorded drive crosses its middle {crossings.size} times, one edge is needed; check the trigger"
+        )
         raise NotIdentified(msg)
+    above = int(crossings[0])
     share = (half - drive[above - 1]) / (drive[above] - drive[above - 1])
     return float((above - 1 + share) / reference.rate_hz)
 

@@ -1,0 +1,128 @@
+"""Recordings of dynamic tests by the command that a user types: what is printed, and with which status it ends."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from in_process import document_of, refused, text_of
+from scipy import signal
+
+RATE_HZ, SIZE = 50_000.0, 4000
+TIME = np.arange(SIZE) / RATE_HZ
+SCALE = 0.0072
+OF_SHOCK = ("--map", "time=time_s,z=DUT_V,reference=REF_g", "--unit-of", "output=V,reference=g", "--units", "SN1")
+OF_STEP = ("--map", "time=time_s,z=OUT_V,reference=DRIVE_V", "--unit-of", "output=V,reference=V", "--units", "SN1")
+NO_BIAS = "not measured: shock_bias_shift_ug: no record at rest before and after the shocks"
+
+
+def half_sine(peak_g: float = 30.0, begins_s: float = 0.02, duration_s: float = 0.006) -> np.ndarray:
+    inside = (begins_s <= TIME) & (begins_s + duration_s > TIME)
+    return np.where(inside, peak_g * np.sin(np.pi * (TIME - begins_s) / duration_s), 0.0)
+
+
+def felt(force: np.ndarray, natural_hz: float = 1500.0, damping: float = 0.62) -> np.ndarray:
+    w = 2.0 * np.pi * natural_hz
+    return signal.lsim(([w**2], [1.0, 2.0 * damping * w, w**2]), force, TIME)[1]
+
+
+def shock(folder: Path, reference: np.ndarray, output: np.ndarray, *more: str, seed: int = 1) -> tuple[str, ...]:
+    """The words of the import of a shock with the noise of both channels."""
+    rng = np.random.default_rng(seed)
+    both = output + 2e-4 * rng.standard_normal(SIZE), reference + 0.02 * rng.standard_normal(SIZE)
+    path, part = folder / "shock.csv", folder / "shock.toml"
+    np.savetxt(path, np.c_[TIME, *both], fmt="%.9g", delimiter=",", header="time_s,DUT_V,REF_g", comments="")
+    part.write_text(f"scale = {SCALE}\n")
+    archive = ("--archive", str(folder / "archive"))
+    return ("import", str(path), "--procedure", "shock", "--set", str(part), *(more or OF_SHOCK), *archive)
+
+
+def step(folder: Path, drive: np.ndarray, output: np.ndarray) -> tuple[str, ...]:
+    """The words of the import of a step."""
+    rng = np.random.default_rng(2)
+    both = output + 2e-4 * rng.standard_normal(SIZE), drive + 0.002 * rng.standard_normal(SIZE)
+    path = folder / "step.csv"
+    np.savetxt(path, np.c_[TIME, *both], fmt="%.9g", delimiter=",", header="time_s,OUT_V,DRIVE_V", comments="")
+    return ("import", str(path), "--procedure", "step_response", *OF_STEP, "--archive", str(folder / "archive"))
+
+
+def test_a_figure_that_a_file_cannot_hold_is_said_once_and_fails_nothing(tmp_path: Path) -> None:
+    words = shock(tmp_path, half_sine(), SCALE * felt(half_sine()))
+    text = text_of(*words, status=0)
+    assert text.count("shock_bias_shift_ug") == 1
+    assert NO_BIAS in text
+    document = document_of(*words, status=0)
+    assert document["verdict"] == "adequate"
+    assert [one["figure"] for one in document["figures"] if not one["measured"]] == ["shock_bias_shift_ug"]
+
+
+def test_a_sensor_alone_has_what_its_own_pulse_gives_and_passes(tmp_path: Path) -> None:
+    alone = ("--map", "time=time_s,z=DUT_V", "--unit-of", "output=V", "--units", "SN1")
+    text = text_of(*shock(tmp_path, half_sine(), SCALE * felt(half_sine()), *alone), status=0)
+    assert "not measured: shock_sensitivity_percent, shock_undershoot_percent: recorded without a reference" in text
+
+
+def test_a_comparison_that_is_not_adequate_fails(tmp_path: Path) -> None:
+    shifted = 0.15 * np.clip(np.cumsum(half_sine()) / half_sine().sum(), 0.0, 1.0)
+    text = text_of(*shock(tmp_path, half_sine(), SCALE * (felt(half_sine()) + shifted)), status=1)
+    assert "NOT ADEQUATE" in text
+    assert "missing effect: zero_shift" in text
+
+
+def test_a_channel_of_the_other_sign_is_named_as_that_and_compared_with_nothing(tmp_path: Path) -> None:
+    text = text_of(*shock(tmp_path, half_sine(), -SCALE * felt(half_sine())), status=1)
+    assert "its sign is turned over" in text
+    assert "CANNOT BE JUDGED" in text
+
+
+def test_a_second_pulse_is_told_and_enters_no_figure(tmp_path: Path) -> None:
+    twice = half_sine() + half_sine(18.0, 0.055)
+    words = shock(tmp_path, twice, SCALE * felt(twice))
+    assert "another pulse: 18 g at 0.058 s of record 1" in text_of(*words, status=0)
+    figures = {one["figure"]: one["value"] for one in document_of(*words)["figures"]}
+    assert figures["shock_return_ms"] < 1.0
+    assert abs(figures["shock_zero_shift_percent"]) < 0.02
+
+
+def test_a_pulse_before_the_largest_lies_in_its_baseline_and_leaves_no_figure(tmp_path: Path) -> None:
+    twice = half_sine(12.0, 0.015) + half_sine(30.0, 0.05)
+    text = text_of(*shock(tmp_path, twice, SCALE * felt(twice)), status=1)
+    assert "another pulse: 12 g at 0.018 s" in text
+    assert "another pulse lies before the largest, in its baseline" in text
+
+
+@pytest.mark.parametrize("share", [0.78, 0.93])
+@pytest.mark.parametrize("what", ["the output", "the reference"])
+def test_a_flat_top_is_told_without_a_full_scale(what: str, share: float, tmp_path: Path) -> None:
+    reference, output = half_sine(), SCALE * felt(half_sine())
+    if what == "the output":
+        output = np.minimum(output, share * output.max())
+    else:
+        reference = np.minimum(reference, share * reference.max())
+    assert f"1 of 1 shocks clip {what}" in text_of(*shock(tmp_path, reference, output), status=1)
+
+
+def test_two_neighbours_that_depart_together_are_told(tmp_path: Path) -> None:
+    output = SCALE * felt(half_sine())
+    output[1100:1102] += 0.3, -0.2
+    assert "a sample that departs alone, at 0.022 s" in text_of(*shock(tmp_path, half_sine(), output), status=1)
+
+
+@pytest.mark.parametrize("levels", [(0.0, 2.0), (2.0, 0.0), (0.0, -2.0)])
+def test_a_step_has_its_figures_whichever_way_it_goes(levels: tuple[float, float], tmp_path: Path) -> None:
+    drive = np.where(TIME >= 0.02, levels[1], levels[0])
+    words = step(tmp_path, drive, 0.05 * (levels[0] + felt(drive - levels[0], 900.0, 0.6)))
+    figures = {one["figure"]: one for one in document_of(*words, status=0)["figures"]}
+    overshoot = figures["step_overshoot_percent"]
+    true = 100.0 * np.exp(-np.pi * 0.6 / 0.8)
+    assert abs(overshoot["value"] - true) < 3.0 * overshoot["uncertainty"]
+
+
+def test_a_drive_without_an_edge_is_refused_as_that(tmp_path: Path) -> None:
+    assert "one edge is needed; check the trigger" in refused(*step(tmp_path, np.ones(SIZE), np.zeros(SIZE)))
+
+
+def test_two_neighbours_of_a_step_that_depart_together_are_told(tmp_path: Path) -> None:
+    drive = np.where(TIME >= 0.02, 2.0, 0.0)
+    output = 0.05 * felt(drive, 900.0, 0.6)
+    output[1500:1502] += 0.05, 0.03
+    assert "a sample departs alone" in text_of(*step(tmp_path, drive, output), status=1)
