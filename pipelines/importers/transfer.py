@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
+from inertial.dynamics.missing_effects import adequate
 from inertial.dynamics.transfer_diagnosis import diagnose_transfer
 from inertial.dynamics.transfer_effects import EFFECTS
-from inertial.dynamics.transfer_model import Points
+from inertial.dynamics.transfer_model import Points, fit_transfer
 from inertial.errors import InertialError
 from pipelines.importers import files
 from pipelines.importers.documents import TransferFailure, TransferImport, TransferParameter
@@ -66,6 +67,8 @@ def import_transfer(
         *diagnosis_text(diagnosis),
         *model_texts(diagnosis, points),
     ]
+    if diagnosis.adequate is False and adequate(fit_transfer(_as_radians(points), effects)):
+        text.append(("phase", "taken as radians the same points agree with the model; add --unit-of phase=rad"))
     stated = {"procedure": "sweep", "effects": list(effects), "unit": unit}
     if layout is not None:
         stated |= {name: dict(value) for name, value in vars(layout).items() if value}
@@ -94,6 +97,13 @@ def import_transfer(
         "next_hz": list(diagnosis.next_hz),
         "text": [f"{subject}: {one}" for subject, one in text],
     }
+
+
+def _as_radians(points: Points) -> Points:
+    """The points of phases that were radians where degrees were read."""
+    angle = np.degrees(np.angle(points.value))
+    turned = np.asarray(np.abs(points.value) * np.exp(1j * angle), dtype=np.complex128)
+    return replace(points, value=turned, phase_error=np.degrees(points.phase_error))
 
 
 def _tables(points: Points, unit: str, text: Sequence[tuple[str, str]]) -> dict[str, pd.DataFrame]:

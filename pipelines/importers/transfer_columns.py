@@ -106,11 +106,9 @@ def transfer_points(content: Content, name: str, layout: PointsLayout) -> tuple[
     if absent:
         raise DataRejected(
             f"{name}: the points have no {' and no '.join(one.replace('_', ' ') for one in absent)}, by which a model "
-            f"is judged; name their columns with --map {','.join(f'{one}=…' for one in absent)}, or state that of every point in a "
-            "file of --set: repeatability_percent = … and repeatability_deg = …"
+            f"is judged; name their columns with --map {','.join(f'{one}=…' for one in absent)}, or state that of every "
+            "point in a file of --set: repeatability_percent = … and repeatability_deg = …"
         )
-    if len(table) < FEWEST:
-        raise DataRejected(f"{name}: {len(table)} points, at least {FEWEST} are needed; measure more frequencies")
     value = {meaning: _values(table, column, name, meaning, units[meaning]) for meaning, column in found.items()}
     value |= {one: np.full(len(table), size) for one, size in layout.every_point.items() if one not in found}
     other = {one: np.full(len(table), usual) for one, usual in OPTIONAL.items()}
@@ -119,9 +117,11 @@ def transfer_points(content: Content, name: str, layout: PointsLayout) -> tuple[
             other[one] = finite_column(table, one, name, "correct the row")
     if "pressure_hPa" in table.columns:
         _refuse_not_positive(other["pressure_hPa"], "pressure_hPa", name)
+    if len(table) < FEWEST:
+        raise DataRejected(f"{name}: {len(table)} points, at least {FEWEST} are needed; measure more frequencies")
     points = Points(
         Conditions(value["frequency"], *other.values()),
-        value["magnitude"] * np.exp(1j * np.radians(value["phase"])),
+        np.asarray(value["magnitude"] * np.exp(1j * np.radians(value["phase"])), dtype=np.complex128),
         1e-2 * value["magnitude_uncertainty"],
         np.radians(value["phase_uncertainty"]),
     )

@@ -205,12 +205,21 @@ def diagnosis_text(diagnosis: TransferDiagnosis) -> list[tuple[str, str]]:
         )
         out.append(("after extension", text))
     out += _remains(diagnosis)
+    fit_effects = set(diagnosis.extended.effects)
     for p in diagnosis.extended.parameters:
         one = diagnosis.parameter(p.name)
         if p.log and not one.identified:
             out.append(("not identified", f"{p.name}: 95 % interval {one.low:.4g} … {one.high:.4g} {p.unit}"))
         elif p.name == "delay_s":
             text = f"{1e6 * one.value:.2f} µs, 95 % interval {1e6 * one.low:.2f} … {1e6 * one.high:.2f} µs"
+            if one.rival is not None:
+                *_, low, high = diagnosis.extended.of(p.name)
+                others = dict.fromkeys(
+                    name for fit in diagnosis.rivals for name in fit.effects if name not in fit_effects
+                )
+                text += (
+                    f" ({1e6 * low:.2f} … {1e6 * high:.2f} µs without {', '.join(others)}, which may make a part of it)"
+                )
             out.append(("delay", text))
     if diagnosis.next_hz:
         out.append(("next frequencies to measure", ", ".join(f"{f:.4g} Hz" for f in diagnosis.next_hz)))

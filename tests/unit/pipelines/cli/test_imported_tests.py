@@ -126,3 +126,78 @@ def test_two_neighbours_of_a_step_that_depart_together_are_told(tmp_path: Path) 
     output = 0.05 * felt(drive, 900.0, 0.6)
     output[1500:1502] += 0.05, 0.03
     assert "a sample departs alone" in text_of(*step(tmp_path, drive, output), status=1)
+
+
+def sweep(folder: Path, head: str, *more: str, form: str = "", scatter: float = 1.0) -> tuple[str, ...]:
+    """The words of the import of points of a sensor of 1500 Hz, a scale of 0.07 and a delay of 40 µs: 0.5 % and 0.3° a point.
+
+    form : ``dB`` and ``rad`` for the units of the columns, ``-`` for the other polarity, ``u`` for columns of uncertainty
+    """
+    rng, f = np.random.default_rng(3), np.geomspace(5.0, 4000.0, 45)
+    h = 0.07 / (1.0 - (f / 1500.0) ** 2 + 1.24j * f / 1500.0) * np.exp(-2j * np.pi * f * 40e-6)
+    h = -h if "-" in form else h
+    size = np.abs(h) * (1.0 + 0.005 * scatter * rng.standard_normal(f.size))
+    angle = np.angle(h) + np.radians(0.3) * scatter * rng.standard_normal(f.size)
+    own = [f, 20.0 * np.log10(size) if "dB" in form else size, angle if "rad" in form else np.degrees(angle)]
+    own += [np.full(f.size, 0.5), np.full(f.size, np.radians(0.3) if "rad" in form else 0.3)] if "u" in form else []
+    np.savetxt(folder / "points.csv", np.column_stack(own), fmt="%.9g", delimiter=",", header=head, comments="")
+    words = ("import", str(folder / "points.csv"), "--procedure", "sweep", "--units", "SN1", *more)
+    return (*words, "--archive", str(folder / "archive"))
+
+
+OWN = "frequency_hz,magnitude,phase_deg,magnitude_uncertainty_percent,phase_uncertainty_deg"
+
+
+def test_points_of_a_sweep_have_their_figures_with_u_and_the_polarity_in_the_text(tmp_path: Path) -> None:
+    text = text_of(*sweep(tmp_path, OWN, form="u"), status=0)
+    assert "figures: sensitivity 0.0700" in text
+    for figure in ("bandwidth 16", "natural frequency 1", "damping ratio 0.62"):
+        assert figure in text
+    assert "polarity: positive" in text
+    assert "of the stated uncertainties" not in text
+    assert "without moving_average, one_pole, two_pole, which may make a part of it" in text
+    turned = text_of(*sweep(tmp_path, OWN, form="u-"), status=0)
+    assert "sensitivity −0.0700" in turned
+    assert "the output is turned over: its phase at low frequency is π" in turned
+
+
+def test_a_delay_beside_a_filter_that_may_be_absent_is_never_longer_than_both(tmp_path: Path) -> None:
+    delay = document_of(*sweep(tmp_path, OWN, form="u", scatter=0.15), status=0)["parameters"]["delay_s"]
+    assert 0.0 < delay["low"] < 35e-6  # a filter of some kHz may make a part of it
+    assert delay["high"] < 42e-6
+
+
+def test_uncertainties_that_are_too_large_are_told_and_fail_nothing(tmp_path: Path) -> None:
+    text = text_of(*sweep(tmp_path, OWN, form="u", scatter=0.3), status=0)
+    assert "uncertainties: the scatter is 0.3" in text
+
+
+@pytest.mark.parametrize(
+    ("head", "form", "more"),
+    [
+        ("Frequency (Hz),Magnitude (dB),Phase (rad)", "dB rad", ()),
+        ("frequency_hz,magnitude,phase", "dB rad", ("--unit-of", "magnitude=dB,phase=rad")),
+        ("a,b,c", "", ("--map", "frequency=1,magnitude=2,phase=3", "--unit-of", "frequency=Hz,phase=deg")),
+    ],
+)
+def test_other_columns_and_units_are_recognised_or_stated(
+    head: str, form: str, more: tuple[str, ...], tmp_path: Path
+) -> None:
+    part = tmp_path / "points.toml"
+    part.write_text("repeatability_percent = 0.5\nrepeatability_deg = 0.3\n")
+    text = text_of(*sweep(tmp_path, head, *more, "--set", str(part), form=form), status=0)
+    assert "columns: frequency " in text
+    assert "sensitivity 0.0700" in text
+
+
+def test_radians_that_are_called_degrees_are_told(tmp_path: Path) -> None:
+    words = sweep(tmp_path, OWN, form="u rad")
+    assert "add --unit-of phase=rad" in text_of(*words, status=1)
+    text_of(*words, "--unit-of", "phase=rad,phase_uncertainty=rad", status=0)
+
+
+def test_a_key_of_records_at_rest_or_of_waveforms_is_refused_for_points(tmp_path: Path) -> None:
+    assert "--set face is for records at rest" in refused(*sweep(tmp_path, OWN, "--set", "face=+z", form="u"))
+    part = tmp_path / "part.toml"
+    part.write_text("stroke_mm = 5.0\n")
+    assert "key stroke_mm is not for points" in refused(*sweep(tmp_path, OWN, "--set", str(part), form="u"))
