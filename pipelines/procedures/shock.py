@@ -13,7 +13,7 @@ from inertial.dynamics.shock_effects import EFFECTS
 from inertial.dynamics.stability import difference_error, error_of_mean, short_noise
 from inertial.errors import NotIdentified
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Role, Trace
-from pipelines.procedures import shock_records
+from pipelines.procedures import shock_figures, shock_records
 from pipelines.procedures.base import (
     Compares,
     FromWaveforms,
@@ -105,7 +105,7 @@ class ShockTest(InG, OnEquipment, FromWaveforms, Compares):
         FigureSpec(
             "shock_bias_shift_ug", "µg", "bias after the shocks minus before, same pose and temperature, worst axis"
         ),
-        *shock_records.OF_PULSE,
+        *shock_figures.OF_PULSE,
     )
 
     def steps(self, part: ShockPart, recipe: Recipe) -> list[ProcedureStep]:
@@ -192,12 +192,12 @@ class ShockTest(InG, OnEquipment, FromWaveforms, Compares):
         if len(bias) and bool((bias.loc[bias["setting"] > 0.0, "uncertainty"] <= STUCK).any()):
             texts.append(("survival", "the output is constant after the shocks: the unit has not survived"))
         pulse = rows[rows["series"] == "pulse"]
-        texts += shock_records.texts_of(reference, pulse, rows[rows["series"] == "other"])
-        apart = shock_records.no_comparison(good, reference, pulse)
-        if shock_records.comparable(rows):
+        texts += shock_figures.texts_of(reference, pulse, rows[rows["series"] == "other"])
+        apart = shock_figures.no_comparison(good, reference, pulse)
+        if shock_figures.comparable(rows):
             texts += shock_records.diagnosis_text(rows, part)
-        compared = shock_records.ratio_figures(part, ratio, good, apart)
-        return [*compared, bias_shift(bias), *shock_records.pulse_figures(part.axis, pulse, ratio)], texts
+        compared = shock_figures.ratio_figures(part, ratio, good, apart)
+        return [*compared, bias_shift(bias), *shock_figures.pulse_figures(part.axis, pulse, ratio)], texts
 
     def compared(
         self, part: ShockPart, rows: pd.DataFrame, figures: Mapping[str, FigureValue], out_unit: str
@@ -272,7 +272,7 @@ def bias_shift(bias: pd.DataFrame) -> FigureValue:
 
 RELATIVE = ("shock_undershoot_percent", "shock_zero_shift_percent", "shock_duration_ms", "shock_return_ms")
 """Figures that the scale of the unit does not enter."""
-UNIT_OF = {spec.name: spec.unit for spec in shock_records.OF_PULSE} | {"shock_undershoot_percent": "%"}
+UNIT_OF = {spec.name: spec.unit for spec in shock_figures.OF_PULSE} | {"shock_undershoot_percent": "%"}
 
 
 def compared_results(part: ShockPart, figures: Mapping[str, FigureValue], shocks: int) -> list[ComparedResult]:

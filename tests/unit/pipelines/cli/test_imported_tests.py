@@ -201,3 +201,18 @@ def test_a_key_of_records_at_rest_or_of_waveforms_is_refused_for_points(tmp_path
     part = tmp_path / "part.toml"
     part.write_text("stroke_mm = 5.0\n")
     assert "key stroke_mm is not for points" in refused(*sweep(tmp_path, OWN, "--set", str(part), form="u"))
+
+
+def test_waveforms_of_a_sweep_pass_without_the_figures_that_nobody_asked_for(tmp_path: Path) -> None:
+    rng, rate = np.random.default_rng(4), 10_000.0
+    t = np.arange(40_000) / rate
+    fine = signal.resample_poly(0.5 * signal.chirp(t, 5.0, t[-1], 3000.0, method="log"), 10, 1)
+    w = 2.0 * np.pi * 800.0
+    output = signal.lsim(([w**2], [1.0, 1.2 * w, w**2]), fine, np.arange(fine.size) / (10.0 * rate))[1][::10]
+    columns = t, 0.1 * output + 2e-4 * rng.standard_normal(t.size), fine[::10]
+    path = tmp_path / "swept.csv"
+    np.savetxt(path, np.c_[columns], fmt="%.9g", delimiter=",", header="time_s,DUT_V,REF_g", comments="")
+    text = text_of("import", path, "--procedure", "sweep", *OF_SHOCK, "--archive", tmp_path / "archive", status=0)
+    assert "not measured: sweep_flatness_percent: a flatness belongs to a band; set flat_to_hz" in text
+    assert "not measured: sweep_sensitivity_percent: no static scale and no nominal_scale" in text
+    assert text.endswith("adequate")
