@@ -25,10 +25,10 @@ from schemas.toml_files import explain, parse_toml, read_text
 
 DECIBEL = float(np.log(10.0)) / 20.0
 """Change of the logarithm of a magnitude for 1 dB."""
-LINEAR, IN_DECIBEL = "", "db"
+LINEAR, IN_DECIBEL = "", "dB"
 OF_ANGLE = {"deg": 1.0, "rad": float(np.degrees(1.0))}
 UNITS: Mapping[str, Mapping[str, float]] = {
-    "frequency": {"hz": 1.0, "khz": 1e3, "rad/s": 0.5 / np.pi},
+    "frequency": {"Hz": 1.0, "kHz": 1e3, "rad/s": 0.5 / np.pi},
     "magnitude": {LINEAR: 1.0, IN_DECIBEL: DECIBEL},
     "phase": OF_ANGLE,
     "magnitude_uncertainty": {"%": 1.0, IN_DECIBEL: 100.0 * DECIBEL},
@@ -36,6 +36,7 @@ UNITS: Mapping[str, Mapping[str, float]] = {
 }
 """Units of each meaning, and their size in Hz, of the logarithm, in degrees, in percent."""
 ALIKE = {
+    **{name.lower(): name for of in UNITS.values() for name in of},
     "percent": "%", "°": "deg", "degree": "deg", "degrees": "deg", "radian": "rad", "radians": "rad", "1/s": "rad/s",
 }  # fmt: skip
 NEEDED = ("frequency", "magnitude", "phase")
@@ -168,12 +169,15 @@ def _meaning(name: str) -> str:
 def _unit(content: Content, layout: PointsLayout, meaning: str, column: str, where: str) -> str:
     """Unit of a column, of :data:`UNITS`: as stated by the command, else by the file, or at the end of its name."""
     given = layout.units.get(meaning, "")
+    if column not in map(str, content.table.columns):
+        there = did_you_mean(column, map(str, content.table.columns))
+        raise DataRejected(f"{where}: column '{shown(column)}' of {meaning} is not there; {there}")
     ending = column.rpartition("_")[2] if "_" in column else ""
     stated = content.units.get(column, "") or unit_in(column) or (ending if _plain(ending) in UNITS[meaning] else "")
     known = UNITS[meaning]
     unit = _plain(given or stated)
     if meaning == "magnitude":  # output per g in any unit, unless it is said to be a level
-        return IN_DECIBEL if unit.startswith(IN_DECIBEL) else LINEAR
+        return IN_DECIBEL if unit.lower().startswith(IN_DECIBEL.lower()) else LINEAR
     if unit not in known:
         what = f"unit '{shown(given or stated)}'" if given or stated else "no unit"
         raise DataRejected(
@@ -183,8 +187,8 @@ def _unit(content: Content, layout: PointsLayout, meaning: str, column: str, whe
 
 
 def _plain(unit: str) -> str:
-    lower = unit.strip().lower()
-    return ALIKE.get(lower, lower)
+    """A unit as :data:`UNITS` has it; another one as it is."""
+    return ALIKE.get(unit.strip().lower(), unit.strip())
 
 
 def _values(table: pd.DataFrame, column: str, where: str, meaning: str, unit: str) -> Array:
@@ -193,12 +197,12 @@ def _values(table: pd.DataFrame, column: str, where: str, meaning: str, unit: st
     if meaning == "magnitude" and unit == IN_DECIBEL:
         return np.exp(value)
     if meaning != "phase":
-        advice = "; a magnitude in dB needs --unit-of magnitude=dB" if meaning == "magnitude" else ""
+        advice = "a magnitude in dB needs --unit-of magnitude=dB" if meaning == "magnitude" else "correct the row"
         _refuse_not_positive(value, column, where, advice)
     return value
 
 
-def _refuse_not_positive(value: Array, column: str, where: str, advice: str = "; correct the row") -> None:
+def _refuse_not_positive(value: Array, column: str, where: str, advice: str = "correct the row") -> None:
     if not np.all(value > 0.0):
         row = int(np.flatnonzero(~(value > 0.0))[0]) + 1
-        raise DataRejected(f"{where}: row {row}, column {shown(column)}: a value above 0 is needed{advice}")
+        raise DataRejected(f"{where}: row {row}, column {shown(column)}: a value above 0 is needed; {advice}")
