@@ -7,7 +7,9 @@ import numpy as np
 import pandas as pd
 from pydantic import Field
 
-from inertial.dynamics.pulse_faults import lone_samples
+from inertial.arrays import Array
+from inertial.dynamics.pulse_faults import CLOSE, flat_top, lone_samples
+from inertial.dynamics.pulses import span
 from inertial.dynamics.step_record import RISE_POINTS, StepFigures, aligned, step_figures
 from inertial.errors import NotIdentified
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace, between
@@ -217,7 +219,9 @@ def _averaged(
     step = float(np.mean(size - base))
     noise = float(np.sqrt(np.mean([one.var(ddof=1) for one in before])))
     fault = 0
-    if max(float(np.max(np.abs(one))) for one in outputs) >= device.full_scale:
+    beyond = [np.sign(step) * (output - end) for output, end in zip(outputs, size, strict=True)]
+    at_end = max(float(np.max(np.abs(one))) for one in outputs) >= device.full_scale
+    if at_end or any(_cut_off(one, rate, noise) for one in beyond):
         fault = 2
     elif not abs(step) > 10.0 * noise / np.sqrt(len(final[0])) or noise == 0.0:
         fault, step = 1, step or 1.0
@@ -244,6 +248,17 @@ def _averaged(
         fault=float(fault),
         step=step,
     )
+
+
+def _cut_off(beyond: Array, rate: float, noise: float) -> bool:
+    """Whether the first overshoot of a response (n,) beyond its final value is cut off flat."""
+    first = int(np.argmax(beyond > 0.0)) if beyond.size and beyond[0] < 0.0 else beyond.size
+    top = first + int(np.argmax(beyond[first:])) if first < beyond.size else first
+    if top >= beyond.size or not beyond[top] > 0.0:
+        return False
+    low, high = span(beyond, top, 0.0)
+    lobe = np.pad(beyond[low : high + 1], CLOSE)
+    return flat_top(lobe, rate, (high - low + 1) / rate, noise, 0.0) > 0
 
 
 def _values(part: StepPart, axis: str, one: StepFigures) -> list[FigureValue]:

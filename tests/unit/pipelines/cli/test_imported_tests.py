@@ -117,6 +117,19 @@ def test_a_step_has_its_figures_whichever_way_it_goes(levels: tuple[float, float
     assert abs(overshoot["value"] - true) < 3.0 * overshoot["uncertainty"]
 
 
+@pytest.mark.parametrize("damping", [0.1, 0.3])
+@pytest.mark.parametrize("share", [0.3, 0.6])
+def test_an_overshoot_that_is_cut_off_is_told_and_a_round_one_is_not(
+    damping: float, share: float, tmp_path: Path
+) -> None:
+    drive = np.where(TIME >= 0.02, 2.0, 0.0)
+    output = 0.05 * felt(drive, 900.0, damping)
+    overshoot = output.max() - 0.1
+    cut = text_of(*step(tmp_path, drive, np.minimum(output, 0.1 + share * overshoot)), status=1)
+    assert "the output is clipped; lower volts" in cut
+    assert "step_overshoot_percent z " in text_of(*step(tmp_path, drive, output))
+
+
 def test_a_drive_without_an_edge_is_refused_as_that(tmp_path: Path) -> None:
     assert "one edge is needed; check the trigger" in refused(*step(tmp_path, np.ones(SIZE), np.zeros(SIZE)))
 
