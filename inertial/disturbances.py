@@ -19,6 +19,7 @@ MATERIAL = 0.05
 BLOCKS, SHORTEST_BLOCK = 128, 64
 LOUDER = 1.5  # of the variance of a block over the usual one
 BRIEF = (8, 32)  # samples of a short burst, over which its power is a mean
+CAPPED = 5.0  # standard deviations to which a sample counts in it: one or two of heavy tails make no burst
 RARE = 6.0
 """Standard deviations of the cube root of such a mean that are rare: of normal noise 1e-9 of them."""
 FEWEST_BURSTS = 3  # of which a cause that comes again, as steps on the floor, is told: one or two may be spikes
@@ -148,10 +149,12 @@ def _brief(quick: Array, whole: float) -> list[Disturbance]:
     whole : sum of the squares of the record's noise
     """
     inside: Flags = np.zeros(quick.size, dtype=bool)
+    most = CAPPED * _spread(quick)
+    capped = np.clip(quick, -most, most)
     for size in BRIEF:
         if quick.size < FEWEST * size:
             break
-        root = np.cbrt(np.convolve(quick**2, np.full(size, 1.0 / size), "valid"))
+        root = np.cbrt(np.convolve(capped**2, np.full(size, 1.0 / size), "valid"))
         spread = _spread(root)
         for place in np.flatnonzero(root - np.median(root) > RARE * spread) if spread > 0.0 else ():
             inside[place : place + size] = True
@@ -161,9 +164,9 @@ def _brief(quick: Array, whole: float) -> list[Disturbance]:
     apart = np.concatenate([[True], starts[1:] - stops[:-1] > BESIDE])
     if np.count_nonzero(apart) < FEWEST_BURSTS:
         return []
-    most = float(quick[inside][np.argmax(np.abs(quick[inside]))])
+    largest = float(quick[inside][np.argmax(np.abs(quick[inside]))])
     material = float(np.sum(quick[inside] ** 2)) > MATERIAL * whole
-    return [Disturbance("bursts", int(starts[0]), int(stops[-1]), int(np.count_nonzero(apart)), most, material)]
+    return [Disturbance("bursts", int(starts[0]), int(stops[-1]), int(np.count_nonzero(apart)), largest, material)]
 
 
 def _jumps(record: Array) -> list[Disturbance]:

@@ -87,3 +87,8 @@ def test_steps_on_the_floor_are_bursts_and_one_of_them_is_none(kind: str, count:
     assert (one.kind, one.count, one.material) == ("bursts", 10, False)
     assert abs(one.start - at[0]) < 40
     assert abs(one.stop - at[-1] - 10) < 40
+
+
+def test_heavy_tails_are_no_bursts() -> None:
+    told = [one.kind for k in range(8) for one in disturbances(np.random.default_rng([819, k]).standard_t(5, 100_000))]
+    assert "bursts" not in told
